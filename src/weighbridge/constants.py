@@ -1,0 +1,24 @@
+"""Physical constants, in SI."""
+
+from typing import Final
+
+GRAVITY: Final = 9.81
+"""Standard acceleration used throughout [m/s^2] (Jensen 2022, sec. 5.2)."""
+
+GAS_CONSTANT_DRY_AIR: Final = 287.05
+"""Specific gas constant of dry air [J/(kg K)] (ISO 2533)."""
+
+STANDARD_PRESSURE: Final = 101_325.0
+"""Sea-level pressure of the standard atmosphere [Pa] (ISO 2533)."""
+
+STANDARD_TEMPERATURE: Final = 288.15
+"""Sea-level temperature of the standard atmosphere [K] (ISO 2533)."""
+
+TEMPERATURE_LAPSE: Final = 0.0065
+"""Temperature lapse rate of the troposphere [K/m] (ISO 2533)."""
+
+PETROL_STOICHIOMETRIC_RATIO: Final = 14.7
+"""Air mass per petrol mass at stoichiometry [-] (Jensen 2022, sec. 7.1)."""
+
+PETROL_HEATING_VALUE: Final = 45.0e6
+"""Heating value of petrol [J/kg] (Jensen 2022, sec. 7.1)."""

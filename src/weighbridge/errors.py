@@ -1,0 +1,28 @@
+"""Exceptions for what a caller can mend.
+
+Every message is one sentence or two that name the file or argument, the
+offending value and the remedy. Poor data is not an exception but a result
+(`weighbridge.Status`).
+"""
+
+
+class WeighbridgeError(Exception):
+    """Base of all errors a caller can mend; the command line exits with 2."""
+
+
+class ConfigError(WeighbridgeError):
+    """A vehicle file, a mapping or an argument holds an impossible value."""
+
+
+class DriveError(WeighbridgeError):
+    """A drive cannot be read, or what it says cannot be so."""
+
+
+class MissingExtraError(WeighbridgeError):
+    """An optional dependency is needed and not installed."""
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        super().__init__(
+            f"{purpose} needs the package {package!r}, which is not installed: "
+            f'pip install "weighbridge[{extra}]"'
+        )

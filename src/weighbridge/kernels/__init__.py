@@ -1,0 +1,1 @@
+"""Compiled kernels: arrays and NamedTuples in SI, no files, no logging, no exceptions."""

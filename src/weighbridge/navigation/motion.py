@@ -1,0 +1,77 @@
+"""The motion side of the force balance, evenly sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from weighbridge.signals import Bools, Floats
+
+MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """How the vehicle moved, band-limited and on an even clock.
+
+    Attributes
+    ----------
+    source : how it was found: "inertial" (IMU with speed and GNSS as there are),
+        "longitudinal_accel" (one accelerometer along the vehicle and speed),
+        "speed_grade" (speed and grade or height) or "speed" (alone)
+    time : (n,) even, rising [s]
+    speed : (n,) along the road, true scale [m/s]
+    accel : (n,) its rate of change [m/s^2]
+    specific_force : (n,) along the road, ``accel + g sin(grade)``; the factor
+        1 + g k of a leaning accelerometer is still in it where ``squat`` is
+        None and taken out otherwise [m/s^2]
+    grade : (n,) road slope, squat removed where known, positive uphill [rad]
+    pitch : (n,) of the body, squat included, nose up positive [rad]
+    roll : (n,) of the body, right side down positive [rad]
+    heading : (n,) clockwise from north [rad]; NaN where unknown
+    distance : (n,) travelled [m]
+    altitude : (n,) [m]; NaN where unknown
+    latitude, longitude : (n,) [rad]; NaN where unknown
+    valid : (n,) the sources were there; False in their gaps
+    specific_force_std : noise level of ``specific_force`` [m/s^2]
+    grade_std : (n,) standard deviation of ``grade`` as the filter sees it [rad]
+    speed_scale : indicated over true vehicle speed [-]; None where not found
+    speed_scale_std : its standard deviation
+    speed_delay : lateness of the vehicle speed used [s]
+    squat : pitch of the body per acceleration k found and removed
+        [rad per m/s^2]; None where the drive does not show it
+    squat_std : its standard deviation
+    mounting : (roll, pitch, yaw) of the sensor found or used [rad]
+    mounting_std : their standard deviations [rad]
+    notes : sentences on what was found and what was doubtful
+    """
+
+    source: MotionSource
+    time: Floats
+    speed: Floats
+    accel: Floats
+    specific_force: Floats
+    grade: Floats
+    pitch: Floats
+    roll: Floats
+    heading: Floats
+    distance: Floats
+    altitude: Floats
+    latitude: Floats
+    longitude: Floats
+    valid: Bools
+    specific_force_std: float
+    grade_std: Floats
+    speed_scale: float | None = None
+    speed_scale_std: float | None = None
+    speed_delay: float = 0.0
+    squat: float | None = None
+    squat_std: float | None = None
+    mounting: tuple[float, float, float] | None = None
+    mounting_std: tuple[float, float, float] | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return float((self.time.size - 1) / (self.time[-1] - self.time[0]))

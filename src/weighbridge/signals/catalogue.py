@@ -1,0 +1,102 @@
+"""The quantities a drive can hold: names, units, tables and plausible ranges."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One quantity of the canonical drive format.
+
+    Attributes
+    ----------
+    name : name inside the program
+    table : canonical table it is stored in
+    stem : column name without its unit suffix
+    suffix : canonical unit suffix; empty for switches and counts
+    low, high : plausible range of a road vehicle [SI]
+    meaning : what it is, for people
+    """
+
+    name: str
+    table: str
+    stem: str
+    suffix: str
+    low: float
+    high: float
+    meaning: str
+
+    @property
+    def column(self) -> str:
+        """Canonical column name with its unit suffix."""
+        return f"{self.stem}_{self.suffix}" if self.suffix else self.stem
+
+
+_C = 273.15
+_WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+
+_ROWS: Final = (
+    *(
+        Quantity(f"accel_{a}", "imu", f"accel_{a}", "mps2", -80.0, 80.0, f"specific force, sensor {a}")
+        for a in "xyz"
+    ),
+    *(
+        Quantity(f"gyro_{a}", "imu", f"gyro_{a}", "radps", -9.0, 9.0, f"angular rate, sensor {a}")
+        for a in "xyz"
+    ),
+    Quantity("longitudinal_accel", "obd", "longitudinal_accel", "mps2", -25.0, 25.0,
+             "specific force along the vehicle, positive forward"),
+    Quantity("vehicle_speed", "obd", "vehicle_speed", "kmh", -8.0, 95.0, "speed from the wheels"),
+    Quantity("engine_speed", "obd", "engine_speed", "rpm", -50.0, 2600.0, "speed of engine or motor"),
+    Quantity("engine_load", "obd", "engine_load", "pct", 0.0, 1.02, "calculated load (PID 04)"),
+    Quantity("engine_torque", "obd", "engine_torque", "nm", -4000.0, 6000.0,
+             "torque at the shaft of engine or motor"),
+    Quantity("engine_torque_fraction", "obd", "engine_torque", "pct", -1.3, 1.3,
+             "torque as a part of the reference torque (PID 62, SPN 513)"),
+    Quantity("reference_torque", "obd", "reference_torque", "nm", 10.0, 6000.0,
+             "reference torque (PID 63, SPN 544)"),
+    Quantity("mass_air_flow", "obd", "mass_air_flow", "gps", 0.0, 1.5, "intake air mass flow (PID 10)"),
+    Quantity("lambda_1", "obd", "lambda_1", "", 0.4, 20.0, "air-fuel equivalence ratio"),
+    Quantity("throttle", "obd", "throttle", "pct", -0.02, 1.02, "throttle or accelerator position"),
+    Quantity("intake_pressure", "obd", "intake_pressure", "kpa", 0.0, 5e5, "intake manifold pressure"),
+    Quantity("ambient_temperature", "obd", "ambient_temperature", "degc", _C - 50, _C + 65,
+             "ambient air temperature"),
+    Quantity("barometric_pressure", "obd", "barometric_pressure", "kpa", 4.5e4, 1.12e5,
+             "barometric pressure"),
+    Quantity("gear", "obd", "gear", "", -3.0, 18.0, "current gear; 0 neutral, negative reverse"),
+    Quantity("brake_switch", "obd", "brake_switch", "", 0.0, 1.0, "1 while the brake is pressed"),
+    Quantity("clutch_switch", "obd", "clutch_switch", "", 0.0, 1.0, "1 while the clutch is pressed"),
+    Quantity("latitude", "gnss", "latitude", "deg", -math.pi / 2, math.pi / 2, "WGS 84 latitude"),
+    Quantity("longitude", "gnss", "longitude", "deg", -math.pi, math.pi, "WGS 84 longitude"),
+    Quantity("altitude", "gnss", "altitude", "m", -500.0, 6000.0, "height"),
+    Quantity("gnss_speed", "gnss", "speed", "mps", 0.0, 95.0, "speed over ground"),
+    Quantity("gnss_course", "gnss", "course", "deg", -2 * math.pi, 2 * math.pi, "course over ground"),
+    Quantity("hdop", "gnss", "hdop", "", 0.0, 100.0, "horizontal dilution of precision"),
+    Quantity("gnss_accuracy", "gnss", "accuracy", "m", 0.0, 1e4, "horizontal accuracy"),
+    Quantity("grade", "gnss", "grade", "rad", -0.5, 0.5, "road slope, positive uphill"),
+    *(
+        Quantity(f"suspension_travel_{w}", "ride", f"suspension_travel_{w}", "m", -1.0, 1.0,
+                 f"suspension travel {where}, positive in extension")
+        for w, where in _WHEELS.items()
+    ),
+    *(
+        Quantity(f"suspension_rate_{w}", "ride", f"suspension_rate_{w}", "mps", -10.0, 10.0,
+                 f"suspension rate {where}, positive in extension")
+        for w, where in _WHEELS.items()
+    ),
+    Quantity("vertical_velocity", "ride", "vertical_velocity", "mps", -10.0, 10.0, "body velocity, up"),
+    Quantity("roll_rate", "ride", "roll_rate", "radps", -9.0, 9.0, "roll rate, right side down"),
+    Quantity("pitch_rate", "ride", "pitch_rate", "radps", -9.0, 9.0, "pitch rate, nose up"),
+)  # fmt: skip
+
+QUANTITIES: Final[dict[str, Quantity]] = {q.name: q for q in _ROWS}
+"""Every quantity known, by its name inside the program."""
+
+TABLES: Final = ("imu", "obd", "gnss", "ride")
+"""Canonical tables of a drive folder."""
+
+TIME_COLUMN: Final = "time_s"
+"""The time column of every canonical table: seconds on one common clock."""

@@ -1,0 +1,116 @@
+"""One recording of one vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from weighbridge.signals.signal import Signal
+
+
+@dataclass(frozen=True, slots=True)
+class DriveInfo:
+    """What is known of a drive beside its signals (``drive.toml``).
+
+    Attributes
+    ----------
+    start_time : when it began, ISO 8601
+    vehicle : name of the vehicle
+    mass : known mass [kg]
+    ambient_temperature : [K]
+    barometric_pressure : [Pa]
+    wind_speed : reported wind at 10 m height [m/s]
+    wind_from : direction the wind blows from, clockwise from north [rad]
+    notes : free text
+    """
+
+    start_time: str | None = None
+    vehicle: str | None = None
+    mass: float | None = None
+    ambient_temperature: float | None = None
+    barometric_pressure: float | None = None
+    wind_speed: float | None = None
+    wind_from: float | None = None
+    notes: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something wrong with a drive that was mended or must be settled.
+
+    Attributes
+    ----------
+    signal : name of the signal, or empty for the whole drive
+    text : one sentence with the value and the remedy
+    serious : a mass made in spite of it could be wrong, so `weigh` refuses
+    """
+
+    signal: str
+    text: str
+    serious: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """One recording of one vehicle: signals, each on its own clock.
+
+    Attributes
+    ----------
+    name : the folder's or file's name
+    signals : by canonical name, in SI
+    info : what is known beside the signals
+    problems : what reading the drive had to mend or doubts
+    """
+
+    name: str
+    signals: Mapping[str, Signal]
+    info: DriveInfo = field(default_factory=DriveInfo)
+    problems: tuple[Problem, ...] = ()
+
+    def get(self, name: str) -> Signal | None:
+        """Return the signal, or None where the drive lacks it."""
+        return self.signals.get(name)
+
+    def has(self, *names: str) -> bool:
+        """Tell whether all the signals are there."""
+        return all(name in self.signals for name in names)
+
+    def missing(self, names: Iterable[str]) -> list[str]:
+        """Name the signals that are not there."""
+        return [name for name in names if name not in self.signals]
+
+    @property
+    def start(self) -> float:
+        """First time stamp [s]; 0 without signals."""
+        return min((float(s.time[0]) for s in self.signals.values() if len(s)), default=0.0)
+
+    @property
+    def end(self) -> float:
+        """Last time stamp [s]; 0 without signals."""
+        return max((float(s.time[-1]) for s in self.signals.values() if len(s)), default=0.0)
+
+    @property
+    def duration(self) -> float:
+        """Time between the first and the last stamp of any signal [s]."""
+        return self.end - self.start
+
+    def with_signals(self, *signals: Signal) -> Drive:
+        """Return a drive in which these signals are added or replaced."""
+        return replace(self, signals={**self.signals, **{s.name: s for s in signals}})
+
+    def with_problems(self, *problems: Problem) -> Drive:
+        """Return a drive with further problems noted."""
+        return replace(self, problems=(*self.problems, *problems))
+
+    def without(self, *names: str) -> Drive:
+        """Return a drive that lacks these signals."""
+        return replace(self, signals={k: v for k, v in self.signals.items() if k not in names})
+
+    def between(self, start: float, end: float) -> Drive:
+        """Return the part from ``start`` to ``end`` [s]; no signal is copied."""
+        cut = {}
+        for name, s in self.signals.items():
+            a, b = s.time.searchsorted([start, end])
+            if b > a:
+                cut[name] = Signal(name, s.time[a:b], s.values[a:b])
+        return replace(self, signals=cut)

@@ -1,0 +1,237 @@
+"""The vehicle: what people write in a vehicle file, checked once, in SI."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+from weighbridge.errors import ConfigError
+
+FORMAT_VERSION: Final = 1
+"""Version of the vehicle file this program writes and reads."""
+
+TorqueSource = Literal["load", "measured", "percent", "air_flow"]
+VehicleClass = Literal["car", "van", "bus", "truck"]
+
+
+def _positive(name: str, value: float | None) -> None:
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise ConfigError(f"{name} must be a positive number, got {value}")
+
+
+def _not_negative(name: str, value: float | None) -> None:
+    if value is not None and not (math.isfinite(value) and value >= 0.0):
+        raise ConfigError(f"{name} must be zero or positive, got {value}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driveline:
+    """Constants of one driveline.
+
+    Attributes
+    ----------
+    gearings : effective gearing ``G = i_t i_d / r`` of gears 1..n, engine angle
+        per distance travelled; one value for a single-speed vehicle [1/m]
+    engine_inertia : all that turns with the engine or motor [kg m^2]
+    wheel_inertia : all wheels and what turns with them [kg m^2]
+    wheel_radius : effective rolling radius [m]
+    efficiency : wheel over engine power when driving, in (0, 1] [-]; 1 where the
+        torque was calibrated at the wheels
+    speed_scale : indicated over true vehicle speed [-]
+    idle_speed : engine idle speed [rad/s]; 0 for a motor that stands
+    """
+
+    gearings: tuple[float, ...] = ()
+    engine_inertia: float = 0.15
+    wheel_inertia: float = 6.0
+    wheel_radius: float = 0.31
+    efficiency: float = 1.0
+    speed_scale: float = 1.0
+    idle_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        for g in self.gearings:
+            _positive("a gearing", g)
+        if list(self.gearings) != sorted(self.gearings, reverse=True):
+            raise ConfigError(f"gearings must fall from first to last gear, got {self.gearings}")
+        _not_negative("engine_inertia", self.engine_inertia)
+        _not_negative("wheel_inertia", self.wheel_inertia)
+        _positive("wheel_radius", self.wheel_radius)
+        _not_negative("idle_speed", self.idle_speed)
+        if not 0.0 < self.efficiency <= 1.0:
+            raise ConfigError(f"efficiency must be in (0, 1], got {self.efficiency}")
+        if not 0.8 <= self.speed_scale <= 1.2:
+            raise ConfigError(f"speed_scale must be in [0.8, 1.2], got {self.speed_scale}")
+
+    @property
+    def single_speed(self) -> bool:
+        """Whether there is one fixed gear."""
+        return len(self.gearings) == 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TorqueModel:
+    """How the torque of engine or motor follows from what was recorded.
+
+    Attributes
+    ----------
+    source : "load" (regression, Jensen 2022 eq. 49), "measured" (torque in N m),
+        "percent" (percent of the reference torque) or "air_flow" (eq. 51)
+    coefficients : w0, w1 (per unit of load or of air flow torque), then w2, w3 ...
+        of rising powers of engine speed in rad/s; for measured and percent
+        torque (offset [N m], scale [-]), empty meaning (0, 1)
+    coefficient_stds : their standard deviations, same length or empty
+    reference_torque : for "percent" where the drive does not carry it [N m]
+    engine_efficiency : for "air_flow", shaft over fuel power [-]
+    noise : standard deviation of the torque from this source [N m]
+    load_range, speed_range : what the regression has seen; outside, torque is
+        extrapolated and the sample left out ([-], [rad/s])
+    """
+
+    source: TorqueSource = "measured"
+    coefficients: tuple[float, ...] = ()
+    coefficient_stds: tuple[float, ...] = ()
+    reference_torque: float | None = None
+    engine_efficiency: float = 0.33
+    noise: float | None = None
+    load_range: tuple[float, float] | None = None
+    speed_range: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.source not in ("load", "measured", "percent", "air_flow"):
+            raise ConfigError(
+                f"torque source must be load, measured, percent or air_flow, got {self.source!r}"
+            )
+        if self.source == "load" and len(self.coefficients) < 2:
+            raise ConfigError(
+                "torque source 'load' needs at least two coefficients: run weighbridge calibrate"
+            )
+        if self.coefficient_stds and len(self.coefficient_stds) != len(self.coefficients):
+            raise ConfigError("coefficient_stds must be as many as coefficients")
+        _positive("reference_torque", self.reference_torque)
+        _positive("noise", self.noise)
+        if not 0.0 < self.engine_efficiency <= 1.0:
+            raise ConfigError(f"engine_efficiency must be in (0, 1], got {self.engine_efficiency}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoadLoad:
+    """Air drag and rolling resistance.
+
+    Attributes
+    ----------
+    drag_area : drag coefficient times frontal area C_d A [m^2]
+    rolling_coefficient : rolling resistance coefficient C_r [-]
+    drag_area_std, rolling_coefficient_std : their standard deviations
+    """
+
+    drag_area: float = 0.70
+    rolling_coefficient: float = 0.010
+    drag_area_std: float | None = None
+    rolling_coefficient_std: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.drag_area < 20.0:
+            raise ConfigError(f"drag_area must be in [0, 20) m^2, got {self.drag_area}")
+        if not 0.0 <= self.rolling_coefficient < 0.1:
+            raise ConfigError(
+                f"rolling_coefficient must be in [0, 0.1), got {self.rolling_coefficient}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mounting:
+    """How the inertial sensor sits in the vehicle.
+
+    Attributes
+    ----------
+    roll, pitch, yaw : of the rotation from sensor to body axes (forward, right,
+        down), ``x_b = Rz(yaw) Ry(pitch) Rx(roll) x_s`` [rad]
+    std : standard deviations of the three [rad]
+    squat : pitch of the body per forward acceleration k [rad per m/s^2]
+    squat_std : its standard deviation
+    """
+
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+    std: tuple[float, float, float] | None = None
+    squat: float | None = None
+    squat_std: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timing:
+    """How late each source is: stamp minus the instant the value was true.
+
+    Attributes
+    ----------
+    torque_delay, torque_delay_std : of torque or engine load [s]
+    speed_delay : of vehicle speed [s]
+    """
+
+    torque_delay: float = 0.0
+    torque_delay_std: float | None = None
+    speed_delay: float | None = None
+
+    def __post_init__(self) -> None:
+        if not -1.0 <= self.torque_delay <= 3.0:
+            raise ConfigError(f"torque_delay must be in [-1, 3] s, got {self.torque_delay}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """Where the numbers come from.
+
+    Attributes
+    ----------
+    drives : names of the drives of the calibration
+    date : ISO 8601 date
+    r_squared : of the torque fit [-]
+    residual_std : of the torque fit [N m]
+    samples : samples used
+    mass_scale_std : relative standard deviation that the calibration leaves in
+        every mass weighed with it [-]
+    notes : free text
+    """
+
+    drives: tuple[str, ...] = ()
+    date: str | None = None
+    r_squared: float | None = None
+    residual_std: float | None = None
+    samples: int | None = None
+    mass_scale_std: float | None = None
+    notes: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle:
+    """All that is known of one vehicle; see ``VEHICLE.toml``.
+
+    Attributes
+    ----------
+    name : for people
+    kind : "car", "van", "bus" or "truck"
+    tare : mass without payload [kg]
+    gross : permitted mass [kg]
+    mapping : path of a mapping TOML for its logs
+    """
+
+    name: str = "vehicle"
+    kind: VehicleClass = "car"
+    tare: float | None = None
+    gross: float | None = None
+    mapping: str | None = None
+    driveline: Driveline = field(default_factory=Driveline)
+    torque: TorqueModel = field(default_factory=TorqueModel)
+    road_load: RoadLoad = field(default_factory=RoadLoad)
+    mounting: Mounting | None = None
+    timing: Timing = field(default_factory=Timing)
+    provenance: Provenance = field(default_factory=Provenance)
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("car", "van", "bus", "truck"):
+            raise ConfigError(f"class must be car, van, bus or truck, got {self.kind!r}")
+        _positive("tare", self.tare)
+        _positive("gross", self.gross)
