@@ -167,17 +167,20 @@ class Timing:
 
     Attributes
     ----------
-    torque_delay, torque_delay_std : of torque or engine load [s]
-    speed_delay : of vehicle speed [s]
+    torque_delay, torque_delay_std : of torque or engine load [s]; None: to be
+        found from the drive
+    speed_delay : of vehicle speed [s]; None: to be found from the drive
     """
 
-    torque_delay: float = 0.0
+    torque_delay: float | None = None
     torque_delay_std: float | None = None
     speed_delay: float | None = None
 
     def __post_init__(self) -> None:
-        if not -1.0 <= self.torque_delay <= 3.0:
-            raise ConfigError(f"torque_delay must be in [-1, 3] s, got {self.torque_delay}")
+        for name in ("torque_delay", "speed_delay"):
+            delay = getattr(self, name)
+            if delay is not None and not -1.0 <= delay <= 3.0:
+                raise ConfigError(f"{name} must be in [-1, 3] s, got {delay}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
