@@ -1,1 +1,1 @@
-"""calibration"""
+"""Vehicle parameters from drives of known mass."""

@@ -1,0 +1,90 @@
+"""How late torque is against motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance.force_balance import force_balance
+from weighbridge.navigation.motion import Motion
+from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle.model import Vehicle
+
+EARLIEST: Final = -0.4
+"""Torque requested before it acts is early; never by more than this [s]."""
+
+LATEST: Final = 1.2
+"""Torque polled, smoothed and sent is late; hardly by more than this [s]."""
+
+
+def best_delay(
+    misfit: Callable[[float], float], *, start: float = EARLIEST, end: float = LATEST
+) -> float:
+    """Minimise ``misfit`` over the delay: a coarse grid, a fine one, a parabola.
+
+    Parameters
+    ----------
+    misfit : of a delay in s; NaN where it cannot be told
+    start, end : of the search [s]
+
+    Returns
+    -------
+    float
+        Delay [s]; NaN where no delay can be told or the best lies at an end.
+    """
+    step = 0.1
+    grid = np.arange(start, end + 0.5 * step, step)
+    for _ in range(2):
+        scores = np.array([misfit(float(delay)) for delay in grid])
+        if not np.isfinite(scores).all():
+            return float("nan")
+        best = int(np.argmin(scores))
+        if best in (0, grid.size - 1):
+            return float("nan")
+        centre = _vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
+        step = 0.02
+        grid = centre + step * np.arange(-2, 3)
+    return centre
+
+
+def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> float:
+    """Find the delay at which traction explains specific force best [s]; 0 if untold.
+
+    A forward fit and an inverse one differ, but their product, the
+    correlation, depends on the delay alone.
+
+    Raises
+    ------
+    DriveError
+        The drive lacks what the torque source needs.
+    """
+
+    def misfit(delay: float) -> float:
+        view = force_balance(drive, vehicle, motion, delay=delay).merged
+        # Standing rows aside, all that have torque and gear: braking too would
+        # spoil the fit, but not move its best delay.
+        rows = view.usable & np.isfinite(view.traction_force)
+        if np.count_nonzero(rows) < 100:
+            return float("nan")
+        force = view.traction_force - view.drag_force - view.rotating_mass * view.accel
+        return 1.0 - _correlation(force[rows], view.specific_force[rows])
+
+    delay = best_delay(misfit)
+    return delay if np.isfinite(delay) else 0.0
+
+
+def _vertex(x: Floats, y: Floats) -> float:
+    """Abscissa of the lowest point of the parabola through three points."""
+    curvature = y[0] - 2.0 * y[1] + y[2]
+    if curvature <= 0.0:
+        return float(x[1])
+    shift = 0.5 * (y[0] - y[2]) / curvature
+    return float(x[1] + np.clip(shift, -1.0, 1.0) * (x[1] - x[0]))
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    a, b = a - a.mean(), b - b.mean()
+    scale = float(np.sqrt(np.dot(a, a) * np.dot(b, b)))
+    return float(np.dot(a, b)) / scale if scale > 0.0 else 0.0

@@ -1,0 +1,304 @@
+"""The waist: forces on one side, motion on the other, and what may be used of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.constants import GRAVITY
+from weighbridge.navigation.motion import Motion
+from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.vehicle.air import air_density
+from weighbridge.vehicle.gear import predict_gear, shifting
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import engine_torque, source_signal
+
+
+class Reason(IntEnum):
+    """Why a sample is not usable; 0 where it is."""
+
+    USED = 0
+    STANDING = 1
+    NO_MOTION = 2
+    NO_TORQUE = 3
+    BRAKING = 4
+    SHIFTING = 5
+    CLUTCH_SLIPPING = 6
+    OVERRUN = 7
+    EXTRAPOLATED = 8
+    NOT_ACCELERATING = 9
+    BAD_FIT = 10
+
+    @property
+    def text(self) -> str:
+        """The reason in words."""
+        return REASON_TEXT[self]
+
+
+REASON_TEXT: Final[dict[Reason, str]] = {
+    Reason.USED: "",
+    Reason.STANDING: "standing",
+    Reason.NO_MOTION: "no motion data",
+    Reason.NO_TORQUE: "no torque data",
+    Reason.BRAKING: "braking",
+    Reason.SHIFTING: "shifting",
+    Reason.CLUTCH_SLIPPING: "clutch slipping",
+    Reason.OVERRUN: "overrun",
+    Reason.EXTRAPOLATED: "outside torque model",
+    Reason.NOT_ACCELERATING: "not accelerating",
+    Reason.BAD_FIT: "bad fit",
+}
+"""Every reason as tables and reports print it."""
+
+SLOWEST: Final = 1.5
+"""Below this speed gears, slip and torque are not told apart [m/s]."""
+
+SHIFT_MARGIN: Final = 0.4
+"""Samples nearer than this to a change of gear are left out [s]."""
+
+BRAKING_FORCE: Final = 0.06
+"""Braking force over weight that marks unseen braking [-]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceSide:
+    """Traction at the instants it was computed in the vehicle.
+
+    Attributes
+    ----------
+    time : (n,) instants, delay taken off, rising [s]
+    traction_force : (n,) at the wheels, before the rotating parts are
+        accelerated [N]; NaN without torque
+    torque : (n,) of engine or motor [N m]
+    engine_speed : (n,) [rad/s]
+    gear : (n,) 1..n, 0 for none
+    gearing : (n,) [1/m]; NaN without a gear
+    reason : (n,) `Reason` why a sample is not usable
+    delay : taken off the stamps [s]
+    noise_std : of the traction force in the middle gear [N]; NaN if unknown
+    """
+
+    time: Floats
+    traction_force: Floats
+    torque: Floats
+    engine_speed: Floats
+    gear: Ints
+    gearing: Floats
+    reason: NDArray[np.uint8]
+    delay: float
+    noise_std: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MergedView:
+    """One row per force sample, for the published methods.
+
+    Attributes
+    ----------
+    time : (n,) [s]
+    traction_force : (n,) [N]
+    speed, accel, specific_force, grade, pitch, heading : (n,) of `Motion`
+    gear : (n,)
+    gearing : (n,) [1/m]
+    rotating_mass : (n,) I_w / r^2 + I_e G^2 [kg]
+    drag_force : (n,) in still air [N]
+    air_density : (n,) [kg/m^3]
+    reason : (n,) `Reason`
+    """
+
+    time: Floats
+    traction_force: Floats
+    speed: Floats
+    accel: Floats
+    specific_force: Floats
+    grade: Floats
+    pitch: Floats
+    heading: Floats
+    gear: Ints
+    gearing: Floats
+    rotating_mass: Floats
+    drag_force: Floats
+    air_density: Floats
+    reason: NDArray[np.uint8]
+
+    @property
+    def usable(self) -> Bools:
+        """Rows without a reason against them."""
+        return np.asarray(self.reason == Reason.USED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceBalance:
+    """Both sides of Newton's law along the road, and their merged view."""
+
+    force: ForceSide
+    motion: Motion
+    merged: MergedView
+
+
+def force_balance(
+    drive: Drive, vehicle: Vehicle, motion: Motion, *, delay: float | None = None
+) -> ForceBalance:
+    """Bring the force and the motion of a drive together.
+
+    Parameters
+    ----------
+    drive, vehicle, motion
+    delay : lateness of the torque; the vehicle's when None, 0 if that is unknown [s]
+
+    Raises
+    ------
+    DriveError
+        The drive lacks what the vehicle's torque source needs.
+    """
+    source = source_signal(drive, vehicle)
+    if delay is None:
+        delay = vehicle.timing.torque_delay or 0.0
+    recorded = source.time
+    time = recorded - delay
+    rows = _motion_at(motion, time)
+    driveline = vehicle.driveline
+
+    engine_speed = _engine_speed(drive, vehicle, time + motion.speed_delay, rows["speed"])
+    gear, gearing, slipping = _gears(drive, vehicle, recorded, engine_speed, rows["speed"])
+    torque = engine_torque(drive, vehicle, engine_speed, recorded)
+    efficiency = np.where(torque.torque >= 0.0, driveline.efficiency, 1.0 / driveline.efficiency)
+    traction = efficiency * torque.torque * gearing
+    density = air_density(drive, time, rows["altitude"])
+    rotating = (
+        driveline.wheel_inertia / driveline.wheel_radius**2 + driveline.engine_inertia * gearing**2
+    )
+    drag = 0.5 * density * vehicle.road_load.drag_area * rows["speed"] ** 2
+
+    # The first reason that applies is the one told, so the order matters.
+    reason = np.zeros(time.size, dtype=np.uint8)
+    near = source.age(recorded) <= 3.0 * source.period
+    braking = _braking(drive, vehicle, recorded, rows, traction, drag, rotating)
+    for flag, why in (
+        (~(rows["valid"] > 0.99) | ~np.isfinite(rows["speed"]), Reason.NO_MOTION),
+        (rows["speed"] < SLOWEST, Reason.STANDING),
+        (braking, Reason.BRAKING),
+        (shifting(time, gear, margin=SHIFT_MARGIN) & ~driveline.single_speed, Reason.SHIFTING),
+        (slipping, Reason.CLUTCH_SLIPPING),
+        (~np.isfinite(traction) | ~near, Reason.NO_TORQUE),
+        (torque.overrun, Reason.OVERRUN),
+        (torque.extrapolated, Reason.EXTRAPOLATED),
+    ):
+        reason[(reason == 0) & flag] = why
+
+    noise = vehicle.torque.noise
+    middle = np.nanmedian(gearing) if np.isfinite(gearing).any() else np.nan
+    return ForceBalance(
+        force=ForceSide(
+            time=time,
+            traction_force=traction,
+            torque=torque.torque,
+            engine_speed=engine_speed,
+            gear=gear,
+            gearing=gearing,
+            reason=reason,
+            delay=delay,
+            noise_std=float(noise * middle) if noise is not None else float("nan"),
+        ),
+        motion=motion,
+        merged=MergedView(
+            time=time,
+            traction_force=traction,
+            speed=rows["speed"],
+            accel=rows["accel"],
+            specific_force=rows["specific_force"],
+            grade=rows["grade"],
+            pitch=rows["pitch"],
+            heading=rows["heading"],
+            gear=gear,
+            gearing=gearing,
+            rotating_mass=rotating,
+            drag_force=drag,
+            air_density=density,
+            reason=reason,
+        ),
+    )
+
+
+def _motion_at(motion: Motion, time: Floats) -> dict[str, Floats]:
+    """Interpolate the motion to the instants ``time``; NaN outside."""
+    rate = motion.rate
+    position = (time - motion.time[0]) * rate
+    inside = (position >= 0.0) & (position <= motion.time.size - 1)
+    index = np.clip(position.astype(np.int64), 0, motion.time.size - 2)
+    part = np.clip(position - index, 0.0, 1.0)
+    rows: dict[str, Floats] = {}
+    for name in ("speed", "accel", "specific_force", "grade", "pitch", "altitude", "valid"):
+        values = np.asarray(getattr(motion, name), dtype=np.float64)
+        mixed = values[index] + part * (values[index + 1] - values[index])
+        rows[name] = np.where(inside, mixed, np.nan)
+    rows["valid"] = np.where(inside, rows["valid"], 0.0)
+    nearest = np.clip(np.rint(position).astype(np.int64), 0, motion.time.size - 1)
+    rows["heading"] = np.where(inside, motion.heading[nearest], np.nan)
+    return rows
+
+
+def _engine_speed(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Floats) -> Floats:
+    """Engine speed at the stamps it was recorded with: it is as late as vehicle speed."""
+    signal = drive.get("engine_speed")
+    if signal is not None and len(signal):
+        return signal.at(recorded)
+    if vehicle.driveline.single_speed:
+        return speed * vehicle.driveline.gearings[0]
+    return np.full(speed.size, np.nan)
+
+
+def _gears(
+    drive: Drive, vehicle: Vehicle, recorded: Floats, engine_speed: Floats, speed: Floats
+) -> tuple[Ints, Floats, Bools]:
+    """Gear, gearing and whether the clutch slips, from the best source there is."""
+    gearings = np.array(vehicle.driveline.gearings)
+    if gearings.size == 1:
+        gear = np.ones(recorded.size, dtype=np.int64)
+        return gear, np.full(recorded.size, gearings[0]), np.zeros(recorded.size, dtype=bool)
+    if gearings.size == 0:
+        # Without known ratios the ratio of the moment is the best there is.
+        moving = speed > SLOWEST
+        ratio = np.where(moving, engine_speed / np.where(moving, speed, 1.0), np.nan)
+        return np.zeros(recorded.size, dtype=np.int64), ratio, np.zeros(recorded.size, dtype=bool)
+    gear, mismatch = predict_gear(engine_speed, speed, gearings)
+    measured: Signal | None = drive.get("gear")
+    if measured is not None and len(measured):
+        told = np.nan_to_num(measured.held(recorded)).astype(np.int64)
+        gear = np.where((told >= 1) & (told <= gearings.size), told, 0)
+        mismatch = np.where(
+            gear > 0,
+            engine_speed / np.maximum(speed, SLOWEST) / gearings[np.maximum(gear, 1) - 1] - 1.0,
+            mismatch,
+        )
+    clutch = drive.get("clutch_switch")
+    pressed = clutch.held(recorded) > 0.5 if clutch is not None else np.zeros(gear.size, bool)
+    slipping = (gear == 0) | pressed | (np.abs(np.nan_to_num(mismatch)) > 0.06)
+    gearing = np.where(gear > 0, gearings[np.maximum(gear, 1) - 1], np.nan)
+    return gear, gearing, slipping
+
+
+def _braking(
+    drive: Drive,
+    vehicle: Vehicle,
+    recorded: Floats,
+    rows: dict[str, Floats],
+    traction: Floats,
+    drag: Floats,
+    rotating: Floats,
+) -> Bools:
+    """Where the brake is pressed, or the vehicle slows more than its torque explains."""
+    switch = drive.get("brake_switch")
+    if switch is not None and len(switch):
+        return np.asarray(switch.held(recorded) > 0.5)
+    # Unseen braking: what slows the vehicle is far more than engine, drag and
+    # rolling can, whatever the mass within reason.
+    mass = vehicle.tare or 1500.0
+    force = np.where(np.isfinite(traction), traction, 0.0)
+    rolling = vehicle.road_load.rolling_coefficient * GRAVITY
+    needed = (mass + np.nan_to_num(rotating)) * rows["specific_force"] + mass * rolling + drag
+    return np.asarray(needed - np.minimum(force, 0.0) < -BRAKING_FORCE * mass * GRAVITY)

@@ -1,0 +1,218 @@
+"""Torque model and road load from drives of known mass, as one linear fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import DriveError
+from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.model import VehicleClass
+from weighbridge.vehicle.torque import torque_rows
+
+ROAD_PARAMETERS: Final = ("drag_area", "rolling_coefficient", "engine_inertia", "wheel_inertia")
+"""Parameters of the longitudinal model beside the torque, in the order of the columns."""
+
+BOUNDS: Final[dict[VehicleClass, tuple[Floats, Floats]]] = {
+    "car": (np.array([0.30, 0.002, 0.02, 2.0]), np.array([1.00, 0.030, 1.00, 12.0])),
+    "van": (np.array([0.60, 0.004, 0.05, 3.0]), np.array([3.00, 0.030, 1.50, 20.0])),
+    "bus": (np.array([2.50, 0.003, 0.30, 20.0]), np.array([8.00, 0.020, 6.00, 150.0])),
+    "truck": (np.array([2.50, 0.003, 0.30, 20.0]), np.array([10.0, 0.020, 6.00, 300.0])),
+}
+"""Lower and upper bounds of `ROAD_PARAMETERS`: cars from Jensen 2022, Table 5; the
+others spanning the usual values of Gillespie, Fundamentals of Vehicle Dynamics, ch. 4."""
+
+HUBER: Final = 1.345
+"""Residual over noise beyond which a row counts less [-] (Huber 1964, 95 % efficiency)."""
+
+BLOCK: Final = 60.0
+"""Rows nearer than this share their errors [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TorqueRows:
+    """Rows of eq. 48: torque of the source against torque of the motion.
+
+    Attributes
+    ----------
+    design : (n, p + 4) columns of the torque regression, then of
+        `ROAD_PARAMETERS`, such that ``design @ parameters = target``
+    target : (n,) torque that lifts and accelerates the known mass [N m]
+    block : (n,) number of the block each row belongs to
+    """
+
+    design: Floats
+    target: Floats
+    block: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TorqueFit:
+    """Optimum of eq. 48.
+
+    Attributes
+    ----------
+    coefficients : (p,) w0, w1 ... of eq. 49
+    road : (4,) `ROAD_PARAMETERS`
+    cov : (p + 4, p + 4) their covariance, zero where a bound holds
+    weight : (n,) what each row counted, in (0, 1]
+    residual : (n,) [N m]
+    r_squared : of source torque against torque of the motion [-]
+    residual_std : robust [N m]
+    at_bound : names of the road parameters that a bound holds
+    """
+
+    coefficients: Floats
+    road: Floats
+    cov: Floats
+    weight: Floats
+    residual: Floats
+    r_squared: float
+    residual_std: float
+    at_bound: tuple[str, ...]
+
+
+def build_rows(
+    view: MergedView,
+    regressor: Floats,
+    engine_speed: Floats,
+    *,
+    mass: float,
+    wheel_radius: float,
+    order: int,
+    rows: Bools,
+) -> TorqueRows:
+    """Write eq. 48 for the rows of one drive.
+
+    Parameters
+    ----------
+    view : (n,) merged view of the drive
+    regressor : (n,) load [-], air-flow torque or measured torque [N m]
+    engine_speed : (n,) [rad/s]
+    mass : known mass [kg]
+    wheel_radius : [m]
+    order : highest power of engine speed in eq. 49
+    rows : (n,) which rows to take
+
+    References
+    ----------
+    Jensen et al. 2022, eqs. 3, 48, 49, with the drivetrain efficiency at one.
+    """
+    gearing = view.gearing[rows]
+    accel = view.accel[rows]
+    torque = torque_rows(regressor[rows], engine_speed[rows], order)
+    road = np.column_stack(
+        [
+            -0.5 * view.air_density[rows] * view.speed[rows] ** 2 / gearing,
+            -mass * GRAVITY * np.cos(view.grade[rows]) / gearing,
+            -gearing * accel,
+            -accel / (wheel_radius**2 * gearing),
+        ]
+    )
+    time = view.time[rows]
+    first = time[0] if time.size else 0.0
+    return TorqueRows(
+        design=np.hstack([torque, road]),
+        target=mass * view.specific_force[rows] / gearing,
+        block=np.floor((time - first) / BLOCK),
+    )
+
+
+def join_rows(parts: list[TorqueRows]) -> TorqueRows:
+    """Put the rows of several drives under each other."""
+    offset = 0.0
+    blocks = []
+    for part in parts:
+        blocks.append(part.block + offset)
+        offset += float(part.block.max(initial=0.0)) + 1.0
+    return TorqueRows(
+        design=np.vstack([p.design for p in parts]),
+        target=np.concatenate([p.target for p in parts]),
+        block=np.concatenate(blocks),
+    )
+
+
+def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) -> TorqueFit:
+    """Solve eq. 48 with bounds and a Huber loss.
+
+    The problem is linear in all parameters, so its optimum is global and each
+    reweighting costs one small solve.
+
+    Parameters
+    ----------
+    rows : (n, p + 4) of the design
+    low, high : (4,) bounds of `ROAD_PARAMETERS`
+    iterations : at most, of reweighting
+
+    Raises
+    ------
+    DriveError
+        Too few rows.
+    """
+    n, width = rows.design.shape
+    if n < 20 * width:
+        raise DriveError(
+            f"only {n} usable samples for {width} parameters of the calibration; "
+            "drive longer, with more starts and in all gears"
+        )
+    scale = np.sqrt(np.mean(rows.design**2, axis=0))
+    scale[scale == 0.0] = 1.0
+    lower = np.concatenate([np.full(width - 4, -np.inf), low]) * scale
+    upper = np.concatenate([np.full(width - 4, np.inf), high]) * scale
+    # A parameter whose bounds coincide is known; lsq_linear wants an interval.
+    upper = np.maximum(upper, lower + 1e-9 * (1.0 + np.abs(lower)))
+    design = rows.design / scale
+
+    weight = np.ones(n)
+    parameters = np.zeros(width)
+    for _ in range(iterations):
+        root = np.sqrt(weight)
+        _, r = np.linalg.qr(np.column_stack([design, rows.target]) * root[:, None])
+        solved = lsq_linear(r[:, :width], r[:, width], bounds=(lower, upper), method="bvls").x
+        residual = rows.target - design @ solved
+        noise = 1.4826 * float(np.median(np.abs(residual)))
+        weight = np.minimum(1.0, HUBER * noise / np.maximum(np.abs(residual), 1e-12))
+        moved = np.max(np.abs(solved - parameters))
+        parameters = solved
+        if moved < 1e-9 * np.max(np.abs(solved)):
+            break
+
+    margin = 1e-6 * (upper - lower)
+    held = (parameters <= lower + margin) | (parameters >= upper - margin)
+    cov = _sandwich(design, residual, weight, rows.block, ~held) / np.outer(scale, scale)
+    parameters = parameters / scale
+    torque = rows.design[:, :-4] @ parameters[:-4]
+    motion = torque + residual
+    total = np.sum(weight * (motion - np.average(motion, weights=weight)) ** 2)
+    return TorqueFit(
+        coefficients=parameters[:-4],
+        road=parameters[-4:],
+        cov=cov,
+        weight=weight,
+        residual=residual,
+        r_squared=float(1.0 - np.sum(weight * residual**2) / total),
+        residual_std=1.4826 * float(np.median(np.abs(residual))),
+        at_bound=tuple(name for name, at in zip(ROAD_PARAMETERS, held[-4:], strict=True) if at),
+    )
+
+
+def _sandwich(
+    design: Floats, residual: Floats, weight: Floats, block: Floats, free: Bools
+) -> Floats:
+    """Covariance with rows of one block dependent (Liang and Zeger, Biometrika 73, 1986)."""
+    cov = np.zeros((free.size, free.size))
+    x = design[:, free]
+    information = (x * weight[:, None]).T @ x
+    score = x * (weight * residual)[:, None]
+    order = np.argsort(block, kind="stable")
+    starts = np.flatnonzero(np.diff(block[order], prepend=-1.0))
+    sums = np.add.reduceat(score[order], starts, axis=0)
+    bread = np.linalg.pinv(information, hermitian=True)
+    correction = sums.shape[0] / max(sums.shape[0] - 1, 1)
+    cov[np.ix_(free, free)] = correction * bread @ (sums.T @ sums) @ bread
+    return cov

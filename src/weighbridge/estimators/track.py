@@ -1,0 +1,85 @@
+"""What every estimator returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from numpy.typing import NDArray
+
+import numpy as np
+
+from weighbridge.balance import ForceBalance, Reason
+from weighbridge.signals import Bools, Floats
+
+
+class Status(StrEnum):
+    """How a weighing ended."""
+
+    CONVERGED = "converged"
+    NOT_EXCITED = "not_excited"
+    INCONSISTENT = "inconsistent"
+    MISSING_SIGNALS = "missing_signals"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """Mass between two stops, where load can change.
+
+    Attributes
+    ----------
+    start, end : [s]
+    mass, std : [kg]; NaN where the segment is too poor
+    """
+
+    start: float
+    end: float
+    mass: float
+    std: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MassTrack:
+    """The mass over time and the final answer of one estimator.
+
+    Attributes
+    ----------
+    method : name of the estimator
+    balance : what it was made from; the rows are those of its merged view
+    running_mass, running_std : (n,) as known at each row, not later [kg]
+    residual : (n,) measured force minus the model's at the final mass [N];
+        NaN where a row was not used
+    reason : (n,) `Reason` why a row was not used
+    mass, std : final answer and its standard deviation [kg]
+    degrees_of_freedom : behind ``std``, for the interval; infinite if known
+    bound_std : Cramér-Rao bound of this drive [kg]
+    converged_at : when the running mass stays within 5 % of the final answer
+        for good [s]; NaN if never
+    status : and ``why`` in a sentence where it is not converged
+    segments : mass between stops
+    """
+
+    method: str
+    balance: ForceBalance
+    running_mass: Floats
+    running_std: Floats
+    residual: Floats
+    reason: NDArray[np.uint8]
+    mass: float
+    std: float
+    degrees_of_freedom: float
+    bound_std: float
+    converged_at: float
+    status: Status
+    why: str
+    segments: tuple[Segment, ...]
+
+    @property
+    def time(self) -> Floats:
+        """(n,) instants of the rows [s]."""
+        return self.balance.merged.time
+
+    @property
+    def used(self) -> Bools:
+        """(n,) rows the mass was made from."""
+        return np.asarray(self.reason == Reason.USED)

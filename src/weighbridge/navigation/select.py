@@ -1,0 +1,37 @@
+"""The best way to the motion that a drive allows."""
+
+from __future__ import annotations
+
+from weighbridge.errors import DriveError
+from weighbridge.navigation.longitudinal import longitudinal_motion
+from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.speed import speed_motion
+from weighbridge.signals import Drive
+from weighbridge.vehicle.model import Vehicle
+
+IMU_SIGNALS = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
+
+
+def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
+    """Find the motion of a drive the best way its signals allow.
+
+    In this order: IMU with speed or GNSS, one accelerometer along the vehicle
+    with speed, speed with grade or height, speed alone.
+
+    Raises
+    ------
+    DriveError
+        No way is open; the sentence names what is missing.
+    """
+    has_speed = drive.has("vehicle_speed") or drive.has("gnss_speed")
+    if drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude")):
+        from weighbridge.navigation.inertial import inertial_motion
+
+        return inertial_motion(drive, vehicle.mounting if vehicle is not None else None)
+    if drive.has("longitudinal_accel", "vehicle_speed"):
+        return longitudinal_motion(drive)
+    if has_speed:
+        return speed_motion(drive)
+    raise DriveError(
+        f"{drive.name}: no vehicle_speed and no GNSS; without a speed no vehicle can be weighed"
+    )

@@ -1,0 +1,425 @@
+"""From drives of known mass to a vehicle file."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from weighbridge.balance import Reason, force_balance
+from weighbridge.balance.delay import best_delay
+from weighbridge.balance.force_balance import ForceBalance
+from weighbridge.calibration.grid import grid_search
+from weighbridge.calibration.regression import (
+    BOUNDS,
+    TorqueFit,
+    TorqueRows,
+    build_rows,
+    fit,
+    join_rows,
+)
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.rls import block_jackknife, regression
+from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.select import find_motion
+from weighbridge.pipeline.checks import check_drive
+from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle.gear import GearDetection, detect_gearings
+from weighbridge.vehicle.model import (
+    Mounting,
+    Provenance,
+    RoadLoad,
+    Timing,
+    TorqueModel,
+    TorqueSource,
+    Vehicle,
+)
+from weighbridge.vehicle.torque import SIGNALS, lowest_load, regressor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationSettings:
+    """How a calibration is made.
+
+    Attributes
+    ----------
+    order : highest power of engine speed in the torque regression; 2 for load
+        and air flow, 0 for measured torque when None
+    source : torque source; the best the drives have when None
+    grid : solve on the grid of Jensen 2022, Table 5, in place of the bounds
+    """
+
+    order: int | None = None
+    source: TorqueSource | None = None
+    grid: bool = False
+
+    def __post_init__(self) -> None:
+        if self.order is not None and not 0 <= self.order <= 4:
+            raise ConfigError(f"order must be between 0 and 4, got {self.order}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibration:
+    """A calibrated vehicle and what it was made from, for the report.
+
+    Attributes
+    ----------
+    vehicle : the result
+    gears : ratios found; None where they were given
+    balances : of each drive, with the calibrated vehicle
+    fit : of the torque
+    rows : what was fitted
+    """
+
+    vehicle: Vehicle
+    gears: GearDetection | None
+    balances: tuple[ForceBalance, ...]
+    fit: TorqueFit
+    rows: TorqueRows
+
+
+def calibrate(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None = None,
+    *,
+    vehicle: Vehicle | None = None,
+    settings: CalibrationSettings | None = None,
+) -> Vehicle:
+    """Calibrate a vehicle from one or more drives of known mass.
+
+    Parameters
+    ----------
+    drives : recorded drives of one vehicle
+    mass : of all, or one for each [kg]; from ``drive.toml`` when None
+    vehicle : what is known already (class, wheel radius, gearings, tare)
+    settings : see `CalibrationSettings`
+
+    Raises
+    ------
+    DriveError, ConfigError
+        A drive or an argument cannot be used; the sentence says why.
+    """
+    return run_calibration(drives, mass, vehicle=vehicle, settings=settings).vehicle
+
+
+def run_calibration(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None = None,
+    *,
+    vehicle: Vehicle | None = None,
+    settings: CalibrationSettings | None = None,
+) -> Calibration:
+    """As `calibrate`, keeping what the report shows."""
+    drives = [drives] if isinstance(drives, Drive) else list(drives)
+    settings = settings or CalibrationSettings()
+    base = vehicle or Vehicle()
+    masses = _masses(drives, mass)
+    for drive in drives:
+        for problem in check_drive(drive, base):
+            if problem.serious:
+                raise DriveError(f"{drive.name}: {problem.text}")
+    source = settings.source or best_source(drives, base)
+    if source in ("load", "air_flow") and drives and not drives[0].has("engine_speed"):
+        raise DriveError(f"{drives[0].name}: no engine_speed, which torque source {source!r} needs")
+    motions = [find_motion(drive, base) for drive in drives]
+
+    gears = None
+    driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions))
+    if not driveline.gearings:
+        gears = find_gears(drives, motions)
+        driveline = replace(driveline, gearings=tuple(float(g) for g in gears.gearings))
+    order = settings.order
+    if order is None:
+        order = 2 if source in ("load", "air_flow") else 0
+    model = TorqueModel(
+        source="measured" if source == "load" else source,
+        reference_torque=base.torque.reference_torque,
+        engine_efficiency=base.torque.engine_efficiency,
+    )
+    # Until it is fitted, the torque source stands for the torque.
+    draft = replace(base, driveline=driveline, torque=model)
+    low, high = BOUNDS[base.kind]
+    if driveline.single_speed:
+        # One gear cannot tell the inertias from the mass.
+        low, high = low.copy(), high.copy()
+        low[2:] = high[2:] = (driveline.engine_inertia, driveline.wheel_inertia)
+
+    floors = [_load_floor(drive, source) for drive in drives]
+
+    def rows_at(delay: float) -> TorqueRows:
+        return join_rows(
+            [
+                _drive_rows(d, m, draft, source, kg, delay, order, floor)
+                for d, m, kg, floor in zip(drives, motions, masses, floors, strict=True)
+            ]
+        )
+
+    def misfit(delay: float) -> float:
+        rows = rows_at(delay)
+        if rows.target.size < 20 * rows.design.shape[1]:
+            return float("nan")
+        return fit(rows, low, high, iterations=3).residual_std
+
+    delay = best_delay(misfit)
+    if not np.isfinite(delay):
+        delay = base.timing.torque_delay or 0.0
+    rows = rows_at(delay)
+    fitted = fit(rows, low, high)
+    coefficients, road = fitted.coefficients, fitted.road
+    if settings.grid:
+        coefficients, road, _ = grid_search(rows, fitted.weight)
+
+    used_speeds, used_loads = _ranges(drives, motions, draft, source, delay, floors)
+    stds = np.sqrt(np.diag(fitted.cov))
+    finished = replace(
+        draft,
+        driveline=replace(driveline, engine_inertia=float(road[2]), wheel_inertia=float(road[3])),
+        torque=TorqueModel(
+            source=source,
+            coefficients=tuple(float(w) for w in coefficients),
+            coefficient_stds=tuple(float(s) for s in stds[: coefficients.size]),
+            reference_torque=base.torque.reference_torque,
+            engine_efficiency=base.torque.engine_efficiency,
+            noise=fitted.residual_std,
+            load_range=used_loads,
+            speed_range=used_speeds,
+        ),
+        road_load=RoadLoad(
+            drag_area=float(road[0]),
+            rolling_coefficient=float(road[1]),
+            drag_area_std=float(stds[-4]),
+            rolling_coefficient_std=float(stds[-3]),
+        ),
+        mounting=_mounting(motions, base.mounting),
+        timing=Timing(torque_delay=delay, speed_delay=base.timing.speed_delay),
+        provenance=Provenance(
+            drives=tuple(drive.name for drive in drives),
+            date=datetime.date.today().isoformat(),
+            r_squared=fitted.r_squared,
+            residual_std=fitted.residual_std,
+            samples=int(rows.target.size),
+            notes=("held by a bound: " + ", ".join(fitted.at_bound) if fitted.at_bound else None),
+        ),
+    )
+    balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
+    scale, scale_std = _self_weighing(balances, finished, masses)
+    finished = replace(
+        finished,
+        torque=_scaled(finished.torque, scale),
+        provenance=replace(finished.provenance, mass_scale_std=scale_std),
+    )
+    balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
+    return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
+
+
+def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
+    """Choose the torque source that all the drives have, the most direct first.
+
+    Raises
+    ------
+    DriveError
+        None of them has any.
+    """
+    for source in ("measured", "percent", "load", "air_flow"):
+        names = SIGNALS[source]
+        if all(drive.has(*names) for drive in drives):
+            reference = vehicle.torque.reference_torque is not None or all(
+                drive.has("reference_torque") for drive in drives
+            )
+            if source != "percent" or reference:
+                return source
+    names = ", ".join(drive.name for drive in drives)
+    raise DriveError(
+        f"{names}: no engine_torque, engine_torque_fraction, engine_load or mass_air_flow "
+        "in every drive; a calibration needs one of them and engine_speed"
+    )
+
+
+def find_gears(drives: Sequence[Drive], motions: Sequence[Motion]) -> GearDetection:
+    """Find the gearings from all the drives together.
+
+    Raises
+    ------
+    DriveError
+        No engine speed, or no ratio stands out.
+    """
+    times, engine, speeds = [], [], []
+    offset = 0.0
+    for drive, motion in zip(drives, motions, strict=True):
+        signal = drive.get("engine_speed")
+        if signal is None or len(signal) < 30:
+            raise DriveError(
+                f"{drive.name}: no engine_speed, so no gear can be found; give gearings in the "
+                "vehicle file"
+            )
+        instants = signal.time - motion.speed_delay
+        inside = (instants >= motion.time[0]) & (instants <= motion.time[-1])
+        times.append(instants[inside] + offset)
+        engine.append(signal.values[inside])
+        speeds.append(np.interp(instants[inside], motion.time, motion.speed))
+        offset += float(signal.time[-1]) + 100.0
+    return detect_gearings(np.concatenate(times), np.concatenate(engine), np.concatenate(speeds))
+
+
+def _masses(drives: Sequence[Drive], mass: float | Sequence[float] | None) -> list[float]:
+    if not drives:
+        raise ConfigError("no drive to calibrate with")
+    if mass is None:
+        known = [drive.info.mass for drive in drives]
+    elif isinstance(mass, Sequence):
+        known = list(mass)
+        if len(known) != len(drives):
+            raise ConfigError(f"{len(known)} masses for {len(drives)} drives; give one for each")
+    else:
+        known = [mass] * len(drives)
+    for drive, kg in zip(drives, known, strict=True):
+        if kg is None:
+            raise ConfigError(
+                f"{drive.name}: its mass is not known; give --mass, or mass_kg in its drive.toml"
+            )
+        if not 100.0 <= kg <= 80_000.0:
+            raise ConfigError(f"a mass of {kg} kg is no road vehicle; give the mass in kg")
+    return [float(kg) for kg in known if kg is not None]
+
+
+def _load_floor(drive: Drive, source: TorqueSource) -> float:
+    if source not in ("load", "air_flow"):
+        return -np.inf
+    return lowest_load(drive.signals[SIGNALS[source][0]].values) if source == "load" else 0.0
+
+
+def _usable(balance: ForceBalance, x: Floats, floor: float) -> np.ndarray:
+    view = balance.merged
+    return (
+        view.usable
+        & (view.accel > 0.0)
+        & (x >= floor)
+        & np.isfinite(view.specific_force)
+        & np.isfinite(view.gearing)
+        & np.isfinite(x)
+        & np.isfinite(balance.force.engine_speed)
+    )
+
+
+def _drive_rows(
+    drive: Drive,
+    motion: Motion,
+    draft: Vehicle,
+    source: TorqueSource,
+    mass: float,
+    delay: float,
+    order: int,
+    floor: float,
+) -> TorqueRows:
+    balance, x = _draft_balance(drive, motion, draft, source, delay)
+    return build_rows(
+        balance.merged,
+        x,
+        balance.force.engine_speed,
+        mass=mass,
+        wheel_radius=draft.driveline.wheel_radius,
+        order=order,
+        rows=_usable(balance, x, floor),
+    )
+
+
+def _draft_balance(
+    drive: Drive, motion: Motion, draft: Vehicle, source: TorqueSource, delay: float
+) -> tuple[ForceBalance, Floats]:
+    """Balance without a torque model yet, and the torque source at its stamps."""
+    stamps = drive.signals[SIGNALS[source][0]].time
+    x = regressor(drive, source, stamps, draft.torque)
+    stand_in = drive
+    if source == "load":
+        load = drive.signals["engine_load"]
+        stand_in = drive.with_signals(replace(load, name="engine_torque"))
+    return force_balance(stand_in, draft, motion, delay=delay), x
+
+
+def _ranges(
+    drives: Sequence[Drive],
+    motions: Sequence[Motion],
+    draft: Vehicle,
+    source: TorqueSource,
+    delay: float,
+    floors: Sequence[float],
+) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    """Engine speeds and loads that the regression has seen, a little widened."""
+    if source not in ("load", "air_flow"):
+        return None, None
+    speeds, loads = [], []
+    for drive, motion, floor in zip(drives, motions, floors, strict=True):
+        balance, x = _draft_balance(drive, motion, draft, source, delay)
+        rows = _usable(balance, x, floor)
+        speeds.append(balance.force.engine_speed[rows])
+        loads.append(x[rows])
+    speed, load = np.concatenate(speeds), np.concatenate(loads)
+    slow, fast = np.percentile(speed, [0.1, 99.9])
+    high = float(np.max(load))
+    return (float(0.95 * slow), float(1.05 * fast)), (float(min(floors)), 1.02 * high)
+
+
+def _speed_scale(motions: Sequence[Motion]) -> float:
+    known = [
+        (m.speed_scale, m.speed_scale_std)
+        for m in motions
+        if m.speed_scale is not None and m.speed_scale_std is not None
+    ]
+    if not known:
+        return 1.0
+    weight = np.array([1.0 / std**2 for _, std in known])
+    return float(np.average([scale for scale, _ in known], weights=weight))
+
+
+def _mounting(motions: Sequence[Motion], known: Mounting | None) -> Mounting | None:
+    for motion in motions:
+        if motion.mounting is not None:
+            roll, pitch, yaw = motion.mounting
+            return Mounting(
+                roll=roll,
+                pitch=pitch,
+                yaw=yaw,
+                std=motion.mounting_std,
+                squat=motion.squat,
+                squat_std=motion.squat_std,
+            )
+    return known
+
+
+def _self_weighing(
+    balances: Sequence[ForceBalance], vehicle: Vehicle, masses: Sequence[float]
+) -> tuple[float, float]:
+    """Weigh the calibration drives: true over found mass, and its standard deviation.
+
+    Noise in load and acceleration pulls the torque fit and the weighing in
+    different directions; what they leave on the drives of known mass is taken
+    out here.
+    """
+    time, phi, whole, rest = [], [], [], []
+    offset = 0.0
+    for balance, mass in zip(balances, masses, strict=True):
+        view = balance.merged
+        x, target = regression(view, vehicle)
+        used = (view.reason == Reason.USED) & (view.accel > 0.0)
+        used &= np.isfinite(x) & np.isfinite(target)
+        time.append(view.time[used] + offset)
+        phi.append(x[used] * mass)
+        whole.append(target[used])
+        rest.append((view.traction_force - target)[used])
+        offset += float(view.time[-1]) + 1e3 if view.time.size else 0.0
+    every = np.ones(sum(t.size for t in time), dtype=bool)
+    joined = np.concatenate(time), np.concatenate(phi)
+    found, std, _ = block_jackknife(*joined, np.concatenate(whole), every)
+    resisted, _, _ = block_jackknife(*joined, np.concatenate(rest), every)
+    return (1.0 + resisted) / (found + resisted), std / found
+
+
+def _scaled(model: TorqueModel, scale: float) -> TorqueModel:
+    return replace(
+        model,
+        coefficients=tuple(scale * w for w in model.coefficients),
+        coefficient_stds=tuple(scale * s for s in model.coefficient_stds),
+    )
+

@@ -1,0 +1,278 @@
+"""From a drive and a vehicle to a mass."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from weighbridge.balance import REASON_TEXT, Reason, force_balance
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators import ESTIMATORS, MassTrack, Segment, Status
+from weighbridge.navigation.select import find_motion
+from weighbridge.signals import Drive
+from weighbridge.balance.delay import estimate_torque_delay
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import SIGNALS
+
+if TYPE_CHECKING:
+    import polars as pl
+
+DEFAULT_METHOD = "rls"
+"""Estimator used unless one is named."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weighing:
+    """The mass of one drive, how sure it is, and why.
+
+    Attributes
+    ----------
+    drive, vehicle : what it was made from
+    method : name of the estimator
+    status : `Status`
+    reason : why there is no mass, one sentence; empty where there is
+    result : the estimator's track; None where nothing could be estimated
+    warnings : what was mended or doubted, one sentence each
+    """
+
+    drive: Drive
+    vehicle: Vehicle
+    method: str
+    status: Status
+    reason: str
+    result: MassTrack | None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]; NaN where there is none."""
+        return self.result.mass if self.result and self.status is Status.CONVERGED else math.nan
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the mass [kg]; NaN where there is none."""
+        return self.result.std if self.result and self.status is Status.CONVERGED else math.nan
+
+    @property
+    def payload(self) -> float:
+        """Mass minus the vehicle's tare [kg]; NaN where either is unknown."""
+        return self.mass - self.vehicle.tare if self.vehicle.tare is not None else math.nan
+
+    def interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Interval that holds the mass with the probability ``level`` [kg].
+
+        Raises
+        ------
+        ConfigError
+            The level is not between 0 and 1.
+        """
+        if not 0.0 < level < 1.0:
+            raise ConfigError(f"level must be between 0 and 1, got {level}")
+        if self.result is None or not math.isfinite(self.mass):
+            return math.nan, math.nan
+        reach = float(student.ppf(0.5 + 0.5 * level, self.result.degrees_of_freedom)) * self.std
+        return self.mass - reach, self.mass + reach
+
+    @property
+    def used_time(self) -> float:
+        """Time of the rows the mass was made from [s]."""
+        if self.result is None or self.result.time.size < 2:
+            return 0.0
+        return float(np.count_nonzero(self.result.used) * np.median(np.diff(self.result.time)))
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """Mass between stops, where load can change."""
+        return self.result.segments if self.result else ()
+
+    @property
+    def track(self) -> pl.DataFrame:
+        """The mass over time with what it was made from, one row per force sample."""
+        import polars as pl
+
+        if self.result is None:
+            return pl.DataFrame(schema=dict.fromkeys(TRACK_COLUMNS, pl.Float64))
+        r, view = self.result, self.result.balance.merged
+        texts = np.array([REASON_TEXT[Reason(k)] for k in range(len(Reason))])
+        columns = (
+            r.time,
+            r.running_mass,
+            r.running_std,
+            r.used,
+            view.speed,
+            view.accel,
+            view.specific_force,
+            view.grade,
+            view.pitch,
+            view.gear,
+            view.traction_force,
+            texts[r.reason],
+        )
+        return pl.DataFrame(dict(zip(TRACK_COLUMNS, columns, strict=True)), nan_to_null=True)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what ``weigh --json`` prints: numbers, None where there is no mass."""
+        low, high = self.interval(0.95)
+        r = self.result
+        return {
+            "drive": self.drive.name,
+            "vehicle": self.vehicle.name,
+            "method": self.method,
+            "status": str(self.status),
+            "reason": self.reason,
+            "mass_kg": _number(self.mass),
+            "std_kg": _number(self.std),
+            "interval95_kg": [_number(low), _number(high)],
+            "payload_kg": _number(self.payload),
+            "duration_s": _number(self.drive.duration),
+            "used_s": _number(self.used_time),
+            "converged_at_s": _number(r.converged_at - self.drive.start) if r else None,
+            "bound_std_kg": _number(r.bound_std) if r else None,
+            "segments": [
+                {
+                    "start_s": _number(s.start),
+                    "end_s": _number(s.end),
+                    "mass_kg": _number(s.mass),
+                    "std_kg": _number(s.std),
+                }
+                for s in self.segments
+            ],
+            "warnings": list(self.warnings),
+        }
+
+    def to_json(self) -> str:
+        """Return `to_dict` as one line of JSON."""
+        return json.dumps(self.to_dict(), ensure_ascii=False)
+
+    def write_track(self, path: str | Path) -> None:
+        """Write the track as CSV or Parquet, by the suffix of ``path``.
+
+        Raises
+        ------
+        ConfigError
+            The suffix is neither.
+        """
+        path = Path(path)
+        if path.suffix.lower() == ".csv":
+            self.track.write_csv(path)
+        elif path.suffix.lower() == ".parquet":
+            self.track.write_parquet(path)
+        else:
+            raise ConfigError(f"{path}: a track is written as .csv or .parquet")
+
+    def report(self, path: str | Path) -> None:
+        """Write a self-contained HTML report that opens offline."""
+        from weighbridge.report import write_report
+
+        write_report([self], path)
+
+    def plot(self) -> Any:
+        """Return a plotly figure of the mass over time."""
+        from weighbridge.report import mass_figure
+
+        return mass_figure(self)
+
+
+TRACK_COLUMNS = (
+    "time_s",
+    "mass_kg",
+    "std_kg",
+    "used",
+    "speed_mps",
+    "accel_mps2",
+    "specific_force_mps2",
+    "grade_rad",
+    "pitch_rad",
+    "gear",
+    "traction_force_n",
+    "reason",
+)
+"""Columns of the track, as files carry them."""
+
+
+def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weighing:
+    """Weigh a vehicle from one drive.
+
+    Parameters
+    ----------
+    drive : as of `read_drive`
+    vehicle : as of `calibrate` or `Vehicle.load`
+    method : name of an estimator in `weighbridge.estimators.ESTIMATORS`
+
+    Returns
+    -------
+    Weighing
+        Without a mass, but with a reason, where the data cannot carry one.
+
+    Raises
+    ------
+    ConfigError
+        The method is not known.
+    DriveError
+        What the drive says cannot be so, such as a wrong unit.
+    """
+    estimator = ESTIMATORS.get(method)
+    if estimator is None:
+        raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
+
+    from weighbridge.pipeline.checks import check_drive
+
+    drive = drive.with_problems(*check_drive(drive, vehicle))
+    for problem in drive.problems:
+        if problem.serious:
+            raise DriveError(f"{drive.name}: {problem.text}")
+    warnings = tuple(p.text for p in drive.problems)
+
+    lacking = what_is_missing(drive, vehicle)
+    if lacking:
+        return Weighing(
+            drive=drive,
+            vehicle=vehicle,
+            method=method,
+            status=Status.MISSING_SIGNALS,
+            reason=lacking,
+            result=None,
+            warnings=warnings,
+        )
+    motion = find_motion(drive, vehicle)
+    warnings += motion.notes
+    delay = vehicle.timing.torque_delay
+    if delay is None:
+        delay = estimate_torque_delay(drive, vehicle, motion)
+        warnings += (f"torque delay {delay:+.2f} s found from this drive",)
+    result = estimator(force_balance(drive, vehicle, motion, delay=delay), vehicle)
+    return Weighing(
+        drive=drive,
+        vehicle=vehicle,
+        method=method,
+        status=result.status,
+        reason=result.why,
+        result=result,
+        warnings=warnings,
+    )
+
+
+def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
+    """Say which signals a drive lacks for this vehicle; empty if none."""
+    source = vehicle.torque.source
+    missing = drive.missing(SIGNALS[source])
+    if source in ("measured", "percent") and vehicle.driveline.single_speed:
+        missing = [name for name in missing if name != "engine_speed"]
+    if not (drive.has("vehicle_speed") or drive.has("gnss_speed")) and not drive.has("latitude"):
+        missing.append("vehicle_speed")
+    if not vehicle.driveline.single_speed and not drive.has("engine_speed"):
+        missing.append("engine_speed")
+    if not missing:
+        return ""
+    names = " and ".join(dict.fromkeys(missing))
+    return f"the drive has no {names}, which torque source {source!r} needs; nothing can be weighed"
+
+
+def _number(value: float) -> float | None:
+    return round(float(value), 6) if math.isfinite(value) else None

@@ -1,0 +1,254 @@
+"""Gearing: ratios found from engine and vehicle speed, and the gear of the moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from weighbridge.errors import DriveError
+from weighbridge.signals import Bools, Floats, Ints
+
+LOWEST_GEARING: Final = 3.0
+"""Below any top gear of a road vehicle, engine angle per distance [1/m]."""
+
+HIGHEST_GEARING: Final = 140.0
+"""Above any first gear of a road vehicle, trucks' crawlers too [1/m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class GearDetection:
+    """Gearings found and the distribution they were found in (Jensen 2022, fig. 6).
+
+    Attributes
+    ----------
+    gearings : (n,) of gears 1..n, falling [1/m]
+    stds : (n,) their standard deviations [1/m]
+    counts : (n,) samples behind each
+    grid : (m,) centres of the intervals of eq. 50 [1/m]
+    density : (m,) samples within each [-]
+    """
+
+    gearings: Floats
+    stds: Floats
+    counts: Ints
+    grid: Floats
+    density: Floats
+
+
+def effective_gearing(engine_speed: Floats, speed: Floats) -> Floats:
+    """Engine angle per distance travelled (Jensen 2022, eq. 10).
+
+    Parameters
+    ----------
+    engine_speed : (n,) [rad/s]
+    speed : (n,) [m/s]
+
+    Returns
+    -------
+    (n,) [1/m]; NaN where the vehicle does not move forward
+    """
+    moving = speed > 0.1
+    return np.where(moving, engine_speed / np.where(moving, speed, 1.0), np.nan)
+
+
+def ratio_density(
+    gearing: Floats, weight: Floats, *, width: float = 0.02, points: int = 1200
+) -> tuple[Floats, Floats]:
+    """Count samples in intervals that widen with the ratio (Jensen 2022, eq. 50).
+
+    Parameters
+    ----------
+    gearing : (n,) finite, positive [1/m]
+    weight : (n,) what each sample counts
+    width : half width of an interval over its centre [-]
+    points : number of intervals, evenly spaced in the logarithm
+
+    Returns
+    -------
+    grid : (points,) centres [1/m]
+    density : (points,) weighted counts
+    """
+    grid = np.geomspace(LOWEST_GEARING, HIGHEST_GEARING, points)
+    order = np.argsort(gearing)
+    cumulative = np.concatenate(([0.0], np.cumsum(weight[order])))
+    rising = gearing[order]
+    high = np.searchsorted(rising, grid * (1.0 + width), side="right")
+    low = np.searchsorted(rising, grid * (1.0 - width), side="left")
+    return grid, cumulative[high] - cumulative[low]
+
+
+def detect_gearings(
+    time: Floats,
+    engine_speed: Floats,
+    speed: Floats,
+    *,
+    idle_speed: float | None = None,
+    speed_step: float = 0.0,
+    width: float = 0.02,
+    most: int = 18,
+) -> GearDetection:
+    """Find the gearings as peaks of the ratio's distribution.
+
+    Samples count where the ratio holds still, so that shifts and a slipping
+    clutch leave no peak, and less where a coarse speed blurs it.
+
+    Parameters
+    ----------
+    time : (n,) rising [s]
+    engine_speed : (n,) [rad/s]
+    speed : (n,) [m/s]
+    idle_speed : engine speed that is idling; found from standstill when None [rad/s]
+    speed_step : quantisation of ``speed`` [m/s]
+    width : half width of an interval over its centre [-]
+    most : largest number of gears
+
+    Raises
+    ------
+    DriveError
+        No ratio stands out: too short a drive, or a stepless gearbox.
+
+    References
+    ----------
+    Jensen et al. 2022, sec. 6.2, eq. 50.
+    """
+    gearing = effective_gearing(engine_speed, speed)
+    if idle_speed is None:
+        idle_speed = _idle_speed(engine_speed, speed)
+    slowest = max(1.5, 6.0 * speed_step)
+    usable = (
+        np.isfinite(gearing)
+        & (speed > slowest)
+        & (engine_speed > 1.12 * idle_speed)
+        & (gearing > LOWEST_GEARING)
+        & (gearing < HIGHEST_GEARING)
+    )
+    steady = usable & _steady(time, gearing, width + 0.5 * speed_step / np.maximum(speed, 1.0))
+    if np.count_nonzero(steady) < 30:
+        raise DriveError(
+            f"no gear ratio can be found: only {np.count_nonzero(steady)} samples with a steady "
+            "ratio of engine to vehicle speed; record a longer drive with several gears"
+        )
+    blur = np.hypot(width, 0.29 * speed_step / speed[steady])
+    grid, density = ratio_density(gearing[steady], width / blur, width=width)
+    # A gear is a peak that stands out from its surroundings, be it ever so
+    # rarely used: shifting smears samples evenly, gears pile them up.
+    peaks, found = find_peaks(
+        density,
+        prominence=max(5.0, 0.002 * density.sum() / (2.0 * width) * np.log(grid[1] / grid[0])),
+        distance=int(0.07 / np.log(grid[1] / grid[0])),
+    )
+    keep = found["prominences"] > 0.55 * density[peaks]
+    peaks = peaks[keep]
+    if peaks.size > most:
+        peaks = np.sort(peaks[np.argsort(density[peaks])[-most:]])
+    if peaks.size == 0:
+        raise DriveError(
+            "no gear ratio stands out from engine over vehicle speed: the drive is too short, "
+            "or the gearbox is stepless"
+        )
+    values, stds, counts = [], [], []
+    for centre in grid[peaks]:
+        refined, std, count = _refine(gearing[steady], speed[steady], centre, width, speed_step)
+        values.append(refined)
+        stds.append(std)
+        counts.append(count)
+    order = np.argsort(values)[::-1]
+    return GearDetection(
+        np.array(values)[order],
+        np.array(stds)[order],
+        np.array(counts, dtype=np.int64)[order],
+        grid,
+        density,
+    )
+
+
+def predict_gear(
+    engine_speed: Floats, speed: Floats, gearings: Floats, *, tolerance: float = 0.06
+) -> tuple[Ints, Floats]:
+    """Name the gear whose gearing is nearest (Jensen 2022, eq. 11).
+
+    Parameters
+    ----------
+    engine_speed : (n,) [rad/s]
+    speed : (n,) [m/s]
+    gearings : (m,) falling [1/m]
+    tolerance : largest relative distance that still counts as in gear [-]
+
+    Returns
+    -------
+    gear : (n,) 1..m; 0 where no gear is engaged or the vehicle stands
+    mismatch : (n,) relative distance of the ratio to the nearest gearing [-];
+        NaN where the vehicle stands
+    """
+    gearing = effective_gearing(engine_speed, speed)
+    rising = np.sort(gearings)
+    # Halfway in the logarithm, so that the relative distance decides.
+    edges = np.sqrt(rising[1:] * rising[:-1])
+    finite = np.isfinite(gearing)
+    nearest = np.searchsorted(edges, np.where(finite, gearing, rising[0]))
+    mismatch = np.where(finite, gearing / rising[nearest] - 1.0, np.nan)
+    engaged = finite & (np.abs(mismatch) <= tolerance)
+    return np.where(engaged, gearings.size - nearest, 0).astype(np.int64), mismatch
+
+
+def shifting(time: Floats, gear: Ints, *, margin: float) -> Bools:
+    """Mark samples within ``margin`` [s] of a change of gear.
+
+    Parameters
+    ----------
+    time : (n,) rising [s]
+    gear : (n,) with 0 for none engaged
+    """
+    change = np.flatnonzero(np.diff(gear) != 0)
+    if change.size == 0:
+        return np.zeros(time.size, dtype=bool)
+    instants = 0.5 * (time[change] + time[change + 1])
+    right = np.clip(np.searchsorted(instants, time), 0, instants.size - 1)
+    left = np.maximum(right - 1, 0)
+    near = np.minimum(np.abs(instants[right] - time), np.abs(time - instants[left]))
+    return np.asarray(near <= margin)
+
+
+def _idle_speed(engine_speed: Floats, speed: Floats) -> float:
+    standing = (speed < 0.3) & (engine_speed > 30.0)
+    if np.count_nonzero(standing) >= 10:
+        return float(np.median(engine_speed[standing]))
+    running = engine_speed[engine_speed > 30.0]
+    return float(np.percentile(running, 1)) if running.size else 0.0
+
+
+def _steady(time: Floats, gearing: Floats, tolerance: Floats) -> Bools:
+    """Tell where the ratio agrees with the one before and the one after."""
+    log = np.log(np.where(gearing > 0.0, gearing, np.nan))
+    change = np.abs(np.diff(log))
+    near = np.isfinite(change) & (np.diff(time) < 3.0)
+    agrees = near & (change < 0.5 * (tolerance[1:] + tolerance[:-1]))
+    steady = np.zeros(time.size, dtype=bool)
+    steady[1:-1] = agrees[1:] & agrees[:-1]
+    return steady
+
+
+def _refine(
+    gearing: Floats, speed: Floats, centre: float, width: float, speed_step: float
+) -> tuple[float, float, int]:
+    """Weighted robust mean around a peak: value, standard deviation, samples."""
+    value = float(centre)
+    near = np.abs(gearing / value - 1.0) < 2.0 * width
+    for _ in range(3):
+        near = np.abs(gearing / value - 1.0) < 1.5 * width + 0.5 * speed_step / speed
+        if not near.any():
+            return value, float(centre * width), 0
+        weight = speed[near] ** 2 if speed_step > 0.0 else np.ones(np.count_nonzero(near))
+        value = _weighted_median(gearing[near], weight)
+    spread = 1.4826 * float(np.median(np.abs(gearing[near] - value)))
+    count = int(np.count_nonzero(near))
+    return value, max(spread, 1e-4 * value) * float(np.sqrt(np.pi / (2.0 * count))), count
+
+
+def _weighted_median(values: Floats, weight: Floats) -> float:
+    order = np.argsort(values)
+    cumulative = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(cumulative, 0.5 * cumulative[-1])])

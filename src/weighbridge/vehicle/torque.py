@@ -1,0 +1,164 @@
+"""Torque of engine or motor from what a drive recorded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from weighbridge.constants import PETROL_HEATING_VALUE, PETROL_STOICHIOMETRIC_RATIO
+from weighbridge.errors import DriveError
+from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.vehicle.model import TorqueModel, TorqueSource, Vehicle
+
+SIGNALS: dict[TorqueSource, tuple[str, ...]] = {
+    "measured": ("engine_torque",),
+    "percent": ("engine_torque_fraction",),
+    "load": ("engine_load", "engine_speed"),
+    "air_flow": ("mass_air_flow", "engine_speed"),
+}
+"""What each torque source needs of a drive."""
+
+
+@dataclass(frozen=True, slots=True)
+class Torque:
+    """Torque at the engine's or motor's shaft and where it holds.
+
+    Attributes
+    ----------
+    time : (n,) stamps as recorded [s]
+    torque : (n,) [N m]
+    extrapolated : (n,) outside what the torque model has seen
+    overrun : (n,) the source says nothing: load at its lowest, engine dragged
+    """
+
+    time: Floats
+    torque: Floats
+    extrapolated: Bools
+    overrun: Bools
+
+
+def air_flow_torque(
+    mass_air_flow: Floats, engine_speed: Floats, lambda_1: Floats, efficiency: float
+) -> Floats:
+    """Torque from intake air flow (Jensen 2022, eq. 51, with the division by engine speed).
+
+    Parameters
+    ----------
+    mass_air_flow : (n,) [kg/s]
+    engine_speed : (n,) [rad/s]
+    lambda_1 : (n,) air-fuel equivalence ratio [-]
+    efficiency : shaft over fuel power [-]
+
+    Returns
+    -------
+    (n,) [N m]
+    """
+    fuel_flow = mass_air_flow / (PETROL_STOICHIOMETRIC_RATIO * lambda_1)
+    power = efficiency * PETROL_HEATING_VALUE * fuel_flow
+    return np.asarray(power / np.maximum(engine_speed, 30.0))
+
+
+def source_signal(drive: Drive, vehicle: Vehicle) -> Signal:
+    """Return the signal whose clock carries the torque.
+
+    Raises
+    ------
+    DriveError
+        The drive lacks what the vehicle's torque source needs.
+    """
+    source = vehicle.torque.source
+    missing = drive.missing(SIGNALS[source])
+    if missing:
+        raise DriveError(
+            f"{drive.name}: no {' and no '.join(missing)}, which torque source {source!r} of "
+            f"vehicle {vehicle.name!r} needs; record it, or use a vehicle file with another source"
+        )
+    return drive.signals[SIGNALS[source][0]]
+
+
+def regressor(drive: Drive, source: TorqueSource, time: Floats, model: TorqueModel) -> Floats:
+    """Return what torque is (nearly) proportional to, at recorded stamps.
+
+    Load for "load" [-], ideal torque for "air_flow" [N m], torque itself for
+    "measured" and "percent" [N m].
+
+    Raises
+    ------
+    DriveError
+        Percent torque without a reference torque in drive or vehicle.
+    """
+    values = drive.signals[SIGNALS[source][0]].at(time)
+    if source == "percent":
+        reference = drive.get("reference_torque")
+        if reference is not None and len(reference):
+            return values * float(np.median(reference.values))
+        if model.reference_torque is None:
+            raise DriveError(
+                f"{drive.name}: percent torque without a reference torque; give "
+                "reference_torque_nm in the drive or under [torque] in the vehicle file"
+            )
+        return values * model.reference_torque
+    if source == "air_flow":
+        lambda_1 = drive.get("lambda_1")
+        ratio = lambda_1.at(time) if lambda_1 is not None else np.ones_like(time)
+        speed = drive.signals["engine_speed"].at(time)
+        usable = np.where(np.isfinite(ratio), ratio, 1.0)
+        return air_flow_torque(values, speed, usable, model.engine_efficiency)
+    return values
+
+
+def torque_rows(regressor: Floats, engine_speed: Floats, order: int) -> Floats:
+    """Rows of the torque regression (Jensen 2022, eq. 49).
+
+    Parameters
+    ----------
+    regressor : (n,) load [-] or air-flow torque [N m]
+    engine_speed : (n,) [rad/s]
+    order : highest power of engine speed
+
+    Returns
+    -------
+    (n, 2 + order): 1, regressor, N, N^2 ...
+    """
+    powers = [engine_speed**k for k in range(1, order + 1)]
+    return np.column_stack([np.ones_like(regressor), regressor, *powers])
+
+
+def lowest_load(load: Floats) -> float:
+    """Load below which the engine may be dragged and the load says nothing [-]."""
+    finite = load[np.isfinite(load)]
+    if finite.size == 0:
+        return 0.0
+    return float(np.percentile(finite, 1.0) + 0.01)
+
+
+def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Floats) -> Torque:
+    """Return the torque at the recorded stamps ``time``.
+
+    Parameters
+    ----------
+    engine_speed : (n,) at the same stamps [rad/s]; may be NaN for measured torque
+    time : (n,) [s]
+
+    Raises
+    ------
+    DriveError
+        The drive lacks what the torque source needs.
+    """
+    model = vehicle.torque
+    source_signal(drive, vehicle)
+    x = regressor(drive, model.source, time, model)
+    nowhere = np.zeros(time.size, dtype=bool)
+    if model.source in ("measured", "percent"):
+        offset, scale = model.coefficients or (0.0, 1.0)
+        return Torque(time, offset + scale * x, nowhere, nowhere)
+    if not model.coefficients:
+        return Torque(time, x, nowhere, x <= 0.0)
+    rows = torque_rows(x, engine_speed, len(model.coefficients) - 2)
+    torque = rows @ np.array(model.coefficients)
+    low, high = model.load_range or (-math.inf, math.inf)
+    slow, fast = model.speed_range or (-math.inf, math.inf)
+    extrapolated = (x > high) | (engine_speed < slow) | (engine_speed > fast)
+    return Torque(time, torque, extrapolated, x < low)
