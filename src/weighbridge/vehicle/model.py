@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.errors import ConfigError
@@ -238,3 +239,16 @@ class Vehicle:
             raise ConfigError(f"class must be car, van, bus or truck, got {self.kind!r}")
         _positive("tare", self.tare)
         _positive("gross", self.gross)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Vehicle:
+        """Read a vehicle file; see `weighbridge.vehicle.file.load_vehicle`."""
+        from weighbridge.vehicle.file import load_vehicle
+
+        return load_vehicle(path)
+
+    def save(self, path: str | Path) -> None:
+        """Write a vehicle file; see `weighbridge.vehicle.file.save_vehicle`."""
+        from weighbridge.vehicle.file import save_vehicle
+
+        save_vehicle(self, path)

@@ -1,0 +1,33 @@
+"""What a reader hands over: the signals of one file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from weighbridge.io.mapping import TableMapping
+from weighbridge.signals import Problem, Signal
+
+
+@dataclass(slots=True)
+class Log:
+    """The signals of one file, in SI, each on its own clock.
+
+    Attributes
+    ----------
+    path : the file
+    signals : cleaned
+    problems : what was left out
+    absolute : whether the clock counts from 1970
+    """
+
+    path: Path
+    signals: list[Signal] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
+    absolute: bool = False
+
+
+Reader = Callable[[Path, "str | None", "TableMapping | None"], Log]
+"""Reads a file, given the canonical table it is (None where one file holds all)
+and the mapping for it (None for canonical names)."""

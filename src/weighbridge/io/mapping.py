@@ -1,0 +1,264 @@
+"""Mapping TOML: what a foreign log's columns are called and how they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any, Final
+
+from weighbridge.errors import ConfigError
+from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
+from weighbridge.io.table import TextFormat
+from weighbridge.signals import QUANTITIES, Quantity
+from weighbridge.signals.tomlfile import Section, read_toml, suggestion
+from weighbridge.signals.units import UNITS
+
+FORMAT_VERSION: Final = 1
+"""Version of the mapping file this program reads."""
+
+MappingSource = str | Path | Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeColumn:
+    """Where the time stands and how it is written.
+
+    Attributes
+    ----------
+    column : its name; None for a canonical time column or a log's own clock
+    unit : suffix of its unit; None for the unit in the column's brackets, or seconds
+    format : None for numbers, "clock", "iso" or a `strptime` format
+    offset : added to every stamp [s]
+    """
+
+    column: str | None = None
+    unit: str | None = None
+    format: str | None = None
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MappedSignal:
+    """One foreign column: ``value = factor * cell + offset`` in ``unit``.
+
+    Attributes
+    ----------
+    name : canonical name of the quantity
+    column : what the log calls it
+    unit : suffix of its unit; None for the one the log states
+    factor : -1 for an axis that points the other way
+    offset : in ``unit``, added after the factor
+    optional : its absence is not worth a note
+    """
+
+    name: str
+    column: str
+    unit: str | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+    optional: bool = False
+
+    @property
+    def quantity(self) -> Quantity:
+        """The quantity it is."""
+        return QUANTITIES[self.name]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableMapping:
+    """How one kind of file is read.
+
+    Attributes
+    ----------
+    files : file names it is for, as a pattern
+    text : how text tables are written
+    time : the time column
+    signals : the columns
+    source : the mapping's file, for messages
+    """
+
+    files: str
+    text: TextFormat
+    time: TimeColumn
+    signals: tuple[MappedSignal, ...]
+    source: str
+
+
+def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
+    """Read a mapping from a TOML file or a dictionary of the same form.
+
+    Returns
+    -------
+    One mapping per kind of file, the most special first.
+
+    Raises
+    ------
+    ConfigError
+        The file, a key or a value cannot be used.
+    """
+    if isinstance(source, Mapping):
+        root = Section(source, "mapping", {})
+    else:
+        root = read_toml(Path(source))
+    version = root.count("format_version")
+    if version not in (None, FORMAT_VERSION):
+        root.fail(
+            "format_version",
+            f"is {version}, and this program reads {FORMAT_VERSION}: "
+            "use the program's version that goes with the file",
+        )
+    found = []
+    tables = root.section("tables")
+    if tables is not None:
+        for name in tables.data:
+            section = tables.section(name)
+            if section is not None:
+                found.append(_table(section, section.text("files") or f"{name}.*"))
+    if tables is None or "signals" in root.data:
+        found.append(_table(root, "*"))
+    root.done()
+    return tuple(found)
+
+
+def mapping_for(path: Path, mappings: tuple[TableMapping, ...]) -> TableMapping | None:
+    """Return the first mapping whose pattern fits the file's name."""
+    name = path.name.lower()
+    return next((m for m in mappings if fnmatch(name, m.files.lower())), None)
+
+
+def _table(root: Section, files: str) -> TableMapping:
+    text = _text_format(root.section("csv"))
+    time = _time(root.section("time"))
+    section = root.section("signals")
+    if section is None or not section.data:
+        root.fail(
+            "signals",
+            "is missing: name at least one column, such as "
+            '[signals.vehicle_speed] column = "Speed", unit = "kmh"',
+        )
+    signals = tuple(_signal(section, name) for name in section.data)
+    if root.path:
+        root.done()
+    return TableMapping(files=files, text=text, time=time, signals=signals, source=root.name)
+
+
+def _text_format(section: Section | None) -> TextFormat:
+    if section is None:
+        return TextFormat()
+    separator = section.text("separator")
+    if separator is not None and len(separator) != 1:
+        section.fail("separator", f'must be one character such as ";" or "\\t", got {separator!r}')
+    decimal = section.text("decimal") or "."
+    if decimal not in (".", ","):
+        section.fail("decimal", f'must be "." or ",", got {decimal!r}')
+    encoding = section.text("encoding")
+    if encoding is not None:
+        try:
+            "".encode(encoding)
+        except LookupError:
+            section.fail(
+                "encoding", f"is not a text encoding: {encoding!r}; try utf-8, latin-1 or cp1252"
+            )
+    fmt = TextFormat(
+        separator=separator,
+        encoding=encoding,
+        decimal=decimal,
+        skip_rows=section.count("skip_rows") or 0,
+        skip_after_header=section.count("skip_after_header") or 0,
+        columns=section.texts("columns") or (),
+        missing=section.texts("missing") or (),
+    )
+    if fmt.decimal == "," and fmt.separator == ",":
+        section.fail("decimal", "and separator cannot both be a comma")
+    section.done()
+    return fmt
+
+
+def _time(section: Section | None) -> TimeColumn:
+    if section is None:
+        return TimeColumn()
+    written = section.text("unit")
+    unit = None
+    if written is not None:
+        unit = unit_suffix(written)
+        if unit is None or UNITS[unit].dimension != "s":
+            section.fail("unit", f"{written!r} is no unit of time; use s, ms, us, ns or min")
+    time = TimeColumn(
+        column=section.text("column"),
+        unit=unit,
+        format=section.text("format"),
+        offset=section.quantity("offset", "s") or 0.0,
+    )
+    if time.format is not None and time.format not in ("clock", "iso") and "%" not in time.format:
+        section.fail(
+            "format",
+            f'must be "clock" (17:58:02.288), "iso" (2026-01-31T17:58:02) or a pattern such as '
+            f'"%d.%m.%Y %H:%M:%S%.f", got {time.format!r}',
+        )
+    section.done()
+    return time
+
+
+def _signal(parent: Section, name: str) -> MappedSignal:
+    if name not in QUANTITIES:
+        parent.fail(name, f"is no quantity{suggestion(name, QUANTITIES)}")
+    quantity = QUANTITIES[name]
+    section = parent.section(name)
+    if section is None:
+        raise AssertionError(name)
+    column = section.text("column")
+    if column is None:
+        section.fail("column", "is missing: give the name the log calls it")
+    written = section.text("unit")
+    unit: str | None = None
+    if written is not None and written != "":
+        unit = unit_suffix(written)
+        if unit is None or UNITS[unit].dimension != dimension_of(quantity):
+            allowed = ", ".join(suffixes_of(quantity)) or "none"
+            section.fail("unit", f"{written!r} is no unit of {name}; use one of: {allowed}")
+    factor = section.number("factor")
+    if factor == 0.0:
+        section.fail("factor", "must not be 0: that would make the signal constant")
+    signal = MappedSignal(
+        name=name,
+        column=column,
+        unit=unit,
+        factor=1.0 if factor is None else factor,
+        offset=section.number("offset") or 0.0,
+        optional=section.flag("optional") or False,
+    )
+    section.done()
+    return signal
+
+
+def resolved_unit(signal: MappedSignal, stated: str | None, source: str) -> str:
+    """Unit suffix of a mapped signal: the mapping's, else the one the log states.
+
+    Parameters
+    ----------
+    signal : the mapped signal
+    stated : suffix of the unit that the log itself gives, if any
+
+    Raises
+    ------
+    ConfigError
+        Neither says one.
+    """
+    if not signal.quantity.suffix:
+        return ""
+    found = signal.unit or stated or bracketed_unit(signal.column)
+    if found is None:
+        raise ConfigError(
+            f"{source}: signals.{signal.name} has no unit and column "
+            f"{signal.column!r} states none; "
+            f"add unit = one of: {', '.join(suffixes_of(signal.quantity))}"
+        )
+    if UNITS[found].dimension != dimension_of(signal.quantity):
+        raise ConfigError(
+            f"{source}: column {signal.column!r} is in {found!r}, which is no unit of "
+            f"{signal.name}; "
+            "map another quantity or state its unit"
+        )
+    return found

@@ -1,0 +1,204 @@
+"""ASAM MDF: measurement channels, each on the clock of its own channel group.
+
+Raster functions of the library are not used: resampling would blur the delays
+that a calibration has to find.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
+from weighbridge.io.log import Log
+from weighbridge.io.mapping import MappedSignal, TableMapping, resolved_unit
+from weighbridge.io.table import column_list
+from weighbridge.signals import Floats, Problem
+from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.units import to_si
+
+# Channel groups of bus logging (ASAM MDF 4, bus logging), not of measurements.
+_BUS_PREFIXES: Final = ("CAN_", "LIN_", "FLX_", "ETH_", "MOST_")
+
+_Place = tuple[int, int]
+
+
+def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read measurement channels of an MDF file; see `weighbridge.io.log.Reader`.
+
+    Raises
+    ------
+    DriveError
+        Not an MDF file, cut off, only raw bus frames, or no known channel.
+    MissingExtraError
+        asammdf is not installed.
+    """
+    try:
+        from asammdf import MDF
+    except ImportError:
+        raise MissingExtraError("asammdf", "mdf", f"reading {path.name}") from None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            file = MDF(path)
+        # The library raises errors of many kinds, down to struct.error, for a broken file.
+        except Exception as e:
+            raise DriveError(
+                f"{path} is not a readable MDF file ({_first_line(e)}); "
+                "it may have been cut off: copy it again"
+            ) from None
+        with file:
+            return _read(file, path, table, mapping)
+
+
+def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    log = Log(path)
+    channels, raw_bus = _channels(file)
+    wanted = (
+        _mapped(log, channels, mapping, file) if mapping else _canonical(log, channels, table, file)
+    )
+    if not wanted:
+        if raw_bus:
+            raise DriveError(
+                f"{path} holds raw {raw_bus} bus frames and no measurement channel that is known; "
+                "decode it to signals with its DBC first"
+            )
+        names = column_list(channels) if channels else "no channels"
+        hint = f"named in {mapping.source}" if mapping else "with a canonical name"
+        raise DriveError(
+            f"{path} has no channel {hint}; it has {names}: name its channels in a mapping file"
+        )
+    clocks: dict[int, list[tuple[str, Floats]]] = {}
+    times: dict[int, Floats] = {}
+    offset = mapping.time.offset if mapping else 0.0
+    for name, (place, suffix, signal) in wanted.items():
+        group = place[0]
+        time, values = _samples(file, path, place)
+        if values is None:
+            log.problems.append(Problem(name, f"{path.name}: {name} is no number and was ignored"))
+            continue
+        if signal is not None and (signal.factor != 1.0 or signal.offset != 0.0):
+            values = values * signal.factor + signal.offset
+        times.setdefault(group, time + offset if offset else time)
+        clocks.setdefault(group, []).append((name, to_si(values, suffix) if suffix else values))
+    for group, columns in clocks.items():
+        if times[group].size == 0:
+            names = ", ".join(n for n, _ in columns)
+            log.problems.append(Problem("", f"{path.name}: {names} has no samples"))
+            continue
+        signals, problems = clean_columns(times[group], columns, path.name)
+        log.signals += signals
+        log.problems += problems
+    return log
+
+
+def _channels(file: Any) -> tuple[dict[str, list[_Place]], str]:
+    """All measurement channels, and the name of the raw bus if one was logged."""
+    found: dict[str, list[_Place]] = {}
+    raw_bus = ""
+    for g, group in enumerate(file.groups):
+        master = file.masters_db.get(g)
+        for c, channel in enumerate(group.channels):
+            if c == master:
+                continue
+            if channel.name.startswith(_BUS_PREFIXES) and "Frame" in channel.name:
+                if group.channel_group.cycles_nr:
+                    raw_bus = raw_bus or channel.name.split("_", 1)[0]
+                continue
+            found.setdefault(channel.name, []).append((g, c))
+    return found, raw_bus
+
+
+def _longest(file: Any, places: list[_Place]) -> _Place:
+    return max(places, key=lambda p: int(file.groups[p[0]].channel_group.cycles_nr))
+
+
+_Wanted = dict[str, tuple[_Place, str, MappedSignal | None]]
+
+
+def _canonical(
+    log: Log, channels: dict[str, list[_Place]], table: str | None, file: Any
+) -> _Wanted:
+    wanted: _Wanted = {}
+    for name, places in channels.items():
+        place = _longest(file, places)
+        stated = unit_suffix(_unit_text(file, place))
+        try:
+            found = parse_column(name, table, stated)
+        except UnitlessColumnError as e:
+            raise DriveError(f"{log.path}: channel {name!r} {e}") from None
+        if found is None:
+            continue
+        quantity, suffix = found
+        if quantity.name not in wanted:
+            wanted[quantity.name] = (place, suffix, None)
+            _note_choice(log, name, places)
+    return wanted
+
+
+def _mapped(
+    log: Log, channels: dict[str, list[_Place]], mapping: TableMapping, file: Any
+) -> _Wanted:
+    wanted: _Wanted = {}
+    plain = {name.strip().casefold(): name for name in channels}
+    for s in mapping.signals:
+        name = s.column if s.column in channels else plain.get(s.column.strip().casefold())
+        if name is None:
+            if not s.optional:
+                log.problems.append(
+                    Problem(
+                        s.name, f"{log.path.name}: channel {s.column!r} for {s.name} is not there"
+                    )
+                )
+            continue
+        place = _longest(file, channels[name])
+        stated = unit_suffix(_unit_text(file, place))
+        wanted[s.name] = (place, resolved_unit(s, stated, mapping.source), s)
+        _note_choice(log, name, channels[name])
+    return wanted
+
+
+def _note_choice(log: Log, name: str, places: list[_Place]) -> None:
+    if len(places) > 1:
+        log.problems.append(
+            Problem(
+                "",
+                f"{log.path.name}: channel {name!r} is there {len(places)} times; "
+                "the one with the most samples was taken",
+            )
+        )
+
+
+def _unit_text(file: Any, place: _Place) -> str:
+    channel = file.groups[place[0]].channels[place[1]]
+    if channel.unit:
+        return str(channel.unit)
+    conversion = channel.conversion
+    return str(conversion.unit) if conversion is not None and conversion.unit else ""
+
+
+def _samples(file: Any, path: Path, place: _Place) -> tuple[Floats, Floats | None]:
+    """Time and physical values of one channel, samples marked invalid left out as NaN."""
+    try:
+        found = file.get(group=place[0], index=place[1], ignore_invalidation_bits=True)
+    except Exception as e:
+        raise DriveError(
+            f"{path}: channel group {place[0]} cannot be read ({_first_line(e)}); "
+            "the file may have been cut off: copy it again"
+        ) from None
+    time = np.array(found.timestamps, dtype=np.float64)
+    if found.samples.ndim != 1 or found.samples.dtype.kind not in "biuf":
+        return time, None
+    values = np.array(found.samples, dtype=np.float64)
+    if found.invalidation_bits is not None:
+        values[np.asarray(found.invalidation_bits, dtype=bool)] = np.nan
+    return time, values
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error).strip().split("\n", 1)[0]
+    return text or type(error).__name__

@@ -1,0 +1,221 @@
+"""Read a drive: a folder of tables, one file, or several files that belong together."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import DriveError
+from weighbridge.io import mdf, tabular
+from weighbridge.io.info import FILE_NAME as INFO_NAME
+from weighbridge.io.info import read_info
+from weighbridge.io.log import Log, Reader
+from weighbridge.io.mapping import MappingSource, TableMapping, load_mapping, mapping_for
+from weighbridge.io.table import read_parquet, read_text, start_text
+from weighbridge.signals import Drive, DriveInfo, Floats, Signal
+from weighbridge.signals.catalogue import TABLES
+
+_logger = logging.getLogger(__name__)
+
+DrivePath = str | Path | Sequence[str | Path]
+
+READERS: Final[dict[str, Reader]] = {
+    ".csv": tabular.read_csv,
+    ".tsv": tabular.read_csv,
+    ".txt": tabular.read_csv,
+    ".parquet": tabular.read_pq,
+    ".pq": tabular.read_pq,
+    ".mf4": mdf.read_mdf,
+    ".mdf": mdf.read_mdf,
+}
+"""Every log format, by file suffix."""
+
+TRUTH_NAME: Final = "truth"
+"""Table of a simulated drive's truth: never read as a signal."""
+
+
+def read_drive(path: DrivePath, mapping: MappingSource | None = None) -> Drive:
+    """Read one drive, each signal on its own clock and in SI.
+
+    Parameters
+    ----------
+    path : a folder of the tables ``imu``, ``obd``, ``gnss``, ``ride`` (CSV or
+        Parquet, with or without ``drive.toml``), one file, or several files
+        that belong to one drive
+    mapping : mapping TOML, or a dictionary of the same form, for files whose
+        columns have other names or units than the canonical ones
+
+    Returns
+    -------
+    Drive
+        What had to be left out is in its ``problems``.
+
+    Raises
+    ------
+    DriveError
+        Nothing is there, a file cannot be read, or a column cannot be
+        understood.
+    ConfigError
+        The mapping cannot be used.
+    """
+    mappings = load_mapping(mapping) if mapping is not None else ()
+    if not isinstance(path, str | Path):
+        paths = [Path(p) for p in path]
+        if not paths:
+            raise DriveError("no file was given: name a folder or at least one file")
+        if len(paths) > 1:
+            more = f"{paths[0].stem}+{len(paths) - 1}"
+            return _drive(more, [_read_file(p, None, mappings) for p in paths], DriveInfo())
+        path = paths[0]
+    path = Path(path)
+    if path.is_dir():
+        return _read_folder(path, mappings)
+    return _drive(path.stem, [_read_file(path, None, mappings)], DriveInfo())
+
+
+def read_table(path: str | Path) -> dict[str, Floats]:
+    """Read all columns of a CSV or Parquet table as they are, such as a truth table.
+
+    Parameters
+    ----------
+    path : the file
+
+    Returns
+    -------
+    (n,) values by column name; NaN where a cell is empty
+
+    Raises
+    ------
+    DriveError
+        No such file, or not a table of numbers.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise DriveError(f"{path}: no such file")
+    raw = read_parquet(path) if path.suffix.lower() in (".parquet", ".pq") else read_text(path)
+    return {name: raw.numbers(i)[0] for i, name in enumerate(raw.names)}
+
+
+def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> Drive:
+    files = sorted(f for f in folder.iterdir() if f.is_file() and f.suffix.lower() in READERS)
+    files = [f for f in files if f.stem.lower() != TRUTH_NAME]
+    info_path = folder / INFO_NAME
+    info = read_info(info_path) if info_path.is_file() else DriveInfo()
+    name = folder.resolve().name
+    tables: dict[str, Path] = {}
+    for f in files:
+        table = f.stem.lower()
+        if table in TABLES and not mapping_for(f, mappings):
+            if table in tables:
+                raise DriveError(
+                    f"{folder} has {tables[table].name} and {f.name}; keep one of them"
+                )
+            tables[table] = f
+    if tables and not mappings:
+        return _drive(name, [_read_file(f, t, ()) for t, f in tables.items()], info)
+    if not files:
+        raise DriveError(
+            f"{folder} holds no drive: it needs at least one of "
+            f"{', '.join(f'{t}.csv' for t in TABLES)} (or .parquet), "
+            f"or one log ({', '.join(READERS)})"
+        )
+    logs = []
+    for f in files:
+        if mappings and f.stem.lower() not in TABLES and mapping_for(f, mappings) is None:
+            continue
+        logs.append(_read_file(f, None, mappings))
+    return _drive(name, logs, info)
+
+
+def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]) -> Log:
+    if path.is_dir():
+        raise DriveError(f"{path} is a folder; give it alone, or name files only")
+    if not path.is_file():
+        raise DriveError(f"{path}: no such file or folder")
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise DriveError(
+            f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; "
+            f"known are {', '.join(READERS)}, and folders of tables"
+        )
+    if table is None and path.stem.lower() in TABLES:
+        table = path.stem.lower()
+    mapping = mapping_for(path, mappings)
+    if mappings and mapping is None and table is None:
+        raise DriveError(
+            f"{path}: no [tables] section of {mappings[0].source} has a pattern "
+            "in files that fits its name"
+        )
+    try:
+        log = reader(path, table, mapping)
+    except OSError as e:
+        raise DriveError(f"{path} cannot be read: {e.strerror or e}") from None
+    _logger.debug("%s: %d signals", path, len(log.signals))
+    return log
+
+
+def _drive(name: str, logs: Sequence[Log], info: DriveInfo) -> Drive:
+    problems = [p for log in logs for p in log.problems]
+    parts: dict[str, list[tuple[Log, Signal]]] = {}
+    info = _rebase(logs, info)
+    for log in logs:
+        for s in log.signals:
+            parts.setdefault(s.name, []).append((log, s))
+    if not parts:
+        files = ", ".join(log.path.name for log in logs)
+        why = f" ({problems[0].text})" if problems else ""
+        raise DriveError(
+            f"{name} holds no samples: every table ({files}) is empty{why}; record it again"
+        )
+    joined: dict[tuple[int, ...], Floats] = {}
+    signals = {n: p[0][1] if len(p) == 1 else _joined(n, p, joined) for n, p in parts.items()}
+    drive = Drive(name=name, signals=signals, info=info, problems=tuple(problems))
+    _logger.info("%s: %d signals over %.0f s", name, len(signals), drive.duration)
+    return drive
+
+
+def _joined(
+    name: str, parts: list[tuple[Log, Signal]], clocks: dict[tuple[int, ...], Floats]
+) -> Signal:
+    """Put the pieces of one signal from several files one after another."""
+    parts = sorted(parts, key=lambda p: float(p[1].time[0]))
+    for (log_a, a), (log_b, b) in pairwise(parts):
+        if b.time[0] <= a.time[-1]:
+            raise DriveError(
+                f"{name} is both in {log_a.path} (up to {a.time[-1]:.6g} s) and "
+                f"in {log_b.path} (from {b.time[0]:.6g} s); read them as drives of their own, "
+                "or leave one out"
+            )
+    key = tuple(id(s.time) for _, s in parts)
+    if key not in clocks:
+        clocks[key] = np.concatenate([s.time for _, s in parts])
+    return Signal(name, clocks[key], np.concatenate([s.values for _, s in parts]))
+
+
+def _rebase(logs: Sequence[Log], info: DriveInfo) -> DriveInfo:
+    """Count from the drive's first full second where clocks count from 1970."""
+    filled = [log for log in logs if log.signals]
+    absolute = [log for log in filled if log.absolute]
+    if not absolute:
+        return info
+    if len(absolute) < len(filled):
+        other = next(log for log in filled if not log.absolute)
+        raise DriveError(
+            f"{absolute[0].path.name} has dates and {other.path.name} counts seconds: "
+            "write all files of a drive on one clock"
+        )
+    start = float(math.floor(min(float(s.time[0]) for log in absolute for s in log.signals)))
+    clocks: dict[int, Floats] = {}
+    for log in absolute:
+        for k, s in enumerate(log.signals):
+            if id(s.time) not in clocks:
+                clocks[id(s.time)] = s.time - start
+            log.signals[k] = Signal(s.name, clocks[id(s.time)], s.values)
+    return info if info.start_time is not None else replace(info, start_time=start_text(start))

@@ -1,0 +1,368 @@
+"""Tables of numbers: CSV and other separated text, and Parquet."""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import polars as pl
+
+from weighbridge.errors import DriveError
+from weighbridge.signals import Floats
+
+SEPARATORS: Final = (",", ";", "\t", "|")
+MISSING: Final = ("", "na", "n/a", "nan", "null", "none", "-", "#n/a")
+"""Cells that mean "no value", in any case."""
+
+# Above this part of cells that are not numbers, a column is text.
+_TEXT_PART: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextFormat:
+    """How a text table is written.
+
+    Attributes
+    ----------
+    separator : between cells; None to find it in the header
+    encoding : None for UTF-8, or Latin-1 where the bytes are not UTF-8
+    decimal : mark of the decimals, "." or ","
+    skip_rows : lines before the header
+    skip_after_header : lines between the header and the first row
+    columns : names of the columns of a file without a header
+    missing : further texts that mean "no value"
+    """
+
+    separator: str | None = None
+    encoding: str | None = None
+    decimal: str = "."
+    skip_rows: int = 0
+    skip_after_header: int = 0
+    columns: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RawTable:
+    """A table as it stands in the file.
+
+    Attributes
+    ----------
+    path : the file
+    names : all its columns
+    frame : cells, columns named by their place "0", "1", …; text cells as text
+    notes : what was odd about the file itself
+    separator : found or given; empty for Parquet
+    missing : texts that mean "no value", lower case
+    decimal : mark of the decimals
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    frame: pl.DataFrame
+    separator: str = ""
+    missing: frozenset[str] = frozenset(MISSING)
+    decimal: str = "."
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.frame.height
+
+    def index(self, name: str) -> int | None:
+        """Place of a column; spaces and case do not count where that is unambiguous."""
+        if name in self.names:
+            return self.names.index(name)
+        wanted = _plain(name)
+        places = [i for i, n in enumerate(self.names) if _plain(n) == wanted]
+        return places[0] if len(places) == 1 else None
+
+    def column(self, index: int) -> pl.Series:
+        """One column as it stands in the file."""
+        return self.frame[str(index)]
+
+    def is_time(self, index: int) -> bool:
+        """Tell whether a column holds dates or times of day."""
+        return self.column(index).dtype.is_temporal()
+
+    def numbers(self, index: int) -> tuple[Floats, list[str]]:
+        """Read a column as numbers.
+
+        Returns
+        -------
+        values : (n,) NaN where a cell is empty or no number
+        notes : cells that were not numbers or not-a-number
+
+        Raises
+        ------
+        DriveError
+            Most of the column is text.
+        """
+        series, name, notes = self.column(index), self.names[index], []
+        if series.dtype == pl.String:
+            text = series.str.strip_chars()
+            if self.decimal == ",":
+                text = text.str.replace(",", ".", literal=True)
+            numbers = text.cast(pl.Float64, strict=False)
+            empty = text.is_null() | text.str.to_lowercase().is_in(sorted(self.missing))
+            wrong = numbers.is_null() & ~empty
+            if bad := int(wrong.sum()):
+                example = text.filter(wrong)[0]
+                row = int(wrong.arg_max() or 0) + 1
+                filled = int((~empty).sum())
+                if bad > _TEXT_PART * filled:
+                    raise DriveError(
+                        f"{self.path}: column {name!r} holds text such as {example!r} "
+                        f"(row {row}), not numbers; correct the file or map another column"
+                    )
+                notes.append(
+                    f"{bad} of {filled} cells of {name!r} are no numbers, such as {example!r} "
+                    f"in row {row}, and were left out"
+                )
+            series = numbers
+        elif series.dtype.is_temporal() or series.dtype.is_nested() or series.dtype == pl.Binary:
+            raise DriveError(
+                f"{self.path}: column {name!r} holds {series.dtype}, not numbers; "
+                "map another column"
+            )
+        elif series.dtype != pl.Float64:
+            series = series.cast(pl.Float64, strict=False)
+        if nans := int(series.is_nan().sum() or 0):
+            notes.append(f"{nans} of {series.len()} cells of {name!r} are NaN and were left out")
+        values = series.to_numpy()
+        # Kernels are compiled for arrays that can be written to and lie in one piece.
+        if not (values.flags.writeable and values.flags.c_contiguous):
+            values = np.array(values, dtype=np.float64)
+        return np.asarray(values, dtype=np.float64), notes
+
+
+def _plain(name: str) -> str:
+    return " ".join(name.split()).casefold()
+
+
+def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
+    """Read a CSV or other separated text table.
+
+    Raises
+    ------
+    DriveError
+        No such file, not text in the encoding, or no header.
+    """
+    fmt = text_format or TextFormat()
+    text, notes = _decode(path, fmt)
+    lines = text.split("\n", fmt.skip_rows + 1)
+    header = lines[fmt.skip_rows].rstrip("\r") if len(lines) > fmt.skip_rows else ""
+    if not header.strip():
+        raise DriveError(f"{path} is empty: it has no header line; remove it or record it again")
+    separator = fmt.separator or _separator(path, header)
+    names = fmt.columns or tuple(_cells(header, separator))
+    skip = fmt.skip_rows + (0 if fmt.columns else 1 + fmt.skip_after_header)
+    body = text if skip == 0 else _after_line(text, skip)
+    if not body.strip():
+        frame = pl.DataFrame({str(i): pl.Series([], dtype=pl.Float64) for i in range(len(names))})
+    else:
+        frame = _parse(path, body, len(names), separator, fmt.decimal, notes)
+    missing = frozenset(MISSING) | {m.strip().lower() for m in fmt.missing}
+    return RawTable(path, names, frame, separator, missing, fmt.decimal, notes)
+
+
+def _decode(path: Path, fmt: TextFormat) -> tuple[str, list[str]]:
+    data = path.read_bytes()
+    if data[:4] in (b"PAR1", b"MDF ", b"UnFi"):
+        raise DriveError(f"{path} is not a text table; give it its own suffix (.parquet, .mf4)")
+    if fmt.encoding is not None:
+        try:
+            return data.decode(fmt.encoding).removeprefix("\ufeff"), []
+        except UnicodeDecodeError as e:
+            raise DriveError(
+                f"{path} is not {fmt.encoding} (byte {e.start}): "
+                "set encoding in [csv] of the mapping"
+            ) from None
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", errors="replace"), []
+    notes = []
+    if b"\x00" in data:
+        notes.append(f"{data.count(0)} zero bytes, as a broken-off recording leaves, were ignored")
+        data = data.replace(b"\x00", b"")
+    try:
+        return data.decode("utf-8-sig"), notes
+    except UnicodeDecodeError:
+        return data.decode("latin-1"), notes
+
+
+def _separator(path: Path, header: str) -> str:
+    if path.suffix.lower() == ".tsv":
+        return "\t"
+    return max(SEPARATORS, key=header.count)
+
+
+def _cells(header: str, separator: str) -> list[str]:
+    return [cell.strip() for cell in next(csv.reader([header], delimiter=separator))]
+
+
+def _after_line(text: str, count: int) -> str:
+    at = 0
+    for _ in range(count):
+        at = text.find("\n", at) + 1
+        if at == 0:
+            return ""
+    return text[at:]
+
+
+def _parse(
+    path: Path, body: str, columns: int, separator: str, decimal: str, notes: list[str]
+) -> pl.DataFrame:
+    data = body.encode()
+    first = len(next(csv.reader([body.split("\n", 1)[0]], delimiter=separator)))
+    width = max(columns, first)
+    names = [f"column_{i + 1}" for i in range(width)]
+
+    def parse(dtype: type[pl.DataType]) -> pl.DataFrame:
+        return pl.read_csv(
+            io.BytesIO(data),
+            has_header=False,
+            separator=separator,
+            decimal_comma=decimal == ",",
+            schema=dict.fromkeys(names, dtype),
+            null_values=None if dtype is pl.String else ["NA", "na", "N/A", "null", "-"],
+            truncate_ragged_lines=True,
+        )
+
+    try:
+        frame = parse(pl.Float64)
+    except pl.exceptions.PolarsError:
+        # Some cell is no number: take all as text, and judge column by column.
+        try:
+            frame = parse(pl.String)
+        except pl.exceptions.PolarsError as e:
+            raise DriveError(f"{path} is not a readable table: {_first_line(e)}") from None
+    if first > columns:
+        notes.append(f"its rows have {first} cells and its header {columns}; the rest is ignored")
+    return frame.select(pl.col(f"column_{i + 1}").alias(str(i)) for i in range(columns))
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n", 1)[0]
+
+
+def read_parquet(path: Path, text_format: TextFormat | None = None) -> RawTable:
+    """Read a Parquet table.
+
+    Raises
+    ------
+    DriveError
+        Not a Parquet file, or only the first part of one.
+    """
+    try:
+        frame = pl.read_parquet(path)
+    except (pl.exceptions.PolarsError, OSError) as e:
+        raise DriveError(
+            f"{path} is not a readable Parquet file ({_first_line(e)}); "
+            "it may have been cut off: copy or convert it again"
+        ) from None
+    names = tuple(frame.columns)
+    frame.columns = [str(i) for i in range(len(names))]
+    return RawTable(path, names, frame)
+
+
+def time_seconds(
+    table: RawTable, index: int, unit_factor: float, time_format: str | None
+) -> tuple[Floats, bool, list[str]]:
+    """Read the time column.
+
+    Parameters
+    ----------
+    table : the table
+    index : place of the time column
+    unit_factor : seconds per unit, where it holds numbers
+    time_format : None for numbers, "clock" for a time of day such as 17:58:02.288,
+        "iso" for ISO 8601, otherwise a `strptime` format
+
+    Returns
+    -------
+    time : (n,) [s]; NaN where it cannot be read
+    absolute : whether it counts from 1970
+    notes : what was odd
+
+    Raises
+    ------
+    DriveError
+        The column holds no times in that format.
+    """
+    series = table.column(index)
+    if series.dtype.is_temporal():
+        return (*_temporal(series), [])
+    if time_format is None:
+        values, notes = table.numbers(index)
+        return values * unit_factor if unit_factor != 1.0 else values, False, notes
+    text = series.cast(pl.String).str.strip_chars()
+    if time_format == "clock":
+        part = text.str.extract_groups(r"^(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)$").struct.unnest()
+        hour, minute, second = (
+            part[c].str.replace(",", ".", literal=True).cast(pl.Float64, strict=False).to_numpy()
+            for c in part.columns
+        )
+        seconds, absolute = _unwrapped(3600.0 * hour + 60.0 * minute + second), False
+    else:
+        parsed = _parse_datetime(text, time_format)
+        seconds, absolute = _temporal(parsed)
+    present = text.is_not_null() & (text != "")
+    lost = int(present.sum()) - int(np.count_nonzero(np.isfinite(seconds)))
+    if lost > _TEXT_PART * max(int(present.sum()), 1):
+        example = text.filter(present)[0]
+        raise DriveError(
+            f"{table.path}: time {example!r} in column {table.names[index]!r} is not in the "
+            f"format {time_format!r}; set format in [time] of the mapping"
+        )
+    notes = [f"{lost} time stamps could not be read and their rows were left out"] if lost else []
+    return seconds, absolute, notes
+
+
+def _parse_datetime(text: pl.Series, time_format: str) -> pl.Series:
+    if time_format != "iso":
+        return text.str.to_datetime(time_format, strict=False, time_unit="us")
+    # One spelling for all: a blank as T, no zone but an offset applied below.
+    plain = text.str.replace(" ", "T", literal=True).str.replace("Z$", "+00:00")
+    if bool(plain.str.contains(r"[+-]\d{2}:?\d{2}$").any()):
+        return plain.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f%:z", strict=False, time_unit="us")
+    return plain.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f", strict=False, time_unit="us")
+
+
+def _temporal(series: pl.Series) -> tuple[Floats, bool]:
+    if series.dtype == pl.Time:
+        return _unwrapped(series.cast(pl.Int64).cast(pl.Float64).to_numpy() * 1e-9), False
+    if isinstance(series.dtype, pl.Duration):
+        return np.array(series.dt.total_microseconds().cast(pl.Float64).to_numpy()) * 1e-6, False
+    us = series.cast(pl.Datetime("us")).cast(pl.Int64).cast(pl.Float64)
+    return np.array(us.to_numpy()) * 1e-6, True
+
+
+def _unwrapped(seconds: Floats) -> Floats:
+    """Carry a time of day over midnight."""
+    day = 86_400.0
+    finite = np.isfinite(seconds)
+    present = seconds[finite]
+    turns = np.zeros(present.size)
+    turns[1:] = np.cumsum(np.diff(present) < -day / 2)
+    out = seconds.copy()
+    out[finite] = present + day * turns
+    return out
+
+
+def start_text(seconds: float) -> str:
+    """ISO 8601 text of a time counted from 1970."""
+    return dt.datetime.fromtimestamp(seconds, tz=dt.UTC).isoformat()
+
+
+def column_list(names: Iterable[str], limit: int = 12) -> str:
+    """Name the columns found, the first of them where there are many."""
+    names = list(names)
+    shown = ", ".join(repr(n) for n in names[:limit])
+    return f"{shown} and {len(names) - limit} more" if len(names) > limit else shown

@@ -1,0 +1,193 @@
+"""From a raw table to signals, by canonical names or by a mapping."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from pathlib import Path
+
+from weighbridge.errors import DriveError
+from weighbridge.io.columns import (
+    UnitlessColumnError,
+    bracketed_unit,
+    near_column,
+    parse_column,
+    time_unit,
+)
+from weighbridge.io.log import Log
+from weighbridge.io.mapping import TableMapping, resolved_unit
+from weighbridge.io.table import (
+    SEPARATORS,
+    RawTable,
+    column_list,
+    read_parquet,
+    read_text,
+    time_seconds,
+)
+from weighbridge.signals import Floats, Problem
+from weighbridge.signals.catalogue import TIME_COLUMN
+from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.units import UNITS, to_si
+
+
+def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read separated text; see `weighbridge.io.log.Reader`."""
+    raw = read_text(path, mapping.text if mapping else None)
+    return _mapped(raw, mapping) if mapping else _canonical(raw, table)
+
+
+def read_pq(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read Parquet; see `weighbridge.io.log.Reader`."""
+    raw = read_parquet(path)
+    return _mapped(raw, mapping) if mapping else _canonical(raw, table)
+
+
+def _canonical(raw: RawTable, table: str | None) -> Log:
+    log = Log(raw.path)
+    log.problems += [Problem("", f"{raw.path.name}: {note}") for note in raw.notes]
+    time_index = next((i for i, n in enumerate(raw.names) if time_unit(n)), None)
+    wanted: dict[str, tuple[int, str]] = {}
+    unknown: list[str] = []
+    for i, name in enumerate(raw.names):
+        if i == time_index:
+            continue
+        try:
+            found = parse_column(name, table or _table_of_all(raw))
+        except UnitlessColumnError as e:
+            raise DriveError(f"{raw.path}: column {name!r} {e}") from None
+        if found is None:
+            unknown.append(name)
+        elif found[0].name in wanted:
+            first = raw.names[wanted[found[0].name][0]]
+            log.problems.append(
+                Problem(
+                    found[0].name,
+                    f"{raw.path.name}: column {name!r} says the same as {first!r} and was ignored",
+                )
+            )
+        else:
+            wanted[found[0].name] = (i, found[1])
+    if time_index is None:
+        raise DriveError(_no_time(raw, bool(wanted)))
+    if not wanted:
+        raise DriveError(
+            f"{raw.path} has no column with a canonical name and unit (such as vehicle_speed_kmh); "
+            f"it has {column_list(raw.names)}: name its columns in a mapping file"
+            f"{_separator_hint(raw)}"
+        )
+    if unknown:
+        log.problems.append(Problem("", f"{raw.path.name}: {_unknown_text(unknown)}"))
+    unit = UNITS[time_unit(raw.names[time_index]) or "s"]
+    time, log.absolute, notes = time_seconds(raw, time_index, unit.factor, None)
+    log.problems += [Problem("", f"{raw.path.name}: {note}") for note in notes]
+    columns = []
+    for name, (i, suffix) in wanted.items():
+        values, notes = raw.numbers(i)
+        log.problems += [Problem(name, f"{raw.path.name}: {note}") for note in notes]
+        columns.append((name, to_si(values, suffix) if suffix else values))
+    _finish(log, raw, time, columns)
+    return log
+
+
+def _table_of_all(raw: RawTable) -> str | None:
+    """A single file with positions may use the short names of the GNSS table."""
+    return "gnss" if any(n.strip().lower().startswith("latitude_") for n in raw.names) else None
+
+
+def _mapped(raw: RawTable, mapping: TableMapping) -> Log:
+    log = Log(raw.path)
+    log.problems += [Problem("", f"{raw.path.name}: {note}") for note in raw.notes]
+    places = {}
+    for s in mapping.signals:
+        index = raw.index(s.column)
+        if index is not None:
+            places[s.name] = index
+        elif not s.optional:
+            log.problems.append(
+                Problem(
+                    s.name,
+                    f"{raw.path.name}: column {s.column!r} for {s.name} is not there"
+                    f"{_near(s.column, raw)}",
+                )
+            )
+    if not places:
+        raise DriveError(
+            f"{raw.path}: none of the columns named in {mapping.source} is there; "
+            f"the file has {column_list(raw.names)}{_separator_hint(raw)}"
+        )
+    time_column = mapping.time.column
+    if time_column is None:
+        index = next((i for i, n in enumerate(raw.names) if time_unit(n)), None)
+        if index is None:
+            raise DriveError(
+                f"{raw.path}: {mapping.source} names no time column; "
+                f"set column in [time] to one of {column_list(raw.names)}"
+            )
+    else:
+        index = raw.index(time_column)
+        if index is None:
+            raise DriveError(
+                f"{raw.path} has no time column {time_column!r} (from {mapping.source}); "
+                f"it has {column_list(raw.names)}"
+            )
+    name = raw.names[index]
+    suffix = mapping.time.unit or time_unit(name) or bracketed_unit(name) or "s"
+    factor = UNITS[suffix].factor if UNITS[suffix].dimension == "s" else 1.0
+    time, log.absolute, notes = time_seconds(raw, index, factor, mapping.time.format)
+    if mapping.time.offset:
+        time = time + mapping.time.offset
+    log.problems += [Problem("", f"{raw.path.name}: {note}") for note in notes]
+    columns = []
+    for s in mapping.signals:
+        if s.name not in places:
+            continue
+        values, notes = raw.numbers(places[s.name])
+        log.problems += [Problem(s.name, f"{raw.path.name}: {note}") for note in notes]
+        if s.factor != 1.0 or s.offset != 0.0:
+            values = values * s.factor + s.offset
+        suffix = resolved_unit(s, None, mapping.source)
+        columns.append((s.name, to_si(values, suffix) if suffix else values))
+    _finish(log, raw, time, columns)
+    return log
+
+
+def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floats]]) -> None:
+    if raw.rows == 0:
+        log.problems.append(Problem("", f"{raw.path.name} has a header and no rows"))
+        return
+    signals, problems = clean_columns(time, columns, raw.path.name)
+    log.signals += signals
+    log.problems += problems
+
+
+def _no_time(raw: RawTable, known: bool) -> str:
+    if known:
+        return (
+            f"{raw.path} has no time column; name it {TIME_COLUMN} (seconds on one clock), "
+            f"or name it in [time] of a mapping file; it has {column_list(raw.names)}"
+        )
+    return (
+        f"{raw.path} has no canonical columns ({TIME_COLUMN}, vehicle_speed_kmh …); "
+        f"it has {column_list(raw.names)}: name them in a mapping file{_separator_hint(raw)}"
+    )
+
+
+def _separator_hint(raw: RawTable) -> str:
+    for other in SEPARATORS:
+        if raw.separator and other != raw.separator and any(other in n for n in raw.names):
+            return f", or set separator = {json.dumps(other)} there"
+    return ""
+
+
+def _near(column: str, raw: RawTable) -> str:
+    near = difflib.get_close_matches(column, raw.names, n=1, cutoff=0.7)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def _unknown_text(names: list[str]) -> str:
+    parts = []
+    for name in names[:6]:
+        near = near_column(name)
+        parts.append(f"{name!r} (did you mean {near}?)" if near else f"{name!r}")
+    more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+    return f"not known and ignored: {', '.join(parts)}{more}"

@@ -1,0 +1,274 @@
+"""TOML files that people write: every fault is told with its line and a remedy."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from decimal import Context, Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.signals.units import UNITS, Unit, unit
+
+_HEADER: Final = re.compile(r"^\s*\[\[?\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_KEY: Final = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*[\w"'-]+)*)\s*=""")
+
+_TYPES: Final[dict[type, str]] = {
+    bool: "true or false",
+    int: "a number",
+    float: "a number",
+    Decimal: "a number",
+    str: "text",
+    list: "a list",
+    dict: "a section",
+}
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean ...?`` for a near miss, or the known words."""
+    known = list(known)
+    near = difflib.get_close_matches(word.lower(), known, n=1, cutoff=0.6)
+    return f"; did you mean {near[0]}?" if near else f"; known are {', '.join(known)}"
+
+
+def _split(key: str) -> tuple[str, ...]:
+    return tuple(part.strip().strip("\"'") for part in key.split("."))
+
+
+def key_lines(text: str) -> dict[tuple[str, ...], int]:
+    """Find the line, from 1, of every section and key that has a line of its own."""
+    lines: dict[tuple[str, ...], int] = {}
+    section: tuple[str, ...] = ()
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := _HEADER.match(line):
+            section = _split(header.group(1))
+            lines.setdefault(section, number)
+        elif key := _KEY.match(line):
+            lines.setdefault((*section, *_split(key.group(1))), number)
+    return lines
+
+
+class Section:
+    """One table of a TOML file, whose keys are taken one by one.
+
+    Parameters
+    ----------
+    data : the table, numbers as `Decimal` or int
+    name : what the file is called in messages
+    lines : line of every key, see `key_lines`
+    path : keys that lead to this table
+    error : the exception to raise
+    """
+
+    def __init__(
+        self,
+        data: Mapping[str, Any],
+        name: str,
+        lines: Mapping[tuple[str, ...], int],
+        path: tuple[str, ...] = (),
+        error: type[WeighbridgeError] = ConfigError,
+    ) -> None:
+        self.data = data
+        self.name = name
+        self.lines = lines
+        self.path = path
+        self.error = error
+        self._known: list[str] = []
+
+    def where(self, key: str = "") -> str:
+        """Say where a key is: file, line and section."""
+        full = (*self.path, key) if key else self.path
+        for n in range(len(full), 0, -1):
+            if full[:n] in self.lines:
+                return f"{self.name}, line {self.lines[full[:n]]}"
+        return self.name
+
+    def fail(self, key: str, text: str) -> NoReturn:
+        """Raise the file's error for a key."""
+        label = ".".join((*self.path, key)) if key else ".".join(self.path)
+        raise self.error(f"{self.where(key)}: {label} {text}")
+
+    def _take(self, key: str) -> Any:
+        self._known.append(key)
+        return self.data.get(key)
+
+    def _wrong_type(self, key: str, wanted: str, value: Any) -> NoReturn:
+        kind = _TYPES.get(type(value), type(value).__name__)
+        shown = f" ({value!s:.40})" if not isinstance(value, dict) else ""
+        self.fail(key, f"must be {wanted}, not {kind}{shown}")
+
+    def section(self, key: str) -> Section | None:
+        """Return a table inside this one, or None where it is absent."""
+        value = self._take(key)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            self._wrong_type(key, "a section", value)
+        return Section(value, self.name, self.lines, (*self.path, key), self.error)
+
+    def text(self, key: str) -> str | None:
+        """Return text; a TOML date or time counts as its ISO 8601 text."""
+        value = self._take(key)
+        if value is None or isinstance(value, str):
+            return value
+        if not hasattr(value, "isoformat"):
+            self._wrong_type(key, 'text in "quotes"', value)
+        return str(value.isoformat())
+
+    def texts(self, key: str) -> tuple[str, ...] | None:
+        """Return a list of texts."""
+        value = self._take(key)
+        if value is None:
+            return None
+        if isinstance(value, str):
+            return (value,)
+        if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
+            self._wrong_type(key, "a list of texts", value)
+        return tuple(value)
+
+    def flag(self, key: str) -> bool | None:
+        """Return true or false."""
+        value = self._take(key)
+        if value is not None and not isinstance(value, bool):
+            self._wrong_type(key, "true or false", value)
+        return value
+
+    def count(self, key: str) -> int | None:
+        """Return a whole number, zero or more."""
+        value = self._take(key)
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int):
+            self._wrong_type(key, "a whole number", value)
+        if value < 0:
+            self.fail(key, f"must be zero or more, got {value}")
+        return value
+
+    def _exact(self, key: str, value: Any) -> Fraction:
+        if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
+            self._wrong_type(key, "a number", value)
+        if not math.isfinite(value):
+            self.fail(key, f"must be a finite number, got {value}")
+        return Fraction(value)
+
+    def number(self, key: str) -> float | None:
+        """Return a finite number without a unit."""
+        value = self._take(key)
+        return None if value is None else float(self._exact(key, value))
+
+    def numbers(self, key: str) -> tuple[float, ...] | None:
+        """Return a list of finite numbers without a unit."""
+        value = self._take(key)
+        if value is None:
+            return None
+        if not isinstance(value, list):
+            self._wrong_type(key, "a list of numbers", value)
+        return tuple(float(self._exact(key, v)) for v in value)
+
+    def _measured(self, stem: str, suffix: str, tail: str) -> tuple[str, Any, Unit] | None:
+        """Find the one key ``stem_{unit}{tail}`` in a unit of the right dimension."""
+        canonical = f"{stem}_{suffix}{tail}"
+        self._known.append(canonical)
+        dimension = unit(suffix).dimension
+        found = []
+        for key, value in self.data.items():
+            if key.startswith(f"{stem}_") and key.endswith(tail):
+                u = UNITS.get(key[len(stem) + 1 : len(key) - len(tail)].lower())
+                if u is not None and u.dimension == dimension:
+                    found.append((key, value, u))
+        if stem in self.data and not found:
+            self.fail(stem, f"carries no unit; write it as {canonical}")
+        if len(found) > 1:
+            self.fail(found[1][0], f"says the same as {found[0][0]}; keep one of them")
+        if not found:
+            return None
+        self._known.append(found[0][0])
+        return found[0]
+
+    def quantity(self, stem: str, suffix: str, tail: str = "") -> float | None:
+        """Return the number under ``stem_{unit}`` in SI, any unit of the dimension.
+
+        The conversion is exact and rounds once, so that what was saved is
+        loaded again to the last bit.
+        """
+        found = self._measured(stem, suffix, tail)
+        if found is None:
+            return None
+        key, value, u = found
+        return _si(self._exact(key, value), u)
+
+    def quantities(self, stem: str, suffix: str, tail: str = "") -> tuple[float, ...] | None:
+        """Return the list under ``stem_{unit}`` in SI; see `quantity`."""
+        found = self._measured(stem, suffix, tail)
+        if found is None:
+            return None
+        key, value, u = found
+        if not isinstance(value, list):
+            self._wrong_type(key, "a list of numbers", value)
+        return tuple(_si(self._exact(key, v), u) for v in value)
+
+    def done(self) -> None:
+        """Refuse keys that nobody asked for."""
+        for key in self.data:
+            if key not in self._known:
+                self.fail(key, f"is not known{suggestion(key, dict.fromkeys(self._known))}")
+
+
+def _rational(number: float) -> Fraction:
+    """Read a unit's factor as the simple fraction it stands for, as 1/100 for 0.01."""
+    simple = Fraction(number).limit_denominator(1_000_000)
+    return simple if float(simple) == number else Fraction(number)
+
+
+def _si(value: Fraction, u: Unit) -> float:
+    return float(value * _rational(u.factor) + _rational(u.offset))
+
+
+def exact_text(value: float, suffix: str) -> str:
+    """Write an SI value in a file's unit, in the fewest digits that load back exactly."""
+    u = unit(suffix)
+    inside = Fraction(value)
+    outside = (inside - _rational(u.offset)) / _rational(u.factor)
+    for digits in range(1, 40):
+        text = _decimal(outside, digits)
+        if _si(Fraction(Decimal(text)), u) == value:
+            return text
+    return _decimal(outside, 40)
+
+
+def _decimal(value: Fraction, digits: int) -> str:
+    """Round to significant digits, as a TOML float."""
+    context = Context(prec=digits)
+    number = context.divide(Decimal(value.numerator), Decimal(value.denominator))
+    small = number == 0 or -6 <= number.adjusted() <= 15
+    text = f"{number:f}" if small else f"{number:e}"
+    if "e" in text.lower():
+        mantissa, exponent = text.lower().split("e")
+        return f"{mantissa if '.' in mantissa else mantissa + '.0'}e{int(exponent)}"
+    return text if "." in text else f"{text}.0"
+
+
+def read_toml(path: Path, error: type[WeighbridgeError] = ConfigError) -> Section:
+    """Read a TOML file that a person wrote.
+
+    Raises
+    ------
+    WeighbridgeError
+        Of the type given: no such file, not text, or not TOML.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise error(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as e:
+        raise error(f"{path} cannot be read as text: {e}") from None
+    try:
+        data = tomllib.loads(text, parse_float=Decimal)
+    except tomllib.TOMLDecodeError as e:
+        raise error(f"{path} is not valid TOML: {e}") from None
+    return Section(data, str(path), key_lines(text), (), error)
