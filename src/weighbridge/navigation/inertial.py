@@ -1,0 +1,528 @@
+"""Motion from an inertial sensor, vehicle speed and GNSS (Jensen 2022, sec. 5)."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import DriveError
+from weighbridge.kernels.ins import (
+    BA,
+    BG,
+    ERRORS,
+    PITCH0,
+    SCALE,
+    SQUAT,
+    STATES,
+    YAW0,
+    Noise,
+    P,
+    Q,
+    V,
+    new_log,
+    new_work,
+    run,
+    smooth,
+)
+from weighbridge.kernels.rotation import (
+    euler_to_matrix,
+    euler_to_quaternion,
+    matrix_to_euler,
+    quaternions_to_euler,
+    rotate_body,
+)
+from weighbridge.navigation.aiding import (
+    Fixes,
+    Imu,
+    interpolated,
+    measurements,
+    place_nodes,
+    read_fixes,
+    read_imu,
+    resample,
+    speed_from_fixes,
+    still_state,
+)
+from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.mounting import coarse_mounting
+from weighbridge.navigation.settings import NavigationSettings
+from weighbridge.navigation.timing import estimate_speed_delay
+from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.vehicle.model import Mounting
+
+_LOG = logging.getLogger(__name__)
+
+_COARSE_PERIOD = 0.5
+"""Clock of the coarse alignment [s]."""
+
+_STRETCH = 512
+"""Nodes the backward pass holds at a time: bounds its memory."""
+
+_FIRST_PASS = 900.0
+"""The first pass, which only finds the constants, ends after so long [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Start:
+    """Where the filter begins.
+
+    Attributes
+    ----------
+    x : (23,) nominal state
+    cov : (19, 19)
+    """
+
+    x: Floats
+    cov: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """What the filter found, at its nodes.
+
+    Attributes
+    ----------
+    time : (m,) [s]
+    states : (m, 23) see `weighbridge.kernels.ins`
+    stds : (m, 20) standard deviations of the forward pass
+    last : (23,) nominal state at the end of the forward pass
+    last_cov : (19, 19) its covariance
+    """
+
+    time: Floats
+    states: Floats
+    stds: Floats
+    last: Floats
+    last_cov: Floats
+
+
+def inertial_motion(
+    drive: Drive,
+    mounting: Mounting | None = None,
+    *,
+    settings: NavigationSettings | None = None,
+    rate: float = 20.0,
+) -> Motion:
+    """Find how the vehicle moved from its inertial sensor, aided by speed and GNSS.
+
+    The mounting is found from the drive, or refined where given. The filter
+    runs forward twice, first to find the constants, then from these with
+    their uncertainty as it was, and once backward.
+
+    The specific force is low-passed without delay at 0.4 of ``rate`` before it is taken to the
+    even clock, so that road and engine vibration does not fold.
+
+    Parameters
+    ----------
+    drive : with ``accel_x..z`` and ``gyro_x..z`` and at least one of
+        ``vehicle_speed``, ``gnss_speed`` and ``latitude`` with ``longitude``
+    mounting : known mounting and squat
+    settings : noise levels and priors
+    rate : of the result [Hz]
+
+    Raises
+    ------
+    DriveError
+        Signals are missing, the drive is too short or too quiet, or units or axes of the
+        inertial sensor do not fit together.
+
+    References
+    ----------
+    Jensen et al., Mech. Syst. Signal Process. 171, 2022, sec. 5.2-5.4.
+    """
+    settings = settings or NavigationSettings()
+    imu = read_imu(drive)
+    start, end = float(imu.time[0]), float(imu.time[-1])
+    fixes = read_fixes(drive, start, end)
+    wheel = _usable(drive.get("vehicle_speed"), start, end)
+    reference = wheel or _usable(drive.get("gnss_speed"), start, end)
+    if reference is None and fixes is not None:
+        reference = speed_from_fixes(fixes)
+    if reference is None or len(reference) < 10:
+        raise DriveError(
+            f"{drive.name}: inertial navigation lacks vehicle_speed, gnss_speed or latitude and "
+            "longitude: with the inertial sensor alone the motion drifts away"
+        )
+    notes: list[str] = []
+
+    rot_bs, tilt_std, yaw_std, yaw_bias, delay = _align(imu, reference, mounting, notes)
+    reference = Signal(reference.name, reference.time - delay, reference.values)
+    gnss_delay = delay if wheel is None else 0.0
+    speed = reference if wheel is not None or drive.has("gnss_speed") else None
+
+    count = max(2, math.floor((end - start) * rate) + 1)
+    grid = start + np.arange(count) / rate
+    sensor = resample(imu.time, np.hstack([imu.accel, imu.gyro]), start, 1.0 / rate, count)
+    accel, gyro = sensor[:, :3] @ rot_bs.T, sensor[:, 3:] @ rot_bs.T
+
+    fix_times = fixes.time - gnss_delay if fixes is not None else np.empty(0)
+    nodes = place_nodes(imu.time, fix_times, rate, settings.max_gap)
+    node_time = imu.time[nodes]
+    slow = ~(interpolated(reference, grid, 3.0) > 0.7)
+    still = still_state(node_time, wheel and reference, grid, accel, gyro, slow)
+    z = measurements(
+        node_time, settings, speed=speed, fixes=fixes, drive=drive, gnss_delay=gnss_delay,
+        still=still,
+    )  # fmt: skip
+
+    noise = settings.noise()
+    begin = _begin(
+        grid, accel, gyro, reference, fixes, still, node_time, settings, mounting,
+        tilt_std=tilt_std, yaw_std=yaw_std, yaw_bias=yaw_bias,
+        free_scale=wheel is not None and fixes is not None,
+    )  # fmt: skip
+    first_end = min(nodes.size, int(np.searchsorted(node_time, start + _FIRST_PASS)) + 1)
+    found = _filter(imu, rot_bs, nodes[:first_end], z[:first_end], begin, noise, False)
+    rot_bs, begin = _restart(rot_bs, begin, found)
+    solution = _filter(imu, rot_bs, nodes, z, begin, noise, settings.smooth)
+    return _motion(
+        drive, imu, grid, sensor, rot_bs, solution, fixes, reference, wheel is not None, delay,
+        settings, mounting, notes, begin,
+    )  # fmt: skip
+
+
+def _usable(signal: Signal | None, start: float, end: float) -> Signal | None:
+    """Return the signal if it has samples enough beside the inertial ones."""
+    if signal is None or len(signal) < 10:
+        return None
+    inside = (signal.time > start - 1.0) & (signal.time < end + 1.0)
+    return signal if inside.sum() >= 10 else None
+
+
+def _align(
+    imu: Imu, reference: Signal, mounting: Mounting | None, notes: list[str]
+) -> tuple[Floats, float, float, float, float]:
+    """Find sensor to body axes, their uncertainty, the yaw rate's bias and the speed's delay."""
+    start = float(imu.time[0])
+    count = max(4, math.floor((imu.time[-1] - start) / _COARSE_PERIOD) + 1)
+    grid = start + np.arange(count) * _COARSE_PERIOD
+    data = resample(imu.time, np.hstack([imu.accel, imu.gyro]), start, _COARSE_PERIOD, count)
+
+    fine_count = max(4, math.floor((imu.time[-1] - start) * 20.0) + 1)
+    fine_grid = start + np.arange(fine_count) / 20.0
+    fine = resample(imu.time, imu.accel, start, 0.05, fine_count)
+
+    delay = 0.0
+    rot = np.eye(3) if mounting is None else euler_to_matrix(
+        mounting.roll, mounting.pitch, mounting.yaw
+    )  # fmt: skip
+    tilt_std, yaw_std, yaw_bias = 0.01, 0.02, math.nan
+    if mounting is not None and mounting.std is not None:
+        tilt_std = max(mounting.std[0], mounting.std[1], 0.003)
+        yaw_std = max(mounting.std[2], 0.005)
+    for _ in range(2):
+        shifted = Signal(reference.name, reference.time - delay, reference.values)
+        coarse_speed = _coarse_speed(shifted, grid)
+        try:
+            coarse = coarse_mounting(
+                data[:, :3], data[:, 3:], coarse_speed, _COARSE_PERIOD, coarse_speed < 0.05
+            )
+        except DriveError:
+            if mounting is None:
+                raise
+            coarse = None
+        if coarse is not None:
+            yaw_bias = coarse.yaw_rate_bias
+            if mounting is None:
+                rot, tilt_std, yaw_std = coarse.rot_bs, coarse.tilt_std, coarse.yaw_std
+            else:
+                angle = math.acos(np.clip(0.5 * (np.trace(rot @ coarse.rot_bs.T) - 1.0), -1, 1))
+                if angle > 0.2 and not notes:
+                    notes.append(
+                        f"the drive shows a mounting {math.degrees(angle):.0f} deg from the one "
+                        "given"
+                    )
+        delay, delay_std = estimate_speed_delay(fine_grid, fine @ rot[0], reference)
+        if not delay_std < 0.1:
+            delay = 0.0
+    if delay == 0.0:
+        notes.append("the drive does not show how late its vehicle speed is; taken as 0 s")
+    return rot, tilt_std, yaw_std, yaw_bias, delay
+
+
+def _coarse_speed(speed: Signal, grid: Floats) -> Floats:
+    """Take the speed to the coarse clock in the band of the coarse inertial samples."""
+    longest = max(2.0, 3.0 * speed.period)
+    at = interpolated(speed, grid, longest)
+    if speed.period < 0.3 * _COARSE_PERIOD:
+        smooth_speed = resample(
+            speed.time, speed.values[:, None], float(grid[0]), _COARSE_PERIOD, grid.size
+        )[:, 0]
+        return np.where(np.isfinite(at) & (at > 0.05), smooth_speed, at)
+    return at
+
+
+def _begin(
+    grid: Floats, accel: Floats, gyro: Floats, reference: Signal, fixes: Fixes | None,
+    still: Floats, node_time: Floats, settings: NavigationSettings, mounting: Mounting | None,
+    *, tilt_std: float, yaw_std: float, yaw_bias: float, free_scale: bool,
+) -> _Start:  # fmt: skip
+    """Set the first state: level and speed from the first seconds, heading from GNSS."""
+    x = np.zeros(STATES)
+    std = np.zeros(ERRORS)
+    speed = interpolated(reference, grid, 3.0)
+    known = np.isfinite(speed) & np.isfinite(accel).all(axis=1)
+    x[SCALE] = 1.0
+    x[SQUAT] = settings.squat
+    std[17] = settings.squat_std
+    if mounting is not None and mounting.squat is not None:
+        x[SQUAT] = mounting.squat
+        std[17] = max(mounting.squat_std or 0.0, 2e-4)
+    std[15] = math.hypot(tilt_std, settings.mounting_std if mounting is None else 0.0)
+    std[16] = math.hypot(yaw_std, settings.mounting_std if mounting is None else 0.0)
+    std[18] = settings.speed_scale_std if free_scale else 1e-6
+
+    # gyro bias: from rest; else pitch and roll come back to where they were
+    # and the yaw rate follows from lateral force
+    rest = np.interp(grid, node_time, still) > 1.9
+    bias_std = np.full(3, settings.gyro_bias_std)
+    if rest.sum() * (grid[1] - grid[0]) > 2.0:
+        bias = np.median(gyro[rest & known], axis=0) if (rest & known).any() else np.zeros(3)
+        bias_std[:] = 0.002
+    else:
+        window = known & (grid < grid[0] + 120.0)
+        span = max(1.0, float(window.sum() * (grid[1] - grid[0])))
+        bias = np.mean(gyro[window], axis=0) if window.any() else np.zeros(3)
+        bias_std[:2] = min(0.03, 0.003 + 0.1 / span)
+        bias[2] = yaw_bias if math.isfinite(yaw_bias) else 0.0
+        bias_std[2] = 0.02
+    x[BG : BG + 3] = bias
+
+    # level of the first two seconds: what is left of specific force without
+    # what speed and turning explain
+    place = int(np.argmax(known)) if known.any() else 0
+    head = slice(place, place + max(4, round(2.0 / (grid[1] - grid[0]))))
+    f = np.nanmean(accel[head], axis=0)
+    v = speed[head]
+    rate = 0.0
+    if np.isfinite(v).sum() > 3:
+        ok = np.isfinite(v)
+        rate = float(np.polyfit(grid[head][ok], v[ok], 1)[0])
+    v0 = float(np.nan_to_num(speed[place]))
+    turn = float(np.nanmean(gyro[head, 2]) - bias[2]) * v0
+    pitch = math.asin(float(np.clip((f[0] - rate) / GRAVITY, -0.3, 0.3)))
+    roll = math.asin(float(np.clip(-(f[1] - turn) / GRAVITY, -0.3, 0.3)))
+    heading, heading_std = _first_heading(grid, gyro[:, 2] - bias[2], speed, fixes)
+    x[Q : Q + 4] = euler_to_quaternion(roll, pitch, heading)
+    x[V] = v0 * math.cos(heading)
+    x[V + 1] = v0 * math.sin(heading)
+    if fixes is not None:
+        x[P : P + 2] = fixes.ned[0, :2]
+        gone = min(float(fixes.time[0]) - float(grid[0]), 30.0)
+        std[0:2] = 10.0 + v0 * max(gone, 0.0)
+        std[2] = 10.0
+    else:
+        std[0:3] = 0.1
+    std[3:5] = 0.5 + 0.1 * v0
+    std[5] = 0.3 + 0.05 * v0
+    std[6:8] = 0.02 if v0 < 0.1 else 0.03
+    std[8] = heading_std
+    std[9:12] = settings.accel_bias_std
+    std[12:15] = bias_std
+    return _Start(x, np.diag(std**2))
+
+
+def _first_heading(
+    grid: Floats, yaw_rate: Floats, speed: Floats, fixes: Fixes | None
+) -> tuple[float, float]:
+    """Find the first heading by turning a dead-reckoned track onto the first fixes.
+
+    The paper takes the chord of two fixes (sec. 7.1), which fails in bends.
+    """
+    if fixes is None:
+        return 0.0, 0.05
+    period = float(grid[1] - grid[0])
+    v = np.nan_to_num(speed)
+    heading = np.cumsum(np.nan_to_num(yaw_rate)) * period
+    track = np.cumsum(v * np.exp(1j * heading)) * period
+    travelled = np.cumsum(v) * period
+    begin = int(np.searchsorted(grid, fixes.time[0]))
+    if begin >= grid.size:
+        return 0.0, math.pi
+    end = int(np.searchsorted(travelled, travelled[begin] + 60.0))
+    end = min(max(end, begin + 1), grid.size - 1)
+    use = (fixes.time >= grid[begin]) & (fixes.time <= grid[end])
+    if use.sum() < 2:
+        return 0.0, math.pi
+    t = fixes.time[use]
+    seen = fixes.ned[use, 0] + 1j * fixes.ned[use, 1]
+    dead = np.interp(t, grid, track.real) + 1j * np.interp(t, grid, track.imag)
+    cross = np.sum((seen - seen.mean()) * np.conj(dead - dead.mean()))
+    size = float(np.sqrt(np.sum(np.abs(dead - dead.mean()) ** 2)))
+    if size < 1.0:
+        return 0.0, math.pi
+    return float(np.angle(cross)), min(0.1 + 3.0 / size, 1.0)
+
+
+def _restart(rot_bs: Floats, begin: _Start, found: Solution) -> tuple[Floats, _Start]:
+    """Move the beginning to the constants a pass has found, uncertain as they were.
+
+    The linearisation profits, and nothing is counted twice.
+    """
+    x = begin.x.copy()
+    end = found.last
+    # direction of travel in body axes is (1, yaw0, pitch0)
+    turn = euler_to_matrix(0.0, float(end[PITCH0]), -float(end[YAW0]))
+    x[SQUAT], x[SCALE] = end[SQUAT], end[SCALE]
+    x[BG : BG + 3] = turn @ end[BG : BG + 3]
+    x[BA : BA + 3] = turn @ end[BA : BA + 3]
+    rotate_body(x[Q : Q + 4], 0.0, -float(end[PITCH0]), float(end[YAW0]))
+    return turn @ rot_bs, _Start(x, begin.cov)
+
+
+def _filter(
+    imu: Imu, rot_bs: Floats, nodes: Ints, z: Floats, begin: _Start, noise: Noise, backward: bool
+) -> Solution:
+    """Run forward over the nodes and, if asked, backward."""
+    x, cov, work = begin.x.copy(), begin.cov.copy(), new_work()
+    count = nodes.size
+    states = np.empty((count, STATES))
+    stds = np.empty((count, ERRORS + 1))
+    empty = new_log(0)
+    kept = []
+    for first in range(0, count, _STRETCH):
+        last = min(first + _STRETCH, count)
+        if backward:
+            kept.append((x.copy(), cov.copy()))
+        run(
+            x, cov, work, imu.time, imu.accel, imu.gyro, rot_bs, nodes, first, last, z, noise,
+            empty, states, stds,
+        )  # fmt: skip
+    end, end_cov = x.copy(), cov.copy()
+    if backward:
+        # one stretch after another is run again from where it began: the
+        # covariances of a whole drive would fill the memory
+        adjoint = np.zeros(ERRORS)
+        log = new_log(_STRETCH)
+        for first in reversed(range(0, count, _STRETCH)):
+            last = min(first + _STRETCH, count)
+            x, cov = kept.pop()
+            run(
+                x, cov, work, imu.time, imu.accel, imu.gyro, rot_bs, nodes, first, last, z, noise,
+                log, states, stds,
+            )  # fmt: skip
+            smooth(log, last - first, adjoint, states, first)
+    return Solution(imu.time[nodes], states, stds, end, end_cov)
+
+
+def _motion(
+    drive: Drive, imu: Imu, grid: Floats, sensor: Floats, rot_bs: Floats, solution: Solution,
+    fixes: Fixes | None, reference: Signal, has_wheel: bool, delay: float,
+    settings: NavigationSettings, mounting: Mounting | None, notes: list[str], begin: _Start,
+) -> Motion:  # fmt: skip
+    """Lay the solution out on the even clock."""
+    time, states, stds = solution.time, solution.states, solution.stds
+    end = states[-1] if settings.smooth else solution.last
+    end_std = np.sqrt(np.maximum(np.diag(solution.last_cov), 0.0))
+
+    angles = np.empty((time.size, 3))
+    quaternions_to_euler(np.ascontiguousarray(states[:, Q : Q + 4]), angles)
+
+    def on_grid(y: Floats) -> Floats:
+        return np.interp(grid, time, y)
+
+    roll, pitch = on_grid(angles[:, 0]), on_grid(angles[:, 1])
+    heading = on_grid(np.unwrap(angles[:, 2]))
+    bias = np.column_stack([on_grid(states[:, BA + i]) for i in range(3)])
+    velocity = np.column_stack([on_grid(states[:, V + i]) for i in range(3)])
+    position = np.column_stack([on_grid(states[:, P + i]) for i in range(3)])
+
+    # constants: the smoothed ones do not change over the drive
+    pitch0, yaw0, squat = float(end[PITCH0]), float(end[YAW0]), float(end[SQUAT])
+    shown = end_std[17] < settings.squat_found_std
+    given = mounting is not None and mounting.squat is not None
+    use_squat = squat if shown or given else 0.0
+
+    force = sensor[:, :3] @ rot_bs.T - bias
+    cp, sp = np.cos(pitch), np.sin(pitch)
+    body_accel = force + GRAVITY * np.column_stack([-sp, cp * np.sin(roll), cp * np.cos(roll)])
+    accel = body_accel[:, 0] + yaw0 * body_accel[:, 1] + pitch0 * body_accel[:, 2]
+    held = np.nan_to_num(accel)
+    width = max(1, round(0.3 / (grid[1] - grid[0]))) | 1
+    lean = np.convolve(np.pad(held, width // 2, mode="edge"), np.full(width, 1.0 / width), "valid")
+    grade = pitch - pitch0 - use_squat * lean
+    specific_force = accel + GRAVITY * np.sin(grade)
+
+    horizontal = np.hypot(velocity[:, 0], velocity[:, 1])
+    ahead = velocity[:, 0] * np.cos(heading) + velocity[:, 1] * np.sin(heading)
+    speed = np.copysign(np.hypot(horizontal, velocity[:, 2]), ahead)
+    speed = np.where(np.abs(speed) < 0.02, 0.0, speed)
+
+    near = np.searchsorted(imu.time, grid)
+    near = np.clip(near, 1, imu.time.size - 1)
+    valid: Bools = (
+        (imu.time[near] - imu.time[near - 1] <= settings.max_gap)
+        & np.isfinite(accel)
+        & (grid >= imu.time[0])
+    )
+    aided = reference.age(grid)
+    if fixes is not None:
+        right = np.clip(np.searchsorted(fixes.time, grid), 1, fixes.time.size - 1)
+        away = np.minimum(np.abs(grid - fixes.time[right]), np.abs(grid - fixes.time[right - 1]))
+        aided = np.minimum(aided, away)
+    valid &= aided < 10.0
+    accel = np.where(np.isfinite(accel), accel, 0.0)
+    specific_force = np.where(np.isfinite(specific_force), specific_force, 0.0)
+
+    nothing = np.full(grid.size, np.nan)
+    latitude, longitude, altitude = nothing, nothing, nothing
+    if fixes is not None:
+        latitude, longitude, altitude = fixes.frame.to_geodetic(position)
+        if not fixes.has_height:
+            altitude = nothing
+            notes.append("without GNSS height the grade may be off by a constant")
+    else:
+        heading = nothing
+        notes.append(
+            "without GNSS the heading is unknown, the speed's scale is taken as 1 and the grade "
+            "may be off by a constant"
+        )
+    if not shown and not given:
+        notes.append("the drive does not show the squat: pitch of the body is taken as grade")
+
+    rot_vs = euler_to_matrix(0.0, pitch0, -yaw0) @ rot_bs
+    found_scale = has_wheel and fixes is not None and end_std[18] < 0.02
+    slow_std = float(np.median(stds[:, ERRORS])) * GRAVITY
+    _LOG.debug("squat %.4f +- %.4f rad per m/s^2, slow std %.3f", squat, end_std[17], slow_std)
+    return Motion(
+        source="inertial",
+        time=grid,
+        speed=speed,
+        accel=accel,
+        specific_force=specific_force,
+        grade=grade,
+        pitch=pitch,
+        roll=roll,
+        heading=np.mod(heading, 2.0 * math.pi),
+        distance=np.concatenate(
+            [[0.0], np.cumsum(0.5 * np.abs(speed[1:] + speed[:-1]) * np.diff(grid))]
+        ),
+        altitude=altitude,
+        latitude=latitude,
+        longitude=longitude,
+        valid=valid,
+        specific_force_std=_noise_level(specific_force[valid]),
+        grade_std=on_grid(stds[:, ERRORS]),
+        speed_scale=float(end[SCALE]) if found_scale else None,
+        speed_scale_std=float(end_std[18]) if found_scale else None,
+        speed_delay=delay,
+        squat=squat if shown or given else None,
+        squat_std=float(end_std[17]) if shown or given else None,
+        mounting=tuple(float(a) for a in matrix_to_euler(rot_vs)),  # type: ignore[arg-type]
+        mounting_std=(
+            float(math.sqrt(begin.cov[15, 15])), float(end_std[15]), float(end_std[16])
+        ),
+        notes=tuple(dict.fromkeys(notes)),
+    )  # fmt: skip
+
+
+def _noise_level(y: Floats) -> float:
+    """Return the noise of a smooth signal from its second differences, robustly."""
+    if y.size < 10:
+        return 0.1
+    second = y[2:] - 2.0 * y[1:-1] + y[:-2]
+    return max(0.005, float(1.4826 * np.median(np.abs(second)) / math.sqrt(6.0)))

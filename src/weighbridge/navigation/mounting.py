@@ -1,0 +1,164 @@
+"""How the inertial sensor sits in the vehicle, found from the drive."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import DriveError
+from weighbridge.signals import Bools, Floats
+
+_LOG = logging.getLogger(__name__)
+
+_CORRELATION = 8.0
+"""Neighbouring half-second samples share grade and camber: the regression has
+this many times fewer independent samples than rows [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class CoarseMounting:
+    """The mounting as gravity, acceleration and turning show it.
+
+    Attributes
+    ----------
+    rot_bs : (3, 3) sensor to body axes
+    yaw_std : standard deviation of the forward direction [rad]
+    tilt_std : of the level [rad]
+    yaw_rate_bias : gyro bias about the body's z axis that lateral force shows
+        [rad/s]; NaN where it does not
+    """
+
+    rot_bs: Floats
+    yaw_std: float
+    tilt_std: float
+    yaw_rate_bias: float
+
+
+def coarse_mounting(
+    accel: Floats, gyro: Floats, speed: Floats, period: float, resting: Bools
+) -> CoarseMounting:
+    """Find the mounting, whatever it is, by one regression of specific force.
+
+    In sensor axes and on average over road and time,
+    ``f = c0 + c1 dv/dt + c2 v yaw_rate + c3 v``: ``c0`` is minus gravity, ``c1`` the
+    forward axis, ``c2`` the right axis, and ``c3`` minus the right axis times the bias
+    of the yaw rate. The yaw rate is the rate about ``c0``, so two rounds are made.
+
+    Parameters
+    ----------
+    accel, gyro : (n, 3) low-passed, on an even clock; NaN in gaps
+    speed : (n,) on the same clock; NaN where unknown [m/s]
+    period : of the clock [s]
+    resting : (n,) vehicle at rest
+
+    Raises
+    ------
+    DriveError
+        Gravity or turning do not fit the units, the axes are swapped or
+        mirrored, or the drive holds too little acceleration.
+    """
+    ok = np.isfinite(accel).all(axis=1) & np.isfinite(gyro).all(axis=1)
+    if ok.sum() < 10:
+        raise DriveError(
+            f"accel_x..z and gyro_x..z overlap for only {ok.sum() * period:.0f} s: "
+            "check their time stamps"
+        )
+    gravity = np.median(accel[ok], axis=0)
+    _check_gravity(float(np.linalg.norm(np.mean(accel[ok], axis=0))))
+    down = -gravity / np.linalg.norm(gravity)
+    rest_gyro = np.median(gyro[resting & ok], axis=0) if (resting & ok).sum() >= 4 else None
+    bias = rest_gyro if rest_gyro is not None else np.zeros(3)
+
+    # speed change over two periods against the force averaged over the same time
+    smooth_accel = (accel[:-2] + 2.0 * accel[1:-1] + accel[2:]) / 4.0
+    smooth_gyro = (gyro[:-2] + 2.0 * gyro[1:-1] + gyro[2:]) / 4.0 - bias
+    rate = (speed[2:] - speed[:-2]) / (2.0 * period)
+    v = (speed[:-2] + 2.0 * speed[1:-1] + speed[2:]) / 4.0
+    rows = (
+        np.isfinite(smooth_accel).all(axis=1)
+        & np.isfinite(smooth_gyro).all(axis=1)
+        & np.isfinite(rate)
+        & (np.abs(rate) < 8.0)
+        & (v > 1.0)
+    )
+    if rows.sum() * period < 8.0:
+        raise DriveError(
+            f"the vehicle moves for only {rows.sum() * period:.0f} s, too little to find how "
+            "the inertial sensor is mounted: give the mounting in the vehicle file"
+        )
+    f, w, a, v = smooth_accel[rows], smooth_gyro[rows], rate[rows], v[rows]
+
+    coef = np.zeros((4, 3))
+    std = np.full(4, np.inf)
+    for _ in range(3):
+        turn = v * (w @ down)
+        design = np.column_stack([np.ones_like(a), a, turn, v])
+        if rest_gyro is not None:
+            design = design[:, :3]
+        weight = np.ones(a.size)
+        for _ in range(3):
+            root = np.sqrt(weight)[:, None]
+            sol, *_ = np.linalg.lstsq(design * root, f * root, rcond=None)
+            res = f - design @ sol
+            size = np.linalg.norm(res, axis=1)
+            weight = 1.0 / np.maximum(1.0, size / (1.5 * np.median(size) + 1e-9))
+        # gravity where rest says it: not tilted by the mean grade of the rows
+        down = -(sol[0]) / np.linalg.norm(sol[0])
+        coef[: sol.shape[0]] = sol
+        noise = float(np.sqrt(np.sum(weight[:, None] * res**2) / (2.0 * weight.sum())))
+        info = np.linalg.inv((design * weight[:, None]).T @ design + 1e-9 * np.eye(design.shape[1]))
+        std[: sol.shape[0]] = noise * np.sqrt(np.diag(info) * _CORRELATION)
+    _check_gravity(float(np.linalg.norm(coef[0])))
+
+    forward = coef[1] - down * (coef[1] @ down)
+    right = coef[2] - down * (coef[2] @ down)
+    _check_axes(forward, right, down, std)
+    w1, w2 = 1.0 / std[1] ** 2, 1.0 / std[2] ** 2
+    if std[2] > 0.35 or np.linalg.norm(right) < 3.0 * std[2]:
+        w2 = 0.0
+    axis = w1 * forward + w2 * np.cross(right, down)
+    yaw_std = 1.0 / math.sqrt(w1 + w2)
+    if yaw_std > 0.3 or np.linalg.norm(axis) / (w1 + w2) < 3.0 * yaw_std:
+        raise DriveError(
+            "the drive holds too little acceleration to find the sensor's forward axis "
+            f"(uncertain by {math.degrees(yaw_std):.0f} deg): give the mounting in the vehicle file"
+        )
+    axis /= np.linalg.norm(axis)
+    rot = np.vstack([axis, np.cross(down, axis), down])
+    yaw_bias = float("nan")
+    if rest_gyro is None and std[3] < 0.1:
+        yaw_bias = -float(coef[3] @ rot[1])
+    _LOG.debug("coarse mounting %s, yaw std %.1f deg", rot, math.degrees(yaw_std))
+    return CoarseMounting(rot, yaw_std, float(std[0]) / GRAVITY + 0.01, yaw_bias)
+
+
+def _check_gravity(size: float) -> None:
+    """Refuse accelerometers that do not read gravity."""
+    if not 0.8 * GRAVITY < size < 1.2 * GRAVITY:
+        hint = "; it looks like g" if 0.8 < size < 1.2 else ""
+        raise DriveError(
+            f"accel_x..z read {size:.3g} m/s^2 on average where gravity is 9.81{hint}: "
+            "set their unit in the mapping"
+        )
+
+
+def _check_axes(forward: Floats, right: Floats, down: Floats, std: Floats) -> None:
+    """Refuse axes that do not form a right-handed set and gyros in a wrong unit."""
+    size = float(np.linalg.norm(right))
+    if std[2] * 6.0 > max(size, 1e-9) or std[1] * 6.0 > float(np.linalg.norm(forward)):
+        return
+    along = float(np.cross(down, forward) @ right) / float(np.linalg.norm(forward))
+    if along < -0.5 * size:
+        raise DriveError(
+            "the inertial axes look swapped or mirrored: turning to one side reads as force to "
+            "the other (accel_x..z against gyro_x..z): set axis signs in the mapping"
+        )
+    if not 0.4 < size < 2.5:
+        raise DriveError(
+            f"gyro_x..z read {1.0 / size:.3g} times the yaw rate that lateral force and speed "
+            "show: set their unit (radps or degps) in the mapping"
+        )
