@@ -1,0 +1,280 @@
+"""Cars that can be simulated: what they physically are, not what is known of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from weighbridge.errors import ConfigError
+
+_RPM = math.pi / 30.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedCar:
+    """The physics of one car.
+
+    Attributes
+    ----------
+    name : for people
+    mass : with driver and full tank, without payload [kg]
+    engine : "petrol" or "electric"
+    transmission : "dual_clutch", "manual" or "single"
+    gear_ratios : gears 1..n [-]
+    final_drive : [-]
+    wheel_radius : effective rolling radius [m]
+    engine_inertia : engine or motor with flywheel and clutch [kg m^2]
+    wheel_inertia : all wheels with brakes and shafts [kg m^2]
+    drag_area : C_d A with closed windows and no side wind [m^2]
+    rolling_coefficient : warm, at 25 degC and walking pace [-]
+    curve_speed, curve_torque : full load torque over speed [rad/s], [N m]
+    idle_speed, max_speed : [rad/s]
+    drag_torque : engine friction and pumping torque, coefficients of rising
+        powers of engine speed in rad/s [N m]
+    loss_constant, loss_slope : driveline torque loss at the engine side,
+        ``constant + slope |torque|`` [N m], [-]
+    torque_lag : first-order lag of the torque [s]
+    shift_time, shift_floor : length of a shift [s], part of the torque kept [-]
+    upshift, downshift : engine speeds of a calm driver or gearbox [rad/s]
+    accessory_power, compressor_power : taken from the crank [W]
+    load_full : reading of the calculated load at full torque [-]
+    load_curvature, load_speed_slope : how far the reading departs from a
+        straight line in torque and with engine speed, relative [-]
+    load_smoothing : first-order lag of the reading [s]
+    regeneration : largest braking torque of an electric motor [N m]
+    squat : pitch of the body per forward acceleration [rad per m/s^2]
+    load_pitch : static pitch per payload, nose up [rad/kg]
+    roll_gain : roll to the outside per lateral acceleration [rad per m/s^2]
+    pitch_frequency, roll_frequency, heave_frequency : undamped, of the body [Hz]
+    tyre_slip : wheel slip per traction over weight [-]
+    side_slip : slip angle of the rear axle per lateral acceleration [rad per m/s^2]
+    cylinders : of a four-stroke engine; 0 for a motor
+
+    Notes
+    -----
+    Typical values: rolling resistance, slip and cornering stiffness from
+    Gillespie, Fundamentals of Vehicle Dynamics, 1992; friction torque from
+    Heywood, Internal Combustion Engine Fundamentals, 1988, ch. 13.
+    """
+
+    name: str
+    mass: float
+    engine: Literal["petrol", "electric"] = "petrol"
+    transmission: Literal["dual_clutch", "manual", "single"] = "dual_clutch"
+    gear_ratios: tuple[float, ...]
+    final_drive: float
+    wheel_radius: float
+    engine_inertia: float
+    wheel_inertia: float
+    drag_area: float
+    rolling_coefficient: float
+    curve_speed: tuple[float, ...]
+    curve_torque: tuple[float, ...]
+    idle_speed: float
+    max_speed: float
+    drag_torque: tuple[float, float, float]
+    loss_constant: float = 4.0
+    loss_slope: float = 0.03
+    torque_lag: float = 0.15
+    shift_time: float = 0.35
+    shift_floor: float = 0.5
+    upshift: float = 1900 * _RPM
+    downshift: float = 1200 * _RPM
+    accessory_power: float = 700.0
+    compressor_power: float = 1500.0
+    load_full: float = 0.35
+    load_curvature: float = 0.06
+    load_speed_slope: float = 0.05
+    load_smoothing: float = 0.15
+    regeneration: float = 0.0
+    squat: float = math.radians(0.21)
+    load_pitch: float = 2.0e-5
+    roll_gain: float = math.radians(0.40)
+    pitch_frequency: float = 1.35
+    roll_frequency: float = 1.6
+    heave_frequency: float = 1.25
+    tyre_slip: float = 0.035
+    side_slip: float = 0.0035
+    cylinders: int = 4
+
+    def __post_init__(self) -> None:
+        for name in ("mass", "final_drive", "wheel_radius", "max_speed", "torque_lag"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ConfigError(f"{name} of a simulated car must be positive, got {value}")
+        if not self.gear_ratios or list(self.gear_ratios) != sorted(self.gear_ratios, reverse=True):
+            raise ConfigError(
+                f"gear_ratios of a simulated car must fall from first to last, "
+                f"got {self.gear_ratios}"
+            )
+        if len(self.curve_speed) != len(self.curve_torque) or len(self.curve_speed) < 2:
+            raise ConfigError("curve_speed and curve_torque must be two or more pairs")
+
+    @property
+    def gearings(self) -> tuple[float, ...]:
+        """Effective gearing of each gear, engine angle over distance [1/m]."""
+        return tuple(g * self.final_drive / self.wheel_radius for g in self.gear_ratios)
+
+    @property
+    def electric(self) -> bool:
+        """Whether a motor drives it."""
+        return self.engine == "electric"
+
+
+def _rpm(*values: float) -> tuple[float, ...]:
+    return tuple(v * _RPM for v in values)
+
+
+MIDSIZE: Final = SimulatedCar(
+    name="midsize petrol, 7-speed dual clutch",
+    mass=1580.0,
+    gear_ratios=(3.188, 2.190, 1.517, 1.057, 0.738, 0.557, 0.433),
+    final_drive=4.234,
+    wheel_radius=0.319,
+    engine_inertia=0.16,
+    wheel_inertia=5.5,
+    drag_area=0.27 * 2.2,
+    rolling_coefficient=0.0085,
+    curve_speed=_rpm(700, 1000, 1450, 4200, 5000, 6000, 6200),
+    curve_torque=(120.0, 200.0, 320.0, 320.0, 271.0, 226.0, 215.0),
+    idle_speed=850 * _RPM,
+    max_speed=6200 * _RPM,
+    drag_torque=(21.0, 0.010, 9.0e-5),
+)
+"""The car of Jensen 2022, Table 1 (2018 Audi A4 2.0 petrol); what the table
+does not give is typical of its class."""
+
+COMPACT: Final = SimulatedCar(
+    name="compact petrol, 5-speed manual",
+    mass=1165.0,
+    transmission="manual",
+    gear_ratios=(3.769, 2.045, 1.281, 0.951, 0.756),
+    final_drive=3.95,
+    wheel_radius=0.292,
+    engine_inertia=0.11,
+    wheel_inertia=3.4,
+    drag_area=0.32 * 2.10,
+    rolling_coefficient=0.0092,
+    curve_speed=_rpm(700, 1000, 2000, 3000, 4000, 5000, 6000, 6500),
+    curve_torque=(60.0, 95.0, 112.0, 121.0, 127.0, 122.0, 110.0, 98.0),
+    idle_speed=750 * _RPM,
+    max_speed=6500 * _RPM,
+    drag_torque=(13.0, 0.008, 6.0e-5),
+    loss_constant=2.5,
+    loss_slope=0.035,
+    torque_lag=0.10,
+    shift_time=0.9,
+    shift_floor=0.0,
+    upshift=2400 * _RPM,
+    downshift=1450 * _RPM,
+    accessory_power=550.0,
+    load_full=0.90,
+    load_curvature=-0.05,
+    load_speed_slope=-0.07,
+    load_smoothing=0.10,
+    squat=math.radians(0.27),
+    load_pitch=3.2e-5,
+    roll_gain=math.radians(0.48),
+    pitch_frequency=1.45,
+    tyre_slip=0.042,
+)
+"""A small car with a naturally aspirated engine and a manual gearbox."""
+
+ELECTRIC: Final = SimulatedCar(
+    name="electric, single speed",
+    mass=1620.0,
+    engine="electric",
+    transmission="single",
+    gear_ratios=(1.0,),
+    final_drive=9.3,
+    wheel_radius=0.325,
+    engine_inertia=0.035,
+    wheel_inertia=4.8,
+    drag_area=0.28 * 2.3,
+    rolling_coefficient=0.0080,
+    curve_speed=_rpm(0, 3600, 5000, 7000, 9000, 12000),
+    curve_torque=(290.0, 290.0, 210.0, 150.0, 115.0, 86.0),
+    idle_speed=0.0,
+    max_speed=12000 * _RPM,
+    drag_torque=(0.0, 0.0, 0.0),
+    loss_constant=1.0,
+    loss_slope=0.025,
+    torque_lag=0.08,
+    shift_time=0.1,
+    accessory_power=0.0,
+    compressor_power=0.0,
+    regeneration=90.0,
+    squat=math.radians(0.18),
+    cylinders=0,
+)
+"""A car with one fixed gear whose control unit reports the motor torque."""
+
+
+def random_car(rng: np.random.Generator) -> SimulatedCar:
+    """Draw a plausible petrol car: light to heavy, manual or dual clutch.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    SimulatedCar
+    """
+    mass = float(rng.uniform(1050.0, 2000.0))
+    manual = bool(rng.random() < 0.5)
+    turbo = bool(rng.random() < 0.6)
+    peak = mass * float(rng.uniform(0.17, 0.22) if turbo else rng.uniform(0.10, 0.12))
+    displacement = peak / (160.0 if turbo else 95.0)  # [l]
+    radius = float(rng.uniform(0.285, 0.285 + 0.06 * (mass - 900.0) / 1100.0))
+    gears = 6 if manual else int(rng.choice([6, 7]))
+    first = float(rng.uniform(14.0, 17.0)) / 4.0
+    last = float(rng.uniform(2.1, 2.6) if turbo else rng.uniform(2.7, 3.1)) / 4.0
+    step = np.linspace(0.0, 1.0, gears)
+    # Steps between gears close up towards the top, as in real boxes.
+    ratios = first * (last / first) ** (1.25 * step - 0.25 * step**2)
+    top = float(rng.uniform(6000.0, 6600.0))
+    if turbo:
+        speeds = _rpm(700.0, 1000.0, 1600.0, 4200.0, 5200.0, top)
+        shape = (0.42, 0.62, 1.0, 1.0, 0.85, 0.66)
+    else:
+        speeds = _rpm(700.0, 1000.0, 2000.0, 4000.0, 5200.0, top)
+        shape = (0.5, 0.74, 0.89, 1.0, 0.94, 0.78)
+    calm = float(rng.uniform(1.0, 1.25)) * (1.0 if turbo else 1.2)
+    return SimulatedCar(
+        name="random petrol car",
+        mass=mass,
+        transmission="manual" if manual else "dual_clutch",
+        gear_ratios=tuple(float(r) for r in ratios),
+        final_drive=4.0,
+        wheel_radius=radius,
+        engine_inertia=0.06 + 0.045 * displacement + float(rng.uniform(0.0, 0.03)),
+        wheel_inertia=float(rng.uniform(0.85, 1.15)) * 5.2 * (mass / 1580.0) ** 1.2,
+        drag_area=float(rng.uniform(0.27, 0.34)) * (2.0 + 0.35 * (mass - 1050.0) / 950.0),
+        rolling_coefficient=float(rng.uniform(0.0075, 0.0100)),
+        curve_speed=speeds,
+        curve_torque=tuple(peak * part for part in shape),
+        idle_speed=float(rng.uniform(700.0, 880.0)) * _RPM,
+        max_speed=top * _RPM,
+        drag_torque=(10.5 * displacement, 0.005 * displacement, 4.5e-5 * displacement),
+        loss_constant=float(rng.uniform(2.0, 5.0)),
+        loss_slope=float(rng.uniform(0.02, 0.04)),
+        torque_lag=float(rng.uniform(0.12, 0.25) if turbo else rng.uniform(0.07, 0.12)),
+        shift_time=float(rng.uniform(0.7, 1.1) if manual else rng.uniform(0.25, 0.5)),
+        shift_floor=0.0 if manual else float(rng.uniform(0.3, 0.7)),
+        upshift=1800.0 * calm * _RPM,
+        downshift=1150.0 * calm * _RPM,
+        accessory_power=float(rng.uniform(400.0, 900.0)),
+        load_full=float(rng.choice([0.35, 0.8, 0.95, 1.0])),
+        load_curvature=float(rng.uniform(-0.10, 0.10)),
+        load_speed_slope=float(rng.uniform(-0.10, 0.10)),
+        load_smoothing=float(rng.uniform(0.05, 0.25)),
+        squat=math.radians(float(rng.uniform(0.14, 0.29))),
+        load_pitch=float(rng.uniform(1.0e-5, 3.5e-5)),
+        roll_gain=math.radians(float(rng.uniform(0.3, 0.55))),
+        pitch_frequency=float(rng.uniform(1.2, 1.6)),
+        tyre_slip=float(rng.uniform(0.025, 0.045)),
+    )

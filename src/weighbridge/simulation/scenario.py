@@ -1,0 +1,436 @@
+"""What is simulated: car, load, road, weather, sensors, and every effect's size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, fields, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import ConfigError
+from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar
+from weighbridge.simulation.route import (
+    Route,
+    highway_route,
+    hilly_route,
+    jensen_route,
+    short_route,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effects:
+    """Size of every effect: 1 as usual on the road, 0 switched off.
+
+    Attributes
+    ----------
+    gusts : gusts and the slow change of the wind; the mean wind is the scenario's
+    warm_up : tyres and oil start cold
+    tyre_speed : rolling resistance grows with speed
+    tyre_temperature : rolling resistance falls with ambient temperature
+    surface : rolling resistance differs from road to road
+    yaw_drag : side wind raises the drag area
+    cornering_drag : tyres drag in bends
+    tyre_slip : driven wheels turn faster than the road passes
+    side_slip : the rear axle drifts outwards in bends
+    accessories : alternator and compressor load the engine
+    driveline_loss : gearbox and axle lose torque
+    torque_lag : torque follows the pedal late
+    load_nonlinearity : the load reading bends away from the torque
+    load_smoothing : the control unit smooths the load reading
+    fuel_burn : the fuel's mass is lost
+    driver_ripple : foot and speed of the driver wander
+    traffic : others slow the driver down
+    squat : the body pitches with acceleration
+    load_pitch : the body pitches with payload
+    roll : the body rolls in bends
+    roughness : the road shakes the body
+    imu_noise, imu_bias, imu_bias_walk, imu_scale, imu_cross_axis, imu_lever,
+    imu_mounting, imu_quantisation, imu_vibration, imu_jitter : errors of the
+        inertial sensor
+    gnss_white, gnss_correlated : errors of the fixes
+    obd_delay, obd_jitter, obd_quantisation, obd_speed_scale : errors of the
+        polled values
+    """
+
+    gusts: float = 1.0
+    warm_up: float = 1.0
+    tyre_speed: float = 1.0
+    tyre_temperature: float = 1.0
+    surface: float = 1.0
+    yaw_drag: float = 1.0
+    cornering_drag: float = 1.0
+    tyre_slip: float = 1.0
+    side_slip: float = 1.0
+    accessories: float = 1.0
+    driveline_loss: float = 1.0
+    torque_lag: float = 1.0
+    load_nonlinearity: float = 1.0
+    load_smoothing: float = 1.0
+    fuel_burn: float = 1.0
+    driver_ripple: float = 1.0
+    traffic: float = 1.0
+    squat: float = 1.0
+    load_pitch: float = 1.0
+    roll: float = 1.0
+    roughness: float = 1.0
+    imu_noise: float = 1.0
+    imu_bias: float = 1.0
+    imu_bias_walk: float = 1.0
+    imu_scale: float = 1.0
+    imu_cross_axis: float = 1.0
+    imu_lever: float = 1.0
+    imu_mounting: float = 1.0
+    imu_quantisation: float = 1.0
+    imu_vibration: float = 1.0
+    imu_jitter: float = 1.0
+    gnss_white: float = 1.0
+    gnss_correlated: float = 1.0
+    obd_delay: float = 1.0
+    obd_jitter: float = 1.0
+    obd_quantisation: float = 1.0
+    obd_speed_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ConfigError(f"effect {f.name} must be zero or positive, got {value}")
+
+    @classmethod
+    def none(cls) -> Effects:
+        """Return a world without any of the effects."""
+        return cls(**{f.name: 0.0 for f in fields(cls)})
+
+    @classmethod
+    def only(cls, **sizes: float) -> Effects:
+        """Return a world with these effects alone."""
+        return replace(cls.none(), **sizes)
+
+    def without(self, *names: str) -> Effects:
+        """Return these effects with some switched off.
+
+        Raises
+        ------
+        ConfigError
+            There is no effect of that name.
+        """
+        known = [f.name for f in fields(self)]
+        for name in names:
+            if name not in known:
+                raise ConfigError(f"unknown effect {name!r}; known are {', '.join(known)}")
+        return replace(self, **dict.fromkeys(names, 0.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensors:
+    """Inertial sensor and GNSS receiver; error levels of low-cost parts.
+
+    Attributes
+    ----------
+    imu_rate, gnss_rate : [Hz]; 0 to leave the sensor out
+    mounting : (roll, pitch, yaw) of the rotation from sensor to body axes [rad]
+    lever : sensor from the turning point at the rear axle, body axes [m]
+    accel_noise, gyro_noise : white, per sample [m/s^2], [rad/s]
+    accel_bias, gyro_bias : standard deviation at the start [m/s^2], [rad/s]
+    accel_walk, gyro_walk : growth of the bias in one hour [m/s^2], [rad/s]
+    scale, cross_axis : standard deviations [-]
+    accel_step, gyro_step : quantisation [m/s^2], [rad/s]
+    vibration : amplitude of engine vibration [m/s^2]
+    clock_jitter : of the time stamps [s]
+    gnss_noise : white, horizontal and vertical [m]
+    gnss_drift : correlated, horizontal and vertical [m]
+    gnss_drift_time : correlation times [s]
+    gnss_speed_noise : [m/s]
+    gnss_outages : (start, end) of times without fixes [s]
+
+    Notes
+    -----
+    Noise and bias are those of consumer six-axis sensors such as the MPU-6050
+    and BMI160 by their data sheets; GNSS errors are those of a single-frequency
+    receiver, see Groves, Principles of GNSS, Inertial and Multisensor
+    Integrated Navigation Systems, 2nd ed., 2013, ch. 9.
+    """
+
+    imu_rate: float = 200.0
+    gnss_rate: float = 1.0
+    mounting: tuple[float, float, float] = (0.021, -0.034, 0.042)
+    lever: tuple[float, float, float] = (-0.45, 0.25, -0.15)
+    accel_noise: float = 0.03
+    gyro_noise: float = 9.0e-4
+    accel_bias: float = 0.05
+    gyro_bias: float = 6.0e-3
+    accel_walk: float = 0.015
+    gyro_walk: float = 2.0e-4
+    scale: float = 0.003
+    cross_axis: float = 0.003
+    accel_step: float = 9.81 / 8192
+    gyro_step: float = math.radians(250.0) / 32768
+    vibration: float = 0.05
+    clock_jitter: float = 2.0e-4
+    gnss_noise: tuple[float, float] = (0.4, 0.8)
+    gnss_drift: tuple[float, float] = (2.2, 4.5)
+    gnss_drift_time: tuple[float, float] = (80.0, 140.0)
+    gnss_speed_noise: float = 0.08
+    gnss_outages: tuple[tuple[float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (self.imu_rate == 0.0 or 10.0 <= self.imu_rate <= 200.0):
+            raise ConfigError(f"imu_rate must be 0 or in [10, 200] Hz, got {self.imu_rate}")
+        if not 0.0 <= self.gnss_rate <= 20.0:
+            raise ConfigError(f"gnss_rate must be in [0, 20] Hz, got {self.gnss_rate}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Polling:
+    """How values are asked from the control units, one after another.
+
+    Attributes
+    ----------
+    fast : quantities asked in every round
+    slow : quantities of which one is asked in every tenth round
+    rate : rounds per second [Hz]
+    delay : how old a value is when its time is stamped, mean [s]
+    delay_spread : from quantity to quantity [s]
+    delay_jitter : from sample to sample [s]
+    speed_scale : indicated over true speed [-]
+    speed_rounding : "nearest" or "down" to whole km/h
+    """
+
+    fast: tuple[str, ...] = (
+        "vehicle_speed",
+        "engine_speed",
+        "engine_load",
+        "mass_air_flow",
+        "lambda_1",
+        "throttle",
+    )
+    slow: tuple[str, ...] = ("ambient_temperature", "barometric_pressure")
+    rate: float = 4.0
+    delay: float = 0.10
+    delay_spread: float = 0.02
+    delay_jitter: float = 0.012
+    speed_scale: float = 1.008
+    speed_rounding: str = "nearest"
+
+    def __post_init__(self) -> None:
+        if not 0.2 <= self.rate <= 100.0:
+            raise ConfigError(f"poll rate must be in [0.2, 100] Hz, got {self.rate}")
+        if self.speed_rounding not in ("nearest", "down"):
+            raise ConfigError(
+                f"speed_rounding must be nearest or down, got {self.speed_rounding!r}"
+            )
+        if not self.fast:
+            raise ConfigError("polling needs at least one fast quantity, got none")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """One drive to be simulated.
+
+    Attributes
+    ----------
+    name : becomes the drive's name
+    car, route : what drives where
+    payload : beside driver and fuel [kg]
+    seed : of driver, weather and sensors; the route keeps its own
+    effects, sensors, polling : see the classes
+    wind_speed : mean at 10 m height [m/s]
+    wind_from : direction it blows from, clockwise from north [rad]
+    gust_std : relative to the mean wind [-]
+    ambient_temperature : [K]
+    pressure : of the air at the route's start [Pa]
+    tyre_factor : of the rolling resistance, for tyre pressure [-]
+    drag_area_addition : for open windows or a roof box [m^2]
+    aggressiveness : of the driver, 1 usual [-]
+    calibration : drive every gear, load and engine speed, not just as usual
+    start_rest : standing before the start [s]
+    duration : end after this time at the latest [s]; None for the whole route
+    start_time : ISO 8601
+
+    Notes
+    -----
+    Wind is reported at 10 m and acts on a car at about 1 m. By the logarithmic
+    profile over open country with hedges, roughness length 0.1 m, the car sees
+    ln(1 / 0.1) / ln(10 / 0.1) = 0.5 of it; in cities half of that (exposure of
+    the route).
+    """
+
+    name: str
+    car: SimulatedCar
+    route: Route
+    payload: float = 0.0
+    seed: int = 0
+    effects: Effects = field(default_factory=Effects)
+    sensors: Sensors = field(default_factory=Sensors)
+    polling: Polling = field(default_factory=Polling)
+    wind_speed: float = 3.0
+    wind_from: float = math.radians(250.0)
+    gust_std: float = 0.25
+    ambient_temperature: float = 283.15
+    pressure: float = 101_325.0
+    tyre_factor: float = 1.0
+    drag_area_addition: float = 0.0
+    aggressiveness: float = 1.0
+    calibration: bool = False
+    start_rest: float = 25.0
+    duration: float | None = None
+    start_time: str = "2021-03-05T10:30:00+01:00"
+
+    def __post_init__(self) -> None:
+        if not -0.5 * self.car.mass < self.payload < 2.0 * self.car.mass:
+            raise ConfigError(f"payload must suit a car of {self.car.mass} kg, got {self.payload}")
+        for name, low, high in (
+            ("wind_speed", 0.0, 40.0),
+            ("wind_from", -2.0 * math.pi, 2.0 * math.pi),
+            ("ambient_temperature", 223.0, 333.0),
+            ("pressure", 6e4, 1.1e5),
+            ("tyre_factor", 0.1, 5.0),
+            ("aggressiveness", 0.3, 3.0),
+            ("start_rest", 0.0, 3600.0),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ConfigError(f"{name} must be in [{low:g}, {high:g}], got {value}")
+        if self.duration is not None and not self.duration >= 10.0:
+            raise ConfigError(f"duration must be at least 10 s, got {self.duration}")
+
+    @property
+    def mass(self) -> float:
+        """Mass at the start: car, driver, fuel and payload [kg]."""
+        return self.car.mass + self.payload
+
+
+_ELECTRIC_POLLING: Final = Polling(
+    fast=("vehicle_speed", "engine_speed", "engine_torque"), rate=10.0, delay=0.08
+)
+
+
+def _car(payload: float, seed: int) -> Scenario:
+    return Scenario(name="car", car=MIDSIZE, route=jensen_route(), payload=payload, seed=seed)
+
+
+def _calibration(payload: float, seed: int) -> Scenario:
+    return Scenario(
+        name="car-calibration",
+        car=MIDSIZE,
+        route=hilly_route(),
+        payload=payload,
+        seed=seed,
+        calibration=True,
+        aggressiveness=1.2,
+        wind_speed=2.0,
+    )
+
+
+def _short(payload: float, seed: int) -> Scenario:
+    return Scenario(name="car-short", car=MIDSIZE, route=short_route(), payload=payload, seed=seed)
+
+
+def _highway(payload: float, seed: int) -> Scenario:
+    return Scenario(name="highway", car=MIDSIZE, route=highway_route(), payload=payload, seed=seed)
+
+
+def _compact(payload: float, seed: int) -> Scenario:
+    return Scenario(name="compact", car=COMPACT, route=jensen_route(6), payload=payload, seed=seed)
+
+
+def _compact_calibration(payload: float, seed: int) -> Scenario:
+    return replace(
+        _calibration(payload, seed), name="compact-calibration", car=COMPACT, route=hilly_route(7)
+    )
+
+
+def _electric(payload: float, seed: int) -> Scenario:
+    return Scenario(
+        name="electric",
+        car=ELECTRIC,
+        route=jensen_route(8),
+        payload=payload,
+        seed=seed,
+        polling=_ELECTRIC_POLLING,
+    )
+
+
+SCENARIOS: Final[dict[str, Callable[[float, int], Scenario]]] = {
+    "car": _car,
+    "car-calibration": _calibration,
+    "car-short": _short,
+    "highway": _highway,
+    "compact": _compact,
+    "compact-calibration": _compact_calibration,
+    "electric": _electric,
+}
+"""Makers of the named scenarios, from payload [kg] and seed."""
+
+ABOUT: Final[dict[str, str]] = {
+    "car": "midsize petrol car, 83 km of city, country, highway and hills, about 75 min",
+    "car-calibration": "the same car in all gears, loads and engine speeds, about 60 min",
+    "car-short": "the same car, 8 km of city and country, about 10 min",
+    "highway": "the same car on a highway, out and back",
+    "compact": "small petrol car with a manual gearbox, about 75 min",
+    "compact-calibration": "the small car in all gears, loads and engine speeds",
+    "electric": "electric car whose control unit reports motor torque, about 75 min",
+}
+"""One line for each named scenario."""
+
+
+def make_scenario(
+    name: str,
+    *,
+    payload: float | None = None,
+    mass: float | None = None,
+    seed: int = 1,
+    wind: float | None = None,
+    wind_from: float | None = None,
+    without: Iterable[str] = (),
+) -> Scenario:
+    """Make a named scenario; `dataclasses.replace` changes the rest.
+
+    Parameters
+    ----------
+    name : str
+        One of `SCENARIOS`.
+    payload : float, optional
+        Beside driver and fuel, none by default [kg].
+    mass : float, optional
+        At the start, instead of the payload [kg].
+    seed : int
+        Of driver, weather and sensors.
+    wind : float, optional
+        Mean wind at 10 m height [m/s].
+    wind_from : float, optional
+        Direction it blows from, clockwise from north [rad].
+    without : iterable of str
+        Effects to switch off, see `Effects`.
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    ConfigError
+        There is no scenario or effect of that name, or a value cannot be.
+    """
+    maker = SCENARIOS.get(name)
+    if maker is None:
+        raise ConfigError(f"unknown scenario {name!r}; known are {', '.join(SCENARIOS)}")
+    if payload is not None and mass is not None:
+        raise ConfigError("give a payload or a mass, not both")
+    made = maker(payload or 0.0, seed)
+    if mass is not None:
+        made = replace(made, payload=mass - made.car.mass)
+    if wind is not None:
+        made = replace(made, wind_speed=wind)
+    if wind_from is not None:
+        made = replace(made, wind_from=wind_from)
+    return replace(made, effects=made.effects.without(*without))
+
+
+def streams(seed: int, *names: str) -> dict[str, np.random.Generator]:
+    """Return one random stream per name, so that one effect never moves another."""
+    children = np.random.SeedSequence(seed).spawn(len(names))
+    return {n: np.random.default_rng(c) for n, c in zip(names, children, strict=True)}

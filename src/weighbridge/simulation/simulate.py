@@ -1,0 +1,281 @@
+"""Simulate a drive: what was recorded, and what was true."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import polars as pl
+import tomlkit
+
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError
+from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
+from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
+from weighbridge.signals.units import from_si, scalar_from_si
+from weighbridge.simulation.body import simulate_pose
+from weighbridge.simulation.longitudinal import DT, simulate_trajectory
+from weighbridge.simulation.scenario import Scenario, streams
+from weighbridge.simulation.sensing import (
+    POLLABLE,
+    engine_load,
+    simulate_gnss,
+    simulate_imu,
+    simulate_polling,
+)
+
+log = logging.getLogger(__name__)
+
+TRUTH_RATE = 20.0
+"""Samples of the truth per second [Hz]."""
+
+_STRIDE = round(1.0 / (DT * TRUTH_RATE))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """What was true, at 20 Hz; every array (n,), SI.
+
+    Attributes
+    ----------
+    time : [s]
+    distance : along the road [m]
+    speed, accel : along the road [m/s], [m/s^2]
+    specific_force : along the road, ``accel + g sin(grade)`` [m/s^2]
+    grade : of the road, positive uphill [rad]
+    pitch : of the body, squat and load included, nose up [rad]
+    roll : of the body, right side down [rad]
+    heading : of the body, clockwise from north, in [0, 2 pi) [rad]
+    altitude : [m]
+    latitude, longitude : [rad]
+    mass : of all that rolls [kg]
+    engine_speed : [rad/s]
+    engine_torque : of engine or motor at the clutch: friction and accessories
+        taken off, its own inertia not yet [N m]
+    load : calculated load before sampling and quantisation [-]
+    gear : current one; during a shift the next
+    phase : 0 driving, 1 shifting, 2 clutch slips, 3 clutch open
+    traction_force : of the driveline at the wheels, its losses and the engine's
+        inertia taken off, the wheels' inertia not yet [N]
+    brake_force, drag_force, rolling_force : against the motion [N]
+    wind_along : wind at the car along its heading, positive from behind [m/s]
+    fuel_flow : [kg/s]
+    pedal : torque asked for over torque there is [-]
+
+    Notes
+    -----
+    ``(mass + I_w / r^2) accel = traction_force - brake_force - drag_force -
+    rolling_force - mass g sin(grade)``, with the force held over one step of
+    5 ms, but while the car stands.
+    """
+
+    time: Floats
+    distance: Floats
+    speed: Floats
+    accel: Floats
+    specific_force: Floats
+    grade: Floats
+    pitch: Floats
+    roll: Floats
+    heading: Floats
+    altitude: Floats
+    latitude: Floats
+    longitude: Floats
+    mass: Floats
+    engine_speed: Floats
+    engine_torque: Floats
+    load: Floats
+    gear: Floats
+    phase: Floats
+    traction_force: Floats
+    brake_force: Floats
+    drag_force: Floats
+    rolling_force: Floats
+    wind_along: Floats
+    fuel_flow: Floats
+    pedal: Floats
+
+
+_TRUTH_SUFFIX = {
+    "time": "s", "distance": "m", "speed": "mps", "accel": "mps2", "specific_force": "mps2",
+    "grade": "rad", "pitch": "rad", "roll": "rad", "heading": "rad", "altitude": "m",
+    "latitude": "deg", "longitude": "deg", "mass": "kg", "engine_speed": "rpm",
+    "engine_torque": "nm", "load": "pct", "gear": "", "phase": "", "traction_force": "n",
+    "brake_force": "n", "drag_force": "n", "rolling_force": "n", "wind_along": "mps",
+    "fuel_flow": "kgps", "pedal": "pct",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedDrive:
+    """A drive with its truth.
+
+    Attributes
+    ----------
+    scenario : what was simulated
+    drive : what was recorded; `DriveInfo.mass` is the mass at the start
+    truth : what was true
+    """
+
+    scenario: Scenario
+    drive: Drive
+    truth: Truth
+
+    def write(self, folder: Path, *, format: Literal["parquet", "csv"] = "parquet") -> None:
+        """Write the drive's tables, ``drive.toml`` and the truth into a folder.
+
+        Parameters
+        ----------
+        folder : Path
+            Made where it is not there; files of the same name are replaced.
+        format : "parquet" or "csv"
+
+        Raises
+        ------
+        ConfigError
+            The format is neither.
+        """
+        if format not in ("parquet", "csv"):
+            raise ConfigError(f"format must be parquet or csv, got {format!r}")
+        folder.mkdir(parents=True, exist_ok=True)
+        for table in TABLES:
+            signals = [s for s in self.drive.signals.values() if QUANTITIES[s.name].table == table]
+            if signals:
+                _write_frame(_frame(signals), folder / table, format)
+        columns = {}
+        for f in fields(self.truth):
+            values, suffix = getattr(self.truth, f.name), _TRUTH_SUFFIX[f.name]
+            column = f"{f.name}_{suffix}" if suffix else f.name
+            columns[column] = from_si(values, suffix) if suffix else values
+        _write_frame(pl.DataFrame(columns), folder / "truth", format)
+        (folder / "drive.toml").write_text(self._toml(), encoding="utf-8")
+
+    def _toml(self) -> str:
+        info = self.drive.info
+        document = tomlkit.document()
+        document.add(
+            tomlkit.comment("Simulated; the truth table beside this file holds what was true.")
+        )
+        if info.start_time:
+            document["start_time"] = info.start_time
+        if info.vehicle:
+            document["vehicle"] = info.vehicle
+        for key, value, suffix in (
+            ("mass", info.mass, "kg"),
+            ("ambient_temperature", info.ambient_temperature, "degc"),
+            ("barometric_pressure", info.barometric_pressure, "kpa"),
+            ("wind_speed", info.wind_speed, "mps"),
+            ("wind_from", info.wind_from, "deg"),
+        ):
+            if value is not None:
+                document[f"{key}_{suffix}"] = round(scalar_from_si(value, suffix), 6)
+        if info.notes:
+            document["notes"] = info.notes
+        return tomlkit.dumps(document)
+
+
+def _frame(signals: list[Signal]) -> pl.DataFrame:
+    """Put the signals of one table side by side, empty where one has no value."""
+    clocks = {id(s.time): s.time for s in signals}
+    time = next(iter(clocks.values()))
+    if len(clocks) > 1:
+        time = np.unique(np.concatenate(list(clocks.values())))
+    columns: dict[str, pl.Series | Floats] = {TIME_COLUMN: time}
+    for s in signals:
+        quantity = QUANTITIES[s.name]
+        values = from_si(s.values, quantity.suffix) if quantity.suffix else s.values
+        if s.time.size == time.size:
+            columns[quantity.column] = values
+            continue
+        row = np.full(time.size, np.nan)
+        row[np.searchsorted(time, s.time)] = values
+        columns[quantity.column] = pl.Series(row).fill_nan(None)
+    return pl.DataFrame(columns)
+
+
+def _write_frame(frame: pl.DataFrame, path: Path, format: str) -> None:
+    if format == "csv":
+        frame.write_csv(path.with_suffix(".csv"), float_precision=9)
+    else:
+        frame.write_parquet(path.with_suffix(".parquet"))
+
+
+def simulate_car(scenario: Scenario) -> SimulatedDrive:
+    """Simulate one drive.
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Returns
+    -------
+    SimulatedDrive
+        The same for the same scenario, to the last bit.
+
+    Raises
+    ------
+    ConfigError
+        The scenario polls what cannot be polled.
+    """
+    for name in (*scenario.polling.fast, *scenario.polling.slow):
+        if name not in POLLABLE:
+            raise ConfigError(f"cannot poll {name!r}; known are {', '.join(POLLABLE)}")
+    random = streams(scenario.seed, "plan", "drive", "road", "imu", "gnss", "obd")
+    trajectory = simulate_trajectory(scenario, random["plan"], random["drive"])
+    pose = simulate_pose(scenario, trajectory, random["road"])
+    signals: list[Signal] = []
+    if scenario.sensors.imu_rate > 0.0:
+        signals += simulate_imu(scenario, trajectory, pose, random["imu"])
+    signals += simulate_polling(scenario, trajectory, pose, random["obd"])
+    if scenario.sensors.gnss_rate > 0.0:
+        signals += simulate_gnss(scenario, trajectory, pose, random["gnss"])
+
+    def cut(values: Floats) -> Floats:
+        return np.ascontiguousarray(values[::_STRIDE])
+
+    accel = np.gradient(trajectory.speed, DT)
+    truth = Truth(
+        time=cut(trajectory.time),
+        distance=cut(trajectory.distance),
+        speed=cut(trajectory.speed),
+        accel=cut(accel),
+        specific_force=cut(accel + GRAVITY * np.sin(pose.grade)),
+        grade=cut(pose.grade),
+        pitch=cut(pose.pitch),
+        roll=cut(pose.roll),
+        heading=np.mod(cut(pose.heading), 2.0 * math.pi),
+        altitude=cut(pose.altitude),
+        latitude=cut(pose.latitude),
+        longitude=cut(pose.longitude),
+        mass=cut(trajectory.mass),
+        engine_speed=cut(trajectory.engine_speed),
+        engine_torque=cut(trajectory.engine_torque),
+        load=cut(engine_load(scenario, trajectory)),
+        gear=cut(trajectory.gear),
+        phase=cut(trajectory.phase),
+        traction_force=cut(trajectory.traction_force),
+        brake_force=cut(trajectory.brake_force),
+        drag_force=cut(trajectory.drag_force),
+        rolling_force=cut(trajectory.rolling_force),
+        wind_along=cut(trajectory.wind_along),
+        fuel_flow=cut(trajectory.fuel_flow),
+        pedal=cut(trajectory.pedal),
+    )
+    info = DriveInfo(
+        start_time=scenario.start_time,
+        vehicle=scenario.car.name,
+        mass=scenario.mass,
+        ambient_temperature=scenario.ambient_temperature,
+        barometric_pressure=scenario.pressure,
+        wind_speed=scenario.wind_speed,
+        wind_from=scenario.wind_from,
+        notes=f"simulated, scenario {scenario.name}, seed {scenario.seed}",
+    )
+    drive = Drive(scenario.name, {s.name: s for s in signals}, info)
+    log.info("simulated %s: %.0f s, %.1f km", scenario.name, drive.duration,
+             trajectory.distance[-1] / 1e3)  # fmt: skip
+    return SimulatedDrive(scenario=scenario, drive=drive, truth=truth)
