@@ -1,0 +1,309 @@
+"""Plausibility of a drive: wrong units, stuck or swapped signals, clocks that disagree.
+
+A serious problem is one that would make a mass wrong without any other sign;
+`weigh` refuses then. Thresholds leave room for real sensors: what a sane drive
+can show never counts as serious.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from weighbridge.pipeline.imu_checks import check_imu
+from weighbridge.pipeline.speed_checks import check_scales
+from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
+from weighbridge.signals.catalogue import TABLES
+from weighbridge.signals.units import scalar_from_si
+from weighbridge.vehicle.model import Vehicle
+
+_IMU: Final = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
+_WEIGHING: Final = frozenset(
+    (
+        *_IMU,
+        "longitudinal_accel",
+        "vehicle_speed",
+        "engine_speed",
+        "engine_load",
+        "engine_torque",
+        "engine_torque_fraction",
+        "mass_air_flow",
+        "latitude",
+        "longitude",
+        "gnss_speed",
+        "grade",
+    )
+)
+"""Signals a mass is made from: what is wrong with them is serious."""
+
+_Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
+
+
+def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, ...]:
+    """Look for what cannot be so in a drive.
+
+    Parameters
+    ----------
+    drive : the drive as read
+    vehicle : its gearings help to judge the speed's unit
+
+    Returns
+    -------
+    What was found, serious problems first. The drive's own ``problems`` (from
+    reading it) are not repeated.
+    """
+    problems = [p for check in _CHECKS for p in check(drive, vehicle)]
+    return tuple(sorted(problems, key=lambda p: not p.serious))
+
+
+def _show(name: str, value: float) -> str:
+    """Write an SI value in the quantity's own unit."""
+    suffix = QUANTITIES[name].suffix
+    return f"{scalar_from_si(value, suffix):.4g} {suffix}" if suffix else f"{value:.4g}"
+
+
+def _check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find time columns in another unit than their name says."""
+    for table in TABLES:
+        signals = [s for s in drive.signals.values() if QUANTITIES[s.name].table == table]
+        signals = [s for s in signals if len(s) >= 10]
+        if not signals:
+            continue
+        s = max(signals, key=len)
+        period, name = s.period, f"{table} ({s.name})"
+        slow, fast = (0.5, 5e-5) if table in ("imu", "ride") else (30.0, 5e-4)
+        if period > slow or (period > 2.0 and s.duration > 2 * 86_400.0):
+            yield Problem(
+                "",
+                f"{name} has one sample every {period:.4g} s; if its time is in milliseconds, "
+                "name the column time_ms or set the unit in [time] of the mapping",
+                serious=True,
+            )
+        elif period < fast:
+            yield Problem(
+                "",
+                f"{name} has {1.0 / period:.4g} samples per second; if its time is in seconds, "
+                "name the column time_s or set the unit in [time] of the mapping",
+                serious=True,
+            )
+
+
+def _check_overlap(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find tables that were not recorded at the same time."""
+    spans = {}
+    for table in TABLES:
+        signals = [
+            s for s in drive.signals.values() if QUANTITIES[s.name].table == table and len(s)
+        ]
+        if signals:
+            start = min(float(s.time[0]) for s in signals)
+            spans[table] = (start, max(float(s.time[-1]) for s in signals))
+    for (a, (a0, a1)), (b, (b0, b1)) in combinations(spans.items(), 2):
+        shared = min(a1, b1) - max(a0, b0)
+        shorter = min(a1 - a0, b1 - b0)
+        if shared <= 0.1 * shorter:
+            yield Problem(
+                "",
+                f"{a} runs from {a0:.6g} to {a1:.6g} s and {b} from {b0:.6g} to {b1:.6g} s: "
+                "write both on one clock (a constant goes into offset_s in [time] of a mapping)",
+                serious=True,
+            )
+        elif shared < 0.5 * max(a1 - a0, b1 - b0):
+            yield Problem("", f"{a} and {b} were recorded together for {shared:.0f} s only")
+
+
+def _check_long_gaps(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find jumps of the clock that no recording makes."""
+    seen: set[int] = set()
+    for s in drive.signals.values():
+        if id(s.time) in seen or len(s) < 2:
+            continue
+        seen.add(id(s.time))
+        step = np.diff(s.time)
+        k = int(np.argmax(step))
+        if step[k] > 6 * 3600.0:
+            yield Problem(
+                s.name,
+                f"the clock of {s.name} jumps by {step[k]:.6g} s after {s.time[k]:.6g} s; "
+                "cut the recording there, or correct that time stamp",
+                serious=True,
+            )
+
+
+def _check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find values no road vehicle can have."""
+    for s in drive.signals.values():
+        q = QUANTITIES[s.name]
+        outside = (s.values < q.low) | (s.values > q.high)
+        count = int(np.count_nonzero(outside))
+        if count == 0:
+            continue
+        k = int(np.argmax(np.where(outside, np.abs(s.values), -1.0)))
+        yield Problem(
+            s.name,
+            f"{count} of {len(s)} values of {s.name} are outside {_show(s.name, q.low)} to "
+            f"{_show(s.name, q.high)}, such as {_show(s.name, float(s.values[k]))} at "
+            f"{s.time[k]:.6g} s; check its unit",
+            serious=s.name in _WEIGHING and count > 0.01 * len(s),
+        )
+
+
+def _check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find signals that never change, and sensors that froze on the way."""
+    moving = _moves(drive)
+    for s in drive.signals.values():
+        if s.name not in _WEIGHING or s.name == "grade" or len(s) < 50 or s.duration < 20.0:
+            continue
+        value = float(s.values[0])
+        if bool(np.all(s.values == value)):
+            standing = s.name in ("vehicle_speed", "gnss_speed", "latitude", "longitude")
+            if (standing or s.name not in _IMU) and not moving:
+                continue
+            yield Problem(
+                s.name,
+                f"{s.name} is {_show(s.name, value)} all the time; its source is stuck: "
+                "leave the column out or record it again",
+                serious=True,
+            )
+        elif s.name in _IMU:
+            run, at = _longest_run(s.values)
+            length = run * s.period
+            if run > 200 and length > 5.0:
+                yield Problem(
+                    s.name,
+                    f"{s.name} repeats one value for {length:.1f} s from {s.time[at]:.6g} s",
+                    serious=length > 0.2 * s.duration,
+                )
+
+
+def _longest_run(values: np.ndarray) -> tuple[int, int]:
+    """Length and start of the longest run of one value."""
+    ends = np.flatnonzero(np.concatenate((values[1:] != values[:-1], [True])))
+    lengths = np.diff(np.concatenate(([-1], ends)))
+    k = int(np.argmax(lengths))
+    return int(lengths[k]), int(ends[k] - lengths[k] + 1)
+
+
+def _moves(drive: Drive) -> bool:
+    """Tell whether any source saw the vehicle move."""
+    for name in ("vehicle_speed", "gnss_speed"):
+        s = drive.get(name)
+        if s is not None and len(s) and float(np.max(np.abs(s.values))) > 1.0:
+            return True
+    lat, lon = drive.get("latitude"), drive.get("longitude")
+    if lat is None or lon is None or not len(lat) or not len(lon):
+        return False
+    return float(np.ptp(lat.values)) > 3e-5 or float(np.ptp(lon.values)) > 3e-5
+
+
+def _check_load(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find parts of one under a percent name."""
+    for name in ("engine_load", "engine_torque_fraction", "throttle"):
+        s = drive.get(name)
+        if s is None or len(s) < 50:
+            continue
+        highest = float(np.max(np.abs(s.values)))
+        if 0.0 < highest <= 0.0102 and np.unique(s.values).size > 5:
+            column = QUANTITIES[name].stem
+            yield Problem(
+                name,
+                f"{name} never exceeds {100 * highest:.3g} %; it seems to run from 0 to 1: "
+                f"name the column {column}_ratio or set the unit ratio in the mapping",
+                serious=name in _WEIGHING,
+            )
+
+
+def _check_engine_speed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find an engine that would turn too slowly for the road speed."""
+    engine, speed = drive.get("engine_speed"), drive.get("vehicle_speed")
+    if engine is None or speed is None or not len(speed):
+        return
+    fast = speed.at(engine.time) > 10.0
+    if np.count_nonzero(fast) < 20:
+        return
+    # Slower than any idle, but turning: rad/s or revolutions per second.
+    highest = float(np.max(engine.values[fast]))
+    if 1.0 < highest < 62.0:
+        yield Problem(
+            "engine_speed",
+            f"engine_speed never exceeds {_show('engine_speed', highest)} while driving faster "
+            "than 36 km/h; if it is in rad/s, name the column engine_speed_radps",
+            serious=True,
+        )
+
+
+def _check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Tell of long standstills and cuts; neither spoils a mass."""
+    s = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    if s is None or len(s) < 2:
+        return
+    standing = np.abs(s.values) < 0.3
+    if float(np.max(np.abs(s.values))) < 1.0:
+        yield Problem(
+            s.name,
+            f"the vehicle stands all the time ({s.duration:.0f} s): there is nothing to weigh by",
+        )
+        return
+    length, start = _longest_time(s, standing)
+    if length > 600.0:
+        yield Problem(
+            s.name,
+            f"the vehicle stands for {length / 60.0:.0f} min from {start:.6g} s; "
+            "if it was loaded there, look at the mass of each segment",
+        )
+    # No car brakes or accelerates at 1.5 g: a piece of the recording is missing there.
+    step, jump = np.diff(s.time), np.abs(np.diff(s.values))
+    cut = (jump > 15.0 * step + 1.5) & (step < 1.0)
+    if count := int(np.count_nonzero(cut)):
+        k = int(np.argmax(np.where(cut, jump, 0.0)))
+        yield Problem(
+            s.name,
+            f"{s.name} jumps {count} times, as from {_show(s.name, float(s.values[k]))} to "
+            f"{_show(s.name, float(s.values[k + 1]))} within {step[k]:.2g} s at {s.time[k]:.6g} s; "
+            "a piece may be cut out of the recording there",
+        )
+
+
+def _longest_time(s: Signal, mask: Bools) -> tuple[float, float]:
+    """Duration and start of the longest run of True [s]."""
+    edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    if starts.size == 0:
+        return 0.0, 0.0
+    lengths = s.time[ends] - s.time[starts]
+    k = int(np.argmax(lengths))
+    return float(lengths[k]), float(s.time[starts[k]])
+
+
+def _check_sign(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find a speed counted backwards."""
+    s = drive.get("vehicle_speed")
+    if s is None:
+        return
+    moving = np.abs(s.values) > 1.0
+    backwards = int(np.count_nonzero(s.values[moving] < 0.0))
+    if backwards > 0.5 * np.count_nonzero(moving):
+        yield Problem(
+            s.name,
+            f"vehicle_speed is negative in {backwards} of {np.count_nonzero(moving)} samples in "
+            "motion; if forward is negative there, set factor = -1 in the mapping",
+            serious=True,
+        )
+
+
+_CHECKS: Final[tuple[_Check, ...]] = (
+    _check_rates,
+    _check_overlap,
+    _check_long_gaps,
+    _check_stuck,
+    _check_load,
+    _check_engine_speed,
+    _check_sign,
+    check_scales,
+    check_imu,
+    _check_range,
+    _check_standstill,
+)

@@ -1,0 +1,225 @@
+"""Are the axes of the inertial sensor in SI, complete and right-handed?
+
+Any fixed mounting is allowed: only what no rotation can explain is a problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from weighbridge.constants import GRAVITY
+from weighbridge.pipeline import windows
+from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+from weighbridge.vehicle.model import Vehicle
+
+# Samples enough for a median; more would only take time.
+_SAMPLES: Final = 20_000
+_WINDOW: Final = 2.0  # [s]
+
+
+def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Compare the inertial sensor with gravity, with the course and with itself."""
+    accel = _axes(drive, "accel")
+    gyro = _axes(drive, "gyro")
+    fine = True
+    if accel is not None:
+        for problem in _check_gravity(accel):
+            fine = False
+            yield problem
+    if gyro is not None:
+        for problem in _check_rate(drive, gyro):
+            fine = False
+            yield problem
+    if fine and accel is not None and gyro is not None:
+        yield from _check_axes(drive, accel, gyro)
+
+
+def _axes(drive: Drive, kind: str) -> tuple[Signal, Signal, Signal] | None:
+    x, y, z = (drive.get(f"{kind}_{a}") for a in "xyz")
+    if x is None or y is None or z is None or min(len(x), len(y), len(z)) < 100:
+        return None
+    return x, y, z
+
+
+def _norm(axes: tuple[Signal, Signal, Signal]) -> Floats:
+    time = axes[0].time[:: max(1, len(axes[0]) // _SAMPLES)]
+    norm = np.sqrt(sum(s.at(time) ** 2 for s in axes))
+    return np.asarray(norm[np.isfinite(norm)])
+
+
+def _check_gravity(accel: tuple[Signal, Signal, Signal]) -> Iterator[Problem]:
+    norm = _norm(accel)
+    usual = float(np.median(norm)) if norm.size else GRAVITY
+    if 8.0 < usual < 12.0:
+        return
+    start = f"the accelerometer reads {usual:.3g} m/s^2 in the median, not {GRAVITY}"
+    if 0.8 < usual < 1.25:
+        text = f"{start}; it seems to be in g: name its columns accel_x_g, accel_y_g, accel_z_g"
+    elif 78.0 < usual < 118.0:
+        text = f"{start}; it is in m/s^2 already: name its columns accel_x_mps2 and so on"
+    elif usual < 3.0:
+        text = f"{start}; gravity was taken out of it: record the raw accelerometer"
+    else:
+        text = f"{start}; check its unit and that all three axes are there"
+    yield Problem("accel_x", text, serious=True)
+
+
+def _check_rate(drive: Drive, gyro: tuple[Signal, Signal, Signal]) -> Iterator[Problem]:
+    norm = _norm(gyro)
+    high = float(np.percentile(norm, 99.9)) if norm.size else 0.0
+    if high > 4.0:
+        yield Problem(
+            "gyro_x",
+            f"the gyro reads up to {high:.3g} rad/s, more than a car can turn; "
+            "it seems to be in deg/s: name its columns gyro_x_degps and so on",
+            serious=True,
+        )
+        return
+    turns = _turns(drive)
+    if turns is None:
+        return
+    time, change = turns
+    rate, full = _window_means(gyro, time)
+    step = np.diff(time)
+    turning = full & (np.abs(change) > np.radians(8.0)) & (np.abs(change) < np.radians(120.0))
+    if np.count_nonzero(turning) < 5:
+        return
+    bias = np.median(rate[full], axis=0)
+    angle = np.linalg.norm(rate - bias, axis=1) * step
+    ratio = float(np.median(angle[turning] / np.abs(change[turning])))
+    if ratio > 15.0:
+        unit, said = "deg/s", "gyro_x_degps"
+    elif ratio < 1.0 / 15.0:
+        unit, said = "rad/s", "gyro_x_radps"
+    else:
+        return
+    yield Problem(
+        "gyro_x",
+        f"the gyro turns {ratio:.3g} times as far as the GNSS course; it seems to be in {unit}: "
+        f"name its columns {said} and so on",
+        serious=True,
+    )
+
+
+def _turns(drive: Drive) -> tuple[Floats, Floats] | None:
+    """Changes of the course between windows in motion: edges [s], changes [rad]."""
+    found = windows.track(drive, _WINDOW)
+    if found is None:
+        return None
+    time, north, east = found
+    way = np.hypot(north, east) / np.diff(time)
+    bearing = np.arctan2(east, north)
+    change = (np.diff(bearing) + np.pi) % (2.0 * np.pi) - np.pi
+    slow = (way[1:] < 4.0) | (way[:-1] < 4.0) | (np.diff(time)[1:] > 2.0 * _WINDOW)
+    change[slow] = 0.0
+    # The bearing of a piece holds at its middle.
+    return 0.5 * (time[1:] + time[:-1]), change
+
+
+def _window_means(axes: tuple[Signal, Signal, Signal], at: Floats) -> tuple[Floats, Bools]:
+    out = np.empty((at.size - 1, 3))
+    full = np.ones(at.size - 1, dtype=bool)
+    for k, s in enumerate(axes):
+        out[:, k], ok = windows.means(s, at)
+        full &= ok
+    return out, full
+
+
+def _check_axes(
+    drive: Drive, accel: tuple[Signal, Signal, Signal], gyro: tuple[Signal, Signal, Signal]
+) -> Iterator[Problem]:
+    """In a bend the lateral acceleration is speed times yaw rate, about one right-handed system."""
+    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    turns = _turns(drive)
+    sides: tuple[Signal, ...] = (*accel, *gyro)
+    if speed is not None and len(speed) > 20:
+        sides = (*sides, speed)
+    start = max(float(s.time[0]) for s in sides)
+    end = min(float(s.time[-1]) for s in sides)
+    if end - start < 30 * _WINDOW:
+        return
+    at = windows.edges(start, end, _WINDOW)
+    force, full = _window_means(accel, at)
+    rate, ok = _window_means(gyro, at)
+    full &= ok
+    if np.count_nonzero(full) < 30:
+        return
+    down = -np.mean(force[full], axis=0)
+    down /= np.linalg.norm(down)
+    if turns is not None:
+        time, change = turns
+        along, good = _window_means(gyro, time)
+        yaw = (along - np.median(rate[full], axis=0)) @ down
+        course_rate = change / np.diff(time)
+        bend = good & (np.abs(change) > np.radians(8.0)) & (np.abs(change) < np.radians(120.0))
+        if np.count_nonzero(bend) >= 8:
+            agreement = float(np.corrcoef(yaw[bend], course_rate[bend])[0, 1])
+            if agreement < -0.6:
+                yield Problem(
+                    "gyro_z",
+                    "the gyro turns against the GNSS course about the accelerometer's vertical "
+                    f"(correlation {agreement:.2f}): the signs of all gyro or of all accelerometer "
+                    "axes are reversed; set factor = -1 for them in the mapping",
+                    serious=True,
+                )
+                return
+            size = np.linalg.norm(along - np.median(rate[full], axis=0), axis=1)[bend]
+            total = np.abs(course_rate[bend])
+            upright = float(yaw[bend] @ course_rate[bend]) / float(size @ total)
+            if upright < 0.6 and _alike(size, total):
+                yield Problem(
+                    "gyro_z",
+                    "the gyro turns with the GNSS course, but not about the accelerometer's "
+                    "vertical: their axes are not the same; map them alike",
+                    serious=True,
+                )
+                return
+    if speed is None or len(speed) <= 20:
+        return
+    v, ok = windows.means(speed, at)
+    near = (speed.age(at) < 1.0)[1:] & (speed.age(at) < 1.0)[:-1]
+    full &= near & np.isfinite(v)
+    accel_along = np.diff(speed.at(at)) / _WINDOW
+    full &= np.isfinite(accel_along)
+    if np.count_nonzero(full) < 30:
+        return
+    forward, agreement = _forward(accel_along[full], force[full], down)
+    if forward is None or agreement < 0.7:
+        return
+    right = np.cross(down, forward)
+    centripetal = v[full] * ((rate[full] - np.median(rate[full], axis=0)) @ down)
+    lateral = force[full] @ right
+    if float(np.std(centripetal)) < 0.25:
+        return
+    agreement = float(np.corrcoef(lateral, centripetal)[0, 1])
+    if agreement < -0.6:
+        yield Problem(
+            "accel_y",
+            "in bends the lateral acceleration runs against speed times yaw rate "
+            f"(correlation {agreement:.2f}): two axes of the inertial sensor are swapped or one "
+            "has the wrong sign; correct it in the mapping (factor = -1)",
+            serious=True,
+        )
+
+
+def _alike(a: Floats, b: Floats) -> bool:
+    return float(np.corrcoef(a, b)[0, 1]) > 0.8
+
+
+def _forward(accel: Floats, force: Floats, down: Floats) -> tuple[Floats | None, float]:
+    """Horizontal direction whose specific force follows the change of speed."""
+    x = accel - np.mean(accel)
+    y = force - np.mean(force, axis=0)
+    spread = float(x @ x)
+    if spread / x.size < 0.15**2:
+        return None, 0.0
+    slope = x @ y / spread
+    slope = slope - (slope @ down) * down
+    size = float(np.linalg.norm(slope))
+    if size < 0.2:
+        return None, 0.0
+    forward = slope / size
+    return forward, float(np.corrcoef(y @ forward, x)[0, 1])

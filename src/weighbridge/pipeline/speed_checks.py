@@ -1,0 +1,243 @@
+"""Is a speed, a position or an altitude in the unit its name says?
+
+Each is compared with another source of the same motion; what remains is a
+ratio, and a wrong unit shows as the ratio of two units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from weighbridge.pipeline import windows
+from weighbridge.signals import Drive, Floats, Problem, Signal
+from weighbridge.signals.units import UNITS
+from weighbridge.vehicle.model import Vehicle
+
+# Unit the name says, unit the numbers are in, as they occur in practice.
+_CONFUSIONS: Final = tuple(
+    (said, meant, UNITS[said].factor / UNITS[meant].factor)
+    for said, meant in (
+        ("kmh", "mph"),
+        ("mph", "kmh"),
+        ("kmh", "mps"),
+        ("mps", "kmh"),
+        ("mph", "mps"),
+        ("mps", "mph"),
+        ("kmh", "kn"),
+        ("mps", "kn"),
+        ("kn", "mps"),
+    )
+)
+
+# A speedometer reads up to a tenth more than the wheels do.
+_TOLERANCE: Final = 0.10
+
+
+def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Compare speeds with each other, with positions, gears and acceleration."""
+    positions = list(_check_positions(drive))
+    yield from positions
+    trusted = None if positions else _position_speed(drive)
+    gnss = drive.get("gnss_speed")
+    if gnss is not None and trusted is not None:
+        ratio = _ratio(gnss, trusted)
+        if ratio is not None and (problem := _scale_problem("gnss_speed", ratio, "the positions")):
+            yield problem
+            gnss = None
+    speed = drive.get("vehicle_speed")
+    if speed is None or len(speed) < 20:
+        return
+    for reference, source in ((gnss, "gnss_speed"), (trusted, "the positions")):
+        ratio = _ratio(speed, reference) if reference is not None else None
+        if ratio is not None:
+            if problem := _scale_problem("vehicle_speed", ratio, source):
+                yield problem
+            return
+    found = _gear_ratio(drive, speed, vehicle)
+    if found is not None:
+        if problem := _scale_problem("vehicle_speed", found, "the gears of the vehicle file", 0.06):
+            yield problem
+        return
+    ratio = _accel_ratio(drive, speed)
+    if ratio is not None:
+        problem = _scale_problem("vehicle_speed", ratio, "the acceleration", only_units=True)
+        if problem:
+            yield problem
+
+
+def _scale_problem(
+    name: str, ratio: float, source: str, near: float = 0.08, *, only_units: bool = False
+) -> Problem | None:
+    """Judge a speed that reads ``ratio`` times another source of it."""
+    if abs(ratio - 1.0) < _TOLERANCE:
+        return None
+    expected = min((c[2] for c in _CONFUSIONS), key=lambda e: abs(np.log(ratio / e)))
+    stem = "speed" if name == "gnss_speed" else name
+    if abs(np.log(ratio / expected)) < near:
+        # Several pairs of units have one ratio: the name says which one it is.
+        alike = [(s, m) for s, m, e in _CONFUSIONS if abs(np.log(e / expected)) < 0.02]
+        texts = " or ".join(f"in {m} under {stem}_{s}" for s, m in alike)
+        return Problem(
+            name,
+            f"{name} is {ratio:.3f} times the speed from {source}; it seems to be {texts}: "
+            f"name the column {stem}_{alike[0][1]} or set its unit in the mapping",
+            serious=True,
+        )
+    if only_units or abs(ratio - 1.0) < 0.2:
+        return None
+    return Problem(
+        name,
+        f"{name} is {ratio:.3f} times the speed from {source}; check the units of both",
+        serious=True,
+    )
+
+
+def _position_speed(drive: Drive) -> Signal | None:
+    """Speed between fixes some 4 s apart, at the middle of each."""
+    found = windows.track(drive, 4.0)
+    if found is None:
+        return None
+    time, north, east = found
+    step = np.diff(time)
+    good = step < 10.0
+    middle = 0.5 * (time[1:] + time[:-1])
+    return Signal("gnss_speed", middle[good], (np.hypot(north, east) / step)[good])
+
+
+def _ratio(speed: Signal, reference: Signal) -> float | None:
+    """Median ratio of two speeds while both move."""
+    if len(reference) < 10:
+        return None
+    usual = float(np.percentile(reference.values, 90))
+    if usual < 1e-6:
+        return None
+    v = speed.at(reference.time)
+    near = speed.age(reference.time) < 2.0
+    # Relative to the fast part of the drive, so that a wrong unit does not hide it.
+    moving = near & (reference.values > 0.4 * usual) & (np.abs(v) > 0.05)
+    if np.count_nonzero(moving) < 10 or (usual < 2.0 and float(np.percentile(v[near], 90)) < 3.0):
+        return None
+    return float(np.median(v[moving] / reference.values[moving]))
+
+
+def _check_positions(drive: Drive) -> Iterator[Problem]:
+    """Find radians for degrees, and latitude and longitude swapped."""
+    speed = drive.get("gnss_speed") or drive.get("vehicle_speed")
+    if speed is None or len(speed) < 20:
+        return
+    lat, lon = drive.get("latitude"), drive.get("longitude")
+    if lat is not None and lon is not None and len(lat) and len(lon):
+        beyond = abs(float(np.median(lat.values))) > np.pi / 2.0
+        if beyond and abs(float(np.median(lon.values))) < np.pi / 2.0:
+            yield _swapped(lat, lon)
+            return
+    spreads: list[float] = []
+    centres: list[float] = []
+    bearings: list[float] = []
+    course = drive.get("gnss_course")
+    for swapped in (False, True):
+        found = windows.track(drive, 4.0, swapped=swapped)
+        if found is None:
+            return
+        time, north, east = found
+        step, middle = np.diff(time), 0.5 * (time[1:] + time[:-1])
+        v, way = speed.at(middle), np.hypot(north, east)
+        good = (step < 10.0) & (v > 3.0) & (way > 0.0) & (speed.age(middle) < 2.0)
+        if np.count_nonzero(good) < 10:
+            return
+        log = np.log(way[good] / (v[good] * step[good]))
+        centres.append(float(np.median(log)))
+        spreads.append(float(np.median(np.abs(log - np.median(log)))))
+        if course is not None and len(course) >= 20:
+            turn = np.arctan2(east, north) - course.held(middle)
+            turn = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)[good]
+            bearings.append(float(np.nanmedian(turn)))
+    if abs(centres[0] - np.log(np.pi / 180.0)) < 0.3:
+        yield Problem(
+            "latitude",
+            f"the positions cover {np.exp(centres[0]):.4f} of the way the speed says; they seem to "
+            "be in radians: name the columns latitude_rad and longitude_rad",
+            serious=True,
+        )
+        return
+    # Swapped, east is stretched by 1/cos(latitude): distances fit only the other way round.
+    crossed = spreads[0] > 0.05 and spreads[1] < 0.4 * spreads[0]
+    turned = len(bearings) == 2 and bearings[0] > 0.6 and bearings[1] < 0.3
+    if crossed or turned:
+        yield _swapped(drive.signals["latitude"], drive.signals["longitude"])
+
+
+def _swapped(lat: Signal, lon: Signal) -> Problem:
+    return Problem(
+        "latitude",
+        f"latitude ({np.degrees(np.median(lat.values)):.3f}) and longitude "
+        f"({np.degrees(np.median(lon.values)):.3f}) seem to be swapped; name their columns "
+        "the other way round",
+        serious=True,
+    )
+
+
+def _gear_ratio(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> float | None:
+    """Scale of the speed that puts engine over vehicle speed onto the known gears."""
+    engine = drive.get("engine_speed")
+    if engine is None or vehicle is None or not vehicle.driveline.gearings or not len(engine):
+        return None
+    v = speed.at(engine.time)
+    moving = (v > 0.3) & (speed.age(engine.time) < 1.0) & (engine.values > 30.0)
+    # The fast part: a clutch slips and gears are sought in the slow one.
+    moving &= v > 0.25 * np.nanmax(np.where(moving, v, 0.0), initial=0.0)
+    if np.count_nonzero(moving) < 100:
+        return None
+    ratio = np.log(engine.values[moving] / v[moving])
+    gears = np.log(np.array(vehicle.driveline.gearings) / vehicle.driveline.speed_scale)
+    scales = np.array([1.0, *sorted({c[2] for c in _CONFUSIONS})])
+    hits = np.array([_on_gears(ratio + np.log(c), gears) for c in scales])
+    best = int(np.argmax(hits))
+    if hits[0] > 0.5:
+        return 1.0
+    return float(scales[best]) if hits[best] > 0.6 and hits[best] > 2.0 * hits[0] else None
+
+
+def _on_gears(ratio: Floats, gears: Floats) -> float:
+    """Part of the samples within 4 % of a gear."""
+    near = np.min(np.abs(ratio[:, None] - gears[None, :]), axis=1)
+    return float(np.mean(near < 0.04))
+
+
+def _accel_ratio(drive: Drive, speed: Signal) -> float | None:
+    """Change of speed over specific force along the vehicle, whatever its axes."""
+    axes = [drive.get("longitudinal_accel")]
+    if axes[0] is None:
+        axes = [drive.get(f"accel_{a}") for a in "xyz"]
+    present = [s for s in axes if s is not None and len(s) > 20]
+    if len(present) != len(axes):
+        return None
+    start = max(float(s.time[0]) for s in (*present, speed))
+    end = min(float(s.time[-1]) for s in (*present, speed))
+    length = 4.0
+    if end - start < 30 * length or speed.period > 1.5:
+        return None
+    at = windows.edges(start, end, length)
+    full = np.ones(at.size - 1, dtype=bool)
+    force = np.empty((at.size - 1, len(present)))
+    for k, s in enumerate(present):
+        force[:, k], ok = windows.means(s, at)
+        full &= ok
+    full &= (speed.age(at[1:]) < 0.5) & (speed.age(at[:-1]) < 0.5)
+    accel = np.diff(speed.at(at)) / length
+    full &= np.isfinite(accel)
+    # Differences of neighbours take out grade, bias and gravity, which change slowly.
+    pairs = full[1:] & full[:-1]
+    x, y = np.diff(accel)[pairs], np.diff(force, axis=0)[pairs]
+    if x.size < 30 or float(np.std(x)) < 0.05:
+        return None
+    slope = x @ y / (x @ x)
+    size = float(np.linalg.norm(slope))
+    if size == 0.0:
+        return None
+    along = y @ (slope / size)
+    agreement = float(np.corrcoef(along, x)[0, 1])
+    return 1.0 / size if agreement > 0.9 else None
