@@ -1,1 +1,67 @@
-"""report"""
+"""The report: one page that answers first and then shows why; opens offline."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+    from weighbridge.pipeline.calibrating import Calibration
+    from weighbridge.pipeline.weighing import Weighing
+
+__all__ = ["mass_figure", "write_report"]
+
+
+def write_report(
+    weighings: Sequence[Weighing],
+    path: str | Path,
+    *,
+    calibration: Calibration | None = None,
+    truth: Mapping[str, float] | None = None,
+    title: str | None = None,
+) -> None:
+    """Write one self-contained HTML page for one or many drives.
+
+    Parameters
+    ----------
+    weighings : in the order to show them
+    path : file to write; its folder must be there
+    calibration : shows how the vehicle file came about
+    truth : true mass by drive name [kg]; where a drive is not named, the known
+        mass of its ``drive.toml`` serves
+    title : heading of the page; made from the drives when None
+
+    Raises
+    ------
+    ConfigError
+        There is nothing to report, or the file cannot be written.
+    """
+    from weighbridge.report.page import write_page
+
+    write_page(weighings, Path(path), calibration=calibration, truth=truth or {}, title=title)
+
+
+def mass_figure(weighing: Weighing, *, truth: float | None = None) -> go.Figure:
+    """Return the mass with its band over time as a plotly figure.
+
+    Parameters
+    ----------
+    weighing : of one drive
+    truth : true mass [kg]; the known mass of the drive when None
+
+    Raises
+    ------
+    ConfigError
+        Nothing was estimated, so there is no mass to draw.
+    """
+    from weighbridge.errors import ConfigError
+    from weighbridge.report.drive_panels import mass_panel
+
+    panel = mass_panel(weighing, truth if truth is not None else weighing.drive.info.mass)
+    if panel.figure is None:
+        raise ConfigError(f"{weighing.drive.name}: {panel.absent}")
+    panel.figure.update_layout(title_text=panel.title, margin_t=60)
+    return panel.figure

@@ -1,0 +1,238 @@
+"""Figures of a calibration (Jensen et al. 2022, figs. 6 to 9)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from weighbridge.balance import Reason
+from weighbridge.calibration.regression import ROAD_PARAMETERS
+from weighbridge.report.style import BLUE, GREY, ORANGE, VERMILLION, Panel, blank, dots, line
+from weighbridge.report.thinning import single, spread, thin_line
+from weighbridge.signals import Floats
+from weighbridge.signals.units import from_si, scalar_from_si
+
+if TYPE_CHECKING:
+    from weighbridge.pipeline.calibrating import Calibration
+
+GEAR_COLOURS = (BLUE, ORANGE, "#009e73", "#b0679b", VERMILLION, "#56b4e9", "#b3a24d", "#6b7a99")
+
+
+def calibration_panels(calibration: Calibration) -> list[Panel]:
+    """Return all figures of a calibration, in the order to show them."""
+    return [
+        ratio_panel(calibration),
+        gear_panel(calibration),
+        *torque_panels(calibration),
+        agreement_panel(calibration),
+        sequence_panel(calibration),
+    ]
+
+
+def ratio_panel(calibration: Calibration) -> Panel:
+    """Distribution of the gear ratio with the gears found (fig. 6)."""
+    title = "Gear ratios"
+    gears = calibration.gears
+    if gears is None:
+        return Panel(
+            title=title,
+            absent="no distribution of gear ratios: they were given, not found from the drives.",
+        )
+    figure = blank(
+        "Engine angle per distance [rad/m]",
+        "Samples within 2 %",
+        xaxis_type="log",
+        xaxis_dtick="D1",
+    )
+    shown = np.flatnonzero(gears.density > 0)
+    part = slice(shown[0], shown[-1] + 1) if shown.size else slice(None)
+    line(
+        figure,
+        gears.grid[part].astype(np.float32),
+        gears.density[part].astype(np.float32),
+        "samples",
+        BLUE,
+        fill="tozeroy",
+        fillcolor="rgba(43,123,186,0.22)",
+        showlegend=False,
+    )
+    for k, gearing in enumerate(gears.gearings):
+        figure.add_vline(x=float(gearing), line={"color": VERMILLION, "width": 1.4, "dash": "dash"})
+        figure.add_annotation(
+            x=float(np.log10(gearing)), y=1.0, yref="paper", yanchor="bottom", showarrow=False,
+            text=f"{k + 1}", font={"color": VERMILLION, "size": 13},
+        )  # fmt: skip
+    figure.update_layout(margin_t=34)
+    found = ", ".join(f"{g:.2f}" for g in gears.gearings)
+    return Panel(
+        title=f"{gears.gearings.size} gears stand out from the ratio of engine to vehicle speed",
+        caption=f"Gears 1 to {gears.gearings.size} in rad/m: {found}.",
+        figure=figure,
+    )
+
+
+def gear_panel(calibration: Calibration) -> Panel:
+    """Engine speed over vehicle speed with the gears' lines (fig. 7)."""
+    speed = np.concatenate([b.merged.speed for b in calibration.balances])
+    engine = np.concatenate([b.force.engine_speed for b in calibration.balances])
+    gear = np.concatenate([b.force.gear for b in calibration.balances])
+    reason = np.concatenate([b.merged.reason for b in calibration.balances])
+    known = np.isfinite(speed) & np.isfinite(engine)
+    if not known.any():
+        return Panel(
+            title="Engine speed over vehicle speed",
+            absent="no engine speed over vehicle speed: engine speed was not recorded.",
+        )
+    clean = (reason != Reason.SHIFTING) & (reason != Reason.CLUTCH_SLIPPING) & (gear > 0)
+    kmh, rpm = from_si(speed, "kmh"), from_si(engine, "rpm")
+    figure = blank("Speed [km/h]", "Engine speed [rpm]")
+    other = spread(known & ~clean, 800)
+    if other.size:
+        dots(figure, single(kmh[other]), single(rpm[other]), "shifting or slipping", GREY,
+             symbol="x-thin-open")  # fmt: skip
+    gearings = calibration.vehicle.driveline.gearings
+    top = float(np.max(engine[known]))
+    share = max(150, 3000 // max(len(gearings), 1))
+    for k, gearing in enumerate(gearings):
+        colour = GEAR_COLOURS[k % len(GEAR_COLOURS)]
+        index = spread(known & clean & (gear == k + 1), share)
+        if index.size:
+            dots(figure, single(kmh[index]), single(rpm[index]), f"gear {k + 1}", colour)
+        fastest = min(top / gearing, float(np.max(speed[known])))
+        line(
+            figure,
+            [0.0, scalar_from_si(fastest, "kmh")],
+            [0.0, scalar_from_si(fastest * gearing, "rpm")],
+            f"ratio of gear {k + 1}",
+            colour,
+            dash="dash",
+            showlegend=False,
+        )
+    return Panel(
+        title="Every sample in gear lies on the line of its gear",
+        caption="Marks off the lines are shifts, the slipping clutch and idling.",
+        figure=figure,
+    )
+
+
+def torque_panels(calibration: Calibration) -> list[Panel]:
+    """Measured and fitted torque over the source and over engine speed (fig. 8)."""
+    source, motion = _torques(calibration)
+    design = calibration.rows.design
+    kind = calibration.vehicle.torque.source
+    labels = {
+        "load": "Engine load [%]",
+        "air_flow": "Torque from air flow [N m]",
+        "measured": "Recorded torque [N m]",
+        "percent": "Recorded torque [N m]",
+    }
+    regressor = design[:, 1]
+    if kind == "load":
+        regressor = from_si(regressor, "pct")
+    panels = [
+        _both(
+            regressor,
+            labels[kind],
+            source,
+            motion,
+            "The fit follows the torque over its source",
+        )
+    ]
+    if calibration.fit.coefficients.size > 2:
+        rpm = from_si(design[:, 2], "rpm")
+        panels.append(
+            _both(rpm, "Engine speed [rpm]", source, motion, "The fit holds at every engine speed")
+        )
+    else:
+        panels.append(
+            Panel(
+                title="Torque over engine speed",
+                absent="no torque over engine speed: the torque model does not use engine speed.",
+            )
+        )
+    return panels
+
+
+def agreement_panel(calibration: Calibration) -> Panel:
+    """Torque of the source against torque of the motion."""
+    source, motion = _torques(calibration)
+    index = spread(np.ones(source.size, dtype=bool))
+    figure = blank("Torque from the motion [N m]", "Torque from the source [N m]")
+    dots(figure, single(motion[index]), single(source[index]), "samples", BLUE)
+    low, high = np.percentile(motion, [0.1, 99.9])
+    line(figure, [low, high], [low, high], "equal", VERMILLION)
+    fit = calibration.fit
+    return Panel(
+        title=f"Both torques agree with R² = {fit.r_squared:.3f}",
+        caption=f"Robust standard deviation of the difference: {fit.residual_std:.1f} N m over "
+        f"{source.size} samples.",
+        figure=figure,
+    )
+
+
+def sequence_panel(calibration: Calibration) -> Panel:
+    """Torque of the motion and of the source one after another (fig. 9)."""
+    source, motion = _torques(calibration)
+    number = np.arange(source.size, dtype=np.float64)
+    figure = blank("Usable samples, in the order driven [-]", "Torque [N m]", height=420)
+    for values, name, colour, width in (
+        (motion, "from the motion", GREY, 1.0),
+        (source, "from the source", BLUE, 1.2),
+    ):
+        x, y = thin_line(number, values)
+        line(figure, x, y, name, colour, line_width=width)
+    return Panel(
+        title="The torque from the source follows the torque that the motion needs",
+        caption="Only the samples of the fit are shown, put after one another; zoom in to "
+        "compare single accelerations.",
+        figure=figure,
+        wide=True,
+    )
+
+
+def calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
+    """Fitted parameters with their standard deviations, for a table."""
+    fit = calibration.fit
+    stds = np.sqrt(np.diag(calibration.fit.cov))
+    facts = [
+        ("torque source", calibration.vehicle.torque.source.replace("_", " ")),
+        ("drives", ", ".join(calibration.vehicle.provenance.drives)),
+        ("samples", f"{calibration.rows.target.size}"),
+        ("R² of the torque", f"{fit.r_squared:.3f}"),
+        ("torque noise", f"{fit.residual_std:.1f} N m"),
+        ("torque delay", f"{calibration.vehicle.timing.torque_delay or 0.0:+.2f} s"),
+    ]
+    names = {
+        "drag_area": ("C_d A", "m²", 3),
+        "rolling_coefficient": ("C_r", "", 4),
+        "engine_inertia": ("engine inertia", "kg m²", 3),
+        "wheel_inertia": ("wheel inertia", "kg m²", 2),
+    }
+    for key, value, std in zip(ROAD_PARAMETERS, fit.road, stds[-4:], strict=True):
+        name, unit, digits = names[key]
+        spread_text = "held by a bound" if key in fit.at_bound else f"± {std:.{digits}f}"
+        facts.append((name, f"{value:.{digits}f} {unit} ({spread_text})".replace("  ", " ")))
+    scale = calibration.vehicle.provenance.mass_scale_std
+    if scale is not None and np.isfinite(scale):
+        facts.append(("left in every mass", f"± {100.0 * scale:.1f} % (one standard deviation)"))
+    return facts
+
+
+def _torques(calibration: Calibration) -> tuple[Floats, Floats]:
+    """Torque of the source as fitted and torque that the motion needs [N m]."""
+    source = calibration.rows.design[:, :-4] @ calibration.fit.coefficients
+    return source, source + calibration.fit.residual
+
+
+def _both(x: Floats, label: str, source: Floats, motion: Floats, title: str) -> Panel:
+    index = spread(np.ones(x.size, dtype=bool), 2000)
+    figure = blank(label, "Torque [N m]")
+    dots(figure, single(x[index]), single(motion[index]), "from the motion", GREY)
+    dots(figure, single(x[index]), single(source[index]), "fitted", BLUE, symbol="diamond")
+    return Panel(
+        title=title,
+        caption="Grey is the torque that the motion of the known mass needs, blue what the fitted "
+        "model makes of the source.",
+        figure=figure,
+    )

@@ -1,0 +1,49 @@
+"use strict";
+// Figures are drawn when their section is first open, so that a page of many drives opens at once.
+const figures = JSON.parse(document.getElementById("figures").textContent);
+const dark = window.matchMedia("(prefers-color-scheme: dark)");
+const printing = window.matchMedia("print");
+const settings = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+
+function colours() {
+  const night = dark.matches && !printing.matches;
+  return {
+    "font.color": night ? "#d5dbe1" : "#3a4450",
+    paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)",
+  };
+}
+
+function draw(place) {
+  if (place.dataset.drawn) return;
+  place.dataset.drawn = "yes";
+  const figure = figures[place.id];
+  const now = colours();
+  const layout = Object.assign({}, figure.layout, {
+    font: Object.assign({}, figure.layout.font, { color: now["font.color"] }),
+    paper_bgcolor: now.paper_bgcolor,
+    plot_bgcolor: now.plot_bgcolor,
+    autosize: true,
+  });
+  Plotly.newPlot(place, figure.data, layout, settings);
+}
+
+function drawOpen() {
+  for (const place of document.querySelectorAll(".plot")) {
+    const section = place.closest("details");
+    if (!section || section.open) draw(place);
+  }
+}
+
+function repaint() {
+  for (const place of document.querySelectorAll(".plot[data-drawn]")) Plotly.relayout(place, colours());
+}
+
+for (const section of document.querySelectorAll("details")) section.addEventListener("toggle", drawOpen);
+dark.addEventListener("change", repaint);
+printing.addEventListener("change", repaint);
+window.addEventListener("beforeprint", () => {
+  for (const section of document.querySelectorAll("details")) section.open = true;
+  drawOpen();
+});
+drawOpen();

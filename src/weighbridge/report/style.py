@@ -1,0 +1,131 @@
+"""How every figure of the report looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import plotly.graph_objects as go
+
+from weighbridge.balance import REASON_TEXT, Reason
+
+BLUE: Final = "#2b7bba"
+BAND: Final = "rgba(43,123,186,0.22)"
+VERMILLION: Final = "#d55e00"
+GREEN: Final = "#009e73"
+GREY: Final = "#8a8a8a"
+PURPLE: Final = "#b0679b"
+ORANGE: Final = "#e69f00"
+"""Mid tones told apart with any colour vision, on white and on dark grey; after Okabe and
+Ito, Color Universal Design, 2008."""
+
+AXIS: Final = {
+    "gridcolor": "rgba(128,128,128,0.22)",
+    "zerolinecolor": "rgba(128,128,128,0.45)",
+    "linecolor": GREY,
+    "showline": True,
+    "ticks": "outside",
+    "automargin": True,
+}
+"""Every axis, on light and on dark paper."""
+
+REASON_STYLE: Final[dict[Reason, tuple[str, str]]] = {
+    Reason.USED: (BLUE, "circle"),
+    Reason.STANDING: ("#9a9a9a", "square"),
+    Reason.NO_MOTION: ("#6b7a99", "x"),
+    Reason.NO_TORQUE: ("#56b4e9", "cross"),
+    Reason.BRAKING: (VERMILLION, "triangle-down"),
+    Reason.SHIFTING: (PURPLE, "diamond"),
+    Reason.CLUTCH_SLIPPING: ("#aa3377", "star"),
+    Reason.OVERRUN: (ORANGE, "triangle-left"),
+    Reason.EXTRAPOLATED: (GREEN, "triangle-up"),
+    Reason.NOT_ACCELERATING: ("#b3a24d", "circle-open"),
+    Reason.BAD_FIT: ("#c0392b", "x-thin-open"),
+}
+"""Colour and marker of used and excluded samples."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One figure of the page, or the sentence that says why it is not there.
+
+    Attributes
+    ----------
+    title : what to see
+    caption : one sentence on how to read it
+    figure : None where there is nothing to draw
+    absent : then why
+    wide : takes the full width of the page
+    """
+
+    title: str
+    caption: str = ""
+    figure: go.Figure | None = None
+    absent: str = ""
+    wide: bool = False
+
+
+def reason_name(reason: Reason) -> str:
+    """Name a reason in a legend."""
+    return "used" if reason is Reason.USED else REASON_TEXT[reason]
+
+
+def blank(x: str, y: str, *, height: int = 380, **layout: Any) -> go.Figure:
+    """Return an empty figure with titled axes; text in ``x`` and ``y`` carries the unit."""
+    return go.Figure(
+        layout={
+            "template": "none",
+            "height": height,
+            "margin": {"l": 60, "r": 20, "t": 20, "b": 50},
+            "font": {"family": "system-ui, sans-serif", "size": 13, "color": "#444"},
+            "legend": {
+                "orientation": "h",
+                "y": -0.22,
+                "yanchor": "top",
+                "x": 0,
+                "itemsizing": "constant",
+            },
+            "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": GREY, "activecolor": BLUE},
+            "hovermode": "closest",
+            "xaxis": {**AXIS, "title": {"text": x}},
+            "yaxis": {**AXIS, "title": {"text": y}},
+            **layout,
+        }
+    )
+
+
+def line(
+    figure: go.Figure, x: Any, y: Any, name: str, colour: str, *, dash: str = "solid", **more: Any
+) -> None:
+    """Add a line."""
+    figure.add_scatter(
+        x=x,
+        y=y,
+        name=name,
+        mode="lines",
+        line={"color": colour, "width": 2 if dash == "solid" else 1.6, "dash": dash},
+        **more,
+    )
+
+
+def dots(
+    figure: go.Figure,
+    x: Any,
+    y: Any,
+    name: str,
+    colour: str,
+    *,
+    symbol: str = "circle",
+    size: float = 4.0,
+    opacity: float = 0.6,
+    **more: Any,
+) -> None:
+    """Add markers."""
+    figure.add_scatter(
+        x=x,
+        y=y,
+        name=name,
+        mode="markers",
+        marker={"color": colour, "size": size, "symbol": symbol, "opacity": opacity},
+        **more,
+    )
