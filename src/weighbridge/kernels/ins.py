@@ -14,6 +14,8 @@ Nominal state, one flat array so that a step allocates nothing:
 19      indicated over true vehicle speed [-]
 20      acceleration along the body, low-passed [m/s^2]
 21, 22  rows of GNSS and of vehicle speed refused in succession [-]
+23:26   last angular rate, body axes [rad/s]
+26:29   its noise power density by axis, from differences of neighbours
 ======  =====================================================================
 
 Error state (19): position, velocity, attitude (rotation vector in navigation
@@ -51,14 +53,16 @@ from weighbridge.kernels.rotation import (
     rotate_navigation,
 )
 
-STATES = 23
+STATES = 29
+SHOWN = 23
+"""Part of the nominal state that a run keeps for each node."""
 ERRORS = 19
 MEASUREMENTS = 11
 ROWS = 11
 """Most scalar rows one node can process."""
 
-P, V, Q, BA, BG, PITCH0, YAW0, SQUAT, SCALE, ACCEL, LOST_GNSS, LOST_SPEED = (
-    0, 3, 6, 10, 13, 16, 17, 18, 19, 20, 21, 22,
+P, V, Q, BA, BG, PITCH0, YAW0, SQUAT, SCALE, ACCEL, LOST_GNSS, LOST_SPEED, LAST, PSD = (
+    0, 3, 6, 10, 13, 16, 17, 18, 19, 20, 21, 22, 23, 26,
 )  # fmt: skip
 """Places in the nominal state."""
 
@@ -75,6 +79,9 @@ class Noise(NamedTuple):
     gravity : [m/s^2]
     accel_psd : of specific force [(m/s^2)^2/Hz]
     gyro_psd : of angular rate [(rad/s)^2/Hz]
+    gyro_share : part of the power of sample-to-sample differences of the rate taken
+        as white noise on top [-]: 1 is right for white noise, less for
+        vibration that the sensor follows
     accel_bias_psd : random walk of the accelerometer bias [(m/s^2)^2/s]
     gyro_bias_psd : random walk of the gyro bias [(rad/s)^2/s]
     lateral_std : lateral velocity of the body at rest speed [m/s]
@@ -94,6 +101,7 @@ class Noise(NamedTuple):
     gravity: float
     accel_psd: float
     gyro_psd: float
+    gyro_share: float
     accel_bias_psd: float
     gyro_bias_psd: float
     lateral_std: float
@@ -172,12 +180,29 @@ def new_log(nodes: int) -> RowLog:
 
 
 @fast_kernel
+def _follow_noise(x, wx, wy, wz, dt):
+    """Follow the power density of sample-to-sample differences over about a second.
+
+    Half the mean square of differences is the variance of white noise, and
+    slow motion hardly enters it; times ``dt`` it is a density. A rattling sensor
+    shows here and nowhere else.
+    """
+    share = min(1.0, dt)
+    half = 0.5 * dt
+    d0, d1, d2 = wx - x[LAST], wy - x[LAST + 1], wz - x[LAST + 2]
+    x[PSD] += share * (half * d0 * d0 - x[PSD])
+    x[PSD + 1] += share * (half * d1 * d1 - x[PSD + 1])
+    x[PSD + 2] += share * (half * d2 * d2 - x[PSD + 2])
+    x[LAST], x[LAST + 1], x[LAST + 2] = wx, wy, wz
+
+
+@fast_kernel
 def propagate(x, work, fx, fy, fz, wx, wy, wz, dt, noise):
     """Move the nominal state by one sample (eqs. 22-29, second order in the attitude).
 
     Parameters
     ----------
-    x : (23,) nominal state, changed in place
+    x : (29,) nominal state, changed in place
     work : Work
     fx, fy, fz : float
         Specific force in body axes [m/s^2].
@@ -187,6 +212,7 @@ def propagate(x, work, fx, fy, fz, wx, wy, wz, dt, noise):
         Time the sample stands for [s].
     noise : Noise
     """
+    _follow_noise(x, wx, wy, wz, dt)
     fx, fy, fz = fx - x[BA], fy - x[BA + 1], fz - x[BA + 2]
     wx, wy, wz = wx - x[BG], wy - x[BG + 1], wz - x[BG + 2]
     rot = work.rot
@@ -212,7 +238,7 @@ def propagate(x, work, fx, fy, fz, wx, wy, wz, dt, noise):
 
 
 @fast_kernel
-def propagate_covariance(cov, work, noise):
+def propagate_covariance(x, cov, work, noise):
     """Move the covariance over the time since the last node (eqs. 34-35).
 
     ``F P F'`` by blocks: rows of position, velocity and attitude over all
@@ -221,6 +247,8 @@ def propagate_covariance(cov, work, noise):
     """
     tr = work.transition
     dt, sx, sy, sz = tr[0], tr[1], tr[2], tr[3]
+    if dt <= 0.0:
+        return
     r00, r01, r02 = tr[4], tr[5], tr[6]
     r10, r11, r12 = tr[7], tr[8], tr[9]
     r20, r21, r22 = tr[10], tr[11], tr[12]
@@ -263,6 +291,14 @@ def propagate_covariance(cov, work, noise):
     for i in range(3):
         cov[3 + i, 3 + i] += dt * noise.accel_psd
         cov[6 + i, 6 + i] += dt * noise.gyro_psd
+        # by body axis: a loose sensor rattles about one of them
+        share = noise.gyro_share / dt
+        w0, w1, w2 = tr[4 + 3 * i] * x[PSD], tr[5 + 3 * i] * x[PSD + 1], tr[6 + 3 * i] * x[PSD + 2]
+        for j in range(i, 3):
+            more = share * (w0 * tr[4 + 3 * j] + w1 * tr[5 + 3 * j] + w2 * tr[6 + 3 * j])
+            cov[6 + i, 6 + j] += more
+            if j > i:
+                cov[6 + j, 6 + i] += more
         cov[9 + i, 9 + i] += dt * noise.accel_bias_psd
         cov[12 + i, 12 + i] += dt * noise.gyro_bias_psd
 
@@ -514,7 +550,7 @@ def step(x, cov, work, accel, gyro, dt, is_node, z, noise, log, node):
 
     Parameters
     ----------
-    x : (23,) float64
+    x : (29,) float64
         Nominal state, changed in place.
     cov : (19, 19) float64
         Error covariance, changed in place.
@@ -537,7 +573,7 @@ def step(x, cov, work, accel, gyro, dt, is_node, z, noise, log, node):
         dt = 0.0
     propagate(x, work, accel[0], accel[1], accel[2], gyro[0], gyro[1], gyro[2], dt, noise)
     if is_node:
-        propagate_covariance(cov, work, noise)
+        propagate_covariance(x, cov, work, noise)
         if node < log.count.size:
             log.count[node] = 0
             log.transition[node] = work.transition
@@ -584,7 +620,7 @@ def run(x, cov, work, time, accel, gyro, rot_bs, nodes, first, last, z, noise, l
     log : RowLog
         Of ``last - first`` nodes, or empty.
     states : (m, 23) float64
-        Filled: nominal state after each node.
+        Filled: first part of the nominal state after each node.
     stds : (m, 20) float64
         Filled: standard deviations after each node; the last is of the grade [rad].
     """
@@ -602,7 +638,7 @@ def run(x, cov, work, time, accel, gyro, rot_bs, nodes, first, last, z, noise, l
         is_node = i == nodes[k]
         step(x, cov, work, f, w, dt, is_node, z[k], noise, log, k - first)
         if is_node:
-            states[k] = x
+            states[k] = x[:SHOWN]
             for a in range(ERRORS):
                 stds[k, a] = math.sqrt(max(cov[a, a], 0.0))
             stds[k, ERRORS] = grade_std(x, cov, work)

@@ -14,8 +14,10 @@ from weighbridge.kernels.ins import (
     BA,
     BG,
     ERRORS,
+    LAST,
     PITCH0,
     SCALE,
+    SHOWN,
     SQUAT,
     STATES,
     YAW0,
@@ -72,7 +74,7 @@ class _Start:
 
     Attributes
     ----------
-    x : (23,) nominal state
+    x : (29,) nominal state
     cov : (19, 19)
     """
 
@@ -89,7 +91,7 @@ class Solution:
     time : (m,) [s]
     states : (m, 23) see `weighbridge.kernels.ins`
     stds : (m, 20) standard deviations of the forward pass
-    last : (23,) nominal state at the end of the forward pass
+    last : (29,) nominal state at the end of the forward pass
     last_cov : (19, 19) its covariance
     """
 
@@ -267,6 +269,7 @@ def _begin(
     speed = interpolated(reference, grid, 3.0)
     known = np.isfinite(speed) & np.isfinite(accel).all(axis=1)
     x[SCALE] = 1.0
+    x[LAST : LAST + 3] = gyro[int(np.argmax(np.isfinite(gyro).all(axis=1)))]
     x[SQUAT] = settings.squat
     std[17] = settings.squat_std
     if mounting is not None and mounting.squat is not None:
@@ -380,7 +383,7 @@ def _filter(
     """Run forward over the nodes and, if asked, backward."""
     x, cov, work = begin.x.copy(), begin.cov.copy(), new_work()
     count = nodes.size
-    states = np.empty((count, STATES))
+    states = np.empty((count, SHOWN))
     stds = np.empty((count, ERRORS + 1))
     empty = new_log(0)
     kept = []

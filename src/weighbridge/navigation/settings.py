@@ -21,6 +21,8 @@ class NavigationSettings:
     ----------
     accel_density : of specific force [m/s^2/sqrt(Hz)]
     gyro_density : of angular rate [rad/s/sqrt(Hz)]
+    gyro_share : part of the power of sample-to-sample differences of the
+        angular rate taken as noise on top: a rattling sensor [-]
     accel_bias_walk : [m/s^2/sqrt(s)]
     gyro_bias_walk : [rad/s/sqrt(s)]
     accel_bias_std : before the drive [m/s^2]
@@ -49,6 +51,7 @@ class NavigationSettings:
 
     accel_density: float = 0.005
     gyro_density: float = 2e-4
+    gyro_share: float = 0.1
     accel_bias_walk: float = 3e-4
     gyro_bias_walk: float = 1e-5
     accel_bias_std: float = 0.15
@@ -68,7 +71,7 @@ class NavigationSettings:
     mounting_std: float = 0.035
     squat: float = 0.0035
     squat_std: float = 0.0025
-    squat_found_std: float = 0.0008
+    squat_found_std: float = 0.001
     speed_scale_std: float = 0.03
     gate: float = 20.0
     patience: float = 10.0
@@ -87,6 +90,7 @@ class NavigationSettings:
             gravity=GRAVITY,
             accel_psd=self.accel_density**2,
             gyro_psd=self.gyro_density**2,
+            gyro_share=self.gyro_share,
             accel_bias_psd=self.accel_bias_walk**2,
             gyro_bias_psd=self.gyro_bias_walk**2,
             lateral_std=self.lateral_std,
