@@ -1,0 +1,113 @@
+"""``weighbridge inspect``: what is in a drive, and how it could be weighed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Optional
+
+import typer
+
+from weighbridge.cli.options import DrivePaths, MappingPath, load, mapping_for
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from weighbridge.pipeline.inspection import Inspection
+
+# Width of tables where no terminal gives one.
+_WIDTH = 120
+
+
+def inspect(
+    drives: DrivePaths,
+    mapping: MappingPath = None,
+    vehicle: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--vehicle", help="Vehicle file: judges the speed by its gears."),
+    ] = None,
+    every_way: Annotated[
+        bool, typer.Option("--all", help="List the ways that lack signals, too.")
+    ] = False,
+) -> None:
+    """Tell what a drive holds: signals, rates, gaps, problems, possible methods.
+
+    Example: weighbridge inspect drive/ --vehicle car.toml
+    """
+    from rich.console import Console
+
+    from weighbridge.pipeline.inspection import inspect_drive
+    from weighbridge.vehicle.model import Vehicle
+
+    car = Vehicle.load(vehicle) if vehicle is not None else None
+    chosen = mapping_for(mapping, car, vehicle)
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = _WIDTH
+    for path in drives:
+        _show(console, inspect_drive(load(path, chosen), car), every_way)
+
+
+def _show(console: Console, found: Inspection, every_way: bool) -> None:
+    from rich.markup import escape
+
+    drive = found.drive
+    console.print(f"[bold]{escape(drive.name)}[/]: {drive.duration / 60.0:.1f} min")
+    console.print(_signal_table(found))
+    if found.problems:
+        console.print("Problems")
+        for p in found.problems:
+            mark = "[bold red]serious[/]" if p.serious else "note"
+            console.print(f"  {mark}: {escape(p.text)}", soft_wrap=True)
+    else:
+        console.print("No problems found")
+    possible = [w for w in found.ways if w.possible]
+    if not possible:
+        console.print("No way to weigh by this drive; the nearest one:")
+    console.print(_way_table(found, every_way))
+    console.print()
+
+
+def _signal_table(found: Inspection) -> Table:
+    from rich.table import Table
+
+    table = Table()
+    table.add_column("signal", no_wrap=True)
+    for name in ("samples", "Hz", "period s", "jitter ms", "gaps", "longest s"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for name in ("lowest", "highest", "step"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    for s in found.signals:
+        table.add_row(
+            s.name,
+            str(s.count),
+            f"{s.rate:.4g}",
+            f"{s.period:.4g}",
+            f"{1e3 * s.jitter:.3g}",
+            str(s.gaps),
+            f"{s.longest_gap:.3g}" if s.gaps else "",
+            f"{s.low:.5g}",
+            f"{s.high:.5g}",
+            f"{s.step:.3g}" if s.step is not None else "fine",
+            s.unit,
+        )
+    return table
+
+
+def _way_table(found: Inspection, every_way: bool) -> Table:
+    from rich.table import Table
+
+    ways = [w for w in found.ways if w.possible or every_way] or list(found.ways[:1])
+    table = Table()
+    for name in ("way to weigh by", "expect", "because", "lacks"):
+        table.add_column(name)
+    for w in ways:
+        mark = " (weigh goes this way)" if w.chosen else ""
+        table.add_row(
+            w.name + mark,
+            f"± {w.accuracy}" if w.possible else "",
+            w.because if w.possible else "",
+            ", ".join(w.needs),
+        )
+    return table

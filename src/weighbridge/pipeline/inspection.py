@@ -1,0 +1,279 @@
+"""What a drive holds, how well it was recorded, and how it could be weighed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.navigation.motion import MotionSource
+from weighbridge.navigation.select import IMU_SIGNALS
+from weighbridge.pipeline.checks import check_drive
+from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
+from weighbridge.signals.units import from_si
+from weighbridge.vehicle.model import TorqueSource, Vehicle
+from weighbridge.vehicle.torque import SIGNALS
+
+GAP_PERIODS: Final = 5.0
+"""A gap is a step of the clock longer than this many median periods."""
+
+# Values enough to see a quantisation step; more would only take time.
+_STEP_SAMPLES: Final = 20_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalReport:
+    """How one signal was recorded.
+
+    Attributes
+    ----------
+    name, meaning : what it is
+    unit : suffix of the unit of ``low``, ``high`` and ``step``; empty for counts
+    count : samples
+    start, end : first and last stamp [s]
+    rate : samples per second over all [Hz]; NaN below two samples
+    period : median time between samples [s]; NaN below two samples
+    jitter : standard deviation of that time, gaps left out [s]
+    gaps : steps longer than five median periods
+    longest_gap : [s]; 0 without gaps
+    low, high : extreme values
+    step : smallest step between values; None where they are continuous
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    count: int
+    start: float
+    end: float
+    rate: float
+    period: float
+    jitter: float
+    gaps: int
+    longest_gap: float
+    low: float
+    high: float
+    step: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Way:
+    """One way a drive could be weighed.
+
+    Attributes
+    ----------
+    motion : where motion comes from, see `weighbridge.navigation.Motion`
+    torque : where torque comes from, see `weighbridge.vehicle.model.TorqueModel`
+    possible : whether nothing is missing
+    needs : what is missing
+    accuracy : what to expect of the mass after a calibration
+    because : what limits it
+    chosen : the way `weigh` would go with the vehicle file given
+    """
+
+    motion: MotionSource
+    torque: TorqueSource
+    possible: bool
+    needs: tuple[str, ...]
+    accuracy: str
+    because: str
+    chosen: bool = False
+
+    @property
+    def name(self) -> str:
+        """The way in words."""
+        return f"{_MOTIONS[self.motion]} and {_TORQUES[self.torque]}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inspection:
+    """All that `inspect` tells of a drive.
+
+    Attributes
+    ----------
+    drive : the drive
+    signals : one report each, table by table
+    problems : found while reading and by the checks; serious ones first
+    ways : possible ones first, the most accurate first
+    """
+
+    drive: Drive
+    signals: tuple[SignalReport, ...]
+    problems: tuple[Problem, ...]
+    ways: tuple[Way, ...]
+
+
+_MOTIONS: Final[dict[MotionSource, str]] = {
+    "inertial": "IMU with speed",
+    "longitudinal_accel": "longitudinal accelerometer with speed",
+    "speed_grade": "speed with grade or height",
+    "speed": "speed alone",
+}
+_TORQUES: Final[dict[TorqueSource, str]] = {
+    "measured": "torque in N m",
+    "percent": "torque in percent",
+    "load": "engine load",
+    "air_flow": "air flow",
+}
+
+# Half-width of what to expect of a mass [%], best to worst, and what sets it. The range of
+# "load" by IMU is what Jensen et al. 2022 report; the others are graded from it.
+_MOTION_LIMITS: Final[dict[MotionSource, tuple[float, str]]] = {
+    "inertial": (1.0, "the IMU sees acceleration and grade at once"),
+    "longitudinal_accel": (1.0, "the accelerometer sees acceleration and grade at once"),
+    "speed_grade": (2.5, "acceleration and grade come from smoothed speed and height"),
+    "speed": (5.0, "grade is unknown, so only level roads can be weighed on"),
+}
+_TORQUE_LIMITS: Final[dict[TorqueSource, tuple[float, str]]] = {
+    "measured": (2.0, "torque is measured or well modelled"),
+    "percent": (3.0, "torque is the engine control's own estimate"),
+    "load": (5.0, "engine load is only roughly linear in torque"),
+    "air_flow": (6.0, "air flow says little of efficiency and ignition"),
+}
+
+
+def inspect_drive(drive: Drive, vehicle: Vehicle | None = None) -> Inspection:
+    """Describe the signals of a drive, its problems, and the ways to weigh by it.
+
+    Parameters
+    ----------
+    drive : as of `read_drive`
+    vehicle : the vehicle file, if there is one
+
+    Returns
+    -------
+    Inspection
+    """
+    order = list(QUANTITIES)
+    signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
+    problems = (*drive.problems, *check_drive(drive, vehicle))
+    return Inspection(
+        drive=drive,
+        signals=tuple(describe(s) for s in signals),
+        problems=tuple(sorted(dict.fromkeys(problems), key=lambda p: not p.serious)),
+        ways=_ways(drive, vehicle),
+    )
+
+
+def describe(signal: Signal) -> SignalReport:
+    """Describe how one signal was recorded."""
+    suffix = QUANTITIES[signal.name].suffix
+    time, count = signal.time, len(signal)
+    values = from_si(signal.values, suffix) if suffix else signal.values
+    steps = np.diff(time)
+    period = signal.period
+    gap = steps > GAP_PERIODS * period
+    regular = steps[~gap]
+    return SignalReport(
+        name=signal.name,
+        meaning=QUANTITIES[signal.name].meaning,
+        unit=suffix,
+        count=count,
+        start=float(time[0]) if count else math.nan,
+        end=float(time[-1]) if count else math.nan,
+        rate=(count - 1) / signal.duration if count > 1 else math.nan,
+        period=period,
+        jitter=float(np.std(regular)) if regular.size else math.nan,
+        gaps=int(np.count_nonzero(gap)),
+        longest_gap=float(np.max(steps[gap])) if gap.any() else 0.0,
+        low=float(np.min(values)) if count else math.nan,
+        high=float(np.max(values)) if count else math.nan,
+        step=quantisation(values),
+    )
+
+
+def quantisation(values: Floats) -> float | None:
+    """Smallest step between values, where all are multiples of it.
+
+    Parameters
+    ----------
+    values : (n,) in the unit they were recorded in
+
+    Returns
+    -------
+    The step in that unit, or None where the values are continuous, or too few
+    to tell.
+    """
+    some = values[:: max(1, values.size // _STEP_SAMPLES)]
+    largest = float(np.max(np.abs(some), initial=0.0))
+    if largest == 0.0:
+        return None
+    # Rounding takes out what the conversion of units left behind.
+    grain = 1e-9 * largest
+    levels = np.unique(np.round(some / grain))
+    if levels.size < 3 or levels.size > 0.5 * some.size:
+        return None
+    spacing = np.diff(levels) * grain
+    step = float(np.min(spacing))
+    multiples = spacing / step
+    whole = np.abs(multiples - np.round(multiples)) < 0.05
+    return float(f"{step:.4g}") if float(np.mean(whole)) > 0.9 else None
+
+
+def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
+    ways = []
+    for motion, (motion_limit, motion_reason) in _MOTION_LIMITS.items():
+        for torque, (torque_limit, torque_reason) in _TORQUE_LIMITS.items():
+            needs = (*_motion_needs(drive, motion), *_torque_needs(drive, torque, vehicle))
+            best = max(motion_limit, 0.5 * torque_limit)
+            worst = motion_limit + torque_limit
+            reason = motion_reason if motion_limit > torque_limit else torque_reason
+            ways.append(
+                (
+                    worst,
+                    Way(
+                        motion=motion,
+                        torque=torque,
+                        possible=not needs,
+                        needs=tuple(dict.fromkeys(needs)),
+                        accuracy=f"{best:.0f}–{worst:.0f} %",
+                        because=reason,
+                    ),
+                )
+            )
+    ways.sort(key=lambda w: (not w[1].possible, len(w[1].needs), w[0]))
+    return _mark_chosen([w for _, w in ways], vehicle)
+
+
+def _mark_chosen(ways: list[Way], vehicle: Vehicle | None) -> tuple[Way, ...]:
+    """Mark the way that `weigh` goes: the vehicle file's torque, the best motion."""
+    source = vehicle.torque.source if vehicle is not None else None
+    order = list(_MOTION_LIMITS)
+    possible = [w for w in ways if w.possible and w.torque == source]
+    best = min(possible, key=lambda w: order.index(w.motion), default=None)
+    return tuple(replace(w, chosen=True) if w is best else w for w in ways)
+
+
+def _motion_needs(drive: Drive, motion: MotionSource) -> list[str]:
+    speed = drive.has("vehicle_speed") or drive.has("gnss_speed")
+    needs: list[str] = []
+    match motion:
+        case "inertial":
+            needs += drive.missing(IMU_SIGNALS)
+            if not speed and not drive.has("latitude", "longitude"):
+                needs.append("vehicle_speed")
+        case "longitudinal_accel":
+            needs += drive.missing(("longitudinal_accel", "vehicle_speed"))
+        case "speed_grade":
+            if not speed:
+                needs.append("vehicle_speed")
+            if not drive.has("grade") and not drive.has("altitude"):
+                needs.append("altitude or grade")
+        case "speed":
+            if not speed:
+                needs.append("vehicle_speed")
+    return needs
+
+
+def _torque_needs(drive: Drive, torque: TorqueSource, vehicle: Vehicle | None) -> list[str]:
+    needs = drive.missing(SIGNALS[torque])
+    if torque == "percent" and not drive.has("reference_torque"):
+        known = vehicle is not None and vehicle.torque.reference_torque is not None
+        if not known:
+            needs.append("reference_torque (or reference_torque_nm in the vehicle file)")
+    fixed_gear = vehicle is not None and vehicle.driveline.single_speed
+    if not fixed_gear and not drive.has("engine_speed") and "engine_speed" not in needs:
+        needs.append("engine_speed (or the one gearing of a single-speed car in the vehicle file)")
+    return needs
