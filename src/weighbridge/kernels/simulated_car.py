@@ -197,6 +197,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
     locked = power.electric
     fuel = 0.0
     stop = 0
+    approach = 0  # 1 foot lifted, 2 braking
     waiting = driver.rest
     at_stop = True
     ripple, speed_ripple, gust, cross_gust, slow, electric_load = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -293,9 +294,10 @@ def drive(road, power, resistance, driver, noise, dt, steps):
             at_stop = True
             waiting = road.stop_time[stop]
             stop += 1
+            approach = 0
         target = _look_up(road.target_speed, where) * (1.0 + driver.speed_ripple * speed_ripple)
         ahead = _look_up(road.target_speed, where + 2.5 * v / road.step)
-        limit = _look_up(road.accel_limit, where) / (1.0 + v / 20.0)
+        limit = _look_up(road.accel_limit, where) / (1.0 + v / 13.0)
         error = target - v
         if abs(error) < 2.0:
             integral = min(0.4, max(-0.4, integral + 0.05 * error * dt))
@@ -312,13 +314,21 @@ def drive(road, power, resistance, driver, noise, dt, steps):
             demand += v * slope_ahead
         elif ahead < 0.93 * v:
             coast = True
+        # Towards a stop the driver lifts the foot, then follows a braking parabola.
         needed = v * v / (2.0 * max(gap - 1.0, 0.3))
-        if needed > stop_decel or (braking and needed > 0.5 * stop_decel):
-            demand = min(demand, -min(needed, 4.5))
-        elif needed > 0.35 * stop_decel:
+        brake_at = max(0.75 * stop_decel, 0.95)
+        lift_at = max(0.5 * stop_decel, 0.7)
+        if approach == 0 and needed > lift_at:
+            approach = 1
+        if approach == 1 and needed > brake_at:
+            approach = 2
+        if approach > 0 and needed < 0.3 * brake_at:
+            approach = 0
+        if approach == 2:
+            demand = min(demand, -min(1.1 * needed, 3.5))
+        elif approach == 1:
             coast = True
-        if gap < 25.0 and v < 1.5:
-            demand = min(demand, 0.5 * (min(1.5, 0.35 + 0.2 * gap) - v))
+            demand = min(demand, 0.0)
         wanted += (demand - wanted) * dt / 0.35
         if at_stop:
             waiting -= dt

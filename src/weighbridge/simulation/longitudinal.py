@@ -98,7 +98,9 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
             k = int(at / STEP)
             target[k : k + 10] = np.minimum(target[k : k + 10], slow)
     target = np.maximum(target, 2.5)
-    slow_down = np.full(n, 0.9 * lively**0.5) * rng.uniform(0.9, 1.1)
+    # Braking on purpose in town, mostly lifting the foot on the highway.
+    slow_down = np.where(city, 0.95, np.where(fast, 0.5, 0.75)) * lively**0.5
+    slow_down *= rng.uniform(0.85, 1.2)
     target = kernel.limit_target(target, STEP, slow_down)
     rolling = 1.0 + effects.surface * (route.surface - 1.0)
     return kernel.Road(

@@ -50,7 +50,7 @@ class Effects:
     imu_noise, imu_bias, imu_bias_walk, imu_scale, imu_cross_axis, imu_lever,
     imu_mounting, imu_quantisation, imu_vibration, imu_jitter : errors of the
         inertial sensor
-    gnss_white, gnss_correlated : errors of the fixes
+    gnss_white, gnss_correlated, gnss_delay : errors of the fixes
     obd_delay, obd_jitter, obd_quantisation, obd_speed_scale : errors of the
         polled values
     """
@@ -88,6 +88,7 @@ class Effects:
     imu_jitter: float = 1.0
     gnss_white: float = 1.0
     gnss_correlated: float = 1.0
+    gnss_delay: float = 1.0
     obd_delay: float = 1.0
     obd_jitter: float = 1.0
     obd_quantisation: float = 1.0
@@ -144,6 +145,7 @@ class Sensors:
     gnss_drift : correlated, horizontal and vertical [m]
     gnss_drift_time : correlation times [s]
     gnss_speed_noise : [m/s]
+    gnss_delay : how old a fix is when its time is stamped [s]
     gnss_outages : (start, end) of times without fixes [s]
 
     Notes
@@ -174,6 +176,7 @@ class Sensors:
     gnss_drift: tuple[float, float] = (2.2, 4.5)
     gnss_drift_time: tuple[float, float] = (80.0, 140.0)
     gnss_speed_noise: float = 0.08
+    gnss_delay: float = 0.05
     gnss_outages: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
@@ -254,8 +257,8 @@ class Scenario:
     -----
     Wind is reported at 10 m and acts on a car at about 1 m. By the logarithmic
     profile over open country with hedges, roughness length 0.1 m, the car sees
-    ln(1 / 0.1) / ln(10 / 0.1) = 0.5 of it; in cities half of that (exposure of
-    the route).
+    ln(1 / 0.1) / ln(10 / 0.1) = 0.5 of it, on country roads 0.85 and in cities
+    half of that (exposure of the route).
     """
 
     name: str

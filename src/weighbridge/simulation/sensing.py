@@ -168,7 +168,8 @@ def simulate_gnss(
     period = 1.0 / sensors.gnss_rate
     time = np.arange(0.3 * period, drive.time[-1], period)
     n = time.size
-    where = time / DT
+    # A fix describes the instant before it is stamped.
+    where = np.maximum(time - effects.gnss_delay * sensors.gnss_delay, 0.0) / DT
 
     def at(values: Floats) -> Floats:
         return np.interp(where, np.arange(values.size), values)

@@ -6,7 +6,6 @@ import logging
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import polars as pl
@@ -125,7 +124,7 @@ class SimulatedDrive:
     drive: Drive
     truth: Truth
 
-    def write(self, folder: Path, *, format: Literal["parquet", "csv"] = "parquet") -> None:
+    def write(self, folder: Path, *, format: str = "parquet") -> None:
         """Write the drive's tables, ``drive.toml`` and the truth into a folder.
 
         Parameters

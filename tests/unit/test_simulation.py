@@ -1,0 +1,296 @@
+from dataclasses import fields, replace
+
+import numpy as np
+import polars as pl
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from weighbridge.errors import ConfigError
+from weighbridge.signals import QUANTITIES
+from weighbridge.simulation import (
+    ABOUT,
+    COMPACT,
+    ELECTRIC,
+    MIDSIZE,
+    SCENARIOS,
+    Effects,
+    Polling,
+    Sensors,
+    flat_route,
+    jensen_route,
+    make_scenario,
+    mixed_route,
+    random_car,
+    simulate_car,
+)
+
+
+def short(seed=5, duration=80.0, **changes):
+    made = replace(make_scenario("car-short", seed=seed), duration=duration, start_rest=4.0)
+    return replace(made, **changes)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return simulate_car(short())
+
+
+def test_same_scenario_is_the_same_drive(made):
+    again = simulate_car(short())
+    for f in fields(made.truth):
+        assert_array_equal(getattr(made.truth, f.name), getattr(again.truth, f.name))
+    for name, s in made.drive.signals.items():
+        assert_array_equal(s.values, again.drive.signals[name].values)
+        assert_array_equal(s.time, again.drive.signals[name].time)
+
+
+def test_another_seed_is_another_drive_on_the_same_road(made):
+    other = simulate_car(short(seed=6))
+    n = min(other.truth.speed.size, made.truth.speed.size)
+    assert np.abs(other.truth.speed[:n] - made.truth.speed[:n]).max() > 1.0
+    assert_array_equal(other.scenario.route.grade, made.scenario.route.grade)
+
+
+def test_sensor_effects_leave_the_drive_and_other_sensors_alone(made):
+    quiet = simulate_car(short(effects=Effects().without("imu_noise", "imu_bias")))
+    assert_array_equal(quiet.truth.speed, made.truth.speed)
+    assert_array_equal(
+        quiet.drive.signals["latitude"].values, made.drive.signals["latitude"].values
+    )
+    assert_array_equal(
+        quiet.drive.signals["engine_load"].values, made.drive.signals["engine_load"].values
+    )
+    assert np.any(quiet.drive.signals["accel_x"].values != made.drive.signals["accel_x"].values)
+
+
+def test_signals_are_sound(made):
+    for name, s in made.drive.signals.items():
+        assert name == s.name
+        assert np.all(np.diff(s.time) > 0.0), name
+        assert np.all(np.isfinite(s.values)), name
+        quantity = QUANTITIES[name]
+        assert s.values.min() >= quantity.low, name
+        assert s.values.max() <= quantity.high, name
+
+
+def test_values_are_polled_one_after_another(made):
+    polled = [s for s in made.drive.signals.values() if QUANTITIES[s.name].table == "obd"]
+    stamps = np.concatenate([s.time for s in polled])
+    assert len(polled) == 8
+    assert np.unique(stamps).size == stamps.size
+    for s in polled:
+        expected = 0.05 if s.name in ("ambient_temperature", "barometric_pressure") else 0.25
+        if expected == 0.25:
+            assert_allclose(np.median(np.diff(s.time)), expected, rtol=0.1)
+
+
+def test_polled_values_are_quantised(made):
+    signals = made.drive.signals
+    for name, step in (
+        ("vehicle_speed", 1 / 3.6),
+        ("engine_speed", 0.25 * np.pi / 30),
+        ("engine_load", 1 / 255),
+    ):
+        counts = signals[name].values / step
+        assert_allclose(counts, np.round(counts), atol=1e-6)
+        assert np.unique(np.round(counts)).size > 10
+
+
+def test_rounding_down_reads_half_a_step_less():
+    read = []
+    for rounding in ("nearest", "down"):
+        polling = Polling(fast=("vehicle_speed",), slow=(), rate=20.0, speed_rounding=rounding)
+        read.append(simulate_car(short(polling=polling)).drive.signals["vehicle_speed"].values)
+    nearest, down = read
+    moving = nearest > 3.0
+    assert_allclose((nearest - down)[moving].mean(), 0.5 / 3.6, rtol=0.2)
+
+
+def test_polled_values_are_late_by_the_delay():
+    polling = Polling(
+        fast=("vehicle_speed", "engine_speed"), slow=(), rate=20.0, delay=0.13, delay_spread=0.0
+    )
+    made = simulate_car(short(polling=polling, effects=Effects().without("obd_quantisation")))
+    s, truth = made.drive.signals["vehicle_speed"], made.truth
+    speed = s.values / polling.speed_scale
+    inside = (s.time > 1.0) & (s.time < truth.time[-1] - 1.0)
+    errors = [
+        np.std(speed[inside] - np.interp(s.time[inside] - lag, truth.time, truth.speed))
+        for lag in np.arange(0.0, 0.3, 0.01)
+    ]
+    assert_allclose(0.01 * np.argmin(errors), 0.13, atol=0.011)
+
+
+def test_load_is_linear_in_gross_torque_without_effects_and_not_with_them():
+    polling = Polling(fast=("engine_load",), slow=(), rate=20.0)
+
+    def departure(effects):
+        truth = simulate_car(short(polling=polling, effects=effects)).truth
+        c0, c1, c2 = MIDSIZE.drag_torque
+        w = truth.engine_speed
+        gross = truth.engine_torque + c0 + c1 * w + c2 * w**2
+        on = (truth.phase == 0) & (truth.fuel_flow > 0) & (gross > 20.0)
+        ratio = truth.load[on] / gross[on]
+        return ratio.std() / ratio.mean()
+
+    world = replace(Effects.none(), traffic=1.0, driver_ripple=1.0)
+    assert departure(world) < 1e-3  # friction is that of the step before
+    assert departure(replace(world, load_nonlinearity=1.0)) > 0.01
+
+
+def test_load_tops_out_where_the_car_says():
+    made = simulate_car(
+        replace(make_scenario("car-calibration", seed=2), duration=400.0, start_rest=2.0)
+    )
+    top = made.truth.load.max()
+    assert 0.7 * MIDSIZE.load_full < top < 1.2 * MIDSIZE.load_full
+
+
+def test_no_fixes_in_an_outage():
+    made = simulate_car(short(sensors=Sensors(gnss_outages=((20.0, 50.0),))))
+    time = made.drive.signals["latitude"].time
+    assert not np.any((time >= 20.0) & (time < 50.0))
+    assert np.any(time < 20.0)
+    assert np.any(time > 50.0)
+
+
+def test_fixes_err_by_what_is_stated():
+    sensors = Sensors(imu_rate=0.0, gnss_rate=10.0, gnss_drift_time=(2.0, 2.0))
+    effects = Effects().without("gnss_delay")
+    made = simulate_car(short(sensors=sensors, effects=effects, duration=150.0))
+    s = made.drive.signals
+    time = s["latitude"].time
+    north = (s["latitude"].values - np.interp(time, made.truth.time, made.truth.latitude)) * 6.37e6
+    up = s["altitude"].values - np.interp(time, made.truth.time, made.truth.altitude)
+    assert_allclose(north.std(), np.hypot(0.4, 2.2) / np.sqrt(2), rtol=0.3)
+    assert_allclose(up.std(), np.hypot(0.8, 4.5), rtol=0.3)
+
+
+def test_lower_inertial_rate_and_no_sensor():
+    made = simulate_car(short(sensors=Sensors(imu_rate=100.0, gnss_rate=0.0)))
+    assert_allclose(made.drive.signals["accel_x"].period, 0.01, rtol=0.01)
+    assert not made.drive.has("latitude")
+    made = simulate_car(short(sensors=Sensors(imu_rate=0.0)))
+    assert not made.drive.has("accel_x")
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet"])
+def test_written_tables_hold_the_drive(made, tmp_path, format):
+    made.write(tmp_path / "drive", format=format)
+    read = pl.read_csv if format == "csv" else pl.read_parquet
+    imu = read(tmp_path / "drive" / f"imu.{format}")
+    assert imu.columns == [
+        "time_s", "accel_x_mps2", "accel_y_mps2", "accel_z_mps2",
+        "gyro_x_radps", "gyro_y_radps", "gyro_z_radps",
+    ]  # fmt: skip
+    obd = read(tmp_path / "drive" / f"obd.{format}")
+    filled = sum(obd[c].is_not_null().cast(int) for c in obd.columns if c != "time_s")
+    assert filled.min() == 1
+    assert filled.max() == 1
+    speed = obd["vehicle_speed_kmh"].drop_nulls().to_numpy()
+    assert_allclose(speed, made.drive.signals["vehicle_speed"].values * 3.6, atol=1e-6)
+    gnss = read(tmp_path / "drive" / f"gnss.{format}")
+    assert_allclose(
+        np.radians(gnss["latitude_deg"].to_numpy()),
+        made.drive.signals["latitude"].values,
+        atol=1e-9,
+    )
+    truth = read(tmp_path / "drive" / f"truth.{format}")
+    assert_allclose(truth["mass_kg"].to_numpy(), made.truth.mass, atol=1e-6)
+    assert "mass_kg = 1580.0" in (tmp_path / "drive" / "drive.toml").read_text()
+
+
+def test_drive_does_not_tell_the_truth_but_the_mass_at_the_start(made):
+    assert made.drive.info.mass == 1580.0
+    assert not made.drive.has("engine_torque")
+    assert not made.drive.has("grade")
+    assert not made.drive.has("gear")
+
+
+def test_electric_car_reports_torque_and_brakes_with_its_motor():
+    scenario = replace(make_scenario("electric", seed=3), duration=150.0, start_rest=3.0)
+    made = simulate_car(scenario)
+    torque = made.drive.signals["engine_torque"].values
+    assert torque.max() > 50.0
+    assert torque.min() < -20.0
+    moving = made.truth.speed > 2.0
+    ratio = made.truth.engine_speed[moving] / made.truth.speed[moving]
+    assert_allclose(ratio, ELECTRIC.gearings[0], rtol=0.03)
+
+
+def test_manual_gearbox_interrupts_the_torque():
+    scenario = replace(make_scenario("compact", seed=3), duration=80.0, start_rest=3.0)
+    truth = simulate_car(scenario).truth
+    shifting = truth.phase == 1
+    assert shifting.sum() > 10
+    assert truth.traction_force[shifting].min() < 60.0
+    assert COMPACT.shift_floor == 0.0
+
+
+def test_driving_looks_like_driving():
+    truth = simulate_car(make_scenario("car-short", seed=11)).truth
+    assert truth.speed.max() * 3.6 < 95.0
+    assert -4.0 < truth.accel.min() < -1.0
+    assert 1.2 < truth.accel.max() < 3.0
+    assert 0.02 < np.mean(truth.speed < 0.1) < 0.4
+    assert truth.engine_speed.max() < MIDSIZE.max_speed
+    assert set(np.unique(truth.gear)) >= {1.0, 2.0, 3.0, 4.0, 5.0}
+    per_distance = (truth.mass[0] - truth.mass[-1]) / truth.distance[-1]
+    assert 4.0 < per_distance / 0.745 * 1e5 < 12.0  # litres per 100 km
+
+
+def test_route_returns_to_its_height_over_mirrored_hills():
+    route = jensen_route()
+    assert_allclose(route.length, 83_000.0, rtol=0.02)
+    assert abs(route.height[-1]) < 1.0
+    n = route.grade.size // 2
+    assert_allclose(route.grade[:n], -route.grade[::-1][:n], atol=1e-12)
+    assert np.degrees(np.abs(route.grade).max()) > 2.5
+    assert np.degrees(np.abs(route.grade).max()) < 5.5
+
+
+def test_random_cars_drive():
+    rng = np.random.default_rng(8)
+    for _ in range(3):
+        car = random_car(rng)
+        assert 900.0 < car.mass < 2100.0
+        truth = simulate_car(short(car=car, sensors=Sensors(imu_rate=0.0))).truth
+        assert truth.speed.max() > 8.0
+
+
+def test_every_scenario_is_described():
+    assert set(ABOUT) == set(SCENARIOS)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: make_scenario("lorry"), "unknown scenario 'lorry'"),
+        (lambda: make_scenario("car-short", without=["squad"]), "unknown effect 'squad'"),
+        (lambda: make_scenario("car-short", mass=1600.0, payload=1.0), "not both"),
+        (lambda: make_scenario("car-short", wind_from=270.0), "wind_from must be in"),
+        (lambda: make_scenario("car-short", mass=10.0), "payload must suit"),
+        (lambda: Effects(squat=-1.0), "effect squat"),
+        (lambda: Effects(squat=float("nan")), "effect squat"),
+        (lambda: Sensors(imu_rate=5.0), "imu_rate"),
+        (lambda: Sensors(gnss_rate=99.0), "gnss_rate"),
+        (lambda: Polling(rate=0.0), "poll rate"),
+        (lambda: Polling(speed_rounding="up"), "speed_rounding"),
+        (lambda: Polling(fast=()), "at least one"),
+        (lambda: replace(MIDSIZE, gear_ratios=(1.0, 2.0)), "gear_ratios"),
+        (lambda: replace(MIDSIZE, mass=-1.0), "mass"),
+        (lambda: replace(MIDSIZE, curve_torque=(1.0,)), "curve_speed"),
+        (lambda: flat_route(10.0), "at least 50 m"),
+        (lambda: mixed_route(out=[("city", 500)], back=[("city", 900)]), "as long back as out"),
+        (lambda: short(duration=1.0), "duration"),
+        (lambda: simulate_car(short(polling=Polling(fast=("altitude",)))), "cannot poll"),
+    ],
+)
+def test_impossible_scenarios_are_refused(call, words):
+    with pytest.raises(ConfigError, match=words):
+        call()
+
+
+def test_unknown_format_is_refused(made, tmp_path):
+    with pytest.raises(ConfigError, match="format must be"):
+        made.write(tmp_path, format="xls")
