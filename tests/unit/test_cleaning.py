@@ -1,0 +1,107 @@
+"""Cleaning: what is left out is counted, and what is left is what was recorded."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.testing import assert_array_equal
+
+from weighbridge.signals.cleaning import clean_clock, clean_columns, clean_signal, rising
+
+
+def test_clean_table_shares_its_arrays():
+    time = np.arange(10.0)
+    values = np.sin(time)
+    signals, problems = clean_columns(time, [("accel_x", values), ("accel_y", values)], "imu.csv")
+    assert problems == []
+    assert all(s.time is time for s in signals)
+    assert signals[0].values is values
+
+
+def test_columns_with_the_same_rows_share_one_clock():
+    time = np.arange(10.0)
+    holes = np.where(time % 2 == 0, np.nan, time)
+    signals, _ = clean_columns(time, [("accel_x", holes), ("accel_y", -holes)], "imu.csv")
+    assert signals[0].time is signals[1].time
+    assert_array_equal(signals[0].time, [1.0, 3.0, 5.0, 7.0, 9.0])
+    assert_array_equal(signals[1].values, [-1.0, -3.0, -5.0, -7.0, -9.0])
+
+
+def test_repeated_stamp_keeps_the_first_row():
+    clock = clean_clock(np.array([0.0, 1.0, 1.0, 2.0]), "obd.csv")
+    assert_array_equal(clock.keep, [True, True, False, True])
+    assert "1 of 4 time stamps repeat" in clock.problems[0].text
+
+
+def test_one_late_stamp_costs_one_row():
+    clock = clean_clock(np.array([0.0, 1.0, 2.0, 0.5, 3.0, 4.0]), "obd.csv")
+    assert_array_equal(clock.time, [0.0, 1.0, 2.0, 3.0, 4.0])
+    assert "backwards" in clock.problems[0].text
+    assert "1 of 6 rows" in clock.problems[0].text
+
+
+def test_one_stamp_far_ahead_costs_one_row():
+    clock = clean_clock(np.array([0.0, 1.0, 9e9, 3.0, 4.0, 5.0]), "obd.csv")
+    assert_array_equal(clock.time, [0.0, 1.0, 3.0, 4.0, 5.0])
+
+
+def test_restarted_clock_keeps_the_longer_part():
+    time = np.concatenate([np.arange(100.0), np.arange(40.0)])
+    clock = clean_clock(time, "obd.csv")
+    assert_array_equal(clock.time, np.arange(100.0))
+    assert "40 of 140 rows" in clock.problems[0].text
+
+
+def test_missing_stamps_are_counted():
+    clock = clean_clock(np.array([0.0, np.nan, np.inf, 3.0]), "gnss.csv")
+    assert_array_equal(clock.time, [0.0, 3.0])
+    assert "2 of 4 rows have no time" in clock.problems[0].text
+
+
+def test_infinite_values_are_counted():
+    signal, problems = clean_signal(
+        "accel_x", np.arange(4.0), np.array([1.0, np.inf, -np.inf, 2.0]), "imu.csv"
+    )
+    assert signal is not None
+    assert_array_equal(signal.values, [1.0, 2.0])
+    assert "2 of 4 values of accel_x are infinite" in problems[0].text
+
+
+def test_column_without_values_is_told():
+    signal, problems = clean_signal("gear", np.arange(3.0), np.full(3, np.nan), "obd.csv")
+    assert signal is None
+    assert "gear has no value" in problems[0].text
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    hnp.arrays(
+        np.float64,
+        st.integers(0, 40),
+        elements=st.one_of(
+            st.integers(0, 15).map(float), st.sampled_from([np.nan, np.inf, -np.inf])
+        ),
+    )
+)
+def test_clock_only_rises(time):
+    clock = clean_clock(time, "x")
+    assert np.all(np.isfinite(clock.time))
+    assert np.all(np.diff(clock.time) > 0.0)
+    kept = time if clock.keep is None else time[clock.keep]
+    assert_array_equal(kept, clock.time)
+    assert clock.time.size > 0 or not np.isfinite(time).any()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.integers(0, 12).map(float), min_size=1, max_size=14))
+def test_rising_matches_a_plain_loop(stamps):
+    front, highest = [], -np.inf
+    for t in stamps:
+        front.append(t > highest)
+        highest = max(highest, t)
+    back, lowest = [], np.inf
+    for t in reversed(stamps):
+        back.append(t < lowest)
+        lowest = min(lowest, t)
+    back.reverse()
+    assert_array_equal(rising(np.array(stamps)), front if sum(front) >= sum(back) else back)

@@ -1,0 +1,217 @@
+"""Vehicle files: what is saved is loaded again, and mistakes are told with their line."""
+
+import math
+import tomllib
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from weighbridge.errors import ConfigError
+from weighbridge.vehicle.file import load_vehicle, save_vehicle
+from weighbridge.vehicle.model import (
+    Driveline,
+    Mounting,
+    Provenance,
+    RoadLoad,
+    Timing,
+    TorqueModel,
+    Vehicle,
+)
+
+positive = st.floats(1e-6, 1e6)
+finite = st.floats(-1e9, 1e9)
+angle = st.floats(-math.pi, math.pi)
+text = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\r\x00"), max_size=12)
+
+
+def maybe(strategy):
+    return st.none() | strategy
+
+
+drivelines = st.builds(
+    Driveline,
+    gearings=st.lists(positive, max_size=6).map(lambda g: tuple(sorted(g, reverse=True))),
+    engine_inertia=positive,
+    wheel_inertia=positive,
+    wheel_radius=positive,
+    efficiency=st.floats(1e-3, 1.0),
+    speed_scale=st.floats(0.8, 1.2),
+    idle_speed=st.floats(0.0, 200.0),
+)
+pairs = st.tuples(st.floats(0.0, 500.0), st.floats(0.0, 500.0)).map(lambda p: tuple(sorted(p)))
+torques = st.builds(
+    TorqueModel,
+    source=st.just("load"),
+    coefficients=st.lists(finite, min_size=2, max_size=5).map(tuple),
+    reference_torque=maybe(positive),
+    engine_efficiency=st.floats(1e-3, 1.0),
+    noise=maybe(positive),
+    load_range=maybe(pairs),
+    speed_range=maybe(pairs),
+)
+vehicles = st.builds(
+    Vehicle,
+    name=text,
+    kind=st.sampled_from(["car", "van", "bus", "truck"]),
+    tare=maybe(positive),
+    gross=maybe(positive),
+    mapping=maybe(text),
+    driveline=drivelines,
+    torque=torques,
+    road_load=st.builds(
+        RoadLoad, drag_area=st.floats(0.0, 19.0), rolling_coefficient=st.floats(0.0, 0.09)
+    ),
+    mounting=maybe(
+        st.builds(
+            Mounting,
+            roll=angle,
+            pitch=angle,
+            yaw=angle,
+            std=maybe(st.tuples(positive, positive, positive)),
+            squat=maybe(st.floats(-0.1, 0.1)),
+            squat_std=maybe(positive),
+        )
+    ),
+    timing=st.builds(
+        Timing,
+        torque_delay=maybe(st.floats(-1.0, 3.0)),
+        torque_delay_std=maybe(positive),
+        speed_delay=maybe(st.floats(-1.0, 3.0)),
+    ),
+    provenance=st.builds(
+        Provenance,
+        drives=st.lists(text, max_size=3).map(tuple),
+        date=maybe(st.dates().map(str)),
+        r_squared=maybe(st.floats(0.0, 1.0)),
+        residual_std=maybe(positive),
+        samples=maybe(st.integers(0, 10**9)),
+        mass_scale_std=maybe(positive),
+        notes=maybe(text),
+    ),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(vehicles)
+def test_saved_vehicle_is_loaded_to_the_last_bit(tmp_path_factory, vehicle):
+    path = tmp_path_factory.mktemp("vehicle") / "car.toml"
+    vehicle.save(path)
+    assert Vehicle.load(path) == vehicle
+
+
+def test_file_speaks_the_units_of_people(tmp_path):
+    path = tmp_path / "car.toml"
+    save_vehicle(
+        Vehicle(
+            name="test",
+            tare=1580.0,
+            driveline=Driveline(gearings=(28.85,), idle_speed=800 * math.pi / 30),
+            torque=TorqueModel(source="measured", load_range=(0.05, 0.35)),
+            mounting=Mounting(roll=math.radians(2.0)),
+        ),
+        path,
+    )
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert data["vehicle"]["tare_kg"] == 1580.0
+    assert data["driveline"]["idle_speed_rpm"] == pytest.approx(800.0, rel=1e-14)
+    assert data["torque"]["load_range_pct"] == [5.0, 35.0]
+    assert data["mounting"]["roll_deg"] == pytest.approx(2.0, rel=1e-14)
+    assert data["provenance"]["format_version"] == 1
+    # Every key is explained.
+    assert path.read_text(encoding="utf-8").count("#") > 15
+
+
+def load(tmp_path, content):
+    path = tmp_path / "car.toml"
+    path.write_text(content, encoding="utf-8")
+    return load_vehicle(path)
+
+
+def test_data_sheet_values_are_accepted(tmp_path):
+    car = load(
+        tmp_path,
+        """
+        [vehicle]
+        class = "van"
+        tare_t = 2.1
+
+        [driveline]
+        gear_ratios = [3.8, 2.0]
+        final_drive = 4.0
+        wheel_radius_m = 0.32
+
+        [road_load]
+        drag_coefficient = 0.30
+        frontal_area_m2 = 2.5
+
+        [timing]
+        torque_delay_ms = 120
+        """,
+    )
+    assert car.kind == "van"
+    assert car.tare == 2100.0
+    assert car.driveline.gearings == pytest.approx((3.8 * 4.0 / 0.32, 2.0 * 4.0 / 0.32))
+    assert car.road_load.drag_area == pytest.approx(0.75)
+    assert car.timing.torque_delay == 0.12
+
+
+def test_empty_file_is_a_vehicle_of_defaults(tmp_path):
+    assert load(tmp_path, "") == Vehicle()
+
+
+@pytest.mark.parametrize(
+    ("content", "line", "words"),
+    [
+        ("[vehicle]\ntara_kg = 1500", 2, "did you mean tare_kg"),
+        ("[vehicle]\ntare = 1500", 2, "no unit; write it as tare_kg"),
+        ("[vehicle]\ntare_m = 1500", 2, "is not known"),
+        ("[vehicle]\ntare_kg = -3", 2, "must be a positive number"),
+        ("[vehicle]\ntare_kg = nan", 2, "must be a finite number"),
+        ("[vehicle]\ntare_kg = '1500'", 2, "must be a number, not text (1500)"),
+        ("[vehicle]\ntare_kg = 1500\ntare_t = 1.5", 3, "says the same as tare_kg"),
+        ("[vehicle]\nclass = 'boat'", 2, "car, van, bus or truck"),
+        ("[vehicle]\nname = 3", 2, 'text in "quotes"'),
+        ("\n[driveline]\n\nefficiency = 1.2", 4, "must be in (0, 1]"),
+        ("[driveline]\ngearings_per_m = [10, 20]", 2, "must fall from first to last"),
+        ("[driveline]\ngearings_per_m = 10", 2, "must be a list of numbers"),
+        ("[driveline]\ngear_ratios = [3, 2]", 2, "needs wheel_radius_m"),
+        ("[driveline]\nfinal_drive = 4.0", 2, "needs gear_ratios"),
+        ("[driveline]\ngear_ratios = [1, 2]\nwheel_radius_m = 0.3", 2, "must fall"),
+        ("[driveline]\nspeed_scale = 2", 2, "must be in [0.8, 1.2]"),
+        ("[torque]\nsource = 'magic'", 2, "load, measured, percent or air_flow"),
+        ("[torque]\nsource = 'load'", 2, "at least two coefficients"),
+        ("[torque]\nload_range_pct = [50, 10]", 2, "the lower first"),
+        ("[road_load]\ndrag_coefficient = 0.3", 2, "needs frontal_area_m2"),
+        ("[road_load]\nrolling_coefficient = 0.9", 2, "must be in [0, 0.1)"),
+        ("[mounting]\nstd_deg = [1, 2]", 2, "must be three numbers"),
+        ("[timing]\ntorque_delay_s = 120", 2, "must be in [-1, 3] s"),
+        ("[provenance]\nformat_version = 99", 2, "reads version 1"),
+        ("[provenance]\nsamples = 1.5", 2, "a whole number"),
+        ("[roadload]\n", 1, "did you mean road_load"),
+        ("vehicle = 3", 1, "must be a section"),
+    ],
+)
+def test_mistakes_are_told_with_file_line_and_remedy(tmp_path, content, line, words):
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path, content)
+    message = str(caught.value)
+    assert "car.toml" in message
+    assert f"line {line}:" in message
+    assert words in message
+    assert "\n" not in message
+
+
+def test_broken_toml_is_told(tmp_path):
+    with pytest.raises(ConfigError, match=r"car\.toml is not valid TOML.*line 1"):
+        load(tmp_path, "[vehicle\nname = 'x'")
+
+
+def test_missing_file_is_told(tmp_path):
+    with pytest.raises(ConfigError, match=r"nowhere\.toml: no such file"):
+        load_vehicle(tmp_path / "nowhere.toml")
+
+
+def test_unwritable_place_is_told(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be written"):
+        save_vehicle(Vehicle(), tmp_path / "no" / "such" / "folder.toml")
