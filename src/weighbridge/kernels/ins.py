@@ -12,15 +12,16 @@ Nominal state, one flat array so that a step allocates nothing:
 17      yaw from the body's x axis to the direction of travel, mounting [rad]
 18      squat: further pitch of the body per acceleration [rad per m/s^2]
 19      indicated over true vehicle speed [-]
-20      acceleration along the body, low-passed [m/s^2]
-21, 22  rows of GNSS and of vehicle speed refused in succession [-]
-23:26   last angular rate, body axes [rad/s]
-26:29   its noise power density by axis, from differences of neighbours
+20      distance of the sensor ahead of the axle that does not slip sideways [m]
+21      acceleration along the body, low-passed [m/s^2]
+22, 23  rows of GNSS and of vehicle speed refused in succession [-]
+24:27   last angular rate, body axes [rad/s]
+27:30   its noise power density by axis, from differences of neighbours
 ======  =====================================================================
 
-Error state (19): position, velocity, attitude (rotation vector in navigation
+Error state (20): position, velocity, attitude (rotation vector in navigation
 axes: ``rot_true = exp([theta x]) rot``), accelerometer bias, gyro bias, then
-the four constants 16..19. The first 15 are the paper's; the constants are what
+the five constants 16..20. The first 15 are the paper's; the constants are what
 its method takes as known.
 
 Between two covariance steps ("nodes") the mechanisation runs at the full rate
@@ -46,23 +47,18 @@ from typing import NamedTuple
 import numpy as np
 
 from weighbridge.kernels._jit import fast_kernel, kernel
-from weighbridge.kernels.rotation import (
-    normalise,
-    quaternion_to_matrix,
-    rotate_body,
-    rotate_navigation,
-)
+from weighbridge.kernels.rotation import half_turn, matrix_rows, product
 
-STATES = 29
-SHOWN = 23
+STATES = 30
+SHOWN = 24
 """Part of the nominal state that a run keeps for each node."""
-ERRORS = 19
+ERRORS = 20
 MEASUREMENTS = 11
 ROWS = 11
 """Most scalar rows one node can process."""
 
-P, V, Q, BA, BG, PITCH0, YAW0, SQUAT, SCALE, ACCEL, LOST_GNSS, LOST_SPEED, LAST, PSD = (
-    0, 3, 6, 10, 13, 16, 17, 18, 19, 20, 21, 22, 23, 26,
+P, V, Q, BA, BG, PITCH0, YAW0, SQUAT, SCALE, LEVER, ACCEL, LOST_GNSS, LOST_SPEED, LAST, PSD = (
+    0, 3, 6, 10, 13, 16, 17, 18, 19, 20, 21, 22, 23, 24, 27,
 )  # fmt: skip
 """Places in the nominal state."""
 
@@ -86,7 +82,7 @@ class Noise(NamedTuple):
     gyro_bias_psd : random walk of the gyro bias [(rad/s)^2/s]
     lateral_std : lateral velocity of the body at rest speed [m/s]
     lateral_slip_std : further, per speed [-]
-    lateral_turn_std : further, per yaw rate: lever arm and side slip [m]
+    lateral_turn_std : further, per yaw rate: side slip [m]
     vertical_std : vertical velocity of the body, heave [m/s]
     vertical_slope_std : further, per speed [-]
     constraint_time : correlation time of the constraint errors [s]
@@ -123,14 +119,12 @@ class Work(NamedTuple):
 
     Attributes
     ----------
-    rot : (3, 3) attitude of the body
     transition : (13,) time, sum of ``f_n dt`` and sum of ``rot dt`` since the last node
-    h, ph : (19,) one measurement row, covariance times row
+    h, ph : (20,) one measurement row, covariance times row
     rate : (3,) last angular rate, bias removed [rad/s]
     block : (9, 9)
     """
 
-    rot: np.ndarray
     transition: np.ndarray
     h: np.ndarray
     ph: np.ndarray
@@ -144,9 +138,9 @@ class RowLog(NamedTuple):
     Attributes
     ----------
     transition : (m, 13) see `Work`
-    cov : (m, 19, 19) after the node's rows
+    cov : (m, 20, 20) after the node's rows
     count : (m,) rows processed
-    h, ph : (m, 11, 19) rows and covariance times row
+    h, ph : (m, 11, 20) rows and covariance times row
     innovation, innovation_var : (m, 11)
     """
 
@@ -161,9 +155,7 @@ class RowLog(NamedTuple):
 
 def new_work() -> Work:
     """Return scratch arrays for one filter."""
-    return Work(
-        np.eye(3), np.zeros(13), np.zeros(ERRORS), np.zeros(ERRORS), np.zeros(3), np.zeros((9, 9))
-    )
+    return Work(np.zeros(13), np.zeros(ERRORS), np.zeros(ERRORS), np.zeros(3), np.zeros((9, 9)))
 
 
 def new_log(nodes: int) -> RowLog:
@@ -202,7 +194,7 @@ def propagate(x, work, fx, fy, fz, wx, wy, wz, dt, noise):
 
     Parameters
     ----------
-    x : (29,) nominal state, changed in place
+    x : (30,) nominal state, changed in place
     work : Work
     fx, fy, fz : float
         Specific force in body axes [m/s^2].
@@ -215,25 +207,39 @@ def propagate(x, work, fx, fy, fz, wx, wy, wz, dt, noise):
     _follow_noise(x, wx, wy, wz, dt)
     fx, fy, fz = fx - x[BA], fy - x[BA + 1], fz - x[BA + 2]
     wx, wy, wz = wx - x[BG], wy - x[BG + 1], wz - x[BG + 2]
-    rot = work.rot
-    q = x[Q : Q + 4]
     # specific force is turned with the attitude of the middle of the step
-    rotate_body(q, 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz)
-    quaternion_to_matrix(q, rot)
-    rotate_body(q, 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz)
-    normalise(q)
+    half = 0.5 * dt
+    c, s0, s1, s2 = half_turn(half * wx, half * wy, half * wz)
+    q0, q1, q2, q3 = product(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], c, s0, s1, s2)
+    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = matrix_rows(q0, q1, q2, q3)
+    q0, q1, q2, q3 = product(q0, q1, q2, q3, c, s0, s1, s2)
+    n = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = n * q0, n * q1, n * q2, n * q3
+    f0 = r00 * fx + r01 * fy + r02 * fz
+    f1 = r10 * fx + r11 * fy + r12 * fz
+    f2 = r20 * fx + r21 * fy + r22 * fz
+    x[P] += dt * (x[V] + half * f0)
+    x[P + 1] += dt * (x[V + 1] + half * f1)
+    x[P + 2] += dt * (x[V + 2] + half * (f2 + noise.gravity))
+    x[V] += dt * f0
+    x[V + 1] += dt * f1
+    x[V + 2] += dt * (f2 + noise.gravity)
     tr = work.transition
     tr[0] += dt
-    for i in range(3):
-        f_n = rot[i, 0] * fx + rot[i, 1] * fy + rot[i, 2] * fz
-        a_n = f_n + noise.gravity if i == 2 else f_n
-        x[P + i] += dt * (x[V + i] + 0.5 * dt * a_n)
-        x[V + i] += dt * a_n
-        tr[1 + i] += dt * f_n
-        for j in range(3):
-            tr[4 + 3 * i + j] += dt * rot[i, j]
+    tr[1] += dt * f0
+    tr[2] += dt * f1
+    tr[3] += dt * f2
+    tr[4] += dt * r00
+    tr[5] += dt * r01
+    tr[6] += dt * r02
+    tr[7] += dt * r10
+    tr[8] += dt * r11
+    tr[9] += dt * r12
+    tr[10] += dt * r20
+    tr[11] += dt * r21
+    tr[12] += dt * r22
     work.rate[0], work.rate[1], work.rate[2] = wx, wy, wz
-    accel = fx + noise.gravity * rot[2, 0]
+    accel = fx + noise.gravity * r20
     x[ACCEL] += (accel - x[ACCEL]) * min(1.0, dt / noise.accel_time)
 
 
@@ -305,100 +311,107 @@ def propagate_covariance(x, cov, work, noise):
 
 @fast_kernel
 def correct(x, dx):
-    """Add the error ``dx`` (19,) to the nominal state ``x`` (eqs. 41-43)."""
+    """Add the error ``dx`` (20,) to the nominal state ``x`` (eqs. 41-43)."""
     for i in range(6):
         x[i] += dx[i]
-    for i in range(10):
+    for i in range(11):
         x[BA + i] += dx[9 + i]
-    q = x[Q : Q + 4]
-    rotate_navigation(q, dx[6], dx[7], dx[8])
-    normalise(q)
+    c, s0, s1, s2 = half_turn(dx[6], dx[7], dx[8])
+    q0, q1, q2, q3 = product(c, s0, s1, s2, x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+    n = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = n * q0, n * q1, n * q2, n * q3
 
 
 @fast_kernel
-def _fold(x, cov, work, innovation, innovation_var):
-    """Fold one row whose covariance product is in ``work.ph`` into state and covariance."""
-    ph = work.ph
+def _fold(x, cov, ph, innovation, innovation_var):
+    """Fold one row whose covariance product is ``ph`` (20,) into state and covariance.
+
+    Leaves ``ph`` scaled.
+    """
     scale = 1.0 / math.sqrt(innovation_var)
-    gain = innovation / innovation_var
-    for i in range(6):
-        x[i] += gain * ph[i]
-    for i in range(10):
-        x[BA + i] += gain * ph[9 + i]
-    q = x[Q : Q + 4]
-    rotate_navigation(q, gain * ph[6], gain * ph[7], gain * ph[8])
     for i in range(ERRORS):
         ph[i] *= scale
     for i in range(ERRORS):
         c = ph[i]
         for j in range(ERRORS):
             cov[i, j] -= c * ph[j]
+    gain = innovation * scale
+    for i in range(6):
+        x[i] += gain * ph[i]
+    for i in range(11):
+        x[BA + i] += gain * ph[9 + i]
+    c, s0, s1, s2 = half_turn(gain * ph[6], gain * ph[7], gain * ph[8])
+    q0, q1, q2, q3 = product(c, s0, s1, s2, x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+    n = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = n * q0, n * q1, n * q2, n * q3
 
 
 @fast_kernel
-def _body_row(x, cov, work, axis, lean):
-    """Set ``work.h`` and ``work.ph`` to the row of one body velocity; return that velocity.
+def _body_row(x, h, axis, lean):
+    """Set ``h`` (20,) to the row of one body velocity; return that velocity and the forward one.
 
-    The row is ``r = rot[:, axis] - lean rot[:, 0]``: lean carries the mounting
-    and squat angle. Places 15.. of ``h`` are left zero for the caller.
+    The row's direction is body axis ``axis`` less ``lean`` times the forward
+    axis, in navigation coordinates: lean carries the mounting and squat angle.
+    Places 15.. of ``h`` are left zero for the caller.
     """
-    quaternion_to_matrix(x[Q : Q + 4], work.rot)
-    rot = work.rot
-    rx = rot[0, axis] - lean * rot[0, 0]
-    ry = rot[1, axis] - lean * rot[1, 0]
-    rz = rot[2, axis] - lean * rot[2, 0]
+    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = matrix_rows(
+        x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
+    )
     vx, vy, vz = x[V], x[V + 1], x[V + 2]
-    h = work.h
+    forward = r00 * vx + r10 * vy + r20 * vz
+    if axis == 0:
+        rx, ry, rz = r00, r10, r20
+    elif axis == 1:
+        rx, ry, rz = r01, r11, r21
+    else:
+        rx, ry, rz = r02, r12, r22
+    rx -= lean * r00
+    ry -= lean * r10
+    rz -= lean * r20
     for i in range(ERRORS):
         h[i] = 0.0
     h[3], h[4], h[5] = rx, ry, rz
     h[6], h[7], h[8] = ry * vz - rz * vy, rz * vx - rx * vz, rx * vy - ry * vx
-    return rx * vx + ry * vy + rz * vz
+    return rx * vx + ry * vy + rz * vz, forward
 
 
 @fast_kernel
-def _body_product(cov, work):
-    """Set ``work.ph`` for a row with velocity, attitude and constants; return ``h P h'``."""
-    h, ph = work.h, work.ph
+def _body_product(cov, h, ph):
+    """Set ``ph`` to ``P h`` of a row with velocity, attitude and constants; return ``h P h'``."""
+    h3, h4, h5, h6, h7, h8 = h[3], h[4], h[5], h[6], h[7], h[8]
+    h15, h16, h17, h18, h19 = h[15], h[16], h[17], h[18], h[19]
     for j in range(ERRORS):
-        ph[j] = (
-            h[3] * cov[3, j]
-            + h[4] * cov[4, j]
-            + h[5] * cov[5, j]
-            + h[6] * cov[6, j]
-            + h[7] * cov[7, j]
-            + h[8] * cov[8, j]
-            + h[15] * cov[15, j]
-            + h[16] * cov[16, j]
-            + h[17] * cov[17, j]
-            + h[18] * cov[18, j]
-        )
-    var = 0.0
-    for i in range(3, 9):
-        var += h[i] * ph[i]
-    for i in range(15, 19):
-        var += h[i] * ph[i]
-    return var
+        ph[j] = h3 * cov[3, j] + h4 * cov[4, j] + h5 * cov[5, j]
+    for j in range(ERRORS):
+        ph[j] += h6 * cov[6, j] + h7 * cov[7, j] + h8 * cov[8, j]
+    for j in range(ERRORS):
+        ph[j] += h15 * cov[15, j] + h16 * cov[16, j] + h17 * cov[17, j]
+    for j in range(ERRORS):
+        ph[j] += h18 * cov[18, j] + h19 * cov[19, j]
+    return (
+        h3 * ph[3] + h4 * ph[4] + h5 * ph[5] + h6 * ph[6] + h7 * ph[7] + h8 * ph[8]
+        + h15 * ph[15] + h16 * ph[16] + h17 * ph[17] + h18 * ph[18] + h19 * ph[19]
+    )  # fmt: skip
 
 
 @fast_kernel
-def _direct_product(cov, work, place):
-    """Set ``work.h`` and ``work.ph`` for a row that reads one error state; return its variance."""
+def _direct_product(cov, h, ph, place):
+    """Set ``h`` and ``ph`` for a row that reads one error state; return its variance."""
     for j in range(ERRORS):
-        work.h[j] = 0.0
-        work.ph[j] = cov[place, j]
-    work.h[place] = 1.0
+        h[j] = 0.0
+        ph[j] = cov[place, j]
+    h[place] = 1.0
     return cov[place, place]
 
 
 @kernel
-def _record(log, node, work, innovation, innovation_var):
-    """Keep one row for the backward pass, before `_fold` scales ``work.ph``."""
+def _record(log, node, h, ph, innovation, innovation_var):
+    """Keep one row for the backward pass, before `_fold` scales ``ph``."""
     if node < log.count.size:
         k = log.count[node]
         for i in range(ERRORS):
-            log.h[node, k, i] = work.h[i]
-            log.ph[node, k, i] = work.ph[i]
+            log.h[node, k, i] = h[i]
+            log.ph[node, k, i] = ph[i]
         log.innovation[node, k] = innovation
         log.innovation_var[node, k] = innovation_var
         log.count[node] = k + 1
@@ -418,6 +431,7 @@ def update(x, cov, work, z, noise, log, node):
     node : int
         Place in the log.
     """
+    h, ph = work.h, work.ph
     period = work.transition[0]
     # errors of wheel speed and constraints last for about constraint_time: the
     # white noise of the same power density has this much more variance
@@ -429,7 +443,7 @@ def update(x, cov, work, z, noise, log, node):
             if math.isnan(z[Z_N + i]):
                 continue
             r = z[Z_VVAR] if i == 2 else z[Z_HVAR]
-            s = _direct_product(cov, work, i) + r
+            s = _direct_product(cov, h, ph, i) + r
             e = z[Z_N + i] - x[P + i]
             nis = e * e / s
             if nis > noise.gate:
@@ -439,8 +453,8 @@ def update(x, cov, work, z, noise, log, node):
                 # lost: believe the fix, with a variance that makes it just possible
                 s = e * e / noise.gate
                 s = max(s, cov[i, i] + r)
-            _record(log, node, work, e, s)
-            _fold(x, cov, work, e, s)
+            _record(log, node, h, ph, e, s)
+            _fold(x, cov, ph, e, s)
         if not refused:
             x[LOST_GNSS] = 0.0
         elif x[LOST_GNSS] < noise.patience:
@@ -452,72 +466,73 @@ def update(x, cov, work, z, noise, log, node):
                 cov[3 + i, 3 + i] += 1.0
     if not math.isnan(z[Z_VN]):
         for i in range(2):
-            s = _direct_product(cov, work, 3 + i) + z[Z_VEL_VAR]
+            s = _direct_product(cov, h, ph, 3 + i) + z[Z_VEL_VAR]
             e = z[Z_VN + i] - x[V + i]
             s = max(s, e * e / noise.gate)
-            _record(log, node, work, e, s)
-            _fold(x, cov, work, e, s)
+            _record(log, node, h, ph, e, s)
+            _fold(x, cov, ph, e, s)
 
     if z[Z_STILL] > 0.0:
         for axis in range(3):
-            e = -_body_row(x, cov, work, axis, 0.0)
-            s = _body_product(cov, work) + noise.still_std**2 * inflate
+            v, _ = _body_row(x, h, axis, 0.0)
+            e = -v
+            s = _body_product(cov, h, ph) + noise.still_std**2 * inflate
             s = max(s, e * e / noise.gate)
-            _record(log, node, work, e, s)
-            _fold(x, cov, work, e, s)
+            _record(log, node, h, ph, e, s)
+            _fold(x, cov, ph, e, s)
         if z[Z_STILL] > 1.0:
             for i in range(3):
                 # the residual rate at rest is what is left of the bias
-                s = _direct_product(cov, work, 12 + i) + noise.rest_rate_std**2 * inflate
+                s = _direct_product(cov, h, ph, 12 + i) + noise.rest_rate_std**2 * inflate
                 e = work.rate[i]
                 s = max(s, e * e / noise.gate)
-                _record(log, node, work, e, s)
-                _fold(x, cov, work, e, s)
+                _record(log, node, h, ph, e, s)
+                _fold(x, cov, ph, e, s)
         return
 
     if not math.isnan(z[Z_SPEED]):
-        vx = _body_row(x, cov, work, 0, 0.0)
+        vx, _ = _body_row(x, h, 0, 0.0)
         for i in range(3, 9):
-            work.h[i] *= x[SCALE]
-        work.h[18] = vx
-        s = _body_product(cov, work) + z[Z_SPEED_VAR]
+            h[i] *= x[SCALE]
+        h[18] = vx
+        s = _body_product(cov, h, ph) + z[Z_SPEED_VAR]
         e = z[Z_SPEED] - x[SCALE] * vx
         if e * e <= noise.gate * s:
             x[LOST_SPEED] = 0.0
-            _record(log, node, work, e, s)
-            _fold(x, cov, work, e, s)
+            _record(log, node, h, ph, e, s)
+            _fold(x, cov, ph, e, s)
         elif x[LOST_SPEED] < noise.patience:
             x[LOST_SPEED] += 1.0
         else:
             s = e * e / noise.gate
-            _record(log, node, work, e, s)
-            _fold(x, cov, work, e, s)
+            _record(log, node, h, ph, e, s)
+            _fold(x, cov, ph, e, s)
             for i in range(3):
                 cov[3 + i, 3 + i] += 1.0
 
     if noise.constraints > 0.0:
-        v = _body_row(x, cov, work, 1, x[YAW0])
-        rot = work.rot
-        speed = rot[0, 0] * x[V] + rot[1, 0] * x[V + 1] + rot[2, 0] * x[V + 2]
-        work.h[16] = -speed
+        v, speed = _body_row(x, h, 1, x[YAW0])
+        v -= x[LEVER] * work.rate[2]
+        h[16] = -speed
+        h[19] = -work.rate[2]
         r = (
             noise.lateral_std**2
             + (noise.lateral_slip_std * speed) ** 2
             + (noise.lateral_turn_std * work.rate[2]) ** 2
         )
-        s = _body_product(cov, work) + r * inflate
+        s = _body_product(cov, h, ph) + r * inflate
         s = max(s, v * v / noise.gate)
-        _record(log, node, work, -v, s)
-        _fold(x, cov, work, -v, s)
+        _record(log, node, h, ph, -v, s)
+        _fold(x, cov, ph, -v, s)
 
-        v = _body_row(x, cov, work, 2, x[PITCH0] + x[SQUAT] * x[ACCEL])
-        work.h[15] = -speed
-        work.h[17] = -speed * x[ACCEL]
+        v, speed = _body_row(x, h, 2, x[PITCH0] + x[SQUAT] * x[ACCEL])
+        h[15] = -speed
+        h[17] = -speed * x[ACCEL]
         r = noise.vertical_std**2 + (noise.vertical_slope_std * speed) ** 2
-        s = _body_product(cov, work) + r * inflate
+        s = _body_product(cov, h, ph) + r * inflate
         s = max(s, v * v / noise.gate)
-        _record(log, node, work, -v, s)
-        _fold(x, cov, work, -v, s)
+        _record(log, node, h, ph, -v, s)
+        _fold(x, cov, ph, -v, s)
 
 
 @kernel
@@ -550,9 +565,9 @@ def step(x, cov, work, accel, gyro, dt, is_node, z, noise, log, node):
 
     Parameters
     ----------
-    x : (29,) float64
+    x : (30,) float64
         Nominal state, changed in place.
-    cov : (19, 19) float64
+    cov : (20, 20) float64
         Error covariance, changed in place.
     work : Work
     accel, gyro : (3,) float64
@@ -578,7 +593,6 @@ def step(x, cov, work, accel, gyro, dt, is_node, z, noise, log, node):
             log.count[node] = 0
             log.transition[node] = work.transition
         update(x, cov, work, z, noise, log, node)
-        normalise(x[Q : Q + 4])
         if node < log.count.size:
             log.cov[node] = cov
         work.transition[:] = 0.0
@@ -587,15 +601,15 @@ def step(x, cov, work, accel, gyro, dt, is_node, z, noise, log, node):
 @kernel
 def grade_std(x, cov, work):
     """Return the standard deviation of the grade: pitch less mounting and squat [rad]."""
-    quaternion_to_matrix(x[Q : Q + 4], work.rot)
-    rot = work.rot
-    n = 1.0 / math.sqrt(rot[0, 0] ** 2 + rot[1, 0] ** 2 + 1e-12)
-    h = work.h
-    h[:] = 0.0
+    h, ph = work.h, work.ph
+    (r00, _, _), (r10, _, _), _ = matrix_rows(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+    n = 1.0 / math.sqrt(r00 * r00 + r10 * r10 + 1e-12)
+    for i in range(ERRORS):
+        h[i] = 0.0
     # pitch turns about the horizontal axis to the right of the heading
-    h[6], h[7] = -rot[1, 0] * n, rot[0, 0] * n
+    h[6], h[7] = -r10 * n, r00 * n
     h[15], h[17] = -1.0, -x[ACCEL]
-    return math.sqrt(max(_body_product(cov, work), 0.0))
+    return math.sqrt(max(_body_product(cov, h, ph), 0.0))
 
 
 @kernel
@@ -619,9 +633,9 @@ def run(x, cov, work, time, accel, gyro, rot_bs, nodes, first, last, z, noise, l
     noise : Noise
     log : RowLog
         Of ``last - first`` nodes, or empty.
-    states : (m, 23) float64
+    states : (m, 24) float64
         Filled: first part of the nominal state after each node.
-    stds : (m, 20) float64
+    stds : (m, 21) float64
         Filled: standard deviations after each node; the last is of the grade [rad].
     """
     start = nodes[first - 1] + 1 if first > 0 else 0
@@ -654,10 +668,10 @@ def smooth(log, count, adjoint, states, first):
     log : RowLog
         Of the nodes ``first .. first + count - 1``.
     count : int
-    adjoint : (19,) float64
+    adjoint : (20,) float64
         From the stretch after this one, zero at the end of the drive; changed
         in place, for the stretch before.
-    states : (m, 23) float64
+    states : (m, 24) float64
         Nominal states after each node; corrected in place.
     first : int
     """
@@ -715,6 +729,14 @@ def lowpass_resample(time, values, start, period, count, reach, out, weight):
         Filled: sum of the weights, about samples per output period.
     """
     channels = values.shape[1]
+    fine = 256
+    size = int(reach * fine)
+    window = np.empty(size + 2)
+    for i in range(size + 2):
+        u = i / fine
+        angle = math.pi * 0.8 * u
+        window[i] = math.sin(angle) / angle if i > 0 else 1.0
+        window[i] *= math.cos(0.5 * math.pi * min(u, reach) / reach) ** 2
     out[:] = 0.0
     weight[:] = 0.0
     nearest = np.zeros(count)
@@ -729,9 +751,9 @@ def lowpass_resample(time, values, start, period, count, reach, out, weight):
         high = min(count - 1, math.floor(place + reach))
         for k in range(low, high + 1):
             u = place - k
-            angle = math.pi * 0.8 * u
-            w = 1.0 if abs(angle) < 1e-6 else math.sin(angle) / angle
-            w *= math.cos(0.5 * math.pi * u / reach) ** 2 * share
+            cell = abs(u) * fine
+            at = int(cell)
+            w = share * (window[at] + (cell - at) * (window[at + 1] - window[at]))
             weight[k] += w
             if abs(u) <= 1.0:
                 nearest[k] += 1.0

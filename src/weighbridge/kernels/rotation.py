@@ -17,49 +17,63 @@ from weighbridge.kernels._jit import kernel
 
 
 @kernel
+def matrix_rows(w, x, y, z):
+    """Return the three rows of the rotation matrix of a unit quaternion."""
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+
+
+@kernel
 def quaternion_to_matrix(q, rot):
     """Write the rotation matrix of the unit quaternion ``q`` (4,) into ``rot`` (3, 3)."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    rot[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    rot[0, 1] = 2.0 * (x * y - w * z)
-    rot[0, 2] = 2.0 * (x * z + w * y)
-    rot[1, 0] = 2.0 * (x * y + w * z)
-    rot[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    rot[1, 2] = 2.0 * (y * z - w * x)
-    rot[2, 0] = 2.0 * (x * z - w * y)
-    rot[2, 1] = 2.0 * (y * z + w * x)
-    rot[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    (
+        (rot[0, 0], rot[0, 1], rot[0, 2]),
+        (rot[1, 0], rot[1, 1], rot[1, 2]),
+        (rot[2, 0], rot[2, 1], rot[2, 2]),
+    ) = matrix_rows(q[0], q[1], q[2], q[3])
+
+
+@kernel
+def half_turn(rx, ry, rz):
+    """Return cosine and scaled vector of the quaternion of a rotation vector [rad]."""
+    square = 0.25 * (rx * rx + ry * ry + rz * rz)
+    if square < 2.5e-3:
+        # the series is exact to the last bit here and spares three slow functions
+        c = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
+        s = 0.5 * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0))))
+    else:
+        half = math.sqrt(square)
+        c = math.cos(half)
+        s = 0.5 * math.sin(half) / half
+    return c, s * rx, s * ry, s * rz
+
+
+@kernel
+def product(aw, ax, ay, az, bw, bx, by, bz):
+    """Return the Hamilton product ``a * b`` of two quaternions."""
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
 
 
 @kernel
 def rotate_body(q, rx, ry, rz):
     """Turn ``q`` (4,) in place by a rotation vector in body axes: ``q <- q * exp(r)`` [rad]."""
-    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
-    half = 0.5 * angle
-    # sin(x)/x loses nothing to its series here and divides by zero without it
-    s = 0.5 * (1.0 - half * half / 6.0) if angle < 1e-4 else math.sin(half) / angle
-    c = math.cos(half)
-    rx, ry, rz = s * rx, s * ry, s * rz
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    q[0] = w * c - x * rx - y * ry - z * rz
-    q[1] = w * rx + x * c + y * rz - z * ry
-    q[2] = w * ry - x * rz + y * c + z * rx
-    q[3] = w * rz + x * ry - y * rx + z * c
+    c, x, y, z = half_turn(rx, ry, rz)
+    q[0], q[1], q[2], q[3] = product(q[0], q[1], q[2], q[3], c, x, y, z)
 
 
 @kernel
 def rotate_navigation(q, rx, ry, rz):
     """Turn ``q`` (4,) in place by a rotation vector in navigation axes: ``q <- exp(r) * q``."""
-    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
-    half = 0.5 * angle
-    s = 0.5 * (1.0 - half * half / 6.0) if angle < 1e-4 else math.sin(half) / angle
-    c = math.cos(half)
-    rx, ry, rz = s * rx, s * ry, s * rz
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    q[0] = c * w - rx * x - ry * y - rz * z
-    q[1] = c * x + rx * w + ry * z - rz * y
-    q[2] = c * y - rx * z + ry * w + rz * x
-    q[3] = c * z + rx * y - ry * x + rz * w
+    c, x, y, z = half_turn(rx, ry, rz)
+    q[0], q[1], q[2], q[3] = product(c, x, y, z, q[0], q[1], q[2], q[3])
 
 
 @kernel

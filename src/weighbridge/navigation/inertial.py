@@ -15,6 +15,7 @@ from weighbridge.kernels.ins import (
     BG,
     ERRORS,
     LAST,
+    LEVER,
     PITCH0,
     SCALE,
     SHOWN,
@@ -74,8 +75,8 @@ class _Start:
 
     Attributes
     ----------
-    x : (29,) nominal state
-    cov : (19, 19)
+    x : (30,) nominal state
+    cov : (20, 20)
     """
 
     x: Floats
@@ -89,10 +90,10 @@ class Solution:
     Attributes
     ----------
     time : (m,) [s]
-    states : (m, 23) see `weighbridge.kernels.ins`
-    stds : (m, 20) standard deviations of the forward pass
-    last : (29,) nominal state at the end of the forward pass
-    last_cov : (19, 19) its covariance
+    states : (m, 24) see `weighbridge.kernels.ins`
+    stds : (m, 21) standard deviations of the forward pass
+    last : (30,) nominal state at the end of the forward pass
+    last_cov : (20, 20) its covariance
     """
 
     time: Floats
@@ -278,6 +279,7 @@ def _begin(
     std[15] = math.hypot(tilt_std, settings.mounting_std if mounting is None else 0.0)
     std[16] = math.hypot(yaw_std, settings.mounting_std if mounting is None else 0.0)
     std[18] = settings.speed_scale_std if free_scale else 1e-6
+    x[LEVER], std[19] = settings.lever, settings.lever_std
 
     # gyro bias: from rest; else pitch and roll come back to where they were
     # and the yaw rate follows from lateral force
@@ -370,7 +372,7 @@ def _restart(rot_bs: Floats, begin: _Start, found: Solution) -> tuple[Floats, _S
     end = found.last
     # direction of travel in body axes is (1, yaw0, pitch0)
     turn = euler_to_matrix(0.0, float(end[PITCH0]), -float(end[YAW0]))
-    x[SQUAT], x[SCALE] = end[SQUAT], end[SCALE]
+    x[SQUAT], x[SCALE], x[LEVER] = end[SQUAT], end[SCALE], end[LEVER]
     x[BG : BG + 3] = turn @ end[BG : BG + 3]
     x[BA : BA + 3] = turn @ end[BA : BA + 3]
     rotate_body(x[Q : Q + 4], 0.0, -float(end[PITCH0]), float(end[YAW0]))

@@ -35,6 +35,7 @@ class NavigationSettings:
     speed_slip_std : further, per speed [-]
     lateral_std, lateral_slip_std, lateral_turn_std : error of the lateral
         constraint: constant [m/s], per speed [-], per yaw rate [m]
+    lever, lever_std : the sensor ahead of the rear axle before the drive [m]
     vertical_std, vertical_slope_std : error of the vertical constraint:
         heave [m/s], per speed [-]
     constraint_time : correlation time of constraint and wheel speed errors [s]
@@ -64,7 +65,9 @@ class NavigationSettings:
     speed_slip_std: float = 0.003
     lateral_std: float = 0.1
     lateral_slip_std: float = 0.01
-    lateral_turn_std: float = 2.0
+    lateral_turn_std: float = 0.5
+    lever: float = 1.0
+    lever_std: float = 1.5
     vertical_std: float = 0.08
     vertical_slope_std: float = 0.004
     constraint_time: float = 0.3
