@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 GEAR_COLOURS = (BLUE, ORANGE, "#009e73", "#b0679b", VERMILLION, "#56b4e9", "#b3a24d", "#6b7a99")
 
+RATIO_TICKS = (3, 4, 5, 6, 8, 10, 14, 20, 30, 40, 60, 80, 100, 140)
+
 
 def calibration_panels(calibration: Calibration) -> list[Panel]:
     """Return all figures of a calibration, in the order to show them."""
@@ -43,7 +45,7 @@ def ratio_panel(calibration: Calibration) -> Panel:
         "Engine angle per distance [rad/m]",
         "Samples within 2 %",
         xaxis_type="log",
-        xaxis_dtick="D1",
+        xaxis_tickvals=RATIO_TICKS,
     )
     shown = np.flatnonzero(gears.density > 0)
     part = slice(shown[0], shown[-1] + 1) if shown.size else slice(None)
@@ -110,7 +112,7 @@ def gear_panel(calibration: Calibration) -> Panel:
             showlegend=False,
         )
     return Panel(
-        title="Every sample in gear lies on the line of its gear",
+        title="Samples in gear should lie on the line of their gear",
         caption="Marks off the lines are shifts, the slipping clutch and idling.",
         figure=figure,
     )
@@ -136,13 +138,19 @@ def torque_panels(calibration: Calibration) -> list[Panel]:
             labels[kind],
             source,
             motion,
-            "The fit follows the torque over its source",
+            "The fit should follow the torque over its source",
         )
     ]
     if calibration.fit.coefficients.size > 2:
         rpm = from_si(design[:, 2], "rpm")
         panels.append(
-            _both(rpm, "Engine speed [rpm]", source, motion, "The fit holds at every engine speed")
+            _both(
+                rpm,
+                "Engine speed [rpm]",
+                source,
+                motion,
+                "The fit should hold at every engine speed",
+            )
         )
     else:
         panels.append(
@@ -164,7 +172,7 @@ def agreement_panel(calibration: Calibration) -> Panel:
     line(figure, [low, high], [low, high], "equal", VERMILLION)
     fit = calibration.fit
     return Panel(
-        title=f"Both torques agree with R² = {fit.r_squared:.3f}",
+        title=f"Torque from the source against torque from the motion: R² = {fit.r_squared:.3f}",
         caption=f"Robust standard deviation of the difference: {fit.residual_std:.1f} N m over "
         f"{source.size} samples.",
         figure=figure,
@@ -177,13 +185,13 @@ def sequence_panel(calibration: Calibration) -> Panel:
     number = np.arange(source.size, dtype=np.float64)
     figure = blank("Usable samples, in the order driven [-]", "Torque [N m]", height=420)
     for values, name, colour, width in (
-        (motion, "from the motion", GREY, 1.0),
+        (motion, "from the motion", GREY, 2.4),
         (source, "from the source", BLUE, 1.2),
     ):
         x, y = thin_line(number, values)
         line(figure, x, y, name, colour, line_width=width)
     return Panel(
-        title="The torque from the source follows the torque that the motion needs",
+        title="The torque from the source should follow the torque that the motion needs",
         caption="Only the samples of the fit are shown, put after one another; zoom in to "
         "compare single accelerations.",
         figure=figure,
@@ -215,7 +223,9 @@ def calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
         facts.append((name, f"{value:.{digits}f} {unit} ({spread_text})".replace("  ", " ")))
     scale = calibration.vehicle.provenance.mass_scale_std
     if scale is not None and np.isfinite(scale):
-        facts.append(("left in every mass", f"± {100.0 * scale:.1f} % (one standard deviation)"))
+        facts.append(
+            ("uncertainty left in every mass", f"± {100.0 * scale:.1f} % (one standard deviation)")
+        )
     return facts
 
 

@@ -17,6 +17,7 @@ from weighbridge.report.style import (
     GREEN,
     GREY,
     ORANGE,
+    PURPLE,
     REASON_STYLE,
     VERMILLION,
     Panel,
@@ -45,16 +46,17 @@ def drive_panels(weighing: Weighing, truth: float | None) -> list[Panel]:
             fit_panel(weighing),
             residual_panel(weighing, weighing.result),
             share_panel(weighing.result),
-            grade_panel(weighing.result),
-            pitch_panel(weighing, weighing.result),
         ]
-    return [*panels, map_panel(weighing)]
+    panels.append(map_panel(weighing))
+    if weighing.result is not None:
+        panels += [grade_panel(weighing.result), pitch_panel(weighing, weighing.result)]
+    return panels
 
 
 def mass_panel(weighing: Weighing, truth: float | None) -> Panel:
     """Mass with its band over time."""
     result = weighing.result
-    if result is None or not result.used.any():
+    if result is None or not (result.used & np.isfinite(result.running_mass)).any():
         return Panel(
             title="Mass over time",
             absent="no mass over time, for not one sample could be used.",
@@ -71,6 +73,11 @@ def mass_panel(weighing: Weighing, truth: float | None) -> Panel:
         fill="tonexty", fillcolor=BAND, hoverinfo="skip", line_width=0,
     )  # fmt: skip
     line(figure, x, running, "running mass", BLUE)
+    legs = [s for s in result.segments if np.isfinite(s.mass)]
+    if len(legs) > 1:
+        edges = np.array([[s.start, s.end, np.nan] for s in legs]).ravel()
+        levels = np.array([[s.mass, s.mass, np.nan] for s in legs]).ravel()
+        line(figure, _minutes(weighing, edges), levels, "mass between stops", PURPLE)
     ends = np.array([time[0], time[-1]], dtype=np.float32)
     converged = weighing.status is Status.CONVERGED
     marks = [truth] if truth is not None else []
@@ -91,10 +98,10 @@ def mass_panel(weighing: Weighing, truth: float | None) -> Panel:
         )
     figure.update_layout(yaxis_range=_mass_range(mass, half, result.used, marks))
     if converged:
-        title = f"The mass settles at {weighing.mass:.0f} kg"
+        title = f"The final mass, {weighing.mass:.0f} kg, and what was known on the way"
         caption = (
-            "The running mass is what was known at each moment; the final mass is made from "
-            "the whole drive."
+            "The running mass is what was known at each moment and forgets the far past; the "
+            "final mass is made from the whole drive."
         )
     else:
         title = "The running mass, which ended in no result"
@@ -157,14 +164,18 @@ def fit_panel(weighing: Weighing) -> Panel:
     if result is None or not result.used.any():
         return Panel(title=title, absent="no force over specific force: not one sample was used.")
     phi, y = regression(result.balance.merged, weighing.vehicle)
-    index = spread(result.used)
+    index = spread(result.used & np.isfinite(phi) & np.isfinite(y))
     figure = blank("Specific force with rolling resistance [m/s²]", "Force on the mass [N]")
     dots(figure, single(phi[index]), single(y[index]), "used samples", BLUE)
-    ends = np.array([0.0, float(np.max(phi[result.used]))])
+    ends = np.array([0.0, float(np.nanmax(phi[result.used]))])
     name = f"{result.mass:.0f} kg"
+    title = f"The slope of force over specific force is the mass: {name}"
+    if weighing.status is not Status.CONVERGED:
+        name = f"least squares, {name}, no result"
+        title = "Force over specific force lies on no line that could be trusted"
     line(figure, ends, ends * result.mass, name, VERMILLION)
     return Panel(
-        title=f"The slope of force over specific force is the mass: {name}",
+        title=title,
         caption="Traction less air drag and what the rotating parts take; the closer the marks "
         "lie to the line and the further it reaches, the surer the mass.",
         figure=figure,
@@ -206,7 +217,7 @@ def share_panel(result: MassTrack) -> Panel:
     """Share of samples by reason."""
     counts = np.bincount(result.reason, minlength=len(Reason))
     present = sorted((r for r in Reason if counts[r]), key=lambda r: int(counts[r]))
-    figure = blank("Share of all samples [%]", "", height=max(240, 90 + 30 * len(present)))
+    figure = blank("Share of all samples [%]", "", height=460)
     shares = [100.0 * float(counts[r]) / result.reason.size for r in present]
     figure.add_bar(
         x=shares,
@@ -268,6 +279,7 @@ def grade_panel(result: MassTrack) -> Panel:
             else ""
         ),
         figure=figure,
+        wide=True,
     )
 
 
@@ -291,7 +303,6 @@ def pitch_panel(weighing: Weighing, result: MassTrack) -> Panel:
         xaxis_anchor="y2",
         yaxis_domain=[0.62, 1.0],
         yaxis2={**AXIS, "domain": [0.0, 0.54], "anchor": "x", "title": {"text": "Angle [deg]"}},
-        legend_y=-0.17,
     )
     x, height = thin_line(distance[known], altitude[known])
     line(figure, x, height, "altitude", GREY)
@@ -305,9 +316,9 @@ def pitch_panel(weighing: Weighing, result: MassTrack) -> Panel:
     if along.size:
         x, slope_deg = thin_line(from_si(along, "km"), from_si(slope, "deg"))
         name = f"slope of the altitude over {SLOPE_BASE:.0f} m"
-        line(figure, x, slope_deg, name, VERMILLION, yaxis="y2", line_width=1.4)
+        line(figure, x, slope_deg, name, GREEN, yaxis="y2", line_width=1.4)
     return Panel(
-        title="Pitch and grade follow the hills",
+        title="Pitch and grade should follow the hills",
         caption="Where the altitude climbs, pitch and grade should be positive and near the "
         "slope of the altitude.",
         figure=figure,
@@ -326,7 +337,7 @@ def map_panel(weighing: Weighing) -> Panel:
     east, north, _ = pymap3d.geodetic2enu(latitude, longitude, 0.0, *middle, 0.0, deg=False)
     index = spread(np.ones(latitude.size, dtype=bool))
     x, y = single(east[index]), single(north[index])
-    figure = blank("East [m]", "North [m]", height=560)
+    figure = blank("East [m]", "North [m]", height=460)
     figure.add_scatter(
         x=x, y=y, mode="lines", line={"color": GREY, "width": 1}, showlegend=False,
         hoverinfo="skip",
@@ -349,12 +360,11 @@ def map_panel(weighing: Weighing) -> Panel:
             x=[float(x[k])], y=[float(y[k])], mode="markers", name=name,
             marker={"size": 12, "color": colour, "symbol": symbol},
         )  # fmt: skip
-    figure.update_layout(yaxis_scaleanchor="x", yaxis_scaleratio=1, legend_y=-0.15)
+    figure.update_layout(yaxis_scaleanchor="x", yaxis_constrain="domain", xaxis_constrain="domain")
     return Panel(
         title="Where the drive went, and how fast",
         caption="Metres east and north of the middle of the drive, to one scale.",
         figure=figure,
-        wide=True,
     )
 
 

@@ -209,8 +209,9 @@ def _answer(weighing: Weighing, known: float | None) -> str:
 
 def _facts(weighing: Weighing, known: float | None) -> str:
     result = weighing.result
+    unladen = weighing.vehicle.tare
     facts = [
-        ("payload", _signed_kg(weighing.payload)),
+        ("payload", "unknown without a tare" if unladen is None else _signed_kg(weighing.payload)),
         ("status", STATUS_TEXT[weighing.status]),
         ("vehicle", weighing.vehicle.name),
         ("drive", weighing.drive.name),
@@ -218,8 +219,8 @@ def _facts(weighing: Weighing, known: float | None) -> str:
         ("duration", _time(weighing.drive.duration)),
         ("used", _time(weighing.used_time)),
     ]
-    if weighing.vehicle.tare is not None:
-        facts.insert(1, ("tare", _kg(weighing.vehicle.tare)))
+    if unladen is not None:
+        facts.insert(1, ("tare", _kg(unladen)))
     if known is not None:
         facts.insert(1, ("true mass", _kg(known)))
     if result is not None and _found(weighing):
@@ -244,7 +245,7 @@ def _segments(weighing: Weighing) -> str:
     ]
     heads = [("from", "n"), ("to", "n"), ("mass ± standard deviation", "n")]
     caption = "Mass between longer stops, where load can change"
-    return _table(caption, heads, rows)
+    return f"<details><summary>{caption} ({len(rows)})</summary>{_table('', heads, rows)}</details>"
 
 
 def _calibration(page: Page, calibration: Calibration, *, opened: bool) -> str:
@@ -269,7 +270,7 @@ def _table(
     head = "".join(cell("th", text, kind) for text, kind in heads)
     body = "".join(f"<tr>{''.join(cell('td', t, k) for t, k in row)}</tr>" for row in rows)
     return (
-        f'<div class="scroll"><table><caption>{escape(caption)}</caption>'
+        f'<div class="scroll"><table>{f"<caption>{escape(caption)}</caption>" if caption else ""}'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
 

@@ -26,6 +26,7 @@ AXIS: Final = {
     "showline": True,
     "ticks": "outside",
     "automargin": True,
+    "exponentformat": "none",
 }
 """Every axis, on light and on dark paper."""
 
@@ -80,8 +81,8 @@ def blank(x: str, y: str, *, height: int = 380, **layout: Any) -> go.Figure:
             "font": {"family": "system-ui, sans-serif", "size": 13, "color": "#444"},
             "legend": {
                 "orientation": "h",
-                "y": -0.22,
-                "yanchor": "top",
+                "y": 1.02,
+                "yanchor": "bottom",
                 "x": 0,
                 "itemsizing": "constant",
             },

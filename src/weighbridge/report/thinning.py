@@ -10,10 +10,10 @@ from tsdownsample import MinMaxLTTBDownsampler
 
 from weighbridge.signals import Bools, Floats, Ints
 
-LINE_POINTS = 3000
+LINE_POINTS = 2400
 """Points kept of a line: more than a screen has columns."""
 
-SCATTER_POINTS = 3000
+SCATTER_POINTS = 2000
 """Points kept of a scatter."""
 
 Thinned = NDArray[np.float32]
@@ -49,7 +49,7 @@ def thin_line(x: Floats, *ys: Floats, points: int = LINE_POINTS) -> tuple[Thinne
     breaks = np.flatnonzero(np.diff(missing[index])) + 1 if index.size else index
     thinned = [np.insert(x[index], breaks, x[index][breaks])]
     thinned += [np.insert(y[index], breaks, np.nan) for y in ys]
-    return tuple(values.astype(np.float32) for values in thinned)
+    return tuple(single(values) for values in thinned)
 
 
 def spread(rows: Bools, points: int = SCATTER_POINTS) -> Ints:
@@ -62,4 +62,5 @@ def spread(rows: Bools, points: int = SCATTER_POINTS) -> Ints:
 
 def single(values: Floats) -> Thinned:
     """Return the values in single precision: half the page, and no eye sees it."""
-    return values.astype(np.float32)
+    with np.errstate(over="ignore"):
+        return values.astype(np.float32)
