@@ -1,0 +1,475 @@
+"""The report page: what it says, and that it needs nothing from outside."""
+
+import base64
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from weighbridge.balance import ForceBalance, ForceSide, MergedView, Reason
+from weighbridge.calibration.regression import BOUNDS, build_rows, fit
+from weighbridge.errors import ConfigError
+from weighbridge.estimators import MassTrack, Segment, Status
+from weighbridge.navigation.motion import Motion
+from weighbridge.pipeline.calibrating import Calibration
+from weighbridge.pipeline.weighing import Weighing
+from weighbridge.report import mass_figure, write_report
+from weighbridge.report.page import Page
+from weighbridge.report.style import Panel, blank
+from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.gear import detect_gearings
+from weighbridge.vehicle.model import Driveline, RoadLoad, Vehicle
+
+MASS = 1500.0
+GEARINGS = (40.0, 25.0, 16.0)
+VEHICLE = Vehicle(
+    name="test car",
+    tare=1400.0,
+    driveline=Driveline(gearings=GEARINGS, wheel_inertia=4.0, engine_inertia=0.1),
+    road_load=RoadLoad(drag_area=0.6, rolling_coefficient=0.01),
+)
+
+
+class Elements(HTMLParser):
+    """Start tags with their attributes, visible text, and whether tags match."""
+
+    VOID = frozenset({"meta", "link", "br"})
+
+    def __init__(self, html):
+        super().__init__()
+        self.tags, self.open, self.text, self.matched = [], [], "", True
+        self.feed(html)
+        self.matched &= not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        self.matched &= bool(self.open) and self.open.pop() == tag
+
+    def handle_data(self, data):
+        if not self.open or self.open[-1] not in ("script", "style"):
+            self.text += data
+
+    def attributes(self, name):
+        return [attrs[name] for _, attrs in self.tags if name in attrs]
+
+
+def make_weighing(
+    name="first drive", *, status=Status.CONVERGED, why="", altitude=True, gnss=True, hours=0.5
+):
+    rng = np.random.default_rng(3)
+    time = 50.0 + np.arange(0.0, 3600.0 * hours, 0.2)
+    n = time.size
+    speed = 12.0 - 12.0 * np.cos(2.0 * np.pi * (time - 50.0) / 120.0)
+    accel = np.gradient(speed, time)
+    distance = np.cumsum(speed) * 0.2
+    grade = 0.03 * np.sin(distance / 800.0)
+    nowhere = np.full(n, np.nan)
+    motion = Motion(
+        source="inertial",
+        time=time,
+        speed=speed,
+        accel=accel,
+        specific_force=accel + 9.81 * np.sin(grade),
+        grade=grade,
+        pitch=grade + 0.003 * accel,
+        roll=np.zeros(n),
+        heading=nowhere,
+        distance=distance,
+        altitude=20.0 - 24.0 * np.cos(distance / 800.0) if altitude else nowhere,
+        latitude=0.97 + distance / 6.4e6 if gnss else nowhere,
+        longitude=0.2 + 0.0 * distance if gnss else nowhere,
+        valid=np.ones(n, dtype=bool),
+        specific_force_std=0.05,
+        grade_std=np.full(n, 0.004),
+        squat=0.003,
+    )
+    gear = np.clip(1 + (speed / 6.0).astype(np.int64), 1, 3)
+    gearing = np.array(GEARINGS)[gear - 1]
+    line = VEHICLE.driveline
+    rotating = line.wheel_inertia / line.wheel_radius**2 + line.engine_inertia * gearing**2
+    drag = 0.5 * 1.2 * VEHICLE.road_load.drag_area * speed**2
+    noise = rng.normal(scale=60.0, size=n)
+    weight = motion.specific_force + 9.81 * 0.01 * np.cos(grade)
+    traction = MASS * weight + drag + rotating * accel + noise
+    reason = np.where(accel > 0.0, Reason.USED, Reason.NOT_ACCELERATING).astype(np.uint8)
+    reason[speed < 1.5] = Reason.STANDING
+    reason[1003] = Reason.BAD_FIT
+    merged = MergedView(
+        time=time,
+        traction_force=traction,
+        speed=speed,
+        accel=accel,
+        specific_force=motion.specific_force,
+        grade=grade,
+        pitch=motion.pitch,
+        heading=nowhere,
+        gear=gear,
+        gearing=gearing,
+        rotating_mass=rotating,
+        drag_force=drag,
+        air_density=np.full(n, 1.2),
+        reason=reason,
+    )
+    force = ForceSide(
+        time=time,
+        traction_force=traction,
+        torque=traction / gearing,
+        engine_speed=gearing * speed,
+        gear=gear,
+        gearing=gearing,
+        reason=reason,
+        delay=0.0,
+        noise_std=60.0,
+    )
+    result = MassTrack(
+        method="rls",
+        balance=ForceBalance(force=force, motion=motion, merged=merged),
+        running_mass=MASS + 300.0 * np.exp(-(time - 50.0) / 100.0),
+        running_std=np.full(n, 12.0),
+        residual=np.where(reason == Reason.USED, noise, np.nan),
+        reason=reason,
+        mass=MASS,
+        std=10.0,
+        degrees_of_freedom=20.0,
+        bound_std=2.0,
+        converged_at=200.0,
+        status=status,
+        why=why,
+        segments=(
+            Segment(start=50.0, end=500.0, mass=1490.0, std=20.0),
+            Segment(start=500.0, end=1800.0, mass=float("nan"), std=float("nan")),
+        ),
+    )
+    return Weighing(
+        drive=Drive(name, {"vehicle_speed": Signal("vehicle_speed", time, speed)}),
+        vehicle=VEHICLE,
+        method="rls",
+        status=status,
+        reason=why,
+        result=result,
+        warnings=("the torque delay was found from this drive",),
+    )
+
+
+def make_calibration(weighing):
+    balance = weighing.result.balance
+    view = balance.merged
+    rng = np.random.default_rng(4)
+    # 210 Nm at full load, less friction that grows with speed.
+    torque = balance.force.torque + rng.normal(scale=2.0, size=view.time.size)
+    load = (torque + 10.0 + 0.02 * balance.force.engine_speed) / 210.0
+    rows = build_rows(
+        view,
+        load,
+        balance.force.engine_speed,
+        mass=MASS,
+        wheel_radius=VEHICLE.driveline.wheel_radius,
+        order=1,
+        rows=view.usable,
+    )
+    return Calibration(
+        vehicle=VEHICLE,
+        gears=detect_gearings(view.time, balance.force.engine_speed, view.speed, idle_speed=0.0),
+        balances=(balance,),
+        fit=fit(rows, *BOUNDS["car"]),
+        rows=rows,
+    )
+
+
+def written(tmp_path, weighings, **options):
+    path = tmp_path / "report.html"
+    write_report(weighings, path, **options)
+    return path.read_text(encoding="utf-8")
+
+
+def figures(html):
+    found = re.search(r'<script type="application/json" id="figures">(.*?)</script>', html, re.S)
+    return json.loads(found.group(1))
+
+
+def numbers(array):
+    if isinstance(array, dict):
+        return np.frombuffer(base64.b64decode(array["bdata"]), dtype=array["dtype"])
+    return np.asarray(array, dtype=np.float64)
+
+
+def titles(html):
+    return re.findall(r"<h3>([^<]*)</h3><div class=\"plot\"", html)
+
+
+def test_page_answers_first(tmp_path):
+    weighing = make_weighing()
+    page = Elements(written(tmp_path, [weighing]))
+    half = 0.5 * np.diff(weighing.interval(0.95))[0]
+    answer = f"1500 ± {half:.0f} kg"
+    assert answer in page.text
+    assert page.text.index(answer) < page.text.index("payload")
+    for said in ("+100 kg", "test car", "rls", "30.0 min", "The torque delay was found"):
+        assert said in page.text
+    assert page.matched
+
+
+def test_page_asks_no_network_for_anything(tmp_path):
+    weighing = make_weighing()
+    html = written(tmp_path, [weighing], calibration=make_calibration(weighing))
+    page = Elements(html)
+    assert page.attributes("href") == ["data:,"]
+    assert page.attributes("src") == []
+    styles = re.findall(r"<style>(.*?)</style>", html, re.S)
+    assert len(styles) == 1
+    assert "@import" not in styles[0]
+    assert "url(" not in styles[0]
+    # Figures that would fetch tiles or outlines of countries.
+    kinds = {trace["type"] for figure in figures(html).values() for trace in figure["data"]}
+    assert kinds <= {"scatter", "bar"}
+
+
+def test_names_are_escaped_everywhere(tmp_path):
+    evil = "</script><script>alert(1)</script><b>&\"'"
+    weighing = make_weighing(evil)
+    weighing = replace(
+        weighing,
+        vehicle=replace(VEHICLE, name=evil),
+        warnings=(evil,),
+        status=Status.NOT_EXCITED,
+        reason=evil,
+    )
+    plain = Elements(written(tmp_path, [make_weighing()] * 2))
+    page = Elements(written(tmp_path, [weighing] * 2, title=evil))
+    assert [t for t, _ in page.tags if t in ("script", "b")] == [
+        t for t, _ in plain.tags if t in ("script", "b")
+    ]
+    assert "<script>alert(1)</script><b>&\"'" in page.text
+    assert page.matched
+
+
+def test_figure_data_cannot_end_their_script():
+    figure = blank("x [m]", "y [m]")
+    figure.add_scatter(x=[0.0], y=[0.0], name="</script><script>")
+    page = Page()
+    page.place([Panel(title="t", figure=figure)])
+    assert "<" not in page.data()
+    assert json.loads(page.data())["figure-1"]["data"][0]["name"] == "</script><script>"
+
+
+def test_several_drives_are_compared_in_a_table(tmp_path):
+    known = replace(make_weighing("known"), vehicle=replace(VEHICLE, tare=None))
+    poor = make_weighing("poor", status=Status.NOT_EXCITED, why="only 3 usable samples")
+    html = written(tmp_path, [make_weighing("plain"), known, poor], truth={"known": 1470.0})
+    cells = re.findall(r"<tr>(.*?)</tr>", html)
+    rows = [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row) for row in cells[:4]]
+    low, high = known.interval(0.95)
+    interval = f"{low:.0f} to {high:.0f} kg"
+    assert rows[1] == ["plain", "1500 kg", interval, "+100 kg", "–", "–", "mass found"]
+    assert rows[2] == ["known", "1500 kg", interval, "–", "1470 kg", "+2.0 %", "mass found"]
+    assert rows[3][:6] == ["poor", "–", "–", "–", "–", "–"]
+    assert "only 3 usable samples" in rows[3][6]
+    page = Elements(html)
+    sections = [attrs for tag, attrs in page.tags if tag == "details"]
+    assert sum("open" in attrs for attrs in sections) == 1
+    keys = page.attributes("id")
+    assert len(keys) == len(set(keys)) == len(figures(html)) + 1
+
+
+def test_known_mass_of_the_drive_serves_as_truth(tmp_path):
+    weighing = make_weighing()
+    drive = replace(weighing.drive, info=replace(weighing.drive.info, mass=1600.0))
+    page = Elements(written(tmp_path, [replace(weighing, drive=drive)]))
+    assert "−6.2 % off" in page.text
+
+
+@pytest.mark.parametrize("status", [Status.NOT_EXCITED, Status.INCONSISTENT])
+def test_page_without_mass_says_why_and_names_none(tmp_path, status):
+    page_html = written(tmp_path, [make_weighing(status=status, why="the road was too flat")])
+    page = Elements(page_html)
+    assert "The road was too flat." in page.text
+    assert "1500 ±" not in page.text
+    mass = figures(page_html)["figure-1"]
+    assert not any("final" in trace.get("name", "") for trace in mass["data"])
+    assert "no result" in titles(page_html)[0]
+
+
+def test_page_of_a_drive_that_lacks_signals(tmp_path):
+    weighing = replace(
+        make_weighing(), status=Status.MISSING_SIGNALS, reason="no engine_load", result=None
+    )
+    html = written(tmp_path, [weighing])
+    page = Elements(html)
+    assert "No engine_load." in page.text
+    assert titles(html) == ["Speed as recorded"]
+    assert "Left out: No mass over time" in page.text
+    with pytest.raises(ConfigError, match="first drive: no mass over time"):
+        mass_figure(weighing)
+
+
+def test_missing_altitude_and_position_leave_a_sentence(tmp_path):
+    full = written(tmp_path, [make_weighing()])
+    bare = written(tmp_path, [make_weighing(altitude=False, gnss=False)])
+    lost = {"Pitch and grade should follow the hills", "Where the drive went, and how fast"}
+    assert set(titles(full)) - set(titles(bare)) == lost
+    assert "Left out" not in Elements(full).text
+    said = Elements(bare).text
+    assert "No map: no position is known" in said
+    assert "No pitch against altitude: no altitude is known" in said
+
+
+def test_recorded_fixes_serve_where_the_motion_has_no_position(tmp_path):
+    weighing = make_weighing(gnss=False)
+    time = np.arange(60.0, 300.0)
+    # A metre of latitude is 1/M, with M the meridian radius of WGS 84.
+    step = 7.0 / (6378137.0 * (1 - 0.00669438) / (1 - 0.00669438 * np.sin(0.9) ** 2) ** 1.5)
+    drive = weighing.drive.with_signals(
+        Signal("latitude", time, 0.9 + step * np.arange(time.size)),
+        Signal("longitude", time, np.full(time.size, 0.1)),
+    )
+    html = written(tmp_path, [replace(weighing, drive=drive)])
+    place = 1 + titles(html).index("Where the drive went, and how fast")
+    figure = figures(html)[f"figure-{place}"]
+    north = numbers(figure["data"][0]["y"])
+    assert_allclose(north[-1] - north[0], 7.0 * (time.size - 1), rtol=1e-4)
+    assert figure["layout"]["yaxis"]["scaleanchor"] == "x"
+
+
+def test_legend_counts_every_sample(tmp_path):
+    weighing = make_weighing(hours=2.0)
+    html = written(tmp_path, [weighing])
+    speed = figures(html)["figure-2"]
+    told = dict(re.findall(r"^(.*) \((\d+)\)$", t["name"])[0] for t in speed["data"][1:])
+    reason = weighing.result.reason
+    assert sum(int(count) for count in told.values()) == reason.size
+    assert int(told["used"]) == np.count_nonzero(reason == Reason.USED)
+    assert told["bad fit"] == "1"
+    rare = next(t for t in speed["data"] if t["name"] == "bad fit (1)")
+    kmh = 3.6 * weighing.result.balance.merged.speed[1003]
+    assert_allclose(numbers(rare["y"]), [kmh], rtol=1e-6)
+
+
+def test_every_figure_has_title_units_and_caption(tmp_path):
+    weighing = make_weighing()
+    html = written(tmp_path, [weighing], calibration=make_calibration(weighing))
+    drawn = figures(html)
+    assert len(titles(html)) == len(drawn) == 14
+    assert len(re.findall(r"<figcaption>[^<]+\.</figcaption>", html)) == len(drawn)
+    for figure in drawn.values():
+        axes = [v for k, v in figure["layout"].items() if re.fullmatch(r"[xy]axis\d?", k)]
+        named = [axis["title"]["text"] for axis in axes]
+        assert all(
+            re.search(r"\[.+\]$", text) or text in ("", "Samples within 2 %") for text in named
+        )
+
+
+def test_calibration_shows_the_gears_found(tmp_path):
+    weighing = make_weighing()
+    calibration = make_calibration(weighing)
+    html = written(tmp_path, [], calibration=calibration)
+    assert "3 gears stand out" in Elements(html).text
+    histogram = figures(html)["figure-1"]["layout"]
+    marks = sorted(shape["x0"] for shape in histogram["shapes"])
+    assert_allclose(marks, sorted(GEARINGS), rtol=1e-3)
+    r_squared = re.search(r"R² = (0\.\d+)", html).group(1)
+    assert float(r_squared) == pytest.approx(calibration.fit.r_squared, abs=5e-4)
+
+
+def test_calibration_without_gears_or_engine_speed_leaves_sentences(tmp_path):
+    calibration = make_calibration(make_weighing())
+    view, force = calibration.balances[0].merged, calibration.balances[0].force
+    rows = build_rows(
+        view,
+        force.torque,
+        force.engine_speed,
+        mass=MASS,
+        wheel_radius=VEHICLE.driveline.wheel_radius,
+        order=0,
+        rows=view.usable,
+    )
+    calibration = replace(calibration, gears=None, rows=rows, fit=fit(rows, *BOUNDS["car"]))
+    page = Elements(written(tmp_path, [], calibration=calibration))
+    assert "No distribution of gear ratios: they were given" in page.text
+    assert "No torque over engine speed" in page.text
+
+
+def test_long_drive_stays_small(tmp_path):
+    from plotly.offline import get_plotlyjs
+
+    html = written(tmp_path, [make_weighing(hours=1.25)])
+    assert html.count(get_plotlyjs()) == 1
+    assert len(html.encode()) < 6_000_000
+    twice = written(tmp_path, [make_weighing(hours=1.25), make_weighing(hours=4.0)])
+    assert html.count("Plotly.newPlot(place") == twice.count("Plotly.newPlot(place") == 1
+    assert len(twice) < len(html) + 600_000
+
+
+def test_nothing_to_report_and_nowhere_to_write_are_said(tmp_path):
+    with pytest.raises(ConfigError, match="no weighing and no calibration"):
+        write_report([], tmp_path / "report.html")
+    with pytest.raises(ConfigError, match="cannot be written"):
+        write_report([make_weighing()], tmp_path / "no folder" / "report.html")
+
+
+def test_mass_figure_draws_the_answer():
+    weighing = make_weighing()
+    figure = mass_figure(weighing, truth=1520.0)
+    traces = {trace.name: trace for trace in figure.data}
+    assert_allclose(traces["final mass 1500 kg"].y, MASS)
+    assert_allclose(traces["true mass 1520 kg"].y, 1520.0)
+    running = traces["running mass"]
+    first = np.argmax(weighing.result.used)
+    assert_allclose(running.x[0], (weighing.result.time[first] - 50.0) / 60.0, rtol=1e-5)
+    assert_allclose(running.y[0], weighing.result.running_mass[first], rtol=1e-6)
+    low, high = figure.layout.yaxis.range
+    assert low < 0.95 * MASS < 1.05 * MASS < high
+    assert "1500 kg" in figure.layout.title.text
+
+
+def test_thinning_keeps_extremes_ends_and_gaps():
+    rng = np.random.default_rng(5)
+    x = np.linspace(0.0, 100.0, 200_000)
+    y = rng.normal(size=x.size)
+    y[123_456], y[23_456] = 50.0, -40.0
+    y[80_000:90_000] = np.nan
+    thin_x, thin_y, other = thin_line(x, y, 2.0 * y)
+    assert thin_x.size <= LINE_POINTS + 2
+    assert thin_x[0] == 0.0
+    assert thin_x[-1] == 100.0
+    assert np.nanmax(thin_y) == 50.0
+    assert np.nanmin(thin_y) == -40.0
+    assert_array_equal(other, 2.0 * thin_y)
+    gap = np.flatnonzero(np.isnan(thin_y))
+    assert gap.size == 1
+    assert x[79_000] < thin_x[gap[0] - 1] <= thin_x[gap[0]] <= x[91_000]
+
+
+@pytest.mark.parametrize("size", [0, 1, 5])
+def test_short_lines_are_kept_whole(size):
+    x = np.arange(size, dtype=np.float64)
+    thin_x, thin_y = thin_line(x, x**2)
+    assert_array_equal(thin_x, x)
+    assert_array_equal(thin_y, x**2)
+
+
+def test_spread_is_even_over_the_marked_rows():
+    marked = np.zeros(100_000, dtype=bool)
+    marked[10_000:60_000] = True
+    index = spread(marked, 500)
+    assert index.size == 500
+    assert marked[index].all()
+    assert index[0] == 10_000
+    assert index[-1] == 59_999
+    assert np.ptp(np.diff(index)) <= 1
+    assert_array_equal(spread(marked, 60_000), np.arange(10_000, 60_000))
+
+
+def test_report_loads_plotly_only_when_used():
+    code = "import sys, weighbridge.report; sys.exit('plotly' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
