@@ -6,6 +6,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from weighbridge.errors import ConfigError
+from weighbridge.io import read_drive
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import (
     ABOUT,
@@ -139,11 +140,11 @@ def test_load_is_linear_in_gross_torque_without_effects_and_not_with_them():
 
 
 def test_load_tops_out_where_the_car_says():
-    made = simulate_car(
-        replace(make_scenario("car-calibration", seed=2), duration=400.0, start_rest=2.0)
-    )
-    top = made.truth.load.max()
-    assert 0.7 * MIDSIZE.load_full < top < 1.2 * MIDSIZE.load_full
+    # A driver in a hurry on an open road uses full throttle.
+    route = flat_route(4000.0, limit=35.0)
+    made = simulate_car(short(route=route, aggressiveness=3.0, sensors=Sensors(imu_rate=0.0)))
+    assert 0.85 * 320.0 < made.truth.engine_torque.max() <= 320.0
+    assert_allclose(made.truth.load.max(), MIDSIZE.load_full, rtol=0.15)
 
 
 def test_no_fixes_in_an_outage():
@@ -200,6 +201,21 @@ def test_written_tables_hold_the_drive(made, tmp_path, format):
     assert "mass_kg = 1580.0" in (tmp_path / "drive" / "drive.toml").read_text()
 
 
+@pytest.mark.parametrize("format", ["csv", "parquet"])
+def test_written_drive_is_read_back(made, tmp_path, format):
+    made.write(tmp_path / "car-short", format=format)
+    back = read_drive(tmp_path / "car-short")
+    assert set(back.signals) == set(made.drive.signals)
+    for name, s in made.drive.signals.items():
+        assert_allclose(back.signals[name].values, s.values, rtol=1e-9, atol=2e-9)
+        assert_allclose(back.signals[name].time, s.time, atol=1e-9)
+    for f in fields(made.drive.info):
+        expected = getattr(made.drive.info, f.name)
+        if isinstance(expected, float):
+            expected = pytest.approx(expected, rel=1e-6)
+        assert getattr(back.info, f.name) == expected, f.name
+
+
 def test_drive_does_not_tell_the_truth_but_the_mass_at_the_start(made):
     assert made.drive.info.mass == 1580.0
     assert not made.drive.has("engine_torque")
@@ -225,6 +241,11 @@ def test_manual_gearbox_interrupts_the_torque():
     assert shifting.sum() > 10
     assert truth.traction_force[shifting].min() < 60.0
     assert COMPACT.shift_floor == 0.0
+    smooth = replace(scenario, effects=Effects().without("shift_gap"))
+    truth = simulate_car(smooth).truth
+    upshift = (truth.phase == 1) & (truth.pedal > 0.3)
+    assert upshift.sum() > 10
+    assert truth.traction_force[upshift].min() > 200.0
 
 
 def test_driving_looks_like_driving():
@@ -247,6 +268,32 @@ def test_route_returns_to_its_height_over_mirrored_hills():
     assert_allclose(route.grade[:n], -route.grade[::-1][:n], atol=1e-12)
     assert np.degrees(np.abs(route.grade).max()) > 2.5
     assert np.degrees(np.abs(route.grade).max()) < 5.5
+
+
+def test_driving_the_route_ends_near_its_start():
+    made = simulate_car(make_scenario("car-short", seed=1))
+    truth = made.truth
+    assert truth.distance[-1] > 8000.0
+    north = (truth.latitude[-1] - truth.latitude[0]) * 6.37e6
+    east = (truth.longitude[-1] - truth.longitude[0]) * 6.37e6 * np.cos(truth.latitude[0])
+    assert np.hypot(north, east) < 1500.0
+    assert abs(truth.altitude[-1] - truth.altitude[0]) < 1.0
+
+
+def test_a_quantity_named_twice_is_asked_twice():
+    polling = Polling(fast=("engine_load", "vehicle_speed", "engine_load", "engine_speed"))
+    signals = simulate_car(short(polling=polling, sensors=Sensors(imu_rate=0.0))).drive.signals
+    assert_allclose(len(signals["engine_load"]), 2 * len(signals["vehicle_speed"]), atol=2)
+
+
+def test_brake_switch_is_on_while_the_car_is_held():
+    polling = Polling(fast=("vehicle_speed", "brake_switch"), slow=())
+    made = simulate_car(short(polling=polling, sensors=Sensors(imu_rate=0.0)))
+    switch = made.drive.signals["brake_switch"]
+    assert np.all(switch.values[switch.time < 3.0] == 1.0)
+    assert set(np.unique(switch.values)) == {0.0, 1.0}
+    open_road = np.interp(switch.time, made.truth.time, made.truth.pedal) > 0.2
+    assert switch.values[open_road].mean() < 0.05
 
 
 def test_random_cars_drive():

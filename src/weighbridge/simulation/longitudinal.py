@@ -64,11 +64,11 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
         if city[k]:
             length, factor = rng.uniform(80, 300), rng.uniform(0.6, 1.0)
         elif fast[k]:
-            length, factor = rng.uniform(500, 2500), rng.choice([0.78, 0.85, 0.92, 1.0, 1.05, 1.09])
+            length, factor = rng.uniform(500, 2500), rng.choice([0.82, 0.9, 0.96, 1.0, 1.05, 1.09])
         else:
             length, factor = rng.uniform(300, 1200), rng.choice([0.7, 0.8, 0.9, 1.0, 1.05])
         if scenario.calibration:
-            length, factor = min(length, rng.uniform(250, 900)), rng.uniform(0.3, 1.12)
+            length, factor = min(length, rng.uniform(180, 700)), rng.uniform(0.45, 1.15)
         part = (s >= x) & (s < x + length)
         target[part] *= 1.0 + effects.traffic * (factor - 1.0)
         x += length + rng.uniform(50, 400) * (3.0 if fast[k] and not scenario.calibration else 1.0)
@@ -83,14 +83,14 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
         part = (s >= x) & (s < x + length)
         accel_limit[part] *= rng.uniform(0.75, 1.2)
         if scenario.calibration:
-            accel_limit[part] *= rng.choice([0.6, 1.0, 1.8, 4.0])
-            revs[part] = rng.uniform(0.0, 0.95)
+            accel_limit[part] *= rng.choice([0.6, 1.5, 3.0, 6.0])
+            revs[part] = max(0.0, rng.uniform(-0.3, 0.95))
         else:
             revs[part] += rng.uniform(0.0, 0.15)
         x += length
     # Which lights are red.
     red = rng.random(route.stops.size) < route.stop_chance
-    pause = rng.uniform(3.0, 35.0, route.stops.size)
+    pause = rng.uniform(3.0, 25.0, route.stops.size)
     decel = rng.uniform(1.0, 2.1, route.stops.size) * lively**0.5
     pass_speed = rng.uniform(25, 45, route.stops.size) / 3.6
     for at, is_red, slow in zip(route.stops, red, pass_speed, strict=True):
@@ -137,7 +137,7 @@ def _powertrain(scenario: Scenario) -> kernel.Powertrain:
         loss_slope=car.loss_slope * effects.driveline_loss,
         torque_lag=max(0.02, car.torque_lag * effects.torque_lag),
         shift_time=car.shift_time,
-        shift_floor=car.shift_floor,
+        shift_floor=max(0.0, 1.0 - (1.0 - car.shift_floor) * effects.shift_gap),
         upshift=car.upshift,
         downshift=car.downshift,
         accessory_power=car.accessory_power * effects.accessories,
@@ -206,5 +206,5 @@ def simulate_trajectory(
     out, count = kernel.drive(
         road, _powertrain(scenario), _resistance(scenario), driver, noise, DT, steps
     )
-    columns = [np.ascontiguousarray(row[:count]) for row in out]
+    columns = [row[:count] for row in out]
     return Trajectory(np.arange(count) * DT, *columns)

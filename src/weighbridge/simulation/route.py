@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import uniform_filter1d
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals import Floats
@@ -123,6 +123,14 @@ def flat_route(length: float, *, limit: float = 80 / 3.6, heading: float = 0.0) 
     )
 
 
+def _smooth(values: Floats, sigma: float, mode: str = "nearest") -> Floats:
+    """Smooth with a bell of standard deviation ``sigma`` samples: a box, thrice."""
+    width = max(1, round(2.0 * sigma))
+    for _ in range(3):
+        values = uniform_filter1d(values, width, mode=mode)
+    return np.asarray(values)
+
+
 def _turn(curvature: Floats, at: int, angle: float, radius: float) -> None:
     """Add a turn whose curvature rises and falls smoothly."""
     length = max(4, int(1.9 * abs(angle) * radius / STEP))
@@ -171,7 +179,7 @@ def _leg(
             side = float(rng.choice([-1, 1]))
             x = start + float(rng.uniform(150, 300))
             while x < start + count - 100:
-                stops.append((x, 0.55))
+                stops.append((x, 0.45))
                 if rng.random() < 0.35:
                     _turn(curvature, int(x + 14), side * math.pi / 2, float(rng.uniform(9, 14)))
                     side = -side
@@ -191,9 +199,9 @@ def _hills(kinds: Sequence[str], rng: np.random.Generator, peak: float) -> Float
     grade = np.zeros(n)
     labels = np.asarray(kinds)
     for kind, std in _GRADE_STD.items():
-        rough = gaussian_filter1d(white, _GRADE_LENGTH[kind] / STEP, mode="wrap")
+        rough = _smooth(white, _GRADE_LENGTH[kind] / STEP, mode="wrap")
         rough *= std / rough.std()
-        weight = gaussian_filter1d((labels == kind).astype(float), 120.0 / STEP, mode="nearest")
+        weight = _smooth((labels == kind).astype(float), 120.0 / STEP, mode="nearest")
         grade += weight * rough
     where = np.flatnonzero(labels == "hills")
     if where.size:
@@ -211,7 +219,7 @@ def _hills(kinds: Sequence[str], rng: np.random.Generator, peak: float) -> Float
             at += float(rng.uniform(650, 1100))
     # Hills are tens of metres high, not hundreds: what has piled up is taken back.
     height = np.cumsum(grade) * STEP
-    slow = gaussian_filter1d(height, 1500.0 / STEP, mode="nearest")
+    slow = _smooth(height, 1500.0 / STEP, mode="nearest")
     grade -= 0.9 * np.gradient(slow, STEP)
     s = np.arange(n) * STEP
     grade *= np.clip(s / 150.0, 0, 1) * np.clip((s[-1] - s) / 150.0, 0, 1)
@@ -259,20 +267,16 @@ def mixed_route(
     kinds_back = (kinds_back + [kinds_back[-1]] * n)[:n]
     bends_back = np.resize(bends_back, n)
     grade_out = _hills(kinds_out, rng, peak_grade)
-    # The general direction of the road is shared; bends are each side's own.
-    white = gaussian_filter1d(rng.standard_normal(n), 1500.0 / STEP, mode="nearest")
-    weight = gaussian_filter1d(np.array([_WANDER[k] for k in kinds_out]), 300.0 / STEP)
+    white = _smooth(rng.standard_normal(n), 1500.0 / STEP, mode="nearest")
+    weight = _smooth(np.array([_WANDER[k] for k in kinds_out]), 300.0 / STEP)
     wander = np.cumsum(weight * white * (3.0e-4 / max(white.std(), 1e-12))) * STEP
-    curvature = np.concatenate((bends_out, bends_back))
-    curvature = gaussian_filter1d(curvature, 3.0)
-    course = heading + np.cumsum(curvature) * STEP
-    course += np.concatenate((wander, wander[-1] + wander[-1] - wander[::-1]))
-    # Pull the direction back so that the legs run opposite ways on the whole.
+    # Both ways follow the same general direction, each with bends of its own, and
+    # the road turns round where it ends.
+    bends = np.cumsum(_smooth(np.concatenate((bends_out, bends_back)), 3.0)) * STEP
+    bends -= _smooth(bends, 1200.0 / STEP, mode="nearest")
     s = np.arange(2 * n) * STEP
     turn = math.pi * 0.5 * (1.0 + np.tanh((s - n * STEP) / 9.0))
-    own = course - heading
-    drift = gaussian_filter1d(own, 1200.0 / STEP, mode="nearest")
-    course = heading + own - 0.85 * drift + turn
+    course = heading + np.concatenate((wander, wander[::-1])) + bends + turn
     kinds = kinds_out + kinds_back
     labels = np.asarray(kinds)
     limit = np.array([_LIMIT[k] for k in kinds])
@@ -286,7 +290,7 @@ def mixed_route(
     )
     curve = np.gradient(course, STEP)
     bank = 0.02 + np.clip(curve * limit**2 / 9.81 * 0.25, -0.05, 0.05)
-    bank = gaussian_filter1d(bank, 25.0)
+    bank = _smooth(bank, 25.0)
     places = [*stops_out, *[(x + n * STEP, chance) for x, chance in stops_back]]
     places.sort()
     return Route(
@@ -297,7 +301,7 @@ def mixed_route(
         limit=limit,
         surface=surface,
         roughness=roughness,
-        exposure=gaussian_filter1d(np.array([_EXPOSURE[k] for k in kinds]), 60.0),
+        exposure=_smooth(np.array([_EXPOSURE[k] for k in kinds]), 60.0),
         stops=np.array([x for x, _ in places]),
         stop_chance=np.array([c for _, c in places]),
     )
@@ -305,7 +309,7 @@ def mixed_route(
 
 def _patches(rng: np.random.Generator, n: int, length: float) -> Floats:
     """Smooth noise of unit standard deviation."""
-    rough = gaussian_filter1d(rng.standard_normal(n), length / 2.5 / STEP, mode="nearest")
+    rough = _smooth(rng.standard_normal(n), length / 2.5 / STEP, mode="nearest")
     return np.asarray((rough - rough.mean()) / max(float(rough.std()), 1e-12))
 
 
@@ -352,7 +356,7 @@ def highway_route(seed: int = 3, *, length: float = 20000.0) -> Route:
     )
 
 
-def hilly_route(seed: int = 4, *, length: float = 24000.0) -> Route:
+def hilly_route(seed: int = 4, *, length: float = 19000.0) -> Route:
     """Return country roads and hills, where every gear can be used."""
     half = length / 2
     return mixed_route(

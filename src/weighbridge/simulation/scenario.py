@@ -38,6 +38,7 @@ class Effects:
     accessories : alternator and compressor load the engine
     driveline_loss : gearbox and axle lose torque
     torque_lag : torque follows the pedal late
+    shift_gap : torque dips or is interrupted while the gear changes
     load_nonlinearity : the load reading bends away from the torque
     load_smoothing : the control unit smooths the load reading
     fuel_burn : the fuel's mass is lost
@@ -67,6 +68,7 @@ class Effects:
     accessories: float = 1.0
     driveline_loss: float = 1.0
     torque_lag: float = 1.0
+    shift_gap: float = 1.0
     load_nonlinearity: float = 1.0
     load_smoothing: float = 1.0
     fuel_burn: float = 1.0
@@ -192,7 +194,7 @@ class Polling:
 
     Attributes
     ----------
-    fast : quantities asked in every round
+    fast : quantities asked in every round; one named twice is asked twice
     slow : quantities of which one is asked in every tenth round
     rate : rounds per second [Hz]
     delay : how old a value is when its time is stamped, mean [s]

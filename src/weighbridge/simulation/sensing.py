@@ -292,7 +292,8 @@ def _values(scenario: Scenario, drive: Trajectory, name: str, pose: Pose) -> tup
     if name == "gear":
         return drive.gear, 1.0
     if name == "brake_switch":
-        return (drive.brake_force > 20.0).astype(np.float64), 1.0
+        held = (drive.speed < 0.05) & (drive.pedal <= 0.0)
+        return ((drive.brake_force > 20.0) | held).astype(np.float64), 1.0
     if name == "clutch_switch":
         return (drive.phase != kernel.DRIVING).astype(np.float64), 1.0
     raise KeyError(name)
@@ -328,7 +329,7 @@ def simulate_polling(
     slots = len(fast) + (1 if slow else 0)
     gap = 1.0 / (polling.rate * slots)
     total = int((drive.time[-1] - 0.5) / gap)
-    stamps = 0.2 + gap * np.arange(total)
+    stamps: Floats = 0.2 + gap * np.arange(total, dtype=np.float64)
     if effects.obd_jitter > 0.0:
         # An answer is never overtaken by the next.
         wobble = 0.25 * gap * rng.standard_normal(total) * effects.obd_jitter
@@ -336,14 +337,12 @@ def simulate_polling(
     slot = np.arange(total) % slots
     turn = np.arange(total) // slots
     signals = []
-    for index, name in enumerate((*fast, *slow)):
-        if index < len(fast):
-            mine = slot == index
-        else:
+    for name in dict.fromkeys((*fast, *slow)):
+        mine = np.isin(slot, [k for k, other in enumerate(fast) if other == name])
+        if name in slow:
             # The spare slot of every tenth round, one slow quantity after another.
-            order = turn // 10
-            mine = (slot == len(fast)) & (turn % 10 == 0)
-            mine &= order % len(slow) == index - len(fast)
+            spare = (slot == len(fast)) & (turn % 10 == 0)
+            mine |= spare & (turn // 10 % len(slow) == slow.index(name))
         time = stamps[mine]
         values, step = _values(scenario, drive, name, pose)
         delay = effects.obd_delay * np.maximum(
