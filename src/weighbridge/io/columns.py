@@ -126,6 +126,8 @@ def _either(words: list[str]) -> str:
 
 def near_column(column: str) -> str | None:
     """Canonical column that an unknown name resembles, or None."""
-    known = [q.column for q in QUANTITIES.values()] + [TIME_COLUMN]
-    near = difflib.get_close_matches(column.strip().lower(), known, n=1, cutoff=0.75)
+    known = [q.column for q in QUANTITIES.values() if q.stem not in _GENERAL] + [TIME_COLUMN]
+    name = column.strip().lower()
+    whole = [k for k in known if k.endswith(f"_{name}")]
+    near = whole[:1] or difflib.get_close_matches(name, known, n=1, cutoff=0.75)
     return near[0] if near else None

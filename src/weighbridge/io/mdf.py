@@ -6,6 +6,8 @@ that a calibration has to find.
 
 from __future__ import annotations
 
+import gc
+import sys
 import warnings
 from pathlib import Path
 from typing import Any, Final
@@ -43,16 +45,28 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         raise MissingExtraError("asammdf", "mdf", f"reading {path.name}") from None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        try:
-            file = MDF(path)
-        # The library raises errors of many kinds, down to struct.error, for a broken file.
-        except Exception as e:
-            raise DriveError(
-                f"{path} is not a readable MDF file ({_first_line(e)}); "
-                "it may have been cut off: copy it again"
-            ) from None
-        with file:
+        with _open(MDF, path) as file:
             return _read(file, path, table, mapping)
+
+
+def _open(opener: Any, path: Path) -> Any:
+    """Open the file; what the library raises for a broken one becomes one sentence."""
+    hook = sys.unraisablehook
+    # A half-opened file complains on standard error once more when it is collected.
+    sys.unraisablehook = lambda _: None
+    reason = ""
+    try:
+        return opener(path)
+    # The library's errors are of many kinds, down to struct.error.
+    except Exception as e:
+        reason = _first_line(e)
+    finally:
+        if reason:
+            gc.collect()
+        sys.unraisablehook = hook
+    raise DriveError(
+        f"{path} is not a readable MDF file ({reason}); it may have been cut off: copy it again"
+    )
 
 
 def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None) -> Log:

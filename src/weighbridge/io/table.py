@@ -20,6 +20,9 @@ SEPARATORS: Final = (",", ";", "\t", "|")
 MISSING: Final = ("", "na", "n/a", "nan", "null", "none", "-", "#n/a")
 """Cells that mean "no value", in any case."""
 
+# Panics of the parser are no subclass of its errors, nor of Exception.
+_PARSE_ERRORS: Final = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
+
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
 
@@ -204,7 +207,11 @@ def _separator(path: Path, header: str) -> str:
 
 
 def _cells(header: str, separator: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([header], delimiter=separator))]
+    try:
+        cells = next(csv.reader([header], delimiter=separator))
+    except csv.Error:
+        cells = header.split(separator)
+    return [cell.strip() for cell in cells]
 
 
 def _after_line(text: str, count: int) -> str:
@@ -219,33 +226,33 @@ def _after_line(text: str, count: int) -> str:
 def _parse(
     path: Path, body: str, columns: int, separator: str, decimal: str, notes: list[str]
 ) -> pl.DataFrame:
-    data = body.encode()
-    first = len(next(csv.reader([body.split("\n", 1)[0]], delimiter=separator)))
-    width = max(columns, first)
-    names = [f"column_{i + 1}" for i in range(width)]
+    names = [str(i) for i in range(columns)]
+    # With a header of its own, the width does not hang on the first row.
+    data = f"{separator.join(names)}\n{body}".encode()
+    # A quote that is never closed would swallow the rest of the file.
+    quote = '"' if data.count(b'"') % 2 == 0 else None
+    if quote is None:
+        notes.append("a quote is never closed; quotes were taken as text")
 
     def parse(dtype: type[pl.DataType]) -> pl.DataFrame:
         return pl.read_csv(
             io.BytesIO(data),
-            has_header=False,
             separator=separator,
             decimal_comma=decimal == ",",
             schema=dict.fromkeys(names, dtype),
             null_values=None if dtype is pl.String else ["NA", "na", "N/A", "null", "-"],
             truncate_ragged_lines=True,
+            quote_char=quote,
         )
 
     try:
-        frame = parse(pl.Float64)
-    except pl.exceptions.PolarsError:
+        return parse(pl.Float64)
+    except _PARSE_ERRORS:
         # Some cell is no number: take all as text, and judge column by column.
         try:
-            frame = parse(pl.String)
-        except pl.exceptions.PolarsError as e:
+            return parse(pl.String)
+        except _PARSE_ERRORS as e:
             raise DriveError(f"{path} is not a readable table: {_first_line(e)}") from None
-    if first > columns:
-        notes.append(f"its rows have {first} cells and its header {columns}; the rest is ignored")
-    return frame.select(pl.col(f"column_{i + 1}").alias(str(i)) for i in range(columns))
 
 
 def _first_line(error: Exception) -> str:
@@ -262,7 +269,7 @@ def read_parquet(path: Path, text_format: TextFormat | None = None) -> RawTable:
     """
     try:
         frame = pl.read_parquet(path)
-    except (pl.exceptions.PolarsError, OSError) as e:
+    except (*_PARSE_ERRORS, OSError) as e:
         raise DriveError(
             f"{path} is not a readable Parquet file ({_first_line(e)}); "
             "it may have been cut off: copy or convert it again"

@@ -1,0 +1,248 @@
+"""Mapping TOML: foreign names, units, signs, clocks; mistakes are told with their line."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io import read_drive
+from weighbridge.io.columns import unit_suffix
+from weighbridge.io.mapping import load_mapping, mapping_for
+
+
+def write(path, content, encoding="utf-8"):
+    path.write_text(content, encoding=encoding)
+    return path
+
+
+SPEED = {"vehicle_speed": {"column": "v", "unit": "kmh"}}
+
+
+def test_names_units_signs_and_offsets(tmp_path):
+    log = write(tmp_path / "log.csv", "t,v,ax,T\n0,36,1,20\n100,72,-2,21\n")
+    mapping = write(
+        tmp_path / "map.toml",
+        """
+        format_version = 1
+        [time]
+        column = "t"
+        unit = "ms"
+        offset_s = 5
+        [signals.vehicle_speed]
+        column = "v"
+        unit = "km/h"
+        [signals.longitudinal_accel]
+        column = "ax"
+        unit = "g"
+        factor = -1
+        offset = 0.5
+        [signals.ambient_temperature]
+        column = "T"
+        unit = "degc"
+        """,
+    )
+    drive = read_drive(log, mapping)
+    assert drive.name == "log"
+    assert drive.problems == ()
+    speed = drive.signals["vehicle_speed"]
+    assert_allclose(speed.time, [5.0, 5.1])
+    assert_allclose(speed.values, [10.0, 20.0])
+    # Factor first, then the offset in the column's unit, then to SI.
+    assert_allclose(drive.signals["longitudinal_accel"].values, [-0.5 * 9.81, 2.5 * 9.81])
+    assert_allclose(drive.signals["ambient_temperature"].values, [293.15, 294.15])
+
+
+def test_unit_is_taken_from_the_brackets_of_the_column(tmp_path):
+    log = write(tmp_path / "log.csv", "Time [ms];Speed [m/s]\n0;10\n500;20\n")
+    mapping = {
+        "time": {"column": "Time [ms]"},
+        "signals": {"vehicle_speed": {"column": "speed [m/s] "}},
+    }
+    speed = read_drive(log, mapping).signals["vehicle_speed"]
+    assert_allclose(speed.time, [0.0, 0.5])
+    assert_allclose(speed.values, [10.0, 20.0])
+
+
+def test_separator_encoding_decimal_comma_and_lines_to_skip(tmp_path):
+    text = (
+        "made by a logger\nv1\nZeit;Geschw. [km/h];Höhe [m]\ns;km/h;m\n0,5;36,0;400\n1,5;54,0;-\n"
+    )
+    log = write(tmp_path / "log.csv", text, "latin-1")
+    mapping = {
+        "csv": {
+            "separator": ";",
+            "encoding": "latin-1",
+            "decimal": ",",
+            "skip_rows": 2,
+            "skip_after_header": 1,
+        },
+        "time": {"column": "Zeit"},
+        "signals": {
+            "vehicle_speed": {"column": "Geschw. [km/h]"},
+            "altitude": {"column": "Höhe [m]"},
+        },
+    }
+    drive = read_drive(log, mapping)
+    assert_allclose(drive.signals["vehicle_speed"].time, [0.5, 1.5])
+    assert_allclose(drive.signals["vehicle_speed"].values, [10.0, 15.0])
+    assert_allclose(drive.signals["altitude"].values, [400.0])
+
+
+def test_file_without_header(tmp_path):
+    log = write(tmp_path / "log.csv", "0,36\n1,72\n")
+    mapping = {"csv": {"columns": ["t", "v"]}, "time": {"column": "t"}, "signals": SPEED}
+    assert_allclose(read_drive(log, mapping).signals["vehicle_speed"].values, [10.0, 20.0])
+
+
+def test_time_of_day_runs_over_midnight(tmp_path):
+    log = write(tmp_path / "log.csv", "t,v\n23:59:59.500,36\n00:00:00.250,72\n0:00:02,36\n")
+    mapping = {"time": {"column": "t", "format": "clock"}, "signals": SPEED}
+    time = read_drive(log, mapping).signals["vehicle_speed"].time
+    assert_allclose(time - time[0], [0.0, 0.75, 2.5])
+
+
+@pytest.mark.parametrize(
+    ("stamps", "time_format", "start"),
+    [
+        (("2026-01-31T12:00:00.5", "2026-01-31T12:00:02"), "iso", "2026-01-31T12:00:00"),
+        (("2026-01-31 12:00:00.5Z", "2026-01-31 12:00:02Z"), "iso", "2026-01-31T12:00:00"),
+        (
+            ("2026-01-31T12:00:00.5+01:00", "2026-01-31T12:00:02+01:00"),
+            "iso",
+            "2026-01-31T11:00:00",
+        ),
+        (("31.01.2026 12:00:00.5", "31.01.2026 12:00:02.0"), "%d.%m.%Y %H:%M:%S%.f", "2026-01-31"),
+    ],
+)
+def test_dates_count_from_the_first_full_second(tmp_path, stamps, time_format, start):
+    log = write(tmp_path / "log.csv", f"t,v\n{stamps[0]},36\n{stamps[1]},72\n")
+    mapping = {"time": {"column": "t", "format": time_format}, "signals": SPEED}
+    drive = read_drive(log, mapping)
+    assert_allclose(drive.signals["vehicle_speed"].time, [0.5, 2.0], atol=1e-6)
+    assert drive.info.start_time is not None
+    assert drive.info.start_time.startswith(start)
+
+
+def test_absent_column_is_a_note_unless_optional(tmp_path):
+    log = write(tmp_path / "log.csv", "t,v\n0,36\n1,72\n")
+    extra = {"throttle": {"column": "vv", "unit": "pct"}}
+    mapping = {"time": {"column": "t"}, "signals": {**SPEED, **extra}}
+    (problem,) = read_drive(log, mapping).problems
+    assert problem.signal == "throttle"
+    assert "'vv' for throttle is not there" in problem.text
+    assert not problem.serious
+    extra["throttle"]["optional"] = True
+    assert read_drive(log, mapping).problems == ()
+
+
+def test_several_kinds_of_file_in_one_folder(tmp_path):
+    write(tmp_path / "a_fast.csv", "ms,x\n0,1\n10,2\n")
+    write(tmp_path / "b_slow.csv", "s;v\n0;36\n1;72\n")
+    write(tmp_path / "other.csv", "who,knows\n1,2\n")
+    mapping = {
+        "tables": {
+            "fast": {
+                "files": "*_fast.csv",
+                "time": {"column": "ms", "unit": "ms"},
+                "signals": {"accel_x": {"column": "x", "unit": "mps2"}},
+            },
+            "slow": {"files": "*_slow.csv", "time": {"column": "s"}, "signals": SPEED},
+        }
+    }
+    drive = read_drive(tmp_path, mapping)
+    assert set(drive.signals) == {"accel_x", "vehicle_speed"}
+    assert_array_equal(drive.signals["accel_x"].time, [0.0, 0.01])
+
+
+def test_first_pattern_that_fits_is_taken(tmp_path):
+    mappings = load_mapping(
+        {
+            "tables": {"imu": {"signals": SPEED}},
+            "signals": SPEED,
+        }
+    )
+    assert [m.files for m in mappings] == ["imu.*", "*"]
+    assert mapping_for(tmp_path / "IMU.csv", mappings) is mappings[0]
+    assert mapping_for(tmp_path / "obd.csv", mappings) is mappings[1]
+
+
+def test_wrong_separator_is_told_with_the_right_one(tmp_path):
+    log = write(tmp_path / "log.csv", "t;v\n0;36\n")
+    mapping = {"csv": {"separator": ","}, "time": {"column": "t"}, "signals": SPEED}
+    with pytest.raises(DriveError, match=r'none of the columns.*set separator = ";" there'):
+        read_drive(log, mapping)
+
+
+def test_absent_time_column_is_told(tmp_path):
+    log = write(tmp_path / "log.csv", "t,v\n0,36\n")
+    with pytest.raises(DriveError, match=r"no time column 'clock'.*it has 't', 'v'"):
+        read_drive(log, {"time": {"column": "clock"}, "signals": SPEED})
+    with pytest.raises(DriveError, match=r"names no time column"):
+        read_drive(log, {"signals": SPEED})
+
+
+def test_times_in_another_format_are_told(tmp_path):
+    log = write(tmp_path / "log.csv", "t,v\n12.5,36\n13.5,37\n")
+    with pytest.raises(DriveError, match=r"time '12.5' in column 't' is not in the format 'clock'"):
+        read_drive(log, {"time": {"column": "t", "format": "clock"}, "signals": SPEED})
+
+
+def test_other_encoding_is_told(tmp_path):
+    log = write(tmp_path / "log.csv", "t,v [°]\n0,36\n", "latin-1")
+    mapping = {"csv": {"encoding": "utf-8"}, "time": {"column": "t"}, "signals": SPEED}
+    with pytest.raises(DriveError, match="is not utf-8"):
+        read_drive(log, mapping)
+
+
+def test_column_without_any_unit_is_told(tmp_path):
+    log = write(tmp_path / "log.csv", "t,v\n0,36\n")
+    mapping = {"time": {"column": "t"}, "signals": {"vehicle_speed": {"column": "v"}}}
+    with pytest.raises(ConfigError, match=r"vehicle_speed has no unit.*kmh"):
+        read_drive(log, mapping)
+
+
+@pytest.mark.parametrize(
+    ("content", "line", "words"),
+    [
+        ("[signals.vehicle_sped]\ncolumn = 'v'", 1, "did you mean vehicle_speed"),
+        ("[signals.vehicle_speed]\nunit = 'kmh'", 1, "column is missing"),
+        ("[signals.vehicle_speed]\ncolumn = 'v'\nunit = 'rpm'", 3, "is no unit of vehicle_speed"),
+        ("[signals.vehicle_speed]\ncolumn = 'v'\nfactor = 0", 3, "must not be 0"),
+        ("[signals.vehicle_speed]\ncolumn = 'v'\nfaktor = 1", 3, "did you mean factor"),
+        ("[csv]\nseparator = ';;'\n[signals]", 2, "must be one character"),
+        ("[csv]\ndecimal = ':'\n[signals]", 2, 'must be "." or ","'),
+        ("[csv]\nencoding = 'klingon'\n[signals]", 2, "is not a text encoding"),
+        ("[csv]\nseparator = ','\ndecimal = ','\n[signals]", 3, "cannot both be a comma"),
+        ("[time]\nunit = 'km'\n[signals]", 2, "no unit of time"),
+        ("[time]\nformat = 'swatch'\n[signals]", 2, "clock"),
+        ("[time]\noffset = 3\n[signals]", 2, "write it as offset_s"),
+        ("format_version = 7", 1, "this program reads 1"),
+        ("[signals]", 1, "is missing: name at least one column"),
+        ("[singals]\nx = 1", None, "signals is missing"),
+    ],
+)
+def test_mistakes_are_told_with_their_line(tmp_path, content, line, words):
+    path = write(tmp_path / "map.toml", content)
+    with pytest.raises(ConfigError) as caught:
+        load_mapping(path)
+    assert "map.toml" in str(caught.value)
+    assert words in str(caught.value)
+    if line is not None:
+        assert f"line {line}:" in str(caught.value)
+
+
+def test_units_as_people_write_them():
+    assert unit_suffix("km/h") == "kmh"
+    assert unit_suffix("1/min") == "rpm"
+    assert unit_suffix("°C") == "degc"
+    assert unit_suffix("m/s²") == "mps2"
+    assert unit_suffix("N·m") == "nm"
+    assert unit_suffix("furlong") is None
+
+
+def test_mapped_parquet(tmp_path):
+    import polars as pl
+
+    pl.DataFrame({"t": [0, 1], "v": [36.0, None]}).write_parquet(tmp_path / "log.parquet")
+    drive = read_drive(tmp_path / "log.parquet", {"time": {"column": "t"}, "signals": SPEED})
+    assert_array_equal(drive.signals["vehicle_speed"].values, np.array([10.0]))
