@@ -149,9 +149,9 @@ def speed_panel(weighing: Weighing) -> Panel:
         )  # fmt: skip
     used = int(np.count_nonzero(result.used))
     return Panel(
-        title=f"{used} of {total} samples were used: where the vehicle speeds up in gear",
-        caption="Each mark is one force sample; its colour and shape say why it was left out. "
-        "Click a name in the legend to hide it.",
+        title=f"{used} of {total} samples were used",
+        caption="Each mark is one force sample, of frequent kinds every few; colour and shape "
+        "say why it was left out. Click a name in the legend to hide it.",
         figure=figure,
         wide=True,
     )
@@ -234,7 +234,7 @@ def share_panel(result: MassTrack) -> Panel:
     excluded = [r for r in reversed(present) if r is not Reason.USED]
     title = "No sample was excluded"
     if excluded:
-        title = f"Most excluded samples: {reason_name(excluded[0])}"
+        title = f"Most often excluded: {reason_name(excluded[0])}"
     return Panel(
         title=title,
         caption="The first reason that applies is the one counted.",

@@ -48,8 +48,18 @@ function repaint() {
 for (const section of document.querySelectorAll("details")) section.addEventListener("toggle", drawOpen);
 dark.addEventListener("change", repaint);
 printing.addEventListener("change", repaint);
+// Paper does not tell figures its width, so they are set to that of A4 within its margins.
 window.addEventListener("beforeprint", () => {
   for (const section of document.querySelectorAll("details")) section.open = true;
   drawOpen();
+  for (const place of document.querySelectorAll(".plot")) {
+    const height = 0.75 * figures[place.id].layout.height;
+    Plotly.relayout(place, { autosize: false, width: 660, height });
+  }
+});
+window.addEventListener("afterprint", () => {
+  for (const place of document.querySelectorAll(".plot")) {
+    Plotly.relayout(place, { autosize: true, width: null, height: figures[place.id].layout.height });
+  }
 });
 drawOpen();
