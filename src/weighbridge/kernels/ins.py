@@ -122,14 +122,12 @@ class Work(NamedTuple):
     transition : (13,) time, sum of ``f_n dt`` and sum of ``rot dt`` since the last node
     h, ph : (20,) one measurement row, covariance times row
     rate : (3,) last angular rate, bias removed [rad/s]
-    block : (9, 9)
     """
 
     transition: np.ndarray
     h: np.ndarray
     ph: np.ndarray
     rate: np.ndarray
-    block: np.ndarray
 
 
 class RowLog(NamedTuple):
@@ -155,7 +153,7 @@ class RowLog(NamedTuple):
 
 def new_work() -> Work:
     """Return scratch arrays for one filter."""
-    return Work(np.zeros(13), np.zeros(ERRORS), np.zeros(ERRORS), np.zeros(3), np.zeros((9, 9)))
+    return Work(np.zeros(13), np.zeros(ERRORS), np.zeros(ERRORS), np.zeros(3))
 
 
 def new_log(nodes: int) -> RowLog:
@@ -213,8 +211,8 @@ def propagate(x, work, fx, fy, fz, wx, wy, wz, dt, noise):
     q0, q1, q2, q3 = product(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], c, s0, s1, s2)
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = matrix_rows(q0, q1, q2, q3)
     q0, q1, q2, q3 = product(q0, q1, q2, q3, c, s0, s1, s2)
-    n = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
-    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = n * q0, n * q1, n * q2, n * q3
+    unit = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = unit * q0, unit * q1, unit * q2, unit * q3
     f0 = r00 * fx + r01 * fy + r02 * fz
     f1 = r10 * fx + r11 * fy + r12 * fz
     f2 = r20 * fx + r21 * fy + r22 * fz
@@ -273,26 +271,26 @@ def propagate_covariance(x, cov, work, noise):
         cov[6, j] = t0 - (r00 * g0 + r01 * g1 + r02 * g2)
         cov[7, j] = t1 - (r10 * g0 + r11 * g1 + r12 * g2)
         cov[8, j] = t2 - (r20 * g0 + r21 * g1 + r22 * g2)
-    block = work.block
+    # from the right a row needs itself only; below the diagonal symmetry serves
     for i in range(9):
         v0, v1, v2 = cov[i, 3], cov[i, 4], cov[i, 5]
         t0, t1, t2 = cov[i, 6], cov[i, 7], cov[i, 8]
-        a0, a1, a2 = cov[i, 9], cov[i, 10], cov[i, 11]
+        if i < 3:
+            cov[i, 0] += dt * v0
+            cov[i, 1] += dt * v1
+            cov[i, 2] += dt * v2
+        if i < 6:
+            a0, a1, a2 = cov[i, 9], cov[i, 10], cov[i, 11]
+            cov[i, 3] = v0 + (t1 * sz - t2 * sy) - (r00 * a0 + r01 * a1 + r02 * a2)
+            cov[i, 4] = v1 + (t2 * sx - t0 * sz) - (r10 * a0 + r11 * a1 + r12 * a2)
+            cov[i, 5] = v2 + (t0 * sy - t1 * sx) - (r20 * a0 + r21 * a1 + r22 * a2)
         g0, g1, g2 = cov[i, 12], cov[i, 13], cov[i, 14]
-        block[i, 0] = cov[i, 0] + dt * v0
-        block[i, 1] = cov[i, 1] + dt * v1
-        block[i, 2] = cov[i, 2] + dt * v2
-        block[i, 3] = v0 + (t1 * sz - t2 * sy) - (r00 * a0 + r01 * a1 + r02 * a2)
-        block[i, 4] = v1 + (t2 * sx - t0 * sz) - (r10 * a0 + r11 * a1 + r12 * a2)
-        block[i, 5] = v2 + (t0 * sy - t1 * sx) - (r20 * a0 + r21 * a1 + r22 * a2)
-        block[i, 6] = t0 - (r00 * g0 + r01 * g1 + r02 * g2)
-        block[i, 7] = t1 - (r10 * g0 + r11 * g1 + r12 * g2)
-        block[i, 8] = t2 - (r20 * g0 + r21 * g1 + r22 * g2)
+        cov[i, 6] = t0 - (r00 * g0 + r01 * g1 + r02 * g2)
+        cov[i, 7] = t1 - (r10 * g0 + r11 * g1 + r12 * g2)
+        cov[i, 8] = t2 - (r20 * g0 + r21 * g1 + r22 * g2)
+    n = cov.shape[0]
     for i in range(9):
-        for j in range(i, 9):
-            cov[i, j] = block[i, j]
-            cov[j, i] = block[i, j]
-        for j in range(9, ERRORS):
+        for j in range(i + 1, n):
             cov[j, i] = cov[i, j]
     for i in range(3):
         cov[3 + i, 3 + i] += dt * noise.accel_psd
@@ -318,8 +316,8 @@ def correct(x, dx):
         x[BA + i] += dx[9 + i]
     c, s0, s1, s2 = half_turn(dx[6], dx[7], dx[8])
     q0, q1, q2, q3 = product(c, s0, s1, s2, x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
-    n = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
-    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = n * q0, n * q1, n * q2, n * q3
+    unit = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = unit * q0, unit * q1, unit * q2, unit * q3
 
 
 @fast_kernel
@@ -328,12 +326,13 @@ def _fold(x, cov, ph, innovation, innovation_var):
 
     Leaves ``ph`` scaled.
     """
+    n = cov.shape[0]  # not the constant: the compiler would unroll instead of vectorise
     scale = 1.0 / math.sqrt(innovation_var)
-    for i in range(ERRORS):
+    for i in range(n):
         ph[i] *= scale
-    for i in range(ERRORS):
+    for i in range(n):
         c = ph[i]
-        for j in range(ERRORS):
+        for j in range(n):
             cov[i, j] -= c * ph[j]
     gain = innovation * scale
     for i in range(6):
@@ -342,8 +341,8 @@ def _fold(x, cov, ph, innovation, innovation_var):
         x[BA + i] += gain * ph[9 + i]
     c, s0, s1, s2 = half_turn(gain * ph[6], gain * ph[7], gain * ph[8])
     q0, q1, q2, q3 = product(c, s0, s1, s2, x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
-    n = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
-    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = n * q0, n * q1, n * q2, n * q3
+    unit = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = unit * q0, unit * q1, unit * q2, unit * q3
 
 
 @fast_kernel
@@ -380,13 +379,14 @@ def _body_product(cov, h, ph):
     """Set ``ph`` to ``P h`` of a row with velocity, attitude and constants; return ``h P h'``."""
     h3, h4, h5, h6, h7, h8 = h[3], h[4], h[5], h[6], h[7], h[8]
     h15, h16, h17, h18, h19 = h[15], h[16], h[17], h[18], h[19]
-    for j in range(ERRORS):
+    n = cov.shape[0]
+    for j in range(n):
         ph[j] = h3 * cov[3, j] + h4 * cov[4, j] + h5 * cov[5, j]
-    for j in range(ERRORS):
+    for j in range(n):
         ph[j] += h6 * cov[6, j] + h7 * cov[7, j] + h8 * cov[8, j]
-    for j in range(ERRORS):
+    for j in range(n):
         ph[j] += h15 * cov[15, j] + h16 * cov[16, j] + h17 * cov[17, j]
-    for j in range(ERRORS):
+    for j in range(n):
         ph[j] += h18 * cov[18, j] + h19 * cov[19, j]
     return (
         h3 * ph[3] + h4 * ph[4] + h5 * ph[5] + h6 * ph[6] + h7 * ph[7] + h8 * ph[8]
