@@ -15,7 +15,7 @@ import numpy as np
 
 from weighbridge.pipeline.imu_checks import check_imu
 from weighbridge.pipeline.speed_checks import check_scales
-from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
+from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.model import Vehicle
@@ -38,6 +38,9 @@ _WEIGHING: Final = frozenset(
     )
 )
 """Signals a mass is made from: what is wrong with them is serious."""
+
+# Samples that a noisy sensor does not repeat by chance.
+_FROZEN: Final = 200
 
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
@@ -170,8 +173,8 @@ def _check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             )
         elif s.name in _IMU:
             run, at = _longest_run(s.values)
-            length = run * s.period
-            if run > 200 and length > 5.0:
+            length = float(s.time[at + run - 1] - s.time[at])
+            if run > _FROZEN and length > 5.0:
                 yield Problem(
                     s.name,
                     f"{s.name} repeats one value for {length:.1f} s from {s.time[at]:.6g} s",
@@ -179,9 +182,12 @@ def _check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 )
 
 
-def _longest_run(values: np.ndarray) -> tuple[int, int]:
-    """Length and start of the longest run of one value."""
-    ends = np.flatnonzero(np.concatenate((values[1:] != values[:-1], [True])))
+def _longest_run(values: Floats) -> tuple[int, int]:
+    """Length and start of the longest run of one value; (1, 0) where none is long."""
+    same = values[1:] == values[:-1]
+    if np.count_nonzero(same) < _FROZEN:
+        return 1, 0
+    ends = np.flatnonzero(np.concatenate((~same, [True])))
     lengths = np.diff(np.concatenate(([-1], ends)))
     k = int(np.argmax(lengths))
     return int(lengths[k]), int(ends[k] - lengths[k] + 1)

@@ -17,6 +17,8 @@ from weighbridge.vehicle.model import Vehicle
 
 # Samples enough for a median; more would only take time.
 _SAMPLES: Final = 20_000
+# Long enough for fixes a metre off to show a bend [s].
+_TURN_WINDOW: Final = 5.0
 _WINDOW: Final = 2.0  # [s]
 
 
@@ -106,14 +108,14 @@ def _check_rate(drive: Drive, gyro: tuple[Signal, Signal, Signal]) -> Iterator[P
 
 def _turns(drive: Drive) -> tuple[Floats, Floats] | None:
     """Changes of the course between windows in motion: edges [s], changes [rad]."""
-    found = windows.track(drive, _WINDOW)
-    if found is None:
+    found = windows.track(drive, _TURN_WINDOW)
+    if found is None or found[0].size < 10:
         return None
     time, north, east = found
     way = np.hypot(north, east) / np.diff(time)
     bearing = np.arctan2(east, north)
     change = (np.diff(bearing) + np.pi) % (2.0 * np.pi) - np.pi
-    slow = (way[1:] < 4.0) | (way[:-1] < 4.0) | (np.diff(time)[1:] > 2.0 * _WINDOW)
+    slow = (way[1:] < 4.0) | (way[:-1] < 4.0) | (np.diff(time)[1:] > 2.0 * _TURN_WINDOW)
     change[slow] = 0.0
     # The bearing of a piece holds at its middle.
     return 0.5 * (time[1:] + time[:-1]), change

@@ -1,0 +1,424 @@
+"""Plausibility checks: every wrong unit is found, and a sane drive raises no alarm.
+
+The drives are made here from closed forms: a car in bends and over a hill,
+with noise, a tilted sensor and quantised speed.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from weighbridge.errors import DriveError
+from weighbridge.io import read_drive
+from weighbridge.pipeline.checks import check_drive
+from weighbridge.pipeline.inspection import describe, inspect_drive, quantisation
+from weighbridge.pipeline.weighing import weigh
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
+
+GEARINGS = (45.0, 26.0, 17.5, 13.0, 10.5)
+CAR = Vehicle(
+    driveline=Driveline(gearings=GEARINGS),
+    torque=TorqueModel(source="load", coefficients=(0.0, 200.0)),
+)
+
+
+def make_drive(seed=1, mounting=(0.02, -0.1, 0.6), duration=900.0, bends=1.0):
+    """Drive 15 min at 3 to 27 m/s through bends, at 48 degrees north."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, duration, 0.02)
+    v = 15.0 + 8.0 * np.sin(2 * np.pi * t / 60.0) + 4.0 * np.sin(2 * np.pi * t / 17.0)
+    a = np.gradient(v, t)
+    yaw_rate = 0.08 * np.sin(2 * np.pi * t / 40.0) + 0.03 * np.sin(2 * np.pi * t / 23.0) + 0.005
+    yaw_rate *= bends
+    course = 0.7 + np.cumsum(yaw_rate) * 0.02
+    grade = 0.03 * np.sin(2 * np.pi * t / 200.0)
+    body = np.column_stack((a + 9.81 * grade, v * yaw_rate, np.full_like(t, -9.81)))
+    rate = np.column_stack((np.zeros_like(t), np.gradient(grade, t), yaw_rate))
+    # Sensor axes: the inverse of sensor to body.
+    turn = Rotation.from_euler("xyz", mounting).inv()
+    force = turn.apply(body) + rng.normal(0.0, 0.3, body.shape)
+    rates = turn.apply(rate) + rng.normal(0.0, 0.005, body.shape) + [0.01, -0.02, 0.005]
+    obd, gnss = slice(0, None, 13), slice(0, None, 50)
+    north = np.cumsum(v * np.cos(course)) * 0.02
+    east = np.cumsum(v * np.sin(course)) * 0.02
+    gear = np.searchsorted([6.0, 11.0, 16.0, 21.0], v)
+    tg = t[gnss]
+    signals = [
+        *(Signal(f"accel_{x}", t, force[:, k].copy()) for k, x in enumerate("xyz")),
+        *(Signal(f"gyro_{x}", t, rates[:, k].copy()) for k, x in enumerate("xyz")),
+        Signal("vehicle_speed", t[obd], np.round(v[obd] * 3.6) / 3.6),
+        Signal("engine_speed", t[obd], (v * np.array(GEARINGS)[gear])[obd]),
+        Signal("engine_load", t[obd], 0.4 + 0.3 * np.sin(t[obd])),
+        Signal(
+            "latitude", tg, np.radians(48.0) + (north[gnss] + rng.normal(0, 1, tg.size)) / 6.371e6
+        ),
+        Signal(
+            "longitude",
+            tg,
+            np.radians(11.0)
+            + (east[gnss] + rng.normal(0, 1, tg.size)) / 6.371e6 / np.cos(np.radians(48.0)),
+        ),
+        Signal("altitude", tg, 500.0 + np.cumsum(v * grade)[gnss] * 0.02),
+        Signal("gnss_speed", tg, np.abs(v[gnss] + rng.normal(0, 0.1, tg.size))),
+        Signal("gnss_course", tg, np.mod(course[gnss], 2 * np.pi)),
+    ]
+    return Drive("made", {s.name: s for s in signals})
+
+
+@pytest.fixture(scope="module")
+def sane():
+    return make_drive()
+
+
+def scaled(drive, **factors):
+    return drive.with_signals(
+        *(
+            replace(drive.signals[name], values=drive.signals[name].values * factor)
+            for name, factor in factors.items()
+        )
+    )
+
+
+def renamed(drive, **names):
+    moved = {new: replace(drive.signals[old], name=new) for old, new in names.items()}
+    return replace(drive, signals={**drive.signals, **moved})
+
+
+def serious(drive, vehicle=None):
+    return [p for p in check_drive(drive, vehicle) if p.serious]
+
+
+def only(drive, vehicle=None):
+    """The one thing a person is told first."""
+    found = serious(drive, vehicle)
+    assert found, "no serious problem was found"
+    assert "\n" not in found[0].text
+    return found[0]
+
+
+IMU = {f"{kind}_{a}": 1.0 for kind in ("accel", "gyro") for a in "xyz"}
+ACCEL = ("accel_x", "accel_y", "accel_z")
+GYRO = ("gyro_x", "gyro_y", "gyro_z")
+GNSS = ("latitude", "longitude", "altitude", "gnss_speed", "gnss_course")
+
+
+# No false alarms
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("mounting", [(0.0, 0.0, 0.0), (np.pi, 0.0, 0.3), (1.5, 0.2, -2.0)])
+def test_sane_drive_in_any_mounting(seed, mounting):
+    assert check_drive(make_drive(seed, mounting), CAR) == ()
+
+
+@pytest.mark.parametrize(
+    "lacking",
+    [GNSS, ("gnss_speed",), ACCEL + GYRO, ("latitude",), ("vehicle_speed", "engine_speed"), GYRO],
+)
+def test_sane_drive_that_lacks_signals(sane, lacking):
+    assert check_drive(sane.without(*lacking), CAR) == ()
+
+
+def test_speedometer_that_reads_four_percent_high(sane):
+    assert check_drive(scaled(sane, vehicle_speed=1.04)) == ()
+
+
+def test_drive_in_one_gear_and_stepless_gearbox(sane):
+    engine = sane.signals["engine_speed"]
+    stepless = replace(engine, values=np.linspace(120.0, 260.0, len(engine)))
+    assert serious(sane.without(*GNSS, *ACCEL).with_signals(stepless), CAR) == []
+
+
+# Wrong units
+
+
+def test_accelerometer_in_g(sane):
+    problem = only(scaled(sane, **dict.fromkeys(ACCEL, 1 / 9.81)))
+    assert "it seems to be in g: name its columns accel_x_g" in problem.text
+
+
+def test_accelerometer_in_metres_under_g(sane):
+    assert "is in m/s^2 already" in only(scaled(sane, **dict.fromkeys(ACCEL, 9.81))).text
+
+
+def test_accelerometer_without_gravity(sane):
+    z = sane.signals["accel_z"]
+    flat = make_drive(mounting=(0.0, 0.0, 0.0))
+    z = replace(flat.signals["accel_z"], values=flat.signals["accel_z"].values + 9.81)
+    assert "gravity was taken out" in only(flat.with_signals(z)).text
+
+
+def test_gyro_in_degrees(sane):
+    fast = scaled(sane, **dict.fromkeys(GYRO, 180 / np.pi))
+    assert "seems to be in deg/s: name its columns gyro_x_degps" in only(fast).text
+
+
+def test_slow_gyro_in_degrees_is_seen_against_the_course():
+    # A road of wide bends: too slow to stand out by itself.
+    gentle = make_drive(bends=0.4)
+    assert check_drive(gentle) == ()
+    problem = only(scaled(gentle, **dict.fromkeys(GYRO, 180 / np.pi)))
+    assert "times as far as the GNSS course; it seems to be in deg/s" in problem.text
+
+
+def test_gyro_in_radians_under_degrees(sane):
+    assert "in rad/s" in only(scaled(sane, **dict.fromkeys(GYRO, np.pi / 180))).text
+
+
+MPH_UNDER_KMH = 0.621371
+KMH_UNDER_MPH = 1.609344
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (MPH_UNDER_KMH, "in mph under vehicle_speed_kmh: name the column vehicle_speed_mph"),
+        (KMH_UNDER_MPH, "in kmh under vehicle_speed_mph"),
+        (1 / 3.6, "in mps under vehicle_speed_kmh"),
+        (3.6, "in kmh under vehicle_speed_mps"),
+    ],
+)
+@pytest.mark.parametrize(
+    "lacking",
+    [
+        (),
+        ("gnss_speed",),
+        ("gnss_speed", "latitude"),
+        ("gnss_speed", "latitude", *ACCEL),
+        ("gnss_speed", "latitude", "engine_speed"),
+    ],
+    ids=["gnss_speed", "positions", "gears", "gears alone", "acceleration"],
+)
+def test_speed_in_another_unit_is_found_by_any_source(sane, factor, words, lacking):
+    problem = only(scaled(sane, vehicle_speed=factor).without(*lacking), CAR)
+    assert problem.signal == "vehicle_speed"
+    assert words in problem.text
+
+
+@pytest.mark.parametrize("factor", [MPH_UNDER_KMH, 1 / 3.6])
+def test_speed_of_an_electric_car_is_judged_by_its_accelerometer(sane, factor):
+    rng = np.random.default_rng(8)
+    t = np.arange(0.0, 900.0, 0.1)
+    v = 15.0 + 8.0 * np.sin(2 * np.pi * t / 60.0) + 4.0 * np.sin(2 * np.pi * t / 17.0)
+    force = 1.03 * np.gradient(v, t) + 9.81 * 0.03 * np.sin(t / 30.0) + rng.normal(0.0, 0.1, t.size)
+    accel = Signal("longitudinal_accel", t, force)
+    right = Drive("e", {"vehicle_speed": Signal("vehicle_speed", t, v), accel.name: accel})
+    assert check_drive(right) == ()
+    assert "the speed from the acceleration" in only(scaled(right, vehicle_speed=factor)).text
+
+
+def test_gnss_speed_in_another_unit(sane):
+    problem = only(scaled(sane, gnss_speed=1 / 3.6))
+    assert problem.signal == "gnss_speed"
+    assert "in mps under speed_kmh" in problem.text
+
+
+def test_positions_in_radians(sane):
+    problem = only(scaled(sane, latitude=np.pi / 180, longitude=np.pi / 180))
+    assert "seem to be in radians" in problem.text
+
+
+def test_latitude_and_longitude_swapped(sane):
+    problem = only(renamed(sane, latitude="longitude", longitude="latitude"))
+    assert "seem to be swapped" in problem.text
+    lacking = sane.without("gnss_course")
+    assert "swapped" in only(renamed(lacking, latitude="longitude", longitude="latitude")).text
+
+
+def test_load_as_a_part_of_one(sane):
+    problem = only(scaled(sane, engine_load=0.01))
+    assert "name the column engine_load_ratio" in problem.text
+
+
+def test_load_in_percent_under_a_ratio(sane):
+    assert "engine_load are outside 0 pct to 102 pct" in only(scaled(sane, engine_load=100.0)).text
+
+
+def test_engine_speed_in_radians(sane):
+    problem = only(scaled(sane, engine_speed=np.pi / 30))
+    assert "name the column engine_speed_radps" in problem.text
+
+
+def test_time_in_milliseconds(sane):
+    late = {n: replace(s, time=s.time * 1e3) for n, s in sane.signals.items()}
+    problem = only(replace(sane, signals=late))
+    assert "name the column time_ms" in problem.text
+
+
+def test_time_in_seconds_under_milliseconds(sane):
+    late = {n: replace(s, time=s.time * 1e-3) for n, s in sane.signals.items()}
+    problem = only(replace(sane, signals=late))
+    assert "name the column time_s" in problem.text
+
+
+# Axes
+
+
+def test_two_axes_swapped(sane):
+    swap = {"accel_x": "accel_y", "accel_y": "accel_x", "gyro_x": "gyro_y", "gyro_y": "gyro_x"}
+    assert "two axes of the inertial sensor are swapped" in only(renamed(sane, **swap)).text
+
+
+def test_axes_of_the_accelerometer_alone_swapped(sane):
+    swapped = renamed(sane, accel_x="accel_y", accel_y="accel_x")
+    assert "two axes of the inertial sensor are swapped" in only(swapped).text
+    upright = renamed(sane, accel_z="accel_y", accel_y="accel_z")
+    assert "not about the accelerometer's vertical" in only(upright).text
+
+
+def test_one_axis_with_the_wrong_sign(sane):
+    assert "wrong sign" in only(scaled(sane, accel_y=-1.0).without(*GNSS)).text
+
+
+def test_accelerometer_that_reads_gravity_instead_of_specific_force(sane):
+    problem = only(scaled(sane, **dict.fromkeys(ACCEL, -1.0)))
+    assert "the gyro turns against the GNSS course" in problem.text
+
+
+def test_speed_counted_backwards(sane):
+    assert "set factor = -1" in only(scaled(sane, vehicle_speed=-1.0).without(*GNSS)).text
+
+
+# Stuck, standing, apart
+
+
+@pytest.mark.parametrize("name", ["accel_y", "gyro_x", "vehicle_speed", "engine_load"])
+def test_constant_signal(sane, name):
+    s = sane.signals[name]
+    stuck = replace(s, values=np.full(len(s), s.values[0]))
+    texts = [p.text for p in serious(sane.with_signals(stuck)) if p.signal == name]
+    assert any("all the time; its source is stuck" in t for t in texts)
+
+
+def test_sensor_that_froze_on_the_way(sane):
+    s = sane.signals["accel_x"]
+    values = s.values.copy()
+    values[1000:1500] = values[1000]
+    (note,) = check_drive(sane.with_signals(replace(s, values=values)))
+    assert not note.serious
+    assert "repeats one value for 10.0 s from 20 s" in note.text
+    values[1000:20000] = values[1000]
+    found = serious(sane.with_signals(replace(s, values=values)))
+    assert any("repeats one value for 380.0 s" in p.text for p in found)
+
+
+def test_an_hour_of_standstill_is_a_note():
+    t = np.arange(0.0, 3600.0, 0.5)
+    rng = np.random.default_rng(0)
+    still = Drive(
+        "still",
+        {
+            "vehicle_speed": Signal("vehicle_speed", t, np.zeros(t.size)),
+            "engine_torque": Signal("engine_torque", t, np.zeros(t.size)),
+            **{
+                f"accel_{a}": Signal(f"accel_{a}", t, rng.normal(g, 0.01, t.size))
+                for a, g in (("x", 0.0), ("y", 0.0), ("z", -9.81))
+            },
+        },
+    )
+    (note,) = check_drive(still)
+    assert not note.serious
+    assert "stands all the time (3600 s)" in note.text
+
+
+def test_a_long_stop_and_a_cut_are_notes():
+    t = np.arange(0.0, 2000.0, 0.1)
+    v = np.where(t < 500.0, 10.0 + 5.0 * np.sin(t / 20.0), 0.0)
+    v = np.where(t > 1500.0, 10.0 * (1.0 - np.exp(-(t - 1500.0) / 10.0)), v)
+    notes = check_drive(Drive("d", {"vehicle_speed": Signal("vehicle_speed", t, v)}))
+    assert [n.serious for n in notes] == [False, False]
+    assert "stands for 17 min from 500 s" in notes[0].text
+    assert "a piece may be cut out" in notes[1].text
+
+
+def test_values_out_of_range(sane):
+    s = sane.signals["vehicle_speed"]
+    few, many = s.values.copy(), s.values.copy()
+    few[5] = 200.0
+    many[::20] = 200.0
+    (note,) = [
+        p for p in check_drive(sane.with_signals(replace(s, values=few))) if "1 of" in p.text
+    ]
+    assert not note.serious
+    assert "such as 720 kmh at 1.3 s" in note.text
+    found = serious(sane.with_signals(replace(s, values=many)))
+    assert any("are outside -28.8 kmh to 342 kmh" in p.text for p in found)
+
+
+def test_tables_of_different_clocks(sane):
+    late = [replace(s, time=s.time + 1e6) for n, s in sane.signals.items() if n in GNSS]
+    problem = only(sane.with_signals(*late))
+    assert "write both on one clock" in problem.text
+
+
+def test_clock_that_jumps_a_day(sane):
+    s = sane.signals["vehicle_speed"]
+    time = s.time.copy()
+    time[-10:] += 1e9
+    problem = only(Drive("d", {s.name: replace(s, time=time)}))
+    assert "jumps by 1e+09 s" in problem.text
+
+
+def test_weigh_refuses_a_serious_problem(sane):
+    with pytest.raises(DriveError, match=r"made: vehicle_speed is 0\.6.* in mph"):
+        weigh(scaled(sane, vehicle_speed=MPH_UNDER_KMH), CAR)
+
+
+def test_wrong_header_is_found_from_file_to_sentence(tmp_path, sane):
+    from weighbridge.io import write_drive
+
+    write_drive(sane, tmp_path, "csv")
+    text = (tmp_path / "obd.csv").read_text(encoding="utf-8")
+    assert "vehicle_speed_kmh" in text
+    (tmp_path / "obd.csv").write_text(
+        text.replace("vehicle_speed_kmh", "vehicle_speed_mph"), encoding="utf-8"
+    )
+    assert "in kmh under vehicle_speed_mph" in only(read_drive(tmp_path)).text
+
+
+# Inspection
+
+
+def test_report_of_a_signal():
+    time = np.array([0.0, 1.0, 2.0, 3.0, 20.0, 21.0])
+    report = describe(Signal("vehicle_speed", time, np.arange(6.0)))
+    assert report.count == 6
+    assert report.rate == pytest.approx(5 / 21)
+    assert report.period == 1.0
+    assert report.gaps == 1
+    assert report.longest_gap == 17.0
+    assert report.jitter == 0.0
+    assert (report.low, report.high) == pytest.approx((0.0, 18.0))
+    assert report.unit == "kmh"
+
+
+def test_quantisation_is_found_in_the_unit_recorded():
+    rng = np.random.default_rng(2)
+    values = rng.uniform(0.0, 100.0, 5000)
+    assert quantisation(values) is None
+    assert quantisation(np.round(values)) == 1.0
+    assert quantisation(np.round(values / 0.39) * 0.39) == pytest.approx(0.39)
+    assert quantisation(np.zeros(100)) is None
+
+
+def test_ways_follow_from_signals(sane):
+    found = inspect_drive(sane, CAR)
+    assert found.problems == ()
+    assert [s.name for s in found.signals][:2] == ["accel_x", "accel_y"]
+    possible = [w for w in found.ways if w.possible]
+    assert {w.torque for w in possible} == {"load"}
+    assert {w.motion for w in possible} == {"inertial", "speed_grade", "speed"}
+    (chosen,) = (w for w in found.ways if w.chosen)
+    assert chosen.motion == "inertial"
+    air = next(w for w in found.ways if (w.motion, w.torque) == ("inertial", "air_flow"))
+    assert air.needs == ("mass_air_flow",)
+
+
+def test_drive_without_torque_has_no_way(sane):
+    found = inspect_drive(sane.without("engine_load"))
+    assert not any(w.possible for w in found.ways)
+    assert not any(w.chosen for w in found.ways)
+    assert all(w.needs for w in found.ways)
