@@ -1,1 +1,77 @@
+"""A software weighbridge: the mass of a road vehicle, weighed while it drives.
+
+>>> import weighbridge as wb
+>>> drive = wb.read_drive("drive/")
+>>> car = wb.calibrate([drive], mass=1580.0)
+>>> w = wb.weigh(drive, car)
+>>> w.mass, w.interval(0.95), w.status
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from weighbridge.errors import ConfigError, DriveError, MissingExtraError, WeighbridgeError
+    from weighbridge.estimators import Segment, Status
+    from weighbridge.io import read_drive
+    from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
+    from weighbridge.pipeline.inspection import inspect_drive
+    from weighbridge.pipeline.weighing import Weighing, weigh
+    from weighbridge.signals import Drive, DriveInfo, Problem, Signal
+    from weighbridge.vehicle.model import Vehicle
+
+_HOMES = {
+    "CalibrationSettings": "weighbridge.pipeline.calibrating",
+    "ConfigError": "weighbridge.errors",
+    "Drive": "weighbridge.signals",
+    "DriveError": "weighbridge.errors",
+    "DriveInfo": "weighbridge.signals",
+    "MissingExtraError": "weighbridge.errors",
+    "Problem": "weighbridge.signals",
+    "Segment": "weighbridge.estimators",
+    "Signal": "weighbridge.signals",
+    "Status": "weighbridge.estimators",
+    "Vehicle": "weighbridge.vehicle.model",
+    "Weighing": "weighbridge.pipeline.weighing",
+    "WeighbridgeError": "weighbridge.errors",
+    "calibrate": "weighbridge.pipeline.calibrating",
+    "inspect_drive": "weighbridge.pipeline.inspection",
+    "read_drive": "weighbridge.io",
+    "weigh": "weighbridge.pipeline.weighing",
+}
+
+__all__ = [
+    "CalibrationSettings",
+    "ConfigError",
+    "Drive",
+    "DriveError",
+    "DriveInfo",
+    "MissingExtraError",
+    "Problem",
+    "Segment",
+    "Signal",
+    "Status",
+    "Vehicle",
+    "Weighing",
+    "WeighbridgeError",
+    "calibrate",
+    "inspect_drive",
+    "read_drive",
+    "weigh",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the public names when they are first used, so that importing costs nothing."""
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(home), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])

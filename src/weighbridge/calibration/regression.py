@@ -165,7 +165,7 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
     lower = np.concatenate([np.full(width - 4, -np.inf), low]) * scale
     upper = np.concatenate([np.full(width - 4, np.inf), high]) * scale
     # A parameter whose bounds coincide is known; lsq_linear wants an interval.
-    upper = np.maximum(upper, lower + 1e-9 * (1.0 + np.abs(lower)))
+    upper[-4:] = np.maximum(upper[-4:], lower[-4:] + 1e-9 * (1.0 + lower[-4:]))
     design = rows.design / scale
 
     weight = np.ones(n)
@@ -182,8 +182,9 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
         if moved < 1e-9 * np.max(np.abs(solved)):
             break
 
-    margin = 1e-6 * (upper - lower)
-    held = (parameters <= lower + margin) | (parameters >= upper - margin)
+    held = np.zeros(width, dtype=bool)
+    margin = 1e-6 * (upper[-4:] - lower[-4:])
+    held[-4:] = (parameters[-4:] <= lower[-4:] + margin) | (parameters[-4:] >= upper[-4:] - margin)
     cov = _sandwich(design, residual, weight, rows.block, ~held) / np.outer(scale, scale)
     parameters = parameters / scale
     torque = rows.design[:, :-4] @ parameters[:-4]

@@ -1,1 +1,1 @@
-"""papers"""
+"""Reproductions of the published systems, each against its paper's own tables."""

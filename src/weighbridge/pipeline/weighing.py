@@ -12,11 +12,11 @@ import numpy as np
 from scipy.stats import t as student
 
 from weighbridge.balance import REASON_TEXT, Reason, force_balance
+from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Segment, Status
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Drive
-from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import SIGNALS
 
@@ -256,6 +256,27 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
         result=result,
         warnings=warnings,
     )
+
+
+def empty_result(drive: str, vehicle: str, method: str, reason: str) -> dict[str, Any]:
+    """Return `Weighing.to_dict` of a drive that could not be used at all."""
+    return {
+        "drive": drive,
+        "vehicle": vehicle,
+        "method": method,
+        "status": str(Status.INCONSISTENT),
+        "reason": reason,
+        "mass_kg": None,
+        "std_kg": None,
+        "interval95_kg": [None, None],
+        "payload_kg": None,
+        "duration_s": None,
+        "used_s": None,
+        "converged_at_s": None,
+        "bound_std_kg": None,
+        "segments": [],
+        "warnings": [],
+    }
 
 
 def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:

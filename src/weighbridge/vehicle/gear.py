@@ -17,6 +17,9 @@ LOWEST_GEARING: Final = 3.0
 HIGHEST_GEARING: Final = 140.0
 """Above any first gear of a road vehicle, trucks' crawlers too [1/m]."""
 
+MOSTLY_IN_GEAR: Final = 0.6
+"""Part of the steady samples that lies at a ratio of a gearbox with gears [-]."""
+
 
 @dataclass(frozen=True, slots=True)
 class GearDetection:
@@ -148,6 +151,12 @@ def detect_gearings(
         raise DriveError(
             "no gear ratio stands out from engine over vehicle speed: the drive is too short, "
             "or the gearbox is stepless"
+        )
+    near = np.abs(np.log(gearing[steady][:, None] / grid[peaks])).min(axis=1) < 2.0 * width
+    if np.mean(near) < MOSTLY_IN_GEAR:
+        raise DriveError(
+            f"only {100.0 * np.mean(near):.0f} % of the samples lie at a gear ratio that stands "
+            "out: the gearbox is stepless, or engine and vehicle speed do not belong together"
         )
     values, stds, counts = [], [], []
     for centre in grid[peaks]:

@@ -1,0 +1,127 @@
+"""``weighbridge calibrate``: from drives of known mass to a vehicle file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Optional
+
+import typer
+
+from weighbridge.cli.options import (
+    DrivePaths,
+    MappingPath,
+    load,
+    mapping_for,
+    refuse_overwriting,
+)
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from weighbridge.pipeline.calibrating import Calibration
+
+
+def calibrate(
+    drives: DrivePaths,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
+    ],
+    mass: Annotated[
+        Optional[list[float]],  # noqa: UP045
+        typer.Option(
+            "--mass",
+            help="Known mass in kg; repeat it, one for each drive, where they differ. "
+            "Without it, mass_kg of each drive.toml.",
+        ),
+    ] = None,
+    vehicle: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--vehicle", help="What is known already: class, wheel radius, gearings."),
+    ] = None,
+    order: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--order", min=0, max=4, help="Power of engine speed in the torque fit."),
+    ] = None,
+    torque: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--torque", help="Torque source: measured, percent, load or air_flow."),
+    ] = None,
+    grid: Annotated[
+        bool, typer.Option("--grid", help="Search the grid of Jensen 2022, Table 5, instead.")
+    ] = False,
+    mapping: MappingPath = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Calibrate a vehicle from drives of known mass.
+
+    Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
+    """
+    from rich.console import Console
+
+    from weighbridge.errors import ConfigError
+    from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
+    from weighbridge.vehicle.model import Vehicle
+
+    refuse_overwriting(output, force, "vehicle file")
+    if torque not in (None, "measured", "percent", "load", "air_flow"):
+        raise ConfigError(f"--torque {torque}: must be measured, percent, load or air_flow")
+    base = Vehicle.load(vehicle) if vehicle is not None else None
+    recorded = [load(path, mapping_for(mapping, base, vehicle)) for path in drives]
+    settings = CalibrationSettings(order=order, source=torque, grid=grid)  # type: ignore[arg-type]
+    masses = mass[0] if mass is not None and len(mass) == 1 else mass
+    done = run_calibration(recorded, masses, vehicle=base, settings=settings)
+    done.vehicle.save(output)
+    Console().print(table(done))
+    typer.echo(f"written: {output}")
+
+
+def table(done: Calibration) -> Table:
+    """Show what was found, with its standard deviation."""
+    from rich.table import Table
+
+    from weighbridge.signals.units import scalar_from_si
+
+    vehicle, p = done.vehicle, done.vehicle.provenance
+    shown = Table(title=f"calibration of {vehicle.name}", title_justify="left")
+    shown.add_column("parameter")
+    shown.add_column("value", justify="right")
+    shown.add_column("std", justify="right")
+
+    def row(name: str, value: float | None, std: float | None, digits: int) -> None:
+        if value is not None:
+            shown.add_row(
+                name,
+                f"{value:.{digits}f}",
+                "" if std is None or std == 0.0 else f"{std:.{digits}f}",
+            )
+
+    stds = done.gears.stds if done.gears is not None else [None] * len(vehicle.driveline.gearings)
+    for k, (gearing, std) in enumerate(zip(vehicle.driveline.gearings, stds, strict=True), 1):
+        row(f"gearing {k} [rad/m]", gearing, std, 3)
+    road, line = vehicle.road_load, vehicle.driveline
+    row("drag area C_d A [m²]", road.drag_area, road.drag_area_std, 3)
+    row("rolling coefficient C_r [-]", road.rolling_coefficient, road.rolling_coefficient_std, 4)
+    inertia_stds = done.fit.cov.diagonal()[-2:] ** 0.5
+    row("engine inertia [kg m²]", line.engine_inertia, float(inertia_stds[0]), 3)
+    row("wheel inertia [kg m²]", line.wheel_inertia, float(inertia_stds[1]), 2)
+    for k, (w, std) in enumerate(
+        zip(vehicle.torque.coefficients, vehicle.torque.coefficient_stds, strict=True)
+    ):
+        shown.add_row(f"torque w{k}", f"{w:.5g}", f"{std:.2g}")
+    row("torque delay [s]", vehicle.timing.torque_delay, None, 3)
+    row("speed scale, indicated / true", line.speed_scale, None, 4)
+    if vehicle.mounting is not None and vehicle.mounting.squat is not None:
+        row(
+            "squat [°/(m/s²)]",
+            scalar_from_si(vehicle.mounting.squat, "deg"),
+            scalar_from_si(vehicle.mounting.squat_std or 0.0, "deg"),
+            3,
+        )
+    row("torque fit R²", p.r_squared, None, 4)
+    row("torque fit residual [N m]", p.residual_std, None, 1)
+    shown.add_row("samples", str(p.samples), "")
+    if p.mass_scale_std is not None:
+        row("left in every mass [%]", 100.0 * p.mass_scale_std, None, 2)
+    if p.notes:
+        shown.caption = p.notes
+    return shown

@@ -1,0 +1,45 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Optional
+
+import typer
+
+from weighbridge.errors import ConfigError
+
+if TYPE_CHECKING:
+    from weighbridge.signals import Drive
+    from weighbridge.vehicle.model import Vehicle
+
+DrivePaths = Annotated[
+    list[Path], typer.Argument(help="Drives: folders of tables, or log files.", show_default=False)
+]
+MappingPath = Annotated[
+    Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
+    typer.Option("--mapping", help="TOML that names foreign columns, units and signs."),
+]
+
+
+def mapping_for(mapping: Path | None, vehicle: Vehicle | None, home: Path | None) -> Path | None:
+    """Return the mapping asked for, else the one the vehicle file names beside itself."""
+    if mapping is not None or vehicle is None or vehicle.mapping is None:
+        return mapping
+    named = Path(vehicle.mapping)
+    return named if named.is_absolute() or home is None else home.parent / named
+
+
+def load(path: Path, mapping: Path | None) -> Drive:
+    """Read one drive."""
+    from weighbridge.io import read_drive
+
+    return read_drive(path, mapping)
+
+
+def refuse_overwriting(path: Path, force: bool, what: str) -> None:
+    """Raise where ``path`` exists and ``--force`` was not given."""
+    if path.exists() and not force:
+        raise ConfigError(
+            f"{path}: exists already; name another {what}, or give --force to replace it"
+        )

@@ -1,0 +1,173 @@
+"""``weighbridge weigh``: from drives and a vehicle file to masses."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Optional
+
+import typer
+
+from weighbridge.cli.options import DrivePaths, MappingPath, load, mapping_for
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.vehicle.model import Vehicle
+
+
+def weigh(
+    drives: DrivePaths,
+    vehicle: Annotated[
+        Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
+    ],
+    method: Annotated[str, typer.Option("--method", help="Estimator.")] = "rls",
+    json_path: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--json", help="Write one JSON object per drive to a file, or - for here."),
+    ] = None,
+    track: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--track", help="Write the mass over time: .csv or .parquet. One drive."),
+    ] = None,
+    report: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--report", help="Write a self-contained HTML report."),
+    ] = None,
+    mapping: MappingPath = None,
+) -> None:
+    """Weigh a vehicle from one or more drives.
+
+    Exits with 0 where every drive gave a mass, with 1 where one could not.
+
+    Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
+    """
+    from weighbridge.errors import ConfigError, WeighbridgeError
+    from weighbridge.vehicle.model import Vehicle
+
+    if track is not None and len(drives) > 1:
+        raise ConfigError("--track takes one drive; weigh them one by one, or use --json")
+    if track is not None and track.suffix.lower() not in (".csv", ".parquet"):
+        raise ConfigError(f"--track {track}: a track is written as .csv or .parquet")
+    _refuse_inputs(drives, track, report, json_path)
+    car = Vehicle.load(vehicle)
+    chosen = mapping_for(mapping, car, vehicle)
+    weighed: list[Weighing] = []
+    failed: list[tuple[Path, str]] = []
+    for path in _progress(drives):
+        try:
+            weighed.append(_weigh_one(path, chosen, car, method))
+        except WeighbridgeError as error:
+            if len(drives) == 1:
+                raise
+            failed.append((path, str(error)))
+
+    if track is not None:
+        weighed[0].write_track(track)
+    if report is not None:
+        from weighbridge.report import write_report
+
+        if not weighed:
+            raise ConfigError(f"--report {report}: none of the drives could be read")
+        write_report(weighed, report)
+    lines = [w.to_json() for w in weighed] + [
+        _failure(path, why, car, method) for path, why in failed
+    ]
+    if json_path == "-":
+        typer.echo("\n".join(lines))
+    else:
+        if json_path is not None:
+            Path(json_path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        _show(weighed, failed)
+    if failed:
+        raise typer.Exit(2)
+    if any(w.status != "converged" for w in weighed):
+        raise typer.Exit(1)
+
+
+def _weigh_one(path: Path, mapping: Path | None, car: Vehicle, method: str) -> Weighing:
+    from weighbridge.pipeline.weighing import weigh as weigh_drive
+
+    return weigh_drive(load(path, mapping), car, method)
+
+
+def _refuse_inputs(
+    drives: list[Path], track: Path | None, report: Path | None, json_path: str | None
+) -> None:
+    from weighbridge.errors import ConfigError
+
+    inputs = {path.resolve() for path in drives}
+    for output in (track, report, Path(json_path) if json_path not in (None, "-") else None):
+        if output is not None and Path(output).resolve() in inputs:
+            raise ConfigError(f"{output}: is a drive; results must go to another file")
+
+
+def _progress(drives: list[Path]) -> Any:
+    """Show a bar on a terminal while several drives are weighed."""
+    if len(drives) == 1 or not sys.stderr.isatty():
+        return drives
+    from rich.console import Console
+    from rich.progress import track
+
+    return track(drives, description="weighing", console=Console(stderr=True), transient=True)
+
+
+def _failure(path: Path, why: str, car: Vehicle, method: str) -> str:
+    """Write the JSON object of a drive that could not be read, with the fields of the others."""
+    import json
+
+    from weighbridge.pipeline.weighing import empty_result
+
+    return json.dumps(empty_result(path.name, car.name, method, why), ensure_ascii=False)
+
+
+def _show(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> None:
+    from rich.console import Console
+
+    console = Console()
+    if len(weighed) == 1 and not failed:
+        _show_one(weighed[0])
+        return
+    console.print(result_table(weighed, failed))
+
+
+def _show_one(w: Weighing) -> None:
+    if w.status == "converged":
+        low, high = w.interval(0.95)
+        typer.echo(f"{w.drive.name}: {w.mass:.0f} kg, 95 % between {low:.0f} and {high:.0f} kg")
+        if w.vehicle.tare is not None:
+            typer.echo(f"payload {w.payload:.0f} kg over a tare of {w.vehicle.tare:.0f} kg")
+        minutes = w.used_time / 60.0
+        typer.echo(
+            f"from {minutes:.1f} min of {w.drive.duration / 60.0:.1f} min, method {w.method}"
+        )
+    else:
+        typer.echo(f"{w.drive.name}: no mass ({w.status}): {w.reason}")
+    for warning in w.warnings:
+        typer.echo(f"  note: {warning}")
+
+
+def result_table(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> Table:
+    """One row a drive: its mass, or why there is none."""
+    from rich.table import Table
+
+    table = Table()
+    table.add_column("drive", no_wrap=True)
+    table.add_column("min", justify="right")
+    table.add_column("used", justify="right")
+    for name in ("mass kg", "95 % from", "to", "payload kg"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("status or reason")
+    for w in weighed:
+        low, high = w.interval(0.95)
+        table.add_row(
+            w.drive.name,
+            f"{w.drive.duration / 60.0:.1f}",
+            f"{w.used_time / 60.0:.1f}",
+            *(f"{x:.0f}" if x == x else "" for x in (w.mass, low, high, w.payload)),
+            str(w.status) if w.status == "converged" else f"{w.status}: {w.reason}",
+        )
+    for path, why in failed:
+        table.add_row(path.name, "", "", "", "", "", "", f"unreadable: {why}")
+    return table

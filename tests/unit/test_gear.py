@@ -1,0 +1,78 @@
+"""Gear ratios from speeds, and the gear of the moment."""
+
+import numpy as np
+import pytest
+
+from weighbridge.errors import DriveError
+from weighbridge.vehicle.gear import detect_gearings, predict_gear, shifting
+
+GEARINGS = np.array([36.0, 22.0, 14.5, 10.6, 8.4])
+
+
+def drive(rng, *, minutes=20, step=0.0, rate=4.0):
+    """Speeds of a car that works through its gears, with slipping clutches between."""
+    n = int(minutes * 60 * rate)
+    time = np.arange(n) / rate
+    speed = 12.0 + 11.0 * np.sin(time / 17.0) + rng.normal(0.0, 0.05, n)
+    speed = np.clip(speed, 0.0, None)
+    gear = np.searchsorted([4.0, 8.0, 13.0, 18.0], speed)
+    engine = GEARINGS[gear] * speed * (1.0 + rng.normal(0.0, 0.002, n))
+    shift = np.concatenate(([False], np.diff(gear) != 0))
+    engine[shift] *= rng.uniform(0.8, 1.2, np.count_nonzero(shift))
+    engine = np.maximum(engine, 85.0)
+    if step:
+        speed = np.floor(speed / step) * step + 0.5 * step
+    return time, engine, speed
+
+
+def test_gearings_are_found_within_a_percent():
+    found = detect_gearings(*drive(np.random.default_rng(3)))
+    assert found.gearings == pytest.approx(GEARINGS, rel=0.01)
+    assert (found.stds < 0.01 * found.gearings).all()
+
+
+def test_gearings_are_found_from_whole_kmh():
+    step = 1.0 / 3.6
+    found = detect_gearings(*drive(np.random.default_rng(4), step=step), speed_step=step)
+    # The first gear is used below 15 km/h only, where a step is a tenth of the speed.
+    assert found.gearings[-4:] == pytest.approx(GEARINGS[-4:], rel=0.01)
+
+
+def test_a_single_speed_is_found():
+    rng = np.random.default_rng(5)
+    time, _, speed = drive(rng)
+    found = detect_gearings(time, 28.85 * speed, speed, idle_speed=0.0)
+    assert found.gearings == pytest.approx([28.85], rel=0.005)
+
+
+def test_a_stepless_gearbox_is_refused():
+    rng = np.random.default_rng(6)
+    time = np.arange(20_000) * 0.25
+    speed = 15.0 + 10.0 * np.sin(time / 40.0)
+    engine = speed * np.exp(np.log(8.0) + np.cumsum(rng.normal(0, 0.01, time.size)) * 0.2)
+    engine = np.clip(engine, 90.0, 500.0) * (1 + rng.normal(0, 0.2, time.size))
+    with pytest.raises(DriveError, match=r"steady ratio|stands out"):
+        detect_gearings(time, engine, speed)
+
+
+def test_too_short_a_drive_says_so():
+    time = np.arange(20) * 0.25
+    with pytest.raises(DriveError, match="longer drive"):
+        detect_gearings(time, np.full(20, 200.0), np.full(20, 10.0))
+
+
+def test_nearest_gear_is_predicted_and_slip_is_none():
+    speed = np.array([10.0, 10.0, 10.0, 0.0, 10.0])
+    engine = np.array([220.0, 145.0, 180.0, 85.0, 36.0 * 10.0 * 1.03])
+    gear, mismatch = predict_gear(engine, speed, GEARINGS)
+    assert gear.tolist() == [2, 3, 0, 0, 1]
+    assert mismatch[4] == pytest.approx(0.03)
+    assert np.isnan(mismatch[3])
+
+
+def test_shifts_are_marked_on_both_sides():
+    time = np.arange(10) * 0.25
+    gear = np.array([1, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+    marked = shifting(time, gear, margin=0.3)
+    assert marked.tolist() == [False, False, False, True, True, False, False, False, False, False]
+    assert not shifting(time, np.ones(10, dtype=np.int64), margin=0.3).any()
