@@ -1,0 +1,73 @@
+"""``weighbridge inspect`` end to end."""
+
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from weighbridge.cli.inspect import inspect
+from weighbridge.errors import DriveError
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden"
+
+
+@pytest.fixture
+def run():
+    app = typer.Typer()
+    app.command()(inspect)
+
+    def invoke(*words):
+        result = CliRunner().invoke(app, [str(w) for w in words])
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        assert result.exit_code == 0
+        return result.stdout
+
+    return invoke
+
+
+def test_canonical_folder(run):
+    out = run(GOLDEN / "csv")
+    assert "vehicle_speed" in out
+    assert "kmh" in out
+    assert "IMU with speed and torque in N m" in out
+
+
+def test_mapping_and_vehicle_file(run, tmp_path):
+    car = tmp_path / "car.toml"
+    car.write_text(
+        f'[vehicle]\nmapping = "{(GOLDEN / "foreign.toml").as_posix()}"\n'
+        "[driveline]\ngearings_per_m = [40.0]\n",
+        encoding="utf-8",
+    )
+    out = run(GOLDEN / "foreign.csv", "--vehicle", car)
+    assert "longitudinal_accel" in out
+    assert "No way to weigh by this drive" in out
+    assert "engine_torque" in out
+
+
+def test_problems_are_listed(run, tmp_path):
+    rows = "\n".join(f"{t},{t % 7},-9.81,0" for t in range(200))
+    (tmp_path / "imu.csv").write_text(
+        f"time_s,accel_x_mps2,accel_y_mps2,[odd]\n{rows}\n", encoding="utf-8"
+    )
+    out = run(tmp_path)
+    assert "serious: imu" in out
+    assert "'[odd]'" in out
+    assert "accel_y is -9.81 mps2 all the time" in out
+
+
+def test_every_way_on_request(run):
+    short, long = run(GOLDEN / "csv"), run(GOLDEN / "csv", "--all")
+    assert long.count("air flow") >= 4
+    assert "air flow" not in short
+
+
+def test_what_cannot_be_read_is_one_error(run, tmp_path):
+    with pytest.raises(DriveError, match="no such file"):
+        run(tmp_path / "nowhere")
+
+
+def test_help_has_an_example(run):
+    assert "Example: weighbridge inspect drive/" in run("--help")
