@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
+
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.ins import (
     ERRORS,

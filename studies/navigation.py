@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pymap3d
+
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels.rotation import quaternion_to_matrix
 from weighbridge.navigation.inertial import inertial_motion

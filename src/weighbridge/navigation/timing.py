@@ -71,7 +71,7 @@ def estimate_speed_delay(
         # the moving mean over about 15 s is grade and bias
         pad = np.pad(y, width // 2, mode="edge")
         total = np.concatenate([[0.0], np.cumsum(pad)])
-        return y - (total[width:] - total[:-width]) / width
+        return np.asarray(y - (total[width:] - total[:-width]) / width)
 
     target = high_passed(np.where(whole, change, 0.0))[whole]
 

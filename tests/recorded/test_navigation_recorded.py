@@ -1,0 +1,48 @@
+"""Inertial navigation on two recorded drives with independent truth."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from weighbridge.navigation.inertial import inertial_motion
+from weighbridge.navigation.settings import NavigationSettings
+
+_SPEC = importlib.util.spec_from_file_location(
+    "navigation_study", Path(__file__).resolve().parents[2] / "studies" / "navigation.py"
+)
+study = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(study)
+
+
+@pytest.mark.parametrize("raw_gyro", [True, False])
+@pytest.mark.parametrize("gnss_cut", [None, 20.0])
+def test_highway_minute_of_a_phone(shared_data, raw_gyro, gnss_cut):
+    drive, time, pitch, _ = study.load_comma(
+        shared_data / "comma2k19", raw_gyro=raw_gyro, gnss_cut=gnss_cut
+    )
+    motion = inertial_motion(drive)
+    _, std = study.score(motion, time, pitch, "pitch")
+    assert std <= 0.15
+    # the speed of the wheels reads 0.991 of the true speed
+    assert motion.speed_scale == pytest.approx(0.991, abs=0.003)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_hills_with_noisy_fixes(shared_data, seed):
+    drive, time, grade = study.load_rtk(shared_data / "rtk-grade", seed=seed)
+    motion = inertial_motion(drive)
+    mean, std = study.score(motion, time - motion.speed_delay, grade, "grade")
+    assert std <= 0.40
+    assert abs(mean) <= 0.15
+    # sensor axes z up and x back
+    assert abs(np.degrees(motion.mounting[0])) > 178.0
+    assert 0.002 < motion.squat < 0.008
+
+
+def test_forward_pass_alone(shared_data):
+    drive, time, grade = study.load_rtk(shared_data / "rtk-grade", seed=5)
+    motion = inertial_motion(drive, settings=NavigationSettings(smooth=False))
+    _, std = study.score(motion, time - motion.speed_delay, grade, "grade", skip=60.0)
+    assert std <= 0.45

@@ -1,0 +1,215 @@
+"""The filter's linear model against finite differences of its nonlinear one."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from weighbridge.kernels.ins import (
+    ACCEL,
+    BA,
+    BG,
+    ERRORS,
+    LEVER,
+    MEASUREMENTS,
+    PITCH0,
+    SCALE,
+    SQUAT,
+    STATES,
+    YAW0,
+    Z_D,
+    Z_E,
+    Z_HVAR,
+    Z_N,
+    Z_SPEED,
+    Z_SPEED_VAR,
+    Z_STILL,
+    Z_VVAR,
+    Q,
+    V,
+    correct,
+    new_log,
+    new_work,
+    propagate,
+    propagate_covariance,
+    smooth,
+    update,
+)
+from weighbridge.kernels.rotation import euler_to_quaternion
+from weighbridge.navigation.settings import NavigationSettings
+
+QUIET = (
+    NavigationSettings()
+    .noise()
+    ._replace(accel_psd=0.0, gyro_psd=0.0, gyro_share=0.0, accel_bias_psd=0.0, gyro_bias_psd=0.0)
+)
+
+
+def _state():
+    x = np.zeros(STATES)
+    x[0:3] = [10.0, -20.0, 3.0]
+    x[V : V + 3] = [14.0, 7.0, -0.6]
+    x[Q : Q + 4] = euler_to_quaternion(0.03, -0.05, 0.5)
+    x[BA : BA + 3] = [0.05, -0.03, 0.1]
+    x[BG : BG + 3] = [0.002, -0.001, 0.003]
+    x[PITCH0], x[YAW0], x[SQUAT], x[SCALE], x[LEVER] = 0.01, -0.02, 0.004, 1.02, 1.3
+    x[ACCEL] = 0.8
+    return x
+
+
+def _difference(a, b):
+    """Error state of ``a`` from ``b``."""
+    dx = np.empty(ERRORS)
+    dx[:6] = a[:6] - b[:6]
+    turn = (
+        Rotation.from_quat(np.roll(a[Q : Q + 4], -1))
+        * Rotation.from_quat(np.roll(b[Q : Q + 4], -1)).inv()
+    )
+    dx[6:9] = turn.as_rotvec()
+    dx[9:] = a[BA : LEVER + 1] - b[BA : LEVER + 1]
+    return dx
+
+
+def _moved(x, place, size):
+    dx = np.zeros(ERRORS)
+    dx[place] = size
+    y = x.copy()
+    correct(y, dx)
+    return y
+
+
+def _propagated(x):
+    y, work = x.copy(), new_work()
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        f = rng.normal([0.7, 1.2, -9.6], 0.5)
+        w = rng.normal([0.02, -0.03, 0.1], 0.02)
+        propagate(y, work, *f, *w, 0.005, QUIET)
+    return y, work
+
+
+@pytest.mark.parametrize("correlated", [False, True])
+def test_covariance_follows_the_nonlinear_propagation(correlated):
+    x = _state()
+    end, work = _propagated(x)
+    jacobian = np.empty((ERRORS, ERRORS))
+    for i in range(ERRORS):
+        h = 1e-4
+        up, _ = _propagated(_moved(x, i, h))
+        down, _ = _propagated(_moved(x, i, -h))
+        jacobian[:, i] = (_difference(up, end) - _difference(down, end)) / (2.0 * h)
+    cov = np.diag(np.linspace(0.5, 2.0, ERRORS))
+    if correlated:
+        root = np.random.default_rng(2).normal(size=(ERRORS, ERRORS))
+        cov = root @ root.T
+    ours = cov.copy()
+    propagate_covariance(end, ours, work, QUIET)
+    # blocks of the transition are of first order over the 50 ms of a node
+    assert_allclose(ours, jacobian @ cov @ jacobian.T, atol=0.02 * np.abs(cov).max())
+    assert_allclose(ours, ours.T, atol=0.0)
+    # and they are not the identity: the change itself is right to a few percent
+    change = jacobian @ cov @ jacobian.T - cov
+    assert np.abs(ours - cov - change).max() < 0.05 * np.abs(change).max()
+
+
+def _predicted(x, rate):
+    """Speed, lateral and vertical row as functions of the nominal state."""
+    body = Rotation.from_quat(np.roll(x[Q : Q + 4], -1)).inv().apply(x[V : V + 3])
+    return np.array(
+        [
+            x[SCALE] * body[0],
+            body[1] - x[YAW0] * body[0] - x[LEVER] * rate[2],
+            body[2] - (x[PITCH0] + x[SQUAT] * x[ACCEL]) * body[0],
+        ]
+    )
+
+
+def test_rows_of_speed_and_constraints_are_the_derivatives():
+    x = _state()
+    rate = np.array([0.01, 0.02, 0.15])
+    work, log = new_work(), new_log(1)
+    work.rate[:] = rate
+    work.transition[0] = 1.0
+    z = np.full(MEASUREMENTS, np.nan)
+    z[Z_STILL], z[Z_SPEED], z[Z_SPEED_VAR] = 0.0, 16.0, 0.1
+    # so small a covariance that the rows do not move the state between them
+    update(x.copy(), np.eye(ERRORS) * 1e-16, work, z, QUIET, log, 0)
+    assert log.count[0] == 3
+    expected = np.empty((3, ERRORS))
+    for i in range(ERRORS):
+        h = 1e-5
+        up, down = _predicted(_moved(x, i, h), rate), _predicted(_moved(x, i, -h), rate)
+        expected[:, i] = (up - down) / (2.0 * h)
+    assert_allclose(log.h[0, :3], expected, atol=1e-6)
+    # the term eq. 46 leaves out is there: attitude moves the constraint rows by the speed
+    assert np.abs(expected[1:, 6:9]).max() > 10.0
+    assert_allclose(log.innovation[0, :3], [16.0, 0.0, 0.0] - _predicted(x, rate), atol=1e-9)
+
+
+def test_scalar_rows_equal_the_joint_update():
+    rng = np.random.default_rng(3)
+    x = np.zeros(STATES)
+    x[Q], x[SCALE] = 1.0, 1.0
+    root = rng.normal(size=(ERRORS, ERRORS)) * 1e-3
+    cov = root @ root.T + 1e-6 * np.eye(ERRORS)
+    z = np.full(MEASUREMENTS, np.nan)
+    z[Z_STILL] = 0.0
+    z[Z_N : Z_D + 1] = [1e-3, -2e-3, 1.5e-3]
+    z[Z_HVAR], z[Z_VVAR] = 1e-6, 4e-6
+    noise = QUIET._replace(constraints=0.0)
+    ours, ours_cov = x.copy(), cov.copy()
+    update(ours, ours_cov, new_work(), z, noise, new_log(0), 0)
+    h = np.eye(3, ERRORS)
+    s = h @ cov @ h.T + np.diag([1e-6, 1e-6, 4e-6])
+    gain = cov @ h.T @ np.linalg.inv(s)
+    assert_allclose(_difference(ours, x), gain @ z[Z_N : Z_D + 1], rtol=1e-3, atol=1e-8)
+    assert_allclose(ours_cov, (np.eye(ERRORS) - gain @ h) @ cov, atol=1e-12)
+    assert_allclose(z[Z_E], -2e-3)
+
+
+def test_smoother_equals_least_squares_over_all_epochs():
+    """Twenty nodes with fixes against one batch solution of the same linear problem."""
+    rng = np.random.default_rng(4)
+    noise = QUIET._replace(constraints=0.0, accel_psd=0.04, gate=1e9)
+    nodes = 20
+    x = np.zeros(STATES)
+    x[Q], x[SCALE] = 1.0, 1.0
+    prior = np.full(ERRORS, 1e-10)
+    prior[0:3], prior[3:6] = 4.0, 1.0
+    cov = np.diag(prior)
+    work, log = new_work(), new_log(nodes)
+    states = np.empty((nodes, 24))
+    z_all = rng.normal(scale=1.0, size=nodes)
+    for k in range(nodes):
+        for _ in range(10):
+            propagate(x, work, 0.0, 0.0, -noise.gravity, 0.0, 0.0, 0.0, 0.01, noise)
+        propagate_covariance(x, cov, work, noise)
+        log.transition[k] = work.transition
+        z = np.full(MEASUREMENTS, np.nan)
+        z[Z_STILL] = 0.0
+        z[Z_N], z[Z_E], z[Z_D] = z_all[k], 0.0, 0.0
+        z[Z_HVAR], z[Z_VVAR] = 0.25, 0.25
+        update(x, cov, work, z, noise, log, k)
+        log.cov[k] = cov
+        states[k] = x[:24]
+        work.transition[:] = 0.0
+    smooth(log, nodes, np.zeros(ERRORS), states, 0)
+
+    # one axis: p0, v0 and the velocity kicks of each node, which follow the move
+    count = 2 + nodes
+    design, target = [], []
+    position = np.zeros((nodes, count))
+    row_p, row_v = np.zeros(count), np.zeros(count)
+    row_p[0], row_v[1] = 1.0, 1.0
+    for k in range(nodes):
+        row_p = row_p + 0.1 * row_v
+        row_v = row_v.copy()
+        row_v[2 + k] += 1.0
+        position[k] = row_p
+        design.append(row_p / 0.5)
+        target.append(z_all[k] / 0.5)
+    stds = np.concatenate([[2.0, 1.0], np.full(nodes, np.sqrt(0.04 * 0.1))])
+    design += list(np.diag(1.0 / stds))
+    target += [0.0] * count
+    solution, *_ = np.linalg.lstsq(np.array(design), np.array(target), rcond=None)
+    assert_allclose(states[:, 0], position @ solution, atol=1e-5)

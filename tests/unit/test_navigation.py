@@ -1,0 +1,447 @@
+"""Inertial navigation on a small drive made from closed forms."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pymap3d
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.kernels.ins import (
+    ERRORS,
+    MEASUREMENTS,
+    SCALE,
+    SHOWN,
+    STATES,
+    Z_D,
+    Z_HVAR,
+    Z_N,
+    Z_SPEED,
+    Z_SPEED_VAR,
+    Z_STILL,
+    Z_VVAR,
+    P,
+    Q,
+    V,
+    lowpass_resample,
+    new_log,
+    new_work,
+    run,
+    step,
+)
+from weighbridge.navigation.aiding import place_nodes, resolution
+from weighbridge.navigation.geodesy import LocalFrame
+from weighbridge.navigation.inertial import inertial_motion
+from weighbridge.navigation.settings import NavigationSettings
+from weighbridge.navigation.timing import estimate_speed_delay
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.model import Mounting
+
+SQUAT = 0.004
+
+
+@dataclass(frozen=True)
+class Truth:
+    time: np.ndarray
+    speed: np.ndarray
+    accel: np.ndarray
+    grade: np.ndarray
+    pitch: np.ndarray
+    heading: np.ndarray
+
+
+def simulate(
+    *,
+    mounting=(0.0, 0.0, 0.0),
+    seed=0,
+    duration=400.0,
+    delay=0.12,
+    squat=SQUAT,
+    scale=0.98,
+    rest=10.0,
+    bias=(0.05, -0.04, 0.08),
+    gyro_bias=(0.004, -0.003, 0.005),
+):
+    """Make a drive over hills and bends with stops, and its truth, at 100 Hz."""
+    rng = np.random.default_rng(seed)
+    dt = 0.01
+    t = np.arange(0.0, duration, dt)
+    moving = np.clip((t - rest) / 4.0, 0.0, 1.0)
+    moving = moving * moving * (3.0 - 2.0 * moving)
+    speed = moving * np.clip(13.0 + 7.0 * np.sin(t / 19.0) + 5.0 * np.sin(t / 6.3 + 1.0), 0.0, None)
+    width = 101
+    speed = np.convolve(np.pad(speed, width // 2, mode="edge"), np.hanning(width), "valid")
+    speed /= np.hanning(width).sum()
+    speed[t < rest - 1.0] = 0.0
+    accel = np.gradient(speed, dt)
+    s = np.cumsum(speed) * dt
+    grade = 0.04 * np.sin(2 * np.pi * s / 700.0) + 0.015 * np.sin(2 * np.pi * s / 260.0 + 1.0)
+    heading = 0.7 + 0.9 * np.sin(2 * np.pi * s / 500.0)
+    pitch = grade + squat * accel
+    velocity = speed[:, None] * np.column_stack(
+        [np.cos(grade) * np.cos(heading), np.cos(grade) * np.sin(heading), -np.sin(grade)]
+    )
+    ned = np.cumsum(velocity, axis=0) * dt
+    attitude = Rotation.from_euler("ZYX", np.column_stack([heading, pitch, 0.0 * t]))
+    accel_n = np.gradient(velocity, dt, axis=0)
+    force = attitude.inv().apply(accel_n - [0.0, 0.0, GRAVITY])
+    rate = np.zeros((t.size, 3))
+    rate[1:] = (attitude[:-1].inv() * attitude[1:]).as_rotvec() / dt
+    to_sensor = Rotation.from_euler("ZYX", mounting[::-1]).inv()
+    force = to_sensor.apply(force) + bias + rng.normal(scale=0.04, size=force.shape)
+    rate = to_sensor.apply(rate) + gyro_bias + rng.normal(scale=0.002, size=rate.shape)
+    signals = {}
+    for i, a in enumerate("xyz"):
+        signals[f"accel_{a}"] = Signal(f"accel_{a}", t, force[:, i])
+        signals[f"gyro_{a}"] = Signal(f"gyro_{a}", t, rate[:, i])
+    obd = np.arange(0.5, duration - 1.0, 0.2)
+    shown = scale * np.interp(obd - delay, t, speed)
+    signals["vehicle_speed"] = Signal("vehicle_speed", obd, np.round(shown * 3.6) / 3.6)
+    fix = np.arange(0.3, duration - 0.5, 1.0)
+    at = np.column_stack([np.interp(fix, t, ned[:, i]) for i in range(3)])
+    at += rng.normal(size=at.shape) * [1.5, 1.5, 2.5]
+    lat, lon, alt = pymap3d.ned2geodetic(*at.T, 0.98, 0.17, 60.0, deg=False)
+    for name, values in (("latitude", lat), ("longitude", lon), ("altitude", alt)):
+        signals[name] = Signal(name, fix, np.asarray(values))
+    return Drive("hills", signals), Truth(t, speed, accel, grade, pitch, heading)
+
+
+def _error(motion, truth, of, skip=15.0):
+    keep = (motion.time > skip) & motion.valid
+    return (getattr(motion, of) - np.interp(motion.time, truth.time, getattr(truth, of)))[keep]
+
+
+@pytest.fixture(scope="module")
+def hills():
+    return simulate()
+
+
+@pytest.fixture(scope="module")
+def hills_motion(hills):
+    return inertial_motion(hills[0])
+
+
+def test_motion_is_found(hills, hills_motion):
+    _, truth = hills
+    m = hills_motion
+    assert m.source == "inertial"
+    assert np.all(m.valid[20:-20])
+    assert np.degrees(np.std(_error(m, truth, "grade"))) < 0.2
+    assert abs(np.degrees(np.mean(_error(m, truth, "grade")))) < 0.25
+    assert np.std(_error(m, truth, "speed")) < 0.1
+    assert np.std(_error(m, truth, "accel")) < 0.06
+    assert abs(np.mean(_error(m, truth, "accel"))) < 0.01
+    turned = np.angle(np.exp(1j * _error(m, truth, "heading")))
+    assert np.degrees(np.std(turned)) < 2.0
+    assert abs(m.distance[-1] - np.sum(truth.speed) * 0.01) < 0.01 * m.distance[-1]
+
+
+def test_constants_are_found(hills_motion):
+    m = hills_motion
+    assert abs(m.squat - SQUAT) < 3.0 * m.squat_std + 2e-4
+    assert m.squat_std < 0.001
+    assert abs(m.speed_scale - 0.98) < 0.005
+    assert abs(m.speed_delay - 0.12) < 0.03
+    assert all(abs(a) < math.radians(1.0) for a in m.mounting)
+
+
+def test_specific_force_is_acceleration_and_gravity(hills_motion):
+    m = hills_motion
+    expected = m.accel + GRAVITY * np.sin(m.grade)
+    assert_allclose(m.specific_force[m.valid], expected[m.valid], atol=1e-12)
+
+
+def test_even_clock_and_shapes(hills_motion):
+    m = hills_motion
+    assert_allclose(np.diff(m.time), 0.05, atol=1e-9)
+    assert m.rate == pytest.approx(20.0)
+    for name in ("speed", "accel", "specific_force", "grade", "pitch", "roll", "heading",
+                 "distance", "altitude", "latitude", "valid", "grade_std"):  # fmt: skip
+        assert getattr(m, name).shape == m.time.shape
+
+
+@pytest.mark.parametrize(
+    "degrees",
+    [(0, -90, 0), (180, 0, 0), (90, 0, 45), (180, -7, 185), (10, 80, -100), (-90, 5, 170)],
+)
+def test_any_mounting_is_found(degrees):
+    mounting = tuple(math.radians(d) for d in degrees)
+    drive, truth = simulate(mounting=mounting, duration=240.0, seed=3)
+    m = inertial_motion(drive)
+    found = Rotation.from_euler("ZYX", m.mounting[::-1])
+    off = found * Rotation.from_euler("ZYX", mounting[::-1]).inv()
+    assert np.degrees(off.magnitude()) < 1.2
+    assert np.degrees(np.std(_error(m, truth, "grade"))) < 0.3
+
+
+def test_given_mounting_and_squat_are_kept():
+    drive, truth = simulate(mounting=(0.0, 0.0, 0.3), duration=120.0)
+    given = Mounting(yaw=0.3, std=(0.002, 0.002, 0.005), squat=SQUAT, squat_std=1e-4)
+    m = inertial_motion(drive, given)
+    assert_allclose(m.mounting, (0.0, 0.0, 0.3), atol=math.radians(0.6))
+    assert m.squat == pytest.approx(SQUAT, abs=3e-4)
+    assert np.degrees(np.std(_error(m, truth, "grade"))) < 0.25
+
+
+def test_mirrored_axes_are_refused(hills):
+    drive, _ = hills
+    y = drive.signals["accel_y"]
+    mirrored = drive.with_signals(Signal("accel_y", y.time, -y.values))
+    with pytest.raises(DriveError, match="mirrored"):
+        inertial_motion(mirrored)
+
+
+def test_accelerometer_in_g_is_refused(hills):
+    drive, _ = hills
+    g = [Signal(f"accel_{a}", s.time, s.values / GRAVITY)
+         for a in "xyz" for s in [drive.signals[f"accel_{a}"]]]  # fmt: skip
+    with pytest.raises(DriveError, match="looks like g"):
+        inertial_motion(drive.with_signals(*g))
+
+
+def test_gyro_in_degrees_is_refused(hills):
+    drive, _ = hills
+    d = [Signal(f"gyro_{a}", s.time, np.degrees(s.values))
+         for a in "xyz" for s in [drive.signals[f"gyro_{a}"]]]  # fmt: skip
+    with pytest.raises(DriveError, match="degps"):
+        inertial_motion(drive.with_signals(*d))
+
+
+def test_inertial_sensor_alone_is_refused(hills):
+    drive = hills[0].without("vehicle_speed", "latitude", "longitude", "altitude")
+    with pytest.raises(DriveError, match="vehicle_speed"):
+        inertial_motion(drive)
+
+
+def test_missing_axis_is_named(hills):
+    with pytest.raises(DriveError, match="gyro_z"):
+        inertial_motion(hills[0].without("gyro_z"))
+
+
+def test_standing_still_is_refused():
+    drive, _ = simulate(duration=60.0, rest=100.0)
+    with pytest.raises(DriveError, match="moves for only"):
+        inertial_motion(drive)
+
+
+def test_without_gnss(hills):
+    drive, truth = hills
+    m = inertial_motion(drive.without("latitude", "longitude", "altitude"))
+    assert np.all(np.isnan(m.heading))
+    assert np.all(np.isnan(m.altitude))
+    assert m.speed_scale is None
+    assert any("without GNSS" in note for note in m.notes)
+    assert np.degrees(np.std(_error(m, truth, "grade"))) < 0.35
+
+
+def test_without_vehicle_speed(hills):
+    drive, truth = hills
+    m = inertial_motion(drive.without("vehicle_speed"))
+    assert m.speed_scale is None
+    assert np.std(_error(m, truth, "speed")) < 0.5
+    assert np.degrees(np.std(_error(m, truth, "grade"))) < 0.5
+
+
+def test_gnss_outage(hills):
+    drive, truth = hills
+    cut = []
+    for name in ("latitude", "longitude", "altitude"):
+        s = drive.signals[name]
+        keep = (s.time < 150.0) | (s.time > 270.0)
+        cut.append(Signal(name, s.time[keep], s.values[keep]))
+    m = inertial_motion(drive.with_signals(*cut))
+    inside = (m.time > 150.0) & (m.time < 270.0)
+    error = m.grade - np.interp(m.time, truth.time, truth.grade)
+    assert np.degrees(np.std(error[inside])) < 0.35
+
+
+def test_gnss_outliers_are_refused(hills, hills_motion):
+    drive, _ = hills
+    s = drive.signals["altitude"]
+    values = s.values.copy()
+    values[50::60] += 200.0
+    m = inertial_motion(drive.with_signals(Signal("altitude", s.time, values)))
+    assert np.degrees(np.abs(m.grade - hills_motion.grade).max()) < 0.25
+
+
+def test_filter_believes_a_lasting_jump(hills):
+    drive, _ = hills
+    s = drive.signals["altitude"]
+    jumped = np.where(s.time > 200.0, s.values + 300.0, s.values)
+    m = inertial_motion(
+        drive.with_signals(Signal("altitude", s.time, jumped)),
+        settings=NavigationSettings(smooth=False),
+    )
+    assert abs(m.altitude[-200] - m.altitude[m.time.searchsorted(190.0)]) > 200.0
+
+
+def test_gap_of_the_inertial_sensor(hills):
+    drive, truth = hills
+    cut = []
+    for kind in ("accel", "gyro"):
+        for a in "xyz":
+            s = drive.signals[f"{kind}_{a}"]
+            keep = (s.time < 200.0) | (s.time > 206.0)
+            cut.append(Signal(s.name, s.time[keep], s.values[keep]))
+    m = inertial_motion(drive.with_signals(*cut))
+    gap = (m.time > 200.5) & (m.time < 205.5)
+    assert not m.valid[gap].any()
+    assert np.isfinite(m.specific_force).all()
+    after = (m.time > 215.0) & (m.time < 390.0)
+    error = m.grade - np.interp(m.time, truth.time, truth.grade)
+    assert np.degrees(np.std(error[after])) < 0.3
+
+
+def test_jitter_of_the_inertial_clock(hills):
+    drive, truth = hills
+    rng = np.random.default_rng(5)
+    t = drive.signals["accel_x"].time
+    jitter = t + rng.uniform(-0.003, 0.003, t.size)
+    moved = [Signal(f"{k}_{a}", jitter, drive.signals[f"{k}_{a}"].values)
+             for k in ("accel", "gyro") for a in "xyz"]  # fmt: skip
+    m = inertial_motion(drive.with_signals(*moved))
+    assert np.degrees(np.std(_error(m, truth, "grade"))) < 0.25
+
+
+def test_batch_equals_sample_by_sample():
+    rng = np.random.default_rng(8)
+    n = 4000
+    time = np.cumsum(rng.uniform(0.004, 0.006, n))
+    time[2500:] += 2.0
+    accel = np.array([0.1, 0.2, -GRAVITY]) + rng.normal(scale=0.2, size=(n, 3))
+    gyro = rng.normal(scale=0.01, size=(n, 3))
+    nodes = place_nodes(time, time[::203], 20.0, 0.5)
+    z = np.full((nodes.size, MEASUREMENTS), np.nan)
+    z[:, Z_STILL] = (np.arange(nodes.size) % 100 > 90) * 2.0
+    z[:, Z_SPEED] = 15.0 + rng.normal(scale=0.3, size=nodes.size)
+    z[:, Z_SPEED_VAR] = 0.3
+    z[::17, Z_N : Z_D + 1] = rng.normal(scale=3.0, size=(z[::17].shape[0], 3))
+    z[::17, Z_HVAR], z[::17, Z_VVAR] = 4.0, 25.0
+    noise = NavigationSettings().noise()
+    turn = np.eye(3)
+
+    def fresh():
+        x = np.zeros(STATES)
+        x[V], x[Q], x[SCALE] = 15.0, 1.0, 1.0
+        return x, np.eye(ERRORS) * 1e-2, new_work()
+
+    x, cov, work = fresh()
+    states = np.empty((nodes.size, SHOWN))
+    stds = np.empty((nodes.size, ERRORS + 1))
+    half = nodes.size // 2
+    for a, b in ((0, half), (half, nodes.size)):
+        run(x, cov, work, time, accel, gyro, turn, nodes, a, b, z, noise, new_log(0), states, stds)
+
+    y, cov_y, work_y = fresh()
+    log, nothing = new_log(0), np.full(MEASUREMENTS, np.nan)
+    k = 0
+    for i in range(n):
+        dt = time[i] - time[i - 1] if i else 0.0
+        node = k < nodes.size and nodes[k] == i
+        step(
+            y, cov_y, work_y, accel[i], gyro[i], dt, node, z[k] if node else nothing, noise, log, 0
+        )
+        if node:
+            assert_array_equal(y[:SHOWN], states[k])
+            k += 1
+    assert_array_equal(x, y)
+    assert_array_equal(cov, cov_y)
+    assert_array_equal(cov, cov.T)
+
+
+def test_delay_of_the_speed_is_found():
+    rng = np.random.default_rng(2)
+    t = np.arange(0.0, 300.0, 0.05)
+    accel = 1.2 * np.sin(t / 3.0) + 0.5 * np.sin(t / 1.1)
+    speed = 15.0 + np.concatenate([[0.0], np.cumsum(0.5 * (accel[1:] + accel[:-1]) * 0.05)])
+    force = accel + 0.3 * np.sin(t / 40.0) + rng.normal(scale=0.1, size=t.size)
+    stamps = np.arange(3.0, 295.0, 0.25)
+    for delay in (-0.2, 0.0, 0.137, 0.5):
+        shown = np.round(3.6 * np.interp(stamps - delay, t, speed)) / 3.6
+        found, std = estimate_speed_delay(t, force, Signal("vehicle_speed", stamps, shown))
+        assert abs(found - delay) < max(4.0 * std, 0.01)
+        assert std < 0.03
+
+
+def test_delay_of_a_constant_speed_is_not_found():
+    t = np.arange(0.0, 100.0, 0.05)
+    stamps = np.arange(1.0, 99.0, 0.25)
+    steady = Signal("vehicle_speed", stamps, np.full(stamps.size, 20.0))
+    delay, std = estimate_speed_delay(t, 0.1 * np.sin(t), steady)
+    assert delay == 0.0
+    assert np.isinf(std)
+
+
+def test_lowpass_keeps_slow_and_stops_what_would_fold():
+    rng = np.random.default_rng(1)
+    t = np.sort(rng.uniform(0.0, 40.0, 8000))
+    grid = np.arange(10, 700) / 20.0
+    out, weight = np.empty((grid.size, 2)), np.empty(grid.size)
+    values = np.column_stack([np.sin(2 * np.pi * 1.0 * t), np.sin(2 * np.pi * 19.0 * t)])
+    lowpass_resample(t, values, grid[0], 0.05, grid.size, 3.0, out, weight)
+    inner = slice(10, -10)
+    assert np.abs(out[inner, 0] - np.sin(2 * np.pi * grid[inner])).max() < 0.05
+    assert np.std(out[inner, 1]) < 0.1
+
+
+def test_lowpass_response_on_an_even_clock():
+    t = np.arange(0.0, 60.0, 0.005)
+    grid = np.arange(100, 1000) / 20.0
+    for hertz, low, high in (
+        (2.0, 0.97, 1.01),
+        (4.0, 0.9, 1.02),
+        (12.5, 0.0, 0.06),
+        (19.0, 0.0, 0.01),
+    ):
+        y = np.exp(2j * np.pi * hertz * t)
+        out = np.empty((grid.size, 2))
+        lowpass_resample(
+            t, np.column_stack([y.real, y.imag]), grid[0], 0.05, grid.size, 3.0, out,
+            np.empty(grid.size),
+        )  # fmt: skip
+        gain = np.abs(np.mean((out[:, 0] + 1j * out[:, 1]) * np.exp(-2j * np.pi * hertz * grid)))
+        assert low <= gain <= high, hertz
+
+
+def test_local_frame_both_ways():
+    frame = LocalFrame(0.9, -2.0, 35.0)
+    lat = np.array([0.9, 0.9001, 0.8995])
+    lon = np.array([-2.0, -2.0002, -1.9999])
+    alt = np.array([35.0, 80.0, 10.0])
+    ned = frame.to_ned(lat, lon, alt)
+    assert_allclose(ned[0], 0.0, atol=1e-9)
+    # one ten-thousandth of a radian of latitude is a ten-thousandth of the meridian's radius
+    a, e2 = 6378137.0, 6.69437999014e-3
+    radius = a * (1.0 - e2) / (1.0 - e2 * math.sin(0.9) ** 2) ** 1.5
+    assert abs(ned[1, 0] - 1e-4 * radius) < 1.0
+    back = frame.to_geodetic(ned)
+    for got, want in zip(back, (lat, lon, alt), strict=True):
+        assert_allclose(got, want, atol=1e-8, rtol=1e-9)
+
+
+def test_resolution():
+    assert resolution(np.round(np.linspace(0.0, 30.0, 500) * 3.6) / 3.6) == pytest.approx(1 / 3.6)
+    assert resolution(np.random.default_rng(0).normal(size=500)) == 0.0
+    assert resolution(np.ones(10)) == 0.0
+
+
+def test_nodes_hold_each_fix_and_both_sides_of_a_gap():
+    time = np.concatenate([np.arange(0.0, 5.0, 0.01), np.arange(8.0, 12.0, 0.01)])
+    nodes = place_nodes(time, np.array([1.234, 9.876]), 20.0, 0.5)
+    chosen = time[nodes]
+    for instant in (1.234, 9.876):
+        assert np.abs(chosen - instant).min() <= 0.0051
+    assert 499 in nodes
+    assert 500 in nodes
+    assert np.all(np.diff(nodes) > 0)
+    assert np.diff(chosen[chosen < 4.9]).max() < 0.0501
+
+
+def test_settings_refuse_the_impossible():
+    with pytest.raises(ConfigError, match="gate"):
+        NavigationSettings(gate=-1.0)
+    assert P == 0
