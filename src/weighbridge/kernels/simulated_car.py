@@ -149,6 +149,18 @@ def _full_torque(power, speed):
 
 
 @kernel
+def _upshift_speed(power, eager):
+    """Engine speed at which the next gear is taken."""
+    return power.upshift + (0.965 * power.max_speed - power.upshift) * min(1.0, eager) ** 1.6
+
+
+@kernel
+def _downshift_speed(power, eager):
+    """Engine speed below which the gear before is taken."""
+    return power.downshift + (0.55 * power.max_speed - power.downshift) * min(1.0, eager) ** 2
+
+
+@kernel
 def drive(road, power, resistance, driver, noise, dt, steps):
     """Drive the road from end to end.
 
@@ -290,14 +302,15 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         if stop < road.stop_distance.size:
             gap = road.stop_distance[stop] - s
             stop_decel = road.stop_decel[stop]
-        if not at_stop and v < 0.3 and gap < 2.5:
+        if not at_stop and v < 0.5 and gap < 2.5:
             at_stop = True
             waiting = road.stop_time[stop]
             stop += 1
             approach = 0
         target = _look_up(road.target_speed, where) * (1.0 + driver.speed_ripple * speed_ripple)
         ahead = _look_up(road.target_speed, where + 2.5 * v / road.step)
-        limit = _look_up(road.accel_limit, where) / (1.0 + v / 13.0)
+        # The front tyres grip no more than that.
+        limit = min(4.0, _look_up(road.accel_limit, where) / (1.0 + v / 13.0))
         error = target - v
         if abs(error) < 2.0:
             integral = min(0.4, max(-0.4, integral + 0.05 * error * dt))
@@ -325,10 +338,13 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         if approach > 0 and needed < 0.3 * brake_at:
             approach = 0
         if approach == 2:
-            demand = min(demand, -min(1.1 * needed, 3.5))
+            demand = min(demand, -min(1.1 * needed, 3.5, 0.7 + 0.9 * v))
         elif approach == 1:
             coast = True
             demand = min(demand, 0.0)
+        elif gap < 30.0:
+            # Short of the stop: creep up to it.
+            demand = min(demand, 0.8 * (np.sqrt(1.2 * max(gap - 1.0, 0.0)) + 0.2 - v))
         wanted += (demand - wanted) * dt / 0.35
         if at_stop:
             waiting -= dt
@@ -343,7 +359,9 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         coasting = (
             gearing * (lowest - loss_constant) * (1.0 if locked else 0.0) - resist
         ) / inertia
-        if braking:
+        if power.electric:
+            braking = wanted < coasting - 0.02 or at_stop
+        elif braking:
             braking = wanted < coasting + 0.05 or at_stop
         else:
             braking = (wanted < coasting - 0.3) or at_stop
@@ -351,7 +369,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         if braking:
             brake_wanted = max(0.0, inertia * (coasting - wanted))
             if at_stop:
-                brake_wanted = inertia * 3.0
+                brake_wanted = inertia + abs(slope)
         brake += (brake_wanted - brake) * dt / (0.12 if brake_wanted < brake else 0.2)
         if brake < 5.0 and not braking:
             brake = 0.0
@@ -360,27 +378,41 @@ def drive(road, power, resistance, driver, noise, dt, steps):
             ((inertia + power.engine_inertia * gearing * gearing) * wanted + resist) / gearing
             + loss_constant
         ) * (1.0 + power.loss_slope)
-        if braking or (coast and v > 3.0):
+        if power.electric:
+            # The motor brakes as asked; a lifted foot asks for a little.
+            if coast and v > 3.0:
+                torque_wanted = min(torque_wanted, -0.2 * power.regeneration)
+        elif braking or (coast and v > 3.0):
             torque_wanted = lowest
         torque_wanted = min(full, max(lowest, torque_wanted))
         pedal_torque += (torque_wanted - pedal_torque) * dt / 0.25
         pedal = max(0.0, pedal_torque / max(full, 1.0))
-        calm_pedal += (pedal - calm_pedal) * dt / 0.5
+        if shifting <= 0.0:
+            calm_pedal += (pedal - calm_pedal) * dt / 0.5
 
-        # Gears.
-        since_shift += dt
+        # Gears. A shift must not call for its own undoing: the pedal in the new
+        # gear is what decides there.
+        if shifting <= 0.0:
+            since_shift += dt
         if gears > 1 and shifting <= 0.0 and locked:
-            eager = max(min(1.0, calm_pedal), _look_up(road.revs, where))
-            up = power.upshift + (0.965 * power.max_speed - power.upshift) * eager**1.6
-            down = power.downshift + (0.55 * power.max_speed - power.downshift) * eager * eager
+            revs = _look_up(road.revs, where)
             new = gear
-            if gear < gears and since_shift > 1.2 and not braking and sync > up:
-                after = sync * power.gearings[gear] / gearing
-                if after > 1.25 * power.idle_speed:
-                    new = gear + 1
-            if gear > 1 and since_shift > 0.8 and sync < down:
-                after = sync * power.gearings[gear - 2] / gearing
-                if after < 0.9 * up:
+            if gear < gears and since_shift > 1.2 and not braking:
+                up = _upshift_speed(power, max(calm_pedal, revs))
+                if sync > up:
+                    ratio = power.gearings[gear] / gearing
+                    asked = calm_pedal / ratio
+                    after = sync * ratio
+                    enough = after > 1.1 * _downshift_speed(power, max(asked, revs))
+                    if (enough and asked < 0.95) or sync > 0.96 * power.max_speed:
+                        new = gear + 1
+            if gear > 1 and since_shift > 1.0:
+                if sync < _downshift_speed(power, max(calm_pedal, revs)):
+                    ratio = power.gearings[gear - 2] / gearing
+                    asked = calm_pedal / ratio
+                    if sync * ratio < 0.93 * _upshift_speed(power, max(asked, revs)):
+                        new = gear - 1
+                if sync < 1.15 * power.idle_speed:
                     new = gear - 1
             if new != gear:
                 gear_from = gear
@@ -461,7 +493,8 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         loss = loss_constant * min(1.0, v / 0.5) + power.loss_slope * abs(net)
         rotating = power.engine_inertia * gearing * gearing if phase == DRIVING else 0.0
         force = gearing * (net - loss)
-        new_a = (force - brake * min(1.0, v / 0.1) - resist) / (inertia + rotating)
+        held = brake if v > 0.0 else 0.0
+        new_a = (force - held - resist) / (inertia + rotating)
         if v <= 0.0 and (at_stop or new_a < 0.0):
             new_a = 0.0
         v_new = v + new_a * dt
@@ -492,7 +525,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         out[TORQUE, k] = crank
         out[GROSS_TORQUE, k] = gross
         out[TRACTION, k] = traction
-        out[BRAKE, k] = brake * min(1.0, v / 0.1)
+        out[BRAKE, k] = held
         out[DRAG, k] = drag
         out[ROLLING, k] = rolling
         out[WIND_ALONG, k] = tail

@@ -62,13 +62,14 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
     while x < s[-1] and effects.traffic > 0.0:
         k = int(x / STEP)
         if city[k]:
-            length, factor = rng.uniform(80, 300), rng.uniform(0.6, 1.0)
+            length, factor = rng.uniform(80, 300), rng.uniform(0.65, 1.04)
         elif fast[k]:
             length, factor = rng.uniform(500, 2500), rng.choice([0.82, 0.9, 0.96, 1.0, 1.05, 1.09])
         else:
-            length, factor = rng.uniform(300, 1200), rng.choice([0.7, 0.8, 0.9, 1.0, 1.05])
+            length, factor = rng.uniform(300, 1200), rng.choice([0.75, 0.85, 0.95, 1.0, 1.05])
         if scenario.calibration:
-            length, factor = min(length, rng.uniform(180, 700)), rng.uniform(0.45, 1.15)
+            length = min(length, rng.uniform(180, 700))
+            factor = rng.uniform(0.65 if fast[k] else 0.45, 1.15)
         part = (s >= x) & (s < x + length)
         target[part] *= 1.0 + effects.traffic * (factor - 1.0)
         x += length + rng.uniform(50, 400) * (3.0 if fast[k] and not scenario.calibration else 1.0)

@@ -179,7 +179,7 @@ def _leg(
             side = float(rng.choice([-1, 1]))
             x = start + float(rng.uniform(150, 300))
             while x < start + count - 100:
-                stops.append((x, 0.45))
+                stops.append((x, 0.40))
                 if rng.random() < 0.35:
                     _turn(curvature, int(x + 14), side * math.pi / 2, float(rng.uniform(9, 14)))
                     side = -side
@@ -269,7 +269,7 @@ def mixed_route(
     grade_out = _hills(kinds_out, rng, peak_grade)
     white = _smooth(rng.standard_normal(n), 1500.0 / STEP, mode="nearest")
     weight = _smooth(np.array([_WANDER[k] for k in kinds_out]), 300.0 / STEP)
-    wander = np.cumsum(weight * white * (3.0e-4 / max(white.std(), 1e-12))) * STEP
+    wander = np.cumsum(weight * white * (1.2e-4 / max(white.std(), 1e-12))) * STEP
     # Both ways follow the same general direction, each with bends of its own, and
     # the road turns round where it ends.
     bends = np.cumsum(_smooth(np.concatenate((bends_out, bends_back)), 3.0)) * STEP
