@@ -1,4 +1,34 @@
-"""Mapping TOML: what a foreign log's columns are called and how they are written."""
+"""Mapping TOML: what a foreign log's columns are called and how they are written.
+
+::
+
+    format_version = 1               # may be left out
+
+    [csv]                            # text tables only; may be left out
+    separator = ";"                  # found in the header if not given
+    encoding = "latin-1"             # UTF-8, else Latin-1, if not given
+    decimal = ","
+    skip_rows = 2                    # lines before the header
+    skip_after_header = 1            # such as a line of units
+    columns = ["t", "v"]             # names, for a file without a header
+    missing = ["---"]                # cells that mean "no value"
+
+    [time]
+    column = "Time [ms]"
+    unit = "ms"                      # else the brackets, else seconds
+    format = "clock"                 # 17:58:02.288; or "iso"; or a pattern with %
+    offset_s = 0.5                   # added to every stamp
+
+    [signals.longitudinal_accel]     # a canonical name of the catalogue
+    column = "Acc [g]"
+    unit = "g"                       # else the brackets or the log's own unit
+    factor = -1                      # value = factor * cell + offset, in that unit
+    offset = 0.0
+    optional = true                  # no note where it is absent
+
+A drive of several kinds of file has one ``[tables.NAME]`` per kind, with
+``files = "pattern*.csv"`` and the same sections inside.
+"""
 
 from __future__ import annotations
 

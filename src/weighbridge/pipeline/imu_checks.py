@@ -194,7 +194,7 @@ def _check_axes(
     right = np.cross(down, forward)
     centripetal = v[full] * ((rate[full] - np.median(rate[full], axis=0)) @ down)
     lateral = force[full] @ right
-    if float(np.std(centripetal)) < 0.25:
+    if float(np.std(centripetal)) < 0.08:
         return
     agreement = float(np.corrcoef(lateral, centripetal)[0, 1])
     if agreement < -0.6:

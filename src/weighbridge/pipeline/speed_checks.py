@@ -11,8 +11,9 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.constants import GRAVITY
 from weighbridge.pipeline import windows
-from weighbridge.signals import Drive, Floats, Problem, Signal
+from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.model import Vehicle
 
@@ -47,6 +48,7 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         if ratio is not None and (problem := _scale_problem("gnss_speed", ratio, "the positions")):
             yield problem
             gnss = None
+    yield from _check_altitude(drive)
     speed = drive.get("vehicle_speed")
     if speed is None or len(speed) < 20:
         return
@@ -178,6 +180,61 @@ def _swapped(lat: Signal, lon: Signal) -> Problem:
         "the other way round",
         serious=True,
     )
+
+
+def _check_altitude(drive: Drive) -> Iterator[Problem]:
+    """Find feet for metres: by roads too steep, or by the accelerometer along the vehicle."""
+    altitude = drive.get("altitude")
+    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    if altitude is None or speed is None or len(altitude) < 20 or len(speed) < 20:
+        return
+    length = 20.0
+    start = max(float(altitude.time[0]), float(speed.time[0]))
+    end = min(float(altitude.time[-1]), float(speed.time[-1]))
+    if end - start < 30 * length:
+        return
+    at = windows.edges(start, end, length)
+    v, full = windows.means(speed, at)
+    full &= (v > 5.0) & (altitude.age(at) < 3.0)[1:] & (altitude.age(at) < 3.0)[:-1]
+    full &= np.isfinite(altitude.at(at))[1:] & np.isfinite(altitude.at(at))[:-1]
+    if np.count_nonzero(full) < 20:
+        return
+    grade = np.where(full, np.diff(altitude.at(at)) / np.maximum(v * length, 1.0), 0.0)
+    steep = float(np.percentile(np.abs(grade[full]), 95))
+    ratio = _grade_ratio(drive, speed, at, grade, full)
+    if steep > 0.2:
+        # Where an accelerometer sees the grade, the height does not make the mass.
+        alone = not drive.has("longitudinal_accel") and not drive.has("accel_x", "gyro_x")
+        yield Problem(
+            "altitude",
+            f"altitude rises and falls by {100 * steep:.0f} % of the way, steeper than roads are; "
+            "if it is in feet, name the column altitude_ft",
+            serious=alone,
+        )
+    elif ratio is not None and abs(np.log(ratio / UNITS["ft"].factor)) < 0.2:
+        yield Problem(
+            "altitude",
+            f"altitude changes {1.0 / ratio:.2f} times as much as the accelerometer says; "
+            "if it is in feet, name the column altitude_ft",
+        )
+
+
+def _grade_ratio(
+    drive: Drive, speed: Signal, at: Floats, grade: Floats, full: Bools
+) -> float | None:
+    """Grade by the accelerometer over grade by height; None where they do not agree in shape."""
+    accel = drive.get("longitudinal_accel")
+    if accel is None or len(accel) < 20:
+        return None
+    force, ok = windows.means(accel, at)
+    seen = (force - np.diff(speed.at(at)) / np.diff(at)) / GRAVITY
+    ok &= full & np.isfinite(seen)
+    pairs = ok[1:] & ok[:-1]
+    x, y = np.diff(grade)[pairs], np.diff(seen)[pairs]
+    if x.size < 20 or float(np.std(x)) < 0.004:
+        return None
+    alike = float(np.corrcoef(x, y)[0, 1]) > 0.8
+    return float(np.std(y) / np.std(x)) if alike else None
 
 
 def _gear_ratio(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> float | None:

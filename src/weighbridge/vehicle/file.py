@@ -69,7 +69,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             _Key(
                 "gearings_per_m",
                 "gearings",
-                "engine radians per metre travelled, first to last gear: ratio * final drive / radius",
+                "engine radians per metre travelled, gear by gear: ratio * final drive / radius",
                 "numbers",
             ),
             _Key(
@@ -239,7 +239,8 @@ def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:
             version = tomlkit.item(FORMAT_VERSION)
             version.comment("of this file")
             table.add("format_version", version)
-        document.add(name, table)
+        if len(table):
+            document.add(name, table)
     try:
         path.write_text(tomlkit.dumps(document), encoding="utf-8")
     except OSError as e:
