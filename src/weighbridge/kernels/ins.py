@@ -437,7 +437,7 @@ def update(x, cov, work, z, noise, log, node):
     # white noise of the same power density has this much more variance
     inflate = max(1.0, 2.0 * noise.constraint_time / max(period, 1e-3))
 
-    if not math.isnan(z[Z_N]):
+    if not (math.isnan(z[Z_N]) and math.isnan(z[Z_D])):
         refused = False
         for i in range(3):
             if math.isnan(z[Z_N + i]):

@@ -10,7 +10,6 @@ from weighbridge.errors import DriveError
 from weighbridge.kernels.ins import (
     MEASUREMENTS,
     Z_D,
-    Z_E,
     Z_HVAR,
     Z_N,
     Z_SPEED,
@@ -27,6 +26,9 @@ from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 
 _AXES = ("x", "y", "z")
+
+_HEIGHT_PERIOD, _HEIGHT_TIME = 10.0, 300.0
+"""Without heights, distance of the pseudo-heights and how long hills last [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,8 +274,13 @@ def measurements(
         ratio = settings.gnss_vertical_std / settings.gnss_horizontal_std
         z[node, Z_HVAR] = horizontal**2 * inflate
         z[node, Z_VVAR] = (horizontal * ratio) ** 2 * inflate
-        z[node, Z_E] = fixes.ned[near, 1]
         _gnss_velocity(z, node_time, settings, drive, gnss_delay)
+    if fixes is None or not fixes.has_height:
+        # nobody drives far up or down for long: without heights this alone keeps
+        # a bias of the accelerometer from being taken for an endless hill
+        every = np.flatnonzero(np.diff(np.floor(node_time / _HEIGHT_PERIOD), prepend=-1.0) > 0)
+        z[every, Z_D] = 0.0
+        z[every, Z_VVAR] = settings.height_range**2 * _HEIGHT_TIME / _HEIGHT_PERIOD
     return z
 
 

@@ -322,6 +322,8 @@ def _begin(
         std[2] = 10.0
     else:
         std[0:3] = 0.1
+    if fixes is None or not fixes.has_height:
+        std[2] = 0.1
     std[3:5] = 0.5 + 0.1 * v0
     std[5] = 0.3 + 0.05 * v0
     std[6:8] = 0.02 if v0 < 0.1 else 0.03
@@ -489,6 +491,8 @@ def _motion(
     if not shown and not given:
         notes.append("the drive does not show the squat: pitch of the body is taken as grade")
 
+    has_height = fixes is not None and fixes.has_height
+    floor = math.hypot(settings.body_pitch_std, 0.0 if has_height else settings.blind_grade_std)
     rot_vs = euler_to_matrix(0.0, pitch0, -yaw0) @ rot_bs
     found_scale = has_wheel and fixes is not None and end_std[18] < 0.02
     slow_std = float(np.median(stds[:, ERRORS])) * GRAVITY
@@ -511,7 +515,7 @@ def _motion(
         longitude=longitude,
         valid=valid,
         specific_force_std=_noise_level(specific_force[valid]),
-        grade_std=on_grid(stds[:, ERRORS]),
+        grade_std=np.hypot(on_grid(stds[:, ERRORS]), floor),
         speed_scale=float(end[SCALE]) if found_scale else None,
         speed_scale_std=float(end_std[18]) if found_scale else None,
         speed_delay=delay,

@@ -30,6 +30,8 @@ class NavigationSettings:
     gnss_horizontal_std, gnss_vertical_std : of fixes without their own
         accuracy [m] (table 3)
     gnss_velocity_std : [m/s]
+    height_range : how far from its start a drive without heights may lead up
+        or down [m]
     gnss_time : correlation time of GNSS errors [s]; faster fixes weigh less
     speed_std : of the vehicle speed beside its resolution [m/s]
     speed_slip_std : further, per speed [-]
@@ -38,6 +40,9 @@ class NavigationSettings:
     lever, lever_std : the sensor ahead of the rear axle before the drive [m]
     vertical_std, vertical_slope_std : error of the vertical constraint:
         heave [m/s], per speed [-]
+    body_pitch_std : the body's own pitching on bumps, which no grade is [rad]
+    blind_grade_std : what a drive without heights leaves in the grade: errors of
+        the sensor's axes pass for it [rad]
     constraint_time : correlation time of constraint and wheel speed errors [s]
     mounting_std : of pitch and yaw after the coarse alignment [rad]
     squat, squat_std : pitch of the body per acceleration before the drive
@@ -60,6 +65,7 @@ class NavigationSettings:
     gnss_horizontal_std: float = 2.0
     gnss_vertical_std: float = 5.0
     gnss_velocity_std: float = 0.3
+    height_range: float = 100.0
     gnss_time: float = 1.0
     speed_std: float = 0.1
     speed_slip_std: float = 0.003
@@ -70,6 +76,8 @@ class NavigationSettings:
     lever_std: float = 1.5
     vertical_std: float = 0.08
     vertical_slope_std: float = 0.004
+    body_pitch_std: float = 0.0017
+    blind_grade_std: float = 0.004
     constraint_time: float = 0.3
     mounting_std: float = 0.035
     squat: float = 0.0035
