@@ -246,7 +246,7 @@ def test_roughness_has_the_level_of_the_standard():
         top = 2 * damping * w * s + w * w if base else w * w
         return top / (s * s + 2 * damping * w * s + w * w)
 
-    road = (2 * np.pi * 0.1) ** 2 * 24e-6 * 25.0 * 0.6**2
+    road = (2 * np.pi * 0.1) ** 2 * 48e-6 * 25.0 * 0.75**2
     body = np.abs(s * gain(11.0, 0.35, False) * gain(MIDSIZE.heave_frequency, 0.3, True)) ** 2
     expected = math.sqrt(np.trapezoid(road * body, f))
     assert_allclose(measured, expected, rtol=0.10)

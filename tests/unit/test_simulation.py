@@ -173,6 +173,17 @@ def test_fixes_err_by_what_is_stated():
     assert_allclose(up.std(), np.hypot(0.8, 4.5), rtol=0.3)
 
 
+def test_vibration_has_the_level_stated():
+    scenario = short(route=flat_route(4000.0, limit=25.0), effects=Effects.only(imu_vibration=1.0))
+    still = replace(scenario, sensors=Sensors(vibration=0.0), duration=100.0)
+    made = simulate_car(still)
+    s = made.drive.signals
+    fast = np.interp(s["accel_z"].time, made.truth.time, made.truth.speed) > 24.5
+    assert fast.sum() > 5000
+    assert_allclose(s["accel_z"].values[fast].std(), 0.25, rtol=0.1)
+    assert_allclose(s["gyro_y"].values[fast].std(), 0.006, rtol=0.1)
+
+
 def test_lower_inertial_rate_and_no_sensor():
     made = simulate_car(short(sensors=Sensors(imu_rate=100.0, gnss_rate=0.0)))
     assert_allclose(made.drive.signals["accel_x"].period, 0.01, rtol=0.01)

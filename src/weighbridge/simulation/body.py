@@ -16,9 +16,9 @@ from weighbridge.simulation.route import STEP
 if TYPE_CHECKING:
     from weighbridge.simulation.scenario import Scenario
 
-ROAD_ROUGHNESS = 24.0e-6
-"""Displacement spectral density at 0.1 cycles/m, ISO 8608 between classes A and
-B [m^3]."""
+ROAD_ROUGHNESS = 48.0e-6
+"""Displacement spectral density at 0.1 cycles/m, the better half of class B of
+ISO 8608 (32e-6 to 128e-6) [m^3]."""
 
 _WHEELBASE = 2.75  # [m]
 _TRACK = 1.55  # [m]
@@ -115,7 +115,7 @@ def simulate_pose(scenario: Scenario, drive: Trajectory, rng: np.random.Generato
             (2.0 * math.pi * 0.1) ** 2 * ROAD_ROUGHNESS * np.maximum(v, 0.0)
         )
         uneven *= effects.roughness
-        heave = _road_shake(0.6 * uneven, rng, car.heave_frequency, 0.3)
+        heave = _road_shake(0.75 * uneven, rng, car.heave_frequency, 0.3)
         pitch = pitch + _road_shake(uneven / _WHEELBASE, rng, car.pitch_frequency, 0.35)
         roll = roll + _road_shake(0.7 * uneven / _TRACK, rng, car.roll_frequency, 0.3)
     heading = course + car.side_slip * effects.side_slip * lateral

@@ -85,7 +85,7 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
         accel_limit[part] *= rng.uniform(0.75, 1.2)
         if scenario.calibration:
             accel_limit[part] *= rng.choice([0.6, 1.5, 3.0, 6.0])
-            revs[part] = max(0.0, rng.uniform(-0.3, 0.95))
+            revs[part] = max(0.0, rng.uniform(-0.5, 0.95))
         else:
             revs[part] += rng.uniform(0.0, 0.15)
         x += length

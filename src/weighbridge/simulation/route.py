@@ -356,7 +356,7 @@ def highway_route(seed: int = 3, *, length: float = 20000.0) -> Route:
     )
 
 
-def hilly_route(seed: int = 4, *, length: float = 19000.0) -> Route:
+def hilly_route(seed: int = 4, *, length: float = 23000.0) -> Route:
     """Return country roads and hills, where every gear can be used."""
     half = length / 2
     return mixed_route(

@@ -142,6 +142,8 @@ class Sensors:
     scale, cross_axis : standard deviations [-]
     accel_step, gyro_step : quantisation [m/s^2], [rad/s]
     vibration : amplitude of engine vibration [m/s^2]
+    road_vibration : of tyres and body at 8 to 60 Hz, at 25 m/s: accelerometer and
+        gyro, root mean square of the worst axis [m/s^2], [rad/s]
     clock_jitter : of the time stamps [s]
     gnss_noise : white, horizontal and vertical [m]
     gnss_drift : correlated, horizontal and vertical [m]
@@ -173,6 +175,7 @@ class Sensors:
     accel_step: float = 9.81 / 8192
     gyro_step: float = math.radians(250.0) / 32768
     vibration: float = 0.05
+    road_vibration: tuple[float, float] = (0.25, 0.006)
     clock_jitter: float = 2.0e-4
     gnss_noise: tuple[float, float] = (0.4, 0.8)
     gnss_drift: tuple[float, float] = (2.2, 4.5)
@@ -436,6 +439,6 @@ def make_scenario(
 
 
 def streams(seed: int, *names: str) -> dict[str, np.random.Generator]:
-    """Return one random stream per name, so that one effect never moves another."""
+    """Return one random stream per name, so that none moves another."""
     children = np.random.SeedSequence(seed).spawn(len(names))
     return {n: np.random.default_rng(c) for n, c in zip(names, children, strict=True)}

@@ -98,6 +98,15 @@ def simulate_imu(
         )
         for axis, (share, shift) in enumerate(((0.6, 0.3), (0.5, 1.9), (1.0, 0.0))):
             force[axis] += share * strength * np.sin(phase + shift)
+    if effects.imu_vibration > 0.0:
+        # Shaking of what the sensor sits on, not of the body as a whole.
+        band = dsp.butter(2, (8.0, 60.0), btype="band", fs=1.0 / DT, output="sos")
+        gain = 1.0 / np.sqrt((60.0 - 8.0) * 2.0 * DT)  # the share of white noise passed
+        level = effects.imu_vibration * gain * np.sqrt(drive.speed / 25.0)
+        for values, worst in zip((force, rate), sensors.road_vibration, strict=True):
+            for axis, share in enumerate((0.6, 0.7, 1.0) if values is force else (0.7, 1.0, 0.3)):
+                shaking = dsp.sosfilt(band, rng.standard_normal(drive.time.size))
+                values[axis] += share * worst * level * shaking
     stride = max(1, round(1.0 / (DT * sensors.imu_rate)))
     if stride > 1:
         count = time.size // stride
