@@ -13,9 +13,10 @@ import numpy as np
 import pymap3d
 
 from weighbridge.constants import GRAVITY
-from weighbridge.kernels.rotation import quaternion_to_matrix
+from weighbridge.kernels.rotation import euler_to_matrix, quaternion_to_matrix
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.signals import Drive, Signal
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -140,42 +141,147 @@ def score(motion: Motion, time, truth, of: str, *, skip: float = 10.0):
     return float(np.mean(error)), float(np.std(error))
 
 
+def pyins_pitch(drive: Drive, truth, mounting, *, motion: Motion, start: float = 1.0):
+    """Pitch of the body by pyins (PyPI ``python-ins``) with body velocity: time, pitch [rad].
+
+    It is given more than our filter gets: the true mounting (roll, pitch, yaw)
+    and the true first attitude; delay and scale of the speed, which it does
+    not estimate, are those our ``motion`` found. ``truth`` has time, speed,
+    heading, pitch, roll, latitude, longitude and altitude in SI.
+    """
+    import pandas as pd
+    from pyins import filters, measurements, strapdown
+    from pyins.inertial_sensor import EstimationModel
+
+    settings = NavigationSettings()
+    turn = euler_to_matrix(*mounting)
+    time = drive.signals["accel_x"].time
+    read = {
+        kind: np.column_stack([drive.signals[f"{kind}_{a}"].values for a in "xyz"]) @ turn.T
+        for kind in ("gyro", "accel")
+    }
+    imu = pd.DataFrame(
+        np.hstack([read["gyro"], read["accel"]]),
+        index=time,
+        columns=["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"],
+    )
+    imu = imu[imu.index >= start]
+    increments = strapdown.compute_increments_from_imu(imu, "rate")
+
+    def at(name, t):
+        return np.interp(t, truth.time, getattr(truth, name))
+
+    t0 = float(imu.index[0])
+    speed0, heading0 = at("speed", t0), at("heading", t0)
+    pva = pd.Series(
+        {
+            "lat": np.degrees(at("latitude", t0)),
+            "lon": np.degrees(at("longitude", t0)),
+            "alt": at("altitude", t0),
+            "VN": speed0 * np.cos(heading0),
+            "VE": speed0 * np.sin(heading0),
+            "VD": 0.0,
+            "roll": np.degrees(at("roll", t0)),
+            "pitch": np.degrees(at("pitch", t0)),
+            "heading": np.degrees(heading0),
+        },
+        name=t0,
+    )
+
+    def snapped(t):
+        return increments.index[
+            np.clip(np.searchsorted(increments.index, t), 0, len(increments) - 1)
+        ]
+
+    lat = drive.signals["latitude"]
+    fixes = pd.DataFrame(
+        {
+            "lat": np.degrees(lat.values),
+            "lon": np.degrees(drive.signals["longitude"].at(lat.time)),
+            "alt": drive.signals["altitude"].at(lat.time),
+        },
+        index=snapped(lat.time),
+    )
+    speed = drive.signals["vehicle_speed"]
+    scale = motion.speed_scale or 1.0
+    body = pd.DataFrame(
+        {"VX": speed.values / scale, "VY": 0.0, "VZ": 0.0},
+        index=snapped(speed.time - motion.speed_delay),
+    )
+    fixes, body = (d[~d.index.duplicated()].iloc[1:-1] for d in (fixes, body))
+    result = filters.run_feedback_filter(
+        pva, 5.0, 0.2, 0.5, 2.0, increments,
+        EstimationModel(settings.gyro_bias_std, settings.gyro_density, settings.gyro_bias_walk),
+        EstimationModel(settings.accel_bias_std, settings.accel_density, settings.accel_bias_walk),
+        [measurements.Position(fixes, 3.0), measurements.BodyVelocity(body, 0.2)],
+        time_step=0.1,
+    )  # fmt: skip
+    return np.asarray(result.trajectory.index), np.radians(result.trajectory["pitch"].to_numpy())
+
+
+def compare_with_pyins(scenario: str = "car-short", seed: int = 1) -> dict[str, float]:
+    """RMS error of body pitch on one simulated drive after 60 s, while moving [deg]."""
+    from weighbridge.simulation.scenario import make_scenario
+    from weighbridge.simulation.simulate import simulate_car
+
+    made = simulate_car(make_scenario(scenario, seed=seed))
+    truth = made.truth
+
+    def rms(time, pitch):
+        keep = (truth.time > truth.time[0] + 60.0) & (truth.speed > 1.0) & (truth.time < time[-1])
+        error = np.interp(truth.time[keep], time, pitch) - truth.pitch[keep]
+        return float(np.degrees(np.sqrt(np.mean(error**2))))
+
+    smoothed = inertial_motion(made.drive)
+    forward = inertial_motion(made.drive, settings=NavigationSettings(smooth=False))
+    found = {
+        "weighbridge": rms(smoothed.time, smoothed.pitch),
+        "weighbridge, forward only": rms(forward.time, forward.pitch),
+    }
+    found["pyins"] = rms(
+        *pyins_pitch(made.drive, truth, made.scenario.sensors.mounting, motion=smoothed)
+    )
+    return found
+
+
+def report(name: str, motion: Motion, scores: dict[str, tuple[float, float]]) -> None:
+    """Print one line."""
+    parts = [f"{k}: mean {m:+.3f} sd {s:.3f} deg" for k, (m, s) in scores.items()]
+    if motion.squat is not None:
+        degrees = np.degrees([motion.squat, motion.squat_std])
+        parts.append(f"squat {degrees[0]:.2f} +- {degrees[1]:.2f} deg per m/s^2")
+    else:
+        parts.append("squat not shown")
+    parts.append(f"speed late by {motion.speed_delay:.3f} s, scale {motion.speed_scale:.4f}")
+    print(f"{name:<28}", "; ".join(parts))
+
+
 def main() -> None:
     for raw in (True, False):
         for cut in (None, 20.0):
             drive, time, pitch, grade = load_comma(DATA / "comma2k19", raw_gyro=raw, gnss_cut=cut)
             motion = inertial_motion(drive)
-            print(
-                "comma2k19",
-                "raw" if raw else "corrected",
-                "gnss cut" if cut else "gnss",
-                "pitch mean %.3f sd %.3f" % score(motion, time, pitch, "pitch"),
-                "grade mean %.3f sd %.3f" % score(motion, time, grade, "grade"),
-                "squat",
-                motion.squat,
-                motion.squat_std,
-                "delay %.3f" % motion.speed_delay,
-                "scale",
-                motion.speed_scale,
-                np.degrees(motion.mounting).round(2),
-                motion.notes,
+            name = f"comma2k19{' raw gyro' if raw else ''}{' GNSS cut' if cut else ''}"
+            report(
+                name,
+                motion,
+                {
+                    "pitch": score(motion, time, pitch, "pitch"),
+                    "grade": score(motion, time, grade, "grade"),
+                },
             )
-    for seed in range(4):
+    for seed in range(6):
         drive, time, grade = load_rtk(DATA / "rtk-grade", seed=seed)
         motion = inertial_motion(drive)
-        print(
-            "rtk-grade",
-            seed,
-            "grade mean %.3f sd %.3f" % score(motion, time - motion.speed_delay, grade, "grade"),
-            "squat",
-            motion.squat,
-            motion.squat_std,
-            "delay %.3f" % motion.speed_delay,
-            "scale",
-            motion.speed_scale,
-            np.degrees(motion.mounting).round(2),
-            motion.notes,
-        )
+        shifted = time - motion.speed_delay
+        report(f"rtk-grade seed {seed}", motion, {"grade": score(motion, shifted, grade, "grade")})
+    try:
+        compared = compare_with_pyins()
+    except ModuleNotFoundError as missing:
+        print(f"no comparison with pyins: {missing}; pip install python-ins")
+        return
+    for name, value in compared.items():
+        print(f"{name:<28} pitch rms {value:.3f} deg on car-short")
 
 
 if __name__ == "__main__":

@@ -5,9 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba import config
 
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.settings import NavigationSettings
+
+pytestmark = pytest.mark.skipif(
+    bool(config.DISABLE_JIT), reason="a whole drive takes minutes without the compiler"
+)
 
 _SPEC = importlib.util.spec_from_file_location(
     "navigation_study", Path(__file__).resolve().parents[2] / "studies" / "navigation.py"

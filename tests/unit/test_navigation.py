@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pymap3d
 import pytest
+from numba import config
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
@@ -67,6 +68,8 @@ def simulate(
     gyro_bias=(0.004, -0.003, 0.005),
 ):
     """Make a drive over hills and bends with stops, and its truth, at 100 Hz."""
+    if config.DISABLE_JIT:
+        pytest.skip("a whole drive takes minutes without the compiler")
     rng = np.random.default_rng(seed)
     dt = 0.01
     t = np.arange(0.0, duration, dt)
