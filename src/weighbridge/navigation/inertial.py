@@ -69,6 +69,32 @@ _FIRST_PASS = 900.0
 """The first pass, which only finds the constants, ends after so long [s]."""
 
 
+_FINE_RATE = 20.0
+"""Clock of the delays [Hz]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Even:
+    """Inertial samples, low-passed on an even clock.
+
+    Attributes
+    ----------
+    time : (n,) [s]
+    values : (n, 6) specific force and angular rate in sensor axes; NaN in gaps
+    """
+
+    time: Floats
+    values: Floats
+
+
+def _evenly(imu: Imu, rate: float) -> _Even:
+    """Low-pass the inertial samples and take them to an even clock."""
+    start = float(imu.time[0])
+    count = max(4, math.floor((imu.time[-1] - start) * rate) + 1)
+    values = resample(imu.time, np.hstack([imu.accel, imu.gyro]), start, 1.0 / rate, count)
+    return _Even(start + np.arange(count) / rate, values)
+
+
 @dataclass(frozen=True, slots=True)
 class _Start:
     """Where the filter begins.
@@ -152,16 +178,17 @@ def inertial_motion(
         )
     notes: list[str] = []
 
-    rot_bs, tilt_std, yaw_std, yaw_bias, delay = _align(imu, reference, mounting, notes)
+    fine = _evenly(imu, _FINE_RATE)
+    rot_bs, tilt_std, yaw_std, yaw_bias, delay = _align(fine, reference, mounting, notes)
     reference = Signal(reference.name, reference.time - delay, reference.values)
-    gnss_delay = delay if wheel is None else 0.0
+    gnss_delay = delay if wheel is None else _gnss_delay(drive, fine, fixes, rot_bs)
     speed = reference if wheel is not None or drive.has("gnss_speed") else None
 
-    count = max(2, math.floor((end - start) * rate) + 1)
-    grid = start + np.arange(count) / rate
-    sensor = resample(imu.time, np.hstack([imu.accel, imu.gyro]), start, 1.0 / rate, count)
+    even = fine if rate == _FINE_RATE else _evenly(imu, rate)
+    grid, sensor = even.time, even.values
     accel, gyro = sensor[:, :3] @ rot_bs.T, sensor[:, 3:] @ rot_bs.T
 
+    _LOG.debug("vehicle speed late by %.3f s, GNSS by %.3f s", delay, gnss_delay)
     fix_times = fixes.time - gnss_delay if fixes is not None else np.empty(0)
     nodes = place_nodes(imu.time, fix_times, rate, settings.max_gap)
     node_time = imu.time[nodes]
@@ -197,17 +224,14 @@ def _usable(signal: Signal | None, start: float, end: float) -> Signal | None:
 
 
 def _align(
-    imu: Imu, reference: Signal, mounting: Mounting | None, notes: list[str]
+    fine: _Even, reference: Signal, mounting: Mounting | None, notes: list[str]
 ) -> tuple[Floats, float, float, float, float]:
     """Find sensor to body axes, their uncertainty, the yaw rate's bias and the speed's delay."""
-    start = float(imu.time[0])
-    count = max(4, math.floor((imu.time[-1] - start) / _COARSE_PERIOD) + 1)
+    start = float(fine.time[0])
+    count = max(4, math.floor((fine.time[-1] - start) / _COARSE_PERIOD) + 1)
     grid = start + np.arange(count) * _COARSE_PERIOD
-    data = resample(imu.time, np.hstack([imu.accel, imu.gyro]), start, _COARSE_PERIOD, count)
-
-    fine_count = max(4, math.floor((imu.time[-1] - start) * 20.0) + 1)
-    fine_grid = start + np.arange(fine_count) / 20.0
-    fine = resample(imu.time, imu.accel, start, 0.05, fine_count)
+    whole = np.isfinite(fine.values).all(axis=1)
+    data = resample(fine.time[whole], fine.values[whole], start, _COARSE_PERIOD, count)
 
     delay = 0.0
     rot = np.eye(3) if mounting is None else euler_to_matrix(
@@ -239,12 +263,22 @@ def _align(
                         f"the drive shows a mounting {math.degrees(angle):.0f} deg from the one "
                         "given"
                     )
-        delay, delay_std = estimate_speed_delay(fine_grid, fine @ rot[0], reference)
+        delay, delay_std = estimate_speed_delay(fine.time, fine.values[:, :3] @ rot[0], reference)
         if not delay_std < 0.1:
             delay = 0.0
     if delay == 0.0:
         notes.append("the drive does not show how late its vehicle speed is; taken as 0 s")
     return rot, tilt_std, yaw_std, yaw_bias, delay
+
+
+def _gnss_delay(drive: Drive, fine: _Even, fixes: Fixes | None, rot_bs: Floats) -> float:
+    """Find how late GNSS is, from its speed or that between fixes; 0 where not shown [s]."""
+    if fixes is None:
+        return 0.0
+    start, end = float(fine.time[0]), float(fine.time[-1])
+    speed = _usable(drive.get("gnss_speed"), start, end) or speed_from_fixes(fixes)
+    delay, std = estimate_speed_delay(fine.time, fine.values[:, :3] @ rot_bs[0], speed)
+    return delay if std < 0.05 else 0.0
 
 
 def _coarse_speed(speed: Signal, grid: Floats) -> Floats:
