@@ -33,7 +33,7 @@ def rows(rng, n=6000, noise=3.0, road=ROAD):
     return TorqueRows(
         design=design,
         target=target + rng.normal(0.0, noise, n),
-        block=np.arange(n) // 200 * 1.0,
+        time=np.arange(n) * 0.3,
     )
 
 
@@ -53,7 +53,7 @@ def test_outliers_do_not_move_the_fit():
     spoiled = made.target.copy()
     spoiled[rng.random(spoiled.size) < 0.05] += 150.0
     clean = fit(made, *BOUNDS["car"])
-    robust = fit(TorqueRows(design=made.design, target=spoiled, block=made.block), *BOUNDS["car"])
+    robust = fit(TorqueRows(design=made.design, target=spoiled, time=made.time), *BOUNDS["car"])
     plain = np.linalg.lstsq(made.design, spoiled, rcond=None)[0]
     assert abs(robust.coefficients[0] - clean.coefficients[0]) < 1.0
     assert abs(plain[0] - clean.coefficients[0]) > 3.0

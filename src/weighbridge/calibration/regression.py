@@ -43,12 +43,17 @@ class TorqueRows:
     design : (n, p + 4) columns of the torque regression, then of
         `ROAD_PARAMETERS`, such that ``design @ parameters = target``
     target : (n,) torque that lifts and accelerates the known mass [N m]
-    block : (n,) number of the block each row belongs to
+    time : (n,) instants, several drives one after another [s]
     """
 
     design: Floats
     target: Floats
-    block: Floats
+    time: Floats
+
+    @property
+    def block(self) -> Floats:
+        """(n,) number of the block of dependent rows each row belongs to."""
+        return np.floor(self.time / BLOCK)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +62,7 @@ class TorqueFit:
 
     Attributes
     ----------
-    coefficients : (p,) w0, w1 ... of eq. 49
+    coefficients : (p,) w0, w1 ... of eq. 49, then the curvature if there is one
     road : (4,) `ROAD_PARAMETERS`
     cov : (p + 4, p + 4) their covariance, zero where a bound holds
     weight : (n,) what each row counted, in (0, 1]
@@ -85,6 +90,7 @@ def build_rows(
     mass: float,
     wheel_radius: float,
     order: int,
+    curved: bool,
     rows: Bools,
 ) -> TorqueRows:
     """Write eq. 48 for the rows of one drive.
@@ -97,6 +103,7 @@ def build_rows(
     mass : known mass [kg]
     wheel_radius : [m]
     order : highest power of engine speed in eq. 49
+    curved : let the slope over load change with engine speed and load
     rows : (n,) which rows to take
 
     References
@@ -105,7 +112,7 @@ def build_rows(
     """
     gearing = view.gearing[rows]
     accel = view.accel[rows]
-    torque = torque_rows(regressor[rows], engine_speed[rows], order)
+    torque = torque_rows(regressor[rows], engine_speed[rows], order, curved=curved)
     road = np.column_stack(
         [
             -0.5 * view.air_density[rows] * view.speed[rows] ** 2 / gearing,
@@ -114,26 +121,26 @@ def build_rows(
             -accel / (wheel_radius**2 * gearing),
         ]
     )
-    time = view.time[rows]
-    first = time[0] if time.size else 0.0
     return TorqueRows(
         design=np.hstack([torque, road]),
         target=mass * view.specific_force[rows] / gearing,
-        block=np.floor((time - first) / BLOCK),
+        time=view.time[rows],
     )
 
 
 def join_rows(parts: list[TorqueRows]) -> TorqueRows:
     """Put the rows of several drives under each other."""
-    offset = 0.0
-    blocks = []
+    end = 0.0
+    times = []
     for part in parts:
-        blocks.append(part.block + offset)
-        offset += float(part.block.max(initial=0.0)) + 1.0
+        first = float(part.time.min(initial=0.0))
+        times.append(part.time - first + end)
+        # Rows of two drives never share a block.
+        end = (np.floor(times[-1].max(initial=0.0) / BLOCK) + 2.0) * BLOCK
     return TorqueRows(
         design=np.vstack([p.design for p in parts]),
         target=np.concatenate([p.target for p in parts]),
-        block=np.concatenate(blocks),
+        time=np.concatenate(times),
     )
 
 

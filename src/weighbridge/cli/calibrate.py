@@ -38,6 +38,10 @@ def calibrate(
         Optional[Path],  # noqa: UP045
         typer.Option("--vehicle", help="What is known already: class, wheel radius, gearings."),
     ] = None,
+    tare: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--tare", help="Mass without payload in kg; payloads count from it."),
+    ] = None,
     order: Annotated[
         Optional[int],  # noqa: UP045
         typer.Option("--order", min=0, max=4, help="Power of engine speed in the torque fit."),
@@ -49,6 +53,10 @@ def calibrate(
     grid: Annotated[
         bool, typer.Option("--grid", help="Search the grid of Jensen 2022, Table 5, instead.")
     ] = False,
+    straight: Annotated[
+        bool,
+        typer.Option("--straight", help="Torque linear in load, as eq. 49 of Jensen 2022 prints."),
+    ] = False,
     mapping: MappingPath = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
@@ -56,6 +64,8 @@ def calibrate(
 
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
+    from dataclasses import replace
+
     from rich.console import Console
 
     from weighbridge.errors import ConfigError
@@ -67,9 +77,11 @@ def calibrate(
         raise ConfigError(f"--torque {torque}: must be measured, percent, load or air_flow")
     base = Vehicle.load(vehicle) if vehicle is not None else None
     recorded = [load(path, mapping_for(mapping, base, vehicle)) for path in drives]
-    settings = CalibrationSettings(order=order, source=torque, grid=grid)  # type: ignore[arg-type]
+    settings = CalibrationSettings(order=order, source=torque, grid=grid, curved=not straight)  # type: ignore[arg-type]
     masses = mass[0] if mass is not None and len(mass) == 1 else mass
     done = run_calibration(recorded, masses, vehicle=base, settings=settings)
+    if tare is not None:
+        done = replace(done, vehicle=replace(done.vehicle, tare=tare))
     done.vehicle.save(output)
     Console().print(table(done))
     typer.echo(f"written: {output}")

@@ -635,8 +635,8 @@ def run(x, cov, work, time, accel, gyro, rot_bs, nodes, first, last, z, noise, l
         Of ``last - first`` nodes, or empty.
     states : (m, 24) float64
         Filled: first part of the nominal state after each node.
-    stds : (m, 21) float64
-        Filled: standard deviations after each node; the last is of the grade [rad].
+    stds : (m,) float64
+        Filled: standard deviation of the grade after each node [rad].
     """
     start = nodes[first - 1] + 1 if first > 0 else 0
     f = np.empty(3)
@@ -652,10 +652,9 @@ def run(x, cov, work, time, accel, gyro, rot_bs, nodes, first, last, z, noise, l
         is_node = i == nodes[k]
         step(x, cov, work, f, w, dt, is_node, z[k], noise, log, k - first)
         if is_node:
-            states[k] = x[:SHOWN]
-            for a in range(ERRORS):
-                stds[k, a] = math.sqrt(max(cov[a, a], 0.0))
-            stds[k, ERRORS] = grade_std(x, cov, work)
+            for a in range(SHOWN):
+                states[k, a] = x[a]
+            stds[k] = grade_std(x, cov, work)
             k += 1
 
 

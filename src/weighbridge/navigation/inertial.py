@@ -117,7 +117,7 @@ class Solution:
     ----------
     time : (m,) [s]
     states : (m, 24) see `weighbridge.kernels.ins`
-    stds : (m, 21) standard deviations of the forward pass
+    stds : (m,) standard deviation of the grade in the forward pass [rad]
     last : (30,) nominal state at the end of the forward pass
     last_cov : (20, 20) its covariance
     """
@@ -422,7 +422,7 @@ def _filter(
     x, cov, work = begin.x.copy(), begin.cov.copy(), new_work()
     count = nodes.size
     states = np.empty((count, SHOWN))
-    stds = np.empty((count, ERRORS + 1))
+    stds = np.empty(count)
     empty = new_log(0)
     kept = []
     for first in range(0, count, _STRETCH):
@@ -529,7 +529,7 @@ def _motion(
     floor = math.hypot(settings.body_pitch_std, 0.0 if has_height else settings.blind_grade_std)
     rot_vs = euler_to_matrix(0.0, pitch0, -yaw0) @ rot_bs
     found_scale = has_wheel and fixes is not None and end_std[18] < 0.02
-    slow_std = float(np.median(stds[:, ERRORS])) * GRAVITY
+    slow_std = float(np.median(stds)) * GRAVITY
     _LOG.debug("squat %.4f +- %.4f rad per m/s^2, slow std %.3f", squat, end_std[17], slow_std)
     return Motion(
         source="inertial",
@@ -549,7 +549,7 @@ def _motion(
         longitude=longitude,
         valid=valid,
         specific_force_std=_noise_level(specific_force[valid]),
-        grade_std=np.hypot(on_grid(stds[:, ERRORS]), floor),
+        grade_std=np.hypot(on_grid(stds), floor),
         speed_scale=float(end[SCALE]) if found_scale else None,
         speed_scale_std=float(end_std[18]) if found_scale else None,
         speed_delay=delay,

@@ -49,11 +49,14 @@ class CalibrationSettings:
         and air flow, 0 for measured torque when None
     source : torque source; the best the drives have when None
     grid : solve on the grid of Jensen 2022, Table 5, in place of the bounds
+    curved : let the torque per load change with engine speed and load; off for
+        the regression of eq. 49 as printed
     """
 
     order: int | None = None
     source: TorqueSource | None = None
     grid: bool = False
+    curved: bool = True
 
     def __post_init__(self) -> None:
         if self.order is not None and not 0 <= self.order <= 4:
@@ -114,7 +117,7 @@ def run_calibration(
     """As `calibrate`, keeping what the report shows."""
     drives = [drives] if isinstance(drives, Drive) else list(drives)
     settings = settings or CalibrationSettings()
-    base = vehicle or Vehicle()
+    base = vehicle or Vehicle(name=_name(drives))
     masses = _masses(drives, mass)
     for drive in drives:
         for problem in check_drive(drive, base):
@@ -131,8 +134,10 @@ def run_calibration(
         gears = find_gears(drives, motions)
         driveline = replace(driveline, gearings=tuple(float(g) for g in gears.gearings))
     order = settings.order
+    modelled = source in ("load", "air_flow")
     if order is None:
-        order = 2 if source in ("load", "air_flow") else 0
+        order = 2 if modelled else 0
+    curved = settings.curved and modelled
     model = TorqueModel(
         source="measured" if source == "load" else source,
         reference_torque=base.torque.reference_torque,
@@ -151,7 +156,7 @@ def run_calibration(
     def rows_at(delay: float) -> TorqueRows:
         return join_rows(
             [
-                _drive_rows(d, m, draft, source, kg, delay, order, floor)
+                _drive_rows(d, m, draft, source, kg, delay, order, curved, floor)
                 for d, m, kg, floor in zip(drives, motions, masses, floors, strict=True)
             ]
         )
@@ -173,13 +178,15 @@ def run_calibration(
 
     used_speeds, used_loads = _ranges(drives, motions, draft, source, delay, floors)
     stds = np.sqrt(np.diag(fitted.cov))
+    straight = coefficients.size - 2 * curved
     finished = replace(
         draft,
         driveline=replace(driveline, engine_inertia=float(road[2]), wheel_inertia=float(road[3])),
         torque=TorqueModel(
             source=source,
-            coefficients=tuple(float(w) for w in coefficients),
-            coefficient_stds=tuple(float(s) for s in stds[: coefficients.size]),
+            coefficients=tuple(float(w) for w in coefficients[:straight]),
+            coefficient_stds=tuple(float(s) for s in stds[:straight]),
+            curvature=tuple(float(w) for w in coefficients[straight:]),
             reference_torque=base.torque.reference_torque,
             engine_efficiency=base.torque.engine_efficiency,
             noise=fitted.residual_std,
@@ -263,6 +270,11 @@ def find_gears(drives: Sequence[Drive], motions: Sequence[Motion]) -> GearDetect
     return detect_gearings(np.concatenate(times), np.concatenate(engine), np.concatenate(speeds))
 
 
+def _name(drives: Sequence[Drive]) -> str:
+    """Take the vehicle's name from the first drive that tells it."""
+    return next((drive.info.vehicle for drive in drives if drive.info.vehicle), "vehicle")
+
+
 def _masses(drives: Sequence[Drive], mass: float | Sequence[float] | None) -> list[float]:
     if not drives:
         raise ConfigError("no drive to calibrate with")
@@ -311,6 +323,7 @@ def _drive_rows(
     mass: float,
     delay: float,
     order: int,
+    curved: bool,
     floor: float,
 ) -> TorqueRows:
     balance, x = _draft_balance(drive, motion, draft, source, delay)
@@ -321,6 +334,7 @@ def _drive_rows(
         mass=mass,
         wheel_radius=draft.driveline.wheel_radius,
         order=order,
+        curved=curved,
         rows=_usable(balance, x, floor),
     )
 
@@ -421,5 +435,5 @@ def _scaled(model: TorqueModel, scale: float) -> TorqueModel:
         model,
         coefficients=tuple(scale * w for w in model.coefficients),
         coefficient_stds=tuple(scale * s for s in model.coefficient_stds),
+        curvature=tuple(scale * w for w in model.curvature),
     )
-

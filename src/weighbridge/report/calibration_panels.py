@@ -182,18 +182,20 @@ def agreement_panel(calibration: Calibration) -> Panel:
 def sequence_panel(calibration: Calibration) -> Panel:
     """Torque of the motion and of the source one after another (fig. 9)."""
     source, motion = _torques(calibration)
-    number = np.arange(source.size, dtype=np.float64)
-    figure = blank("Usable samples, in the order driven [-]", "Torque [N m]", height=420)
+    minutes = from_si(calibration.rows.time, "min")
+    # A line across minutes without samples would show what nobody measured.
+    pause = np.flatnonzero(np.diff(minutes) > 0.1) + 1
+    minutes, source, motion = (np.insert(x, pause, np.nan) for x in (minutes, source, motion))
+    figure = blank("Time [min]", "Torque [N m]", height=420)
     for values, name, colour, width in (
         (motion, "from the motion", GREY, 2.4),
         (source, "from the source", BLUE, 1.2),
     ):
-        x, y = thin_line(number, values)
+        x, y = thin_line(minutes, values)
         line(figure, x, y, name, colour, line_width=width)
     return Panel(
         title="The torque from the source should follow the torque that the motion needs",
-        caption="Only the samples of the fit are shown, put after one another; zoom in to "
-        "compare single accelerations.",
+        caption="Only the samples of the fit are shown; zoom in to compare single accelerations.",
         figure=figure,
         wide=True,
     )

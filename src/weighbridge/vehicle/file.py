@@ -98,6 +98,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 "numbers",
             ),
             _Key("coefficient_stds", "coefficient_stds", "their standard deviations", "numbers"),
+            _Key("curvature", "curvature", "of load * engine speed and of load^2", "numbers"),
             _Key(
                 "reference_torque",
                 "reference_torque",

@@ -83,6 +83,8 @@ class TorqueModel:
         of rising powers of engine speed in rad/s; for measured and percent
         torque (offset [N m], scale [-]), empty meaning (0, 1)
     coefficient_stds : their standard deviations, same length or empty
+    curvature : of load times engine speed [N m s/rad] and of load squared [N m];
+        empty for the regression of eq. 49 as printed
     reference_torque : for "percent" where the drive does not carry it [N m]
     engine_efficiency : for "air_flow", shaft over fuel power [-]
     noise : standard deviation of the torque from this source [N m]
@@ -93,6 +95,7 @@ class TorqueModel:
     source: TorqueSource = "measured"
     coefficients: tuple[float, ...] = ()
     coefficient_stds: tuple[float, ...] = ()
+    curvature: tuple[float, ...] = ()
     reference_torque: float | None = None
     engine_efficiency: float = 0.33
     noise: float | None = None
@@ -110,6 +113,8 @@ class TorqueModel:
             )
         if self.coefficient_stds and len(self.coefficient_stds) != len(self.coefficients):
             raise ConfigError("coefficient_stds must be as many as coefficients")
+        if len(self.curvature) not in (0, 2):
+            raise ConfigError(f"curvature must be two numbers or none, got {self.curvature}")
         _positive("reference_torque", self.reference_torque)
         _positive("noise", self.noise)
         if not 0.0 < self.engine_efficiency <= 1.0:

@@ -109,21 +109,31 @@ def regressor(drive: Drive, source: TorqueSource, time: Floats, model: TorqueMod
     return values
 
 
-def torque_rows(regressor: Floats, engine_speed: Floats, order: int) -> Floats:
+def torque_rows(
+    regressor: Floats, engine_speed: Floats, order: int, *, curved: bool = False
+) -> Floats:
     """Rows of the torque regression (Jensen 2022, eq. 49).
+
+    The paper's regression is linear in load and takes the same torque per
+    load at every engine speed. Load is a part of the torque that is to be had
+    at that speed, so the slope changes with it: two further columns let it.
 
     Parameters
     ----------
     regressor : (n,) load [-] or air-flow torque [N m]
     engine_speed : (n,) [rad/s]
     order : highest power of engine speed
+    curved : append load times engine speed and load squared
 
     Returns
     -------
-    (n, 2 + order): 1, regressor, N, N^2 ...
+    (n, 2 + order [+ 2]): 1, load, N, N^2 ... [, load N, load^2]
     """
     powers = [engine_speed**k for k in range(1, order + 1)]
-    return np.column_stack([np.ones_like(regressor), regressor, *powers])
+    columns = [np.ones_like(regressor), regressor, *powers]
+    if curved:
+        columns += [regressor * engine_speed, regressor**2]
+    return np.column_stack(columns)
 
 
 def lowest_load(load: Floats) -> float:
@@ -156,8 +166,8 @@ def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Fl
         return Torque(time, offset + scale * x, nowhere, nowhere)
     if not model.coefficients:
         return Torque(time, x, nowhere, x <= 0.0)
-    rows = torque_rows(x, engine_speed, len(model.coefficients) - 2)
-    torque = rows @ np.array(model.coefficients)
+    rows = torque_rows(x, engine_speed, len(model.coefficients) - 2, curved=bool(model.curvature))
+    torque = rows @ np.array([*model.coefficients, *model.curvature])
     low, high = model.load_range or (-math.inf, math.inf)
     slow, fast = model.speed_range or (-math.inf, math.inf)
     extrapolated = (x > high) | (engine_speed < slow) | (engine_speed > fast)
