@@ -53,7 +53,7 @@ def kernel_rate(samples: int = 400_000) -> float:
     z[:, Z_SPEED] = 20.0
     z[:, Z_SPEED_VAR] = 0.25
     nodes = np.arange(samples)
-    states, stds = np.empty((samples, SHOWN)), np.empty((samples, ERRORS + 1))
+    states, stds = np.empty((samples, SHOWN)), np.empty(samples)
     noise = NavigationSettings().noise()
 
     def go() -> None:

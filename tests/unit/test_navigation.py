@@ -214,6 +214,34 @@ def test_gyro_in_degrees_is_refused(hills):
         inertial_motion(drive.with_signals(*d))
 
 
+@pytest.mark.parametrize("factor", [1.0 / 1.609344, 1.609344, 3.6])
+def test_speed_in_a_wrong_unit_is_refused(hills, factor):
+    drive, _ = hills
+    s = drive.signals["vehicle_speed"]
+    wrong = drive.with_signals(Signal("vehicle_speed", s.time, s.values * factor))
+    # a speed wrong by much also makes the gyro look wrong: either sentence names a unit
+    with pytest.raises(DriveError, match="unit"):
+        inertial_motion(wrong)
+
+
+def test_wrong_units_are_refused_with_a_known_mounting_too(hills):
+    drive, _ = hills
+    y = drive.signals["accel_y"]
+    mirrored = drive.with_signals(Signal("accel_y", y.time, -y.values))
+    with pytest.raises(DriveError, match="mirrored"):
+        inertial_motion(mirrored, Mounting())
+
+
+def test_known_mounting_serves_a_short_drive():
+    drive, truth = simulate(duration=45.0)
+    short = drive.between(0.0, 17.0)
+    with pytest.raises(DriveError, match="mounting"):
+        inertial_motion(short)
+    m = inertial_motion(short, Mounting(std=(0.005, 0.005, 0.01)))
+    assert m.squat is None
+    assert np.degrees(np.abs(_error(m, truth, "pitch", skip=11.0)).max()) < 1.0
+
+
 def test_inertial_sensor_alone_is_refused(hills):
     drive = hills[0].without("vehicle_speed", "latitude", "longitude", "altitude")
     with pytest.raises(DriveError, match="vehicle_speed"):
@@ -334,7 +362,7 @@ def test_batch_equals_sample_by_sample():
 
     x, cov, work = fresh()
     states = np.empty((nodes.size, SHOWN))
-    stds = np.empty((nodes.size, ERRORS + 1))
+    stds = np.empty(nodes.size)
     half = nodes.size // 2
     for a, b in ((0, half), (half, nodes.size)):
         run(x, cov, work, time, accel, gyro, turn, nodes, a, b, z, noise, new_log(0), states, stds)

@@ -51,7 +51,7 @@ from weighbridge.navigation.aiding import (
     still_state,
 )
 from weighbridge.navigation.motion import Motion
-from weighbridge.navigation.mounting import coarse_mounting
+from weighbridge.navigation.mounting import TooLittleMotionError, coarse_mounting
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.navigation.timing import estimate_speed_delay
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
@@ -68,6 +68,9 @@ _STRETCH = 512
 _FIRST_PASS = 900.0
 """The first pass, which only finds the constants, ends after so long [s]."""
 
+
+_SQUAT_TIME = 60.0
+"""One start alone shows anything but squat: it takes so much driving [s]."""
 
 _FINE_RATE = 20.0
 """Clock of the delays [Hz]."""
@@ -248,7 +251,7 @@ def _align(
             coarse = coarse_mounting(
                 data[:, :3], data[:, 3:], coarse_speed, _COARSE_PERIOD, coarse_speed < 0.05
             )
-        except DriveError:
+        except TooLittleMotionError:
             if mounting is None:
                 raise
             coarse = None
@@ -266,6 +269,13 @@ def _align(
         delay, delay_std = estimate_speed_delay(fine.time, fine.values[:, :3] @ rot[0], reference)
         if not delay_std < 0.1:
             delay = 0.0
+    if coarse is not None and reference.name == "vehicle_speed":
+        margin = 4.0 * coarse.forward_gain_std
+        if coarse.forward_gain - margin > 1.3 or coarse.forward_gain + margin < 0.75:
+            raise DriveError(
+                f"{reference.name} changes by {1.0 / coarse.forward_gain:.2f} of what the "
+                "accelerometer shows: set its unit (kmh, mph or mps) in the mapping"
+            )
     if delay == 0.0:
         notes.append("the drive does not show how late its vehicle speed is; taken as 0 s")
     return rot, tilt_std, yaw_std, yaw_bias, delay
@@ -474,7 +484,8 @@ def _motion(
 
     # constants: the smoothed ones do not change over the drive
     pitch0, yaw0, squat = float(end[PITCH0]), float(end[YAW0]), float(end[SQUAT])
-    shown = end_std[17] < settings.squat_found_std
+    going = float(np.sum(np.diff(time)[states[1:, V] ** 2 + states[1:, V + 1] ** 2 > 4.0]))
+    shown = end_std[17] < settings.squat_found_std and going > _SQUAT_TIME
     given = mounting is not None and mounting.squat is not None
     use_squat = squat if shown or given else 0.0
 

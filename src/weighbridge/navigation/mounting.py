@@ -19,6 +19,10 @@ _CORRELATION = 8.0
 this many times fewer independent samples than rows [-]."""
 
 
+class TooLittleMotionError(DriveError):
+    """The drive moves too little to show the mounting; one that is given may serve."""
+
+
 @dataclass(frozen=True, slots=True)
 class CoarseMounting:
     """The mounting as gravity, acceleration and turning show it.
@@ -28,6 +32,8 @@ class CoarseMounting:
     rot_bs : (3, 3) sensor to body axes
     yaw_std : standard deviation of the forward direction [rad]
     tilt_std : of the level [rad]
+    forward_gain, forward_gain_std : specific force per rate of change of the
+        speed [-]; 1 plus a little squat where units fit
     yaw_rate_bias : gyro bias about the body's z axis that lateral force shows
         [rad/s]; NaN where it does not
     """
@@ -35,6 +41,8 @@ class CoarseMounting:
     rot_bs: Floats
     yaw_std: float
     tilt_std: float
+    forward_gain: float
+    forward_gain_std: float
     yaw_rate_bias: float
 
 
@@ -57,9 +65,11 @@ def coarse_mounting(
 
     Raises
     ------
+    TooLittleMotionError
+        The drive holds too little acceleration.
     DriveError
-        Gravity or turning do not fit the units, the axes are swapped or
-        mirrored, or the drive holds too little acceleration.
+        Gravity or turning do not fit the units, or the axes are swapped or
+        mirrored.
     """
     ok = np.isfinite(accel).all(axis=1) & np.isfinite(gyro).all(axis=1)
     if ok.sum() < 10:
@@ -86,7 +96,7 @@ def coarse_mounting(
         & (v > 1.0)
     )
     if rows.sum() * period < 8.0:
-        raise DriveError(
+        raise TooLittleMotionError(
             f"the vehicle moves for only {rows.sum() * period:.0f} s, too little to find how "
             "the inertial sensor is mounted: give the mounting in the vehicle file"
         )
@@ -123,7 +133,7 @@ def coarse_mounting(
     axis = w1 * forward + w2 * np.cross(right, down)
     yaw_std = 1.0 / math.sqrt(w1 + w2)
     if yaw_std > 0.3 or np.linalg.norm(axis) / (w1 + w2) < 3.0 * yaw_std:
-        raise DriveError(
+        raise TooLittleMotionError(
             "the drive holds too little acceleration to find the sensor's forward axis "
             f"(uncertain by {math.degrees(yaw_std):.0f} deg): give the mounting in the vehicle file"
         )
@@ -133,7 +143,14 @@ def coarse_mounting(
     if rest_gyro is None and std[3] < 0.1:
         yaw_bias = -float(coef[3] @ rot[1])
     _LOG.debug("coarse mounting %s, yaw std %.1f deg", rot, math.degrees(yaw_std))
-    return CoarseMounting(rot, yaw_std, float(std[0]) / GRAVITY + 0.01, yaw_bias)
+    return CoarseMounting(
+        rot_bs=rot,
+        yaw_std=yaw_std,
+        tilt_std=float(std[0]) / GRAVITY + 0.01,
+        forward_gain=float(np.linalg.norm(forward)),
+        forward_gain_std=float(std[1]),
+        yaw_rate_bias=yaw_bias,
+    )
 
 
 def _check_gravity(size: float) -> None:
