@@ -176,6 +176,7 @@ def make_calibration(weighing):
         mass=MASS,
         wheel_radius=VEHICLE.driveline.wheel_radius,
         order=1,
+        curved=False,
         rows=view.usable,
     )
     return Calibration(
@@ -391,6 +392,7 @@ def test_calibration_without_gears_or_engine_speed_leaves_sentences(tmp_path):
         mass=MASS,
         wheel_radius=VEHICLE.driveline.wheel_radius,
         order=0,
+        curved=False,
         rows=view.usable,
     )
     calibration = replace(calibration, gears=None, rows=rows, fit=fit(rows, *BOUNDS["car"]))

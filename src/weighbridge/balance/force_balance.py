@@ -60,6 +60,11 @@ SLOWEST: Final = 1.5
 SHIFT_MARGIN: Final = 0.4
 """Samples nearer than this to a change of gear are left out [s]."""
 
+WIND_AT_VEHICLE: Final = 0.5
+"""Wind at a vehicle over the wind reported at 10 m [-]: logarithmic profile down to 1 m
+over a roughness length of 0.1 m, ln(1 / 0.1) / ln(10 / 0.1) (Stull, An Introduction to
+Boundary Layer Meteorology, 1988, ch. 9)."""
+
 BRAKING_FORCE: Final = 0.06
 """Braking force over weight that marks unseen braking [-]."""
 
@@ -105,7 +110,7 @@ class MergedView:
     gear : (n,)
     gearing : (n,) [1/m]
     rotating_mass : (n,) I_w / r^2 + I_e G^2 [kg]
-    drag_force : (n,) in still air [N]
+    drag_force : (n,) in still air, or in the wind that ``drive.toml`` reports [N]
     air_density : (n,) [kg/m^3]
     reason : (n,) `Reason`
     """
@@ -172,7 +177,8 @@ def force_balance(
     rotating = (
         driveline.wheel_inertia / driveline.wheel_radius**2 + driveline.engine_inertia * gearing**2
     )
-    drag = 0.5 * density * vehicle.road_load.drag_area * rows["speed"] ** 2
+    air_speed = rows["speed"] + headwind(drive, rows["heading"])
+    drag = 0.5 * density * vehicle.road_load.drag_area * air_speed * np.abs(air_speed)
 
     # The first reason that applies is the one told, so the order matters.
     reason = np.zeros(time.size, dtype=np.uint8)
@@ -222,6 +228,25 @@ def force_balance(
             reason=reason,
         ),
     )
+
+
+def headwind(drive: Drive, heading: Floats) -> Floats:
+    """Wind against the vehicle by the weather report of the drive.
+
+    Parameters
+    ----------
+    drive : with ``wind_speed`` and ``wind_from`` in its info, else there is none
+    heading : (n,) of the vehicle [rad]; NaN where unknown
+
+    Returns
+    -------
+    (n,) positive from ahead [m/s]
+    """
+    speed, direction = drive.info.wind_speed, drive.info.wind_from
+    if not speed or direction is None:
+        return np.zeros_like(heading)
+    along = WIND_AT_VEHICLE * speed * np.cos(direction - heading)
+    return np.asarray(np.where(np.isfinite(along), along, 0.0))
 
 
 def _motion_at(motion: Motion, time: Floats) -> dict[str, Floats]:

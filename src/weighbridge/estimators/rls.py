@@ -111,7 +111,9 @@ def estimate(
     reason[(reason == 0) & (view.accel <= 0.0)] = Reason.NOT_ACCELERATING
     valid = (reason == 0) & np.isfinite(phi) & np.isfinite(y)
     period = float(np.median(np.diff(view.time))) if view.time.size > 1 else 1.0 / PAPER_RATE
-    state = kernel.initial_state([settings.initial_mass], [[settings.initial_gain]])
+    state = kernel.initial_state(  # type: ignore[no-untyped-call]
+        [settings.initial_mass], [[settings.initial_gain]]
+    )
     state, theta, var, _, taken = kernel.run(
         state, view.time, phi[:, None], y, valid, parameters(settings, period)
     )

@@ -229,18 +229,17 @@ def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
     DriveError
         None of them has any.
     """
-    for source in ("measured", "percent", "load", "air_flow"):
-        names = SIGNALS[source]
+    for source, names in SIGNALS.items():
         if all(drive.has(*names) for drive in drives):
             reference = vehicle.torque.reference_torque is not None or all(
                 drive.has("reference_torque") for drive in drives
             )
             if source != "percent" or reference:
                 return source
-    names = ", ".join(drive.name for drive in drives)
     raise DriveError(
-        f"{names}: no engine_torque, engine_torque_fraction, engine_load or mass_air_flow "
-        "in every drive; a calibration needs one of them and engine_speed"
+        f"{', '.join(drive.name for drive in drives)}: not every drive has engine_torque, "
+        "engine_torque_fraction, engine_load or mass_air_flow; a calibration needs "
+        "one of them and engine_speed"
     )
 
 
