@@ -90,18 +90,19 @@ def read_imu(drive: Drive) -> Imu:
             "check their time stamps"
         )
     time = np.ascontiguousarray(clock[keep])
-    columns = []
-    for s in signals:
-        same = s.time.size == clock.size and (s.time is clock or np.array_equal(s.time, clock))
-        columns.append(s.values[keep] if same else np.interp(time, s.time, s.values))
-    data = np.column_stack(columns)
+    data = {kind: np.empty((time.size, 3)) for kind in ("accel", "gyro")}
+    for kind, block in data.items():
+        for i, axis in enumerate(_AXES):
+            s = drive.signals[f"{kind}_{axis}"]
+            same = s.time is clock or np.array_equal(s.time, clock)
+            block[:, i] = s.values[keep] if same else np.interp(time, s.time, s.values)
     period = float(np.median(np.diff(time)))
     if period > 0.11:
         raise DriveError(
             f"{drive.name}: inertial samples come every {period:.2f} s; navigation needs 0.1 s "
             "or less"
         )
-    return Imu(time, np.ascontiguousarray(data[:, :3]), np.ascontiguousarray(data[:, 3:]), period)
+    return Imu(time, data["accel"], data["gyro"], period)
 
 
 def read_fixes(drive: Drive, start: float, end: float) -> Fixes | None:

@@ -94,8 +94,8 @@ def _evenly(imu: Imu, rate: float) -> _Even:
     """Low-pass the inertial samples and take them to an even clock."""
     start = float(imu.time[0])
     count = max(4, math.floor((imu.time[-1] - start) * rate) + 1)
-    values = resample(imu.time, np.hstack([imu.accel, imu.gyro]), start, 1.0 / rate, count)
-    return _Even(start + np.arange(count) / rate, values)
+    both = [resample(imu.time, y, start, 1.0 / rate, count) for y in (imu.accel, imu.gyro)]
+    return _Even(start + np.arange(count) / rate, np.hstack(both))
 
 
 @dataclass(frozen=True, slots=True)
