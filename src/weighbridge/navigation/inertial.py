@@ -497,6 +497,19 @@ def _motion(
     width = max(1, round(0.3 / (grid[1] - grid[0]))) | 1
     lean = np.convolve(np.pad(held, width // 2, mode="edge"), np.full(width, 1.0 / width), "valid")
     grade = pitch - pitch0 - use_squat * lean
+    floor = settings.body_pitch_std
+    if fixes is None or not fixes.has_height:
+        # without heights a bias of the accelerometer passes for a hill, but a
+        # drive does not end far above or below where it began
+        moved = np.hypot(velocity[:, 0], velocity[:, 1])
+        length = float(np.sum(moved)) * float(grid[1] - grid[0])
+        length = max(length, 1.0)
+        level_std = settings.hill_std * math.sqrt(length / 1e3) / length
+        mean = float(np.sum(grade * moved) / max(np.sum(moved), 1e-9))
+        trust = settings.blind_grade_std**2 / (settings.blind_grade_std**2 + level_std**2)
+        grade = grade - trust * mean
+        pitch0 += trust * mean
+        floor = math.hypot(floor, level_std * math.sqrt(trust))
     specific_force = accel + GRAVITY * np.sin(grade)
 
     horizontal = np.hypot(velocity[:, 0], velocity[:, 1])
@@ -536,8 +549,6 @@ def _motion(
     if not shown and not given:
         notes.append("the drive does not show the squat: pitch of the body is taken as grade")
 
-    has_height = fixes is not None and fixes.has_height
-    floor = math.hypot(settings.body_pitch_std, 0.0 if has_height else settings.blind_grade_std)
     rot_vs = euler_to_matrix(0.0, pitch0, -yaw0) @ rot_bs
     found_scale = has_wheel and fixes is not None and end_std[18] < 0.02
     slow_std = float(np.median(stds)) * GRAVITY

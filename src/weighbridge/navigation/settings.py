@@ -43,6 +43,8 @@ class NavigationSettings:
     body_pitch_std : the body's own pitching on bumps, which no grade is [rad]
     blind_grade_std : what a drive without heights leaves in the grade: errors of
         the sensor's axes pass for it [rad]
+    hill_std : height between start and end of a drive of one kilometre; grows
+        with the root of the distance [m]
     constraint_time : correlation time of constraint and wheel speed errors [s]
     mounting_std : of pitch and yaw after the coarse alignment [rad]
     squat, squat_std : pitch of the body per acceleration before the drive
@@ -77,7 +79,8 @@ class NavigationSettings:
     vertical_std: float = 0.08
     vertical_slope_std: float = 0.004
     body_pitch_std: float = 0.0017
-    blind_grade_std: float = 0.004
+    blind_grade_std: float = 0.008
+    hill_std: float = 10.0
     constraint_time: float = 0.3
     mounting_std: float = 0.035
     squat: float = 0.0035
