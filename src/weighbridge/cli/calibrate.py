@@ -109,31 +109,31 @@ def table(done: Calibration) -> Table:
 
     stds = done.gears.stds if done.gears is not None else [None] * len(vehicle.driveline.gearings)
     for k, (gearing, std) in enumerate(zip(vehicle.driveline.gearings, stds, strict=True), 1):
-        row(f"gearing {k} [rad/m]", gearing, std, 3)
+        row(f"gearing {k} (rad/m)", gearing, std, 3)
     road, line = vehicle.road_load, vehicle.driveline
-    row("drag area C_d A [m²]", road.drag_area, road.drag_area_std, 3)
-    row("rolling coefficient C_r [-]", road.rolling_coefficient, road.rolling_coefficient_std, 4)
+    row("drag area C_d A (m²)", road.drag_area, road.drag_area_std, 3)
+    row("rolling coefficient C_r", road.rolling_coefficient, road.rolling_coefficient_std, 4)
     inertia_stds = done.fit.cov.diagonal()[-2:] ** 0.5
-    row("engine inertia [kg m²]", line.engine_inertia, float(inertia_stds[0]), 3)
-    row("wheel inertia [kg m²]", line.wheel_inertia, float(inertia_stds[1]), 2)
+    row("engine inertia (kg m²)", line.engine_inertia, float(inertia_stds[0]), 3)
+    row("wheel inertia (kg m²)", line.wheel_inertia, float(inertia_stds[1]), 2)
     for k, (w, std) in enumerate(
         zip(vehicle.torque.coefficients, vehicle.torque.coefficient_stds, strict=True)
     ):
         shown.add_row(f"torque w{k}", f"{w:.5g}", f"{std:.2g}")
-    row("torque delay [s]", vehicle.timing.torque_delay, None, 3)
+    row("torque delay (s)", vehicle.timing.torque_delay, None, 3)
     row("speed scale, indicated / true", line.speed_scale, None, 4)
     if vehicle.mounting is not None and vehicle.mounting.squat is not None:
         row(
-            "squat [°/(m/s²)]",
+            "squat (° per m/s²)",
             scalar_from_si(vehicle.mounting.squat, "deg"),
             scalar_from_si(vehicle.mounting.squat_std or 0.0, "deg"),
             3,
         )
     row("torque fit R²", p.r_squared, None, 4)
-    row("torque fit residual [N m]", p.residual_std, None, 1)
+    row("torque fit residual (N m)", p.residual_std, None, 1)
     shown.add_row("samples", str(p.samples), "")
     if p.mass_scale_std is not None:
-        row("left in every mass [%]", 100.0 * p.mass_scale_std, None, 2)
+        row("left in every mass (%)", 100.0 * p.mass_scale_std, None, 2)
     if p.notes:
         shown.caption = p.notes
     return shown
