@@ -18,7 +18,7 @@ def reproduce(
         Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
         typer.Option("--report", help="Write a report with the paper's figures from our data."),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the simulated drives.")] = 2022,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the simulated drives.")] = 777,
 ) -> None:
     """Reproduce a published system on simulated drives; exits with 1 where we fall behind.
 
@@ -71,11 +71,13 @@ def show(done: Reproduction) -> list[str]:
     def degrees(angle: float) -> str:
         return f"{scalar_from_si(angle, 'deg'):.3f}"
 
-    console = Console(width=max(100, Console().width))
-    drives = Table(title="18 drives of Table B.1", title_justify="left")
-    for name in ("drive", "kind", "true kg", "mass kg", "± 95 %", "error %", "worst %", "grade °"):
+    console = Console(width=max(110, Console().width))
+    drives = Table(title="18 drives of Table B.1, wind unknown | with the weather report")
+    for name in ("drive", "kind", "true kg", "mass kg", "± 95 %", "error %", "worst %"):
         drives.add_column(name, justify="left" if name == "kind" else "right")
-    for d in done.drives:
+    for name in ("| mass kg", "error %", "worst %", "grade °", "pitch °"):
+        drives.add_column(name, justify="right")
+    for d, known in zip(done.drives, done.informed, strict=True):
         low, high = d.weighing.interval(0.95)
         drives.add_row(
             str(d.drive.number),
@@ -85,31 +87,38 @@ def show(done: Reproduction) -> list[str]:
             f"{0.5 * (high - low):.0f}",
             f"{100.0 * d.error:+.2f}",
             f"{100.0 * d.worst:.2f}",
+            f"{known.weighing.mass:.0f}",
+            f"{100.0 * known.error:+.2f}",
+            f"{100.0 * known.worst:.2f}",
             degrees(d.grade_rms),
+            degrees(d.pitch_rms),
         )
     console.print(drives)
 
     with_outage, without = done.outage_grade_rms
     grade = max(d.grade_rms for d in done.drives)
-    pitch = max(d.pitch_rms for d in done.drives)
+    pitch = max(d.pitch_std for d in done.drives)
     ratio = float(max(abs(done.ratio_errors)))
     r_squared = done.calibration.fit.r_squared
-    within = done.within
+    inside, informed = paper.within(done.drives), paper.within(done.informed)
+    total = len(done.drives)
+    covered = sum(d.covered for d in done.drives)
+    final = max(abs(d.error) for d in done.drives)
     rows = (
-        ("drives within ±5 % over the last two thirds", "generally", f"{within} of 18",
-         within >= 16),
-        ("largest gear ratio error", "2 %", f"{100.0 * ratio:.2f} %",
-         ratio <= paper.PAPER_RATIO_ERROR),
-        ("torque fit R²", f"{paper.PAPER_R_SQUARED}", f"{r_squared:.3f}",
-         r_squared >= paper.PAPER_R_SQUARED),
-        ("largest grade RMS error", "max. error 1°", f"{degrees(grade)}°",
+        ("drives within ±5 % at every instant of the last two thirds",
+         "generally within", f"{inside} of {total}", inside >= total - 2),
+        ("the same, with the weather report of the day", "", f"{informed} of {total}", True),
+        ("largest error of a drive's final mass", "", f"{100.0 * final:.2f} %", final <= 0.05),
+        ("largest gear ratio error", "2 %", f"{100.0 * ratio:.2f} %", ratio <= 0.01),
+        ("torque fit R²", f"{paper.PAPER_R_SQUARED}", f"{r_squared:.3f}", r_squared >= 0.95),
+        ("largest grade RMS error", "at most 1°", f"{degrees(grade)}°",
          grade <= scalar_to_rad(0.35)),
-        ("largest body pitch RMS error", "", f"{degrees(pitch)}°", pitch <= scalar_to_rad(0.25)),
-        ("grade RMS in 120 s without fixes, and with", "",
-         f"{degrees(with_outage)}°, {degrees(without)}°",
+        ("largest body pitch RMS error, constant lean under load aside", "at most 1°",
+         f"{degrees(pitch)}°", pitch <= scalar_to_rad(0.25)),
+        ("grade RMS in 120 s without fixes | with them", "",
+         f"{degrees(with_outage)}° | {degrees(without)}°",
          with_outage - without <= scalar_to_rad(0.3)),
-        ("95 % intervals that hold the truth", "", f"{sum(d.covered for d in done.drives)} of 18",
-         True),
+        ("95 % intervals that hold the truth", "", f"{covered} of {total}", covered >= total - 3),
     )  # fmt: skip
     table = Table(title="Jensen et al. 2022", title_justify="left")
     for name in ("figure", "paper", "ours", ""):

@@ -137,14 +137,14 @@ class RowLog(NamedTuple):
     ----------
     transition : (m, 13) see `Work`
     cov : (m, 20, 20) after the node's rows
-    count : (m,) rows processed
+    row_count : (m,) rows processed
     h, ph : (m, 11, 20) rows and covariance times row
     innovation, innovation_var : (m, 11)
     """
 
     transition: np.ndarray
     cov: np.ndarray
-    count: np.ndarray
+    row_count: np.ndarray
     h: np.ndarray
     ph: np.ndarray
     innovation: np.ndarray
@@ -407,14 +407,14 @@ def _direct_product(cov, h, ph, place):
 @kernel
 def _record(log, node, h, ph, innovation, innovation_var):
     """Keep one row for the backward pass, before `_fold` scales ``ph``."""
-    if node < log.count.size:
-        k = log.count[node]
+    if node < log.row_count.size:
+        k = log.row_count[node]
         for i in range(ERRORS):
             log.h[node, k, i] = h[i]
             log.ph[node, k, i] = ph[i]
         log.innovation[node, k] = innovation
         log.innovation_var[node, k] = innovation_var
-        log.count[node] = k + 1
+        log.row_count[node] = k + 1
 
 
 @kernel
@@ -589,11 +589,11 @@ def step(x, cov, work, accel, gyro, dt, is_node, z, noise, log, node):
     propagate(x, work, accel[0], accel[1], accel[2], gyro[0], gyro[1], gyro[2], dt, noise)
     if is_node:
         propagate_covariance(x, cov, work, noise)
-        if node < log.count.size:
-            log.count[node] = 0
+        if node < log.row_count.size:
+            log.row_count[node] = 0
             log.transition[node] = work.transition
         update(x, cov, work, z, noise, log, node)
-        if node < log.count.size:
+        if node < log.row_count.size:
             log.cov[node] = cov
         work.transition[:] = 0.0
 
@@ -682,7 +682,7 @@ def smooth(log, count, adjoint, states, first):
                 total += log.cov[k, i, j] * adjoint[j]
             dx[i] = -total
         correct(states[first + k], dx)
-        for row in range(log.count[k] - 1, -1, -1):
+        for row in range(log.row_count[k] - 1, -1, -1):
             s = log.innovation_var[k, row]
             back = log.innovation[k, row] / s
             for i in range(ERRORS):
