@@ -20,6 +20,10 @@ _SAMPLES: Final = 20_000
 # Long enough for fixes a metre off to show a bend [s].
 _TURN_WINDOW: Final = 5.0
 _WINDOW: Final = 2.0  # [s]
+# No road vehicle rolls or pitches by 11 degrees within 2 s: what turns faster, yaws [rad/s].
+_YAWS: Final = 0.1
+# Windows enough for a correlation of 0.3 to be no chance.
+_MANY: Final = 150
 
 
 def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -151,6 +155,20 @@ def _check_axes(
         return
     down = -np.mean(force[full], axis=0)
     down /= np.linalg.norm(down)
+    bias = np.median(rate[full], axis=0)
+    turned = np.linalg.norm(rate - bias, axis=1)
+    fast = full & (turned > _YAWS)
+    if np.count_nonzero(fast) >= 4:
+        upright = float(np.median(np.abs((rate - bias)[fast] @ down) / turned[fast]))
+        if upright < 0.6:
+            yield Problem(
+                "gyro_z",
+                "in bends the gyro turns, but not about the accelerometer's vertical (only "
+                f"{100.0 * upright:.0f} % of the rate): their axes are not the same; map them "
+                "alike",
+                serious=True,
+            )
+            return
     if turns is not None:
         time, change = turns
         along, good = _window_means(gyro, time)
@@ -194,9 +212,8 @@ def _check_axes(
     right = np.cross(down, forward)
     centripetal = v[full] * ((rate[full] - np.median(rate[full], axis=0)) @ down)
     lateral = force[full] @ right
-    if float(np.std(centripetal)) < 0.08:
-        return
-    agreement = float(np.corrcoef(lateral, centripetal)[0, 1])
+    seen = min(float(np.std(centripetal)), float(np.std(lateral))) >= 0.08
+    agreement = float(np.corrcoef(lateral, centripetal)[0, 1]) if seen else 0.0
     if agreement < -0.6:
         yield Problem(
             "accel_y",
@@ -205,6 +222,35 @@ def _check_axes(
             "has the wrong sign; correct it in the mapping (factor = -1)",
             serious=True,
         )
+    elif _crossed(force, rate, full, forward, right):
+        yield Problem(
+            "gyro_x",
+            "the gyro rolls where the vehicle speeds up and brakes, and pitches in bends: two of "
+            "its axes are swapped; map them the other way round",
+            serious=True,
+        )
+
+
+def _crossed(force: Floats, rate: Floats, full: Bools, forward: Floats, right: Floats) -> bool:
+    """Tell whether roll follows force along the vehicle, and pitch force across it.
+
+    Gravity and the springs tie pitch to what is felt along and roll to what is
+    felt across, whatever the road.
+    """
+    inner = full[1:-1] & full[2:] & full[:-2]
+    if np.count_nonzero(inner) < _MANY:
+        return False
+    change = (force[2:] - force[:-2])[inner]
+    turn = rate[1:-1][inner]
+
+    def tie(axis: Floats, direction: Floats) -> float:
+        a, b = turn @ axis, change @ direction
+        spread = float(np.std(a) * np.std(b))
+        return float(np.mean((a - a.mean()) * (b - b.mean()))) / spread if spread > 0.0 else 0.0
+
+    usual = float(np.hypot(tie(right, forward), tie(forward, right)))
+    crossed = float(np.hypot(tie(forward, forward), tie(right, right)))
+    return crossed > 0.3 and crossed > 2.5 * usual
 
 
 def _alike(a: Floats, b: Floats) -> bool:
