@@ -6,7 +6,7 @@ from weighbridge.errors import DriveError
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.speed import speed_motion
-from weighbridge.signals import Drive
+from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Vehicle
 
 IMU_SIGNALS = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
@@ -16,7 +16,8 @@ def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
     """Find the motion of a drive the best way its signals allow.
 
     In this order: IMU with speed or GNSS, one accelerometer along the vehicle
-    with speed, speed with grade or height, speed alone.
+    with speed, speed with grade or height, speed alone. Where the drive itself
+    does not show the scale of its vehicle speed, the vehicle's is taken off.
 
     Raises
     ------
@@ -27,11 +28,24 @@ def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
     if drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude")):
         from weighbridge.navigation.inertial import inertial_motion
 
-        return inertial_motion(drive, vehicle.mounting if vehicle is not None else None)
+        positions = drive.has("latitude", "longitude") or drive.has("gnss_speed")
+        return inertial_motion(
+            drive if positions else _true_speed(drive, vehicle),
+            vehicle.mounting if vehicle is not None else None,
+        )
     if drive.has("longitudinal_accel", "vehicle_speed"):
-        return longitudinal_motion(drive)
+        return longitudinal_motion(_true_speed(drive, vehicle))
     if has_speed:
-        return speed_motion(drive)
+        return speed_motion(_true_speed(drive, vehicle))
     raise DriveError(
         f"{drive.name}: no vehicle_speed and no GNSS; without a speed no vehicle can be weighed"
     )
+
+
+def _true_speed(drive: Drive, vehicle: Vehicle | None) -> Drive:
+    """Take the vehicle's known speed scale off its indicated speed."""
+    speed = drive.get("vehicle_speed")
+    if speed is None or vehicle is None or vehicle.driveline.speed_scale == 1.0:
+        return drive
+    true = speed.values / vehicle.driveline.speed_scale
+    return drive.with_signals(Signal(speed.name, speed.time, true))
