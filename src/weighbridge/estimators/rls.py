@@ -14,10 +14,13 @@ from weighbridge.errors import ConfigError
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.kernels import rls as kernel
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.model import MASS_RANGE, Vehicle
 
 BLOCK: Final = 60.0
 """Rows nearer than this share wind, grade and torque errors [s]."""
+
+LIGHTEST: Final = 0.85
+"""Below this part of the tare no error of the calibration explains the mass [-]."""
 
 STOP: Final = 20.0
 """A standstill this long may change the load [s]."""
@@ -124,7 +127,7 @@ def estimate(
     std = float(np.hypot(spread, mass * (vehicle.provenance.mass_scale_std or 0.0)))
     residual = np.where(used, y - phi * mass, np.nan)
     running = theta[:, 0]
-    status, why = judge(view, used, mass, std, blocks)
+    status, why = judge(view, vehicle, used, mass, std, blocks)
     return MassTrack(
         method="rls",
         balance=balance,
@@ -169,7 +172,7 @@ def block_jackknife(
 
 
 def judge(
-    view: MergedView, used: Bools, mass: float, std: float, blocks: int
+    view: MergedView, vehicle: Vehicle, used: Bools, mass: float, std: float, blocks: int
 ) -> tuple[Status, str]:
     """Say whether the rows carry a mass, and why not."""
     count = int(np.count_nonzero(used))
@@ -185,10 +188,17 @@ def judge(
             f"the drive says {mass:.0f} kg give or take {std:.0f} kg, which is no weighing; "
             "more starts and hills are needed"
         )
-    if not 100.0 < mass < 80_000.0:
+    low, high = MASS_RANGE[vehicle.kind]
+    if not low < mass < high:
         return Status.INCONSISTENT, (
-            f"least squares end at {mass:.0f} kg, which is no road vehicle; check the torque's "
-            "sign and scale and the vehicle file's gearings"
+            f"least squares end at {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "
+            f"{high:.0f} kg; check the vehicle file's class and gearings and the torque's sign "
+            "and scale"
+        )
+    if vehicle.tare is not None and mass + 3.0 * std < LIGHTEST * vehicle.tare:
+        return Status.INCONSISTENT, (
+            f"least squares end at {mass:.0f} kg, less than the tare of {vehicle.tare:.0f} kg; "
+            "check that the vehicle file is this vehicle's, and the torque's scale"
         )
     return Status.CONVERGED, ""
 

@@ -7,6 +7,7 @@ ratio, and a wrong unit shows as the ratio of two units.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -61,7 +62,7 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     found = _gear_ratio(drive, speed, vehicle)
     if found is not None:
         if problem := _scale_problem("vehicle_speed", found, "the gears of the vehicle file", 0.06):
-            yield problem
+            yield replace(problem, text=f"{problem.text}; or the vehicle file is another car's")
         return
     ratio = _accel_ratio(drive, speed)
     if ratio is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from scipy.stats import t as student
 
 from weighbridge.balance import REASON_TEXT, Reason, force_balance
 from weighbridge.balance.delay import estimate_torque_delay
+from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Segment, Status
 from weighbridge.navigation.select import find_motion
@@ -87,9 +88,19 @@ class Weighing:
         return float(np.count_nonzero(self.result.used) * np.median(np.diff(self.result.time)))
 
     @property
+    def converged_at(self) -> float:
+        """Time from the start until the running mass stays at the result [s]; NaN if never."""
+        if self.result is None or self.status is not Status.CONVERGED:
+            return math.nan
+        return self.result.converged_at - self.drive.start
+
+    @property
     def segments(self) -> tuple[Segment, ...]:
-        """Mass between stops, where load can change."""
-        return self.result.segments if self.result else ()
+        """Mass between stops, where load can change; NaN where data and vehicle do not fit."""
+        found = self.result.segments if self.result else ()
+        if self.status is Status.INCONSISTENT:
+            return tuple(replace(s, mass=math.nan, std=math.nan) for s in found)
+        return found
 
     @property
     def track(self) -> pl.DataFrame:
@@ -132,7 +143,7 @@ class Weighing:
             "payload_kg": _number(self.payload),
             "duration_s": _number(self.drive.duration),
             "used_s": _number(self.used_time),
-            "converged_at_s": _number(r.converged_at - self.drive.start) if r else None,
+            "converged_at_s": _number(self.converged_at),
             "bound_std_kg": _number(r.bound_std) if r else None,
             "segments": [
                 {
@@ -246,13 +257,28 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     if delay is None:
         delay = estimate_torque_delay(drive, vehicle, motion)
         warnings += (f"torque delay {delay:+.2f} s found from this drive",)
-    result = estimator(force_balance(drive, vehicle, motion, delay=delay), vehicle)
+    if vehicle.provenance.mass_scale_std is None:
+        warnings += (
+            f"the vehicle file of {vehicle.name} was not made by a calibration: errors of its "
+            "torque, efficiency and road load are not in the interval",
+        )
+    balance = force_balance(drive, vehicle, motion, delay=delay)
+    result = estimator(balance, vehicle)
+    status, reason = result.status, result.why
+    share = share_on_gears(balance, vehicle)
+    if share is not None and share < ENOUGH:
+        status = Status.INCONSISTENT
+        reason = (
+            f"only {100.0 * share:.0f} % of the steady ratios of engine to vehicle speed lie at a "
+            f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
+            "are wrong; calibrate this vehicle"
+        )
     return Weighing(
         drive=drive,
         vehicle=vehicle,
         method=method,
-        status=result.status,
-        reason=result.why,
+        status=status,
+        reason=reason,
         result=result,
         warnings=warnings,
     )
@@ -292,7 +318,14 @@ def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
     if not missing:
         return ""
     names = " and ".join(dict.fromkeys(missing))
-    return f"the drive has no {names}, which torque source {source!r} needs; nothing can be weighed"
+    sentence = f"the drive has no {names}, which torque source {source!r} needs"
+    others = [s for s, needed in SIGNALS.items() if s != source and drive.has(*needed)]
+    if others and drive.has("vehicle_speed"):
+        return (
+            f"{sentence}; it has {' and '.join(SIGNALS[others[0]])}: weigh it with a vehicle file "
+            f"of torque source {others[0]!r} (weighbridge calibrate --torque {others[0]})"
+        )
+    return f"{sentence}; nothing can be weighed"
 
 
 def _number(value: float) -> float | None:

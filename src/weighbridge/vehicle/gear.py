@@ -128,14 +128,14 @@ def detect_gearings(
         & (gearing > LOWEST_GEARING)
         & (gearing < HIGHEST_GEARING)
     )
-    steady = usable & _steady(time, gearing, width + 0.5 * speed_step / np.maximum(speed, 1.0))
-    if np.count_nonzero(steady) < 30:
+    kept = usable & steady(time, gearing, width + 0.5 * speed_step / np.maximum(speed, 1.0))
+    if np.count_nonzero(kept) < 30:
         raise DriveError(
-            f"no gear ratio can be found: only {np.count_nonzero(steady)} samples with a steady "
+            f"no gear ratio can be found: only {np.count_nonzero(kept)} samples with a steady "
             "ratio of engine to vehicle speed; record a longer drive with several gears"
         )
-    blur = np.hypot(width, 0.29 * speed_step / speed[steady])
-    grid, density = ratio_density(gearing[steady], width / blur, width=width)
+    blur = np.hypot(width, 0.29 * speed_step / speed[kept])
+    grid, density = ratio_density(gearing[kept], width / blur, width=width)
     # A gear is a peak that stands out from its surroundings, be it ever so
     # rarely used: shifting smears samples evenly, gears pile them up.
     peaks, found = find_peaks(
@@ -152,7 +152,7 @@ def detect_gearings(
             "no gear ratio stands out from engine over vehicle speed: the drive is too short, "
             "or the gearbox is stepless"
         )
-    near = np.abs(np.log(gearing[steady][:, None] / grid[peaks])).min(axis=1) < 2.0 * width
+    near = np.abs(np.log(gearing[kept][:, None] / grid[peaks])).min(axis=1) < 2.0 * width
     if np.mean(near) < MOSTLY_IN_GEAR:
         raise DriveError(
             f"only {100.0 * np.mean(near):.0f} % of the samples lie at a gear ratio that stands "
@@ -160,7 +160,7 @@ def detect_gearings(
         )
     values, stds, counts = [], [], []
     for centre in grid[peaks]:
-        refined, std, count = _refine(gearing[steady], speed[steady], centre, width, speed_step)
+        refined, std, count = _refine(gearing[kept], speed[kept], centre, width, speed_step)
         values.append(refined)
         stds.append(std)
         counts.append(count)
@@ -203,6 +203,24 @@ def predict_gear(
     return np.where(engaged, gearings.size - nearest, 0).astype(np.int64), mismatch
 
 
+def steady(time: Floats, gearing: Floats, tolerance: Floats) -> Bools:
+    """Tell where the ratio agrees with the one before and the one after.
+
+    Parameters
+    ----------
+    time : (n,) rising [s]
+    gearing : (n,) [1/m]; not positive or NaN where there is none
+    tolerance : (n,) relative change that still agrees [-]
+    """
+    log = np.log(np.where(gearing > 0.0, gearing, np.nan))
+    change = np.abs(np.diff(log))
+    near = np.isfinite(change) & (np.diff(time) < 3.0)
+    agrees = near & (change < 0.5 * (tolerance[1:] + tolerance[:-1]))
+    held = np.zeros(time.size, dtype=bool)
+    held[1:-1] = agrees[1:] & agrees[:-1]
+    return held
+
+
 def shifting(time: Floats, gear: Ints, *, margin: float) -> Bools:
     """Mark samples within ``margin`` [s] of a change of gear.
 
@@ -227,17 +245,6 @@ def _idle_speed(engine_speed: Floats, speed: Floats) -> float:
         return float(np.median(engine_speed[standing]))
     running = engine_speed[engine_speed > 30.0]
     return float(np.percentile(running, 1)) if running.size else 0.0
-
-
-def _steady(time: Floats, gearing: Floats, tolerance: Floats) -> Bools:
-    """Tell where the ratio agrees with the one before and the one after."""
-    log = np.log(np.where(gearing > 0.0, gearing, np.nan))
-    change = np.abs(np.diff(log))
-    near = np.isfinite(change) & (np.diff(time) < 3.0)
-    agrees = near & (change < 0.5 * (tolerance[1:] + tolerance[:-1]))
-    steady = np.zeros(time.size, dtype=bool)
-    steady[1:-1] = agrees[1:] & agrees[:-1]
-    return steady
 
 
 def _refine(

@@ -16,6 +16,16 @@ TorqueSource = Literal["load", "measured", "percent", "air_flow"]
 VehicleClass = Literal["car", "van", "bus", "truck"]
 
 
+MASS_RANGE: Final[dict[VehicleClass, tuple[float, float]]] = {
+    "car": (250.0, 8_000.0),
+    "van": (600.0, 15_000.0),
+    "bus": (1_500.0, 45_000.0),
+    "truck": (1_500.0, 80_000.0),
+}
+"""Masses a vehicle of each class can have, from the lightest empty one to an overloaded one
+with a trailer [kg]: outside, data or vehicle file are wrong."""
+
+
 def _positive(name: str, value: float | None) -> None:
     if value is not None and not (math.isfinite(value) and value > 0.0):
         raise ConfigError(f"{name} must be a positive number, got {value}")
@@ -34,8 +44,10 @@ class Driveline:
     ----------
     gearings : effective gearing ``G = i_t i_d / r`` of gears 1..n, engine angle
         per distance travelled; one value for a single-speed vehicle [1/m]
-    engine_inertia : all that turns with the engine or motor [kg m^2]
-    wheel_inertia : all wheels and what turns with them [kg m^2]
+    gearing_stds : standard deviations of the gearings, same length or empty [1/m]
+    engine_inertia, engine_inertia_std : all that turns with the engine or motor
+        and its standard deviation [kg m^2]; None where it was not fitted
+    wheel_inertia, wheel_inertia_std : all wheels and what turns with them [kg m^2]
     wheel_radius : effective rolling radius [m]
     efficiency : wheel over engine power when driving, in (0, 1] [-]; 1 where the
         torque was calibrated at the wheels
@@ -44,8 +56,11 @@ class Driveline:
     """
 
     gearings: tuple[float, ...] = ()
+    gearing_stds: tuple[float, ...] = ()
     engine_inertia: float = 0.15
+    engine_inertia_std: float | None = None
     wheel_inertia: float = 6.0
+    wheel_inertia_std: float | None = None
     wheel_radius: float = 0.31
     efficiency: float = 1.0
     speed_scale: float = 1.0
@@ -56,6 +71,8 @@ class Driveline:
             _positive("a gearing", g)
         if list(self.gearings) != sorted(self.gearings, reverse=True):
             raise ConfigError(f"gearings must fall from first to last gear, got {self.gearings}")
+        if self.gearing_stds and len(self.gearing_stds) != len(self.gearings):
+            raise ConfigError("gearing_stds must be as many as gearings")
         _not_negative("engine_inertia", self.engine_inertia)
         _not_negative("wheel_inertia", self.wheel_inertia)
         _positive("wheel_radius", self.wheel_radius)
@@ -85,6 +102,7 @@ class TorqueModel:
     coefficient_stds : their standard deviations, same length or empty
     curvature : of load times engine speed [N m s/rad] and of load squared [N m];
         empty for the regression of eq. 49 as printed
+    curvature_stds : their standard deviations, same length or empty
     reference_torque : for "percent" where the drive does not carry it [N m]
     engine_efficiency : for "air_flow", shaft over fuel power [-]
     noise : standard deviation of the torque from this source [N m]
@@ -96,6 +114,7 @@ class TorqueModel:
     coefficients: tuple[float, ...] = ()
     coefficient_stds: tuple[float, ...] = ()
     curvature: tuple[float, ...] = ()
+    curvature_stds: tuple[float, ...] = ()
     reference_torque: float | None = None
     engine_efficiency: float = 0.33
     noise: float | None = None
@@ -115,6 +134,8 @@ class TorqueModel:
             raise ConfigError("coefficient_stds must be as many as coefficients")
         if len(self.curvature) not in (0, 2):
             raise ConfigError(f"curvature must be two numbers or none, got {self.curvature}")
+        if self.curvature_stds and len(self.curvature_stds) != len(self.curvature):
+            raise ConfigError("curvature_stds must be as many as curvature")
         _positive("reference_torque", self.reference_torque)
         _positive("noise", self.noise)
         if not 0.0 < self.engine_efficiency <= 1.0:
