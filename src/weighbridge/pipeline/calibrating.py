@@ -28,6 +28,8 @@ from weighbridge.pipeline.checks import check_drive
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
+    Driveline,
+    MASS_RANGE,
     Mounting,
     Provenance,
     RoadLoad,
@@ -35,6 +37,7 @@ from weighbridge.vehicle.model import (
     TorqueModel,
     TorqueSource,
     Vehicle,
+    VehicleClass,
 )
 from weighbridge.vehicle.torque import SIGNALS, lowest_load, regressor
 
@@ -61,6 +64,8 @@ class CalibrationSettings:
     def __post_init__(self) -> None:
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
+        if self.source is not None and self.source not in SIGNALS:
+            raise ConfigError(f"source must be one of {', '.join(SIGNALS)}, got {self.source!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,21 +123,28 @@ def run_calibration(
     drives = [drives] if isinstance(drives, Drive) else list(drives)
     settings = settings or CalibrationSettings()
     base = vehicle or Vehicle(name=_name(drives))
-    masses = _masses(drives, mass)
+    masses = _masses(drives, mass, base.kind)
     for drive in drives:
         for problem in check_drive(drive, base):
             if problem.serious:
                 raise DriveError(f"{drive.name}: {problem.text}")
     source = settings.source or best_source(drives, base)
-    if source in ("load", "air_flow") and drives and not drives[0].has("engine_speed"):
-        raise DriveError(f"{drives[0].name}: no engine_speed, which torque source {source!r} needs")
+    for drive in drives:
+        if missing := drive.missing(SIGNALS[source]):
+            raise DriveError(
+                f"{drive.name}: no {' and no '.join(missing)}, which torque source {source!r} needs"
+            )
     motions = [find_motion(drive, base) for drive in drives]
 
     gears = None
-    driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions))
+    driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions, base))
     if not driveline.gearings:
         gears = find_gears(drives, motions)
-        driveline = replace(driveline, gearings=tuple(float(g) for g in gears.gearings))
+        driveline = replace(
+            driveline,
+            gearings=tuple(float(g) for g in gears.gearings),
+            gearing_stds=tuple(float(g) for g in gears.stds),
+        )
     order = settings.order
     modelled = source in ("load", "air_flow")
     if order is None:
@@ -168,39 +180,33 @@ def run_calibration(
         return fit(rows, low, high, iterations=3).residual_std
 
     delay = best_delay(misfit)
-    if not np.isfinite(delay):
+    found = bool(np.isfinite(delay))
+    if not found:
         delay = base.timing.torque_delay or 0.0
     rows = rows_at(delay)
     fitted = fit(rows, low, high)
-    coefficients, road = fitted.coefficients, fitted.road
     if settings.grid:
         coefficients, road, _ = grid_search(rows, fitted.weight)
-
-    used_speeds, used_loads = _ranges(drives, motions, draft, source, delay, floors)
-    stds = np.sqrt(np.diag(fitted.cov))
-    straight = coefficients.size - 2 * curved
+        fitted = replace(fitted, coefficients=coefficients, road=road)
+    spread = delay_std(misfit, delay, fitted.independent_rows) if found else float("nan")
+    speeds, loads = _ranges(drives, motions, draft, source, delay, floors)
     finished = replace(
         draft,
-        driveline=replace(driveline, engine_inertia=float(road[2]), wheel_inertia=float(road[3])),
-        torque=TorqueModel(
-            source=source,
-            coefficients=tuple(float(w) for w in coefficients[:straight]),
-            coefficient_stds=tuple(float(s) for s in stds[:straight]),
-            curvature=tuple(float(w) for w in coefficients[straight:]),
+        driveline=_fitted_driveline(driveline, fitted),
+        torque=replace(
+            _fitted_torque(fitted, source, curved),
             reference_torque=base.torque.reference_torque,
             engine_efficiency=base.torque.engine_efficiency,
-            noise=fitted.residual_std,
-            load_range=used_loads,
-            speed_range=used_speeds,
+            load_range=loads,
+            speed_range=speeds,
         ),
-        road_load=RoadLoad(
-            drag_area=float(road[0]),
-            rolling_coefficient=float(road[1]),
-            drag_area_std=float(stds[-4]),
-            rolling_coefficient_std=float(stds[-3]),
-        ),
+        road_load=_fitted_road_load(fitted),
         mounting=_mounting(motions, base.mounting),
-        timing=Timing(torque_delay=delay, speed_delay=base.timing.speed_delay),
+        timing=Timing(
+            torque_delay=delay,
+            torque_delay_std=spread if np.isfinite(spread) else None,
+            speed_delay=base.timing.speed_delay,
+        ),
         provenance=Provenance(
             drives=tuple(drive.name for drive in drives),
             date=datetime.date.today().isoformat(),
@@ -274,7 +280,9 @@ def _name(drives: Sequence[Drive]) -> str:
     return next((drive.info.vehicle for drive in drives if drive.info.vehicle), "vehicle")
 
 
-def _masses(drives: Sequence[Drive], mass: float | Sequence[float] | None) -> list[float]:
+def _masses(
+    drives: Sequence[Drive], mass: float | Sequence[float] | None, kind: VehicleClass
+) -> list[float]:
     if not drives:
         raise ConfigError("no drive to calibrate with")
     if mass is None:
@@ -290,8 +298,12 @@ def _masses(drives: Sequence[Drive], mass: float | Sequence[float] | None) -> li
             raise ConfigError(
                 f"{drive.name}: its mass is not known; give --mass, or mass_kg in its drive.toml"
             )
-        if not 100.0 <= kg <= 80_000.0:
-            raise ConfigError(f"a mass of {kg} kg is no road vehicle; give the mass in kg")
+        low, high = MASS_RANGE[kind]
+        if not low <= kg <= high:
+            raise ConfigError(
+                f"{drive.name}: a mass of {kg:g} kg is no {kind}'s, which is between {low:g} and "
+                f"{high:g} kg; give the mass in kg, and the class under [vehicle] of --vehicle"
+            )
     return [float(kg) for kg in known if kg is not None]
 
 
@@ -374,14 +386,14 @@ def _ranges(
     return (float(0.95 * slow), float(1.05 * fast)), (float(min(floors)), 1.02 * high)
 
 
-def _speed_scale(motions: Sequence[Motion]) -> float:
+def _speed_scale(motions: Sequence[Motion], base: Vehicle) -> float:
     known = [
         (m.speed_scale, m.speed_scale_std)
         for m in motions
         if m.speed_scale is not None and m.speed_scale_std is not None
     ]
     if not known:
-        return 1.0
+        return base.driveline.speed_scale
     weight = np.array([1.0 / std**2 for _, std in known])
     return float(np.average([scale for scale, _ in known], weights=weight))
 
@@ -429,10 +441,46 @@ def _self_weighing(
     return (1.0 + resisted) / (found + resisted), std / found
 
 
+def _fitted_driveline(known: Driveline, fitted: TorqueFit) -> Driveline:
+    stds = np.sqrt(np.diag(fitted.cov))
+    return replace(
+        known,
+        engine_inertia=float(fitted.road[2]),
+        engine_inertia_std=float(stds[-2]),
+        wheel_inertia=float(fitted.road[3]),
+        wheel_inertia_std=float(stds[-1]),
+    )
+
+
+def _fitted_torque(fitted: TorqueFit, source: TorqueSource, curved: bool) -> TorqueModel:
+    straight = fitted.coefficients.size - 2 * curved
+    values = [float(w) for w in fitted.coefficients]
+    stds = [float(w) for w in np.sqrt(np.diag(fitted.cov))[: fitted.coefficients.size]]
+    return TorqueModel(
+        source=source,
+        coefficients=tuple(values[:straight]),
+        coefficient_stds=tuple(stds[:straight]),
+        curvature=tuple(values[straight:]),
+        curvature_stds=tuple(stds[straight:]),
+        noise=fitted.residual_std,
+    )
+
+
+def _fitted_road_load(fitted: TorqueFit) -> RoadLoad:
+    stds = np.sqrt(np.diag(fitted.cov))
+    return RoadLoad(
+        drag_area=float(fitted.road[0]),
+        rolling_coefficient=float(fitted.road[1]),
+        drag_area_std=float(stds[-4]),
+        rolling_coefficient_std=float(stds[-3]),
+    )
+
+
 def _scaled(model: TorqueModel, scale: float) -> TorqueModel:
     return replace(
         model,
         coefficients=tuple(scale * w for w in model.coefficients),
         coefficient_stds=tuple(scale * s for s in model.coefficient_stds),
         curvature=tuple(scale * w for w in model.curvature),
+        curvature_stds=tuple(scale * s for s in model.curvature_stds),
     )
