@@ -49,6 +49,29 @@ def best_delay(
     return centre
 
 
+def delay_std(misfit: Callable[[float], float], delay: float, rows: float) -> float:
+    """Standard deviation of the delay that minimises a residual's standard deviation.
+
+    Parameters
+    ----------
+    misfit : standard deviation of the residual over the delay [s]
+    delay : where it is lowest [s]
+    rows : number of independent rows behind it
+
+    Returns
+    -------
+    float
+        [s]; NaN where the misfit has no lowest point there. From the curvature
+        of the Gaussian likelihood ``-n/2 log(variance)``.
+    """
+    reach = 0.1
+    low, middle, high = (misfit(delay + step) ** 2 for step in (-reach, 0.0, reach))
+    curvature = (low - 2.0 * middle + high) / reach**2
+    if not curvature > 0.0 or not rows > 0.0:
+        return float("nan")
+    return float(np.sqrt(2.0 * middle / (rows * curvature)))
+
+
 def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> float:
     """Find the delay at which traction explains specific force best [s]; 0 if untold.
 

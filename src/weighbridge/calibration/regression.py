@@ -70,6 +70,7 @@ class TorqueFit:
     r_squared : of source torque against torque of the motion [-]
     residual_std : robust [N m]
     at_bound : names of the road parameters that a bound holds
+    independent_rows : rows that would say as much if none depended on another
     """
 
     coefficients: Floats
@@ -80,6 +81,7 @@ class TorqueFit:
     r_squared: float
     residual_std: float
     at_bound: tuple[str, ...]
+    independent_rows: float
 
 
 def build_rows(
@@ -192,7 +194,8 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
     held = np.zeros(width, dtype=bool)
     margin = 1e-6 * (upper[-4:] - lower[-4:])
     held[-4:] = (parameters[-4:] <= lower[-4:] + margin) | (parameters[-4:] >= upper[-4:] - margin)
-    cov = _sandwich(design, residual, weight, rows.block, ~held) / np.outer(scale, scale)
+    cov, dependence = _sandwich(design, residual, weight, rows.block, ~held)
+    cov = cov / np.outer(scale, scale)
     parameters = parameters / scale
     torque = rows.design[:, :-4] @ parameters[:-4]
     motion = torque + residual
@@ -206,13 +209,17 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
         r_squared=float(1.0 - np.sum(weight * residual**2) / total),
         residual_std=1.4826 * float(np.median(np.abs(residual))),
         at_bound=tuple(name for name, at in zip(ROAD_PARAMETERS, held[-4:], strict=True) if at),
+        independent_rows=n / dependence,
     )
 
 
 def _sandwich(
     design: Floats, residual: Floats, weight: Floats, block: Floats, free: Bools
-) -> Floats:
-    """Covariance with rows of one block dependent (Liang and Zeger, Biometrika 73, 1986)."""
+) -> tuple[Floats, float]:
+    """Covariance with rows of one block dependent (Liang and Zeger, Biometrika 73, 1986).
+
+    The second value is how much larger its variances are than for independent rows.
+    """
     cov = np.zeros((free.size, free.size))
     x = design[:, free]
     information = (x * weight[:, None]).T @ x
@@ -222,5 +229,7 @@ def _sandwich(
     sums = np.add.reduceat(score[order], starts, axis=0)
     bread = np.linalg.pinv(information, hermitian=True)
     correction = sums.shape[0] / max(sums.shape[0] - 1, 1)
-    cov[np.ix_(free, free)] = correction * bread @ (sums.T @ sums) @ bread
-    return cov
+    clustered = correction * bread @ (sums.T @ sums) @ bread
+    independent = bread @ (score.T @ score) @ bread
+    cov[np.ix_(free, free)] = clustered
+    return cov, max(1.0, float(np.median(np.diag(clustered) / np.diag(independent))))

@@ -107,20 +107,27 @@ def table(done: Calibration) -> Table:
                 "" if std is None or std == 0.0 else f"{std:.{digits}f}",
             )
 
-    stds = done.gears.stds if done.gears is not None else [None] * len(vehicle.driveline.gearings)
-    for k, (gearing, std) in enumerate(zip(vehicle.driveline.gearings, stds, strict=True), 1):
+    gearings = vehicle.driveline.gearings
+    stds = vehicle.driveline.gearing_stds or (None,) * len(gearings)
+    for k, (gearing, std) in enumerate(zip(gearings, stds, strict=True), 1):
         row(f"gearing {k} (rad/m)", gearing, std, 3)
     road, line = vehicle.road_load, vehicle.driveline
     row("drag area C_d A (m²)", road.drag_area, road.drag_area_std, 3)
     row("rolling coefficient C_r", road.rolling_coefficient, road.rolling_coefficient_std, 4)
-    inertia_stds = done.fit.cov.diagonal()[-2:] ** 0.5
-    row("engine inertia (kg m²)", line.engine_inertia, float(inertia_stds[0]), 3)
-    row("wheel inertia (kg m²)", line.wheel_inertia, float(inertia_stds[1]), 2)
-    for k, (w, std) in enumerate(
-        zip(vehicle.torque.coefficients, vehicle.torque.coefficient_stds, strict=True)
-    ):
+    row("engine inertia (kg m²)", line.engine_inertia, line.engine_inertia_std, 3)
+    row("wheel inertia (kg m²)", line.wheel_inertia, line.wheel_inertia_std, 2)
+    torque = vehicle.torque
+    for k, (w, std) in enumerate(zip(torque.coefficients, torque.coefficient_stds, strict=True)):
         shown.add_row(f"torque w{k}", f"{w:.5g}", f"{std:.2g}")
-    row("torque delay (s)", vehicle.timing.torque_delay, None, 3)
+    names = ("torque of load times engine speed", "torque of load squared")
+    for name, w, std in zip(names, torque.curvature, torque.curvature_stds, strict=False):
+        shown.add_row(name, f"{w:.5g}", f"{std:.2g}")
+    row(
+        "torque delay (s)",
+        vehicle.timing.torque_delay,
+        vehicle.timing.torque_delay_std,
+        3,
+    )
     row("speed scale, indicated / true", line.speed_scale, None, 4)
     if vehicle.mounting is not None and vehicle.mounting.squat is not None:
         row(

@@ -71,12 +71,12 @@ def show(done: Reproduction) -> list[str]:
     def degrees(angle: float) -> str:
         return f"{scalar_from_si(angle, 'deg'):.3f}"
 
-    console = Console(width=max(110, Console().width))
-    drives = Table(title="18 drives of Table B.1, wind unknown | with the weather report")
+    console = Console(width=max(130, Console().width))
+    drives = Table(title="Drives of Table B.1, wind unknown | with the weather report of the day")
     for name in ("drive", "kind", "true kg", "mass kg", "± 95 %", "error %", "worst %"):
-        drives.add_column(name, justify="left" if name == "kind" else "right")
+        drives.add_column(name, justify="left" if name == "kind" else "right", no_wrap=True)
     for name in ("| mass kg", "error %", "worst %", "grade °", "pitch °"):
-        drives.add_column(name, justify="right")
+        drives.add_column(name, justify="right", no_wrap=True)
     for d, known in zip(done.drives, done.informed, strict=True):
         low, high = d.weighing.interval(0.95)
         drives.add_row(

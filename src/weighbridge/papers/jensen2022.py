@@ -61,8 +61,8 @@ class TestDrive:
 
 
 COOLING_TIME: Final = 2400.0
-"""Time in which a parked car's tyres lose 63 % of their warmth [s]: about twice the
-warming time of 20 min in driving, for want of air flow."""
+"""Time in which a parked car's tyres and engine lose 63 % of their warmth [s]: chosen, four
+times the ten minutes in which the simulated ones warm, for want of flexing and air flow."""
 
 HIGHWAY_BEARING: Final = math.radians(199.0)
 """Direction of the highway out, clockwise from north [rad]: from Helsingør (56.03 N,

@@ -72,10 +72,23 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 "engine radians per metre travelled, gear by gear: ratio * final drive / radius",
                 "numbers",
             ),
+            _Key("gearing_stds_per_m", "gearing_stds", "their standard deviations", "numbers"),
             _Key(
                 "engine_inertia", "engine_inertia", "all that turns with the engine", suffix="kgm2"
             ),
+            _Key(
+                "engine_inertia_std",
+                "engine_inertia_std",
+                "its standard deviation; 0 where a bound held it",
+                suffix="kgm2",
+            ),
             _Key("wheel_inertia", "wheel_inertia", "all wheels together", suffix="kgm2"),
+            _Key(
+                "wheel_inertia_std",
+                "wheel_inertia_std",
+                "its standard deviation; 0 where a bound held it",
+                suffix="kgm2",
+            ),
             _Key("wheel_radius", "wheel_radius", "effective rolling radius", suffix="m"),
             _Key(
                 "efficiency",
@@ -99,6 +112,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             ),
             _Key("coefficient_stds", "coefficient_stds", "their standard deviations", "numbers"),
             _Key("curvature", "curvature", "of load * engine speed and of load^2", "numbers"),
+            _Key("curvature_stds", "curvature_stds", "their standard deviations", "numbers"),
             _Key(
                 "reference_torque",
                 "reference_torque",

@@ -1,0 +1,282 @@
+"""Figures of studies/jensen2022.md: the 18 drives, other cars, recorded navigation, sensitivity.
+
+Run from the checkout: ``python studies/jensen2022.py``. Recorded drives lie in
+``../shared/data`` and are not part of the project; without them their tables say so.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import navigation as recorded
+
+from weighbridge.papers import jensen2022 as paper
+from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
+from weighbridge.pipeline.weighing import weigh
+from weighbridge.simulation import MIDSIZE, make_scenario, random_car, simulate_car
+
+HERE = Path(__file__).parent
+SEED = 4242
+CARS = (101, 102, 103, 104, 105, 106)
+
+
+def degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.3f}°"
+
+
+def drives_table(done: paper.Reproduction) -> str:
+    lines = [
+        "| drive | kind | wind m/s from ° | true kg | mass kg ± 95 % | error % | worst % | mean % "
+        "| error %, weather known | worst % | grade ° | pitch ° | pitch sd ° | squat found ° |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for d, known in zip(done.drives, done.informed, strict=True):
+        low, high = d.weighing.interval(0.95)
+        motion = d.weighing.result.balance.motion
+        row = d.drive
+        lines.append(
+            f"| {row.number} | {row.kind} | {row.wind_speed:.0f} {math.degrees(row.wind_from):.0f} "
+            f"| {d.true_mass:.0f} | {d.weighing.mass:.0f} ± {0.5 * (high - low):.0f} "
+            f"| {100 * d.error:+.2f} | {100 * d.worst:.2f} | {100 * d.typical:+.2f} "
+            f"| {100 * known.error:+.2f} | {100 * known.worst:.2f} "
+            f"| {math.degrees(d.grade_rms):.3f} | {math.degrees(d.pitch_rms):.3f} "
+            f"| {math.degrees(d.pitch_std):.3f} | {math.degrees(motion.squat or 0.0):.3f} |"
+        )
+    return "\n".join(lines)
+
+
+def targets_table(done: paper.Reproduction, straight: paper.Reproduction) -> str:
+    count = len(done.drives)
+
+    def inside(drives, name):
+        return sum(abs(getattr(d, name)) <= paper.PAPER_BAND for d in drives)
+
+    def largest(name):
+        return max(getattr(d, name) for d in done.drives)
+
+    low_pitch = sum(d.pitch_rms <= math.radians(0.25) for d in done.drives)
+    cut, whole = done.outage_grade_rms
+    rows = [
+        ("running mass within ±5 % at every instant of the last two thirds, wind unknown",
+         "≥ 16 of 18", f"{inside(done.drives, 'worst')} of {count}"),
+        ("the same, with the weather report of the day", "",
+         f"{inside(done.informed, 'worst')} of {count}"),
+        ("the same, wind unknown, torque linear in load as eq. 49 prints", "",
+         f"{inside(straight.drives, 'worst')} of {count}"),
+        ("mean of the running mass over the last two thirds within ±5 %, wind unknown", "",
+         f"{inside(done.drives, 'typical')} of {count}"),
+        ("final mass within ±5 %, wind unknown", "",
+         f"{inside(done.drives, 'error')} of {count}; RMS "
+         f"{100 * np.sqrt(np.mean([d.error**2 for d in done.drives])):.2f} %, worst "
+         f"{100 * max(abs(d.error) for d in done.drives):.2f} %"),
+        ("95 % intervals that hold the truth, wind unknown", "",
+         f"{sum(d.covered for d in done.drives)} of {count}"),
+        ("gear ratios", "≤ 1 %", f"worst {100 * np.max(np.abs(done.ratio_errors)):.2f} %"),
+        ("torque fit R²", "≥ 0.95 (paper 0.972)", f"{done.calibration.fit.r_squared:.3f}"),
+        ("road grade RMS error, squat found and taken out", "≤ 0.35°",
+         f"worst {degrees(largest('grade_rms'))}"),
+        ("body pitch RMS error", "≤ 0.25°",
+         f"{low_pitch} of {count}; worst {degrees(largest('pitch_rms'))}"),
+        ("body pitch, standard deviation of the error", "", degrees(largest("pitch_std"))),
+        ("grade RMS within 120 s without fixes, and with them", "≤ 0.3° more",
+         f"{degrees(cut)}, {degrees(whole)}"),
+    ]  # fmt: skip
+    lines = ["| figure | target | measured |", "|---|---|---|"]
+    lines += [f"| {a} | {b} | {c} |" for a, b, c in rows]
+    return "\n".join(lines)
+
+
+def parameters_table(done: paper.Reproduction) -> str:
+    car = done.calibration.vehicle
+    road = done.calibration.fit.road
+    std = np.sqrt(np.diag(done.calibration.fit.cov))[-4:]
+    rows = (
+        ("C_d A [m²]", 0, MIDSIZE.drag_area, "0.70"),
+        ("C_r [-]", 1, MIDSIZE.rolling_coefficient, "0.008"),
+        ("I_e [kg m²]", 2, MIDSIZE.engine_inertia, "0.14"),
+        ("I_w [kg m²]", 3, MIDSIZE.wheel_inertia, "7.0"),
+    )
+    lines = ["| parameter | found | std | simulated car | paper's car |", "|---|---|---|---|---|"]
+    for name, k, true, theirs in rows:
+        held = "bound" if std[k] == 0.0 else f"{std[k]:.2g}"
+        lines.append(f"| {name} | {road[k]:.4g} | {held} | {true:.4g} | {theirs} |")
+    gears = ", ".join(
+        f"{found * 30 / math.pi:.1f} ({100 * error:+.2f} %)"
+        for found, error in zip(car.driveline.gearings, done.ratio_errors, strict=True)
+    )
+    return "\n".join(lines) + f"\n\nGearings in rpm per m/s: {gears}."
+
+
+def straight_reproduction() -> paper.Reproduction:
+    """The same drives with the torque regression as printed."""
+    chosen = CalibrationSettings(curved=False)
+    original = paper.run_calibration
+
+    def printed(drive, mass):
+        return original(drive, mass, settings=chosen)
+
+    paper.run_calibration = printed
+    try:
+        return paper.reproduce(seed=SEED)
+    finally:
+        paper.run_calibration = original
+
+
+def other_cars() -> str:
+    """Weigh cars drawn at random, each calibrated on one drive of its own."""
+    lines = [
+        "| car | gears found of | ratios, worst % | true kg | mass kg ± 95 % | error % | held |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    errors, held = [], 0
+    for seed in CARS:
+        car = random_car(np.random.default_rng(seed))
+        load = float(np.random.default_rng(seed + 1).uniform(100.0, 350.0))
+        known = replace(make_scenario("car-calibration", seed=seed), car=car)
+        trip = replace(make_scenario("car", payload=load, seed=seed + 50), car=car)
+        made = simulate_car(known)
+        base = None
+        if car.electric:
+            lines.append(f"| {seed} | electric | | | | left out: no load | |")
+            continue
+        vehicle = run_calibration(
+            paper.without_weather(made.drive), float(np.mean(made.truth.mass)), vehicle=base
+        ).vehicle
+        loaded = simulate_car(trip)
+        mass = float(np.mean(loaded.truth.mass))
+        w = weigh(paper.without_weather(loaded.drive), vehicle)
+        low, high = w.interval()
+        found, true = np.array(vehicle.driveline.gearings), np.array(car.gearings)
+        ratio = (
+            f"{100 * np.max(np.abs(found / true - 1)):.2f}" if found.size == true.size else "other"
+        )
+        errors.append(w.mass / mass - 1.0)
+        held += low <= mass <= high
+        lines.append(
+            f"| {seed}: {car.mass:.0f} kg, {car.transmission.replace('_', ' ')} "
+            f"| {found.size} of {true.size} | {ratio} | {mass:.0f} "
+            f"| {w.mass:.0f} ± {0.5 * (high - low):.0f} | {100 * errors[-1]:+.2f} "
+            f"| {'yes' if low <= mass <= high else 'no'} |"
+        )
+    rms = 100 * float(np.sqrt(np.mean(np.square(errors))))
+    return "\n".join(lines) + f"\n\nRMS error {rms:.2f} %, {held} of {len(errors)} intervals hold."
+
+
+def recorded_tables() -> str:
+    if not recorded.DATA.is_dir():
+        return "The recordings were not there when this page was made."
+    lines = ["| recording | figure | target | measured |", "|---|---|---|---|"]
+    folder = recorded.DATA / "comma2k19"
+    for cut, text in ((None, "fixes throughout"), (20.0, "no fixes in the last 20 s")):
+        drive, time, pitch, _ = recorded.load_comma(folder, gnss_cut=cut)
+        motion = recorded.inertial_motion(drive)
+        _, std = recorded.score(motion, time, pitch, "pitch")
+        lines.append(f"| comma2k19, {text} | body pitch sd after 10 s | ≤ 0.15° | {std:.3f}° |")
+    found = []
+    for seed in range(6):
+        drive, time, grade = recorded.load_rtk(recorded.DATA / "rtk-grade", seed=seed)
+        motion = recorded.inertial_motion(drive)
+        found.append(recorded.score(motion, time - motion.speed_delay, grade, "grade")[1])
+    lines.append(
+        f"| rtk-grade, 6 seeds of the added noise | grade sd | ≤ 0.40° "
+        f"| {min(found):.3f}° to {max(found):.3f}° |"
+    )
+    lines.append(
+        f"| rtk-grade | squat found | | {math.degrees(motion.squat or math.nan):.2f}"
+        f" ± {math.degrees(motion.squat_std or math.nan):.2f}° per m/s² |"
+    )
+    return "\n".join(lines)
+
+
+def beside_pyins() -> str:
+    if importlib.util.find_spec("pyins") is None:
+        return "`pip install python-ins` and run again for the comparison with pyins."
+    result = recorded.compare_with_pyins()
+    return "\n".join(
+        ["| filter | body pitch RMS error |", "|---|---|"]
+        + [f"| {name} | {value:.3f}° |" for name, value in result.items()]
+    )
+
+
+def sensitivity_figure(done: paper.Reproduction) -> None:
+    """Perturb wind, drag and rolling resistance of drive 7 (figs. 17 to 19)."""
+    chosen = done.drives[6]
+    w = chosen.weighing
+    minutes = (w.result.time - w.result.time[0]) / 60.0
+    figure, axes = plt.subplots(3, 1, figsize=(9, 10), sharex=True, layout="constrained")
+    direction = chosen.drive.wind_from
+    panels = (
+        ("constant wind from 320° at the vehicle put into the model",
+         [(f"{v:.0f} m/s", {"wind_speed": v, "wind_from": direction}) for v in (0, 3, 6, 9)]),
+        ("product of drag coefficient and frontal area",
+         [(f"{100 * (f - 1):+.0f} %", {"drag": f}) for f in (0.85, 1.0, 1.15)]),
+        ("rolling resistance coefficient",
+         [(f"{100 * (f - 1):+.0f} %", {"rolling": f}) for f in (0.5, 1.0, 1.5)]),
+    )  # fmt: skip
+    for axis, (title, cases) in zip(axes, panels, strict=True):
+        for label, case in cases:
+            axis.plot(minutes, paper.sensitivity(w, **case), lw=1.2, label=label)
+        axis.axhline(chosen.true_mass, color="k", lw=1)
+        for side in (0.95, 1.05):
+            axis.axhline(side * chosen.true_mass, color="k", lw=0.6, ls=":")
+        axis.set(title=title, ylabel="mass [kg]", ylim=(1300, 2400))
+        axis.legend(ncols=4, fontsize=8)
+    axes[-1].set_xlabel("time [min]")
+    folder = HERE / "figures"
+    folder.mkdir(exist_ok=True)
+    figure.savefig(folder / "jensen2022-sensitivity.png", dpi=90)
+    plt.close(figure)
+
+
+def masses_figure(done: paper.Reproduction) -> None:
+    """Running mass of all drives (figs. 11, 12, 14, 15)."""
+    days = ((0, 3, "reference"), (3, 8, "load"), (8, 13, "tyre pressure"), (13, 18, "windows"))
+    figure, axes = plt.subplots(4, 1, figsize=(9, 12), layout="constrained")
+    for axis, (a, b, title) in zip(axes, days, strict=True):
+        for d in done.drives[a:b]:
+            r = d.weighing.result
+            km = np.interp(r.time, r.balance.motion.time, r.balance.motion.distance) / 1e3
+            (drawn,) = axis.plot(
+                km, r.running_mass, lw=1.2, label=f"{d.drive.number}: {d.drive.kind}"
+            )
+            axis.axhline(d.true_mass, color=drawn.get_color(), lw=0.7, ls="--")
+        for side in (0.95, 1.05):
+            axis.axhline(side * 1578, color="k", lw=0.6, ls=":")
+        axis.set(title=title, ylabel="mass [kg]", ylim=(1400, 2000))
+        axis.legend(ncols=3, fontsize=8)
+    axes[-1].set_xlabel("distance [km]; dashed: true mass, dotted: ±5 % of the empty car")
+    folder = HERE / "figures"
+    folder.mkdir(exist_ok=True)
+    figure.savefig(folder / "jensen2022-masses.png", dpi=80)
+    plt.close(figure)
+
+
+def main() -> None:
+    done = paper.reproduce(seed=SEED)
+    straight = straight_reproduction()
+    sensitivity_figure(done)
+    masses_figure(done)
+    template = (HERE / "jensen2022.template.md").read_text(encoding="utf-8")
+    page = template
+    for name, text in (
+        ("targets", targets_table(done, straight)),
+        ("drives", drives_table(done)),
+        ("parameters", parameters_table(done)),
+        ("cars", other_cars()),
+        ("recorded", recorded_tables()),
+        ("pyins", beside_pyins()),
+    ):
+        page = page.replace(f"<!-- {name} -->", text)
+    (HERE / "jensen2022.md").write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
