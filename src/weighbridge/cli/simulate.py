@@ -65,6 +65,6 @@ def simulate(
     if without:
         chosen = replace(chosen, effects=chosen.effects.without(*without))
     made = simulate_car(chosen)
-    made.write(output, format=table)
+    made.write(output, format=table)  # type: ignore[arg-type]
     minutes = made.drive.duration / 60.0
     typer.echo(f"{output}: {minutes:.1f} min, {made.truth.mass[0]:.0f} kg at the start")

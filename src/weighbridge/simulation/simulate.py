@@ -8,14 +8,12 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-import polars as pl
-import tomlkit
 
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
-from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
-from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
-from weighbridge.signals.units import from_si, scalar_from_si
+from weighbridge.io.write import TableFormat, write_drive
+from weighbridge.signals import Drive, DriveInfo, Floats, Signal
+from weighbridge.signals.units import from_si
 from weighbridge.simulation.body import simulate_pose
 from weighbridge.simulation.longitudinal import DT, simulate_trajectory
 from weighbridge.simulation.scenario import Scenario, streams
@@ -124,7 +122,7 @@ class SimulatedDrive:
     drive: Drive
     truth: Truth
 
-    def write(self, folder: Path, *, format: str = "parquet") -> None:
+    def write(self, folder: Path, *, format: TableFormat = "parquet") -> None:
         """Write the drive's tables, ``drive.toml`` and the truth into a folder.
 
         Parameters
@@ -140,67 +138,12 @@ class SimulatedDrive:
         """
         if format not in ("parquet", "csv"):
             raise ConfigError(f"format must be parquet or csv, got {format!r}")
-        folder.mkdir(parents=True, exist_ok=True)
-        for table in TABLES:
-            signals = [s for s in self.drive.signals.values() if QUANTITIES[s.name].table == table]
-            if signals:
-                _write_frame(_frame(signals), folder / table, format)
         columns = {}
         for f in fields(self.truth):
             values, suffix = getattr(self.truth, f.name), _TRUTH_SUFFIX[f.name]
             column = f"{f.name}_{suffix}" if suffix else f.name
             columns[column] = from_si(values, suffix) if suffix else values
-        _write_frame(pl.DataFrame(columns), folder / "truth", format)
-        (folder / "drive.toml").write_text(self._toml(), encoding="utf-8")
-
-    def _toml(self) -> str:
-        info = self.drive.info
-        document = tomlkit.document()
-        document.add(
-            tomlkit.comment("Simulated; the truth table beside this file holds what was true.")
-        )
-        if info.start_time:
-            document["start_time"] = info.start_time
-        if info.vehicle:
-            document["vehicle"] = info.vehicle
-        for key, value, suffix in (
-            ("mass", info.mass, "kg"),
-            ("ambient_temperature", info.ambient_temperature, "degc"),
-            ("barometric_pressure", info.barometric_pressure, "kpa"),
-            ("wind_speed", info.wind_speed, "mps"),
-            ("wind_from", info.wind_from, "deg"),
-        ):
-            if value is not None:
-                document[f"{key}_{suffix}"] = round(scalar_from_si(value, suffix), 6)
-        if info.notes:
-            document["notes"] = info.notes
-        return tomlkit.dumps(document)
-
-
-def _frame(signals: list[Signal]) -> pl.DataFrame:
-    """Put the signals of one table side by side, empty where one has no value."""
-    clocks = {id(s.time): s.time for s in signals}
-    time = next(iter(clocks.values()))
-    if len(clocks) > 1:
-        time = np.unique(np.concatenate(list(clocks.values())))
-    columns: dict[str, pl.Series | Floats] = {TIME_COLUMN: time}
-    for s in signals:
-        quantity = QUANTITIES[s.name]
-        values = from_si(s.values, quantity.suffix) if quantity.suffix else s.values
-        if s.time.size == time.size:
-            columns[quantity.column] = values
-            continue
-        row = np.full(time.size, np.nan)
-        row[np.searchsorted(time, s.time)] = values
-        columns[quantity.column] = pl.Series(row).fill_nan(None)
-    return pl.DataFrame(columns)
-
-
-def _write_frame(frame: pl.DataFrame, path: Path, format: str) -> None:
-    if format == "csv":
-        frame.write_csv(path.with_suffix(".csv"), float_precision=9)
-    else:
-        frame.write_parquet(path.with_suffix(".parquet"))
+        write_drive(self.drive, folder, format, truth=columns)
 
 
 def simulate_car(scenario: Scenario) -> SimulatedDrive:
