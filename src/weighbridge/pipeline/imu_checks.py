@@ -222,24 +222,43 @@ def _check_axes(
             "has the wrong sign; correct it in the mapping (factor = -1)",
             serious=True,
         )
-    elif _crossed(force, rate, full, forward, right):
+        return
+    usual, crossed, pitch = _ties(force, rate, full, forward, right)
+    if crossed > 0.3 and crossed > 2.5 * usual:
         yield Problem(
             "gyro_x",
             "the gyro rolls where the vehicle speeds up and brakes, and pitches in bends: two of "
             "its axes are swapped; map them the other way round",
             serious=True,
         )
+    elif pitch < -0.15:
+        yield Problem(
+            "gyro_y",
+            "the gyro says nose down where the accelerometer says nose up "
+            f"(correlation {pitch:.2f}): one axis of the inertial sensor has the wrong sign; "
+            "correct it in the mapping (factor = -1)",
+            serious=True,
+        )
 
 
-def _crossed(force: Floats, rate: Floats, full: Bools, forward: Floats, right: Floats) -> bool:
-    """Tell whether roll follows force along the vehicle, and pitch force across it.
+def _ties(
+    force: Floats, rate: Floats, full: Bools, forward: Floats, right: Floats
+) -> tuple[float, float, float]:
+    """Correlate roll and pitch rate with the change of force along and across the vehicle.
 
     Gravity and the springs tie pitch to what is felt along and roll to what is
-    felt across, whatever the road.
+    felt across, whatever the road. A nose that rises is always felt as force
+    forward; how a roll is felt depends on the banking of the bends.
+
+    Returns
+    -------
+    usual, crossed : size of the ties as they should be, and with the axes swapped
+    pitch : of pitch rate and force along
+    All 0 where there are too few windows to tell.
     """
     inner = full[1:-1] & full[2:] & full[:-2]
     if np.count_nonzero(inner) < _MANY:
-        return False
+        return 0.0, 0.0, 0.0
     change = (force[2:] - force[:-2])[inner]
     turn = rate[1:-1][inner]
 
@@ -248,9 +267,9 @@ def _crossed(force: Floats, rate: Floats, full: Bools, forward: Floats, right: F
         spread = float(np.std(a) * np.std(b))
         return float(np.mean((a - a.mean()) * (b - b.mean()))) / spread if spread > 0.0 else 0.0
 
-    usual = float(np.hypot(tie(right, forward), tie(forward, right)))
-    crossed = float(np.hypot(tie(forward, forward), tie(right, right)))
-    return crossed > 0.3 and crossed > 2.5 * usual
+    pitch = tie(right, forward)
+    usual = float(np.hypot(pitch, tie(forward, right)))
+    return usual, float(np.hypot(tie(forward, forward), tie(right, right))), pitch
 
 
 def _alike(a: Floats, b: Floats) -> bool:

@@ -1,0 +1,97 @@
+"""Drives and a vehicle file that the commands are tried on, made once."""
+
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import polars as pl
+import pytest
+
+from weighbridge.cli import main
+from weighbridge.simulation import make_scenario, simulate_car
+
+
+class Ran(NamedTuple):
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+class Made(NamedTuple):
+    """A simulated drive on disk."""
+
+    folder: Path
+    mass: float
+
+
+@pytest.fixture
+def weighbridge(capsys, monkeypatch) -> Callable[..., Ran]:
+    """Run the command line in this process, error handling included."""
+
+    def run(*words: object) -> Ran:
+        monkeypatch.setattr(sys, "argv", ["weighbridge", *(str(w) for w in words)])
+        capsys.readouterr()
+        code = 0
+        try:
+            main.run()
+        except SystemExit as leaving:
+            code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
+        return Ran(code, *capsys.readouterr())
+
+    return run
+
+
+def _made(folder: Path, name: str, seed: int, payload: float, duration: float | None) -> Made:
+    # A warm engine: a cold one needs more torque than a calibration knows of.
+    scenario = make_scenario(name, payload=payload, seed=seed, without=("warm_up",))
+    made = simulate_car(replace(scenario, duration=duration))
+    made.write(folder)
+    return Made(folder, float(made.truth.mass.mean()))
+
+
+@pytest.fixture(scope="session")
+def known(tmp_path_factory) -> Made:
+    """Return a calibration drive with its mass in drive.toml."""
+    return _made(tmp_path_factory.mktemp("known") / "known", "car-calibration", 101, 0.0, 2400.0)
+
+
+@pytest.fixture(scope="session")
+def loaded(tmp_path_factory) -> Made:
+    """Return a drive of the same car with 150 kg more."""
+    return _made(tmp_path_factory.mktemp("loaded") / "loaded", "car-short", 102, 150.0, None)
+
+
+@pytest.fixture(scope="session")
+def car(known, tmp_path_factory) -> Path:
+    """Return the vehicle file that the command ``calibrate`` makes of the known drive."""
+    path = tmp_path_factory.mktemp("car") / "car.toml"
+    words = ["calibrate", str(known.folder), "-o", str(path), "--tare", "1580"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["weighbridge", *words])
+        with pytest.raises(SystemExit) as leaving:
+            main.run()
+    assert leaving.value.code in (0, None)
+    return path
+
+
+@pytest.fixture
+def changed(loaded, tmp_path) -> Callable[..., Path]:
+    """Copy the loaded drive with some of its tables changed; None leaves a table out."""
+
+    def copy(**tables: Callable[[pl.DataFrame], pl.DataFrame] | None) -> Path:
+        folder = tmp_path / "changed"
+        shutil.copytree(loaded.folder, folder)
+        for table, change in tables.items():
+            path = folder / f"{table}.parquet"
+            frame = pl.read_parquet(path)
+            path.unlink()
+            if change is not None:
+                change(frame).write_parquet(path)
+        return folder
+
+    return copy
