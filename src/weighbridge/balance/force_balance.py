@@ -183,12 +183,15 @@ def force_balance(
     # The first reason that applies is the one told, so the order matters.
     reason = np.zeros(time.size, dtype=np.uint8)
     near = source.age(recorded) <= 3.0 * source.period
+    changing = shifting(time, gear, margin=SHIFT_MARGIN)
+    if driveline.single_speed:
+        changing[:] = False
     braking = _braking(drive, vehicle, recorded, rows, traction, drag, rotating)
     for flag, why in (
         (~(rows["valid"] > 0.99) | ~np.isfinite(rows["speed"]), Reason.NO_MOTION),
         (rows["speed"] < SLOWEST, Reason.STANDING),
         (braking, Reason.BRAKING),
-        (shifting(time, gear, margin=SHIFT_MARGIN) & ~driveline.single_speed, Reason.SHIFTING),
+        (changing, Reason.SHIFTING),
         (slipping, Reason.CLUTCH_SLIPPING),
         (~np.isfinite(traction) | ~near, Reason.NO_TORQUE),
         (torque.overrun, Reason.OVERRUN),

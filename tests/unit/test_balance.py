@@ -1,0 +1,222 @@
+"""Forces against motion on a small made-up drive, by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from weighbridge.balance import Reason, force_balance
+from weighbridge.balance.force_balance import WIND_AT_VEHICLE
+from weighbridge.balance.gear_fit import share_on_gears
+from weighbridge.errors import DriveError
+from weighbridge.estimators.rls import estimate
+from weighbridge.navigation.motion import Motion
+from weighbridge.signals import Drive, DriveInfo, Signal
+from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel, Vehicle
+
+END = 400.0
+CLOCK = np.arange(0.0, END, 0.1)
+STAMPS = np.arange(1.0, END - 2.0, 0.25)
+GEARINGS = (20.0, 10.0)
+MASS = 1500.0
+CAR = Vehicle(
+    driveline=Driveline(
+        gearings=GEARINGS, engine_inertia=0.2, wheel_inertia=4.0, wheel_radius=0.3, efficiency=0.9
+    ),
+    road_load=RoadLoad(drag_area=0.6, rolling_coefficient=0.01),
+    timing=Timing(torque_delay=0.0),
+)
+
+
+def speed_at(time):
+    return 15.0 + 3.0 * np.sin(0.2 * time)
+
+
+def accel_at(time):
+    return 0.6 * np.cos(0.2 * time)
+
+
+def motion(**changes):
+    n = CLOCK.size
+    nothing = np.full(n, np.nan)
+    made = Motion(
+        source="inertial",
+        time=CLOCK,
+        speed=speed_at(CLOCK),
+        accel=accel_at(CLOCK),
+        specific_force=accel_at(CLOCK),
+        grade=np.zeros(n),
+        pitch=np.zeros(n),
+        roll=np.zeros(n),
+        heading=nothing,
+        distance=np.cumsum(speed_at(CLOCK)) * 0.1,
+        altitude=np.zeros(n),
+        latitude=nothing,
+        longitude=nothing,
+        valid=np.ones(n, dtype=bool),
+        specific_force_std=0.05,
+        grade_std=np.full(n, 0.01),
+    )
+    return replace(made, **changes)
+
+
+def signal(name, values, time=STAMPS):
+    return Signal(name, time, np.broadcast_to(np.asarray(values, dtype=float), time.shape).copy())
+
+
+def drive(*more, torque=50.0, engine_speed=None, info=None):
+    """Drive in second gear unless the engine speed says otherwise."""
+    turning = 10.0 * speed_at(STAMPS) if engine_speed is None else engine_speed
+    signals = (signal("engine_torque", torque), signal("engine_speed", turning), *more)
+    return Drive("d", {s.name: s for s in signals}, info or DriveInfo())
+
+
+def between(a, b):
+    return (a <= STAMPS) & (b >= STAMPS)
+
+
+def reasons(*args, vehicle=CAR, **changes):
+    return force_balance(drive(*args), vehicle, motion(**changes)).merged.reason
+
+
+def test_every_row_of_a_plain_drive_may_be_used():
+    assert_array_equal(reasons(), Reason.USED)
+
+
+def test_standing_and_no_motion():
+    slow = np.where((CLOCK > 100.0) & (CLOCK < 120.0), 0.5, speed_at(CLOCK))
+    assert_array_equal(reasons(speed=slow)[between(101, 119)], Reason.STANDING)
+    valid = (CLOCK < 200.0) | (CLOCK > 220.0)
+    found = reasons(valid=valid)
+    assert_array_equal(found[between(201, 219)], Reason.NO_MOTION)
+    assert_array_equal(found[between(0, 199)], Reason.USED)
+
+
+def test_no_motion_beyond_its_ends():
+    view = force_balance(drive(), CAR, motion(), delay=3.0).merged
+    assert_array_equal(view.reason[STAMPS < 3.0], Reason.NO_MOTION)
+
+
+def test_braking_by_its_switch_and_unseen():
+    pressed = signal("brake_switch", between(100, 110))
+    found = reasons(pressed)
+    assert_array_equal(found[between(100, 110)], Reason.BRAKING)
+    assert_array_equal(found[~between(99, 111)], Reason.USED)
+    hard = np.where((CLOCK > 100.0) & (CLOCK < 110.0), -3.0, accel_at(CLOCK))
+    assert_array_equal(reasons(specific_force=hard)[between(101, 109)], Reason.BRAKING)
+
+
+def test_shifting_and_clutch():
+    first = np.where(STAMPS < 200.0, 20.0, 10.0) * speed_at(STAMPS)
+    view = force_balance(drive(engine_speed=first), CAR, motion()).merged
+    assert_array_equal(view.gear[STAMPS < 200.0], 1)
+    assert_array_equal(view.gear[STAMPS >= 200.0], 2)
+    assert_array_equal(view.reason[between(199.7, 200.2)], Reason.SHIFTING)
+    assert_array_equal(view.reason[~between(199, 201)], Reason.USED)
+    slipping = np.where(between(100, 120), 13.0, 10.0) * speed_at(STAMPS)
+    view = force_balance(drive(engine_speed=slipping), CAR, motion()).merged
+    assert_array_equal(view.reason[between(101, 119)], Reason.CLUTCH_SLIPPING)
+    pedal = signal("clutch_switch", between(300, 310))
+    assert_array_equal(reasons(pedal)[between(300, 310)], Reason.CLUTCH_SLIPPING)
+
+
+def test_a_measured_gear_is_believed():
+    # Neutral where the recorder says 0, whatever the ratio.
+    gear = signal("gear", np.where(between(100, 120), 0.0, 2.0))
+    view = force_balance(drive(gear), CAR, motion()).merged
+    assert_array_equal(view.gear[between(101, 119)], 0)
+    assert_array_equal(view.reason[between(101, 119)], Reason.CLUTCH_SLIPPING)
+    assert_array_equal(view.reason[~between(99, 121)], Reason.USED)
+
+
+def test_load_outside_the_model_and_engine_speed_that_ends():
+    model = TorqueModel(source="load", coefficients=(0.0, 100.0, 0.01), load_range=(0.2, 0.8))
+    car = replace(CAR, torque=model, driveline=Driveline(gearings=(10.0,)))
+    load = np.where(between(100, 110), 0.1, np.where(between(200, 210), 0.9, 0.5))
+    turning = Signal("engine_speed", STAMPS[:1200], 10.0 * speed_at(STAMPS[:1200]))
+    recorded = Drive("d", {"engine_load": signal("engine_load", load), "engine_speed": turning})
+    found = force_balance(recorded, car, motion()).merged.reason
+    assert_array_equal(found[between(100, 110)], Reason.OVERRUN)
+    assert_array_equal(found[between(200, 210)], Reason.EXTRAPOLATED)
+    assert_array_equal(found[1200:], Reason.NO_TORQUE)
+    assert_array_equal(found[between(0, 99)], Reason.USED)
+
+
+def test_driveline_loses_power_both_ways():
+    pulling = force_balance(drive(torque=50.0), CAR, motion()).merged
+    assert_allclose(pulling.traction_force, 0.9 * 50.0 * 10.0)
+    dragging = force_balance(drive(torque=-50.0), CAR, motion()).merged
+    assert_allclose(dragging.traction_force, -50.0 * 10.0 / 0.9)
+
+
+def test_rotating_mass_and_drag():
+    view = force_balance(drive(), CAR, motion()).merged
+    assert_allclose(view.rotating_mass, 4.0 / 0.09 + 0.2 * 100.0)
+    assert_allclose(
+        view.drag_force, 0.5 * view.air_density * 0.6 * speed_at(view.time) ** 2, rtol=1e-3
+    )
+
+
+def test_delay_shifts_torque_against_motion():
+    late = drive(torque=50.0 + 10.0 * np.sin(0.5 * (STAMPS - 0.6)))
+    side = force_balance(late, CAR, motion(), delay=0.6).force
+    assert side.delay == 0.6
+    assert_allclose(side.time, STAMPS - 0.6)
+    assert_allclose(side.torque, 50.0 + 10.0 * np.sin(0.5 * side.time), atol=1e-9)
+    by_file = replace(CAR, timing=Timing(torque_delay=0.6))
+    assert_allclose(force_balance(late, by_file, motion()).force.time, side.time)
+
+
+@pytest.mark.parametrize(("heading", "part"), [(0.0, 1.0), (np.pi, -1.0), (np.pi / 2.0, 0.0)])
+def test_headwind_from_the_north(heading, part):
+    info = DriveInfo(wind_speed=8.0, wind_from=0.0)
+    view = force_balance(drive(info=info), CAR, motion(heading=np.full(CLOCK.size, heading))).merged
+    air = view.speed + part * WIND_AT_VEHICLE * 8.0
+    assert_allclose(view.drag_force, 0.5 * view.air_density * 0.6 * air**2, rtol=1e-9)
+
+
+def test_wind_of_unknown_direction_is_no_wind():
+    still = force_balance(drive(), CAR, motion()).merged.drag_force
+    unknown = force_balance(
+        drive(info=DriveInfo(wind_speed=8.0, wind_from=0.0)), CAR, motion()
+    ).merged.drag_force
+    assert_allclose(unknown, still)
+
+
+def test_missing_torque_is_told():
+    with pytest.raises(DriveError, match="engine_torque"):
+        force_balance(drive().without("engine_torque"), CAR, motion())
+
+
+def weighable():
+    """Make the torque that moves 1500 kg."""
+    view = force_balance(drive(), CAR, motion()).merged
+    needed = (MASS + view.rotating_mass) * view.accel + MASS * 9.81 * 0.01 + view.drag_force
+    return needed / 10.0 * np.where(needed > 0.0, 1.0 / 0.9, 0.9)
+
+
+def test_weighing_takes_rising_speed_only():
+    track = estimate(force_balance(drive(torque=weighable()), CAR, motion()), CAR)
+    assert track.mass == pytest.approx(MASS, rel=1e-3)
+    falling = track.balance.merged.accel <= 0.0
+    assert_array_equal(track.reason[falling], Reason.NOT_ACCELERATING)
+    assert_array_equal(track.reason[~falling], Reason.USED)
+
+
+def test_an_outlier_is_a_bad_fit():
+    rising = np.flatnonzero((accel_at(STAMPS) > 0.3) & (STAMPS > 300.0))[5]
+    torque = weighable() + np.random.default_rng(1).normal(scale=0.5, size=STAMPS.size)
+    torque[rising] += 400.0
+    track = estimate(force_balance(drive(torque=torque), CAR, motion()), CAR)
+    assert track.reason[rising] == Reason.BAD_FIT
+    assert track.mass == pytest.approx(MASS, rel=0.01)
+
+
+def test_share_on_gears():
+    balance = force_balance(drive(), CAR, motion())
+    assert share_on_gears(balance, CAR) == 1.0
+    other = replace(CAR, driveline=Driveline(gearings=(17.0, 8.5)))
+    assert share_on_gears(force_balance(drive(), other, motion()), other) == 0.0
+    unknown = replace(CAR, driveline=Driveline())
+    assert share_on_gears(balance, unknown) is None
