@@ -62,6 +62,8 @@ UNITS: Final[dict[str, Unit]] = {
     "degf": Unit("K", 5.0 / 9.0, 459.67 * 5.0 / 9.0),
     "gps": Unit("kg/s", 1e-3),
     "kgps": Unit("kg/s", 1.0),
+    "lph": Unit("m^3/s", 1e-3 / 3600.0),
+    "v": Unit("V", 1.0),
     "kg": Unit("kg", 1.0),
     "t": Unit("kg", 1e3),
     "kgm2": Unit("kg m^2", 1.0),
