@@ -19,7 +19,8 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
     "%": "pct", "percent": "pct", "-": "ratio", "1": "ratio",
     "°c": "degc", "c": "degc", "deg c": "degc", "celsius": "degc", "°f": "degf", "f": "degf",
-    "g/s": "gps", "kg/s": "kgps", "l/h": "lph", "volt": "v", "volts": "v", "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
+    "g/s": "gps", "kg/s": "kgps", "l/h": "lph", "volt": "v", "volts": "v",
+    "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""
 
