@@ -1,0 +1,298 @@
+"""The commands end to end: what they print, write and exit with."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import polars as pl
+import pytest
+
+from weighbridge import Vehicle, __version__
+from weighbridge.papers import jensen2022
+from weighbridge.pipeline.weighing import TRACK_COLUMNS
+from weighbridge.vehicle.model import Driveline
+
+COMMANDS = ("demo", "inspect", "calibrate", "weigh", "simulate", "reproduce")
+
+FIELDS = [
+    "drive", "vehicle", "method", "status", "reason", "mass_kg", "std_kg", "interval95_kg",
+    "payload_kg", "duration_s", "used_s", "converged_at_s", "bound_std_kg", "segments", "warnings",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_an_example(weighbridge, command):
+    ran = weighbridge(command, "--help")
+    assert ran.code == 0
+    assert f"Example: weighbridge {command}" in " ".join(ran.out.split())
+
+
+def test_version(weighbridge):
+    assert weighbridge("--version").out == f"weighbridge {__version__}\n"
+
+
+def test_help_in_a_process_of_its_own_loads_no_arrays():
+    script = (
+        "import sys\n"
+        "sys.argv = ['weighbridge', '--help']\n"
+        "from weighbridge.cli.main import run\n"
+        "try:\n"
+        "    run()\n"
+        "finally:\n"
+        "    heavy = {'numpy', 'scipy', 'numba', 'polars', 'plotly'} & set(sys.modules)\n"
+        "    print('loaded:', sorted(heavy), file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert all(command in done.stdout for command in COMMANDS)
+    assert done.stderr == "loaded: []\n"
+
+
+def test_a_mistake_in_a_process_of_its_own_is_one_line_and_status_2(tmp_path):
+    words = ["weigh", str(tmp_path / "none"), "--vehicle", str(tmp_path / "none.toml")]
+    script = "from weighbridge.cli.main import run; run()"
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("weighbridge: ")
+    assert "none.toml" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_unknown_option_is_status_2(weighbridge):
+    assert weighbridge("weigh", "--nonsense").code == 2
+
+
+def test_bugs_keep_their_traceback(weighbridge, car, loaded, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("weighbridge.pipeline.weighing.weigh", broken)
+    with pytest.raises(ZeroDivisionError):
+        weighbridge("weigh", loaded.folder, "--vehicle", car)
+
+
+def test_calibrate_writes_a_vehicle_file(car, known):
+    vehicle = Vehicle.load(car)
+    assert vehicle.torque.source == "load"
+    assert vehicle.tare == 1580.0
+    assert 5 <= len(vehicle.driveline.gearings) <= 7
+    assert vehicle.provenance.drives == (known.folder.name,)
+    assert vehicle.provenance.r_squared > 0.95
+
+
+def test_calibrate_refuses_to_overwrite(weighbridge, car, known):
+    before = car.read_text()
+    ran = weighbridge("calibrate", known.folder, "-o", car)
+    assert ran.code == 2
+    assert "--force" in ran.err
+    assert car.read_text() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--mass", "1.58"], "1.58 kg"),
+        (["--mass", "1580", "--mass", "1600"], "2 masses for 1 drives"),
+        (["--torque", "measured"], "no engine_torque"),
+        (["--torque", "guess"], "--torque guess"),
+        (["--vehicle", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_calibrate_refuses(weighbridge, known, tmp_path, words, said):
+    ran = weighbridge("calibrate", known.folder, "-o", tmp_path / "car.toml", *words)
+    assert ran.code == 2
+    assert said in ran.err
+    assert ran.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_weigh_in_words(weighbridge, car, loaded):
+    ran = weighbridge("weigh", loaded.folder, "--vehicle", car)
+    assert ran.code == 0
+    assert "95 % between" in ran.out
+    assert "over a tare of 1580 kg" in ran.out
+    assert ran.err == ""
+
+
+def test_weigh_to_standard_output_is_json_alone(weighbridge, car, loaded):
+    ran = weighbridge("weigh", loaded.folder, loaded.folder, "--vehicle", car, "--json", "-")
+    lines = ran.out.splitlines()
+    assert len(lines) == 2
+    assert lines[0] == lines[1]
+    result = json.loads(lines[0])
+    assert list(result) == FIELDS
+    assert result["mass_kg"] == pytest.approx(loaded.mass, rel=0.05)
+    assert result["payload_kg"] == pytest.approx(result["mass_kg"] - 1580.0, abs=1e-3)
+
+
+def test_weigh_writes_everything(weighbridge, car, loaded, tmp_path):
+    outputs = {k: tmp_path / f"out{k}" for k in (".json", ".csv", ".parquet", ".html")}
+    words = ("weigh", loaded.folder, "--vehicle", car)
+    ran = weighbridge(
+        *words, "--json", outputs[".json"], "--track", outputs[".csv"], "--report", outputs[".html"]
+    )
+    assert ran.code == 0
+    assert weighbridge(*words, "--track", outputs[".parquet"]).code == 0
+    csv, parquet = pl.read_csv(outputs[".csv"]), pl.read_parquet(outputs[".parquet"])
+    assert csv.columns == parquet.columns == list(TRACK_COLUMNS)
+    assert csv.height == parquet.height > 1000
+    result = json.loads(outputs[".json"].read_text())
+    assert result["status"] == "converged"
+    assert f"{result['mass_kg']:.0f}" in outputs[".html"].read_text().replace(" ", "")
+
+
+def test_one_broken_drive_of_two(weighbridge, car, loaded, tmp_path):
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / "obd.parquet").write_bytes(b"PAR1 and nothing more")
+    words = ("weigh", loaded.folder, broken, "--vehicle", car)
+    ran = weighbridge(*words, "--json", "-")
+    assert ran.code == 2
+    good, bad = (json.loads(line) for line in ran.out.splitlines())
+    assert good["mass_kg"] == pytest.approx(loaded.mass, rel=0.05)
+    assert bad["drive"] == "broken"
+    assert bad["mass_kg"] is None
+    assert "obd.parquet" in bad["reason"]
+    assert list(bad) == FIELDS
+    assert "unreadable" in weighbridge(*words).out
+
+
+def test_one_drive_without_a_mass_is_status_1(weighbridge, car, loaded, changed):
+    parked = changed(
+        obd=lambda f: f.filter(pl.col("time_s") < 20.0),
+        imu=lambda f: f.filter(pl.col("time_s") < 20.0),
+        gnss=lambda f: f.filter(pl.col("time_s") < 20.0),
+    )
+    ran = weighbridge("weigh", loaded.folder, parked, "--vehicle", car)
+    assert ran.code == 1
+    assert "converged" in ran.out
+    assert "not_excited" in ran.out
+
+
+@pytest.mark.parametrize("option", ["--json", "--track", "--report"])
+def test_weigh_into_a_folder_that_is_not_there(weighbridge, car, loaded, tmp_path, option):
+    ran = weighbridge("weigh", loaded.folder, "--vehicle", car, option, tmp_path / "no" / "out.csv")
+    assert ran.code == 2
+    assert ran.out == ""
+    assert "no folder" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--method", "guess"], "unknown method 'guess'"),
+        (["--track", "track.xlsx"], ".csv or .parquet"),
+        (["--mapping", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_weigh_refuses(weighbridge, car, loaded, words, said):
+    ran = weighbridge("weigh", loaded.folder, "--vehicle", car, *words)
+    assert ran.code == 2
+    assert said in ran.err
+    assert ran.err.count("\n") == 1
+
+
+def test_calibrate_into_a_folder_that_is_not_there(weighbridge, known, tmp_path):
+    ran = weighbridge("calibrate", known.folder, "-o", tmp_path / "no" / "car.toml")
+    assert ran.code == 2
+    assert "no folder" in ran.err
+
+
+def vehicle_file(path, text):
+    path.write_text("[vehicle]\nname = 'other'\n" + text, encoding="utf-8")
+    return path
+
+
+def test_vehicle_file_of_another_car_gives_no_mass(weighbridge, car, loaded, tmp_path):
+    own = Vehicle.load(car)
+    gearings = (51.3, 27.7, 17.4, 12.9, 10.2, 8.2)
+    other = tmp_path / "other.toml"
+    replace(own, driveline=Driveline(gearings=gearings)).save(other)
+    ran = weighbridge("weigh", loaded.folder, "--vehicle", other, "--json", "-")
+    assert ran.code == 1
+    result = json.loads(ran.out)
+    assert result["status"] == "inconsistent"
+    assert result["mass_kg"] is None
+    assert "gearing" in result["reason"]
+    assert all(s["mass_kg"] is None for s in result["segments"])
+
+
+def test_vehicle_file_for_load_and_a_drive_with_torque_only(weighbridge, car, loaded, changed):
+    def only_torque(frame):
+        return frame.rename({"engine_load_pct": "engine_torque_nm"}).drop("mass_air_flow_gps")
+
+    ran = weighbridge("weigh", changed(obd=only_torque), "--vehicle", car, "--json", "-")
+    assert ran.code == 1
+    assert "torque source 'measured'" in json.loads(ran.out)["reason"]
+
+
+def test_data_sheet_without_gearings_is_told_to_be_uncalibrated(weighbridge, tmp_path):
+    folder = tmp_path / "drive"
+    made = weighbridge("simulate", "electric", "-o", folder, "--seed", 5, "--mass", 1900)
+    assert made.code == 0
+    sheet = vehicle_file(tmp_path / "sheet.toml", "[torque]\nsource = 'measured'\n")
+    ran = weighbridge("weigh", folder, "--vehicle", sheet, "--json", "-")
+    assert ran.code == 0
+    result = json.loads(ran.out)
+    assert result["mass_kg"] == pytest.approx(1900.0, rel=0.15)
+    assert any("not made by a calibration" in w for w in result["warnings"])
+
+
+def test_simulate_writes_a_folder_once(weighbridge, tmp_path):
+    folder = tmp_path / "new" / "drive"
+    words = ("simulate", "car-short", "-o", folder, "--mass", 1700, "--format", "csv")
+    ran = weighbridge(*words)
+    assert ran.code == 0
+    assert "1700 kg" in ran.out
+    names = {f.name for f in folder.iterdir()}
+    assert names == {"imu.csv", "obd.csv", "gnss.csv", "truth.csv", "drive.toml"}
+    again = weighbridge(*words)
+    assert again.code == 2
+    assert "--force" in again.err
+    assert weighbridge(*words, "--force").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["moon"], "unknown scenario 'moon'"),
+        (["car-short", "--without", "friction"], "unknown effect 'friction'"),
+        (["car-short", "--format", "xlsx"], "csv or parquet"),
+    ],
+)
+def test_simulate_refuses(weighbridge, tmp_path, words, said):
+    ran = weighbridge("simulate", *words, "-o", tmp_path / "drive")
+    assert ran.code == 2
+    assert said in ran.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_reproduce_refuses_unknown_papers(weighbridge):
+    ran = weighbridge("reproduce", "newton1687")
+    assert ran.code == 2
+    assert "jensen2022" in ran.err
+
+
+def test_rows_of_table_b_1_are_as_printed():
+    rows = jensen2022.TABLE_B1
+    assert len(rows) == 18
+    assert [row.number for row in rows] == list(range(1, 19))
+    first = jensen2022.scenario(rows[0], seed=1)
+    again = jensen2022.scenario(rows[0], seed=2)
+    assert first.mass == again.mass
+    assert first.seed != again.seed
+
+
+@pytest.mark.slow
+def test_demo(weighbridge, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ran = weighbridge("demo", "--no-open", "-o", "demo.html")
+    assert ran.code == 0
+    errors = [float(line.split("│")[-2]) for line in ran.out.splitlines() if " kg │" in line]
+    assert len(errors) == 3
+    assert max(abs(e) for e in errors) < 5.0
+    assert (tmp_path / "demo.html").stat().st_size > 100_000

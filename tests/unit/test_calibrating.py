@@ -1,0 +1,192 @@
+"""Calibration on simulated drives: what it finds, what it refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numba import config
+
+from weighbridge import calibrate, weigh
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.pipeline.calibrating import CalibrationSettings
+from weighbridge.signals import Signal
+from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
+
+pytestmark = pytest.mark.skipif(
+    bool(config.DISABLE_JIT), reason="a whole drive takes minutes without the compiler"
+)
+
+
+def short(seed, payload=0.0):
+    return simulate_car(
+        make_scenario("car-short", payload=payload, seed=seed, without=("warm_up",))
+    )
+
+
+@pytest.fixture(scope="module")
+def empty():
+    return short(31)
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return short(32, 300.0)
+
+
+@pytest.fixture(scope="module")
+def electric():
+    return simulate_car(replace(make_scenario("electric", seed=33), duration=900.0)).drive
+
+
+def with_torque(made):
+    truth = made.truth
+    torque = Signal("engine_torque", truth.time[::5].copy(), truth.engine_torque[::5].copy())
+    return made.drive.with_signals(torque)
+
+
+@pytest.fixture(scope="module")
+def car(empty):
+    return calibrate(empty.drive)
+
+
+def test_one_drive_by_load(car, empty):
+    assert car.torque.source == "load"
+    assert car.name == empty.drive.info.vehicle
+    assert car.provenance.r_squared > 0.95
+    made = empty.scenario.car
+    true = np.array(made.gear_ratios) * made.final_drive / made.wheel_radius
+    nearest = [np.abs(true / g - 1.0).min() for g in car.driveline.gearings]
+    assert max(nearest) < 0.02
+
+
+def test_it_weighs_its_own_drive_and_another(car, empty, loaded):
+    assert weigh(empty.drive, car).mass == pytest.approx(empty.truth.mass.mean(), rel=0.01)
+    assert weigh(loaded.drive, car).mass == pytest.approx(loaded.truth.mass.mean(), rel=0.05)
+
+
+def test_drives_of_different_mass_together(empty, loaded):
+    drives, masses = [empty.drive, loaded.drive], [empty.scenario.mass, loaded.scenario.mass]
+    both = calibrate(drives, masses)
+    assert both.provenance.drives == ("car-short", "car-short")
+    for made in (empty, loaded):
+        assert weigh(made.drive, both).mass == pytest.approx(made.truth.mass.mean(), rel=0.03)
+    # The masses in the drives' own files say the same.
+    assert calibrate(drives).torque.coefficients == both.torque.coefficients
+
+
+def test_measured_torque_is_preferred_and_better(empty):
+    car = calibrate(with_torque(empty))
+    assert car.torque.source == "measured"
+    offset, scale = car.torque.coefficients
+    # Torque at the clutch; the driveline takes a few percent of it.
+    assert 0.85 < scale < 1.02
+    assert abs(offset) < 15.0
+    assert car.provenance.r_squared > 0.97
+
+
+def test_torque_from_air_flow(empty, loaded):
+    car = calibrate(empty.drive, settings=CalibrationSettings(source="air_flow"))
+    assert car.torque.source == "air_flow"
+    assert weigh(loaded.drive, car).mass == pytest.approx(loaded.truth.mass.mean(), rel=0.06)
+
+
+def test_grid_of_table_5_ends_near(empty, car):
+    grid = calibrate(empty.drive, settings=CalibrationSettings(grid=True))
+    assert grid.road_load.drag_area == pytest.approx(car.road_load.drag_area, abs=0.06)
+    # Values of Table 5 only.
+    steps = (grid.road_load.drag_area - 0.30) / 0.05
+    assert steps == pytest.approx(round(steps), abs=1e-6)
+
+
+def test_straight_regression_has_no_curvature(empty):
+    car = calibrate(empty.drive, settings=CalibrationSettings(order=1, curved=False))
+    assert len(car.torque.coefficients) == 3
+    assert car.torque.curvature == ()
+
+
+def test_single_speed_electric_car(electric):
+    car = calibrate(electric)
+    assert car.torque.source == "measured"
+    assert car.driveline.single_speed
+    found = weigh(electric, car)
+    assert found.mass == pytest.approx(electric.info.mass, rel=0.01)
+
+
+def test_single_speed_without_engine_speed(electric):
+    known = Vehicle(driveline=Driveline(gearings=calibrate(electric).driveline.gearings))
+    car = calibrate(electric.without("engine_speed"), vehicle=known)
+    assert car.provenance.r_squared > 0.97
+
+
+def test_measured_gear_signal(empty):
+    truth = empty.truth
+    told = np.where(truth.phase == 0.0, truth.gear, 0.0)
+    drive = empty.drive.with_signals(Signal("gear", truth.time[::5].copy(), told[::5].copy()))
+    car = calibrate(drive)
+    assert weigh(drive, car).mass == pytest.approx(truth.mass.mean(), rel=0.02)
+
+
+def test_percent_of_a_reference_torque(empty):
+    torque = with_torque(empty).signals["engine_torque"]
+    drive = empty.drive.with_signals(
+        Signal("engine_torque_fraction", torque.time, torque.values / 250.0)
+    )
+    settings = CalibrationSettings(source="percent")
+    with pytest.raises(DriveError, match="reference_torque_nm"):
+        calibrate(drive, settings=settings)
+    known = Vehicle(torque=TorqueModel(source="percent", reference_torque=250.0))
+    car = calibrate(drive, vehicle=known, settings=settings)
+    direct = calibrate(with_torque(empty))
+    assert car.torque.coefficients == pytest.approx(direct.torque.coefficients, rel=1e-3)
+
+
+def test_known_speed_scale_stays_where_the_drive_shows_none(empty):
+    alone = empty.drive.without(
+        *(n for n in empty.drive.signals if n.startswith(("gnss", "lat", "lon", "alt")))
+    )
+    known = Vehicle(driveline=Driveline(speed_scale=1.02))
+    assert calibrate(alone, vehicle=known).driveline.speed_scale == 1.02
+    assert calibrate(alone).driveline.speed_scale == 1.0
+
+
+@pytest.mark.parametrize("mass", [1.58, 158.0, 1.58e6, -1580.0, float("nan")])
+def test_a_mass_no_car_has(empty, mass):
+    with pytest.raises(ConfigError, match="no car's"):
+        calibrate(empty.drive, mass)
+
+
+def test_masses_that_do_not_fit_the_drives(empty):
+    with pytest.raises(ConfigError, match="2 masses for 1 drives"):
+        calibrate([empty.drive], [1500.0, 1600.0])
+    with pytest.raises(ConfigError, match="no drive"):
+        calibrate([])
+    unknown = replace(empty.drive, info=replace(empty.drive.info, mass=None))
+    with pytest.raises(ConfigError, match="mass_kg in its"):
+        calibrate(unknown)
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("measured", "no engine_torque, which torque source 'measured' needs"),
+        ("percent", "no engine_torque_fraction"),
+    ],
+)
+def test_a_source_the_drive_lacks(empty, source, words):
+    with pytest.raises(DriveError, match=words):
+        calibrate(empty.drive, settings=CalibrationSettings(source=source))
+
+
+def test_settings_are_checked():
+    with pytest.raises(ConfigError, match="source must be one of"):
+        CalibrationSettings(source="guess")
+    with pytest.raises(ConfigError, match="order"):
+        CalibrationSettings(order=5)
+
+
+def test_too_little_to_calibrate_by(empty):
+    with pytest.raises(DriveError, match="a calibration needs one of them"):
+        calibrate(empty.drive.without("engine_load", "mass_air_flow"))
+    with pytest.raises(DriveError, match="drive longer"):
+        calibrate(empty.drive.between(0.0, 90.0))

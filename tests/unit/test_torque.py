@@ -1,0 +1,84 @@
+"""Torque from what a drive recorded, against numbers worked out by hand."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from weighbridge.errors import DriveError
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.torque import air_flow_torque, engine_torque, lowest_load, torque_rows
+
+TIME = np.arange(5.0)
+SPEED = np.array([100.0, 150.0, 200.0, 250.0, 700.0])
+
+
+def drive(**values):
+    return Drive("d", {k: Signal(k, TIME, np.asarray(v, dtype=float)) for k, v in values.items()})
+
+
+def torque(recorded, **model):
+    vehicle = Vehicle(torque=TorqueModel(**model))
+    return engine_torque(recorded, vehicle, SPEED, TIME)
+
+
+def test_measured_torque_is_taken_as_it_is():
+    values = [10.0, -20.0, 30.0, 0.0, 5.0]
+    found = torque(drive(engine_torque=values), source="measured")
+    assert_allclose(found.torque, values)
+    assert not found.extrapolated.any()
+    assert not found.overrun.any()
+
+
+def test_measured_torque_with_offset_and_scale():
+    recorded = drive(engine_torque=[0.0, 100.0, 200.0, 0.0, 0.0])
+    found = torque(recorded, source="measured", coefficients=(5.0, 0.9))
+    assert_allclose(found.torque, [5.0, 95.0, 185.0, 5.0, 5.0])
+
+
+def test_percent_torque_takes_the_drives_reference_before_the_files():
+    percent = drive(engine_torque_fraction=[0.1] * 5)
+    assert_allclose(torque(percent, source="percent", reference_torque=300.0).torque, 30.0)
+    both = drive(engine_torque_fraction=[0.1] * 5, reference_torque=[2000.0] * 5)
+    assert_allclose(torque(both, source="percent", reference_torque=300.0).torque, 200.0)
+    with pytest.raises(DriveError, match="reference_torque_nm"):
+        torque(percent, source="percent")
+
+
+def test_load_by_the_regression_of_eq_49():
+    load = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
+    recorded = drive(engine_load=load, engine_speed=SPEED)
+    model = {"source": "load", "load_range": (0.2, 0.8), "speed_range": (120.0, 600.0)}
+    found = torque(recorded, coefficients=(-20.0, 300.0, 0.05, -1e-4), **model)
+    assert_allclose(found.torque, -20.0 + 300.0 * load + 0.05 * SPEED - 1e-4 * SPEED**2)
+    assert found.overrun.tolist() == [True, False, False, False, False]
+    assert found.extrapolated.tolist() == [True, False, False, False, True]
+    bent = torque(recorded, coefficients=(-20.0, 300.0), curvature=(0.1, 50.0), **model)
+    assert_allclose(bent.torque, -20.0 + 300.0 * load + 0.1 * load * SPEED + 50.0 * load**2)
+
+
+def test_air_flow_torque_by_hand():
+    # 14.7 g/s of air carry 1 g/s of petrol, 45 kW; a third of it at 150 rad/s is 100 N m.
+    assert_allclose(air_flow_torque(np.array([0.0147]), np.array([150.0]), 1.0, 1.0 / 3.0), 100.0)
+    # Twice the air for the same petrol.
+    assert_allclose(air_flow_torque(np.array([0.0147]), np.array([150.0]), 2.0, 1.0 / 3.0), 50.0)
+    # An engine that stands has no finite torque of flow over speed.
+    assert np.isfinite(air_flow_torque(np.array([0.01]), np.array([0.0]), 1.0, 0.3)).all()
+
+
+def test_columns_of_the_regression():
+    rows = torque_rows(np.array([0.5]), np.array([10.0]), 2, curved=True)
+    assert_allclose(rows, [[1.0, 0.5, 10.0, 100.0, 5.0, 0.25]])
+
+
+def test_lowest_load_is_just_above_the_dragged_engine():
+    load = np.concatenate((np.full(200, 0.05), np.linspace(0.2, 0.9, 800)))
+    assert lowest_load(load) == pytest.approx(0.06)
+    assert lowest_load(np.array([np.nan])) == 0.0
+
+
+@pytest.mark.parametrize("source", ["measured", "percent", "load", "air_flow"])
+def test_what_is_missing_is_named(source):
+    coefficients = (0.0, 1.0) if source == "load" else ()
+    with pytest.raises(DriveError, match=f"torque source '{source}'"):
+        torque(drive(throttle=[0.5] * 5), source=source, coefficients=coefficients)

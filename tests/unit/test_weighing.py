@@ -1,0 +1,182 @@
+"""The result of a weighing: fields, intervals, track, segments, and no mass without trust."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+from scipy.stats import t as student
+
+from tests.unit.test_balance import CAR, CLOCK, MASS, STAMPS, accel_at, drive, motion, weighable
+from weighbridge import Status, weigh
+from weighbridge.balance import force_balance
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.rls import estimate
+from weighbridge.pipeline.weighing import TRACK_COLUMNS, Weighing, empty_result
+from weighbridge.signals import Signal
+from weighbridge.vehicle.model import Provenance
+
+FIELDS = {
+    "drive", "vehicle", "method", "status", "reason", "mass_kg", "std_kg", "interval95_kg",
+    "payload_kg", "duration_s", "used_s", "converged_at_s", "bound_std_kg", "segments", "warnings",
+}  # fmt: skip
+
+
+def weighing(vehicle=CAR, status=None, **changes):
+    noise = np.random.default_rng(3).normal(scale=2.0, size=STAMPS.size)
+    recorded = drive(torque=weighable() + noise)
+    track = estimate(force_balance(recorded, vehicle, motion(**changes)), vehicle)
+    return Weighing(
+        drive=recorded,
+        vehicle=vehicle,
+        method="rls",
+        status=status or track.status,
+        reason=track.why,
+        result=track,
+    )
+
+
+@pytest.fixture(scope="module")
+def good():
+    return weighing(replace(CAR, tare=1400.0))
+
+
+def test_fields_of_the_json(good):
+    result = json.loads(good.to_json())
+    assert set(result) == FIELDS
+    assert result["status"] == "converged"
+    assert result["reason"] == ""
+    assert result["mass_kg"] == pytest.approx(MASS, rel=0.01)
+    assert result["payload_kg"] == pytest.approx(result["mass_kg"] - 1400.0, abs=1e-5)
+    assert result["interval95_kg"] == pytest.approx(list(good.interval(0.95)), abs=1e-5)
+    assert result["duration_s"] == pytest.approx(STAMPS[-1] - STAMPS[0])
+    assert result["used_s"] == pytest.approx(
+        0.25 * np.count_nonzero(accel_at(STAMPS) > 0), rel=0.02
+    )
+    assert 0.0 <= result["converged_at_s"] < result["duration_s"]
+    assert 0.0 < result["bound_std_kg"] < result["std_kg"]
+    assert set(result["segments"][0]) == {"start_s", "end_s", "mass_kg", "std_kg"}
+    assert "\n" not in good.to_json()
+
+
+def test_a_failed_drive_has_the_same_fields():
+    failed = empty_result("d", "car", "rls", "why")
+    assert set(failed) == FIELDS
+    assert failed["status"] in set(Status)
+
+
+@pytest.mark.parametrize("status", [Status.INCONSISTENT, Status.NOT_EXCITED])
+def test_numbers_are_null_where_there_is_no_mass(status):
+    none = weighing(status=status)
+    result = json.loads(none.to_json())
+    assert math.isnan(none.mass)
+    assert result["interval95_kg"] == [None, None]
+    assert all(result[k] is None for k in ("mass_kg", "std_kg", "payload_kg", "converged_at_s"))
+    if status is Status.INCONSISTENT:
+        assert result["segments"]
+        assert all(s["mass_kg"] is None and s["std_kg"] is None for s in result["segments"])
+
+
+def test_interval_is_students(good):
+    low, high = good.interval(0.8)
+    half = student.ppf(0.9, good.result.degrees_of_freedom) * good.std
+    assert (low, high) == pytest.approx((good.mass - half, good.mass + half))
+    assert good.interval(0.99)[0] < good.interval(0.95)[0] < low
+    for level in (0.0, 1.0, 95.0):
+        with pytest.raises(ConfigError, match="level"):
+            good.interval(level)
+
+
+def test_uncertainty_of_the_calibration_is_in_the_mass(good):
+    shared = weighing(replace(CAR, provenance=Provenance(mass_scale_std=0.02)))
+    assert shared.std == pytest.approx(math.hypot(good.std, 0.02 * shared.mass), rel=1e-6)
+
+
+def test_payload_needs_a_tare(good):
+    assert good.payload == pytest.approx(good.mass - 1400.0)
+    assert math.isnan(weighing().payload)
+
+
+def test_track(good, tmp_path):
+    track = good.track
+    assert tuple(track.columns) == TRACK_COLUMNS
+    assert track.height == STAMPS.size
+    assert track["used"].sum() == np.count_nonzero(good.result.used)
+    reasons = set(track["reason"])
+    assert reasons == {"", "not accelerating"}
+    for suffix, read in ((".csv", pl.read_csv), (".parquet", pl.read_parquet)):
+        path = tmp_path / f"track{suffix}"
+        good.write_track(path)
+        back = read(path)
+        assert back.columns == track.columns
+        assert back["mass_kg"].to_list() == pytest.approx(track["mass_kg"].to_list())
+    with pytest.raises(ConfigError, match=r"\.csv or \.parquet"):
+        good.write_track(tmp_path / "track.xlsx")
+
+
+def test_track_without_a_result():
+    none = weigh(drive().without("engine_torque"), CAR)
+    assert none.status is Status.MISSING_SIGNALS
+    assert tuple(none.track.columns) == TRACK_COLUMNS
+    assert none.track.height == 0
+    assert none.segments == ()
+    assert set(none.to_dict()) == FIELDS
+
+
+def test_segments_end_where_the_vehicle_stands():
+    speed = np.where((CLOCK > 190.0) & (CLOCK < 220.0), 0.0, motion().speed)
+    parts = weighing(speed=speed).segments
+    assert len(parts) == 2
+    assert parts[0].start == pytest.approx(STAMPS[0])
+    assert parts[1].start == pytest.approx(220.0, abs=0.5)
+    assert [p.mass for p in parts] == pytest.approx([MASS, MASS], rel=0.02)
+
+
+def test_less_than_the_tare_is_inconsistent():
+    light = weighing(replace(CAR, tare=2200.0))
+    assert light.status is Status.INCONSISTENT
+    assert "less than the tare" in light.reason
+    assert math.isnan(light.mass)
+
+
+def test_a_mass_the_class_cannot_have_is_inconsistent():
+    bus = weighing(replace(CAR, kind="bus", torque=replace(CAR.torque, coefficients=(0.0, 0.5))))
+    assert bus.status is Status.INCONSISTENT
+    assert "a bus has between" in bus.reason
+
+
+def test_another_torque_source_is_named():
+    load = (
+        drive()
+        .without("engine_torque")
+        .with_signals(
+            Signal("engine_load", STAMPS, 0.4 + 0.2 * np.sin(STAMPS)),
+            Signal("vehicle_speed", STAMPS, 10.0 + np.sin(0.1 * STAMPS)),
+        )
+    )
+    assert "--torque load" in weigh(load, CAR).reason
+
+
+def test_method_and_serious_problems_are_refused():
+    with pytest.raises(ConfigError, match="unknown method 'guess'; known are rls"):
+        weigh(drive(), CAR, "guess")
+    stuck = drive().with_signals(
+        Signal("vehicle_speed", STAMPS, motion().speed[: STAMPS.size]),
+        Signal("engine_torque", STAMPS, np.full(STAMPS.size, 50.0)),
+    )
+    with pytest.raises(DriveError, match="engine_torque is 50"):
+        weigh(stuck, CAR)
+
+
+def test_a_vehicle_that_was_not_calibrated_is_told():
+    turning = 10.0 * (15.0 + 3.0 * np.sin(0.2 * STAMPS))
+    recorded = drive(torque=weighable(), engine_speed=turning).with_signals(
+        Signal("vehicle_speed", STAMPS, turning / 10.0)
+    )
+    found = weigh(recorded, CAR)
+    assert any("not made by a calibration" in w for w in found.warnings)
+    assert found.mass == pytest.approx(MASS, rel=0.05)
+    named = replace(CAR, provenance=Provenance(mass_scale_std=0.01))
+    assert not any("calibration" in w for w in weigh(recorded, named).warnings)
