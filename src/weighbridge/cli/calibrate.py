@@ -12,6 +12,7 @@ from weighbridge.cli.options import (
     MappingPath,
     load,
     mapping_for,
+    refuse_missing_folder,
     refuse_overwriting,
 )
 
@@ -72,6 +73,7 @@ def calibrate(
     from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
     from weighbridge.vehicle.model import Vehicle
 
+    refuse_missing_folder(output)
     refuse_overwriting(output, force, "vehicle file")
     if torque not in (None, "measured", "percent", "load", "air_flow"):
         raise ConfigError(f"--torque {torque}: must be measured, percent, load or air_flow")

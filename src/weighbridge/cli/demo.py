@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from weighbridge.cli.options import refuse_missing_folder
+
 if TYPE_CHECKING:
     from weighbridge.pipeline.weighing import Weighing
 
@@ -35,6 +37,7 @@ def demo(
     from weighbridge.report import write_report
     from weighbridge.simulation import make_scenario, simulate_car
 
+    refuse_missing_folder(output)
     say = _say if sys.stderr.isatty() else _keep_quiet
     say("simulating and calibrating: one drive of known mass")
     known = simulate_car(make_scenario("car-calibration", seed=seed))

@@ -43,3 +43,12 @@ def refuse_overwriting(path: Path, force: bool, what: str) -> None:
         raise ConfigError(
             f"{path}: exists already; name another {what}, or give --force to replace it"
         )
+
+
+def refuse_missing_folder(*outputs: Path | None) -> None:
+    """Raise before the work where a result could not be written after it."""
+    for path in outputs:
+        if path is not None and not path.parent.is_dir():
+            raise ConfigError(f"{path}: there is no folder {path.parent}; make it first")
+        if path is not None and path.is_dir():
+            raise ConfigError(f"{path}: is a folder; name a file in it")

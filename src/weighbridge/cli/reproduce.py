@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
+from weighbridge.cli.options import refuse_missing_folder
+
 if TYPE_CHECKING:
     from weighbridge.papers.jensen2022 import Reproduction
 
@@ -28,6 +30,7 @@ def reproduce(
 
     if paper not in ("jensen2022", "all"):
         raise ConfigError(f"{paper}: known papers are jensen2022 and all")
+    refuse_missing_folder(report)
     from weighbridge.papers import jensen2022
 
     bar = _bar()

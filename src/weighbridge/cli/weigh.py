@@ -8,13 +8,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
-from weighbridge.cli.options import DrivePaths, MappingPath, load, mapping_for
+from weighbridge.cli.options import (
+    DrivePaths,
+    MappingPath,
+    load,
+    mapping_for,
+    refuse_missing_folder,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from weighbridge.pipeline.weighing import Weighing
     from weighbridge.vehicle.model import Vehicle
+
+# Width of the table where no terminal gives one: a reason needs room.
+_WIDTH = 160
 
 
 def weigh(
@@ -98,7 +107,9 @@ def _refuse_inputs(
     from weighbridge.errors import ConfigError
 
     inputs = {path.resolve() for path in drives}
-    for output in (track, report, Path(json_path) if json_path not in (None, "-") else None):
+    outputs = (track, report, Path(json_path) if json_path and json_path != "-" else None)
+    refuse_missing_folder(*outputs)
+    for output in outputs:
         if output is not None and Path(output).resolve() in inputs:
             raise ConfigError(f"{output}: is a drive; results must go to another file")
 
@@ -126,6 +137,8 @@ def _show(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> None:
     from rich.console import Console
 
     console = Console()
+    if not console.is_terminal:
+        console.width = _WIDTH
     if len(weighed) == 1 and not failed:
         _show_one(weighed[0])
         return

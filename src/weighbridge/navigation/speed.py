@@ -13,6 +13,9 @@ from weighbridge.navigation.longitudinal import LONGEST_GAP, lowpass, resample
 from weighbridge.navigation.motion import Motion, MotionSource
 from weighbridge.signals import Drive, Floats
 
+SHORTEST: Final = 20.0
+"""A shorter drive is not worth a look [s]."""
+
 GRADE_DISTANCE: Final = 60.0
 """Distance over which height is smoothed into grade [m]."""
 
@@ -42,9 +45,9 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
     start, end = float(speed.time[0]), float(speed.time[-1])
     rate = min(rate, 4.0 / speed.period)
     time = start + np.arange(int((end - start) * rate)) / rate
-    if time.size < 32:
+    if end - start < SHORTEST or time.size < 32:
         raise DriveError(
-            f"{drive.name}: only {end - start:.0f} s of speed; at least 20 s are needed"
+            f"{drive.name}: only {end - start:.0f} s of speed; at least {SHORTEST:.0f} s are needed"
         )
     valid = speed.age(time) < max(LONGEST_GAP, 2.5 * speed.period)
     # A quadratic over two seconds, or three samples where they are rarer,
