@@ -68,6 +68,9 @@ Boundary Layer Meteorology, 1988, ch. 9)."""
 BRAKING_FORCE: Final = 0.06
 """Braking force over weight that marks unseen braking [-]."""
 
+RETARDING: Final = -0.005
+"""Retarder torque over its reference below which it brakes [-]; SPN 520 has steps of 1 %."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceSide:
@@ -319,14 +322,19 @@ def _braking(
     drag: Floats,
     rotating: Floats,
 ) -> Bools:
-    """Where the brake is pressed, or the vehicle slows more than its torque explains."""
+    """Where brake or retarder work, or the vehicle slows more than its torque explains."""
+    retarder = drive.get("retarder_torque")
+    retarding = np.zeros(recorded.size, dtype=bool)
+    if retarder is not None and len(retarder):
+        retarding = np.nan_to_num(retarder.held(recorded)) < RETARDING
     switch = drive.get("brake_switch")
     if switch is not None and len(switch):
-        return np.asarray(switch.held(recorded) > 0.5)
+        return np.asarray(retarding | (switch.held(recorded) > 0.5))
     # Unseen braking: what slows the vehicle is far more than engine, drag and
     # rolling can, whatever the mass within reason.
     mass = vehicle.tare or 1500.0
     force = np.where(np.isfinite(traction), traction, 0.0)
     rolling = vehicle.road_load.rolling_coefficient * GRAVITY
     needed = (mass + np.nan_to_num(rotating)) * rows["specific_force"] + mass * rolling + drag
-    return np.asarray(needed - np.minimum(force, 0.0) < -BRAKING_FORCE * mass * GRAVITY)
+    unseen = needed - np.minimum(force, 0.0) < -BRAKING_FORCE * mass * GRAVITY
+    return np.asarray(retarding | unseen)

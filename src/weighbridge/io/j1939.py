@@ -1,0 +1,487 @@
+"""SAE J1939: the parameter groups of trucks and buses that a weighing can use.
+
+Identifier, transport protocol and the coding of values that are missing follow
+SAE J1939-21 (data link layer) and SAE J1939-71 (vehicle application layer).
+The table below holds facts of J1939-71 only: group, place, resolution, offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.io.frames import Frames
+from weighbridge.signals import Bools, Floats, Problem, Signal
+from weighbridge.signals.cleaning import clean_signal
+from weighbridge.signals.units import to_si
+
+EEC1, EEC2, EEC3 = 0xF004, 0xF003, 0xFEDF
+ETC1, ETC2 = 0xF002, 0xF005
+CCVS1, EBC1, ERC1 = 0xFEF1, 0xF001, 0xF000
+VDHR, AMB, VW, CVW = 0xFEC1, 0xFEF5, 0xFEEA, 0xFE70
+EC1 = 0xFEE3
+_TP_CM, _TP_DT = 0xEC00, 0xEB00
+
+NAMES: Final[dict[int, str]] = {
+    EEC1: "EEC1", EEC2: "EEC2", EEC3: "EEC3", ETC1: "ETC1", ETC2: "ETC2", CCVS1: "CCVS1",
+    EBC1: "EBC1", ERC1: "ERC1", VDHR: "VDHR", AMB: "AMB", VW: "VW", CVW: "CVW", EC1: "EC1",
+    _TP_CM: "TP.CM", _TP_DT: "TP.DT",
+}  # fmt: skip
+"""Parameter groups by number, with the acronyms of J1939-71."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spn:
+    """One suspect parameter: ``value = resolution * raw + offset`` in ``unit``.
+
+    Attributes
+    ----------
+    number : SPN
+    name : canonical quantity, or a word for what has none
+    pgn : parameter group it stands in
+    byte : first byte, counted from 1 as the standard does
+    bit : first bit in it, counted from 1
+    bits : length
+    resolution, offset : of the scaling
+    unit : suffix as in `weighbridge.signals.units`; empty for switches and counts
+    """
+
+    number: int
+    name: str
+    pgn: int
+    byte: int
+    bit: int
+    bits: int
+    resolution: float = 1.0
+    offset: float = 0.0
+    unit: str = ""
+
+
+SPNS: Final[tuple[Spn, ...]] = (
+    Spn(513, "actual_torque", EEC1, 3, 1, 8, 1.0, -125.0, "pct"),
+    Spn(190, "engine_speed", EEC1, 4, 1, 16, 0.125, 0.0, "rpm"),
+    Spn(91, "throttle", EEC2, 2, 1, 8, 0.4, 0.0, "pct"),
+    Spn(92, "engine_load", EEC2, 3, 1, 8, 1.0, 0.0, "pct"),
+    Spn(514, "friction_torque", EEC3, 1, 1, 8, 1.0, -125.0, "pct"),
+    Spn(2978, "parasitic_torque", EEC3, 5, 1, 8, 1.0, -125.0, "pct"),
+    Spn(560, "driveline_engaged", ETC1, 1, 1, 2),
+    Spn(574, "shift_in_process", ETC1, 1, 5, 2),
+    Spn(191, "output_shaft_speed", ETC1, 2, 1, 16, 0.125, 0.0, "rpm"),
+    Spn(522, "clutch_slip", ETC1, 4, 1, 8, 0.4, 0.0, "pct"),
+    Spn(161, "input_shaft_speed", ETC1, 6, 1, 16, 0.125, 0.0, "rpm"),
+    Spn(526, "gear_ratio", ETC2, 2, 1, 16, 0.001),
+    Spn(523, "gear", ETC2, 4, 1, 8, 1.0, -125.0),
+    Spn(84, "vehicle_speed", CCVS1, 2, 1, 16, 1.0 / 256.0, 0.0, "kmh"),
+    Spn(597, "brake", CCVS1, 4, 5, 2),
+    Spn(598, "clutch", CCVS1, 4, 7, 2),
+    Spn(1121, "ebs_brake", EBC1, 1, 7, 2),
+    Spn(521, "brake_pedal", EBC1, 2, 1, 8, 0.4, 0.0, "pct"),
+    Spn(520, "retarder_torque", ERC1, 2, 1, 8, 1.0, -125.0, "pct"),
+    Spn(917, "distance", VDHR, 1, 1, 32, 5.0, 0.0, "m"),
+    Spn(108, "barometric_pressure", AMB, 1, 1, 8, 0.5, 0.0, "kpa"),
+    Spn(171, "ambient_temperature", AMB, 4, 1, 16, 0.03125, -273.0, "degc"),
+    Spn(928, "axle", VW, 1, 1, 8),
+    Spn(582, "axle_weight", VW, 2, 1, 16, 0.5, 0.0, "kg"),
+    Spn(1760, "combination_weight", CVW, 3, 1, 16, 10.0, 0.0, "kg"),
+    Spn(544, "reference_torque", EC1, 20, 1, 16, 1.0, 0.0, "nm"),
+)
+"""Every parameter read, all of SAE J1939-71."""
+
+_SPN: Final = {s.name: s for s in SPNS}
+
+_PARK: Final = 0xFB
+"""SPN 523: a gearbox in park is told by a code above the range of gears."""
+
+# J1939-21 5.10.2.4: packets of one message come within T1 = 0.75 s (broadcast)
+# or T2 = 1.25 s; a receiver that lags may ask again, so the longer one is taken.
+_PACKET_TIME: Final = 1.25
+
+# Friction changes with engine speed and heat; older than this it says nothing.
+_FRICTION_AGE: Final = 5.0
+
+
+@dataclass(slots=True)
+class J1939Summary:
+    """What was found in J1939 traffic.
+
+    Attributes
+    ----------
+    decoded : frames of the groups that were read, by acronym
+    ignored : frames of all other groups, by parameter group number
+    sources : source address each signal was taken from; -1 where several agree
+    incomplete : multi-packet messages with parts missing
+    extras : what has no canonical name, such as shaft speeds; in SI
+    problems : what a person should know
+    """
+
+    decoded: dict[str, int] = field(default_factory=dict)
+    ignored: dict[int, int] = field(default_factory=dict)
+    sources: dict[str, int] = field(default_factory=dict)
+    incomplete: int = 0
+    extras: dict[str, Signal] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+
+
+class J1939(NamedTuple):
+    """Signals of J1939 traffic and what they were made from."""
+
+    signals: list[Signal]
+    summary: J1939Summary
+
+
+def parameter_group(identifier: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Parameter group number of 29-bit identifiers (J1939-21, 5.2).
+
+    Below PDU format 240 the low byte is a destination and no part of it.
+
+    Parameters
+    ----------
+    identifier : (n,) without flags
+
+    Returns
+    -------
+    (n,) 18 bits
+    """
+    group = (identifier >> 8) & 0x3FFFF
+    addressed = ((identifier >> 16) & 0xFF) < 240
+    return np.asarray(np.where(addressed, group & 0x3FF00, group), dtype=np.uint32)
+
+
+def is_j1939(frames: Frames) -> bool:
+    """Tell whether there is J1939 traffic: two of the groups known, in 8-byte frames.
+
+    One known group alone may be a car's own 29-bit identifier.
+    """
+    groups = np.unique(parameter_group(frames.id[frames.extended & (frames.length == 8)]))
+    return sum(int(g) in NAMES for g in groups) >= 2
+
+
+def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
+    """Decode the parameter groups of `SPNS`.
+
+    Net engine torque is actual (SPN 513) less nominal friction (SPN 514) less
+    parasitic losses (SPN 2978, where told), in parts of the reference torque
+    (SPN 544). The brake counts as pressed where any of the brake switches, the
+    brake pedal or a retarder says so. The clutch counts as pressed while the
+    gearbox shifts or has the driveline open.
+
+    Parameters
+    ----------
+    frames : of all buses; frames with 11-bit identifiers are left alone
+    name : the log, for messages
+
+    Returns
+    -------
+    J1939
+    """
+    frames = frames.select(frames.extended & (frames.length <= 8))
+    summary = J1939Summary()
+    group = parameter_group(frames.id)
+    numbers, counts = np.unique(group, return_counts=True)
+    for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
+        if number in NAMES:
+            summary.decoded[NAMES[number]] = count
+        else:
+            summary.ignored[number] = count
+    parts = {number: frames.select(group == number) for number in numbers.tolist()}
+    empty = Frames.empty()
+    assembled, summary.incomplete = _assemble(
+        parts.get(_TP_CM, empty), parts.get(_TP_DT, empty), EC1
+    )
+    parts[EC1] = assembled
+    if len(assembled):
+        summary.decoded[NAMES[EC1]] = len(assembled)
+    reader = _Reader(parts, summary, name)
+
+    signals = [
+        reader.best(q)
+        for q in (
+            "engine_speed", "vehicle_speed", "gear", "reference_torque", "throttle", "engine_load",
+            "retarder_torque", "barometric_pressure", "ambient_temperature",
+        )
+    ]  # fmt: skip
+    signals += [
+        _net_torque(reader),
+        reader.pressed("brake_switch", ("brake", "ebs_brake", "brake_pedal", "retarder_torque")),
+        reader.pressed("clutch_switch", ("clutch", "driveline_engaged", "shift_in_process")),
+    ]
+    for extra in ("input_shaft_speed", "output_shaft_speed", "clutch_slip", "gear_ratio"):
+        if (found := reader.best(extra)) is not None:
+            summary.extras[extra] = found
+    found_signals = [s for s in signals if s is not None]
+    _check_distance(reader, found_signals)
+    _tell_weights(reader)
+    if summary.incomplete:
+        reader.note(
+            "",
+            f"{summary.incomplete} multi-packet messages with the engine configuration have "
+            "parts missing and were left out",
+        )
+    return J1939(found_signals, summary)
+
+
+class _Reader:
+    """Reads parameters from frames sorted by parameter group."""
+
+    def __init__(self, parts: dict[int, Frames], summary: J1939Summary, name: str) -> None:
+        self.parts = parts
+        self.summary = summary
+        self.name = name
+
+    def note(self, signal: str, text: str, *, serious: bool = False) -> None:
+        self.summary.problems.append(Problem(signal, f"{self.name}: {text}", serious))
+
+    def senders(self, spn: Spn) -> list[tuple[int, Floats, Floats]]:
+        """Address, stamps and values of each that sends valid values, the most first."""
+        part = self.parts.get(spn.pgn)
+        if part is None or not len(part):
+            return []
+        values = _values(part, spn)
+        sender = part.channel.astype(np.int64) << 8 | (part.id & 0xFF).astype(np.int64)
+        found = []
+        for s in np.unique(sender).tolist():
+            which = (sender == s) & np.isfinite(values)
+            if which.any():
+                found.append((s, part.time[which], values[which]))
+        found.sort(key=lambda f: (-f[1].size, f[0]))
+        return [(s & 0xFF, time, value) for s, time, value in found]
+
+    def best(self, name: str) -> Signal | None:
+        """The signal of the sender with the most valid values."""
+        senders = self.senders(_SPN[name])
+        if not senders:
+            return None
+        address, time, values = senders[0]
+        self.summary.sources[name] = address
+        signal, problems = clean_signal(name, time, values, self.name)
+        self.summary.problems += problems
+        return signal
+
+    def pressed(self, name: str, spns: Sequence[str]) -> Signal | None:
+        """One switch of several: pressed where any says so, each holding its last value."""
+        told = []
+        for spn in spns:
+            for _, time, values in self.senders(_SPN[spn]):
+                on = _pressed(spn, values)
+                signal, problems = clean_signal(name, time, on.astype(np.float64), self.name)
+                self.summary.problems += problems
+                if signal is not None:
+                    told.append(signal)
+        if not told:
+            return None
+        self.summary.sources[name] = -1
+        time = np.unique(np.concatenate([s.time for s in told]))
+        held = np.array([np.nan_to_num(s.held(time)) for s in told])
+        return Signal(name, time, held.max(axis=0))
+
+
+def _pressed(spn: str, values: Floats) -> Bools:
+    """Whether a brake or clutch works, by what one parameter says."""
+    match spn:
+        case "driveline_engaged":
+            return np.asarray(values < 0.5)
+        case "retarder_torque":
+            # Its torque is negative while it brakes; the resolution is 1 %.
+            return np.asarray(values < -0.005)
+        case "brake_pedal":
+            # The pedal's rest may read one step.
+            return np.asarray(values > 0.005)
+    return np.asarray(values > 0.5)
+
+
+def _values(part: Frames, spn: Spn) -> Floats:
+    """Values of one parameter in SI; NaN where not available, in error or cut off.
+
+    J1939-71, table 1: codes from 0xFB.. up are no values; a switch of two bits
+    is 2 in error and 3 where not available.
+    """
+    width = (spn.bit - 1 + spn.bits + 7) // 8
+    first = spn.byte - 1
+    raw = np.zeros(len(part), dtype=np.uint64)
+    if part.data.shape[1] < first + width:
+        return np.full(len(part), np.nan)
+    for k in range(width):
+        raw |= part.data[:, first + k].astype(np.uint64) << np.uint64(8 * k)
+    raw = (raw >> np.uint64(spn.bit - 1)) & np.uint64((1 << spn.bits) - 1)
+    top = 1 if spn.bits == 2 else (0xFB << (spn.bits - 8)) - 1
+    good = (raw <= top) & (part.length >= first + width)
+    if spn.name == "reference_torque":
+        good &= raw > 0
+    values = raw.astype(np.float64) * spn.resolution + spn.offset
+    if spn.name == "gear":
+        park = raw == _PARK
+        good |= park & (part.length >= first + width)
+        values = np.where(park, 0.0, values)
+    values = np.where(good, values, np.nan)
+    return to_si(values, spn.unit) if spn.unit else values
+
+
+def _net_torque(reader: _Reader) -> Signal | None:
+    """Net torque fraction: actual less friction and parasitic losses."""
+    actual = reader.best("actual_torque")
+    reader.summary.sources.pop("actual_torque", None)
+    if actual is None:
+        return None
+    address = reader.senders(_SPN["actual_torque"])[0][0]
+    reader.summary.sources["engine_torque_fraction"] = address
+    reader.summary.extras["actual_torque"] = actual
+    friction = reader.best("friction_torque")
+    reader.summary.sources.pop("friction_torque", None)
+    if friction is None:
+        reader.note(
+            "engine_torque_fraction",
+            "no nominal friction torque (EEC3, PGN 65247): the torque is the engine's indicated "
+            "one, friction included; log EEC3 as well",
+            serious=True,
+        )
+        return Signal("engine_torque_fraction", actual.time, actual.values)
+    reader.summary.extras["friction_torque"] = friction
+    lost = np.interp(actual.time, friction.time, friction.values)
+    parasitic = reader.best("parasitic_torque")
+    reader.summary.sources.pop("parasitic_torque", None)
+    if parasitic is not None:
+        # A controller that does not know it sends its lowest code, -125 %.
+        told = np.interp(actual.time, parasitic.time, parasitic.values)
+        lost = lost + np.where(told > 0.0, told, 0.0)
+    near = friction.age(actual.time) <= _FRICTION_AGE
+    if not near.all():
+        reader.note(
+            "engine_torque_fraction",
+            f"{int(np.count_nonzero(~near))} of {near.size} values of engine torque have no "
+            f"friction torque within {_FRICTION_AGE:g} s and were left out",
+        )
+    if not near.any():
+        return None
+    return Signal("engine_torque_fraction", actual.time[near], (actual.values - lost)[near])
+
+
+def _assemble(control: Frames, data: Frames, wanted: int) -> tuple[Frames, int]:
+    """Put messages of the transport protocol together (J1939-21, 5.10).
+
+    Both ways look the same to a listener: an announcement by broadcast (BAM)
+    or to one address (RTS), then packets of seven bytes under a number each.
+
+    Returns
+    -------
+    messages : whole ones of the group ``wanted``; time of the last packet
+    incomplete : number of those with parts missing
+    """
+    empty = Frames.empty()
+    if not len(control):
+        return empty, 0
+    opens = np.isin(control.data[:, 0], (16, 32)) & (control.length == 8)
+    ends = opens | (control.data[:, 0] == 255)
+    number = (
+        control.data[:, 5].astype(np.int64)
+        | control.data[:, 6].astype(np.int64) << 8
+        | control.data[:, 7].astype(np.int64) << 16
+    )
+    # Bus, sender and receiver; an abort may come from either end.
+    pair = _pair(control)
+    back = _pair(control, swapped=True)
+    pair_data = _pair(data)
+    whole: list[tuple[int, float, NDArray[np.uint8]]] = []
+    incomplete = 0
+    for k in np.flatnonzero(opens & (number == wanted)).tolist():
+        size = int(control.data[k, 1]) | int(control.data[k, 2]) << 8
+        packets = int(control.data[k, 3])
+        if packets == 0 or size > 7 * packets:
+            incomplete += 1
+            continue
+        later = np.flatnonzero(
+            ends[k + 1 :] & ((pair[k + 1 :] == pair[k]) | (back[k + 1 :] == pair[k]))
+        )
+        end = float(control.time[k]) + _PACKET_TIME * (packets + 1)
+        if later.size:
+            end = min(end, float(control.time[k + 1 + later[0]]))
+        a, b = np.searchsorted(data.time, [control.time[k], end], side="left")
+        rows = a + np.flatnonzero((pair_data[a:b] == pair[k]) & (data.length[a:b] == 8))
+        sequence = data.data[rows, 0].astype(np.int64)
+        rows, sequence = rows[sequence <= packets], sequence[sequence <= packets]
+        # A packet sent again replaces the one before.
+        places = np.full(packets + 1, -1)
+        places[sequence] = rows
+        if (places[1:] < 0).any():
+            incomplete += 1
+            continue
+        body = data.data[places[1:], 1:8].reshape(-1)[:size]
+        whole.append((k, float(data.time[places[1:].max()]), body))
+    if not whole:
+        return empty, incomplete
+    width = max(body.size for *_, body in whole)
+    picked = np.array([k for k, *_ in whole])
+    joined = np.zeros((len(whole), width), dtype=np.uint8)
+    for row, (*_, body) in zip(joined, whole, strict=True):
+        row[: body.size] = body
+    return (
+        Frames(
+            time=np.array([t for _, t, _ in whole]),
+            channel=control.channel[picked],
+            id=control.id[picked],
+            extended=control.extended[picked],
+            length=np.array([min(body.size, 255) for *_, body in whole], dtype=np.uint8),
+            data=joined,
+        ),
+        incomplete,
+    )
+
+
+def _pair(frames: Frames, *, swapped: bool = False) -> NDArray[np.int64]:
+    """Bus, sender and receiver of addressed frames as one number."""
+    sender = (frames.id & 0xFF).astype(np.int64)
+    receiver = (frames.id >> 8 & 0xFF).astype(np.int64)
+    if swapped:
+        sender, receiver = receiver, sender
+    return frames.channel.astype(np.int64) << 16 | sender << 8 | receiver
+
+
+def _check_distance(reader: _Reader, signals: list[Signal]) -> None:
+    """Compare the odometer with the speed, where the way is long enough to."""
+    speed = next((s for s in signals if s.name == "vehicle_speed"), None)
+    distance = reader.best("distance")
+    reader.summary.sources.pop("distance", None)
+    if distance is None:
+        return
+    reader.summary.extras["distance"] = distance
+    if speed is None or len(speed) < 2 or speed.period > 1.0:
+        return
+    way = float(distance.values[-1] - distance.values[0])
+    step = np.diff(speed.time)
+    middle = 0.5 * (speed.values[1:] + speed.values[:-1])
+    inside = (speed.time[1:] <= distance.time[-1]) & (speed.time[:-1] >= distance.time[0])
+    driven = float(np.sum((middle * step)[inside & (step < 1.0)]))
+    if way < 500.0 or driven <= 0.0 or abs(driven / way - 1.0) < 0.1:
+        return
+    reader.note(
+        "vehicle_speed",
+        f"the speed adds up to {driven:.0f} m and the odometer (VDHR) to {way:.0f} m; "
+        "there are gaps in the log, or one of them is not what it seems",
+    )
+
+
+def _tell_weights(reader: _Reader) -> None:
+    """Tell the weights the vehicle itself reports: a hint, never a known mass."""
+    gross = reader.best("combination_weight")
+    reader.summary.sources.pop("combination_weight", None)
+    if gross is not None:
+        reader.summary.extras["combination_weight"] = gross
+        reader.note(
+            "",
+            f"the vehicle itself reports a gross combination weight of "
+            f"{float(np.median(gross.values)):.0f} kg (CVW)",
+        )
+    part = reader.parts.get(VW)
+    if part is None or not len(part):
+        return
+    weight = _values(part, _SPN["axle_weight"])
+    axle = _values(part, _SPN["axle"])
+    good = np.isfinite(weight) & np.isfinite(axle)
+    if good.any():
+        total = sum(
+            float(np.median(weight[good & (axle == a)])) for a in np.unique(axle[good]).tolist()
+        )
+        reader.note("", f"the vehicle itself reports axle weights of {total:.0f} kg in all (VW)")
