@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 from scipy.stats import t as student
-
 from tests.unit.test_balance import CAR, CLOCK, MASS, STAMPS, accel_at, drive, motion, weighable
+
 from weighbridge import Status, weigh
 from weighbridge.balance import force_balance
 from weighbridge.errors import ConfigError, DriveError
