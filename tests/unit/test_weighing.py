@@ -90,8 +90,14 @@ def test_interval_is_students(good):
 
 
 def test_uncertainty_of_the_calibration_is_in_the_mass(good):
-    shared = weighing(replace(CAR, provenance=Provenance(mass_scale_std=0.02)))
-    assert shared.std == pytest.approx(math.hypot(good.std, 0.02 * shared.mass), rel=1e-6)
+    known = {
+        scale: weighing(replace(CAR, provenance=Provenance(mass_scale_std=scale)))
+        for scale in (0.0, 0.02, 0.06)
+    }
+    exact = known[0.0]
+    assert known[0.02].std == pytest.approx(math.hypot(exact.std, 0.02 * exact.mass), rel=1e-6)
+    # A file that was never calibrated and does not say how sure it is counts as 6 %.
+    assert good.std == pytest.approx(known[0.06].std, rel=1e-6)
 
 
 def test_payload_needs_a_tare(good):
