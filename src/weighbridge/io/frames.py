@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.signals import Floats
+from weighbridge.signals import Floats, Problem
 
 EXTENDED_MASK = 0x1FFFFFFF
 """The 29 bits of an extended identifier."""
@@ -78,23 +79,104 @@ class Frames:
         )
 
 
-def join_frames(parts: Sequence[Frames]) -> Frames:
-    """Frames of several logs or buses as one, in the order of time."""
+def in_order(parts: Sequence[Frames]) -> Frames:
+    """Frames one part after another, as they were written."""
     parts = [p for p in parts if len(p)]
     if not parts:
         return Frames.empty()
     if len(parts) == 1:
-        joined = parts[0]
-    else:
-        width = max(p.data.shape[1] for p in parts)
-        joined = Frames(
-            np.concatenate([p.time for p in parts]),
-            np.concatenate([p.channel for p in parts]),
-            np.concatenate([p.id for p in parts]),
-            np.concatenate([p.extended for p in parts]),
-            np.concatenate([p.length for p in parts]),
-            np.concatenate([np.pad(p.data, ((0, 0), (0, width - p.data.shape[1]))) for p in parts]),
-        )
+        return parts[0]
+    data = np.zeros((sum(map(len, parts)), max(p.data.shape[1] for p in parts)), np.uint8)
+    at = 0
+    for p in parts:
+        data[at : at + len(p), : p.data.shape[1]] = p.data
+        at += len(p)
+    return Frames(
+        np.concatenate([p.time for p in parts]),
+        np.concatenate([p.channel for p in parts]),
+        np.concatenate([p.id for p in parts]),
+        np.concatenate([p.extended for p in parts]),
+        np.concatenate([p.length for p in parts]),
+        data,
+    )
+
+
+def join_frames(parts: Sequence[Frames]) -> Frames:
+    """Frames of several logs or buses as one, in the order of time."""
+    joined = in_order(parts)
     if np.all(joined.time[1:] >= joined.time[:-1]):
         return joined
     return joined.select(np.argsort(joined.time, kind="stable"))
+
+
+# What lies further behind is no frame that waited in a queue, but a clock set back [s].
+_QUEUE: Final = 1.0
+# No logger is silent that long and goes on in the same file [s].
+_SILENCE: Final = 86400.0
+# Counters of 32 bits, in microseconds, tens of them, and milliseconds [s].
+_WRAPS: Final = tuple(2.0**32 * tick for tick in (1e-6, 1e-5, 1e-3))
+
+
+def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
+    """Bring frames into the order of time; mend a counter that wrapped, tell a clock that was set.
+
+    Parameters
+    ----------
+    frames : as they were written
+    source : the file, for the problems' text
+
+    Returns
+    -------
+    frames : in the order of time; where the clock was set, the longest part between
+    problems : what was mended or left out
+    """
+    problems = []
+    time = frames.time
+    finite = np.isfinite(time)
+    if not finite.all():
+        frames = frames.select(finite)
+        problems.append(
+            Problem("", f"{source}: {int((~finite).sum())} frames without a time were left out")
+        )
+        time = frames.time
+    if len(frames) < 2:
+        return frames, problems
+    step = np.diff(time)
+    breaks = np.flatnonzero((step < -_QUEUE) | (step > _SILENCE))
+    if breaks.size and breaks.size < 10_000:
+        shift = np.zeros(time.size)
+        cuts = []
+        for k in breaks:
+            wrap = next((w for w in _WRAPS if abs(step[k] + w) < 0.01 * w), None)
+            if wrap is not None:
+                shift[k + 1 :] += wrap
+                problems.append(
+                    Problem("", f"{source}: the clock wraps around at {time[k]:.6g} s; mended")
+                )
+            else:
+                cuts.append(int(k) + 1)
+        time = time + shift
+        frames = replace(frames, time=time)
+        if cuts:
+            edges = [0, *cuts, time.size]
+            lengths = np.diff(edges)
+            best = int(np.argmax(lengths))
+            kept = slice(edges[best], edges[best + 1])
+            problems.append(
+                Problem(
+                    "",
+                    f"{source}: the clock jumps {len(cuts)} times (by "
+                    f"{step[cuts[0] - 1]:.6g} s at {time[cuts[0] - 1]:.6g} s); "
+                    f"{time.size - int(lengths[best])} of {time.size} frames outside the longest "
+                    "part were left out; split the log there to read the others",
+                )
+            )
+            frames = frames.select(kept)
+            time = frames.time
+    elif breaks.size:
+        problems.append(
+            Problem("", f"{source}: the time stamps are in no order; frames were sorted by them")
+        )
+    if np.all(time[1:] >= time[:-1]):
+        return frames, problems
+    return frames.select(np.argsort(time, kind="stable")), problems

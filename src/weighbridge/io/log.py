@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from weighbridge.io.frames import Frames
 from weighbridge.io.mapping import TableMapping
 from weighbridge.signals import Problem, Signal
 
@@ -20,12 +21,17 @@ class Log:
     signals : cleaned
     problems : what was left out
     absolute : whether the clock counts from 1970
+    start : where the clock begins [s since 1970], if it does not count from there
+        and the file tells; None otherwise
+    frames : raw bus traffic, decoded once all files of a drive are read
     """
 
     path: Path
     signals: list[Signal] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     absolute: bool = False
+    start: float | None = None
+    frames: Frames | None = None
 
 
 Reader = Callable[[Path, "str | None", "TableMapping | None"], Log]

@@ -1,0 +1,343 @@
+"""OBD-II: the answers to requests for current data, out of raw CAN traffic.
+
+Answers of service 01 (SAE J1979) come from 0x7E8 to 0x7EF, or from 18DAF1xx with
+29 bits (ISO 15765-4), in ISO-TP messages that may hold several parameters.
+Requests are not needed: an answer says what it answers, and when.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.io.frames import Frames
+from weighbridge.io.isotp import Messages, assemble
+from weighbridge.signals import Bools, Floats, Problem, Signal
+from weighbridge.signals.cleaning import clean_signal
+from weighbridge.signals.units import to_si
+
+SOURCE: Final = "SAE J1979"
+"""Where the facts of `PIDS` and `LENGTHS` are laid down."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pid:
+    """One value in the answer to a parameter: ``value = scale * raw + offset`` in ``unit``.
+
+    Attributes
+    ----------
+    number : parameter identifier (PID) of service 01
+    name : canonical quantity
+    first, count : which bytes of the value hold it, counted from 0; big-endian
+    scale, offset : of the scaling
+    unit : suffix as in `weighbridge.signals.units`; empty for counts
+    shift : bits to drop at the low end
+    needs : bits of the value's first byte that say it is supported; 0 if none do
+    """
+
+    number: int
+    name: str
+    first: int
+    count: int
+    scale: float
+    offset: float
+    unit: str
+    shift: int = 0
+    needs: int = 0
+
+
+_PCT: Final = 100.0 / 255.0
+
+PIDS: Final[tuple[Pid, ...]] = (
+    Pid(0x04, "engine_load", 0, 1, _PCT, 0.0, "pct"),
+    Pid(0x05, "coolant_temperature", 0, 1, 1.0, -40.0, "degc"),
+    Pid(0x0B, "intake_pressure", 0, 1, 1.0, 0.0, "kpa"),
+    Pid(0x0C, "engine_speed", 0, 2, 0.25, 0.0, "rpm"),
+    Pid(0x0D, "vehicle_speed", 0, 1, 1.0, 0.0, "kmh"),
+    Pid(0x0F, "intake_temperature", 0, 1, 1.0, -40.0, "degc"),
+    Pid(0x10, "mass_air_flow", 0, 2, 0.01, 0.0, "gps"),
+    Pid(0x11, "throttle", 0, 1, _PCT, 0.0, "pct"),
+    Pid(0x1F, "run_time", 0, 2, 1.0, 0.0, "s"),
+    Pid(0x2F, "fuel_level", 0, 1, _PCT, 0.0, "pct"),
+    Pid(0x33, "barometric_pressure", 0, 1, 1.0, 0.0, "kpa"),
+    Pid(0x34, "lambda_1", 0, 2, 2.0 / 65536.0, 0.0, ""),
+    Pid(0x42, "module_voltage", 0, 2, 0.001, 0.0, "v"),
+    Pid(0x43, "absolute_load", 0, 2, _PCT, 0.0, "pct"),
+    Pid(0x44, "commanded_lambda", 0, 2, 2.0 / 65536.0, 0.0, ""),
+    Pid(0x45, "relative_throttle", 0, 1, _PCT, 0.0, "pct"),
+    Pid(0x46, "ambient_temperature", 0, 1, 1.0, -40.0, "degc"),
+    Pid(0x47, "throttle_b", 0, 1, _PCT, 0.0, "pct"),
+    Pid(0x49, "accelerator_pedal", 0, 1, _PCT, 0.0, "pct"),
+    Pid(0x4C, "commanded_throttle", 0, 1, _PCT, 0.0, "pct"),
+    Pid(0x5A, "relative_pedal", 0, 1, _PCT, 0.0, "pct"),
+    Pid(0x5C, "oil_temperature", 0, 1, 1.0, -40.0, "degc"),
+    Pid(0x5E, "fuel_rate", 0, 2, 0.05, 0.0, "lph"),
+    Pid(0x61, "demanded_torque", 0, 1, 1.0, -125.0, "pct"),
+    Pid(0x62, "engine_torque_fraction", 0, 1, 1.0, -125.0, "pct"),
+    Pid(0x63, "reference_torque", 0, 2, 1.0, 0.0, "nm"),
+    *(Pid(0x64, f"torque_point_{k}", k, 1, 1.0, -125.0, "pct") for k in range(5)),
+    Pid(0xA4, "gear", 1, 1, 1.0, 0.0, "", shift=4, needs=0x01),
+    Pid(0xA4, "gear_ratio", 2, 2, 0.001, 0.0, "", needs=0x02),
+    Pid(0xA6, "odometer", 0, 4, 0.1, 0.0, "km"),
+)
+"""The parameters that are decoded; facts of SAE J1979."""
+
+# How many bytes of value follow each parameter's number in an answer (SAE J1979). An answer
+# of several parameters can only be read on where the length of each is known.
+_LENGTHS: Final[dict[int, str]] = {
+    1: "04-0B 0D-0F 11-13 1C-1E 2C-30 33 45-4C 51-52 5A-5C 5F 61 62 7D 7E 84 8D 8E A9",
+    2: "02 03 0C 10 14-1B 1F 21-23 31 32 3C-3F 42-44 4D 4E 53-59 5D 5E 63 65 92 9E A2",
+    3: "67 6F 90 93",
+    4: "00 01 20 24-2B 34-3B 40 4F 50 60 80 9B 9D A0 A4-A8 C0",
+    5: "64 66 6A-6C 72-74 77 86 87 91",
+    6: "71 9A",
+    7: "68 69 75 76 7A 7B 8B 8F",
+    9: "6E 78 79 7C 83 98 99 9F A1 A3",
+    10: "70 85",
+    11: "6D",
+    12: "94",
+    13: "7F 88",
+    17: "8C 9C",
+    41: "81 82 89 8A",
+}
+
+
+def _spread(text: str) -> range:
+    low, _, high = text.partition("-")
+    return range(int(low, 16), int(high or low, 16) + 1)
+
+
+LENGTHS: Final[dict[int, int]] = {
+    pid: size for size, text in _LENGTHS.items() for part in text.split() for pid in _spread(part)
+}
+"""Bytes of value by parameter identifier."""
+
+_CURRENT_DATA: Final = 0x41
+_VEHICLE_INFORMATION: Final = 0x49
+_VIN: Final = 0x02
+_REFUSED: Final = 0x7F
+# An answer with speed, engine speed and four more is 25 bytes long; the longest value has 41.
+_MOST_PARAMETERS: Final = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Obd:
+    """What OBD-II traffic said.
+
+    Attributes
+    ----------
+    signals : cleaned
+    problems : what was left out
+    contents : what was found, for people
+    used : (n,) bool, frames that belong to OBD-II traffic
+    """
+
+    signals: list[Signal]
+    problems: list[Problem]
+    contents: list[str]
+    used: Bools
+
+
+@dataclass(slots=True)
+class _Sender:
+    """What one control unit answered."""
+
+    name: str
+    values: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
+    counts: dict[int, int] = field(default_factory=dict)
+    other: int = 0
+    cut: int = 0
+    refused: int = 0
+    vins: set[bytes] = field(default_factory=set)
+
+
+def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
+    """Decode the answers of service 01 in raw traffic.
+
+    Where several control units answer the same parameter, the one that
+    answers it most often is taken, and of equals the engine's (the lowest).
+
+    Parameters
+    ----------
+    frames : all traffic, in the order of time
+    name : of the log, for the problems' text
+
+    Returns
+    -------
+    Obd
+        Empty where there is no OBD-II traffic. Vehicle identification numbers
+        are counted, not kept.
+    """
+    standard = ~frames.extended & (frames.id >= 0x7E8) & (frames.id <= 0x7EF)
+    physical = frames.extended & ((frames.id & 0x1FFFFF00) == 0x18DAF100)
+    answers = standard | physical
+    found = Obd([], [], [], np.zeros(len(frames), dtype=bool))
+    if not answers.any():
+        return found
+    senders = []
+    for channel, identifier, extended in frames.select(answers).counts():
+        which = (
+            answers
+            & (frames.channel == channel)
+            & (frames.id == identifier)
+            & (frames.extended == extended)
+        )
+        messages = assemble(frames.select(which))
+        sender = _Sender(f"CAN {channel} {identifier:X}")
+        _read_messages(messages, sender)
+        if messages.broken:
+            found.problems.append(
+                Problem(
+                    "",
+                    f"{name}: {messages.broken} answers of {sender.name} lack frames and were "
+                    "left out",
+                )
+            )
+        if sender.counts or sender.refused or sender.other:
+            senders.append(sender)
+            found.used[which] = True
+    if not any(s.counts for s in senders):
+        found.used[:] = False
+        return found
+    found.used[_requests(frames)] = True
+    _tell(senders, name, found)
+    _choose(senders, name, found)
+    return found
+
+
+def _requests(frames: Frames) -> Bools:
+    """Mark requests and flow control to the control units."""
+    standard = ~frames.extended & (
+        (frames.id == 0x7DF) | ((frames.id >= 0x7E0) & (frames.id <= 0x7E7))
+    )
+    extended = frames.extended & (
+        (frames.id == 0x18DB33F1) | ((frames.id & 0x1FFF00FF) == 0x18DA00F1)
+    )
+    return np.asarray(standard | extended)
+
+
+def _read_messages(messages: Messages, sender: _Sender) -> None:
+    """Take the values out of all messages of one control unit."""
+    if messages.length.size == 0:
+        return
+    data, length = messages.data, messages.length
+    service = data[:, 0]
+    sender.refused = int(np.count_nonzero(service == _REFUSED))
+    vin = (service == _VEHICLE_INFORMATION) & (data[:, 1 % data.shape[1]] == _VIN)
+    sender.vins = {row.tobytes() for row in np.unique(data[vin][:, 2:], axis=0)}
+    current = service == _CURRENT_DATA
+    sender.other = int(np.count_nonzero(~current & (service != _REFUSED)))
+    data, length, time = data[current], length[current], messages.time[current]
+    table = np.zeros(256, np.int64)
+    table[list(LENGTHS)] = list(LENGTHS.values())
+    parts: dict[int, list[tuple[Floats, NDArray[np.uint8]]]] = {}
+    at = np.ones(length.size, np.int64)
+    rows = np.flatnonzero(at < length)
+    for _ in range(_MOST_PARAMETERS):
+        if rows.size == 0:
+            break
+        pid = data[rows, at[rows]]
+        size = table[pid]
+        whole = (size > 0) & (at[rows] + 1 + size <= length[rows])
+        sender.cut += int(np.count_nonzero(~whole))
+        rows, pid, size = rows[whole], pid[whole], size[whole]
+        for number in np.unique(pid):
+            these = rows[pid == number]
+            columns = at[these, None] + 1 + np.arange(table[number])
+            parts.setdefault(int(number), []).append((time[these], data[these[:, None], columns]))
+        at[rows] += 1 + size
+        rows = rows[at[rows] < length[rows]]
+    for number, pieces in parts.items():
+        sender.counts[number] = sum(t.size for t, _ in pieces)
+    for p in PIDS:
+        if p.number in parts:
+            times = np.concatenate([t for t, _ in parts[p.number]])
+            values = np.concatenate([_value(p, raw) for _, raw in parts[p.number]])
+            order = np.argsort(times, kind="stable")
+            known = np.isfinite(values[order])
+            if known.any():
+                sender.values[p.name] = (times[order][known], values[order][known])
+
+
+def _value(pid: Pid, raw: NDArray[np.uint8]) -> Floats:
+    """Physical values [SI] of one parameter's bytes; NaN where not supported."""
+    number = np.zeros(len(raw), np.int64)
+    for k in range(pid.first, pid.first + pid.count):
+        number = (number << 8) | raw[:, k]
+    values = np.asarray((number >> pid.shift) * pid.scale + pid.offset, dtype=np.float64)
+    values = to_si(values, pid.unit) if pid.unit else values
+    return np.where(raw[:, 0] & pid.needs == pid.needs, values, np.nan)
+
+
+def _tell(senders: list[_Sender], name: str, found: Obd) -> None:
+    """Say what each control unit answered, and what was not read."""
+    wanted = {p.number for p in PIDS}
+    for s in senders:
+        known = ", ".join(f"{n:02X} ({c})" for n, c in sorted(s.counts.items()) if n in wanted)
+        skipped = ", ".join(
+            f"{n:02X} ({c})" for n, c in sorted(s.counts.items()) if n not in wanted
+        )
+        parts = [f"PIDs {known}"] if known else []
+        if skipped:
+            parts.append(f"not used: PIDs {skipped}")
+        if s.other:
+            parts.append(f"{s.other} answers of other services, not used")
+        if s.refused:
+            parts.append(f"{s.refused} requests it declined")
+        found.contents.append(f"{s.name}, OBD-II answers: {'; '.join(parts)}")
+        if s.cut:
+            found.problems.append(
+                Problem(
+                    "",
+                    f"{name}: {s.cut} answers of {s.name} are cut off or hold a parameter of "
+                    "unknown length; what stood before it was read",
+                )
+            )
+    vins = set().union(*(s.vins for s in senders))
+    if len(vins) > 1:
+        found.problems.append(
+            Problem(
+                "",
+                f"{name}: the answers name {len(vins)} vehicles; split the log where the "
+                "vehicle changes",
+                serious=True,
+            )
+        )
+
+
+# Speeds of one vehicle agree far better than this [SI]; clocks and polling are in it.
+_APART: Final = {"vehicle_speed": 4.0, "engine_speed": 60.0}
+
+
+def _choose(senders: list[_Sender], name: str, found: Obd) -> None:
+    """Take every quantity from the control unit that gives it most often."""
+    names = dict.fromkeys(q for s in senders for q in s.values)
+    for quantity in names:
+        giving = [s for s in senders if quantity in s.values]
+        best = max(giving, key=lambda s: s.values[quantity][0].size)
+        signal, problems = clean_signal(quantity, *best.values[quantity], name)
+        found.problems.extend(problems)
+        if signal is None:
+            continue
+        found.signals.append(signal)
+        for other in giving:
+            if other is best:
+                continue
+            time, values = other.values[quantity]
+            doubt = False
+            if quantity in _APART:
+                gap = np.abs(signal.at(time) - values)[signal.age(time) < 2.0]
+                doubt = gap.size >= 10 and float(np.median(gap)) > _APART[quantity]
+            text = (
+                f"{name}: {quantity} of {other.name} ({time.size} answers) was left out for that "
+                f"of {best.name} ({len(signal)})"
+            )
+            if doubt:
+                text = (
+                    f"{name}: {best.name} and {other.name} say different {quantity}, as two "
+                    "vehicles would; keep the frames of one vehicle"
+                )
+            found.problems.append(Problem(quantity, text, serious=doubt))
