@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io import mdf, tabular
+from weighbridge.io import gpx, mdf, nmea, tabular, vbo
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
 from weighbridge.io.log import Log, Reader
@@ -34,8 +34,15 @@ READERS: Final[dict[str, Reader]] = {
     ".pq": tabular.read_pq,
     ".mf4": mdf.read_mdf,
     ".mdf": mdf.read_mdf,
+    ".nmea": nmea.read_nmea,
+    ".ubx": nmea.read_nmea,
+    ".gpx": gpx.read_gpx,
+    ".vbo": vbo.read_vbo,
 }
 """Every log format, by file suffix."""
+
+SELF_DESCRIBED: Final = frozenset({".nmea", ".ubx", ".gpx", ".vbo"})
+"""Formats that name their quantities and units themselves: a mapping need not know them."""
 
 TRUTH_NAME: Final = "truth"
 """Table of a simulated drive's truth: never read as a signal."""
@@ -119,7 +126,11 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> Drive:
                 )
             tables[table] = f
     if tables and not mappings:
-        return _drive(name, [_read_file(f, t, ()) for t, f in tables.items()], info)
+        others = [
+            f for f in files if f.suffix.lower() in SELF_DESCRIBED and f not in tables.values()
+        ]
+        known = [*((f, t) for t, f in tables.items()), *((f, None) for f in others)]
+        return _drive(name, [_read_file(f, t, ()) for f, t in known], info)
     if not files:
         raise DriveError(
             f"{folder} holds no drive: it needs at least one of "
@@ -128,7 +139,8 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> Drive:
         )
     logs = []
     for f in files:
-        if mappings and f.stem.lower() not in TABLES and mapping_for(f, mappings) is None:
+        named = f.stem.lower() in TABLES or f.suffix.lower() in SELF_DESCRIBED
+        if mappings and not named and mapping_for(f, mappings) is None:
             continue
         logs.append(_read_file(f, None, mappings))
     return _drive(name, logs, info)
@@ -148,7 +160,7 @@ def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]
     if table is None and path.stem.lower() in TABLES:
         table = path.stem.lower()
     mapping = mapping_for(path, mappings)
-    if mappings and mapping is None and table is None:
+    if mappings and mapping is None and table is None and path.suffix.lower() not in SELF_DESCRIBED:
         raise DriveError(
             f"{path}: no [tables] section of {mappings[0].source} has a pattern "
             "in files that fits its name"

@@ -316,7 +316,7 @@ def time_seconds(
             part[c].str.replace(",", ".", literal=True).cast(pl.Float64, strict=False).to_numpy()
             for c in part.columns
         )
-        seconds, absolute = _unwrapped(3600.0 * hour + 60.0 * minute + second), False
+        seconds, absolute = unwrapped(3600.0 * hour + 60.0 * minute + second), False
     else:
         parsed = _parse_datetime(text, time_format)
         seconds, absolute = _temporal(parsed)
@@ -344,14 +344,14 @@ def _parse_datetime(text: pl.Series, time_format: str) -> pl.Series:
 
 def _temporal(series: pl.Series) -> tuple[Floats, bool]:
     if series.dtype == pl.Time:
-        return _unwrapped(series.cast(pl.Int64).cast(pl.Float64).to_numpy() * 1e-9), False
+        return unwrapped(series.cast(pl.Int64).cast(pl.Float64).to_numpy() * 1e-9), False
     if isinstance(series.dtype, pl.Duration):
         return np.array(series.dt.total_microseconds().cast(pl.Float64).to_numpy()) * 1e-6, False
     us = series.cast(pl.Datetime("us")).cast(pl.Int64).cast(pl.Float64)
     return np.array(us.to_numpy()) * 1e-6, True
 
 
-def _unwrapped(seconds: Floats) -> Floats:
+def unwrapped(seconds: Floats) -> Floats:
     """Carry a time of day over midnight."""
     day = 86_400.0
     finite = np.isfinite(seconds)

@@ -1,0 +1,239 @@
+"""NMEA 0183: position, speed and course as receivers send them, u-blox among them.
+
+Sentences RMC, GGA, GNS, GST and VTG are read, of any talker; between them any
+other bytes may stand, as in a mixed u-blox recording.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.io.log import Log
+from weighbridge.io.mapping import TableMapping
+from weighbridge.io.table import unwrapped
+from weighbridge.signals import Floats, Problem
+from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.units import to_si
+
+# Longest sentence of the standard is 82 characters; receivers send longer ones of their own.
+_SENTENCE: Final = re.compile(rb"\$[A-Z]{2}(?:RMC|GGA|GNS|GST|VTG)[ -#%-~]{0,180}")
+_OTHER: Final = re.compile(rb"\$[A-Z]{5,6},")
+_DAY: Final = 86_400.0
+
+# Quality 0 is no fix, 6 dead reckoning, 7 put in by hand, 8 simulated (NMEA 0183, GGA).
+_NO_FIX: Final = frozenset((0, 6, 7, 8))
+
+
+# Fields up to the last one read: without a checksum a sentence that was cut off shows only here.
+_FIELDS: Final = {"RMC": 9, "GGA": 9, "GNS": 9, "GST": 7, "VTG": 7}
+
+
+class _Rows:
+    """Values of one kind of sentence, each with the stamp of its epoch."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self.names = names
+        self.stamps: list[int] = []
+        self.values: list[tuple[float, ...]] = []
+
+
+def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read a file of NMEA 0183 sentences; see `weighbridge.io.log.Reader`.
+
+    A mapping gives the offset of the clock only: names and units are the
+    standard's.
+
+    Raises
+    ------
+    DriveError
+        No position in it.
+    MissingExtraError
+        pynmea2 is not installed.
+    """
+    try:
+        import pynmea2
+    except ImportError:
+        raise MissingExtraError("pynmea2", "position", f"reading {path.name}") from None
+    data = path.read_bytes()
+    log = Log(path)
+    position = _Rows(("latitude", "longitude", "altitude", "hdop"))
+    minimum = _Rows(("latitude", "longitude"))
+    motion = _Rows(("gnss_speed", "gnss_course"))
+    velocity = _Rows(("gnss_speed", "gnss_course"))
+    accuracy = _Rows(("gnss_accuracy",))
+    clocks: list[float] = []
+    days: list[float] = []
+    lost: Counter[str] = Counter()
+    for found in _SENTENCE.finditer(data):
+        text = found.group().decode("ascii").rstrip()
+        try:
+            message = pynmea2.parse(text)
+            kind = message.sentence_type
+            if len(message.data) < _FIELDS[kind]:
+                lost["damaged"] += 1
+                continue
+            clock = None if kind == "VTG" else _clock(message)
+            day = _day(message) if kind == "RMC" else math.nan
+            if kind == "VTG":
+                # It has no time of its own and follows the sentences of its epoch.
+                row = (_number(message.spd_over_grnd_kmph), _number(message.true_track))
+                if clocks:
+                    velocity.stamps.append(len(clocks) - 1)
+                    velocity.values.append(row)
+                continue
+            if clock is None or not _fixed(message, kind):
+                lost["without a fix"] += 1
+                continue
+            if kind == "RMC":
+                places = (_coordinate(message, "lat", 90.0), _coordinate(message, "lon", 180.0))
+                moving = (_number(message.spd_over_grnd), _number(message.true_course))
+            elif kind in ("GGA", "GNS"):
+                dilution = message.horizontal_dil if kind == "GGA" else message.hdop
+                full = (
+                    _coordinate(message, "lat", 90.0),
+                    _coordinate(message, "lon", 180.0),
+                    _number(message.altitude),
+                    _number(dilution),
+                )
+            else:
+                spread = math.hypot(
+                    _number(message.std_dev_latitude), _number(message.std_dev_longitude)
+                )
+        except pynmea2.ChecksumError:
+            lost["with a wrong checksum"] += 1
+            continue
+        # The parser leaves damage in a field to whoever asks for it, with errors of many kinds.
+        except Exception:
+            lost["damaged"] += 1
+            continue
+        stamp = len(clocks)
+        clocks.append(clock)
+        days.append(day)
+        if kind == "RMC":
+            minimum.stamps.append(stamp)
+            minimum.values.append(places)
+            motion.stamps.append(stamp)
+            motion.values.append(moving)
+        elif kind == "GST":
+            accuracy.stamps.append(stamp)
+            accuracy.values.append((spread,))
+        else:
+            position.stamps.append(stamp)
+            position.values.append(full)
+        if b"*" not in found.group()[-5:]:
+            lost["taken without a checksum"] += 1
+    if not clocks:
+        raise DriveError(_nothing(path, data, lost))
+    time, log.absolute = _time(np.array(clocks), np.array(days))
+    if mapping:
+        time = time + mapping.time.offset
+    for reason, count in lost.items():
+        log.problems.append(Problem("", f"{path.name}: {count} NMEA sentences {reason}"))
+    known = position if position.stamps else minimum
+    speeds, unit = (motion, "kn") if motion.stamps else (velocity, "kmh")
+    for rows, units in (
+        (known, ("deg", "deg", "m", "")),
+        (speeds, (unit, "deg")),
+        (accuracy, ("m",)),
+    ):
+        _add(log, rows, units, time)
+    if not log.signals:
+        raise DriveError(_nothing(path, data, lost))
+    return log
+
+
+def _add(log: Log, rows: _Rows, units: tuple[str, ...], time: Floats) -> None:
+    if not rows.stamps:
+        return
+    table = np.array(rows.values, dtype=np.float64)
+    columns = [
+        (name, to_si(table[:, k], unit) if unit else table[:, k])
+        for k, (name, unit) in enumerate(zip(rows.names, units, strict=False))
+        if np.isfinite(table[:, k]).any()
+    ]
+    signals, problems = clean_columns(time[np.array(rows.stamps)], columns, log.path.name)
+    log.signals += signals
+    log.problems += problems
+
+
+def _clock(message: Any) -> float | None:
+    """Time of day [s]; None where the receiver does not know it."""
+    stamp = message.timestamp
+    if not isinstance(stamp, dt.time):
+        return None
+    return 3600.0 * stamp.hour + 60.0 * stamp.minute + stamp.second + 1e-6 * stamp.microsecond
+
+
+def _day(message: Any) -> float:
+    """Date as seconds from 1970; NaN where there is none."""
+    date = message.datestamp
+    if not isinstance(date, dt.date):
+        return math.nan
+    return (date - dt.date(1970, 1, 1)).days * _DAY
+
+
+def _fixed(message: Any, kind: str) -> bool:
+    if kind == "RMC":
+        return bool(message.status == "A")
+    if kind == "GGA":
+        return int(message.gps_qual) not in _NO_FIX
+    if kind == "GNS":
+        return any(c not in "NESM" for c in message.mode_indicator)
+    return True
+
+
+def _coordinate(message: Any, name: str, limit: float) -> float:
+    """Latitude or longitude [deg], north and east positive; NaN where it cannot be."""
+    if not getattr(message, name) or not getattr(message, f"{name}_dir"):
+        return math.nan
+    value = float(message.latitude if name == "lat" else message.longitude)
+    return value if abs(value) <= limit else math.nan
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None or value == "" else float(value)
+
+
+def _time(clock: Floats, day: Floats) -> tuple[Floats, bool]:
+    """Put times of day on one clock, over midnight and with the dates there are.
+
+    A receiver with a wrong date for a while has it outvoted: the date of most
+    sentences counts.
+    """
+    running = unwrapped(clock)
+    dated = np.isfinite(day)
+    if not dated.any():
+        return running, False
+    starts = day[dated] - (running - clock)[dated]
+    values, counts = np.unique(starts, return_counts=True)
+    if counts.max() > 0.5 * starts.size:
+        return running + float(values[np.argmax(counts)]), True
+    # Recordings of several days in one file: each sentence takes the date last told.
+    last = np.maximum.accumulate(np.where(dated, np.arange(day.size), 0))
+    last[: int(np.argmax(dated))] = int(np.argmax(dated))
+    told = day[last] + clock[last]
+    time = day[last] + clock
+    return time + _DAY * np.round((told - time) / _DAY), True
+
+
+def _nothing(path: Path, data: bytes, lost: Counter[str]) -> str:
+    if lost:
+        why = ", ".join(f"{count} {reason}" for reason, count in lost.items())
+        return f"{path} has no usable NMEA sentence ({why}); record it again with a fix"
+    if _OTHER.search(data):
+        return (
+            f"{path} has NMEA sentences, but none of RMC, GGA, GNS, GST, VTG; "
+            "turn RMC and GGA on at the receiver"
+        )
+    return (
+        f"{path} holds no NMEA sentence such as $GPRMC; u-blox receivers send them once "
+        "NMEA output is turned on"
+    )

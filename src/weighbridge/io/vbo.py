@@ -1,0 +1,191 @@
+"""VBOX ``.vbo``: Racelogic's text log of GNSS at up to 100 Hz.
+
+Facts of the format from Racelogic, *VBO File Format* (support pages): the
+titles under ``[header]`` carry the units, ``[column names]`` the columns;
+latitude and longitude in minutes, north and **west** positive; time of day in
+UTC as HHMMSS.ss; the number of satellites is raised by 64 while the brake
+trigger is on and by 128 with differential correction.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import polars as pl
+
+from weighbridge.errors import DriveError
+from weighbridge.io.log import Log
+from weighbridge.io.mapping import TableMapping
+from weighbridge.io.table import column_list, unwrapped
+from weighbridge.signals import Floats, Problem
+from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.units import to_si
+
+_CREATED: Final = re.compile(
+    r"created on (\d{1,2})/(\d{1,2})/(\d{4})(?:\s*(?:@|at)\s*(\d{1,2}):(\d{2}))?", re.IGNORECASE
+)
+_SPEED_UNITS: Final = {
+    "kmh": "kmh", "km/h": "kmh", "kph": "kmh", "knots": "kn", "kts": "kn", "mph": "mph",
+    "m/s": "mps", "ms": "mps",
+}  # fmt: skip
+_DAY: Final = 86_400.0
+_BRAKE: Final = 64
+
+# Fewer satellites than these give no position (Racelogic counts four for one with height).
+_SATELLITES: Final = 3
+
+
+def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read a VBOX log; see `weighbridge.io.log.Reader`.
+
+    The accelerations in it are differences of its speed and say nothing of
+    the road's slope, so they are not taken for specific force.
+
+    Raises
+    ------
+    DriveError
+        Not a VBOX log, or one without rows.
+    """
+    text = _text(path)
+    head, sections = _sections(text)
+    names = [n.lower() for n in " ".join(sections.get("column names", [])).split()]
+    if not names or "data" not in sections:
+        raise DriveError(
+            f"{path} is no VBOX log: it has no [column names] and [data]; export it as .vbo again"
+        )
+    log = Log(path)
+    cells = _cells(log, sections["data"], len(names))
+    places = {name: k for k, name in reversed(list(enumerate(names)))}
+    if "time" not in places:
+        raise DriveError(f"{path} has no column 'time'; it has {column_list(names)}")
+    clock = cells[:, places["time"]]
+    seconds = np.floor(clock / 1e4) * 3600.0 + np.floor(clock / 1e2) % 100.0 * 60.0 + clock % 1e2
+    seconds[~((clock >= 0.0) & (clock < 240000.0))] = np.nan
+    time, log.absolute = _dated(unwrapped(seconds), head)
+    if mapping:
+        time = time + mapping.time.offset
+
+    used = {"time", "sats"}
+    columns: list[tuple[str, Floats]] = []
+    fixed = np.ones(clock.size, dtype=bool)
+    if "sats" in places:
+        sats = np.nan_to_num(cells[:, places["sats"]]).astype(np.int64)
+        fixed = (sats % _BRAKE) >= _SATELLITES
+        if not fixed.all():
+            log.problems.append(
+                Problem(
+                    "",
+                    f"{path.name}: {int(np.count_nonzero(~fixed))} of {fixed.size} rows have "
+                    f"fewer than {_SATELLITES} satellites; their positions were left out",
+                )
+            )
+        # Without a wire to the brake the flag is never set, and says nothing.
+        brake = (sats // _BRAKE) % 2
+        if brake.any():
+            columns.append(("brake_switch", brake.astype(np.float64)))
+
+    def take(column: str, name: str, unit: str, factor: float = 1.0) -> None:
+        if column in places:
+            used.add(column)
+            values = np.where(fixed, factor * cells[:, places[column]], np.nan)
+            columns.append((name, to_si(values, unit)))
+
+    take("lat", "latitude", "deg", 1.0 / 60.0)
+    take("long", "longitude", "deg", -1.0 / 60.0)
+    take("height", "altitude", "m")
+    take("heading", "gnss_course", "deg")
+    take("velocity", "gnss_speed", _speed_unit(log, sections.get("header", []), names))
+    if ignored := [n for n in names if n not in used]:
+        log.problems.append(Problem("", f"{path.name}: ignored columns {column_list(ignored)}"))
+    log.signals, problems = clean_columns(time, columns, path.name)
+    log.problems += problems
+    return log
+
+
+def _text(path: Path) -> str:
+    data = path.read_bytes().replace(b"\x00", b"")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _sections(text: str) -> tuple[str, dict[str, list[str]]]:
+    """Lines before the first bracket, and the lines of each bracketed section."""
+    head, sections, current = "", dict[str, list[str]](), ""
+    for line in text.splitlines():
+        plain = line.strip()
+        if plain.startswith("[") and plain.endswith("]"):
+            current = plain[1:-1].strip().lower()
+            sections.setdefault(current, [])
+        elif not current:
+            head += f"{plain}\n"
+        elif plain:
+            sections[current].append(plain)
+    return head, sections
+
+
+def _cells(log: Log, lines: list[str], width: int) -> Floats:
+    """Data rows of the full width as numbers; NaN where a cell is none."""
+    rows = [r for r in (line.split() for line in lines) if len(r) == width]
+    if not rows:
+        raise DriveError(f"{log.path} has no row of {width} values under [data]; record it again")
+    if lost := len(lines) - len(rows):
+        log.problems.append(
+            Problem("", f"{log.path.name}: {lost} of {len(lines)} rows are cut off or too long")
+        )
+    flat = pl.Series([cell for row in rows for cell in row], dtype=pl.String)
+    if not flat.str.contains(".", literal=True).any():
+        flat = flat.str.replace(",", ".", literal=True)
+    # The parser of numbers takes no plus sign.
+    numbers = flat.str.strip_prefix("+").cast(pl.Float64, strict=False)
+    return numbers.to_numpy().astype(np.float64).reshape(-1, width)
+
+
+def _dated(time: Floats, head: str) -> tuple[Floats, bool]:
+    """Count from 1970 where the file tells its date.
+
+    The date may be of another zone than the times, which are UTC: of the days
+    around it the one that puts the first row nearest to it is taken.
+    """
+    found = _CREATED.search(head)
+    finite = time[np.isfinite(time)]
+    if found is None or finite.size == 0:
+        return time, False
+    day, month, year = (int(g) for g in found.groups()[:3])
+    try:
+        midnight = dt.datetime(year, month, day, tzinfo=dt.UTC).timestamp()
+    except ValueError:
+        return time, False
+    hour, minute = (int(g) if g is not None else 12 for g in found.groups()[3:])
+    created = midnight + 3600.0 * hour + 60.0 * minute
+    first = midnight + float(finite[0])
+    return time + midnight + _DAY * round((created - first) / _DAY), True
+
+
+def _speed_unit(log: Log, titles: list[str], names: list[str]) -> str:
+    """Unit of the velocity by its title: the one in its place, else the one that says so."""
+    if "velocity" not in names:
+        return "kmh"
+    title = ""
+    if len(titles) == len(names):
+        title = titles[names.index("velocity")].lower()
+    if not title.startswith("velocity"):
+        title = next((t.lower() for t in titles if t.lower().startswith("velocity")), "")
+    unit = _SPEED_UNITS.get(title.removeprefix("velocity").strip(" ()[]"))
+    if unit is None:
+        log.problems.append(
+            Problem(
+                "gnss_speed",
+                f"{log.path.name}: no unit of the velocity under [header] "
+                f"({title or 'no title'!r}); it was taken as km/h: "
+                "write 'velocity kmh' there if that is so",
+                serious=True,
+            )
+        )
+        return "kmh"
+    return unit
