@@ -18,6 +18,7 @@
     unit = "ms"                      # else the brackets, else seconds
     format = "clock"                 # 17:58:02.288; or "iso"; or a pattern with %
     offset_s = 0.5                   # added to every stamp
+    align = true                     # find the offset to the drive's other files
 
     [signals.longitudinal_accel]     # a canonical name of the catalogue
     column = "Acc [g]"
@@ -25,9 +26,11 @@
     factor = -1                      # value = factor * cell + offset, in that unit
     offset = 0.0
     optional = true                  # no note where it is absent
+    valid = "AccValid"               # values count only where this signal is not 0; CAN only
 
 A drive of several kinds of file has one ``[tables.NAME]`` per kind, with
-``files = "pattern*.csv"`` and the same sections inside.
+``files = "pattern*.csv"`` and the same sections inside. A file that needs no
+names, such as a GPX or one with canonical columns, may have ``[time]`` alone.
 """
 
 from __future__ import annotations
@@ -61,12 +64,14 @@ class TimeColumn:
     unit : suffix of its unit; None for the unit in the column's brackets, or seconds
     format : None for numbers, "clock", "iso" or a `strptime` format
     offset : added to every stamp [s]
+    align : whether the clock differs from that of the drive's other files
     """
 
     column: str | None = None
     unit: str | None = None
     format: str | None = None
     offset: float = 0.0
+    align: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +86,7 @@ class MappedSignal:
     factor : -1 for an axis that points the other way
     offset : in ``unit``, added after the factor
     optional : its absence is not worth a note
+    valid : signal of the same CAN message that is 0 where the value does not count
     """
 
     name: str
@@ -89,6 +95,7 @@ class MappedSignal:
     factor: float = 1.0
     offset: float = 0.0
     optional: bool = False
+    valid: str | None = None
 
     @property
     def quantity(self) -> Quantity:
@@ -105,7 +112,7 @@ class TableMapping:
     files : file names it is for, as a pattern
     text : how text tables are written
     time : the time column
-    signals : the columns
+    signals : the columns; none where only the clock of the file is told
     source : the mapping's file, for messages
     """
 
@@ -162,6 +169,12 @@ def _table(root: Section, files: str) -> TableMapping:
     text = _text_format(root.section("csv"))
     time = _time(root.section("time"))
     section = root.section("signals")
+    clock_only = (time.align or time.offset != 0.0) and time == TimeColumn(
+        offset=time.offset, align=time.align
+    )
+    if section is None and clock_only and text == TextFormat():
+        root.done()
+        return TableMapping(files=files, text=text, time=time, signals=(), source=root.name)
     if section is None or not section.data:
         root.fail(
             "signals",
@@ -220,6 +233,7 @@ def _time(section: Section | None) -> TimeColumn:
         unit=unit,
         format=section.text("format"),
         offset=section.quantity("offset", "s") or 0.0,
+        align=section.flag("align") or False,
     )
     if time.format is not None and time.format not in ("clock", "iso") and "%" not in time.format:
         section.fail(
@@ -258,6 +272,7 @@ def _signal(parent: Section, name: str) -> MappedSignal:
         factor=1.0 if factor is None else factor,
         offset=section.number("offset") or 0.0,
         optional=section.flag("optional") or False,
+        valid=section.text("valid"),
     )
     section.done()
     return signal

@@ -1,4 +1,4 @@
-"""ASAM MDF: measurement channels, each on the clock of its own channel group.
+"""ASAM MDF: measurement channels, each on the clock of its own group, and bus frames.
 
 Raster functions of the library are not used: resampling would blur the delays
 that a calibration has to find.
@@ -16,8 +16,10 @@ import numpy as np
 
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
+from weighbridge.io.frames import Frames
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, resolved_unit
+from weighbridge.io.mdf_bus import bus_frames
 from weighbridge.io.table import column_list
 from weighbridge.signals import Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
@@ -30,12 +32,12 @@ _Place = tuple[int, int]
 
 
 def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    """Read measurement channels of an MDF file; see `weighbridge.io.log.Reader`.
+    """Read measurement channels and CAN frames of an MDF file; see `weighbridge.io.log.Reader`.
 
     Raises
     ------
     DriveError
-        Not an MDF file, cut off, only raw bus frames, or no known channel.
+        Not an MDF file, cut off, or neither a known channel nor a CAN frame.
     MissingExtraError
         asammdf is not installed.
     """
@@ -70,16 +72,23 @@ def _open(opener: Any, path: Path) -> Any:
 
 
 def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    log = Log(path)
+    log = Log(path, start=_start(file))
     channels, raw_bus = _channels(file)
+    frames = _frames(file, path) if raw_bus else Frames.empty()
     wanted = (
         _mapped(log, channels, mapping, file) if mapping else _canonical(log, channels, table, file)
     )
+    if len(frames):
+        log.frames = frames
+        # What is no channel may be a signal of the frames.
+        log.problems.clear()
+    if not wanted and len(frames):
+        return log
     if not wanted:
         if raw_bus:
             raise DriveError(
-                f"{path} holds raw {raw_bus} bus frames and no measurement channel that is known; "
-                "decode it to signals with its DBC first"
+                f"{path} holds raw {raw_bus} bus frames and no CAN frame or measurement channel "
+                "that is known; decode it to signals first"
             )
         names = column_list(channels) if channels else "no channels"
         hint = f"named in {mapping.source}" if mapping else "with a canonical name"
@@ -108,6 +117,26 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
         log.signals += signals
         log.problems += problems
     return log
+
+
+def _start(file: Any) -> float | None:
+    """When the file's clock began [s since 1970]; None where it was not set."""
+    try:
+        start = float(file.header.start_time.timestamp())
+    except (AttributeError, OverflowError, OSError, ValueError):
+        return None
+    return start if start > 0.0 else None
+
+
+def _frames(file: Any, path: Path) -> Frames:
+    try:
+        return bus_frames(file)
+    # The library's errors on damaged data are of many kinds.
+    except Exception as e:
+        raise DriveError(
+            f"{path}: its bus frames cannot be read ({_first_line(e)}); "
+            "the file may have been cut off: copy it again"
+        ) from None
 
 
 def _channels(file: Any) -> tuple[dict[str, list[_Place]], str]:

@@ -13,27 +13,49 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io import gpx, mdf, nmea, tabular, vbo
+from weighbridge.io import blf, candump, canlog, gpx, mdf, nmea, tabular, vbo
+from weighbridge.io.bus import decode
+from weighbridge.io.clocks import settle_clocks, shift_clock
+from weighbridge.io.dbc import Database, DbcSource, load_dbcs
+from weighbridge.io.frames import Frames, join_frames, settle_clock
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import MappingSource, TableMapping, load_mapping, mapping_for
 from weighbridge.io.table import read_parquet, read_text, start_text
-from weighbridge.signals import Drive, DriveInfo, Floats, Signal
+from weighbridge.signals import Drive, DriveInfo, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 
 _logger = logging.getLogger(__name__)
 
 DrivePath = str | Path | Sequence[str | Path]
 
+
+def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+    """Read a CSV: a table, or frames as python-can writes them; see `weighbridge.io.log.Reader`.
+
+    Raises
+    ------
+    DriveError
+        The file cannot be understood.
+    """
+    if canlog.is_can_csv(path):
+        return canlog.read_can_csv(path, table, mapping)
+    return tabular.read_csv(path, table, mapping)
+
+
 READERS: Final[dict[str, Reader]] = {
-    ".csv": tabular.read_csv,
+    ".csv": read_csv,
     ".tsv": tabular.read_csv,
     ".txt": tabular.read_csv,
     ".parquet": tabular.read_pq,
     ".pq": tabular.read_pq,
     ".mf4": mdf.read_mdf,
     ".mdf": mdf.read_mdf,
+    ".blf": blf.read_blf,
+    ".asc": canlog.read_asc,
+    ".trc": canlog.read_trc,
+    ".log": candump.read_candump,
     ".nmea": nmea.read_nmea,
     ".ubx": nmea.read_nmea,
     ".gpx": gpx.read_gpx,
@@ -41,14 +63,18 @@ READERS: Final[dict[str, Reader]] = {
 }
 """Every log format, by file suffix."""
 
-SELF_DESCRIBED: Final = frozenset({".nmea", ".ubx", ".gpx", ".vbo"})
+SELF_DESCRIBED: Final = frozenset({".nmea", ".ubx", ".gpx", ".vbo", ".blf", ".asc", ".trc", ".log"})
 """Formats that name their quantities and units themselves: a mapping need not know them."""
 
 TRUTH_NAME: Final = "truth"
 """Table of a simulated drive's truth: never read as a signal."""
 
 
-def read_drive(path: DrivePath, mapping: MappingSource | None = None) -> Drive:
+def read_drive(
+    path: DrivePath,
+    mapping: MappingSource | None = None,
+    dbc: DbcSource | Sequence[DbcSource] = (),
+) -> Drive:
     """Read one drive, each signal on its own clock and in SI.
 
     Parameters
@@ -57,7 +83,9 @@ def read_drive(path: DrivePath, mapping: MappingSource | None = None) -> Drive:
         Parquet, with or without ``drive.toml``), one file, or several files
         that belong to one drive
     mapping : mapping TOML, or a dictionary of the same form, for files whose
-        columns have other names or units than the canonical ones
+        columns have other names or units than the canonical ones, and for the
+        signals of a DBC
+    dbc : one or several DBC files for raw bus logs; ``1:file.dbc`` is for bus 1 alone
 
     Returns
     -------
@@ -73,18 +101,23 @@ def read_drive(path: DrivePath, mapping: MappingSource | None = None) -> Drive:
         The mapping cannot be used.
     """
     mappings = load_mapping(mapping) if mapping is not None else ()
+    databases = load_dbcs([dbc] if isinstance(dbc, str | Path) else list(dbc))
+    info = DriveInfo()
     if not isinstance(path, str | Path):
         paths = [Path(p) for p in path]
         if not paths:
             raise DriveError("no file was given: name a folder or at least one file")
         if len(paths) > 1:
-            more = f"{paths[0].stem}+{len(paths) - 1}"
-            return _drive(more, [_read_file(p, None, mappings) for p in paths], DriveInfo())
+            name = f"{paths[0].stem}+{len(paths) - 1}"
+            return _drive(
+                name, [_read_file(p, None, mappings) for p in paths], info, mappings, databases
+            )
         path = paths[0]
     path = Path(path)
     if path.is_dir():
-        return _read_folder(path, mappings)
-    return _drive(path.stem, [_read_file(path, None, mappings)], DriveInfo())
+        logs, info = _read_folder(path, mappings)
+        return _drive(path.resolve().name, logs, info, mappings, databases)
+    return _drive(path.stem, [_read_file(path, None, mappings)], info, mappings, databases)
 
 
 def read_table(path: str | Path) -> dict[str, Floats]:
@@ -110,12 +143,11 @@ def read_table(path: str | Path) -> dict[str, Floats]:
     return {name: raw.numbers(i)[0] for i, name in enumerate(raw.names)}
 
 
-def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> Drive:
+def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list[Log], DriveInfo]:
     files = sorted(f for f in folder.iterdir() if f.is_file() and f.suffix.lower() in READERS)
     files = [f for f in files if f.stem.lower() != TRUTH_NAME]
     info_path = folder / INFO_NAME
     info = read_info(info_path) if info_path.is_file() else DriveInfo()
-    name = folder.resolve().name
     tables: dict[str, Path] = {}
     for f in files:
         table = f.stem.lower()
@@ -130,7 +162,7 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> Drive:
             f for f in files if f.suffix.lower() in SELF_DESCRIBED and f not in tables.values()
         ]
         known = [*((f, t) for t, f in tables.items()), *((f, None) for f in others)]
-        return _drive(name, [_read_file(f, t, ()) for f, t in known], info)
+        return [_read_file(f, t, ()) for f, t in known], info
     if not files:
         raise DriveError(
             f"{folder} holds no drive: it needs at least one of "
@@ -143,7 +175,7 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> Drive:
         if mappings and not named and mapping_for(f, mappings) is None:
             continue
         logs.append(_read_file(f, None, mappings))
-    return _drive(name, logs, info)
+    return logs, info
 
 
 def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]) -> Log:
@@ -165,17 +197,32 @@ def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]
             f"{path}: no [tables] section of {mappings[0].source} has a pattern "
             "in files that fits its name"
         )
+    self_described = path.suffix.lower() in SELF_DESCRIBED
+    named = mapping if mapping is not None and (mapping.signals or self_described) else None
     try:
-        log = reader(path, table, mapping)
+        log = reader(path, table, named)
     except OSError as e:
         raise DriveError(f"{path} cannot be read: {e.strerror or e}") from None
+    if mapping is not None:
+        log.align = mapping.time.align
+        if named is None:
+            shift_clock(log, mapping.time.offset)
     _logger.debug("%s: %d signals", path, len(log.signals))
     return log
 
 
-def _drive(name: str, logs: Sequence[Log], info: DriveInfo) -> Drive:
+def _drive(
+    name: str,
+    logs: list[Log],
+    info: DriveInfo,
+    mappings: tuple[TableMapping, ...],
+    databases: tuple[Database, ...],
+) -> Drive:
+    _share_clock(logs)
+    contents = _decode_frames(logs, mappings, databases)
     problems = [p for log in logs for p in log.problems]
     parts: dict[str, list[tuple[Log, Signal]]] = {}
+    problems += settle_clocks(logs)
     info = _rebase(logs, info)
     for log in logs:
         for s in log.signals:
@@ -188,9 +235,85 @@ def _drive(name: str, logs: Sequence[Log], info: DriveInfo) -> Drive:
         )
     joined: dict[tuple[int, ...], Floats] = {}
     signals = {n: p[0][1] if len(p) == 1 else _joined(n, p, joined) for n, p in parts.items()}
-    drive = Drive(name=name, signals=signals, info=info, problems=tuple(problems))
+    drive = Drive(
+        name=name, signals=signals, info=info, problems=tuple(problems), contents=contents
+    )
     _logger.info("%s: %d signals over %.0f s", name, len(signals), drive.duration)
     return drive
+
+
+def _share_clock(logs: Sequence[Log]) -> None:
+    """Let clocks count from 1970 where all files tell when theirs began.
+
+    A file of measurement channels alone keeps its own clock, as its makers know it.
+    """
+    if len(logs) == 1 and logs[0].frames is None:
+        return
+    if not all(log.absolute or log.start is not None for log in logs):
+        return
+    for log in logs:
+        if log.absolute or log.start is None:
+            continue
+        clocks: dict[int, Floats] = {}
+        for k, s in enumerate(log.signals):
+            clocks.setdefault(id(s.time), s.time + log.start)
+            log.signals[k] = Signal(s.name, clocks[id(s.time)], s.values)
+        if log.frames is not None:
+            log.frames = replace(log.frames, time=log.frames.time + log.start)
+        log.absolute = True
+
+
+def _decode_frames(
+    logs: list[Log], mappings: tuple[TableMapping, ...], databases: tuple[Database, ...]
+) -> tuple[str, ...]:
+    """Turn the raw frames of all files into signals of the first; return what they held."""
+    raw = [log for log in logs if log.frames is not None]
+    if not raw:
+        return ()
+    if len({log.absolute for log in raw}) > 1:
+        other = next(log for log in raw if not log.absolute)
+        raise DriveError(
+            f"{other.path.name} counts seconds and the other logs have dates: "
+            "give files of one logger, or read them as drives of their own"
+        )
+    parts = []
+    for log in raw:
+        frames, problems = settle_clock(log.frames or Frames.empty(), log.path.name)
+        log.frames = None
+        log.problems += problems
+        parts.append((log, frames))
+    parts.sort(key=lambda p: float(p[1].time[0]) if len(p[1]) else 0.0)
+    for (log_a, a), (log_b, b) in pairwise(parts):
+        if len(a) and len(b) and b.time[0] <= a.time[-1] and set(a.counts()) & set(b.counts()):
+            raise DriveError(
+                f"{log_a.path} and {log_b.path} hold the same frames at the same time; read them "
+                "as drives of their own, or leave one out"
+            )
+    first = parts[0][0]
+    name = first.path.name + (f" and {len(parts) - 1} more" if len(parts) > 1 else "")
+    mapping = next((m for log in raw if (m := mapping_for(log.path, mappings))), None)
+    joined = join_frames([frames for _, frames in parts])
+    known = {s.name for log in logs for s in log.signals}
+    try:
+        found = decode(joined, name, mapping, databases)
+    except DriveError as error:
+        if not known:
+            raise
+        first.problems.append(Problem("", str(error)))
+        return ()
+    first.problems += found.problems
+    for signal in found.signals.values():
+        if signal.name in known:
+            first.problems.append(
+                Problem(
+                    signal.name,
+                    f"{name}: {signal.name} of the frames ({len(signal)} values) was left out: "
+                    "another table of the drive has it",
+                )
+            )
+        else:
+            first.signals.append(signal)
+    return tuple(found.contents)
 
 
 def _joined(
@@ -217,17 +340,7 @@ def _rebase(logs: Sequence[Log], info: DriveInfo) -> DriveInfo:
     absolute = [log for log in filled if log.absolute]
     if not absolute:
         return info
-    if len(absolute) < len(filled):
-        other = next(log for log in filled if not log.absolute)
-        raise DriveError(
-            f"{absolute[0].path.name} has dates and {other.path.name} counts seconds: "
-            "write all files of a drive on one clock"
-        )
     start = float(math.floor(min(float(s.time[0]) for log in absolute for s in log.signals)))
-    clocks: dict[int, Floats] = {}
     for log in absolute:
-        for k, s in enumerate(log.signals):
-            if id(s.time) not in clocks:
-                clocks[id(s.time)] = s.time - start
-            log.signals[k] = Signal(s.name, clocks[id(s.time)], s.values)
+        shift_clock(log, -start)
     return info if info.start_time is not None else replace(info, start_time=start_text(start))

@@ -60,12 +60,14 @@ class Drive:
     signals : by canonical name, in SI
     info : what is known beside the signals
     problems : what reading the drive had to mend or doubts
+    contents : what raw bus logs held, decoded or not, in sentences
     """
 
     name: str
     signals: Mapping[str, Signal]
     info: DriveInfo = field(default_factory=DriveInfo)
     problems: tuple[Problem, ...] = ()
+    contents: tuple[str, ...] = ()
 
     def get(self, name: str) -> Signal | None:
         """Return the signal, or None where the drive lacks it."""

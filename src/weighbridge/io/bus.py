@@ -1,0 +1,313 @@
+"""From raw bus traffic to signals: DBC by mapping, OBD-II, J1939; what is left is counted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
+from weighbridge.io.dbc import Database, Found, find_signal, is_readable, message_frames, physical
+from weighbridge.io.frames import Frames
+from weighbridge.io.j1939 import decode_j1939, is_j1939
+from weighbridge.io.mapping import MappedSignal, TableMapping, resolved_unit
+from weighbridge.io.obd import decode_obd
+from weighbridge.signals import Bools, Floats, Problem, Signal
+from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.units import to_si
+
+# Identifiers named one by one; the others are counted.
+_NAMED: Final = 8
+
+
+@dataclass(slots=True)
+class Decoded:
+    """What bus traffic said.
+
+    Attributes
+    ----------
+    signals : by canonical name, in SI
+    problems : what was left out
+    contents : what was found, decoded and ignored, with counts, for people
+    """
+
+    signals: dict[str, Signal] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    contents: list[str] = field(default_factory=list)
+
+
+def decode(
+    frames: Frames, name: str, mapping: TableMapping | None, databases: Sequence[Database]
+) -> Decoded:
+    """Decode raw traffic.
+
+    What the mapping names is taken from the databases; what it does not name
+    from OBD-II or J1939, whichever says it more often.
+
+    Parameters
+    ----------
+    frames : all traffic of a drive, in the order of time
+    name : of the log, for messages
+    mapping : names the databases' signals; None for canonical names
+    databases : as of `load_dbcs`
+
+    Raises
+    ------
+    ConfigError
+        The mapping names a signal that several messages have, or states no unit.
+    DriveError
+        Nothing in the traffic is known.
+    """
+    done = Decoded()
+    used = np.zeros(len(frames), dtype=bool)
+    span = float(frames.time[-1] - frames.time[0]) if len(frames) else 0.0
+    buses = np.unique(frames.channel).tolist()
+    done.contents.append(
+        f"{name}: {len(frames)} CAN frames over {span:.0f} s on "
+        f"{'bus' if len(buses) == 1 else 'buses'} {', '.join(map(str, buses))}"
+    )
+    if databases:
+        used |= _databases(frames, name, mapping, databases, done)
+    obd = decode_obd(frames, name)
+    used |= obd.used
+    done.contents += obd.contents
+    _add(obd.signals, obd.problems, "OBD-II", name, done)
+    rest = frames.select(~obd.used) if obd.used.any() else frames
+    if is_j1939(rest):
+        truck = decode_j1939(rest, name)
+        groups = truck.summary.decoded
+        ignored = truck.summary.ignored
+        told = ", ".join(f"{g} ({n})" for g, n in groups.items())
+        done.contents.append(
+            f"J1939: {told}; not used: {len(ignored)} other parameter groups "
+            f"({sum(ignored.values())} frames)"
+        )
+        _add(truck.signals, truck.summary.problems, "J1939", name, done)
+        used |= frames.extended & ~obd.used
+    unknown = frames.select(~used)
+    if len(unknown):
+        done.contents.append(f"not known: {_counts(unknown)}")
+    if not done.signals:
+        raise DriveError(_nothing(frames, name, mapping, databases, done))
+    return done
+
+
+def _add(
+    signals: Sequence[Signal], problems: Sequence[Problem], kind: str, name: str, done: Decoded
+) -> None:
+    """Add signals of one protocol; of two that say the same the fuller one stays."""
+    done.problems += problems
+    for s in signals:
+        other = done.signals.get(s.name)
+        if other is not None and len(other) >= len(s):
+            done.problems.append(
+                Problem(
+                    s.name,
+                    f"{name}: {s.name} of {kind} ({len(s)} values) was left out for "
+                    f"{len(other)} values from elsewhere in the log",
+                )
+            )
+        else:
+            done.signals[s.name] = s
+
+
+def _counts(frames: Frames) -> str:
+    """Identifiers with how often each was seen, the commonest first."""
+    counts = sorted(frames.counts().items(), key=lambda item: -item[1])
+    shown = ", ".join(f"CAN {c} {i:X} ({n})" for (c, i, _), n in counts[:_NAMED])
+    more = f" and {len(counts) - _NAMED} more identifiers" if len(counts) > _NAMED else ""
+    return f"{len(frames)} frames: {shown}{more}"
+
+
+def _nothing(
+    frames: Frames,
+    name: str,
+    mapping: TableMapping | None,
+    databases: Sequence[Database],
+    done: Decoded,
+) -> str:
+    names = " and ".join(d.path.name for d in databases)
+    if not len(frames):
+        return f"{name} holds no CAN frames; record it again"
+    seen = f"{name} holds {_counts(frames)}"
+    if not databases:
+        return (
+            f"{seen}; they are neither OBD-II answers nor J1939: "
+            "give the vehicle's DBC with --dbc and name its signals in a mapping"
+        )
+    if done.problems and mapping is not None:
+        return f"{seen}; {done.problems[0].text}"
+    return (
+        f"{seen}; {names} gives no signal for them: name its signals in a mapping, or name "
+        "the DBC that goes with the log"
+    )
+
+
+def _databases(
+    frames: Frames,
+    name: str,
+    mapping: TableMapping | None,
+    databases: Sequence[Database],
+    done: Decoded,
+) -> Bools:
+    """Decode what the mapping names, or what has canonical names; mark the frames used."""
+    used = np.zeros(len(frames), dtype=bool)
+    carried = [message_frames(frames, d) for d in databases]
+    for d, found in zip(databases, carried, strict=True):
+        if not found:
+            bus = "" if d.channel is None else f" on bus {d.channel}"
+            done.problems.append(
+                Problem(
+                    "",
+                    f"{name}: none of the {len(d.messages)} messages of {d.path.name} is in the "
+                    f"log{bus}; it may be the DBC of another vehicle",
+                )
+            )
+    wanted = (
+        _mapped(name, mapping, databases, carried, done)
+        if mapping is not None
+        else _canonical(databases, carried)
+    )
+    columns: dict[bytes, tuple[NDArray[np.intp], list[tuple[str, Floats]]]] = {}
+    taken: dict[str, list[str]] = {}
+    for quantity, (found_signal, suffix, mapped) in wanted.items():
+        found_signal = _one_bus(frames, name, found_signal, done)
+        values, at = physical(frames, found_signal)
+        short = found_signal.frames.size - at.size
+        if short and found_signal.signal.multiplexer_ids is None:
+            done.problems.append(
+                Problem(
+                    quantity,
+                    f"{name}: {short} of {found_signal.frames.size} frames of "
+                    f"{found_signal.message.name} are shorter than its DBC says and were left out",
+                )
+            )
+        if mapped is not None:
+            values = values * mapped.factor + mapped.offset
+            values, at = _valid(frames, name, found_signal, mapped, values, at, done)
+        used[found_signal.frames] = True
+        taken.setdefault(found_signal.message.name, []).append(quantity)
+        if at.size == 0:
+            done.problems.append(
+                Problem(quantity, f"{name}: {found_signal.signal.name} has no value in any frame")
+            )
+            continue
+        values = to_si(values, suffix) if suffix else values
+        columns.setdefault(at.tobytes(), (at, []))[1].append((quantity, values))
+    for at, group in columns.values():
+        signals, problems = clean_columns(frames.time[at], group, name)
+        done.problems += problems
+        done.signals.update({s.name: s for s in signals})
+    for d, found in zip(databases, carried, strict=True):
+        read = [f"{m} ({at.size}): {', '.join(taken[m])}" for m, at in found.items() if m in taken]
+        skipped = [f"{m} ({at.size})" for m, at in found.items() if m not in taken]
+        if read:
+            done.contents.append(f"{d.path.name}: {'; '.join(read)}")
+        if skipped:
+            done.contents.append(f"{d.path.name}, not used: {', '.join(skipped)}")
+            for m in skipped:
+                used[found[m.rpartition(" (")[0]]] = True
+    return used
+
+
+_Wanted = dict[str, tuple[Found, str, MappedSignal | None]]
+
+
+def _mapped(
+    name: str,
+    mapping: TableMapping,
+    databases: Sequence[Database],
+    carried: Sequence[dict[str, NDArray[np.intp]]],
+    done: Decoded,
+) -> _Wanted:
+    wanted: _Wanted = {}
+    for s in mapping.signals:
+        found = find_signal(s.column, databases, carried)
+        if not found:
+            if not s.optional:
+                done.problems.append(
+                    Problem(
+                        s.name,
+                        f"{name}: no frame carries {s.column!r} for {s.name}; "
+                        "check the name in the DBC",
+                    )
+                )
+            continue
+        if len(found) > 1:
+            names = ", ".join(f"{f.message.name}.{f.signal.name}" for f in found)
+            raise ConfigError(
+                f"{mapping.source}: signals.{s.name} column {s.column!r} is in several messages; "
+                f"name one of {names}"
+            )
+        stated = unit_suffix(found[0].signal.unit or "")
+        wanted[s.name] = (found[0], resolved_unit(s, stated, mapping.source), s)
+    return wanted
+
+
+def _canonical(
+    databases: Sequence[Database], carried: Sequence[dict[str, NDArray[np.intp]]]
+) -> _Wanted:
+    wanted: _Wanted = {}
+    for database, frames in zip(databases, carried, strict=True):
+        for message in database.messages:
+            if message.name not in frames:
+                continue
+            for signal in message.signals:
+                try:
+                    known = parse_column(signal.name, None, unit_suffix(signal.unit or ""))
+                except UnitlessColumnError:
+                    continue
+                if known is not None and known[0].name not in wanted and is_readable(signal):
+                    place = Found(message, signal, frames[message.name])
+                    wanted[known[0].name] = (place, known[1], None)
+    return wanted
+
+
+def _one_bus(frames: Frames, name: str, found: Found, done: Decoded) -> Found:
+    """Keep the frames of one bus, the one that carries most of them."""
+    buses, counts = np.unique(frames.channel[found.frames], return_counts=True)
+    if buses.size < 2:
+        return found
+    best = int(buses[np.argmax(counts)])
+    text = (
+        f"{name}: {found.message.name} is on buses {', '.join(map(str, buses.tolist()))}; "
+        f"that of bus {best} was taken; give the DBC as {best}:FILE to settle it"
+    )
+    if all(p.text != text for p in done.problems):
+        done.problems.append(Problem("", text))
+    return Found(found.message, found.signal, found.frames[frames.channel[found.frames] == best])
+
+
+def _valid(
+    frames: Frames,
+    name: str,
+    found: Found,
+    mapped: MappedSignal,
+    values: Floats,
+    at: NDArray[np.intp],
+    done: Decoded,
+) -> tuple[Floats, NDArray[np.intp]]:
+    """Leave out values that a signal of the same message says do not count."""
+    if mapped.valid is None:
+        return values, at
+    flag = next((s for s in found.message.signals if s.name == mapped.valid), None)
+    if flag is None:
+        raise ConfigError(
+            f"signals.{mapped.name} valid = {mapped.valid!r}: message {found.message.name} has no "
+            f"such signal; it has {', '.join(s.name for s in found.message.signals)}"
+        )
+    raw, where = physical(frames, Found(found.message, flag, at))
+    good = np.isin(at, where[raw != 0.0])
+    lost = int(at.size - np.count_nonzero(good))
+    if lost:
+        text = (
+            f"{name}: {lost} of {at.size} frames of {found.message.name} are marked invalid by "
+            f"{mapped.valid} and were left out"
+        )
+        if all(p.text != text for p in done.problems):
+            done.problems.append(Problem("", text))
+    return values[good], at[good]

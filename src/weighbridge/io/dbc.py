@@ -1,0 +1,230 @@
+"""Signals of CAN databases (DBC), taken out of raw frames in whole columns.
+
+cantools reads the database; the bits are taken out with numpy, for the signals
+wanted only.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.errors import ConfigError, MissingExtraError
+from weighbridge.io.frames import Frames
+from weighbridge.signals import Bools, Floats
+
+DbcSource = str | Path
+"""A DBC file, for one bus alone where it is written ``1:file.dbc``."""
+
+_CHANNEL: Final = re.compile(r"^(\d{1,3}):(.+)$")
+
+
+@dataclass(frozen=True, slots=True)
+class Database:
+    """One DBC.
+
+    Attributes
+    ----------
+    path : the file
+    channel : the bus it is for; None for every bus
+    messages : as cantools gives them
+    """
+
+    path: Path
+    channel: int | None
+    messages: tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One signal of a database and the frames that carry it.
+
+    Attributes
+    ----------
+    message, signal : as cantools gives them
+    frames : indices of the message's frames
+    """
+
+    message: Any
+    signal: Any
+    frames: NDArray[np.intp]
+
+
+def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
+    """Read DBC files.
+
+    Raises
+    ------
+    ConfigError
+        A file is not there or is no DBC.
+    MissingExtraError
+        cantools is not installed.
+    """
+    if not sources:
+        return ()
+    try:
+        import cantools
+    except ImportError:
+        raise MissingExtraError("cantools", "can", f"reading {sources[0]}") from None
+    # It warns of what decoding does not need.
+    logging.getLogger("cantools").setLevel(logging.ERROR)
+    databases = []
+    for source in sources:
+        found = _CHANNEL.match(str(source))
+        channel = int(found.group(1)) if found else None
+        path = Path(found.group(2) if found else source)
+        if not path.is_file():
+            raise ConfigError(f"--dbc {path}: no such file")
+        try:
+            text = path.read_bytes().decode("cp1252", "replace")
+            database = cantools.database.load_string(text, "dbc", strict=False)
+        # The library's errors on text that is no DBC are of many kinds.
+        except Exception as error:
+            reason = str(error).strip().split("\n", 1)[0]
+            raise ConfigError(f"--dbc {path} is no readable DBC ({reason})") from None
+        messages = tuple(getattr(database, "messages", ()))
+        if not messages:
+            raise ConfigError(f"--dbc {path} defines no message; name another file")
+        databases.append(Database(path, channel, messages))
+    return tuple(databases)
+
+
+def message_frames(frames: Frames, database: Database) -> dict[str, NDArray[np.intp]]:
+    """Indices of the frames of each message, by its name.
+
+    A J1939 message is known by its parameter group, whatever the sender and
+    the priority; any other by its whole identifier.
+    """
+    here = np.ones(len(frames), dtype=bool)
+    if database.channel is not None:
+        here = frames.channel == database.channel
+    key = (frames.id.astype(np.int64) << 1) | frames.extended
+    key[~here] = -1
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    group = None
+    found = {}
+    for message in database.messages:
+        identifier = int(message.frame_id)
+        if message.is_extended_frame and message.protocol == "j1939":
+            if group is None:
+                group = np.where(here & frames.extended, _group(frames.id.astype(np.int64)), -1)
+            at = np.flatnonzero(group == int(_group(np.array([identifier]))[0]))
+        else:
+            wanted = identifier << 1 | bool(message.is_extended_frame)
+            low, high = np.searchsorted(ordered, [wanted, wanted + 1])
+            at = np.sort(order[low:high])
+        if at.size:
+            found[message.name] = at
+    return found
+
+
+def _group(identifier: NDArray[np.int64]) -> NDArray[np.int64]:
+    """J1939 parameter group; below PDU format 240 the low byte is a destination."""
+    group = (identifier >> 8) & 0x3FFFF
+    return np.asarray(np.where(group >> 8 & 0xFF < 240, group & 0x3FF00, group))
+
+
+def find_signal(
+    name: str, databases: Sequence[Database], carried: Sequence[dict[str, NDArray[np.intp]]]
+) -> list[Found]:
+    """Signals called ``name`` or, with their message, ``message.name``, that frames carry."""
+    message_name, _, signal_name = name.rpartition(".")
+    return [
+        Found(message, signal, frames[message.name])
+        for database, frames in zip(databases, carried, strict=True)
+        for message in database.messages
+        if message.name in frames and message_name.casefold() in ("", message.name.casefold())
+        for signal in message.signals
+        if signal.name.casefold() == signal_name.casefold() and is_readable(signal)
+    ]
+
+
+def is_readable(signal: Any) -> bool:
+    """Tell whether a signal is a number of a size that can be taken out."""
+    length = int(signal.length)
+    return length in (16, 32, 64) if signal.is_float else 0 < length <= 64
+
+
+def physical(frames: Frames, found: Found) -> tuple[Floats, NDArray[np.intp]]:
+    """Physical values of one signal, in its own unit.
+
+    Parameters
+    ----------
+    frames : all traffic
+    found : the signal and where its message stands
+
+    Returns
+    -------
+    values : (m,) where the frame is long enough and the multiplexer selects it
+    indices : (m,) of those frames
+    """
+    signal, message, at = found.signal, found.message, found.frames
+    at = at[frames.length[at] >= _bytes_needed(signal)]
+    at = at[_selected(frames, at, message, signal)]
+    raw = _raw(frames.data[at], signal)
+    scale, offset = float(signal.scale), float(signal.offset)
+    return np.asarray(raw * scale + offset, dtype=np.float64), at
+
+
+def _selected(frames: Frames, at: NDArray[np.intp], message: Any, signal: Any) -> Bools:
+    """Which frames carry a multiplexed signal; multiplexers may be multiplexed themselves."""
+    chosen = np.ones(at.size, dtype=bool)
+    seen = set()
+    while signal.multiplexer_ids is not None and signal.multiplexer_signal not in seen:
+        seen.add(signal.multiplexer_signal)
+        switch = next(s for s in message.signals if s.name == signal.multiplexer_signal)
+        long_enough = frames.length[at] >= _bytes_needed(switch)
+        chosen &= long_enough & np.isin(_raw(frames.data[at], switch), list(signal.multiplexer_ids))
+        signal = switch
+    return chosen
+
+
+def _place(signal: Any) -> tuple[int, int]:
+    """First bit and length, bits counted in the order they are read in."""
+    start = int(signal.start)
+    if signal.byte_order == "big_endian":
+        # A DBC names the most significant bit, numbered from the low end of its byte.
+        start = 8 * (start // 8) + 7 - start % 8
+    return start, int(signal.length)
+
+
+def _bytes_needed(signal: Any) -> int:
+    start, length = _place(signal)
+    return (start + length + 7) // 8
+
+
+def _raw(data: NDArray[np.uint8], signal: Any) -> Floats | NDArray[np.int64]:
+    """(n,) raw values of a signal of up to 64 bits; data shorter than it read as zero."""
+    start, length = _place(signal)
+    first, last = start // 8, (start + length - 1) // 8
+    columns = [
+        data[:, k].astype(np.uint64) if k < data.shape[1] else np.zeros(len(data), np.uint64)
+        for k in range(first, last + 1)
+    ]
+    if signal.byte_order == "big_endian":
+        columns.reverse()
+        shift = 8 * (last + 1) - (start + length)
+    else:
+        shift = start % 8
+    value = np.zeros(len(data), np.uint64)
+    for k, column in enumerate(columns):
+        place = 8 * k - shift
+        value |= column << np.uint64(place) if place >= 0 else column >> np.uint64(-place)
+    if length < 64:
+        value &= np.uint64((1 << length) - 1)
+    if signal.is_float:
+        kinds = {16: ("<u2", "<f2"), 32: ("<u4", "<f4"), 64: ("<u8", "<f8")}
+        whole, real = kinds[length]
+        return value.astype(whole).view(real).astype(np.float64)
+    if signal.is_signed:
+        sign = np.uint64(1 << (length - 1))
+        return ((value ^ sign) - sign).astype(np.int64)
+    return value.astype(np.int64) if length < 64 else value.astype(np.float64)
