@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 import typer
 
 from weighbridge.cli.options import (
+    DbcPaths,
     DrivePaths,
     MappingPath,
     load,
@@ -59,6 +60,7 @@ def calibrate(
         typer.Option("--straight", help="Torque linear in load, as eq. 49 of Jensen 2022 prints."),
     ] = False,
     mapping: MappingPath = None,
+    dbc: DbcPaths = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Calibrate a vehicle from drives of known mass.
@@ -78,7 +80,7 @@ def calibrate(
     if torque not in (None, "measured", "percent", "load", "air_flow"):
         raise ConfigError(f"--torque {torque}: must be measured, percent, load or air_flow")
     base = Vehicle.load(vehicle) if vehicle is not None else None
-    recorded = [load(path, mapping_for(mapping, base, vehicle)) for path in drives]
+    recorded = [load(path, mapping_for(mapping, base, vehicle), dbc) for path in drives]
     settings = CalibrationSettings(order=order, source=torque, grid=grid, curved=not straight)  # type: ignore[arg-type]
     masses = mass[0] if mass is not None and len(mass) == 1 else mass
     done = run_calibration(recorded, masses, vehicle=base, settings=settings)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.options import DrivePaths, MappingPath, load, mapping_for
+from weighbridge.cli.options import DbcPaths, DrivePaths, MappingPath, load, mapping_for
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -16,12 +16,13 @@ if TYPE_CHECKING:
     from weighbridge.pipeline.inspection import Inspection
 
 # Width of tables where no terminal gives one.
-_WIDTH = 120
+_WIDTH = 140
 
 
 def inspect(
     drives: DrivePaths,
     mapping: MappingPath = None,
+    dbc: DbcPaths = None,
     vehicle: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--vehicle", help="Vehicle file: judges the speed by its gears."),
@@ -45,7 +46,7 @@ def inspect(
     if not console.is_terminal:
         console.width = _WIDTH
     for path in drives:
-        _show(console, inspect_drive(load(path, chosen), car), every_way)
+        _show(console, inspect_drive(load(path, chosen, dbc), car), every_way)
 
 
 def _show(console: Console, found: Inspection, every_way: bool) -> None:
@@ -53,6 +54,8 @@ def _show(console: Console, found: Inspection, every_way: bool) -> None:
 
     drive = found.drive
     console.print(f"[bold]{escape(drive.name)}[/]: {drive.duration / 60.0:.1f} min")
+    for line in drive.contents:
+        console.print(f"  {escape(line)}", soft_wrap=True)
     console.print(_signal_table(found))
     if found.problems:
         console.print("Problems")

@@ -20,6 +20,14 @@ MappingPath = Annotated[
     Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
     typer.Option("--mapping", help="TOML that names foreign columns, units and signs."),
 ]
+DbcPaths = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--dbc",
+        help="DBC of raw CAN logs; repeat it for more, write 1:FILE for bus 1 alone.",
+        metavar="FILE",
+    ),
+]
 
 
 def mapping_for(mapping: Path | None, vehicle: Vehicle | None, home: Path | None) -> Path | None:
@@ -30,11 +38,11 @@ def mapping_for(mapping: Path | None, vehicle: Vehicle | None, home: Path | None
     return named if named.is_absolute() or home is None else home.parent / named
 
 
-def load(path: Path, mapping: Path | None) -> Drive:
+def load(path: Path, mapping: Path | None, dbc: list[str] | None = None) -> Drive:
     """Read one drive."""
     from weighbridge.io import read_drive
 
-    return read_drive(path, mapping)
+    return read_drive(path, mapping, dbc or ())
 
 
 def refuse_overwriting(path: Path, force: bool, what: str) -> None:

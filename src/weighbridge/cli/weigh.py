@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 import typer
 
 from weighbridge.cli.options import (
+    DbcPaths,
     DrivePaths,
     MappingPath,
     load,
@@ -45,6 +46,7 @@ def weigh(
         typer.Option("--report", help="Write a self-contained HTML report."),
     ] = None,
     mapping: MappingPath = None,
+    dbc: DbcPaths = None,
 ) -> None:
     """Weigh a vehicle from one or more drives.
 
@@ -66,7 +68,7 @@ def weigh(
     failed: list[tuple[Path, str]] = []
     for path in _progress(drives):
         try:
-            weighed.append(_weigh_one(path, chosen, car, method))
+            weighed.append(_weigh_one(path, chosen, dbc, car, method))
         except WeighbridgeError as error:
             if len(drives) == 1:
                 raise
@@ -95,10 +97,12 @@ def weigh(
         raise typer.Exit(1)
 
 
-def _weigh_one(path: Path, mapping: Path | None, car: Vehicle, method: str) -> Weighing:
+def _weigh_one(
+    path: Path, mapping: Path | None, dbc: list[str] | None, car: Vehicle, method: str
+) -> Weighing:
     from weighbridge.pipeline.weighing import weigh as weigh_drive
 
-    return weigh_drive(load(path, mapping), car, method)
+    return weigh_drive(load(path, mapping, dbc), car, method)
 
 
 def _refuse_inputs(
