@@ -5,6 +5,9 @@ from typing import Final
 GRAVITY: Final = 9.81
 """Standard acceleration used throughout [m/s^2] (Jensen 2022, sec. 5.2)."""
 
+EARTH_RADIUS: Final = 6_371_008.8
+"""Mean radius of the Earth [m] (IUGG)."""
+
 GAS_CONSTANT_DRY_AIR: Final = 287.05
 """Specific gas constant of dry air [J/(kg K)] (ISO 2533)."""
 

@@ -23,6 +23,7 @@ class Log:
     absolute : whether the clock counts from 1970
     start : where the clock begins [s since 1970], if it does not count from there
         and the file tells; None otherwise
+    align : whether a mapping asks to align its clock with the drive's other files
     frames : raw bus traffic, decoded once all files of a drive are read
     """
 
@@ -31,6 +32,7 @@ class Log:
     problems: list[Problem] = field(default_factory=list)
     absolute: bool = False
     start: float | None = None
+    align: bool = False
     frames: Frames | None = None
 
 

@@ -207,6 +207,8 @@ def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]
         log.align = mapping.time.align
         if named is None:
             shift_clock(log, mapping.time.offset)
+        if log.frames is not None:
+            log.frames = replace(log.frames, time=log.frames.time + mapping.time.offset)
     _logger.debug("%s: %d signals", path, len(log.signals))
     return log
 

@@ -1,0 +1,269 @@
+"""Files of one drive whose clocks differ: put on one clock by what they share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from weighbridge.constants import EARTH_RADIUS
+from weighbridge.errors import DriveError
+from weighbridge.io.log import Log
+from weighbridge.signals import Floats, Problem, Signal
+from weighbridge.signals.alignment import Alignment, align
+
+_Signals = Mapping[str, Signal]
+
+# Course over ground says nothing of turning at walking pace.
+_MOVING: Final = 3.0
+
+# Gyroscopes feel the engine; turning is slower [s].
+_TURN: Final = 0.5
+
+# Sensors are late by up to this; a clock that is off by more is a wrong clock [s].
+_LATE: Final = 1.5
+
+_REMEDY: Final = "give offset_s under [time] of the file's table in a mapping"
+
+
+def settle_clocks(logs: Sequence[Log]) -> list[Problem]:
+    """Put the files of a drive on one clock where they are not on one already.
+
+    A file is moved where a mapping asks for it (`Log.align`), where only
+    some files have dates, and where files that hold different signals do not
+    overlap. Files with the same signals one after another are left alone:
+    they are parts of one recording.
+
+    Parameters
+    ----------
+    logs : of the drive; those moved are changed in place
+
+    Returns
+    -------
+    What was moved, by how much and how sure that is.
+
+    Raises
+    ------
+    DriveError
+        A file must be moved and the offset is not to be found, or ambiguous.
+    """
+    logs = [log for log in logs if log.signals]
+    problems: list[Problem] = []
+    moved = [log for log in logs if log.align]
+    fixed = [log for log in logs if not log.align]
+    if moved and not fixed:
+        moved, fixed = moved[1:], moved[:1]
+    dated = [log for log in fixed if log.absolute]
+    if dated and len(dated) < len(fixed):
+        counted = [log for log in fixed if not log.absolute]
+        problems.append(
+            _move(dated, counted, f"{_names(dated)} has dates and {_names(counted)} counts seconds")
+        )
+    for log in moved:
+        problems.append(_move(fixed, [log], f"{log.path.name} is to be aligned"))
+        fixed.append(log)
+    problems += _apart(logs)
+    problems += _doubts(logs)
+    return problems
+
+
+def shift_clock(log: Log, offset: float) -> None:
+    """Add ``offset`` [s] to every stamp; signals that share a clock go on sharing one."""
+    if offset == 0.0:
+        return
+    clocks: dict[int, Floats] = {}
+    for k, s in enumerate(log.signals):
+        if id(s.time) not in clocks:
+            clocks[id(s.time)] = s.time + offset
+        log.signals[k] = Signal(s.name, clocks[id(s.time)], s.values)
+
+
+def _apart(logs: Sequence[Log]) -> list[Problem]:
+    """Move files that share no time with the others, and no signal either."""
+    groups = _overlapping(logs)
+    if len(groups) < 2:
+        return []
+    names = [{s.name for log in g for s in log.signals} for g in groups]
+    if any(a & b for k, a in enumerate(names) for b in names[:k]):
+        return []
+    # The longest recording is the one the others are put onto.
+    groups.sort(key=lambda g: _span(g)[0] - _span(g)[1])
+    fixed = list(groups[0])
+    problems = []
+    for group in groups[1:]:
+        why = f"{_names(group)} and {_names(fixed)} share no time"
+        problems.append(_move(fixed, group, why))
+        fixed += group
+    return problems
+
+
+def _doubts(logs: Sequence[Log]) -> list[Problem]:
+    """Tell of files with dates that agree better under an offset."""
+    problems = []
+    dated = [log for log in logs if log.absolute]
+    for k, log in enumerate(dated):
+        for other in dated[:k]:
+            if {s.name for s in log.signals} & {s.name for s in other.signals}:
+                continue
+            found, what = _offset([other], [log])
+            if found is not None and found.found and abs(found.offset) > _LATE + 5.0 * found.std:
+                problems.append(
+                    Problem(
+                        "",
+                        f"the clocks of {other.path.name} and {log.path.name} seem to be "
+                        f"{_told(found)} apart, by {what}; set align = true under [time] of its "
+                        "table in a mapping to move it",
+                        serious=True,
+                    )
+                )
+    return problems
+
+
+def _move(fixed: Sequence[Log], group: Sequence[Log], why: str) -> Problem:
+    found, what = _offset(fixed, group)
+    if found is None:
+        raise DriveError(
+            f"{why}, and they have no speed, yaw rate or engine speed in common to align them by; "
+            f"{_REMEDY}"
+        )
+    if not found.found:
+        raise DriveError(f"{why}, and {what} cannot align them: {found.refusal}; {_REMEDY}")
+    for log in group:
+        shift_clock(log, found.offset)
+        log.absolute = fixed[0].absolute
+    return Problem(
+        "",
+        f"{_names(group)}: the clock was moved by {_told(found)} onto that of {_names(fixed)}, by "
+        f"{what} (correlation {abs(found.correlation):.3f} over {found.overlap:.0f} s)",
+    )
+
+
+def _offset(fixed: Sequence[Log], group: Sequence[Log]) -> tuple[Alignment | None, str]:
+    """The surest offset of all that both sides share, and what it was found by."""
+    a, b = _merged(fixed), _merged(group)
+    tried: list[tuple[Alignment, str]] = []
+    for what, make, signed in (
+        ("speed", _speed, True),
+        ("yaw rate", _yaw_rate, False),
+        ("engine speed", _engine_speed, True),
+    ):
+        x, y = make(a), make(b)
+        if x is not None and y is not None:
+            tried.append((align(x, y, signed=signed), what))
+    good = sorted((t for t in tried if t[0].found), key=lambda t: t[0].std)
+    if not good:
+        return tried[0] if tried else (None, "")
+    best, what = good[0]
+    for other, second in good[1:]:
+        reach = _LATE + 4.0 * (best.std + other.std)
+        if abs(other.offset - best.offset) > reach:
+            text = f"{what} says {_told(best)} and {second} {_told(other)}"
+            return (
+                Alignment(best.offset, best.std, best.correlation, 1.0, best.overlap, text),
+                what,
+            )
+    return best, what
+
+
+def _told(found: Alignment) -> str:
+    digits = 3 if found.std < 0.1 else 2
+    return f"{found.offset:+.{digits}f} s (± {max(found.std, 10.0**-digits):.{digits}f} s)"
+
+
+def _names(logs: Sequence[Log]) -> str:
+    return ", ".join(log.path.name for log in logs)
+
+
+def _span(logs: Sequence[Log]) -> tuple[float, float]:
+    return (
+        min(float(s.time[0]) for log in logs for s in log.signals),
+        max(float(s.time[-1]) for log in logs for s in log.signals),
+    )
+
+
+def _overlapping(logs: Sequence[Log]) -> list[list[Log]]:
+    """Group files whose times overlap."""
+    groups: list[list[Log]] = []
+    end = -np.inf
+    for log in sorted(logs, key=lambda log: _span([log])[0]):
+        start, last = _span([log])
+        if groups and start <= end:
+            groups[-1].append(log)
+        else:
+            groups.append([log])
+        end = max(end, last)
+    return groups
+
+
+def _merged(logs: Sequence[Log]) -> dict[str, Signal]:
+    """Signals of files on one clock, parts of one signal joined where they follow each other."""
+    parts: dict[str, list[Signal]] = {}
+    for log in logs:
+        for s in log.signals:
+            parts.setdefault(s.name, []).append(s)
+    merged = {}
+    for name, pieces in parts.items():
+        pieces.sort(key=lambda s: float(s.time[0]))
+        kept = pieces[:1]
+        for s in pieces[1:]:
+            if s.time[0] > kept[-1].time[-1]:
+                kept.append(s)
+        merged[name] = Signal(
+            name,
+            np.concatenate([s.time for s in kept]),
+            np.concatenate([s.values for s in kept]),
+        )
+    return merged
+
+
+def _speed(signals: _Signals) -> Signal | None:
+    """Speed from the wheels or over ground, else from the way between fixes."""
+    for name in ("vehicle_speed", "gnss_speed"):
+        if name in signals:
+            return signals[name]
+    lat, lon = signals.get("latitude"), signals.get("longitude")
+    if lat is None or lon is None or len(lat) < 3:
+        return None
+    step = np.diff(lat.time)
+    north = np.diff(lat.values)
+    east = np.diff(np.unwrap(lon.at(lat.time))) * np.cos(lat.values[:-1])
+    good = (step < 5.0) & np.isfinite(east)
+    if not good.any():
+        return None
+    middle = 0.5 * (lat.time[1:] + lat.time[:-1])
+    way = EARTH_RADIUS * np.hypot(north, east)
+    return Signal("gnss_speed", middle[good], (way / step)[good])
+
+
+def _engine_speed(signals: _Signals) -> Signal | None:
+    return signals.get("engine_speed")
+
+
+def _yaw_rate(signals: _Signals) -> Signal | None:
+    """Turning: about the axis a gyroscope turns most about, else by the course over ground."""
+    axes = [signals.get(f"gyro_{a}") for a in "xyz"]
+    present = [s for s in axes if s is not None]
+    if len(present) == 3:
+        time = present[0].time
+        rates = np.column_stack([s.at(time) for s in present])
+        good = np.isfinite(rates).all(axis=1)
+        bins = np.floor(time[good] / _TURN)
+        _, which, count = np.unique(bins, return_inverse=True, return_counts=True)
+        if count.size < 3:
+            return None
+
+        def mean(values: Floats) -> Floats:
+            return np.asarray(np.bincount(which, values) / count)
+
+        slow = np.column_stack([mean(rates[good, k]) for k in range(3)])
+        _, _, directions = np.linalg.svd(slow - slow.mean(axis=0), full_matrices=False)
+        return Signal("yaw_rate", mean(time[good]), slow @ directions[0])
+    course, speed = signals.get("gnss_course"), signals.get("gnss_speed")
+    if course is None or speed is None or len(course) < 3:
+        return None
+    step = np.diff(course.time)
+    turn = (np.diff(course.values) + np.pi) % (2.0 * np.pi) - np.pi
+    middle = 0.5 * (course.time[1:] + course.time[:-1])
+    good = (step < 3.0) & (np.nan_to_num(speed.at(middle)) > _MOVING)
+    return Signal("yaw_rate", middle[good], (turn / step)[good]) if good.any() else None

@@ -1,0 +1,161 @@
+"""Drives of several files whose clocks differ."""
+
+import re
+
+import numpy as np
+import polars as pl
+import pytest
+from tests.unit.test_alignment import road_speed
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io import read_drive
+
+WHEEL = np.arange(0.0, 600.0, 0.25)
+FIX = np.arange(100.0, 500.0, 1.0)
+
+
+def obd(folder, start=0.0, name="obd.csv", speed=None):
+    v = road_speed(WHEEL) if speed is None else speed
+    frame = {"time_s": WHEEL + start, "vehicle_speed_kmh": 3.6 * v, "engine_speed_rpm": 100.0 * v}
+    pl.DataFrame(frame).write_csv(folder / name)
+    return folder / name
+
+
+def gnss(folder, offset=0.0, name="fixes.csv"):
+    """Speed over ground on a clock that lags by ``offset``."""
+    noise = np.random.default_rng(4).normal(scale=0.1, size=FIX.size)
+    frame = {"time_s": FIX - offset, "gnss_speed_mps": np.maximum(road_speed(FIX) + noise, 0.0)}
+    pl.DataFrame(frame).write_csv(folder / name)
+    return folder / name
+
+
+def gpx(folder, offset=0.0, begin="2021-03-05T10:00:00"):
+    """A track without speeds: it has to be found from the way between points."""
+    start = np.datetime64(begin, "ms")
+    way = np.concatenate([[0.0], np.cumsum(road_speed(np.arange(100.005, 500.0, 0.01)))]) * 0.01
+    north = np.degrees(np.interp(FIX, 100.0 + 0.01 * np.arange(way.size), way) / 6_371_008.8)
+    points = "".join(
+        f'<trkpt lat="{48.0 + n:.9f}" lon="11.0"><time>'
+        f"{start + np.timedelta64(round(1000 * (t - offset)), 'ms')}Z</time></trkpt>"
+        for t, n in zip(FIX, north, strict=True)
+    )
+    path = folder / "track.gpx"
+    path.write_text(f'<gpx version="1.1" creator="t"><trk><trkseg>{points}</trkseg></trk></gpx>')
+    return path
+
+
+def told(drive):
+    return [p for p in drive.problems if "clock" in p.text]
+
+
+def moved_by(drive):
+    """Offset and its standard deviation as the note tells them."""
+    found = re.search(r"moved by ([+-]?[\d.]+) s \(± ([\d.]+) s\)", told(drive)[0].text)
+    return float(found.group(1)), float(found.group(2))
+
+
+def test_a_file_the_mapping_names_is_aligned(tmp_path):
+    obd(tmp_path)
+    gnss(tmp_path, 33.3)
+    mapping = {"tables": {"gps": {"files": "fixes.csv", "time": {"align": True}}}}
+    drive = read_drive([tmp_path / "obd.csv", tmp_path / "fixes.csv"], mapping)
+    offset, std = moved_by(drive)
+    assert abs(offset - 33.3) < 4.0 * std + 0.01
+    assert abs(drive.signals["gnss_speed"].time[0] - 100.0) < 4.0 * std + 0.01
+    assert drive.signals["vehicle_speed"].time[0] == 0.0
+    assert not any(p.serious for p in drive.problems)
+
+
+def test_without_the_mapping_clocks_that_overlap_are_believed(tmp_path):
+    drive = read_drive([obd(tmp_path), gnss(tmp_path, 33.3)])
+    assert told(drive) == []
+    assert abs(drive.signals["gnss_speed"].time[0] - 66.7) < 1e-9
+
+
+def test_files_that_share_no_time_are_aligned(tmp_path):
+    drive = read_drive([obd(tmp_path), gnss(tmp_path, -40_000.0)])
+    offset, std = moved_by(drive)
+    assert abs(offset + 40_000.0) < 4.0 * std + 0.01
+    assert abs(drive.signals["gnss_speed"].time[0] - 100.0) < 4.0 * std + 0.01
+
+
+def test_parts_of_one_recording_are_not_moved(tmp_path):
+    drive = read_drive([obd(tmp_path), obd(tmp_path, 1000.0, "more.csv")])
+    assert told(drive) == []
+    assert drive.duration == pytest.approx(1599.75)
+
+
+@pytest.mark.parametrize("offset", [0.0, 17.5])
+def test_seconds_are_put_onto_dates(tmp_path, offset):
+    drive = read_drive([obd(tmp_path), gpx(tmp_path, offset)])
+    assert drive.info.start_time is not None
+    speed, lat = drive.signals["vehicle_speed"], drive.signals["latitude"]
+    assert abs((lat.time[0] - speed.time[0]) - 100.0) < 0.1
+    assert "track.gpx" in told(drive)[0].text
+
+
+def test_dates_that_disagree_by_minutes_are_a_serious_doubt(tmp_path):
+    path = obd(tmp_path)
+    text = path.read_text().splitlines()
+    rows = [r.split(",") for r in text[1:]]
+    start = np.datetime64("2021-03-05T10:02:00", "ms")
+    stamps = [start + np.timedelta64(round(1000 * float(r[0])), "ms") for r in rows]
+    body = [f"{t}Z,{r[1]}" for t, r in zip(stamps, rows, strict=True)]
+    path.write_text("\n".join(["when,v", *body]))
+    mapping = {
+        "time": {"column": "when", "format": "iso"},
+        "signals": {"vehicle_speed": {"column": "v", "unit": "kmh"}},
+    }
+    files = [path, gpx(tmp_path)]
+    drive = read_drive(files, mapping)
+    assert [p.serious for p in told(drive)] == [True]
+    assert "+120.00" in told(drive)[0].text
+    assert read_drive([path, gpx(tmp_path, -120.0)], mapping).problems == ()
+
+
+def test_nothing_in_common_is_refused(tmp_path):
+    (tmp_path / "imu.csv").write_text("time_s,accel_x_mps2\n0,1\n1,2\n")
+    with pytest.raises(DriveError, match="no speed, yaw rate or engine speed in common"):
+        read_drive([tmp_path / "imu.csv", gpx(tmp_path)])
+
+
+def test_an_ambiguous_offset_is_refused(tmp_path):
+    wave = 15.0 + 5.0 * np.sin(2 * np.pi * WHEEL / 40.0)
+    obd(tmp_path, speed=wave)
+    v = 15.0 + 5.0 * np.sin(2 * np.pi * FIX / 40.0)
+    frame = pl.DataFrame({"time_s": FIX - 40_000.0, "gnss_speed_mps": v})
+    frame.write_csv(tmp_path / "fixes.csv")
+    with pytest.raises(DriveError, match=r"two offsets fit alike .* offset_s"):
+        read_drive([tmp_path / "obd.csv", tmp_path / "fixes.csv"])
+
+
+def test_a_gyroscope_is_aligned_by_turning(tmp_path):
+    """A gyroscope of unknown mounting against the course over ground."""
+    t = np.arange(0.0, 600.0, 0.02)
+    rng = np.random.default_rng(0)
+    turn = 0.1 * (road_speed(t, 5) - 15.0)
+    axis = np.array([0.2, -0.9, 0.4]) / np.linalg.norm([0.2, -0.9, 0.4])
+    rates = turn[:, None] * axis + rng.normal(scale=0.02, size=(t.size, 3)) + [0.01, 0.0, -0.02]
+    imu = {"time_s": t + 5000.0, **{f"gyro_{a}_radps": rates[:, k] for k, a in enumerate("xyz")}}
+    pl.DataFrame(imu).write_csv(tmp_path / "imu.csv")
+    course = np.interp(FIX, t, np.cumsum(turn) * 0.02) % (2 * np.pi)
+    frame = {"time_s": FIX, "speed_mps": np.full(FIX.size, 12.0), "course_rad": course}
+    pl.DataFrame(frame).write_csv(tmp_path / "gnss.csv")
+    drive = read_drive([tmp_path / "imu.csv", tmp_path / "gnss.csv"])
+    offset, std = moved_by(drive)
+    assert abs(offset - 5000.0) < 4.0 * std + 0.02
+    assert "by yaw rate" in told(drive)[0].text
+
+
+def test_the_clock_alone_may_stand_in_a_mapping(tmp_path):
+    gnss(tmp_path)
+    mapping = {"tables": {"gps": {"files": "*.csv", "time": {"offset_s": 7.0}}}}
+    drive = read_drive(tmp_path / "fixes.csv", mapping)
+    assert drive.signals["gnss_speed"].time[0] == 107.0
+
+
+@pytest.mark.parametrize("time", [{}, {"column": "t"}, {"align": False}])
+def test_a_mapping_without_signals_and_clock_is_refused(tmp_path, time):
+    gnss(tmp_path)
+    with pytest.raises(ConfigError, match="is missing: name at least one column"):
+        read_drive(tmp_path / "fixes.csv", {"tables": {"gps": {"files": "*.csv", "time": time}}})
