@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weighbridge.estimators.rls import COLD_STD, block_jackknife, consider_std
+from weighbridge.estimators.judging import COLD_STD, consider_std
+from weighbridge.estimators.rls import block_jackknife
 from weighbridge.vehicle.model import Provenance, TorqueModel, Vehicle
 
 CAR = Vehicle(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import Motion
@@ -32,6 +33,7 @@ class Reason(IntEnum):
     EXTRAPOLATED = 8
     NOT_ACCELERATING = 9
     BAD_FIT = 10
+    TOO_SHORT = 11
 
     @property
     def text(self) -> str:
@@ -51,6 +53,7 @@ REASON_TEXT: Final[dict[Reason, str]] = {
     Reason.EXTRAPOLATED: "outside torque model",
     Reason.NOT_ACCELERATING: "not accelerating",
     Reason.BAD_FIT: "bad fit",
+    Reason.TOO_SHORT: "too short a stretch",
 }
 """Every reason as tables and reports print it."""
 
@@ -149,14 +152,23 @@ class ForceBalance:
 
 
 def force_balance(
-    drive: Drive, vehicle: Vehicle, motion: Motion, *, delay: float | None = None
+    drive: Drive,
+    vehicle: Vehicle,
+    motion: Motion,
+    *,
+    delay: float | None = None,
+    lag: float | None = None,
 ) -> ForceBalance:
     """Bring the force and the motion of a drive together.
+
+    A control unit smooths what it reports. The motion is smoothed alike, so
+    that both sides have lost the same.
 
     Parameters
     ----------
     drive, vehicle, motion
     delay : lateness of the torque; the vehicle's when None, 0 if that is unknown [s]
+    lag : time constant of its first-order smoothing; the vehicle's when None [s]
 
     Raises
     ------
@@ -168,7 +180,7 @@ def force_balance(
         delay = vehicle.timing.torque_delay or 0.0
     recorded = source.time
     time = recorded - delay
-    rows = _motion_at(motion, time)
+    rows = _motion_at(_smoothed(motion, vehicle.timing.torque_lag if lag is None else lag), time)
     driveline = vehicle.driveline
 
     engine_speed = _engine_speed(drive, vehicle, time + motion.speed_delay, rows["speed"])
@@ -253,6 +265,24 @@ def headwind(drive: Drive, heading: Floats) -> Floats:
         return np.zeros_like(heading)
     along = WIND_AT_VEHICLE * speed * np.cos(direction - heading)
     return np.asarray(np.where(np.isfinite(along), along, 0.0))
+
+
+def _smoothed(motion: Motion, lag: float) -> Motion:
+    """Pass what the force side is compared with through a first-order lag [s]."""
+    if lag <= 0.0:
+        return motion
+    keep = float(np.exp(-1.0 / (motion.rate * lag)))
+
+    def behind(values: Floats) -> Floats:
+        start = [keep * values[0]]
+        return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=start)[0])
+
+    return replace(
+        motion,
+        specific_force=behind(motion.specific_force),
+        accel=behind(motion.accel),
+        grade=behind(motion.grade),
+    )
 
 
 def _motion_at(motion: Motion, time: Floats) -> dict[str, Floats]:

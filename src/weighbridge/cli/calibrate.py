@@ -44,6 +44,9 @@ def calibrate(
         Optional[float],  # noqa: UP045
         typer.Option("--tare", help="Mass without payload in kg; payloads count from it."),
     ] = None,
+    method: Annotated[
+        str, typer.Option("--method", help="Estimator to calibrate for: rls or joint.")
+    ] = "rls",
     order: Annotated[
         Optional[int],  # noqa: UP045
         typer.Option("--order", min=0, max=4, help="Power of engine speed in the torque fit."),
@@ -81,7 +84,13 @@ def calibrate(
         raise ConfigError(f"--torque {torque}: must be measured, percent, load or air_flow")
     base = Vehicle.load(vehicle) if vehicle is not None else None
     recorded = [load(path, mapping_for(mapping, base, vehicle), dbc) for path in drives]
-    settings = CalibrationSettings(order=order, source=torque, grid=grid, curved=not straight)  # type: ignore[arg-type]
+    settings = CalibrationSettings(
+        order=order,
+        source=torque,  # type: ignore[arg-type]
+        grid=grid,
+        curved=not straight,
+        method=method,  # type: ignore[arg-type]
+    )
     masses = mass[0] if mass is not None and len(mass) == 1 else mass
     done = run_calibration(recorded, masses, vehicle=base, settings=settings)
     if tare is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -26,7 +26,8 @@ from weighbridge.estimators.rls import block_jackknife, regression
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
-from weighbridge.signals import Drive, Floats
+from weighbridge.pipeline.joint_calibrating import JointProblem, refine
+from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
     MASS_RANGE,
@@ -66,18 +67,22 @@ class CalibrationSettings:
     grid : solve on the grid of Jensen 2022, Table 5, in place of the bounds
     curved : let the torque per load change with engine speed and load; off for
         the regression of eq. 49 as printed
+    method : estimator the vehicle is calibrated for, "rls" by eq. 48 or "joint"
     """
 
     order: int | None = None
     source: TorqueSource | None = None
     grid: bool = False
     curved: bool = True
+    method: Literal["rls", "joint"] = "rls"
 
     def __post_init__(self) -> None:
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
         if self.source is not None and self.source not in SIGNALS:
             raise ConfigError(f"source must be one of {', '.join(SIGNALS)}, got {self.source!r}")
+        if self.method not in ("rls", "joint"):
+            raise ConfigError(f"method must be rls or joint, got {self.method!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -232,12 +237,29 @@ def run_calibration(
     scale, scale_std = _self_weighing(balances, finished, masses)
     finished = replace(
         finished,
-        torque=_scaled(finished.torque, scale),
+        torque=finished.torque.scaled(scale),
         provenance=replace(
             finished.provenance,
             mass_scale_std=float(np.hypot(scale_std, TRANSFER_STD[source])),
         ),
     )
+    if settings.method == "joint":
+
+        def balance_at(k: int, delay: float, lag: float) -> tuple[ForceBalance, Floats, Bools]:
+            balance, x = _draft_balance(drives[k], motions[k], draft, source, delay, lag)
+            return balance, x, _finite(balance, x, floors[k])
+
+        def rebalance(car: Vehicle) -> list[ForceBalance]:
+            return [force_balance(d, car, m) for d, m in zip(drives, motions, strict=True)]
+
+        asked = JointProblem(
+            balance_at=balance_at,
+            masses=masses,
+            order=order,
+            curved=curved,
+            torque_noise=fitted.residual_std,
+        )
+        finished = refine(finished, asked, rebalance)
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
 
@@ -328,17 +350,20 @@ def _load_floor(drive: Drive, source: TorqueSource) -> float:
     return lowest_load(drive.signals[SIGNALS[source][0]].values) if source == "load" else 0.0
 
 
-def _usable(balance: ForceBalance, x: Floats, floor: float) -> np.ndarray:
+def _finite(balance: ForceBalance, x: Floats, floor: float) -> Bools:
     view = balance.merged
-    return (
+    return np.asarray(
         view.usable
-        & (view.accel > 0.0)
         & (x >= floor)
         & np.isfinite(view.specific_force)
         & np.isfinite(view.gearing)
         & np.isfinite(x)
         & np.isfinite(balance.force.engine_speed)
     )
+
+
+def _usable(balance: ForceBalance, x: Floats, floor: float) -> Bools:
+    return _finite(balance, x, floor) & (balance.merged.accel > 0.0)
 
 
 def _drive_rows(
@@ -366,7 +391,12 @@ def _drive_rows(
 
 
 def _draft_balance(
-    drive: Drive, motion: Motion, draft: Vehicle, source: TorqueSource, delay: float
+    drive: Drive,
+    motion: Motion,
+    draft: Vehicle,
+    source: TorqueSource,
+    delay: float,
+    lag: float = 0.0,
 ) -> tuple[ForceBalance, Floats]:
     """Balance without a torque model yet, and the torque source at its stamps."""
     stamps = drive.signals[SIGNALS[source][0]].time
@@ -375,7 +405,7 @@ def _draft_balance(
     if source == "load":
         load = drive.signals["engine_load"]
         stand_in = drive.with_signals(replace(load, name="engine_torque"))
-    return force_balance(stand_in, draft, motion, delay=delay), x
+    return force_balance(stand_in, draft, motion, delay=delay, lag=lag), x
 
 
 def _ranges(
@@ -488,14 +518,4 @@ def _fitted_road_load(fitted: TorqueFit) -> RoadLoad:
         rolling_coefficient=float(fitted.road[1]),
         drag_area_std=float(stds[-4]),
         rolling_coefficient_std=float(stds[-3]),
-    )
-
-
-def _scaled(model: TorqueModel, scale: float) -> TorqueModel:
-    return replace(
-        model,
-        coefficients=tuple(scale * w for w in model.coefficients),
-        coefficient_stds=tuple(scale * s for s in model.coefficient_stds),
-        curvature=tuple(scale * w for w in model.curvature),
-        curvature_stds=tuple(scale * s for s in model.curvature_stds),
     )

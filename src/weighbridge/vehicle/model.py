@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, Literal
 
@@ -141,6 +141,16 @@ class TorqueModel:
         if not 0.0 < self.engine_efficiency <= 1.0:
             raise ConfigError(f"engine_efficiency must be in (0, 1], got {self.engine_efficiency}")
 
+    def scaled(self, scale: float) -> TorqueModel:
+        """Return the model that gives ``scale`` times the torque."""
+        return replace(
+            self,
+            coefficients=tuple(scale * w for w in self.coefficients),
+            coefficient_stds=tuple(scale * s for s in self.coefficient_stds),
+            curvature=tuple(scale * w for w in self.curvature),
+            curvature_stds=tuple(scale * s for s in self.curvature_stds),
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoadLoad:
@@ -196,11 +206,14 @@ class Timing:
     ----------
     torque_delay, torque_delay_std : of torque or engine load [s]; None: to be
         found from the drive
+    torque_lag : time constant of the first-order smoothing of torque or load by
+        the control unit [s]
     speed_delay : of vehicle speed [s]; None: to be found from the drive
     """
 
     torque_delay: float | None = None
     torque_delay_std: float | None = None
+    torque_lag: float = 0.0
     speed_delay: float | None = None
 
     def __post_init__(self) -> None:
@@ -208,6 +221,8 @@ class Timing:
             delay = getattr(self, name)
             if delay is not None and not -1.0 <= delay <= 3.0:
                 raise ConfigError(f"{name} must be in [-1, 3] s, got {delay}")
+        if not 0.0 <= self.torque_lag <= 3.0:
+            raise ConfigError(f"torque_lag must be in [0, 3] s, got {self.torque_lag}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,260 @@
+"""Torque model and road load as the joint estimator needs them.
+
+The reading of the torque source stands alone on the left, because the fast
+noise is in it; disturbances stand beside the parameters; and both sides are
+averaged over the same windows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance.averaging import Windows, windows
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import DriveError
+from weighbridge.estimators.joint import (
+    DISTURBANCE_STD,
+    GATE,
+    MOTION_STD,
+    RESISTANCE_STD,
+    TIME_CONSTANTS,
+    WIND_STD,
+)
+from weighbridge.kernels import disturbance as kernel
+from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.model import VehicleClass
+
+ROAD_PRIOR: Final[dict[VehicleClass, tuple[Floats, Floats]]] = {
+    "car": (np.array([0.65, 0.010, 0.15, 6.0]), np.array([0.25, 0.004, 0.06, 1.5])),
+    "van": (np.array([1.30, 0.010, 0.30, 9.0]), np.array([0.50, 0.004, 0.12, 3.0])),
+    "bus": (np.array([5.0, 0.008, 2.0, 80.0]), np.array([1.5, 0.003, 0.8, 30.0])),
+    "truck": (np.array([5.5, 0.007, 2.5, 120.0]), np.array([1.5, 0.003, 1.0, 50.0])),
+}
+"""C_d A [m^2], C_r [-], I_e and I_w [kg m^2] of a class and their standard deviations:
+Gillespie, Fundamentals of Vehicle Dynamics, 1992, ch. 4; inertias as in Jensen 2022,
+sec. 7.3, for cars and in proportion to engine and wheels for the others."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveRows:
+    """What one drive of known mass gives to the fit, one row per usable sample.
+
+    Attributes
+    ----------
+    view : merged view of the drive
+    regressor : load [-] or torque [N m]
+    engine_speed : [rad/s]
+    usable : rows to take
+    mass : known [kg]
+    """
+
+    view: MergedView
+    regressor: Floats
+    engine_speed: Floats
+    usable: Bools
+    mass: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InverseFit:
+    """Result of the fit.
+
+    Attributes
+    ----------
+    coefficients : (p,) w0, w1, w2 ... of Jensen 2022, eq. 49, then the curvature
+    road : (4,) C_d A, C_r, I_e, I_w
+    stds : (p + 4,) standard deviations of both
+    log_likelihood : of the innovations
+    windows : number of windows
+    """
+
+    coefficients: Floats
+    road: Floats
+    stds: Floats
+    log_likelihood: float
+    windows: int
+
+
+def fit(
+    drives: list[DriveRows],
+    kind: VehicleClass,
+    wheel_radius: float,
+    *,
+    order: int,
+    curved: bool,
+    torque_noise: float,
+    inertias: tuple[float, float] | None = None,
+    rounds: int = 3,
+) -> InverseFit:
+    """Fit the reading of the torque source to the force that the motion takes.
+
+    With the fast noise on the side of the torque source, its reading is what
+    is regressed: ``w1 G L = m f + C_d A q + ... - G (w0 + w2 N + ...)`` is
+    divided by w1, which keeps the problem linear. The curvature needs the
+    reading on the right as well; there the fitted one of the round before
+    stands for it, so that no noise enters.
+
+    Parameters
+    ----------
+    drives : rows of each drive
+    kind : class of the vehicle, for `ROAD_PRIOR`
+    wheel_radius : [m]
+    order : highest power of engine speed
+    curved : let torque per load bend with engine speed and load
+    torque_noise : of one reading, as torque [N m]
+    inertias : I_e and I_w where the drives cannot tell them
+    rounds : of refining the fitted reading
+
+    Raises
+    ------
+    DriveError
+        Too few usable windows.
+    """
+    cuts = [windows(d.view.time, d.usable) for d in drives]
+    total = sum(cut.count.size for cut in cuts)
+    mean, std = (values.copy() for values in ROAD_PRIOR[kind])
+    if inertias is not None:
+        mean[2:], std[2:] = inertias, 1e-3 * np.array(inertias)
+    p = 2 + order + 2 * curved
+    if total < 15 * (p + 4):
+        raise DriveError(
+            f"only {total} usable stretches of {p + 4} needed parameters; drive longer, with more "
+            "starts and in all gears"
+        )
+    scale = _torque_per_reading(drives)
+    readings = [d.regressor for d in drives]
+    for _ in range(rounds):
+        state, fitted = _solve(
+            drives, cuts, readings, scale, mean, std, wheel_radius, order, curved, torque_noise
+        )
+        readings = fitted
+    return _unpack(state, scale, order, curved, total)
+
+
+def _torque_per_reading(drives: list[DriveRows]) -> float:
+    """Rough torque per unit of reading, to make the first coefficient about one [N m]."""
+    slopes = []
+    for d in drives:
+        rows = d.usable
+        target = d.mass * d.view.specific_force[rows] / d.view.gearing[rows]
+        reading = d.regressor[rows]
+        centred = reading - reading.mean()
+        slopes.append(float(centred @ target) / float(centred @ centred))
+    return float(np.median(slopes))
+
+
+def _columns(
+    d: DriveRows, reading: Floats, scale: float, wheel_radius: float, order: int, curved: bool
+) -> Floats:
+    """Columns of one drive: motion, road load, torque terms, disturbances."""
+    view = d.view
+    gearing = np.nan_to_num(view.gearing)
+    speed = d.engine_speed
+    heading = np.where(np.isfinite(view.heading), view.heading, 0.0)
+    known = np.isfinite(view.heading)
+    push = view.air_density * 0.5 * view.speed
+    terms = [speed**k for k in range(1, order + 1)]
+    if curved:
+        terms += [reading * speed, reading**2]
+    one = np.ones_like(gearing)
+    columns = [
+        d.mass * view.specific_force,
+        0.5 * view.air_density * view.speed**2,
+        d.mass * GRAVITY * np.cos(view.grade),
+        gearing**2 * view.accel,
+        view.accel / wheel_radius**2,
+        -gearing,
+        *(-gearing * term for term in terms),
+        one,
+        one,
+        np.where(known, push * np.cos(heading), 0.0),
+        np.where(known, push * np.sin(heading), 0.0),
+    ]
+    return np.asarray(np.nan_to_num(np.column_stack(columns)))
+
+
+def _solve(
+    drives: list[DriveRows],
+    cuts: list[Windows],
+    readings: list[Floats],
+    scale: float,
+    mean: Floats,
+    std: Floats,
+    wheel_radius: float,
+    order: int,
+    curved: bool,
+    torque_noise: float,
+) -> tuple[kernel.DisturbanceState, list[Floats]]:
+    """Run the filter over all drives one after another."""
+    times, rows, targets, variances, parts = [], [], [], [], []
+    clock = 0.0
+    mass = float(np.mean([d.mass for d in drives]))
+    for d, cut, reading in zip(drives, cuts, readings, strict=True):
+        columns = _columns(d, reading, scale, wheel_radius, order, curved)
+        gearing = np.nan_to_num(d.view.gearing)
+        time = cut.mean(d.view.time)
+        times.append(time - time[0] + clock)
+        # Between two drives every disturbance has faded.
+        clock = float(times[-1][-1]) + 1e5
+        rows.append(cut.mean(columns))
+        targets.append(cut.mean(scale * gearing * np.nan_to_num(d.regressor)))
+        torque = cut.mean((torque_noise * gearing) ** 2)
+        variances.append((torque + (mass * MOTION_STD) ** 2) / cut.count + (mass * 0.008) ** 2)
+        parts.append(columns)
+    stacked = np.ascontiguousarray(np.vstack(rows))
+    extra = 1 + order + 2 * curved
+    typical = np.sqrt(np.mean(stacked[:, 5 : 5 + extra] ** 2, axis=0))
+    force = float(np.sqrt(np.mean(np.concatenate(targets) ** 2)))
+    loose = 3.0 * force / np.maximum(typical, 1e-12)
+    fading = np.array(
+        [
+            mass * DISTURBANCE_STD,
+            mass * RESISTANCE_STD,
+            WIND_STD * 2 * mean[0],
+            WIND_STD * 2 * mean[0],
+        ]
+    )
+    x0 = np.concatenate(([1.0], mean, np.zeros(extra), np.zeros(4)))
+    prior = np.concatenate(([0.5], std, loose, fading)) ** 2
+    params = kernel.DisturbanceParams(
+        time_constant=np.concatenate((np.full(5 + extra, np.inf), TIME_CONSTANTS)),
+        std=np.concatenate((np.zeros(5 + extra), fading)),
+        gate=GATE,
+        settle=100,
+    )
+    start = kernel.initial_state(x0, np.diag(prior), 0.0)  # type: ignore[no-untyped-call]
+    state, _, _, _, _ = kernel.run(
+        start, np.concatenate(times), stacked, np.concatenate(targets),
+        np.concatenate(variances), params,
+    )  # fmt: skip
+    fitted = []
+    for d, columns in zip(drives, parts, strict=True):
+        gearing = np.nan_to_num(d.view.gearing)
+        predicted = columns[:, : 5 + extra] @ state.x[: 5 + extra]
+        safe = np.maximum(gearing, 1e-3)
+        fitted.append(np.where(gearing > 0.0, predicted / (scale * safe), d.regressor))
+    return state, fitted
+
+
+def _unpack(
+    state: kernel.DisturbanceState, scale: float, order: int, curved: bool, total: int
+) -> InverseFit:
+    """Divide by the first coefficient, and carry the covariance along."""
+    extra = 1 + order + 2 * curved
+    x, cov = state.x[: 5 + extra], state.cov[: 5 + extra, : 5 + extra]
+    ratio = x[1:] / x[0]
+    var = (np.diag(cov)[1:] - 2.0 * ratio * cov[1:, 0] + ratio**2 * cov[0, 0]) / x[0] ** 2
+    slope = scale / x[0]
+    slope_std = slope * float(np.sqrt(cov[0, 0])) / x[0]
+    stds = np.sqrt(np.maximum(var, 0.0))
+    return InverseFit(
+        coefficients=np.concatenate(([ratio[4]], [slope], ratio[5:])),
+        road=ratio[:4],
+        stds=np.concatenate(([stds[4]], [slope_std], stds[5:], stds[:4])),
+        log_likelihood=float(state.log_likelihood),
+        windows=total,
+    )

@@ -1,0 +1,167 @@
+"""What all estimators answer the same way: status, slow uncertainty, segments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.balance import ForceBalance, Reason
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.estimators.track import MassTrack, Segment, Status
+from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.model import MASS_RANGE, TorqueSource, Vehicle
+
+STOP: Final = 20.0
+"""A standstill this long may change the load [s]."""
+
+WARMING: Final = 600.0
+"""Time in which engine and tyres warm [s]."""
+
+COLD_STD: Final[dict[TorqueSource, float]] = {
+    "measured": 0.02,
+    "percent": 0.02,
+    "load": 0.05,
+    "air_flow": 0.05,
+}
+"""Standard deviation of a mass made from the first `WARMING` alone, relative [-]. Load and
+air flow count the friction of a cold engine as traction: simulated cold drives of 13
+minutes came out 5 to 8 % heavy, and right when warm. Measured torque leaves the tyres, a
+fifth more rolling resistance."""
+
+UNCALIBRATED_STD: Final = 0.06
+"""Relative standard deviation of masses by a vehicle file that was never calibrated and
+does not say how sure it is [-]: torque and efficiency 4 %, rolling radius 2 %, lean of the
+accelerometer 3 %."""
+
+LIGHTEST: Final = 0.85
+"""Below this part of the tare no error of the calibration explains the mass [-]."""
+
+
+def consider_std(time: Floats, phi: Floats, used: Bools, vehicle: Vehicle) -> float:
+    """Relative standard deviation that no row of this drive can take away [-].
+
+    What the calibration left open, and the cold start: engine and tyres that
+    are not warm yet make a vehicle seem heavy, by as much as `COLD_STD` where
+    all that was learnt is from the first `WARMING` of driving.
+    """
+    scale = vehicle.provenance.mass_scale_std
+    if scale is None:
+        scale = UNCALIBRATED_STD
+    if not used.any():
+        return scale
+    power = phi[used] ** 2
+    moving = time[used]
+    early = float(np.sum(power[moving < moving[0] + WARMING]) / np.sum(power))
+    return float(np.hypot(scale, early * COLD_STD[vehicle.torque.source]))
+
+
+def judge(
+    view: MergedView, vehicle: Vehicle, used: Bools, mass: float, std: float, blocks: int
+) -> tuple[Status, str]:
+    """Say whether the rows carry a mass, and why not."""
+    count = int(np.count_nonzero(used))
+    if count < 50 or blocks < 3:
+        told, share = np.unique(view.reason[view.reason != 0], return_counts=True)
+        most = Reason(int(told[np.argmax(share)])).text if told.size else "too short"
+        return Status.NOT_EXCITED, (
+            f"only {count} usable samples, in {blocks} stretch(es) of time; "
+            f"most of the others: {most}"
+        )
+    if not np.isfinite(std) or std > 0.15 * abs(mass):
+        return Status.NOT_EXCITED, (
+            f"the drive says {mass:.0f} kg give or take {std:.0f} kg, which is no weighing; "
+            "more starts and hills are needed"
+        )
+    low, high = MASS_RANGE[vehicle.kind]
+    if not low < mass < high:
+        return Status.INCONSISTENT, (
+            f"the estimate is {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "
+            f"{high:.0f} kg; check the vehicle file's class and gearings and the torque's sign "
+            "and scale"
+        )
+    if vehicle.tare is not None and mass + 3.0 * std < LIGHTEST * vehicle.tare:
+        return Status.INCONSISTENT, (
+            f"the estimate is {mass:.0f} kg, less than the tare of {vehicle.tare:.0f} kg; "
+            "check that the vehicle file is this vehicle's, and the torque's scale"
+        )
+    return Status.CONVERGED, ""
+
+
+def converged_at(time: Floats, running: Floats, mass: float, used: Bools) -> float:
+    """When the running mass stays within 5 % of the final one for good [s]; NaN if never."""
+    off = np.abs(running - mass) > 0.05 * abs(mass)
+    if not used.any() or not np.isfinite(mass) or off[-1]:
+        return float("nan")
+    last = np.flatnonzero(off)
+    return float(time[last[-1] + 1]) if last.size else float(time[used][0])
+
+
+def segments(
+    view: MergedView, weigh_part: Callable[[slice], tuple[float, float]]
+) -> tuple[Segment, ...]:
+    """Weigh between standstills of `STOP` or longer.
+
+    Parameters
+    ----------
+    view : rows of the drive
+    weigh_part : mass and standard deviation of some rows [kg]
+    """
+    time = view.time
+    if time.size < 2:
+        return ()
+    moving = np.nan_to_num(view.speed) > 0.5
+    starts = np.flatnonzero(np.diff(np.concatenate(([False], moving))) & moving)
+    edges = [0]
+    for k in starts:
+        before = np.flatnonzero(moving[:k])
+        if before.size and time[k] - time[before[-1]] >= STOP:
+            edges.append(int(k))
+    found = []
+    for a, b in zip(edges, [*edges[1:], time.size], strict=True):
+        part = slice(a, b)
+        if not moving[part].any():
+            continue
+        mass, std = weigh_part(part)
+        known = np.isfinite(std) and std < 0.15 * mass
+        found.append(
+            Segment(
+                start=float(time[a]),
+                end=float(time[b - 1]),
+                mass=mass if known else float("nan"),
+                std=std if known else float("nan"),
+            )
+        )
+    return tuple(found)
+
+
+def nothing(
+    method: str,
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    reason: NDArray[np.uint8],
+    stretches: int,
+) -> MassTrack:
+    """Return the track of a drive that has too few usable rows for any estimate."""
+    view = balance.merged
+    unknown = np.full(view.time.size, np.nan)
+    used = reason == Reason.USED
+    _, why = judge(view, vehicle, np.zeros_like(used), float("nan"), float("inf"), stretches)
+    return MassTrack(
+        method=method,
+        balance=balance,
+        running_mass=unknown,
+        running_std=unknown,
+        residual=unknown,
+        reason=reason,
+        mass=float("nan"),
+        std=float("inf"),
+        degrees_of_freedom=float("inf"),
+        bound_std=float("nan"),
+        converged_at=float("nan"),
+        status=Status.NOT_EXCITED,
+        why=why,
+        segments=(),
+    )

@@ -1,0 +1,134 @@
+"""Linear Kalman filter of constants and disturbances that fade."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from weighbridge.kernels._jit import kernel
+
+
+class DisturbanceParams(NamedTuple):
+    """How each state moves on its own.
+
+    Attributes
+    ----------
+    time_constant : (n,) of a first-order Gauss-Markov state [s]; infinite for a
+        constant
+    std : (n,) stationary standard deviation of the fading states, 0 for constants
+    gate : innovations beyond this many standard deviations are left out [-]
+    settle : rows before the gate closes
+    """
+
+    time_constant: np.ndarray
+    std: np.ndarray
+    gate: float
+    settle: int
+
+
+class DisturbanceState(NamedTuple):
+    """Estimate, covariance, and what was seen so far.
+
+    Attributes
+    ----------
+    x : (n,) states
+    cov : (n, n)
+    time : of the last row [s]
+    rows : rows seen
+    log_likelihood : of all innovations, gated ones counted at the gate
+    """
+
+    x: np.ndarray
+    cov: np.ndarray
+    time: float
+    rows: int
+    log_likelihood: float
+
+
+def initial_state(x, cov, time):
+    """Start from ``x`` (n,) with ``cov`` (n, n) at ``time`` [s]."""
+    return DisturbanceState(
+        np.array(x, dtype=np.float64), np.array(cov, dtype=np.float64), float(time), 0, 0.0
+    )
+
+
+@kernel
+def step(state, time, row, y, noise_var, params):
+    """Let the states fade until ``time`` and fold in ``y = row @ x + noise``.
+
+    Parameters
+    ----------
+    state : DisturbanceState
+    time : float
+        Not before the last row [s].
+    row : (n,) float64
+    y, noise_var : float
+        Measurement and its noise variance, > 0.
+    params : DisturbanceParams
+
+    Returns
+    -------
+    state : DisturbanceState
+    innovation : float
+        Divided by its standard deviation [-].
+    taken : bool
+        False where the gate left the row out.
+
+    References
+    ----------
+    Gelb, Applied Optimal Estimation, 1974, ch. 3.8 (Gauss-Markov), 4.2.
+    """
+    x = state.x.copy()
+    cov = state.cov.copy()
+    span = time - state.time
+    for i in range(x.size):
+        if params.std[i] > 0.0:
+            keep = np.exp(-span / params.time_constant[i])
+            x[i] *= keep
+            cov[i, :] *= keep
+            cov[:, i] *= keep
+            cov[i, i] += params.std[i] ** 2 * (1.0 - keep * keep)
+    cov_row = cov @ row
+    innovation_var = row @ cov_row + noise_var
+    innovation = (y - row @ x) / np.sqrt(innovation_var)
+    taken = state.rows < params.settle or abs(innovation) <= params.gate
+    seen = min(abs(innovation), params.gate)
+    likelihood = state.log_likelihood - 0.5 * (np.log(innovation_var) + seen * seen)
+    if taken:
+        gain = cov_row / innovation_var
+        x = x + gain * (y - row @ x)
+        cov = cov - np.outer(gain, cov_row)
+    return DisturbanceState(x, cov, time, state.rows + 1, likelihood), innovation, taken
+
+
+@kernel
+def run(state, time, rows, y, noise_var, params):
+    """Apply ``step`` to each row.
+
+    Parameters
+    ----------
+    state : DisturbanceState
+    time : (m,) float64
+        Not falling [s].
+    rows : (m, n) float64
+    y, noise_var : (m,) float64
+    params : DisturbanceParams
+
+    Returns
+    -------
+    state : DisturbanceState
+        After the last row.
+    first, first_var : (m,) float64
+        The first state and its variance after each row.
+    innovation : (m,) float64
+        Divided by its standard deviation [-].
+    taken : (m,) bool
+    """
+    first = np.empty(y.size)
+    first_var = np.empty(y.size)
+    innovation = np.empty(y.size)
+    taken = np.empty(y.size, dtype=np.bool_)
+    for k in range(y.size):
+        state, innovation[k], taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
+        first[k] = state.x[0]
+        first_var[k] = state.cov[0, 0]
+    return state, first, first_var, innovation, taken
