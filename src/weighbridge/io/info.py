@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+from decimal import Decimal
 from pathlib import Path
 from typing import Final
 
@@ -9,9 +11,12 @@ import tomlkit
 
 from weighbridge.errors import DriveError
 from weighbridge.signals import DriveInfo
-from weighbridge.signals.tomlfile import exact_text, read_toml
+from weighbridge.signals.tomlfile import Section, exact_text, read_toml
 
 FILE_NAME: Final = "drive.toml"
+
+MDF_INFO_MARK: Final = "# drive.toml\n"
+"""First line of an MDF file's comment that holds what is known of the drive."""
 
 # Key, field and canonical unit of every number.
 _NUMBERS: Final = (
@@ -32,7 +37,25 @@ def read_info(path: Path) -> DriveInfo:
     DriveError
         A key is unknown or a value impossible.
     """
-    root = read_toml(path, DriveError)
+    return _info(read_toml(path, DriveError))
+
+
+def parse_info(text: str, name: str) -> DriveInfo:
+    """Read the text of a ``drive.toml`` that stands in ``name``.
+
+    Raises
+    ------
+    DriveError
+        It is no TOML, a key is unknown or a value impossible.
+    """
+    try:
+        data = tomllib.loads(text, parse_float=Decimal)
+    except tomllib.TOMLDecodeError as e:
+        raise DriveError(f"{name}: what is known of the drive is no TOML ({e})") from None
+    return _info(Section(data, name, {}, error=DriveError))
+
+
+def _info(root: Section) -> DriveInfo:
     texts = {name: root.text(name) for name in _TEXTS}
     numbers = {name: root.quantity(stem, suffix) for stem, name, suffix in _NUMBERS}
     for key, low in (("mass", 0.0), ("ambient_temperature", 0.0), ("barometric_pressure", 0.0)):
@@ -46,6 +69,11 @@ def read_info(path: Path) -> DriveInfo:
 
 def write_info(info: DriveInfo, path: Path) -> None:
     """Write a ``drive.toml``; what is unknown is left out."""
+    path.write_text(info_text(info), encoding="utf-8")
+
+
+def info_text(info: DriveInfo) -> str:
+    """Text of a ``drive.toml``; what is unknown is left out."""
     document = tomlkit.document()
     for name in _TEXTS:
         if (text := getattr(info, name)) is not None:
@@ -53,4 +81,4 @@ def write_info(info: DriveInfo, path: Path) -> None:
     for stem, name, suffix in _NUMBERS:
         if (value := getattr(info, name)) is not None:
             document.add(f"{stem}_{suffix}", tomlkit.value(exact_text(value, suffix)))
-    path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    return tomlkit.dumps(document)

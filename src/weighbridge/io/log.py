@@ -8,7 +8,7 @@ from pathlib import Path
 
 from weighbridge.io.frames import Frames
 from weighbridge.io.mapping import TableMapping
-from weighbridge.signals import Problem, Signal
+from weighbridge.signals import DriveInfo, Problem, Signal
 
 
 @dataclass(slots=True)
@@ -25,6 +25,7 @@ class Log:
         and the file tells; None otherwise
     align : whether a mapping asks to align its clock with the drive's other files
     frames : raw bus traffic, decoded once all files of a drive are read
+    info : what the file knows of the drive beside its signals
     """
 
     path: Path
@@ -34,6 +35,7 @@ class Log:
     start: float | None = None
     align: bool = False
     frames: Frames | None = None
+    info: DriveInfo | None = None
 
 
 Reader = Callable[[Path, "str | None", "TableMapping | None"], Log]

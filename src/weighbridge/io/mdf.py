@@ -17,11 +17,12 @@ import numpy as np
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
 from weighbridge.io.frames import Frames
+from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, resolved_unit
 from weighbridge.io.mdf_bus import bus_frames
 from weighbridge.io.table import column_list
-from weighbridge.signals import Floats, Problem
+from weighbridge.signals import DriveInfo, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
 
@@ -72,7 +73,7 @@ def _open(opener: Any, path: Path) -> Any:
 
 
 def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    log = Log(path, start=_start(file))
+    log = Log(path, start=_start(file), info=_info(file, path))
     channels, raw_bus = _channels(file)
     frames = _frames(file, path) if raw_bus else Frames.empty()
     wanted = (
@@ -126,6 +127,12 @@ def _start(file: Any) -> float | None:
     except (AttributeError, OverflowError, OSError, ValueError):
         return None
     return start if start > 0.0 else None
+
+
+def _info(file: Any, path: Path) -> DriveInfo | None:
+    """What is known of the drive, where `weighbridge.io.write.write_mdf` put it."""
+    text = str(getattr(file.header, "description", "") or "")
+    return parse_info(text, path.name) if text.startswith(MDF_INFO_MARK) else None
 
 
 def _frames(file: Any, path: Path) -> Frames:

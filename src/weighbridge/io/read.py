@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io import blf, candump, canlog, gpx, mdf, nmea, tabular, vbo
+from weighbridge.io import blf, candump, canlog, gpx, mdf, nmea, npy, tabular, vbo
 from weighbridge.io.bus import decode
 from weighbridge.io.clocks import settle_clocks, shift_clock
 from weighbridge.io.dbc import Database, DbcSource, load_dbcs
@@ -60,6 +60,7 @@ READERS: Final[dict[str, Reader]] = {
     ".ubx": nmea.read_nmea,
     ".gpx": gpx.read_gpx,
     ".vbo": vbo.read_vbo,
+    ".npy": npy.read_npy,
 }
 """Every log format, by file suffix."""
 
@@ -220,6 +221,8 @@ def _drive(
     mappings: tuple[TableMapping, ...],
     databases: tuple[Database, ...],
 ) -> Drive:
+    if info == DriveInfo():
+        info = next((log.info for log in logs if log.info is not None), info)
     _share_clock(logs)
     contents = _decode_frames(logs, mappings, databases)
     problems = [p for log in logs for p in log.problems]

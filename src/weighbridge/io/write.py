@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import polars as pl
 
-from weighbridge.errors import DriveError
+from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io.info import FILE_NAME as INFO_NAME
-from weighbridge.io.info import write_info
+from weighbridge.io.info import MDF_INFO_MARK, info_text, write_info
 from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
 from weighbridge.signals.units import from_si
@@ -52,6 +54,54 @@ def write_drive(
         write_table(truth, folder / f"truth.{table_format}")
     if drive.info != DriveInfo():
         write_info(drive.info, folder / INFO_NAME)
+
+
+def write_mdf(drive: Drive, path: str | Path) -> None:
+    """Write a drive as one MF4, one channel group per clock, compressed.
+
+    Channels have canonical names with unit suffixes; what is known beside the
+    signals stands in the file's comment.
+
+    Parameters
+    ----------
+    drive : what to write
+    path : the file; replaced where it is there
+
+    Raises
+    ------
+    DriveError
+        The file cannot be written.
+    MissingExtraError
+        asammdf is not installed.
+    """
+    path = Path(path)
+    try:
+        from asammdf import MDF
+        from asammdf import Signal as Channel
+    except ImportError:
+        raise MissingExtraError("asammdf", "mdf", f"writing {path.name}") from None
+    clocks: dict[int, list[Signal]] = {}
+    for s in drive.signals.values():
+        clocks.setdefault(id(s.time), []).append(s)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with MDF(version="4.10") as file:
+            # The clock of a drive counts from its own zero.
+            file.header.start_time = datetime.fromtimestamp(0.0, UTC)
+            if drive.info != DriveInfo():
+                file.header.description = MDF_INFO_MARK + info_text(drive.info)
+            for group in clocks.values():
+                channels = []
+                for s in group:
+                    suffix = QUANTITIES[s.name].suffix
+                    values = from_si(s.values, suffix) if suffix else s.values
+                    name = f"{s.name}_{suffix}" if suffix else s.name
+                    channels.append(Channel(values, s.time, name=name, unit=suffix))
+                file.append(channels)
+            try:
+                file.save(path, overwrite=True, compression=2)
+            except OSError as e:
+                raise DriveError(f"{path} cannot be written: {e.strerror or e}") from None
 
 
 def write_table(columns: Mapping[str, Floats], path: str | Path) -> None:
