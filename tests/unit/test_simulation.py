@@ -24,6 +24,7 @@ from weighbridge.simulation import (
     random_car,
     simulate_car,
 )
+from weighbridge.simulation.route import _turn
 
 
 def short(seed=5, duration=80.0, **changes):
@@ -360,3 +361,16 @@ def test_impossible_scenarios_are_refused(call, words):
 def test_unknown_format_is_refused(made, tmp_path):
     with pytest.raises(ConfigError, match="format must be"):
         made.write(tmp_path, format="xls")
+
+
+@pytest.mark.parametrize("seed", [1000, 1234, 1500, 1777, 1999])
+def test_any_seed_makes_a_route(seed):
+    route = jensen_route(seed)
+    assert np.isfinite(route.heading).all()
+    assert route.heading.size == jensen_route(1).heading.size
+
+
+def test_a_turn_beyond_the_end_of_a_leg_is_left_out():
+    curvature = np.zeros(50)
+    _turn(curvature, 80, 0.3, 120.0)
+    assert not curvature.any()

@@ -134,7 +134,10 @@ def _smooth(values: Floats, sigma: float, mode: str = "nearest") -> Floats:
 def _turn(curvature: Floats, at: int, angle: float, radius: float) -> None:
     """Add a turn whose curvature rises and falls smoothly."""
     length = max(4, int(1.9 * abs(angle) * radius / STEP))
-    a, b = max(0, at - length // 2), min(curvature.size, at - length // 2 + length)
+    a = min(max(0, at - length // 2), curvature.size)
+    b = min(curvature.size, at - length // 2 + length)
+    if b <= a:
+        return
     shape = np.sin(np.linspace(0.0, math.pi, b - a)) ** 2
     if shape.sum() > 0:
         curvature[a:b] += angle * shape / (shape.sum() * STEP)
