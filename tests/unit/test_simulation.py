@@ -372,5 +372,5 @@ def test_any_seed_makes_a_route(seed):
 
 def test_a_turn_beyond_the_end_of_a_leg_is_left_out():
     curvature = np.zeros(50)
-    _turn(curvature, 80, 0.3, 120.0)
+    _turn(curvature, 500, 0.3, 120.0)
     assert not curvature.any()
