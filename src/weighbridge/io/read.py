@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +13,20 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io import blf, candump, canlog, gpx, mdf, nmea, npy, tabular, vbo
+from weighbridge.io import (
+    blf,
+    candump,
+    canlog,
+    gpx,
+    mdf,
+    nmea,
+    npy,
+    racechrono,
+    sensor_logger,
+    tabular,
+    torque_pro,
+    vbo,
+)
 from weighbridge.io.bus import decode
 from weighbridge.io.clocks import settle_clocks, shift_clock
 from weighbridge.io.dbc import Database, DbcSource, load_dbcs
@@ -31,8 +44,18 @@ _logger = logging.getLogger(__name__)
 DrivePath = str | Path | Sequence[str | Path]
 
 
+APPS: Final[tuple[tuple[Callable[[bytes], bool], Reader], ...]] = (
+    (racechrono.is_racechrono, racechrono.read_racechrono),
+    (torque_pro.is_torque_pro, torque_pro.read_torque_pro),
+    (sensor_logger.is_sensor_logger, sensor_logger.read_sensor_logger),
+)
+"""CSV of apps, by how their first bytes look."""
+
+
 def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    """Read a CSV: a table, or frames as python-can writes them; see `weighbridge.io.log.Reader`.
+    """Read a CSV: a table, frames of python-can or an app's log; see `weighbridge.io.log.Reader`.
+
+    An app's log is read as a plain table where a mapping names its columns.
 
     Raises
     ------
@@ -41,6 +64,12 @@ def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     """
     if canlog.is_can_csv(path):
         return canlog.read_can_csv(path, table, mapping)
+    if mapping is None:
+        with path.open("rb") as file:
+            head = file.read(4096)
+        for recognised, reader in APPS:
+            if recognised(head):
+                return reader(path, table, mapping)
     return tabular.read_csv(path, table, mapping)
 
 

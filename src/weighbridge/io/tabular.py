@@ -33,13 +33,13 @@ from weighbridge.signals.units import UNITS, to_si
 def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
     """Read separated text; see `weighbridge.io.log.Reader`."""
     raw = read_text(path, mapping.text if mapping else None)
-    return _mapped(raw, mapping) if mapping else _canonical(raw, table)
+    return read_mapped(raw, mapping) if mapping else _canonical(raw, table)
 
 
 def read_pq(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
     """Read Parquet; see `weighbridge.io.log.Reader`."""
     raw = read_parquet(path)
-    return _mapped(raw, mapping) if mapping else _canonical(raw, table)
+    return read_mapped(raw, mapping) if mapping else _canonical(raw, table)
 
 
 def _canonical(raw: RawTable, table: str | None) -> Log:
@@ -94,7 +94,16 @@ def _table_of_all(raw: RawTable) -> str | None:
     return "gnss" if any(n.strip().lower().startswith("latitude_") for n in raw.names) else None
 
 
-def _mapped(raw: RawTable, mapping: TableMapping) -> Log:
+def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
+    """Take the columns of a table that a mapping names.
+
+    Raises
+    ------
+    DriveError
+        None of them is there, or there is no time.
+    ConfigError
+        A unit is missing or impossible.
+    """
     log = Log(raw.path)
     log.problems += [Problem("", f"{raw.path.name}: {note}") for note in raw.notes]
     places = {}
