@@ -14,7 +14,7 @@ from weighbridge.cli.options import (
     refuse_missing_folder,
     refuse_overwriting,
 )
-from weighbridge.errors import ConfigError
+from weighbridge.errors import ConfigError, DriveError
 
 if TYPE_CHECKING:
     from weighbridge.signals import Drive
@@ -44,6 +44,10 @@ def convert(
         raise ConfigError(f"{out}: is the drive itself; name another folder or file")
     refuse_overwriting(out, force, "folder or file")
     recorded = load(drive, mapping, dbc)
+    serious = next((p for p in recorded.problems if p.serious), None)
+    if serious is not None:
+        # A canonical drive carries no doubts: a mass would be made of it without a word.
+        raise DriveError(f"{drive}: not converted, {serious.text}")
     if out.suffix.lower() == ".mf4":
         from weighbridge.io import write_mdf
 

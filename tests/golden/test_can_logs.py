@@ -1,0 +1,115 @@
+"""Every format of raw CAN logs gives the same drive."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from make_can_logs import STEPS, SUFFIXES, truth
+from numpy.testing import assert_allclose, assert_array_equal
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io import read_drive
+
+HERE = Path(__file__).parent
+DBC = HERE / "golden.dbc"
+MAPPING = {
+    "signals": {
+        "accel_x": {"column": "Sensor.Forward", "valid": "Valid"},
+        "accel_y": {"column": "Lateral", "valid": "Valid"},
+        "altitude": {"column": "Height"},
+    }
+}
+ANSWERED = (
+    "vehicle_speed", "engine_speed", "engine_torque_fraction", "throttle", "ambient_temperature",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", [*SUFFIXES, ".mf4"])
+def test_formats(suffix):
+    drive = read_drive(HERE / f"can{suffix}", MAPPING, DBC)
+    assert set(drive.signals) == {*ANSWERED, "accel_x", "accel_y", "altitude"}
+    assert drive.info.start_time == "2020-09-13T12:26:40+00:00"
+    for name in ANSWERED:
+        # An answer of two frames is as old as the first of them.
+        assert_allclose(drive.signals[name].time, 0.5 * STEPS + 0.01, atol=1e-4)
+        assert_allclose(drive.signals[name].values, truth(name, STEPS), rtol=1e-12)
+    valid = STEPS[STEPS != 3]
+    for name in ("accel_x", "accel_y"):
+        assert_allclose(drive.signals[name].time, 0.5 * valid + 0.1, atol=1e-4)
+        assert_allclose(drive.signals[name].values, truth(name, valid), rtol=1e-12)
+    assert drive.signals["accel_x"].time is drive.signals["accel_y"].time
+    assert_allclose(drive.signals["altitude"].values, truth("altitude", STEPS), rtol=1e-12)
+    told = "\n".join(drive.contents)
+    assert "160 CAN frames" in told
+    assert "PIDs 0C (20), 0D (20), 11 (20), 46 (20), 62 (20)" in told
+    assert "not known: 20 frames" in told
+
+
+def test_without_dbc_the_answers_are_read():
+    drive = read_drive(HERE / "can.blf")
+    assert set(drive.signals) == set(ANSWERED)
+    assert "CAN 2 18FF1234 (40)" in drive.contents[-1]
+
+
+def test_dbc_of_another_bus_is_not_used():
+    drive = read_drive(HERE / "can.mf4", MAPPING, f"1:{DBC}")
+    assert not drive.has("accel_x")
+    assert any("none of the 2 messages of golden.dbc" in p.text for p in drive.problems)
+    assert read_drive(HERE / "can.mf4", MAPPING, f"2:{DBC}").has("accel_x")
+
+
+def test_ambiguous_and_missing_validity_are_refused():
+    mapping = {"signals": {"altitude": {"column": "Height", "valid": "HeightOk"}}}
+    with pytest.raises(ConfigError, match=r"no such signal; it has Valid, Kind"):
+        read_drive(HERE / "can.mf4", mapping, DBC)
+
+
+def test_files_of_one_drive_are_joined_by_time(tmp_path):
+    lines = (HERE / "can.log").read_text().splitlines(keepends=True)
+    # Cut between the two frames of an answer: the message goes on in the second file.
+    cut = next(k for k, line in enumerate(lines) if k > 70 and "7E8#21" in line)
+    (tmp_path / "b-first.log").write_text("".join(lines[:cut]))
+    (tmp_path / "a-second.log").write_text("".join(lines[cut:]))
+    whole, joined = read_drive(HERE / "can.log"), read_drive(tmp_path)
+    for name in ANSWERED:
+        assert_array_equal(joined.signals[name].time, whole.signals[name].time)
+        assert_array_equal(joined.signals[name].values, whole.signals[name].values)
+
+
+def test_the_same_frames_twice_are_refused():
+    with pytest.raises(DriveError, match="same frames at the same time"):
+        read_drive([HERE / "can.asc", HERE / "can.blf"])
+
+
+def test_unknown_identifiers_only_give_one_sentence(tmp_path):
+    rows = [f"({100 + 0.1 * k:.6f}) can0 {0x100 + k % 3:03X}#0102" for k in range(30)]
+    (tmp_path / "x.log").write_text("\n".join(rows))
+    with pytest.raises(DriveError, match=r"30 frames: CAN 0 100 \(10\).* --dbc ") as told:
+        read_drive(tmp_path / "x.log")
+    assert "\n" not in str(told.value)
+    with pytest.raises(DriveError, match=r"golden\.dbc is in the log"):
+        read_drive(tmp_path / "x.log", MAPPING, DBC)
+
+
+@pytest.mark.parametrize(("suffix", "share"), [(".blf", 0.7), (".asc", 0.5), (".trc", 0.5)])
+def test_cut_off_logs_are_salvaged(tmp_path, suffix, share):
+    raw = (HERE / f"can{suffix}").read_bytes()
+    cut = tmp_path / f"cut{suffix}"
+    cut.write_bytes(raw[: int(share * len(raw))])
+    drive = read_drive(cut)
+    assert 5 < len(drive.signals["engine_speed"]) < 20
+    got = drive.signals["engine_speed"].values
+    assert_allclose(got, truth("engine_speed", np.arange(got.size)), rtol=1e-12)
+
+
+def test_cut_off_mf4_is_one_sentence_or_what_is_left(tmp_path):
+    raw = (HERE / "can.mf4").read_bytes()
+    for share in (0.1, 0.4, 0.6, 0.9):
+        cut = tmp_path / "cut.mf4"
+        cut.write_bytes(raw[: int(share * len(raw))])
+        try:
+            drive = read_drive(cut)
+        except DriveError as told:
+            assert "\n" not in str(told)
+        else:
+            assert len(drive.signals["engine_speed"])

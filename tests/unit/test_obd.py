@@ -1,0 +1,153 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_frames import make, split
+
+from weighbridge.io.frames import join_frames
+from weighbridge.io.obd import LENGTHS, PIDS, decode_obd
+from weighbridge.signals import QUANTITIES
+from weighbridge.signals.units import UNITS, from_si
+
+
+def answers(payloads, identifier=0x7E8, start=0.0, **rest):
+    """Frames of answers half a second apart."""
+    data, time = [], []
+    for k, payload in enumerate(payloads):
+        parts = [bytes([len(payload)]) + payload] if len(payload) < 8 else split(payload)
+        data += [p.ljust(8, b"\0") for p in parts]
+        time += [start + 0.5 * k + 0.01 * j for j in range(len(parts))]
+    return make(time, identifier, data, extended=identifier > 0x7FF, **rest)
+
+
+def value(found, name):
+    signal = next(s for s in found.signals if s.name == name)
+    suffix = QUANTITIES[name].suffix
+    return from_si(signal.values, suffix) if suffix else signal.values
+
+
+# Worked by hand from the scalings of SAE J1979.
+@pytest.mark.parametrize(
+    ("payload", "name", "expected"),
+    [
+        ("41 04 80", "engine_load", 100 * 128 / 255),
+        ("41 05 7B", "coolant_temperature", 83.0),
+        ("41 0B 64", "intake_pressure", 100.0),
+        ("41 0C 1A F8", "engine_speed", 1726.0),
+        ("41 0D 32", "vehicle_speed", 50.0),
+        ("41 0F 41", "intake_temperature", 25.0),
+        ("41 10 07 D0", "mass_air_flow", 20.0),
+        ("41 11 FF", "throttle", 100.0),
+        ("41 1F 01 02", "run_time", 258.0),
+        ("41 2F 80", "fuel_level", 100 * 128 / 255),
+        ("41 33 65", "barometric_pressure", 101.0),
+        ("41 34 80 00 80 00", "lambda_1", 1.0),
+        ("41 42 36 B0", "module_voltage", 14.0),
+        ("41 43 00 FF", "absolute_load", 100.0),
+        ("41 44 40 00", "commanded_lambda", 0.5),
+        ("41 45 33", "relative_throttle", 20.0),
+        ("41 46 3C", "ambient_temperature", 20.0),
+        ("41 47 33", "throttle_b", 20.0),
+        ("41 49 33", "accelerator_pedal", 20.0),
+        ("41 4C 33", "commanded_throttle", 20.0),
+        ("41 5A 33", "relative_pedal", 20.0),
+        ("41 5C 82", "oil_temperature", 90.0),
+        ("41 5E 00 64", "fuel_rate", 5.0),
+        ("41 61 AF", "demanded_torque", 50.0),
+        ("41 62 73", "engine_torque_fraction", -10.0),
+        ("41 63 01 90", "reference_torque", 400.0),
+        ("41 64 87 91 9B A5 E1", "torque_point_4", 100.0),
+        ("41 A4 03 30 08 98", "gear", 3.0),
+        ("41 A4 03 30 08 98", "gear_ratio", 2.2),
+        ("41 A6 00 12 D6 87", "odometer", 123456.7),
+    ],
+)
+def test_scalings(payload, name, expected):
+    found = decode_obd(answers([bytes.fromhex(payload)] * 3))
+    assert_allclose(value(found, name), expected, rtol=1e-12)
+
+
+def test_gear_counts_only_where_it_is_supported():
+    found = decode_obd(answers([bytes.fromhex("41A402300898")] * 3))
+    assert [s.name for s in found.signals] == ["gear_ratio"]
+
+
+def test_table_fits_the_catalogue():
+    for p in PIDS:
+        assert p.name in QUANTITIES
+        assert p.first + p.count <= LENGTHS[p.number]
+        if p.unit:
+            assert UNITS[p.unit].dimension == UNITS[QUANTITIES[p.name].suffix].dimension
+
+
+def test_several_parameters_in_one_answer_share_its_time():
+    payload = bytes.fromhex("41 0C 1A F8 0D 32 62 AF 63 01 90 11 33")
+    found = decode_obd(answers([payload] * 4))
+    for name, expected in (
+        ("engine_speed", 1726.0),
+        ("vehicle_speed", 50.0),
+        ("engine_torque_fraction", 50.0),
+        ("reference_torque", 400.0),
+        ("throttle", 20.0),
+    ):
+        assert_allclose(value(found, name), expected)
+    assert all(s.time is not None and len(s) == 4 for s in found.signals)
+    assert_allclose(found.signals[0].time, [0.0, 0.5, 1.0, 1.5])
+
+
+def test_eleven_and_twenty_nine_bits_and_several_units():
+    standard = answers([bytes([0x41, 0x0D, 10 + k]) for k in range(6)])
+    engine = answers([bytes.fromhex("410C1AF8")] * 4, 0x18DAF110, 0.2)
+    gearbox = answers([bytes([0x41, 0x0D, 12 + k]) for k in range(3)], 0x18DAF118, 0.3)
+    request = make([0.0, 0.5], 0x18DB33F1, [b"\2\1\x0d\0\0\0\0\0"] * 2, extended=True)
+    frames = join_frames([standard, engine, gearbox, request])
+    found = decode_obd(frames)
+    assert_allclose(value(found, "vehicle_speed"), 10 + np.arange(6))
+    assert_allclose(value(found, "engine_speed"), 1726.0)
+    assert found.used.all()
+    assert [c.split(",")[0] for c in found.contents] == [
+        "CAN 1 7E8", "CAN 1 18DAF110", "CAN 1 18DAF118",
+    ]  # fmt: skip
+    assert "of CAN 1 18DAF118 (3 answers) was left out for that of CAN 1 7E8 (6)" in (
+        found.problems[0].text
+    )
+
+
+def test_missing_parts_cost_that_answer_only():
+    payload = bytes.fromhex("41 0C 1A F8 0D 32 62 AF 63 01 90")
+    frames = answers([payload] * 5)
+    keep = np.ones(len(frames), bool)
+    keep[3] = False
+    found = decode_obd(frames.select(keep))
+    assert_allclose(found.signals[0].time, [0.0, 1.0, 1.5, 2.0])
+    assert "1 answers of CAN 1 7E8 lack frames" in found.problems[0].text
+
+
+def test_cut_answer_gives_what_stood_before():
+    found = decode_obd(answers([bytes.fromhex("41 0D 32 0C 1A")] * 3))
+    assert [s.name for s in found.signals] == ["vehicle_speed"]
+    assert "3 answers of CAN 1 7E8 are cut off" in found.problems[0].text
+
+
+def test_identification_numbers_are_counted_and_never_kept():
+    vin = [b"\x49\x02\x01" + text for text in (b"WVWZZZ1KZ8W000001", b"WVWZZZ1KZ8W000002")]
+    speed = [b"\x41\x0d\x32"] * 3
+    found = decode_obd(answers([vin[0], *speed]))
+    assert found.problems == []
+    found = decode_obd(answers([vin[0], *speed, vin[1], *speed]))
+    assert found.problems[0].serious
+    assert "2 vehicles" in found.problems[0].text
+    assert "WVWZZZ" not in repr(found)
+
+
+def test_two_vehicles_at_once_are_a_serious_doubt():
+    one = answers([bytes([0x41, 0x0D, 50])] * 30)
+    two = answers([bytes([0x41, 0x0D, 90])] * 20, channel=2, start=0.1)
+    found = decode_obd(join_frames([one, two]))
+    assert any(p.serious and "two vehicles" in p.text for p in found.problems)
+
+
+def test_other_services_alone_are_no_obd_drive():
+    frames = answers([b"\x62\xf4\x0d\x32"] * 5)
+    found = decode_obd(frames)
+    assert found.signals == []
+    assert not found.used.any()
