@@ -329,7 +329,8 @@ def _choose(senders: list[_Sender], name: str, found: Obd) -> None:
             time, values = other.values[quantity]
             doubt = False
             if quantity in _APART:
-                gap = np.abs(signal.at(time) - values)[signal.age(time) < 2.0]
+                gap = np.abs(signal.at(time) - values)
+                gap = gap[np.isfinite(gap) & (signal.age(time) < 2.0)]
                 doubt = gap.size >= 10 and float(np.median(gap)) > _APART[quantity]
             text = (
                 f"{name}: {quantity} of {other.name} ({time.size} answers) was left out for that "
