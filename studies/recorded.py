@@ -11,6 +11,10 @@ from pathlib import Path
 import numpy as np
 
 import weighbridge as wb
+from weighbridge.io.candump import read_candump
+from weighbridge.io.j1939 import decode_j1939
+from weighbridge.signals import Signal
+from weighbridge.signals.alignment import align
 
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "shared" / "data"
@@ -53,9 +57,100 @@ def bmw_i3() -> str:
     return "\n".join(lines)
 
 
+def j1939_truck() -> str:
+    """What 30 s of a truck's bus say, and what they cannot."""
+    path = DATA / "j1939-truck" / "normal.log"
+    found = decode_j1939(read_candump(path, None, None).frames)
+    signals, extras = {s.name: s for s in found.signals}, found.summary.extras
+    shaft, output = extras["input_shaft_speed"], extras["output_shaft_speed"]
+    gear = signals["gear"].held(shaft.time)
+    free = signals["clutch_switch"].held(shaft.time) == 0.0
+    lines = [
+        "| gear | announced ratio (SPN 526) | input over output shaft | off by |",
+        "|---|---|---|---|",
+    ]
+    for number, ratio in ((2, 1.81), (3, 1.406), (4, 1.0)):
+        rows = (gear == number) & free
+        seen = float(np.median(shaft.values[rows] / output.values[rows]))
+        lines.append(f"| {number} | {ratio:.3f} | {seen:.4f} | {100 * (seen / ratio - 1):+.2f} % |")
+    torque = signals["engine_torque_fraction"].values
+    speed = 3.6 * signals["vehicle_speed"].values
+    car = wb.Vehicle.load(HERE.parent / "examples" / "j1939-truck" / "vehicle.toml")
+    w = wb.weigh(wb.read_drive(path), car, method="rls")
+    view = w.result.balance.merged
+    rows = view.usable
+    force = (view.traction_force - view.drag_force - view.rotating_mass * view.accel)[rows]
+    design = np.column_stack([view.accel[rows], np.ones(force.size)])
+    fit = np.linalg.lstsq(design, force, rcond=None)[0]
+    # Six stretches of the log, each left out in turn: their spread is what the grade may do.
+    parts = np.array_split(np.arange(force.size), 6)
+    out = np.array(
+        [
+            np.linalg.lstsq(np.delete(design, p, 0), np.delete(force, p), rcond=None)[0][0]
+            for p in parts
+        ]
+    )
+    std = float(np.sqrt(5 / 6 * np.sum((out - out.mean()) ** 2)))
+    reach = 2.571 * std  # Student, 5 degrees of freedom
+    lines += [
+        "",
+        f"Reference torque {signals['reference_torque'].values[0]:.0f} N m in all "
+        f"{len(signals['reference_torque'])} broadcasts (SPN 544, transport protocol); net torque "
+        f"{100 * torque.min():.0f} to {100 * torque.max():.0f} % of it, friction "
+        f"{100 * extras['friction_torque'].values.min():.0f} to "
+        f"{100 * extras['friction_torque'].values.max():.0f} %; speed {speed.min():.0f} to "
+        f"{speed.max():.0f} km/h; {sum(found.summary.decoded.values())} frames of "
+        f"{len(found.summary.decoded)} groups read, {len(found.summary.ignored)} groups not used.",
+        "",
+        f"`weigh` says `{w.status}`: {w.reason}.",
+        "",
+        "Force against acceleration by least squares, with a free constant that takes rolling "
+        f"resistance and an even grade: {fit[0]:.0f} kg, 95 % interval "
+        f"{max(fit[0] - reach, 0):.0f} to {fit[0] + reach:.0f} kg from six stretches left out in "
+        f"turn; the constant is a grade of {100 * (fit[1] / fit[0] / 9.81 + 0.008):+.1f} %.",
+    ]
+    return "\n".join(lines)
+
+
+def clocks() -> str:
+    """Offsets found between sources of one logger, whose true offset is that of their lateness."""
+    lines = [
+        "| recording | s | offset of GNSS s | std s | correlation | refused |",
+        "|---|---|---|---|---|---|",
+    ]
+    folder, example = DATA / "canedge-obd-imu-gnss", HERE.parent / "examples" / "canedge"
+    found = []
+    for path in sorted(folder.glob("*/*.MF4")):
+        drive = wb.read_drive(path, example / "mapping.toml", dbc=folder / "canmod-gps.dbc")
+        found.append((f"canedge {path.parent.name}/{path.stem.split('-')[0]}", drive))
+    comma = HERE.parent / "examples" / "comma2k19" / "mapping.toml"
+    found.append(("comma2k19", wb.read_drive(DATA / "comma2k19", comma)))
+    offsets = []
+    for name, drive in found:
+        wheel, ground = drive.signals["vehicle_speed"], drive.signals["gnss_speed"]
+        moved = Signal(ground.name, ground.time - 1234.5, ground.values)
+        a = align(wheel, moved)
+        lines.append(
+            f"| {name} | {drive.duration:.0f} | {a.offset - 1234.5:+.3f} | {a.std:.3f} "
+            f"| {a.correlation:.4f} | {a.refusal or 'no'} |"
+        )
+        if name.startswith("canedge") and drive.duration > 300.0:
+            offsets.append((a.offset - 1234.5, a.std))
+    values, stds = np.array(offsets).T
+    lines += [
+        "",
+        f"The {values.size} canedge files longer than 5 min agree on {values.mean():+.3f} s with a "
+        f"standard deviation of {values.std(ddof=1):.3f} s; their own standard deviations are "
+        f"{stds.min():.3f} to {stds.max():.3f} s.",
+    ]
+    return "\n".join(lines)
+
+
 def main() -> None:
     page = (HERE / "recorded.template.md").read_text(encoding="utf-8")
     page = page.replace("<!-- bmw-i3 -->", bmw_i3())
+    page = page.replace("<!-- j1939-truck -->", j1939_truck())
+    page = page.replace("<!-- clocks -->", clocks())
     (HERE / "recorded.md").write_text(page, encoding="utf-8")
 
 
