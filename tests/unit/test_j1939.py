@@ -143,6 +143,27 @@ def test_the_sender_with_most_values_is_taken():
     assert_allclose(found.signals[0].values, 51 / 3.6)
 
 
+def two_buses(second):
+    one = [(0.1 * k, 0x0CF00400, "FF FF FF 68 13 FF FF FF") for k in range(20)]
+    two = [(0.1 * k + 0.01, 0x0CF00400, second) for k in range(15)]
+    speed = [(0.1 * k + 0.02, 0x18FEF100, "FF 00 32 FF FF FF FF FF") for k in range(30)]
+    rows = join_frames([frames(*one, channel=2), frames(*sorted(two + speed), channel=5)])
+    return decode_j1939(rows)
+
+
+def test_a_gateway_to_a_second_bus_is_no_second_vehicle():
+    found = two_buses("FF FF FF 70 13 FF FF FF")
+    assert found.summary.problems == []
+    assert [len(s) for s in found.signals if s.name == "engine_speed"] == [20]
+    assert [len(s) for s in found.signals if s.name == "vehicle_speed"] == [30]
+
+
+def test_two_engines_on_two_buses_are_a_serious_doubt():
+    found = two_buses("FF FF FF 68 26 FF FF FF")
+    assert [p.signal for p in found.summary.problems if p.serious] == ["engine_speed"]
+    assert "two vehicles" in found.summary.problems[0].text
+
+
 def test_group_of_addressed_and_of_broadcast_identifiers():
     ids = np.array([0x0CF00400, 0x1CECFF00, 0x1CEB0321, 0x18FEE300, 0x19FEE300], np.uint32)
     assert parameter_group(ids).tolist() == [0xF004, 0xEC00, 0xEB00, 0xFEE3, 0x1FEE3]

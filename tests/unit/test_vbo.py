@@ -62,6 +62,15 @@ def test_velocity_without_a_unit_is_a_serious_doubt(tmp_path, title):
     assert [p.signal for p in found.problems if p.serious] == ["gnss_speed"]
 
 
+def test_a_mapping_settles_the_unit(tmp_path):
+    titles = [t if not t.startswith("velocity") else "velocity" for t in TITLES]
+    (tmp_path / "log.vbo").write_text(vbo(row(), titles=titles))
+    mapping = {"signals": {"gnss_speed": {"column": "velocity", "unit": "mps"}}}
+    found = read_drive(tmp_path / "log.vbo", mapping)
+    assert found.signals["gnss_speed"].values[0] == 36.0
+    assert found.problems == ()
+
+
 def test_flags_in_the_satellites(tmp_path):
     rows = [
         row("120000.00", sats="009"),

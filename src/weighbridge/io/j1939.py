@@ -213,6 +213,7 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
         if (found := reader.best(extra)) is not None:
             summary.extras[extra] = found
     found_signals = [s for s in signals if s is not None]
+    _check_buses(reader)
     _check_distance(reader, found_signals)
     _tell_weights(reader)
     if summary.incomplete:
@@ -231,12 +232,21 @@ class _Reader:
         self.parts = parts
         self.summary = summary
         self.name = name
+        engine = parts.get(EEC1)
+        self.bus = 0
+        if engine is not None and len(engine):
+            # The bus that hears the engine most is the vehicle's; what it lacks may be on another.
+            buses, counts = np.unique(engine.channel, return_counts=True)
+            self.bus = int(buses[np.argmax(counts)])
 
     def note(self, signal: str, text: str, *, serious: bool = False) -> None:
         self.summary.problems.append(Problem(signal, f"{self.name}: {text}", serious))
 
     def senders(self, spn: Spn) -> list[tuple[int, Floats, Floats]]:
-        """Address, stamps and values of each that sends valid values, the most first."""
+        """Address, stamps and values of each that sends valid values.
+
+        Those on the engine's bus come first, and of them those that send most.
+        """
         part = self.parts.get(spn.pgn)
         if part is None or not len(part):
             return []
@@ -247,7 +257,7 @@ class _Reader:
             which = (sender == s) & np.isfinite(values)
             if which.any():
                 found.append((s, part.time[which], values[which]))
-        found.sort(key=lambda f: (-f[1].size, f[0]))
+        found.sort(key=lambda f: (f[0] >> 8 != self.bus, -f[1].size, f[0]))
         return [(s & 0xFF, time, value) for s, time, value in found]
 
     def best(self, name: str) -> Signal | None:
@@ -437,6 +447,31 @@ def _pair(frames: Frames, *, swapped: bool = False) -> NDArray[np.int64]:
     if swapped:
         sender, receiver = receiver, sender
     return frames.channel.astype(np.int64) << 16 | sender << 8 | receiver
+
+
+def _check_buses(reader: _Reader) -> None:
+    """Find a second engine: one address on two buses, turning at another speed."""
+    part = reader.parts.get(EEC1)
+    if part is None or np.unique(part.channel).size < 2:
+        return
+    values = _values(part, _SPN["engine_speed"])
+    own = (part.channel == reader.bus) & np.isfinite(values)
+    if not own.any():
+        return
+    for bus in np.unique(part.channel[part.channel != reader.bus]).tolist():
+        other = (part.channel == bus) & np.isfinite(values)
+        here = np.interp(part.time[other], part.time[own], values[own])
+        running = np.maximum(here, values[other]) > 10.0
+        if not running.any():
+            continue
+        apart = np.abs(values[other] / np.maximum(here, 1.0) - 1.0)[running]
+        if float(np.median(apart)) > 0.1:
+            reader.note(
+                "engine_speed",
+                f"buses {reader.bus} and {bus} hear engines that turn at different speeds: two "
+                "vehicles in one log; log one of them alone",
+                serious=True,
+            )
 
 
 def _check_distance(reader: _Reader, signals: list[Signal]) -> None:

@@ -98,7 +98,7 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     take("long", "longitude", "deg", -1.0 / 60.0)
     take("height", "altitude", "m")
     take("heading", "gnss_course", "deg")
-    take("velocity", "gnss_speed", _speed_unit(log, sections.get("header", []), names))
+    take("velocity", "gnss_speed", _speed_unit(log, sections.get("header", []), names, mapping))
     if ignored := [n for n in names if n not in used]:
         log.problems.append(Problem("", f"{path.name}: ignored columns {column_list(ignored)}"))
     log.signals, problems = clean_columns(time, columns, path.name)
@@ -167,10 +167,13 @@ def _dated(time: Floats, head: str) -> tuple[Floats, bool]:
     return time + midnight + _DAY * round((created - first) / _DAY), True
 
 
-def _speed_unit(log: Log, titles: list[str], names: list[str]) -> str:
-    """Unit of the velocity by its title: the one in its place, else the one that says so."""
+def _speed_unit(log: Log, titles: list[str], names: list[str], mapping: TableMapping | None) -> str:
+    """Unit of the velocity: by the mapping, else by the title in its place or that says so."""
     if "velocity" not in names:
         return "kmh"
+    mapped = next((s for s in mapping.signals if s.name == "gnss_speed"), None) if mapping else None
+    if mapped is not None and mapped.unit is not None:
+        return mapped.unit
     title = ""
     if len(titles) == len(names):
         title = titles[names.index("velocity")].lower()
@@ -183,7 +186,7 @@ def _speed_unit(log: Log, titles: list[str], names: list[str]) -> str:
                 "gnss_speed",
                 f"{log.path.name}: no unit of the velocity under [header] "
                 f"({title or 'no title'!r}); it was taken as km/h: "
-                "write 'velocity kmh' there if that is so",
+                "write 'velocity kmh' there, or give gnss_speed its unit in a mapping",
                 serious=True,
             )
         )
