@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge.errors import DriveError
-from weighbridge.vehicle.gear import detect_gearings, predict_gear, shifting
+from weighbridge.vehicle.gear import detect_gearings, number_told_gears, predict_gear, shifting
 
 GEARINGS = np.array([36.0, 22.0, 14.5, 10.6, 8.4])
 
@@ -76,3 +76,17 @@ def test_shifts_are_marked_on_both_sides():
     marked = shifting(time, gear, margin=0.3)
     assert marked.tolist() == [False, False, False, True, True, False, False, False, False, False]
     assert not shifting(time, np.ones(10, dtype=np.int64), margin=0.3).any()
+
+
+def test_gears_told_are_numbered_by_the_gearings_of_the_file():
+    """A truck that began in second: its file knows three gears, the gearbox counts 2 to 4."""
+    gearings = np.array([18.9, 14.7, 10.5])
+    told = np.repeat([2, 3, 4, 0, -1, 9], 10)
+    ratio = np.repeat([18.8, 14.8, 10.5, 30.0, 40.0, np.nan], 10)
+    gear = number_told_gears(told, ratio, gearings)
+    assert gear[::10].tolist() == [1, 2, 3, 0, 0, 0]
+
+
+def test_a_gear_told_that_slips_keeps_its_number():
+    gear = number_told_gears(np.full(10, 2), np.full(10, 17.0), np.array([18.9, 14.7, 10.5]))
+    assert gear.tolist() == [2] * 10

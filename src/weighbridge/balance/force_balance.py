@@ -14,7 +14,12 @@ from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.vehicle.air import air_density
-from weighbridge.vehicle.gear import predict_gear, shifting
+from weighbridge.vehicle.gear import (
+    effective_gearing,
+    number_told_gears,
+    predict_gear,
+    shifting,
+)
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import engine_torque, source_signal
 
@@ -330,7 +335,7 @@ def _gears(
     measured: Signal | None = drive.get("gear")
     if measured is not None and len(measured):
         told = np.nan_to_num(measured.held(recorded)).astype(np.int64)
-        gear = np.where((told >= 1) & (told <= gearings.size), told, 0)
+        gear = number_told_gears(told, effective_gearing(engine_speed, speed), gearings)
         mismatch = np.where(
             gear > 0,
             engine_speed / np.maximum(speed, SLOWEST) / gearings[np.maximum(gear, 1) - 1] - 1.0,

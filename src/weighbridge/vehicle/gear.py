@@ -21,6 +21,10 @@ MOSTLY_IN_GEAR: Final = 0.6
 """Part of the steady samples that lies at a ratio of a gearbox with gears [-]."""
 
 
+TOLD_NEAR: Final = 0.06
+"""A gear told belongs to the gearing its median ratio is this near to [-]."""
+
+
 @dataclass(frozen=True, slots=True)
 class GearDetection:
     """Gearings found and the distribution they were found in (Jensen 2022, fig. 6).
@@ -201,6 +205,38 @@ def predict_gear(
     mismatch = np.where(finite, gearing / rising[nearest] - 1.0, np.nan)
     engaged = finite & (np.abs(mismatch) <= tolerance)
     return np.where(engaged, gearings.size - nearest, 0).astype(np.int64), mismatch
+
+
+def number_told_gears(told: Ints, gearing: Floats, gearings: Floats) -> Ints:
+    """Number the gears a gearbox tells by the gearings of the vehicle file.
+
+    A file fitted to drives that never used the first gears counts from the
+    lowest one used, and a gearbox from its own first gear. Each gear told is
+    the gearing that its median ratio lies at; where it lies at none the
+    number is taken as told.
+
+    Parameters
+    ----------
+    told : (n,) as the gearbox counts, 1 and up forward
+    gearing : (n,) of the moment [1/m]; NaN where unknown
+    gearings : (m,) of gears 1..m [1/m]
+
+    Returns
+    -------
+    (n,) 1..m; 0 where none
+    """
+    gear = np.zeros(told.size, dtype=np.int64)
+    for k in np.unique(told[told >= 1]).tolist():
+        rows = told == k
+        ratio = gearing[rows & np.isfinite(gearing) & (gearing > 0.0)]
+        number = k if k <= gearings.size else 0
+        if ratio.size >= 5:
+            distance = np.abs(np.log(np.median(ratio) / gearings))
+            best = int(np.argmin(distance))
+            if distance[best] < TOLD_NEAR:
+                number = best + 1
+        gear[rows] = number
+    return gear
 
 
 def steady(time: Floats, gearing: Floats, tolerance: Floats) -> Bools:
