@@ -76,7 +76,7 @@ def decode(
     used |= obd.used
     done.contents += obd.contents
     _add(obd.signals, obd.problems, "OBD-II", name, done)
-    rest = frames.select(~obd.used) if obd.used.any() else frames
+    rest = frames.select(frames.extended & ~obd.used)
     if is_j1939(rest):
         truck = decode_j1939(rest, name)
         groups = truck.summary.decoded
@@ -88,9 +88,8 @@ def decode(
         )
         _add(truck.signals, truck.summary.problems, "J1939", name, done)
         used |= frames.extended & ~obd.used
-    unknown = frames.select(~used)
-    if len(unknown):
-        done.contents.append(f"not known: {_counts(unknown)}")
+    if not used.all():
+        done.contents.append(f"not known: {_counts(frames, ~used)}")
     if not done.signals:
         raise DriveError(_nothing(frames, name, mapping, databases, done))
     return done
@@ -115,12 +114,13 @@ def _add(
             done.signals[s.name] = s
 
 
-def _counts(frames: Frames) -> str:
+def _counts(frames: Frames, which: Bools | None = None) -> str:
     """Identifiers with how often each was seen, the commonest first."""
-    counts = sorted(frames.counts().items(), key=lambda item: -item[1])
+    counts = sorted(frames.counts(which).items(), key=lambda item: -item[1])
+    total = sum(n for _, n in counts)
     shown = ", ".join(f"CAN {c} {i:X} ({n})" for (c, i, _), n in counts[:_NAMED])
     more = f" and {len(counts) - _NAMED} more identifiers" if len(counts) > _NAMED else ""
-    return f"{len(frames)} frames: {shown}{more}"
+    return f"{total} frames: {shown}{more}"
 
 
 def _nothing(

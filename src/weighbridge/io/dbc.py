@@ -102,25 +102,24 @@ def message_frames(frames: Frames, database: Database) -> dict[str, NDArray[np.i
     A J1939 message is known by its parameter group, whatever the sender and
     the priority; any other by its whole identifier.
     """
-    here = np.ones(len(frames), dtype=bool)
+    # 30 bits, so that an hour of traffic stays small; no frame has the key -1.
+    key = ((frames.id.astype(np.int32) << 1) | frames.extended).astype(np.int32)
     if database.channel is not None:
-        here = frames.channel == database.channel
-    key = (frames.id.astype(np.int64) << 1) | frames.extended
-    key[~here] = -1
-    order = np.argsort(key, kind="stable")
-    ordered = key[order]
+        key[frames.channel != database.channel] = -1
+    present = set(np.unique(key).tolist())
     group = None
     found = {}
     for message in database.messages:
         identifier = int(message.frame_id)
         if message.is_extended_frame and message.protocol == "j1939":
             if group is None:
-                group = np.where(here & frames.extended, _group(frames.id.astype(np.int64)), -1)
+                group = np.where(
+                    frames.extended & (key >= 0), _group(frames.id.astype(np.int64)), -1
+                )
             at = np.flatnonzero(group == int(_group(np.array([identifier]))[0]))
         else:
             wanted = identifier << 1 | bool(message.is_extended_frame)
-            low, high = np.searchsorted(ordered, [wanted, wanted + 1])
-            at = np.sort(order[low:high])
+            at = np.flatnonzero(key == wanted) if wanted in present else np.zeros(0, np.intp)
         if at.size:
             found[message.name] = at
     return found

@@ -62,9 +62,10 @@ class Frames:
             self.data[which],
         )
 
-    def counts(self) -> dict[tuple[int, int, bool], int]:
-        """How often each (channel, id, extended) was seen, the lowest first."""
-        keys, numbers = np.unique(self.keys(), return_counts=True)
+    def counts(self, which: NDArray[np.bool_] | None = None) -> dict[tuple[int, int, bool], int]:
+        """How often each (channel, id, extended) was seen, under a mask; the lowest first."""
+        keys = self.keys() if which is None else self.keys()[which]
+        keys, numbers = np.unique(keys, return_counts=True)
         return {
             (int(k) >> 33, (int(k) >> 1) & 0xFFFFFFFF, bool(k & 1)): int(n)
             for k, n in zip(keys, numbers, strict=True)

@@ -178,7 +178,7 @@ def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
     if not answers.any():
         return found
     senders = []
-    for channel, identifier, extended in frames.select(answers).counts():
+    for channel, identifier, extended in frames.counts(answers):
         which = (
             answers
             & (frames.channel == channel)
