@@ -107,6 +107,17 @@ def test_braking_by_its_switch_and_unseen():
     assert_array_equal(reasons(specific_force=hard)[between(101, 109)], Reason.BRAKING)
 
 
+def test_a_retarder_brakes_with_and_without_a_brake_switch():
+    retarder = signal("retarder_torque", -0.3 * between(100, 110))
+    switch = signal("brake_switch", between(200, 210))
+    alone, both = reasons(retarder), reasons(retarder, switch)
+    inside = (STAMPS > 100.5) & (STAMPS < 109.5)
+    assert (alone[inside] == Reason.BRAKING).all()
+    assert (both[inside] == Reason.BRAKING).all()
+    assert (both[(STAMPS > 200.5) & (STAMPS < 209.5)] == Reason.BRAKING).all()
+    assert not (both[(STAMPS > 120.0) & (STAMPS < 190.0)] == Reason.BRAKING).any()
+
+
 def test_shifting_and_clutch():
     first = np.where(STAMPS < 200.0, 20.0, 10.0) * speed_at(STAMPS)
     view = force_balance(drive(engine_speed=first), CAR, motion()).merged
