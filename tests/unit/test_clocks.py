@@ -30,14 +30,20 @@ def gnss(folder, offset=0.0, name="fixes.csv"):
 
 
 def gpx(folder, offset=0.0, begin="2021-03-05T10:00:00"):
-    """A track without speeds: it has to be found from the way between points."""
+    """A winding track at 60 degrees north, without speeds: points alone must give them."""
     start = np.datetime64(begin, "ms")
-    way = np.concatenate([[0.0], np.cumsum(road_speed(np.arange(100.005, 500.0, 0.01)))]) * 0.01
-    north = np.degrees(np.interp(FIX, 100.0 + 0.01 * np.arange(way.size), way) / 6_371_008.8)
+    fine = np.arange(100.0, 500.0, 0.01)
+    step = 0.01 * road_speed(fine + 0.005)
+    heading = 2.0 * np.pi * fine / 150.0
+    places = []
+    for part, stretch in ((np.cos(heading), 1.0), (np.sin(heading), 2.0)):
+        way = np.concatenate([[0.0], np.cumsum(step * part)])
+        arc = np.interp(FIX, 100.0 + 0.01 * np.arange(way.size), way) / 6_371_008.8
+        places.append(stretch * np.degrees(arc))
     points = "".join(
-        f'<trkpt lat="{48.0 + n:.9f}" lon="11.0"><time>'
+        f'<trkpt lat="{60.0 + n:.9f}" lon="{11.0 + e:.9f}"><time>'
         f"{start + np.timedelta64(round(1000 * (t - offset)), 'ms')}Z</time></trkpt>"
-        for t, n in zip(FIX, north, strict=True)
+        for t, n, e in zip(FIX, *places, strict=True)
     )
     path = folder / "track.gpx"
     path.write_text(f'<gpx version="1.1" creator="t"><trk><trkseg>{points}</trkseg></trk></gpx>')

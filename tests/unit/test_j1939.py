@@ -274,6 +274,16 @@ def test_a_lost_packet_leaves_the_message_out(lost):
     assert any("parts missing" in p.text for p in summary.problems)
 
 
+def test_packets_may_be_slow_but_not_for_ever():
+    """A broadcast has up to 0.2 s between packets (J1939-21, 5.10.2.4)."""
+    slow = packets(EC1, 0x1CEBFF00, 0.2, step=0.2)
+    assert reference(announce(0.0, 0x1CECFF00), *slow)[0] == [1109.0]
+    late = packets(EC1, 0x1CEBFF00, 20.0)
+    values, summary = reference(announce(0.0, 0x1CECFF00), *late)
+    assert values is None
+    assert summary.incomplete == 1
+
+
 def test_an_aborted_message_is_left_out():
     abort = (0.12, 0x18EC0021, "FF 01 FF FF FF E3 FE 00")
     body = packets(EC1, 0x18EB2100, 0.05)
