@@ -131,8 +131,14 @@ def test_an_ambiguous_offset_is_refused(tmp_path):
     v = 15.0 + 5.0 * np.sin(2 * np.pi * FIX / 40.0)
     frame = pl.DataFrame({"time_s": FIX - 40_000.0, "gnss_speed_mps": v})
     frame.write_csv(tmp_path / "fixes.csv")
-    with pytest.raises(DriveError, match=r"two offsets fit alike .* offset_s"):
-        read_drive([tmp_path / "obd.csv", tmp_path / "fixes.csv"])
+    files = [tmp_path / "obd.csv", tmp_path / "fixes.csv"]
+    drive = read_drive(files)
+    assert [p.serious for p in drive.problems] == [True]
+    assert re.search(r"two offsets fit alike .* offset_s", drive.problems[0].text)
+    assert drive.signals["gnss_speed"].time[0] == FIX[0] - 40_000.0
+    mapping = {"tables": {"gps": {"files": "fixes.csv", "time": {"align": True}}}}
+    with pytest.raises(DriveError, match="two offsets fit alike"):
+        read_drive(files, mapping)
 
 
 def test_a_gyroscope_is_aligned_by_turning(tmp_path):

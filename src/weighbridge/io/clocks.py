@@ -46,7 +46,8 @@ def settle_clocks(logs: Sequence[Log]) -> list[Problem]:
     Raises
     ------
     DriveError
-        A file must be moved and the offset is not to be found, or ambiguous.
+        A mapping asks for it or some files have dates and others none, and the
+        offset is not to be found, or ambiguous.
     """
     logs = [log for log in logs if log.signals]
     problems: list[Problem] = []
@@ -93,7 +94,12 @@ def _apart(logs: Sequence[Log]) -> list[Problem]:
     problems = []
     for group in groups[1:]:
         why = f"{_names(group)} and {_names(fixed)} share no time"
-        problems.append(_move(fixed, group, why))
+        try:
+            problems.append(_move(fixed, group, why))
+        except DriveError as e:
+            # What each file holds can still be looked at, though not weighed.
+            problems.append(Problem("", str(e), serious=True))
+            continue
         fixed += group
     return problems
 
