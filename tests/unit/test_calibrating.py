@@ -190,3 +190,54 @@ def test_too_little_to_calibrate_by(empty):
         calibrate(empty.drive.without("engine_load", "mass_air_flow"))
     with pytest.raises(DriveError, match="drive longer"):
         calibrate(empty.drive.between(0.0, 90.0))
+
+
+def test_a_source_that_says_nothing_is_refused(empty):
+    load = empty.drive.signals["engine_load"]
+    noise = np.random.default_rng(4).uniform(0.05, 0.3, load.values.size)
+    useless = empty.drive.with_signals(Signal("engine_load", load.time, noise))
+    with pytest.raises(DriveError, match="does not rise with its source engine_load"):
+        calibrate(useless, settings=CalibrationSettings(source="load"))
+
+
+def test_an_order_for_measured_torque_is_refused(electric):
+    with pytest.raises(ConfigError, match="offset and a scale only"):
+        calibrate(electric, settings=CalibrationSettings(order=1))
+    with pytest.raises(ConfigError, match="offset and scale"):
+        TorqueModel(source="measured", coefficients=(0.0, 1.0, 0.1))
+
+
+def test_a_cold_or_short_calibration_widens_every_mass(empty, car):
+    start = empty.drive.start
+    brief = calibrate(empty.drive.between(start, start + 420.0))
+    assert brief.provenance.mass_scale_std > car.provenance.mass_scale_std
+    assert brief.provenance.mass_scale_std > 0.04
+    assert "drive longer" in brief.provenance.notes
+
+
+def test_rolling_resistance_of_a_single_gear_is_not_fitted(electric):
+    base = Vehicle(
+        driveline=Driveline(gearings=make_scenario("electric").car.gearings),
+    )
+    found = calibrate(electric, vehicle=base)
+    assert found.road_load.rolling_coefficient == pytest.approx(
+        base.road_load.rolling_coefficient, rel=1e-3
+    )
+    assert found.driveline.engine_inertia_std is None
+
+
+def test_joint_calibration_weighs_its_own_drive(empty):
+    joint = calibrate(empty.drive, settings=CalibrationSettings(method="joint"))
+    w = weigh(empty.drive, joint, method="joint")
+    assert w.mass == pytest.approx(empty.drive.info.mass, rel=0.005)
+    assert 0.0 <= joint.timing.torque_lag <= 0.45
+    assert "joint" in joint.provenance.notes
+
+
+def test_joint_finds_a_load_in_unknown_wind(empty, loaded):
+    joint = calibrate(empty.drive, settings=CalibrationSettings(method="joint"))
+    w = weigh(loaded.drive, joint, method="joint")
+    truth = float(np.mean(loaded.truth.mass))
+    low, high = w.interval(0.95)
+    assert low < truth < high
+    assert w.mass == pytest.approx(truth, rel=0.03)

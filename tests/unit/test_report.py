@@ -117,6 +117,7 @@ def make_weighing(
         gear=gear,
         gearing=gearing,
         rotating_mass=rotating,
+        air_speed=speed,
         drag_force=drag,
         air_density=np.full(n, 1.2),
         reason=reason,

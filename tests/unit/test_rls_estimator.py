@@ -1,11 +1,12 @@
 """What the estimator adds to the standard deviation of the rows."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from weighbridge.estimators.judging import COLD_STD, consider_std
+from weighbridge.estimators.judging import COLD_STD, MOTION_STD, consider_std
 from weighbridge.estimators.rls import block_jackknife
 from weighbridge.vehicle.model import Provenance, TorqueModel, Vehicle
 
@@ -20,11 +21,17 @@ def test_a_cold_start_counts_by_its_share_of_the_information():
     phi = np.where(time < 600.0, 2.0, 1.0)
     every = np.ones(time.size, dtype=bool)
     share = 600 * 4.0 / (600 * 4.0 + 2400)
-    assert consider_std(time, phi, every, CAR) == pytest.approx(share * COLD_STD["load"])
+    balance = SimpleNamespace(
+        merged=SimpleNamespace(time=time), motion=SimpleNamespace(source="inertial")
+    )
+    assert consider_std(balance, phi, every, CAR) == pytest.approx(share * COLD_STD["load"])
     first = time < 600.0
-    assert consider_std(time, phi, first, CAR) == pytest.approx(COLD_STD["load"])
+    assert consider_std(balance, phi, first, CAR) == pytest.approx(COLD_STD["load"])
     measured = replace(CAR, torque=TorqueModel(source="measured"))
-    assert consider_std(time, phi, first, measured) == pytest.approx(COLD_STD["measured"])
+    assert consider_std(balance, phi, first, measured) == pytest.approx(COLD_STD["measured"])
+    balance.motion.source = "speed_grade"
+    late = time >= 600.0
+    assert consider_std(balance, phi, late, measured) > MOTION_STD["speed_grade"]
 
 
 def test_jackknife_counts_blocks_not_rows():

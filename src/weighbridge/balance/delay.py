@@ -73,7 +73,7 @@ def delay_std(misfit: Callable[[float], float], delay: float, rows: float) -> fl
 
 
 def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> float:
-    """Find the delay at which traction explains specific force best [s]; 0 if untold.
+    """Find the delay at which traction explains specific force best [s]; NaN if untold.
 
     A forward fit and an inverse one differ, but their product, the
     correlation, depends on the delay alone.
@@ -86,16 +86,13 @@ def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> flo
 
     def misfit(delay: float) -> float:
         view = force_balance(drive, vehicle, motion, delay=delay).merged
-        # Standing rows aside, all that have torque and gear: braking too would
-        # spoil the fit, but not move its best delay.
         rows = view.usable & np.isfinite(view.traction_force)
         if np.count_nonzero(rows) < 100:
             return float("nan")
         force = view.traction_force - view.drag_force - view.rotating_mass * view.accel
         return 1.0 - _correlation(force[rows], view.specific_force[rows])
 
-    delay = best_delay(misfit)
-    return delay if np.isfinite(delay) else 0.0
+    return best_delay(misfit)
 
 
 def _vertex(x: Floats, y: Floats) -> float:

@@ -20,7 +20,7 @@ from weighbridge.vehicle.gear import (
     predict_gear,
     shifting,
 )
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.model import Vehicle, VehicleClass
 from weighbridge.vehicle.torque import engine_torque, source_signal
 
 
@@ -73,6 +73,14 @@ WIND_AT_VEHICLE: Final = 0.5
 over a roughness length of 0.1 m, ln(1 / 0.1) / ln(10 / 0.1) (Stull, An Introduction to
 Boundary Layer Meteorology, 1988, ch. 9)."""
 
+TYPICAL_MASS: Final[dict[VehicleClass, float]] = {
+    "car": 1500.0,
+    "van": 2500.0,
+    "bus": 13_000.0,
+    "truck": 15_000.0,
+}
+"""Mass of a vehicle whose tare is unknown, to tell braking [kg]."""
+
 BRAKING_FORCE: Final = 0.06
 """Braking force over weight that marks unseen braking [-]."""
 
@@ -121,6 +129,7 @@ class MergedView:
     gear : (n,)
     gearing : (n,) [1/m]
     rotating_mass : (n,) I_w / r^2 + I_e G^2 [kg]
+    air_speed : (n,) against the air, with the reported wind [m/s]
     drag_force : (n,) in still air, or in the wind that ``drive.toml`` reports [N]
     air_density : (n,) [kg/m^3]
     reason : (n,) `Reason`
@@ -137,6 +146,7 @@ class MergedView:
     gear: Ints
     gearing: Floats
     rotating_mass: Floats
+    air_speed: Floats
     drag_force: Floats
     air_density: Floats
     reason: NDArray[np.uint8]
@@ -246,6 +256,7 @@ def force_balance(
             gear=gear,
             gearing=gearing,
             rotating_mass=rotating,
+            air_speed=air_speed,
             drag_force=drag,
             air_density=density,
             reason=reason,
@@ -312,7 +323,8 @@ def _engine_speed(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Float
     """Engine speed at the stamps it was recorded with: it is as late as vehicle speed."""
     signal = drive.get("engine_speed")
     if signal is not None and len(signal):
-        return signal.at(recorded)
+        near = signal.age(recorded) <= 3.0 * signal.period
+        return np.where(near, signal.at(recorded), np.nan)
     if vehicle.driveline.single_speed:
         return speed * vehicle.driveline.gearings[0]
     return np.full(speed.size, np.nan)
@@ -367,7 +379,7 @@ def _braking(
         return np.asarray(retarding | (switch.held(recorded) > 0.5))
     # Unseen braking: what slows the vehicle is far more than engine, drag and
     # rolling can, whatever the mass within reason.
-    mass = vehicle.tare or 1500.0
+    mass = vehicle.tare or TYPICAL_MASS[vehicle.kind]
     force = np.where(np.isfinite(traction), traction, 0.0)
     rolling = vehicle.road_load.rolling_coefficient * GRAVITY
     needed = (mass + np.nan_to_num(rotating)) * rows["specific_force"] + mass * rolling + drag

@@ -163,7 +163,7 @@ def _columns(
     one = np.ones_like(gearing)
     columns = [
         d.mass * view.specific_force,
-        0.5 * view.air_density * view.speed**2,
+        0.5 * view.air_density * view.air_speed * np.abs(view.air_speed),
         d.mass * GRAVITY * np.cos(view.grade),
         gearing**2 * view.accel,
         view.accel / wheel_radius**2,

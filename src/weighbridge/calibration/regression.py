@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -67,7 +67,8 @@ class TorqueFit:
     cov : (p + 4, p + 4) their covariance, zero where a bound holds
     weight : (n,) what each row counted, in (0, 1]
     residual : (n,) [N m]
-    r_squared : of source torque against torque of the motion [-]
+    r_squared : of source torque against torque of the motion, with the weights
+        of the fit [-]
     residual_std : robust [N m]
     at_bound : names of the road parameters that a bound holds
     independent_rows : rows that would say as much if none depended on another
@@ -117,7 +118,10 @@ def build_rows(
     torque = torque_rows(regressor[rows], engine_speed[rows], order, curved=curved)
     road = np.column_stack(
         [
-            -0.5 * view.air_density[rows] * view.speed[rows] ** 2 / gearing,
+            -0.5
+            * view.air_density[rows]
+            * (view.air_speed * np.abs(view.air_speed))[rows]
+            / gearing,
             -mass * GRAVITY * np.cos(view.grade[rows]) / gearing,
             -gearing * accel,
             -accel / (wheel_radius**2 * gearing),
@@ -197,20 +201,37 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
     cov, dependence = _sandwich(design, residual, weight, rows.block, ~held)
     cov = cov / np.outer(scale, scale)
     parameters = parameters / scale
-    torque = rows.design[:, :-4] @ parameters[:-4]
-    motion = torque + residual
-    total = np.sum(weight * (motion - np.average(motion, weights=weight)) ** 2)
     return TorqueFit(
         coefficients=parameters[:-4],
         road=parameters[-4:],
         cov=cov,
         weight=weight,
         residual=residual,
-        r_squared=float(1.0 - np.sum(weight * residual**2) / total),
+        r_squared=_r_squared(rows.target - rows.design[:, -4:] @ parameters[-4:], residual, weight),
         residual_std=1.4826 * float(np.median(np.abs(residual))),
         at_bound=tuple(name for name, at in zip(ROAD_PARAMETERS, held[-4:], strict=True) if at),
         independent_rows=n / dependence,
     )
+
+
+def at_point(rows: TorqueRows, fitted: TorqueFit, coefficients: Floats, road: Floats) -> TorqueFit:
+    """Return a fit of the same rows and weights at other parameters, such as a grid's."""
+    residual = rows.target - rows.design @ np.concatenate([coefficients, road])
+    return replace(
+        fitted,
+        coefficients=coefficients,
+        road=road,
+        residual=residual,
+        r_squared=_r_squared(rows.target - rows.design[:, -4:] @ road, residual, fitted.weight),
+        residual_std=1.4826 * float(np.median(np.abs(residual))),
+        at_bound=(),
+    )
+
+
+def _r_squared(torque: Floats, residual: Floats, weight: Floats) -> float:
+    """Part of the torque of the motion that the source explains, with the fit's weights."""
+    total = np.sum(weight * (torque - np.average(torque, weights=weight)) ** 2)
+    return float(1.0 - np.sum(weight * residual**2) / total)
 
 
 def _sandwich(

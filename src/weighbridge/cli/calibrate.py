@@ -93,6 +93,12 @@ def calibrate(
     )
     masses = mass[0] if mass is not None and len(mass) == 1 else mass
     done = run_calibration(recorded, masses, vehicle=base, settings=settings)
+    lightest = min(done.vehicle.provenance.masses)
+    if tare is not None and not 0.3 * lightest <= tare <= 1.02 * lightest:
+        raise ConfigError(
+            f"--tare {tare:g}: must not be above the known mass of {lightest:g} kg nor far below; "
+            "it is the vehicle without payload"
+        )
     if tare is not None:
         done = replace(done, vehicle=replace(done.vehicle, tare=tare))
     done.vehicle.save(output)
@@ -111,6 +117,8 @@ def table(done: Calibration) -> Table:
     shown.add_column("parameter")
     shown.add_column("value", justify="right")
     shown.add_column("std", justify="right")
+
+    shown.add_row("known mass (kg)", ", ".join(f"{kg:.0f}" for kg in p.masses), "")
 
     def row(name: str, value: float | None, std: float | None, digits: int) -> None:
         if value is not None:

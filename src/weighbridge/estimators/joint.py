@@ -146,7 +146,8 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
             [guess, 0.0, 0.0, 0.0, 0.0], prior, time[0]
         )
         return kernel.run(  # type: ignore[no-any-return]
-            start, time, mean_rows, mean_y, fast**2 * variance, params)
+            start, time, mean_rows, mean_y, fast**2 * variance, params
+        )
 
     def misfit(level: Floats) -> float:
         # A weak prior keeps the levels within a factor of about three.
@@ -161,7 +162,8 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
 
     mass = float(state.x[0])
     bound = float(np.sqrt(state.cov[0, 0]))
-    std = float(np.hypot(bound, mass * consider_std(view.time, rows[:, 0], used, vehicle)))
+    slow = consider_std(balance, rows[:, 0], used, vehicle)
+    std = float(np.hypot(bound, mass * slow))
     last = np.searchsorted(time, view.time, side="right") - 1
     known = last >= 0
     running = np.where(known, mass_track[np.maximum(last, 0)], np.nan)
@@ -178,7 +180,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
         method="joint",
         balance=balance,
         running_mass=running,
-        running_std=running_std,
+        running_std=np.hypot(running_std, running * slow),
         residual=np.where(used, y - rows[:, 0] * mass, np.nan),
         reason=reason,
         mass=mass,
@@ -188,5 +190,5 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
         converged_at=converged_at(view.time, running, mass, used),
         status=status,
         why=why,
-        segments=segments(view, part),
+        segments=segments(balance, vehicle, rows[:, 0], used, part),
     )

@@ -107,7 +107,8 @@ def estimate(
     phi, y = regression(view, vehicle)
     reason = view.reason.copy()
     reason[(reason == 0) & (view.accel <= 0.0)] = Reason.NOT_ACCELERATING
-    valid = (reason == 0) & np.isfinite(phi) & np.isfinite(y)
+    reason[(reason == 0) & ~(np.isfinite(phi) & np.isfinite(y))] = Reason.NO_MOTION
+    valid = reason == 0
     period = float(np.median(np.diff(view.time))) if view.time.size > 1 else 1.0 / PAPER_RATE
     state = kernel.initial_state(  # type: ignore[no-untyped-call]
         [settings.initial_mass], [[settings.initial_gain]]
@@ -119,10 +120,11 @@ def estimate(
     used = reason == Reason.USED
 
     mass, spread, blocks = block_jackknife(view.time, phi, y, used)
-    slow = consider_std(view.time, phi, used, vehicle)
+    slow = consider_std(balance, phi, used, vehicle)
     std = float(np.hypot(spread, mass * slow))
     residual = np.where(used, y - phi * mass, np.nan)
-    running = theta[:, 0]
+    # Before the first row there is a start value, but no measurement.
+    running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)
     status, why = judge(view, vehicle, used, mass, std, blocks)
 
     def part(rows: slice) -> tuple[float, float]:
@@ -132,7 +134,7 @@ def estimate(
         method="rls",
         balance=balance,
         running_mass=running,
-        running_std=np.sqrt(var),
+        running_std=np.hypot(np.sqrt(var), running * slow),
         residual=residual,
         reason=reason,
         mass=mass,
@@ -142,7 +144,7 @@ def estimate(
         converged_at=converged_at(view.time, running, mass, used),
         status=status,
         why=why,
-        segments=segments(view, part),
+        segments=segments(balance, vehicle, phi, used, part),
     )
 
 

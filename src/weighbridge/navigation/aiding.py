@@ -84,6 +84,11 @@ def read_imu(drive: Drive) -> Imu:
     end = min(float(s.time[-1]) if len(s) else -np.inf for s in signals)
     clock = signals[0].time
     keep = (clock >= start) & (clock <= end)
+    usual = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
+    for s in signals:
+        # An axis that has a gap of its own must not be invented across it.
+        if s.time is not clock and not np.array_equal(s.time, clock):
+            keep &= s.age(clock) <= 2.0 * max(usual, s.period)
     if keep.sum() < 50:
         raise DriveError(
             f"{drive.name}: accel and gyro have only {int(keep.sum())} samples in common: "

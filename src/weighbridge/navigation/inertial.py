@@ -98,6 +98,10 @@ def _evenly(imu: Imu, rate: float) -> _Even:
     return _Even(start + np.arange(count) / rate, np.hstack(both))
 
 
+MOST_MOVED = 0.2
+"""A mounting further from the one given is another one [rad]."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Start:
     """Where the filter begins.
@@ -182,7 +186,7 @@ def inertial_motion(
     notes: list[str] = []
 
     fine = _evenly(imu, _FINE_RATE)
-    rot_bs, tilt_std, yaw_std, yaw_bias, delay = _align(fine, reference, mounting, notes)
+    rot_bs, tilt_std, yaw_std, yaw_bias, delay, mounting = _align(fine, reference, mounting, notes)
     reference = Signal(reference.name, reference.time - delay, reference.values)
     gnss_delay = delay if wheel is None else _gnss_delay(drive, fine, fixes, rot_bs)
     speed = reference if wheel is not None or drive.has("gnss_speed") else None
@@ -228,8 +232,11 @@ def _usable(signal: Signal | None, start: float, end: float) -> Signal | None:
 
 def _align(
     fine: _Even, reference: Signal, mounting: Mounting | None, notes: list[str]
-) -> tuple[Floats, float, float, float, float]:
-    """Find sensor to body axes, their uncertainty, the yaw rate's bias and the speed's delay."""
+) -> tuple[Floats, float, float, float, float, Mounting | None]:
+    """Find sensor to body axes, their uncertainty, the yaw rate's bias and the speed's delay.
+
+    The last value is the mounting given, or None where the sensor was moved since.
+    """
     start = float(fine.time[0])
     count = max(4, math.floor((fine.time[-1] - start) / _COARSE_PERIOD) + 1)
     grid = start + np.arange(count) * _COARSE_PERIOD
@@ -261,11 +268,13 @@ def _align(
                 rot, tilt_std, yaw_std = coarse.rot_bs, coarse.tilt_std, coarse.yaw_std
             else:
                 angle = math.acos(np.clip(0.5 * (np.trace(rot @ coarse.rot_bs.T) - 1.0), -1, 1))
-                if angle > 0.2 and not notes:
+                if angle > MOST_MOVED:
                     notes.append(
-                        f"the drive shows a mounting {math.degrees(angle):.0f} deg from the one "
-                        "given"
+                        f"the sensor sits {math.degrees(angle):.0f} deg from the mounting given: "
+                        "it was moved, and its mounting is found from this drive alone"
                     )
+                    rot, tilt_std, yaw_std = coarse.rot_bs, coarse.tilt_std, coarse.yaw_std
+                    mounting = None
         delay, delay_std = estimate_speed_delay(fine.time, fine.values[:, :3] @ rot[0], reference)
         if not delay_std < 0.1:
             delay = 0.0
@@ -278,7 +287,7 @@ def _align(
             )
     if delay == 0.0:
         notes.append("the drive does not show how late its vehicle speed is; taken as 0 s")
-    return rot, tilt_std, yaw_std, yaw_bias, delay
+    return rot, tilt_std, yaw_std, yaw_bias, delay, mounting
 
 
 def _gnss_delay(drive: Drive, fine: _Even, fixes: Fixes | None, rot_bs: Floats) -> float:

@@ -28,7 +28,7 @@ def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
     if drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude")):
         from weighbridge.navigation.inertial import inertial_motion
 
-        positions = drive.has("latitude", "longitude") or drive.has("gnss_speed")
+        positions = drive.has("latitude", "longitude")
         return inertial_motion(
             drive if positions else _true_speed(drive, vehicle),
             vehicle.mounting if vehicle is not None else None,

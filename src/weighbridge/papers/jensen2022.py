@@ -129,10 +129,6 @@ day of the windows; the values for the other drives are chosen (sec. 7.4, app. B
 HIGHWAY_LIMIT: Final = 25.0
 """Speed limit above which a road is the highway [m/s]."""
 
-PAPER_RATIOS: Final = (406.0, 278.9, 193.2, 134.6, 94.0, 70.9, 55.1)
-"""Gearing of gears 1 to 7, engine rpm per m/s (Table 4, specifications)."""
-
-PAPER_RATIO_ERROR: Final = 0.02
 PAPER_R_SQUARED: Final = 0.972
 PAPER_BAND: Final = 0.05
 OUTAGE: Final = (2400.0, 2520.0)
@@ -154,7 +150,6 @@ class DriveResult:
     covered : the 95 % interval holds the true mass
     grade_rms, pitch_rms : errors while moving [rad]
     pitch_std : of the pitch error, the constant lean under load aside [rad]
-    specific_force_slow : RMS of the error's mean over 300 s [m/s^2]
     """
 
     drive: TestDrive
@@ -167,7 +162,6 @@ class DriveResult:
     grade_rms: float
     pitch_rms: float
     pitch_std: float
-    specific_force_slow: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -285,10 +279,6 @@ def judge(row: TestDrive, made: SimulatedDrive, weighing: Weighing) -> DriveResu
         true = np.interp(motion.time, truth.time, getattr(truth, name))
         return np.asarray(getattr(motion, name) - true)
 
-    force = error("specific_force")
-    window = ((motion.time - motion.time[0]) // 300.0).astype(np.int64)
-    count = np.bincount(window, moving)
-    slow = np.bincount(window, force * moving)[count > 600] / count[count > 600]
     return DriveResult(
         drive=row,
         true_mass=mass,
@@ -300,7 +290,6 @@ def judge(row: TestDrive, made: SimulatedDrive, weighing: Weighing) -> DriveResu
         grade_rms=_rms(error("grade")[moving]),
         pitch_rms=_rms(error("pitch")[moving]),
         pitch_std=float(np.std(error("pitch")[moving])),
-        specific_force_slow=_rms(slow),
     )
 
 

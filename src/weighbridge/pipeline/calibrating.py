@@ -15,13 +15,16 @@ from weighbridge.balance.force_balance import ForceBalance
 from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.regression import (
     BOUNDS,
+    ROAD_PARAMETERS,
     TorqueFit,
     TorqueRows,
+    at_point,
     build_rows,
     fit,
     join_rows,
 )
 from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.judging import COLD_STD, cold_share
 from weighbridge.estimators.rls import block_jackknife, regression
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
@@ -42,6 +45,9 @@ from weighbridge.vehicle.model import (
     VehicleClass,
 )
 from weighbridge.vehicle.torque import SIGNALS, lowest_load, regressor
+
+FEW_SAMPLES: Final = 2000
+"""Fewer usable samples, some twenty minutes of driving, make a poor calibration."""
 
 TRANSFER_STD: Final[dict[TorqueSource, float]] = {
     "measured": 0.005,
@@ -166,6 +172,11 @@ def run_calibration(
     modelled = source in ("load", "air_flow")
     if order is None:
         order = 2 if modelled else 0
+    if order and not modelled:
+        raise ConfigError(
+            f"order {order}: torque source {source!r} has an offset and a scale only; "
+            "leave --order out"
+        )
     curved = settings.curved and modelled
     model = TorqueModel(
         source="measured" if source == "load" else source,
@@ -176,9 +187,15 @@ def run_calibration(
     draft = replace(base, driveline=driveline, torque=model)
     low, high = BOUNDS[base.kind]
     if driveline.single_speed:
-        # One gear cannot tell the inertias from the mass.
+        # One gear cannot tell the inertias from the mass, nor rolling resistance from an
+        # offset of the torque.
         low, high = low.copy(), high.copy()
-        low[2:] = high[2:] = (driveline.engine_inertia, driveline.wheel_inertia)
+        known = (
+            base.road_load.rolling_coefficient,
+            driveline.engine_inertia,
+            driveline.wheel_inertia,
+        )
+        low[1:] = high[1:] = known
 
     floors = [_load_floor(drive, source) for drive in drives]
 
@@ -202,9 +219,14 @@ def run_calibration(
         delay = base.timing.torque_delay or 0.0
     rows = rows_at(delay)
     fitted = fit(rows, low, high)
+    _refuse_nonsense(drives, fitted, source)
     if settings.grid:
+        if base.kind != "car" or driveline.single_speed:
+            raise ConfigError(
+                "the grid of Jensen 2022 is for cars with gears; calibrate without --grid"
+            )
         coefficients, road, _ = grid_search(rows, fitted.weight)
-        fitted = replace(fitted, coefficients=coefficients, road=road)
+        fitted = at_point(rows, fitted, coefficients, road)
     spread = delay_std(misfit, delay, fitted.independent_rows) if found else float("nan")
     speeds, loads = _ranges(drives, motions, draft, source, delay, floors)
     finished = replace(
@@ -220,17 +242,18 @@ def run_calibration(
         road_load=_fitted_road_load(fitted),
         mounting=_mounting(motions, base.mounting),
         timing=Timing(
-            torque_delay=delay,
+            torque_delay=delay if found else base.timing.torque_delay,
             torque_delay_std=spread if np.isfinite(spread) else None,
             speed_delay=base.timing.speed_delay,
         ),
         provenance=Provenance(
             drives=tuple(drive.name for drive in drives),
+            masses=tuple(masses),
             date=datetime.date.today().isoformat(),
             r_squared=fitted.r_squared,
             residual_std=fitted.residual_std,
             samples=int(rows.target.size),
-            notes=("held by a bound: " + ", ".join(fitted.at_bound) if fitted.at_bound else None),
+            notes=_notes(fitted, low < high, rows.target.size, found),
         ),
     )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
@@ -240,7 +263,11 @@ def run_calibration(
         torque=finished.torque.scaled(scale),
         provenance=replace(
             finished.provenance,
-            mass_scale_std=float(np.hypot(scale_std, TRANSFER_STD[source])),
+            mass_scale_std=float(
+                np.sqrt(
+                    scale_std**2 + TRANSFER_STD[source] ** 2 + _misfit_std(fitted, low < high) ** 2
+                )
+            ),
         ),
     )
     if settings.method == "joint":
@@ -467,23 +494,69 @@ def _self_weighing(
     different directions; what they leave on the drives of known mass is taken
     out here.
     """
-    time, phi, whole, rest = [], [], [], []
+    time, phi, whole, rest, cold = [], [], [], [], []
     offset = 0.0
     for balance, mass in zip(balances, masses, strict=True):
         view = balance.merged
         x, target = regression(view, vehicle)
         used = (view.reason == Reason.USED) & (view.accel > 0.0)
         used &= np.isfinite(x) & np.isfinite(target)
-        time.append(view.time[used] + offset)
+        if not used.any():
+            continue
+        instants = view.time[used] - view.time[0]
+        cold.append((float(np.sum(x[used] ** 2)), cold_share(view.time, x, used)))
+        time.append(instants + offset)
         phi.append(x[used] * mass)
         whole.append(target[used])
         rest.append((view.traction_force - target)[used])
-        offset += float(view.time[-1]) + 1e3 if view.time.size else 0.0
+        offset += float(instants[-1]) + 1e3
     every = np.ones(sum(t.size for t in time), dtype=bool)
     joined = np.concatenate(time), np.concatenate(phi)
     found, std, _ = block_jackknife(*joined, np.concatenate(whole), every)
     resisted, _, _ = block_jackknife(*joined, np.concatenate(rest), every)
-    return (1.0 + resisted) / (found + resisted), std / found
+    weights, shares = np.array(cold).T
+    warming = COLD_STD[vehicle.torque.source] * float(np.average(shares, weights=weights))
+    return (1.0 + resisted) / (found + resisted), float(np.hypot(std / found, warming))
+
+
+def _refuse_nonsense(drives: Sequence[Drive], fitted: TorqueFit, source: TorqueSource) -> None:
+    """Raise where torque does not rise with its source: nothing can be weighed by it."""
+    slope, std = fitted.coefficients[1], float(np.sqrt(fitted.cov[1, 1]))
+    if not slope > 3.0 * std:
+        raise DriveError(
+            f"{', '.join(drive.name for drive in drives)}: torque does not rise with its source "
+            f"{SIGNALS[source][0]} ({slope:.3g} ± {std:.2g}); check the signal, its unit and the "
+            "known mass, or calibrate with another --torque"
+        )
+
+
+def _misfit_std(fitted: TorqueFit, free: Bools) -> float:
+    """Relative uncertainty of every mass by what the fit did not explain or hold off bounds."""
+    bounds = sum(
+        open_ and name in fitted.at_bound
+        for name, open_ in zip(ROAD_PARAMETERS[:2], free[:2], strict=True)
+    )
+    return float(np.hypot(0.3 * max(0.0, 1.0 - fitted.r_squared), 0.03 * bounds))
+
+
+def _notes(fitted: TorqueFit, free: Bools, samples: int, delay_found: bool) -> str | None:
+    """Say what a reader of the vehicle file should know of its making."""
+    held = [
+        name
+        for name, open_ in zip(ROAD_PARAMETERS, free, strict=True)
+        if open_ and name in fitted.at_bound
+    ]
+    notes = ["held by a bound: " + ", ".join(held)] if held else []
+    if samples < FEW_SAMPLES:
+        notes.append(f"made from {samples} samples only; drive longer")
+    if not delay_found:
+        notes.append("the drives do not show how late the torque is")
+    return "; ".join(notes) or None
+
+
+def _known(std: float) -> float | None:
+    """Standard deviation of what was free; None for what a bound held."""
+    return float(std) if std > 0.0 else None
 
 
 def _fitted_driveline(known: Driveline, fitted: TorqueFit) -> Driveline:
@@ -491,9 +564,9 @@ def _fitted_driveline(known: Driveline, fitted: TorqueFit) -> Driveline:
     return replace(
         known,
         engine_inertia=float(fitted.road[2]),
-        engine_inertia_std=float(stds[-2]),
+        engine_inertia_std=_known(stds[-2]),
         wheel_inertia=float(fitted.road[3]),
-        wheel_inertia_std=float(stds[-1]),
+        wheel_inertia_std=_known(stds[-1]),
     )
 
 
@@ -516,6 +589,6 @@ def _fitted_road_load(fitted: TorqueFit) -> RoadLoad:
     return RoadLoad(
         drag_area=float(fitted.road[0]),
         rolling_coefficient=float(fitted.road[1]),
-        drag_area_std=float(stds[-4]),
-        rolling_coefficient_std=float(stds[-3]),
+        drag_area_std=_known(stds[-4]),
+        rolling_coefficient_std=_known(stds[-3]),
     )

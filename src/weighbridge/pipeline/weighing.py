@@ -96,9 +96,9 @@ class Weighing:
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """Mass between stops, where load can change; NaN where data and vehicle do not fit."""
+        """Mass between stops, where load can change; NaN where the drive carries no mass."""
         found = self.result.segments if self.result else ()
-        if self.status is Status.INCONSISTENT:
+        if self.status is not Status.CONVERGED:
             return tuple(replace(s, mass=math.nan, std=math.nan) for s in found)
         return found
 
@@ -256,7 +256,11 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     delay = vehicle.timing.torque_delay
     if delay is None:
         delay = estimate_torque_delay(drive, vehicle, motion)
-        warnings += (f"torque delay {delay:+.2f} s found from this drive",)
+        if math.isfinite(delay):
+            warnings += (f"torque delay {delay:+.2f} s found from this drive",)
+        else:
+            delay = 0.0
+            warnings += ("the drive does not show how late its torque is; taken as 0 s",)
     if vehicle.provenance.mass_scale_std is None:
         warnings += (
             f"the vehicle file of {vehicle.name} was not made by a calibration: errors of its "

@@ -176,6 +176,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
         Provenance,
         (
             _Key("drives", "drives", "drives of the calibration", "texts"),
+            _Key("masses", "masses", "their known masses", "numbers", "kg"),
             _Key("date", "date", "of the calibration", "text"),
             _Key("r_squared", "r_squared", "of the torque fit"),
             _Key("residual_std", "residual_std", "of the torque fit", suffix="nm"),

@@ -130,6 +130,11 @@ class TorqueModel:
             raise ConfigError(
                 "torque source 'load' needs at least two coefficients: run weighbridge calibrate"
             )
+        if self.source in ("measured", "percent") and len(self.coefficients) not in (0, 2):
+            raise ConfigError(
+                f"torque source {self.source!r} takes two coefficients, offset and scale, or none, "
+                f"got {len(self.coefficients)}"
+            )
         if self.coefficient_stds and len(self.coefficient_stds) != len(self.coefficients):
             raise ConfigError("coefficient_stds must be as many as coefficients")
         if len(self.curvature) not in (0, 2):
@@ -232,6 +237,7 @@ class Provenance:
     Attributes
     ----------
     drives : names of the drives of the calibration
+    masses : their known masses [kg]
     date : ISO 8601 date
     r_squared : of the torque fit [-]
     residual_std : of the torque fit [N m]
@@ -242,12 +248,16 @@ class Provenance:
     """
 
     drives: tuple[str, ...] = ()
+    masses: tuple[float, ...] = ()
     date: str | None = None
     r_squared: float | None = None
     residual_std: float | None = None
     samples: int | None = None
     mass_scale_std: float | None = None
     notes: str | None = None
+
+    def __post_init__(self) -> None:
+        _not_negative("mass_scale_std", self.mass_scale_std)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
