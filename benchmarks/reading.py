@@ -108,20 +108,32 @@ def write_candump(path: Path, seconds: int) -> None:
             )  # fmt: skip
 
 
-READ = """
-import json, resource, sys, time
+# The largest the process itself ever was; getrusage would count its parent's before exec.
+PEAK = """
+def peak():
+    line = next(x for x in open("/proc/self/status") if x.startswith("VmHWM"))
+    return int(line.split()[1]) * 1024 / 1e9
+"""
+
+READ = (
+    PEAK
+    + """
+import json, sys, time
 from weighbridge.io import read_drive
 import asammdf, cantools, can
 began = time.perf_counter()
 mapping = json.loads(sys.argv[2]) if sys.argv[2].startswith("{") else sys.argv[2]
 drive = read_drive(sys.argv[1], mapping, sys.argv[3])
 took = time.perf_counter() - began
-print(json.dumps([took, drive.duration, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
+print(json.dumps([took, drive.duration, peak(),
                   sum(map(len, drive.signals.values()))]))
 """
+)
 
-LOOP = """
-import json, resource, sys, time
+LOOP = (
+    PEAK
+    + """
+import json, sys, time
 import can, cantools
 from asammdf import MDF
 began = time.perf_counter()
@@ -134,8 +146,9 @@ for m in can.LogReader(sys.argv[1]):
     elif m.arbitration_id == 0x7E8 and m.data[1] == 0x41:
         values += 1
 print(json.dumps([time.perf_counter() - began, m.timestamp - 1.6e9,
-                  resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, values]))
+                  peak(), values]))
 """
+)
 
 
 def run(program: str, log: Path, mapping: str, dbc: Path) -> list[float]:

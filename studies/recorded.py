@@ -6,6 +6,7 @@ Run from the checkout: ``python studies/recorded.py``. The recordings lie in
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ import numpy as np
 import weighbridge as wb
 from weighbridge.io.candump import read_candump
 from weighbridge.io.j1939 import decode_j1939
+from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.signals import Signal
 from weighbridge.signals.alignment import align
+from weighbridge.vehicle.gear import detect_gearings
 
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "shared" / "data"
@@ -146,11 +149,128 @@ def clocks() -> str:
     return "\n".join(lines)
 
 
+CANEDGE = HERE.parent / "examples" / "canedge"
+SEAT = HERE.parent / "examples" / "seat-leon"
+# rpm per km/h of one radian per metre
+RPM_PER_KMH = np.pi / 30.0 * 3.6
+
+
+def canedge_drives() -> list[tuple[str, wb.Drive]]:
+    folder = DATA / "canedge-obd-imu-gnss"
+    found = []
+    for path in sorted(folder.glob("*/*.MF4")):
+        drive = wb.read_drive(path, CANEDGE / "mapping.toml", folder / "canmod-gps.dbc")
+        found.append((f"{path.parent.name}/{path.stem.split('-')[0]}", drive))
+    return found
+
+
+def gear_line(name: str, drives: list[wb.Drive], known: tuple[float, ...]) -> str:
+    """Gear ratios found in drives together, each beside the one known."""
+    time, engine, speed = [], [], []
+    for k, drive in enumerate(drives):
+        rpm, wheels = drive.signals["engine_speed"], drive.signals["vehicle_speed"]
+        inside = np.isfinite(wheels.at(rpm.time))
+        time.append(rpm.time[inside] - rpm.time[0] + 1e5 * k)
+        engine.append(rpm.values[inside])
+        speed.append(wheels.at(rpm.time)[inside])
+    found = detect_gearings(*map(np.concatenate, (time, engine, speed)), speed_step=1 / 3.6)
+    ratios = found.gearings / RPM_PER_KMH
+    told = []
+    for ratio in known:
+        nearest = ratios[np.argmin(np.abs(np.log(ratios / ratio)))]
+        off = 100.0 * (nearest / ratio - 1.0)
+        told.append(f"{nearest:.2f} ({off:+.1f} %)" if abs(off) < 5.0 else "–")
+    return f"| {name} | {' | '.join(told)} | {ratios.size} |"
+
+
+def canedge() -> str:
+    """Eight MF4 files with OBD-II, IMU and GNSS: gear ratios, mounting, mass per torque."""
+    drives = canedge_drives()
+    long = [(name, drive) for name, drive in drives if drive.duration > 300.0]
+    known = (134.0, 67.0, 44.75, 33.75, 27.25, 22.25)
+    head = f"| file | {' | '.join(f'{k:g}' for k in known)} | peaks |"
+    lines = [head, "|" + "---|" * (len(known) + 2)]
+    for name, drive in long:
+        lines.append(gear_line(name, [drive], known))
+    lines.append(gear_line("all together", [drive for _, drive in long], known))
+
+    car = wb.Vehicle.load(CANEDGE / "vehicle.toml")
+    assert car.torque.reference_torque is not None
+    reference = car.torque.reference_torque
+    gross = replace(car, torque=replace(car.torque, coefficients=()))
+    small = 0.8 * reference
+    other = replace(
+        car,
+        torque=replace(
+            car.torque, reference_torque=small, coefficients=(0.8 * car.torque.coefficients[0], 1.0)
+        ),
+    )
+    lines += [
+        "",
+        "| file | s | used s | kg per N m | ± sd within the file | gross torque | "
+        f"{small:.0f} N m | forward axis in the sensor's x, y, z | sd of roll, pitch, yaw ° |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    table = []
+    for name, drive in drives:
+        w = wb.weigh(drive, car, method="rls")
+        if w.status != "converged" or w.result is None:
+            lines.append(f"| {name} | {drive.duration:.0f} | | {w.status} | | | | | |")
+            continue
+        motion = w.result.balance.motion
+        forward = ", ".join(f"{x:+.2f}" for x in euler_to_matrix(*motion.mounting)[0])
+        sd = ", ".join(f"{x:.1f}" for x in np.degrees(motion.mounting_std))
+        row = [
+            w.mass / reference,
+            wb.weigh(drive, gross, method="rls").mass / reference,
+            wb.weigh(drive, other, method="rls").mass / small,
+        ]
+        table.append((drive.duration, *row))
+        lines.append(
+            f"| {name} | {drive.duration:.0f} | {w.used_time:.0f} | {row[0]:.2f} "
+            f"| {w.std / reference:.2f} | {row[1]:.2f} | {row[2]:.2f} | {forward} | {sd} |"
+        )
+    rows = np.array(table)
+    full = rows[rows[:, 0] > 500.0]
+
+    def agreement(values: np.ndarray) -> str:
+        spread = 100.0 * np.std(values, ddof=1) / np.mean(values)
+        return f"{np.mean(values):.2f} kg per N m, sd {spread:.1f} %"
+
+    lines += [
+        "",
+        f"Agreement with `--method rls`: the {len(full)} files of nine minutes and more "
+        f"{agreement(full[:, 1])}; all {len(rows)} that give a mass {agreement(rows[:, 1])}; "
+        f"the long ones on gross torque {agreement(full[:, 2])}, with {small:.0f} N m "
+        f"{agreement(full[:, 3])}. With {reference:.0f} N m the long files say "
+        f"{reference * np.min(full[:, 1]):.0f} to {reference * np.max(full[:, 1]):.0f} kg.",
+    ]
+    return "\n".join(lines)
+
+
+def seat_leon() -> str:
+    """Gear ratios from one parameter at a time; a mass is refused."""
+    paths = sorted((DATA / "seat-leon-obd").glob("*.csv"))
+    drives = [wb.read_drive(path, SEAT / "mapping.toml") for path in paths]
+    known = (58.25, 37.25, 25.75, 20.25, 16.75)
+    lines = [
+        f"| recording | {' | '.join(f'{k:g}' for k in known)} | peaks |",
+        "|" + "---|" * (len(known) + 2),
+        *(gear_line(p.stem, [d], known) for p, d in zip(paths, drives, strict=True)),
+        gear_line("all together", drives, known),
+    ]
+    w = wb.weigh(drives[0], wb.Vehicle.load(SEAT / "vehicle.toml"), method="rls")
+    lines += ["", f"`weigh` says `{w.status}`: {w.reason}."]
+    return "\n".join(lines)
+
+
 def main() -> None:
     page = (HERE / "recorded.template.md").read_text(encoding="utf-8")
     page = page.replace("<!-- bmw-i3 -->", bmw_i3())
     page = page.replace("<!-- j1939-truck -->", j1939_truck())
     page = page.replace("<!-- clocks -->", clocks())
+    page = page.replace("<!-- canedge -->", canedge())
+    page = page.replace("<!-- seat-leon -->", seat_leon())
     (HERE / "recorded.md").write_text(page, encoding="utf-8")
 
 

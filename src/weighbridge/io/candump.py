@@ -81,6 +81,8 @@ def _blocks(path: Path) -> Iterator[bytes]:
 
 def _parse(block: bytes, channels: dict[str, int]) -> tuple[Frames, int, int]:
     """Frames of a block of lines, how many lines there are, how many say nothing."""
+    if (quick := _parse_plain(block, channels)) is not None:
+        return quick, len(quick), 0
     text = pl.Series("line", [block.decode("ascii", "replace")]).str.split("\n").explode()
     text = text.str.strip_chars_end("\r").filter(text.str.len_bytes() > 1)
     shown = bool(text[:100].str.contains(r"\s\[\d+\]").any())
@@ -91,22 +93,54 @@ def _parse(block: bytes, channels: dict[str, int]) -> tuple[Frames, int, int]:
     known = columns.filter(pl.col("data").is_not_null())
     remote = int(text.str.contains(_REMOTE).sum())
     strange = len(text) - len(known) - remote
+    return _frames(known, channels), len(text), strange
+
+
+def _parse_plain(block: bytes, channels: dict[str, int]) -> Frames | None:
+    """Frames of a block that holds nothing but data frames of classic CAN; None of any other."""
+    try:
+        columns = pl.read_csv(
+            block, has_header=False, separator=" ", quote_char=None, infer_schema=False,
+            new_columns=["time", "bus", "frame"],
+        )  # fmt: skip
+        if columns.width != 3:
+            return None
+        columns = columns.select(
+            pl.col("time").str.strip_prefix("(").str.strip_suffix(")").cast(pl.Float64),
+            "bus",
+            pl.col("frame").str.strip_chars_end("\r").str.split_exact("#", 1).alias("frame"),
+        ).unnest("frame")
+        columns.columns = ["time", "bus", "id", "data"]
+        sound = columns.select(
+            sound=(
+                pl.col("id").str.len_bytes().is_in([3, 8])
+                & (pl.col("data").str.len_bytes() % 2 == 0)
+                & (pl.col("data").str.len_bytes() <= 16)
+                & pl.col("time").is_not_null()
+            ).all()
+        )
+        return _frames(columns, channels) if sound["sound"][0] else None
+    except pl.exceptions.PolarsError:
+        return None
+
+
+def _frames(known: pl.DataFrame, channels: dict[str, int]) -> Frames:
+    """Data frames of columns of text; error frames are left out."""
     identifier = known["id"].str.to_integer(base=16, dtype=pl.UInt32).to_numpy()
     buses = known["bus"]
     for bus in buses.unique(maintain_order=True):
         channels.setdefault(bus, _number(bus, channels))
-    channel = buses.replace_strict(channels, return_dtype=pl.Int16).to_numpy()
     length, data = bytes_of_hex(known["data"])
     frames = Frames(
         known["time"].cast(pl.Float64).to_numpy(),
-        channel,
+        buses.replace_strict(channels, return_dtype=pl.Int16).to_numpy(),
         identifier & np.uint32(EXTENDED_MASK),
         known["id"].str.len_bytes().to_numpy() == 8,
         length,
         data,
     )
     error = frames.extended & ((identifier & np.uint32(_ERROR_FLAG)) != 0)
-    return frames.select(~error) if error.any() else frames, len(text), strange
+    return frames.select(~error) if error.any() else frames
 
 
 def _number(bus: str, taken: dict[str, int]) -> int:
