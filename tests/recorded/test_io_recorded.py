@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.imu_checks import _turns
@@ -94,14 +93,6 @@ def test_seat_logs_by_time_of_day(shared_data):
         assert serious(drive) == []
 
 
-def test_raw_can_logs_are_refused_in_one_sentence(shared_data):
-    pytest.importorskip("asammdf")
-    for file in sorted((shared_data / "canedge-obd-imu-gnss").rglob("*.MF4")):
-        with pytest.raises(DriveError, match="holds raw CAN bus frames"):
-            read_drive(file)
-
-
-@pytest.fixture(scope="module")
 def hills(shared_data):
     """The rtk-grade drive: IMU by mapping, GNSS from RTKLIB's text, clocks brought together."""
     folder = shared_data / "rtk-grade"
