@@ -77,7 +77,6 @@ vehicles = st.builds(
         Timing,
         torque_delay=maybe(st.floats(-1.0, 3.0)),
         torque_delay_std=maybe(positive),
-        speed_delay=maybe(st.floats(-1.0, 3.0)),
     ),
     provenance=st.builds(
         Provenance,

@@ -14,7 +14,7 @@ from weighbridge import Status, weigh
 from weighbridge.balance import force_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.rls import estimate
-from weighbridge.pipeline.weighing import TRACK_COLUMNS, Weighing, empty_result
+from weighbridge.pipeline.weighing import TRACK_COLUMNS, Weighing, empty_result, overload
 from weighbridge.signals import Signal
 from weighbridge.vehicle.model import Provenance
 
@@ -186,3 +186,12 @@ def test_a_vehicle_that_was_not_calibrated_is_told():
     assert found.mass == pytest.approx(MASS, rel=0.05)
     named = replace(CAR, provenance=Provenance(mass_scale_std=0.01))
     assert not any("calibration" in w for w in weigh(recorded, named).warnings)
+
+
+def test_overload_is_told(good):
+    mass, std = good.result.mass, good.result.std
+    for gross, word in ((mass - 3.0 * std, "surely"), (mass - 0.5 * std, "perhaps")):
+        (told,) = overload(replace(CAR, gross=gross), good.result)
+        assert told.startswith(f"{word} above the permitted mass of {gross:.0f} kg")
+    assert overload(replace(CAR, gross=mass + std), good.result) == ()
+    assert overload(CAR, good.result) == ()

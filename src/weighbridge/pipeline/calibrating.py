@@ -162,7 +162,7 @@ def run_calibration(
     gears = None
     driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions, base))
     if not driveline.gearings:
-        gears = find_gears(drives, motions)
+        gears = find_gears(drives, motions, idle_speed=base.driveline.idle_speed or None)
         driveline = replace(
             driveline,
             gearings=tuple(float(g) for g in gears.gearings),
@@ -244,7 +244,6 @@ def run_calibration(
         timing=Timing(
             torque_delay=delay if found else base.timing.torque_delay,
             torque_delay_std=spread if np.isfinite(spread) else None,
-            speed_delay=base.timing.speed_delay,
         ),
         provenance=Provenance(
             drives=tuple(drive.name for drive in drives),
@@ -313,7 +312,9 @@ def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
     )
 
 
-def find_gears(drives: Sequence[Drive], motions: Sequence[Motion]) -> GearDetection:
+def find_gears(
+    drives: Sequence[Drive], motions: Sequence[Motion], *, idle_speed: float | None = None
+) -> GearDetection:
     """Find the gearings from all the drives together.
 
     Raises
@@ -336,7 +337,12 @@ def find_gears(drives: Sequence[Drive], motions: Sequence[Motion]) -> GearDetect
         engine.append(signal.values[inside])
         speeds.append(np.interp(instants[inside], motion.time, motion.speed))
         offset += float(signal.time[-1]) + 100.0
-    return detect_gearings(np.concatenate(times), np.concatenate(engine), np.concatenate(speeds))
+    return detect_gearings(
+        np.concatenate(times),
+        np.concatenate(engine),
+        np.concatenate(speeds),
+        idle_speed=idle_speed,
+    )
 
 
 def _name(drives: Sequence[Drive]) -> str:

@@ -277,6 +277,7 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
             f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
             "are wrong; calibrate this vehicle"
         )
+    warnings += overload(vehicle, result)
     return Weighing(
         drive=drive,
         vehicle=vehicle,
@@ -286,6 +287,15 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
         result=result,
         warnings=warnings,
     )
+
+
+def overload(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
+    """Say in a sentence whether a mass is above the permitted one; nothing if not."""
+    gross = vehicle.gross
+    if gross is None or result.status is not Status.CONVERGED or result.mass <= gross:
+        return ()
+    sure = "surely" if result.mass - 2.0 * result.std > gross else "perhaps"
+    return (f"{sure} above the permitted mass of {gross:.0f} kg",)
 
 
 def empty_result(drive: str, vehicle: str, method: str, reason: str) -> dict[str, Any]:

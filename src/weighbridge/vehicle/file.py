@@ -169,7 +169,6 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             _Key("torque_delay", "torque_delay", "how late torque or load is stamped", suffix="s"),
             _Key("torque_delay_std", "torque_delay_std", "its standard deviation", suffix="s"),
             _Key("torque_lag", "torque_lag", "time constant of its smoothing", suffix="s"),
-            _Key("speed_delay", "speed_delay", "how late vehicle speed is stamped", suffix="s"),
         ),
     ),
     "provenance": (

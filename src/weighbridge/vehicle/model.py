@@ -52,7 +52,7 @@ class Driveline:
     efficiency : wheel over engine power when driving, in (0, 1] [-]; 1 where the
         torque was calibrated at the wheels
     speed_scale : indicated over true vehicle speed [-]
-    idle_speed : engine idle speed [rad/s]; 0 for a motor that stands
+    idle_speed : engine idle speed [rad/s]; 0 where it is unknown or the motor stands
     """
 
     gearings: tuple[float, ...] = ()
@@ -213,19 +213,16 @@ class Timing:
         found from the drive
     torque_lag : time constant of the first-order smoothing of torque or load by
         the control unit [s]
-    speed_delay : of vehicle speed [s]; None: to be found from the drive
     """
 
     torque_delay: float | None = None
     torque_delay_std: float | None = None
     torque_lag: float = 0.0
-    speed_delay: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("torque_delay", "speed_delay"):
-            delay = getattr(self, name)
-            if delay is not None and not -1.0 <= delay <= 3.0:
-                raise ConfigError(f"{name} must be in [-1, 3] s, got {delay}")
+        delay = self.torque_delay
+        if delay is not None and not -1.0 <= delay <= 3.0:
+            raise ConfigError(f"torque_delay must be in [-1, 3] s, got {delay}")
         if not 0.0 <= self.torque_lag <= 3.0:
             raise ConfigError(f"torque_lag must be in [0, 3] s, got {self.torque_lag}")
 
