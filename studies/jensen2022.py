@@ -115,21 +115,6 @@ def parameters_table(done: paper.Reproduction) -> str:
     return "\n".join(lines) + f"\n\nGearings in rpm per m/s: {gears}."
 
 
-def straight_reproduction() -> paper.Reproduction:
-    """The same drives with the torque regression as printed."""
-    chosen = CalibrationSettings(curved=False)
-    original = paper.run_calibration
-
-    def printed(drive, mass):
-        return original(drive, mass, settings=chosen)
-
-    paper.run_calibration = printed
-    try:
-        return paper.reproduce(seed=SEED)
-    finally:
-        paper.run_calibration = original
-
-
 def other_cars() -> str:
     """Weigh cars drawn at random, each calibrated on one drive of its own."""
     lines = [
@@ -143,12 +128,11 @@ def other_cars() -> str:
         known = replace(make_scenario("car-calibration", seed=seed), car=car)
         trip = replace(make_scenario("car", payload=load, seed=seed + 50), car=car)
         made = simulate_car(known)
-        base = None
         if car.electric:
             lines.append(f"| {seed} | electric | | | | left out: no load | |")
             continue
         vehicle = run_calibration(
-            paper.without_weather(made.drive), float(np.mean(made.truth.mass)), vehicle=base
+            paper.without_weather(made.drive), float(np.mean(made.truth.mass))
         ).vehicle
         loaded = simulate_car(trip)
         mass = float(np.mean(loaded.truth.mass))
@@ -261,7 +245,7 @@ def masses_figure(done: paper.Reproduction) -> None:
 
 def main() -> None:
     done = paper.reproduce(seed=SEED)
-    straight = straight_reproduction()
+    straight = paper.reproduce(seed=SEED, settings=CalibrationSettings(curved=False))
     sensitivity_figure(done)
     masses_figure(done)
     template = (HERE / "jensen2022.template.md").read_text(encoding="utf-8")

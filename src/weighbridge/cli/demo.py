@@ -57,6 +57,7 @@ def demo(
         truth={w.drive.name: mass for w, mass in weighed},
         title="weighbridge demo: a simulated car, weighed three times",
     )
+    typer.echo("told beside the recordings: the wind of the weather report")
     typer.echo(f"report: {output}")
     if open_report and sys.stdout.isatty():
         import webbrowser

@@ -16,7 +16,7 @@ import numpy as np
 
 from weighbridge.estimators.rls import estimate
 from weighbridge.navigation.select import find_motion
-from weighbridge.pipeline.calibrating import Calibration, run_calibration
+from weighbridge.pipeline.calibrating import Calibration, CalibrationSettings, run_calibration
 from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.signals import Drive, Floats
 from weighbridge.simulation import MIDSIZE, make_scenario, simulate_car
@@ -213,7 +213,11 @@ def scenario(drive: TestDrive, *, seed: int) -> Scenario:
 
 
 def reproduce(
-    *, seed: int = 777, drives: tuple[TestDrive, ...] = TABLE_B1, progress: Progress | None = None
+    *,
+    seed: int = 777,
+    drives: tuple[TestDrive, ...] = TABLE_B1,
+    settings: CalibrationSettings | None = None,
+    progress: Progress | None = None,
 ) -> Reproduction:
     """Calibrate on one drive and weigh the drives of the table.
 
@@ -221,15 +225,16 @@ def reproduce(
     ----------
     seed : of the calibration drive; the drives of the table count on from it
     drives : rows of the table
+    settings : of the calibration
     progress : called with drives done and drives in all
     """
     total = len(drives) + 2
     known = simulate_car(make_scenario("car-calibration", seed=seed))
     mass = float(np.mean(known.truth.mass))
-    calibration = run_calibration(without_weather(known.drive), mass)
+    calibration = run_calibration(without_weather(known.drive), mass, settings=settings)
     car, informed_car = (
         replace(made.vehicle, name="Audi A4 2.0 (simulated)", tare=MIDSIZE.mass)
-        for made in (calibration, run_calibration(known.drive, mass))
+        for made in (calibration, run_calibration(known.drive, mass, settings=settings))
     )
     if progress:
         progress(1, total)
