@@ -58,6 +58,13 @@ def test_dbc_of_another_bus_is_not_used():
     assert read_drive(HERE / "can.mf4", MAPPING, f"2:{DBC}").has("accel_x")
 
 
+def test_what_a_mapping_names_goes_before_answers():
+    mapping = {"signals": {"throttle": {"column": "Kind", "unit": "%"}}}
+    drive = read_drive(HERE / "can.mf4", mapping, DBC)
+    assert_allclose(drive.signals["throttle"].values, 0.01 * (np.arange(40) % 2))
+    assert len(drive.signals["engine_speed"]) == 20
+
+
 def test_ambiguous_and_missing_validity_are_refused():
     mapping = {"signals": {"altitude": {"column": "Height", "valid": "HeightOk"}}}
     with pytest.raises(ConfigError, match=r"no such signal; it has Valid, Kind"):

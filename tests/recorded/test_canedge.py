@@ -150,6 +150,24 @@ def test_cut_off_mf4_is_salvaged_or_refused_in_one_sentence(folder, tmp_path, sh
     assert "\n" not in told
 
 
+def test_truck_by_its_dbc_agrees_with_our_table(shared_data):
+    folder = shared_data / "j1939-truck"
+    mapping = {
+        "signals": {
+            "vehicle_speed": {"column": "WheelBasedVehicleSpeed"},
+            "engine_speed": {"column": "EngineSpeed"},
+        }
+    }
+    own = wb.read_drive(folder / "normal.log")
+    by_dbc = wb.read_drive(
+        folder / "normal.log", mapping, folder / "CSS-Electronics-SAE-J1939-DEMO.dbc"
+    )
+    for name in ("vehicle_speed", "engine_speed"):
+        # Two senders give the speed, and one of them says that it has none.
+        np.testing.assert_allclose(by_dbc.signals[name].values, own.signals[name].values, rtol=1e-9)
+        np.testing.assert_array_equal(by_dbc.signals[name].time, own.signals[name].time)
+
+
 def test_seat_leon_has_five_ratios_and_no_mass(shared_data):
     paths = sorted((shared_data / "seat-leon-obd").glob("*.csv"))
     drives = [wb.read_drive(p, SEAT / "mapping.toml") for p in paths]

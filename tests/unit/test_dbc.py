@@ -109,9 +109,15 @@ def test_j1939_message_is_known_whoever_sends_it(tmp_path):
         'BA_DEF_DEF_ "VFrameFormat" "";\nBA_ "VFrameFormat" BO_ 2566844926 3;\n'
         'BA_ "ProtocolType" "J1939";',
     )
-    frames = make([0.0], 0x0CFEF127, [bytes(8)], extended=True)
+    contents = [bytes([0, 0, 50]) + bytes(5), b"\xff" * 8, bytes([0, 0, 251]) + bytes(5)]
+    frames = make(np.arange(3.0), 0x0CFEF127, contents, extended=True)
     (database,) = load_dbcs([path])
-    assert list(message_frames(frames, database)) == ["CCVS"]
+    carried = message_frames(frames, database)
+    assert list(carried) == ["CCVS"]
+    # From 0xFB00 on the sender says that it has no value.
+    values, at = physical(frames, find_signal("Speed", [database], [carried])[0])
+    assert_array_equal(values, [50.0])
+    assert_array_equal(at, [0])
 
 
 def test_files_that_are_no_dbc_are_refused(tmp_path):

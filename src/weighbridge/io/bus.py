@@ -75,7 +75,8 @@ def decode(
     obd = decode_obd(frames, name)
     used |= obd.used
     done.contents += obd.contents
-    _add(obd.signals, obd.problems, "OBD-II", name, done)
+    settled = frozenset(done.signals)
+    _add(obd.signals, obd.problems, "OBD-II", name, done, settled)
     rest = frames.select(frames.extended & ~obd.used)
     if is_j1939(rest):
         truck = decode_j1939(rest, name)
@@ -86,7 +87,7 @@ def decode(
             f"J1939: {told}; not used: {len(ignored)} other parameter groups "
             f"({sum(ignored.values())} frames)"
         )
-        _add(truck.signals, truck.summary.problems, "J1939", name, done)
+        _add(truck.signals, truck.summary.problems, "J1939", name, done, settled)
         used |= frames.extended & ~obd.used
     if not used.all():
         done.contents.append(f"not known: {_counts(frames, ~used)}")
@@ -96,13 +97,23 @@ def decode(
 
 
 def _add(
-    signals: Sequence[Signal], problems: Sequence[Problem], kind: str, name: str, done: Decoded
+    signals: Sequence[Signal],
+    problems: Sequence[Problem],
+    kind: str,
+    name: str,
+    done: Decoded,
+    settled: frozenset[str],
 ) -> None:
-    """Add signals of one protocol; of two that say the same the fuller one stays."""
-    done.problems += problems
+    """Add signals of one protocol; of two that say the same the fuller one stays.
+
+    What is ``settled`` by the databases stays whatever its rate: a person named it.
+    """
+    done.problems += [p for p in problems if p.signal not in settled]
     for s in signals:
         other = done.signals.get(s.name)
-        if other is not None and len(other) >= len(s):
+        if other is None or (s.name not in settled and len(other) < len(s)):
+            done.signals[s.name] = s
+        elif s.name not in settled:
             done.problems.append(
                 Problem(
                     s.name,
@@ -110,8 +121,6 @@ def _add(
                     f"{len(other)} values from elsewhere in the log",
                 )
             )
-        else:
-            done.signals[s.name] = s
 
 
 def _counts(frames: Frames, which: Bools | None = None) -> str:
@@ -177,8 +186,11 @@ def _databases(
     for quantity, (found_signal, suffix, mapped) in wanted.items():
         found_signal = _one_bus(frames, name, found_signal, done)
         values, at = physical(frames, found_signal)
-        short = found_signal.frames.size - at.size
-        if short and found_signal.signal.multiplexer_ids is None:
+        if found_signal.message.protocol == "j1939":
+            values, at = _one_sender(frames, name, found_signal, values, at, done)
+        elif (
+            short := found_signal.frames.size - at.size
+        ) and found_signal.signal.multiplexer_ids is None:
             done.problems.append(
                 Problem(
                     quantity,
@@ -280,6 +292,30 @@ def _one_bus(frames: Frames, name: str, found: Found, done: Decoded) -> Found:
     if all(p.text != text for p in done.problems):
         done.problems.append(Problem("", text))
     return Found(found.message, found.signal, found.frames[frames.channel[found.frames] == best])
+
+
+def _one_sender(
+    frames: Frames,
+    name: str,
+    found: Found,
+    values: Floats,
+    at: NDArray[np.intp],
+    done: Decoded,
+) -> tuple[Floats, NDArray[np.intp]]:
+    """Keep the values of one sender of a J1939 group, the one that has most of them."""
+    senders, counts = np.unique(frames.id[at], return_counts=True)
+    if senders.size < 2:
+        return values, at
+    best = senders[np.argmax(counts)]
+    done.problems.append(
+        Problem(
+            "",
+            f"{name}: {senders.size} senders give {found.signal.name}; that of {best:X} "
+            f"({counts.max()} values) was taken",
+        )
+    )
+    mine = frames.id[at] == best
+    return values[mine], at[mine]
 
 
 def _valid(

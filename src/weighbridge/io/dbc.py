@@ -162,15 +162,26 @@ def physical(frames: Frames, found: Found) -> tuple[Floats, NDArray[np.intp]]:
 
     Returns
     -------
-    values : (m,) where the frame is long enough and the multiplexer selects it
+    values : (m,) where the frame is long enough, the multiplexer selects it and,
+        in J1939, the sender has it
     indices : (m,) of those frames
     """
     signal, message, at = found.signal, found.message, found.frames
     at = at[frames.length[at] >= _bytes_needed(signal)]
     at = at[_selected(frames, at, message, signal)]
     raw = _raw(frames.data[at], signal)
+    if message.protocol == "j1939":
+        told = _available(raw, int(signal.length))
+        raw, at = raw[told], at[told]
     scale, offset = float(signal.scale), float(signal.offset)
     return np.asarray(raw * scale + offset, dtype=np.float64), at
+
+
+def _available(raw: Floats | NDArray[np.int64], length: int) -> Bools:
+    """Which raw values of J1939 are values: the top of their range says "none" (J1939-71)."""
+    if length % 8 == 0:
+        return np.asarray(raw < 0xFB << (length - 8))
+    return np.asarray(raw < (1 << length) - 1) if length > 1 else np.ones(raw.size, dtype=bool)
 
 
 def _selected(frames: Frames, at: NDArray[np.intp], message: Any, signal: Any) -> Bools:
