@@ -111,14 +111,17 @@ def _add(
     done.problems += [p for p in problems if p.signal not in settled]
     for s in signals:
         other = done.signals.get(s.name)
-        if other is None or (s.name not in settled and len(other) < len(s)):
+        if s.name in settled:
+            continue
+        if other is None or len(other) < len(s):
             done.signals[s.name] = s
-        elif s.name not in settled:
+        if other is not None:
+            few, many = sorted((len(s), len(other)))
             done.problems.append(
                 Problem(
                     s.name,
-                    f"{name}: {s.name} of {kind} ({len(s)} values) was left out for "
-                    f"{len(other)} values from elsewhere in the log",
+                    f"{name}: {s.name} is there by {kind} and otherwise; the {few} values of one "
+                    f"were left out for the {many} of the other",
                 )
             )
 

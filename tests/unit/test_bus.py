@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_dbc import write
+from test_frames import make
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io.bus import decode
+from weighbridge.io.dbc import load_dbcs
+from weighbridge.io.frames import Frames, join_frames
+from weighbridge.io.mapping import load_mapping
+
+
+def obd_speed(count, period):
+    return make(period * np.arange(count), 0x7E8, [bytes([3, 0x41, 0x0D, 50, 0, 0, 0, 0])] * count)
+
+
+def truck(count, period):
+    time = period * np.arange(count) + 0.003
+    ccvs = make(time, 0x18FEF100, [bytes([0, 0, 60, 0, 0, 0, 0, 0])] * count, extended=True)
+    eec1 = make(time, 0x0CF00400, [bytes([0, 0, 0, 0, 32, 0, 0, 0])] * count, extended=True)
+    return join_frames([ccvs, eec1])
+
+
+@pytest.mark.parametrize(("answers", "broadcasts", "expected"), [(20, 100, 60.0), (100, 20, 50.0)])
+def test_of_two_protocols_the_fuller_one_stays(answers, broadcasts, expected):
+    frames = join_frames([obd_speed(answers, 10 / answers), truck(broadcasts, 10 / broadcasts)])
+    done = decode(frames, "x.log", None, ())
+    assert_allclose(done.signals["vehicle_speed"].values, expected / 3.6)
+    assert len(done.signals["vehicle_speed"]) == 100
+    assert "the 20 values of one were left out for the 100" in done.problems[-1].text
+
+
+def test_message_on_two_buses_is_taken_from_one(tmp_path):
+    path = write(tmp_path, 'BO_ 16 M: 8 X\n SG_ S : 0|8@1+ (1,0) [0|0] "km/h" X')
+    mapping = load_mapping({"signals": {"vehicle_speed": {"column": "S"}}})[0]
+    one = make(np.arange(30.0), 0x10, [b"\x24" + bytes(7)] * 30, channel=1)
+    two = make(np.arange(20.0) + 0.5, 0x10, [b"\x48" + bytes(7)] * 20, channel=2)
+    done = decode(join_frames([one, two]), "x.log", mapping, load_dbcs([path]))
+    assert_allclose(done.signals["vehicle_speed"].values, 10.0)
+    assert "that of bus 1 was taken; give the DBC as 1:FILE" in done.problems[0].text
+    done = decode(join_frames([one, two]), "x.log", mapping, load_dbcs([f"2:{path}"]))
+    assert_allclose(done.signals["vehicle_speed"].values, 20.0)
+
+
+def test_signal_of_two_messages_must_be_named_with_its_message(tmp_path):
+    signal = ' SG_ S : 0|8@1+ (1,0) [0|0] "km/h" X'
+    path = write(tmp_path, f"BO_ 16 A: 8 X\n{signal}", f"BO_ 17 B: 8 X\n{signal}")
+    frames = join_frames([make(np.arange(3.0), 0x10), make(np.arange(3.0), 0x11)])
+    for column in ("S", "B.S"):
+        mapping = load_mapping({"signals": {"vehicle_speed": {"column": column}}})[0]
+        if column == "S":
+            with pytest.raises(ConfigError, match=r"name one of A\.S, B\.S"):
+                decode(frames, "x.log", mapping, load_dbcs([path]))
+        else:
+            assert len(decode(frames, "x.log", mapping, load_dbcs([path])).signals) == 1
+
+
+def test_canonical_names_in_a_dbc_need_no_mapping(tmp_path):
+    path = write(tmp_path, 'BO_ 16 M: 8 X\n SG_ engine_speed_rpm : 0|8@1+ (10,0) [0|0] "" X')
+    frames = make(np.arange(3.0), 0x10, [b"\x5a" + bytes(7)] * 3)
+    done = decode(frames, "x.log", None, load_dbcs([path]))
+    assert_allclose(done.signals["engine_speed"].values, 900 * np.pi / 30)
+
+
+def test_nothing_known_and_nothing_at_all_are_told():
+    with pytest.raises(DriveError, match=r"holds 3 frames: CAN 1 123 \(3\); they are neither"):
+        decode(make(np.arange(3.0), 0x123), "x.log", None, ())
+    with pytest.raises(DriveError, match="holds no CAN frames"):
+        decode(Frames.empty(), "x.log", None, ())
