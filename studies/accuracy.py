@@ -144,7 +144,7 @@ def table(outcomes: list[Outcome]) -> str:
 
 
 def main() -> None:
-    seed = int(sys.argv[1]) if len(sys.argv) > 1 else 52_000
+    seed = int(sys.argv[1]) if len(sys.argv) > 1 else 70_000
     text = table(weigh_all(seed))
     print(text)
     template = HERE / "accuracy.template.md"
