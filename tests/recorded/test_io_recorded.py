@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.imu_checks import _turns
@@ -93,6 +94,7 @@ def test_seat_logs_by_time_of_day(shared_data):
         assert serious(drive) == []
 
 
+@pytest.fixture(scope="module")
 def hills(shared_data):
     """The rtk-grade drive: IMU by mapping, GNSS from RTKLIB's text, clocks brought together."""
     folder = shared_data / "rtk-grade"

@@ -134,7 +134,7 @@ def test_rows_of_speed_and_constraints_are_the_derivatives():
     z[Z_STILL], z[Z_SPEED], z[Z_SPEED_VAR] = 0.0, 16.0, 0.1
     # so small a covariance that the rows do not move the state between them
     update(x.copy(), np.eye(ERRORS) * 1e-16, work, z, QUIET, log, 0)
-    assert log.count[0] == 3
+    assert log.row_count[0] == 3
     expected = np.empty((3, ERRORS))
     for i in range(ERRORS):
         h = 1e-5
