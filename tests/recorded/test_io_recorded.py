@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.imu_checks import _turns
