@@ -29,7 +29,7 @@ from weighbridge.estimators.rls import block_jackknife, regression
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
-from weighbridge.pipeline.joint_calibrating import JointProblem, refine
+from weighbridge.pipeline.joint_calibrating import BalanceAt, JointProblem, refine
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
@@ -159,44 +159,17 @@ def run_calibration(
             )
     motions = [find_motion(drive, base) for drive in drives]
 
-    gears = None
-    driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions, base))
-    if not driveline.gearings:
-        gears = find_gears(drives, motions, idle_speed=base.driveline.idle_speed or None)
-        driveline = replace(
-            driveline,
-            gearings=tuple(float(g) for g in gears.gearings),
-            gearing_stds=tuple(float(g) for g in gears.stds),
-        )
-    order = settings.order
+    gears, draft = _draft(drives, motions, base, source)
+    driveline = draft.driveline
     modelled = source in ("load", "air_flow")
-    if order is None:
-        order = 2 if modelled else 0
+    order = settings.order if settings.order is not None else (2 if modelled else 0)
     if order and not modelled:
         raise ConfigError(
             f"order {order}: torque source {source!r} has an offset and a scale only; "
             "leave --order out"
         )
     curved = settings.curved and modelled
-    model = TorqueModel(
-        source="measured" if source == "load" else source,
-        reference_torque=base.torque.reference_torque,
-        engine_efficiency=base.torque.engine_efficiency,
-    )
-    # Until it is fitted, the torque source stands for the torque.
-    draft = replace(base, driveline=driveline, torque=model)
-    low, high = BOUNDS[base.kind]
-    if driveline.single_speed:
-        # One gear cannot tell the inertias from the mass, nor rolling resistance from an
-        # offset of the torque.
-        low, high = low.copy(), high.copy()
-        known = (
-            base.road_load.rolling_coefficient,
-            driveline.engine_inertia,
-            driveline.wheel_inertia,
-        )
-        low[1:] = high[1:] = known
-
+    low, high = _bounds(base, driveline)
     floors = [_load_floor(drive, source) for drive in drives]
 
     def rows_at(delay: float) -> TorqueRows:
@@ -270,24 +243,72 @@ def run_calibration(
         ),
     )
     if settings.method == "joint":
-
-        def balance_at(k: int, delay: float, lag: float) -> tuple[ForceBalance, Floats, Bools]:
-            balance, x = _draft_balance(drives[k], motions[k], draft, source, delay, lag)
-            return balance, x, _finite(balance, x, floors[k])
-
-        def rebalance(car: Vehicle) -> list[ForceBalance]:
-            return [force_balance(d, car, m) for d, m in zip(drives, motions, strict=True)]
-
         asked = JointProblem(
-            balance_at=balance_at,
+            balance_at=_balance_at(drives, motions, draft, source, floors),
             masses=masses,
             order=order,
             curved=curved,
             torque_noise=fitted.residual_std,
         )
-        finished = refine(finished, asked, rebalance)
+        finished = refine(
+            finished,
+            asked,
+            lambda car: [force_balance(d, car, m) for d, m in zip(drives, motions, strict=True)],
+        )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
+
+
+def _draft(
+    drives: Sequence[Drive], motions: Sequence[Motion], base: Vehicle, source: TorqueSource
+) -> tuple[GearDetection | None, Vehicle]:
+    """Find the gears, where they are not known, and let the source stand for the torque."""
+    gears = None
+    driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions, base))
+    if not driveline.gearings:
+        gears = find_gears(drives, motions, idle_speed=base.driveline.idle_speed or None)
+        driveline = replace(
+            driveline,
+            gearings=tuple(float(g) for g in gears.gearings),
+            gearing_stds=tuple(float(g) for g in gears.stds),
+        )
+    model = TorqueModel(
+        source="measured" if source == "load" else source,
+        reference_torque=base.torque.reference_torque,
+        engine_efficiency=base.torque.engine_efficiency,
+    )
+    return gears, replace(base, driveline=driveline, torque=model)
+
+
+def _bounds(base: Vehicle, driveline: Driveline) -> tuple[Floats, Floats]:
+    """Bounds of the road parameters; equal where a parameter is known."""
+    low, high = BOUNDS[base.kind]
+    if driveline.single_speed:
+        # One gear cannot tell the inertias from the mass, nor rolling resistance from an
+        # offset of the torque.
+        low, high = low.copy(), high.copy()
+        low[1:] = high[1:] = (
+            base.road_load.rolling_coefficient,
+            driveline.engine_inertia,
+            driveline.wheel_inertia,
+        )
+    return low, high
+
+
+def _balance_at(
+    drives: Sequence[Drive],
+    motions: Sequence[Motion],
+    draft: Vehicle,
+    source: TorqueSource,
+    floors: Sequence[float],
+) -> BalanceAt:
+    """Return what makes the rows of drive ``k`` at a delay and a lag."""
+
+    def rows(k: int, delay: float, lag: float) -> tuple[ForceBalance, Floats, Bools]:
+        balance, x = _draft_balance(drives[k], motions[k], draft, source, delay, lag)
+        return balance, x, _finite(balance, x, floors[k])
+
+    return rows
 
 
 def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
