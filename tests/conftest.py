@@ -1,8 +1,13 @@
 """Fixtures shared by all tests."""
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from weighbridge.errors import DriveError
+from weighbridge.io import read_drive
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -13,3 +18,21 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip("recorded drives are not here: no folder ../shared/data beside the checkout")
     return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def assert_salvaged() -> Callable[[Path], None]:
+    """Check that a damaged log leaves sound signals or one sentence."""
+
+    def check(path: Path) -> None:
+        said, found = "one sentence", {}
+        try:
+            found = read_drive(path).signals
+        except DriveError as e:
+            said = str(e)
+        assert len(said.splitlines()) == 1
+        for signal in found.values():
+            assert np.isfinite(signal.values).all()
+            assert (np.diff(signal.time) > 0.0).all()
+
+    return check

@@ -168,15 +168,9 @@ def test_sensor_logger_without_total_acceleration_has_none(tmp_path):
     st.binary(max_size=20),
     st.integers(0, 100),
 )
-def test_any_damage_leaves_signals_or_one_sentence(tmp_path_factory, whole, at, junk, cut):
+def test_any_damage_leaves_signals_or_one_sentence(
+    tmp_path_factory, assert_salvaged, whole, at, junk, cut
+):
     path = tmp_path_factory.mktemp("apps") / "log.csv"
     path.write_bytes(whole[:at] + junk + whole[at + cut :])
-    said, found = "one sentence", {}
-    try:
-        found = read_drive(path).signals
-    except DriveError as e:
-        said = str(e)
-    assert len(said.splitlines()) == 1
-    for signal in found.values():
-        assert np.isfinite(signal.values).all()
-        assert (np.diff(signal.time) > 0.0).all()
+    assert_salvaged(path)

@@ -156,6 +156,13 @@ class MergedView:
         """Rows without a reason against them."""
         return np.asarray(self.reason == Reason.USED)
 
+    @property
+    def direction(self) -> tuple[Floats, Floats]:
+        """North and east part of the direction driven (n,) [-]; zero where it is unknown."""
+        known = np.isfinite(self.heading)
+        heading = np.where(known, self.heading, 0.0)
+        return np.where(known, np.cos(heading), 0.0), np.where(known, np.sin(heading), 0.0)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceBalance:

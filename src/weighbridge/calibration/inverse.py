@@ -19,14 +19,15 @@ from weighbridge.errors import DriveError
 from weighbridge.estimators.joint import (
     DISTURBANCE_STD,
     GATE,
-    MOTION_STD,
     RESISTANCE_STD,
     TIME_CONSTANTS,
     WIND_STD,
+    noise_variance,
 )
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import VehicleClass
+from weighbridge.vehicle.torque import torque_rows
 
 ROAD_PRIOR: Final[dict[VehicleClass, tuple[Floats, Floats]]] = {
     "car": (np.array([0.65, 0.010, 0.15, 6.0]), np.array([0.25, 0.004, 0.06, 1.5])),
@@ -148,18 +149,15 @@ def _torque_per_reading(drives: list[DriveRows]) -> float:
 
 
 def _columns(
-    d: DriveRows, reading: Floats, scale: float, wheel_radius: float, order: int, curved: bool
+    d: DriveRows, reading: Floats, wheel_radius: float, order: int, curved: bool
 ) -> Floats:
     """Columns of one drive: motion, road load, torque terms, disturbances."""
     view = d.view
     gearing = np.nan_to_num(view.gearing)
-    speed = d.engine_speed
-    heading = np.where(np.isfinite(view.heading), view.heading, 0.0)
-    known = np.isfinite(view.heading)
+    north, east = view.direction
     push = view.air_density * 0.5 * view.speed
-    terms = [speed**k for k in range(1, order + 1)]
-    if curved:
-        terms += [reading * speed, reading**2]
+    # The reading itself stands on the left; the other torque terms stand here.
+    offset, _, *terms = torque_rows(reading, d.engine_speed, order, curved=curved).T
     one = np.ones_like(gearing)
     columns = [
         d.mass * view.specific_force,
@@ -167,12 +165,11 @@ def _columns(
         d.mass * GRAVITY * np.cos(view.grade),
         gearing**2 * view.accel,
         view.accel / wheel_radius**2,
-        -gearing,
-        *(-gearing * term for term in terms),
+        *(-gearing * term for term in (offset, *terms)),
         one,
         one,
-        np.where(known, push * np.cos(heading), 0.0),
-        np.where(known, push * np.sin(heading), 0.0),
+        push * north,
+        push * east,
     ]
     return np.asarray(np.nan_to_num(np.column_stack(columns)))
 
@@ -194,7 +191,7 @@ def _solve(
     clock = 0.0
     mass = float(np.mean([d.mass for d in drives]))
     for d, cut, reading in zip(drives, cuts, readings, strict=True):
-        columns = _columns(d, reading, scale, wheel_radius, order, curved)
+        columns = _columns(d, reading, wheel_radius, order, curved)
         gearing = np.nan_to_num(d.view.gearing)
         time = cut.mean(d.view.time)
         times.append(time - time[0] + clock)
@@ -202,8 +199,7 @@ def _solve(
         clock = float(times[-1][-1]) + 1e5
         rows.append(cut.mean(columns))
         targets.append(cut.mean(scale * gearing * np.nan_to_num(d.regressor)))
-        torque = cut.mean((torque_noise * gearing) ** 2)
-        variances.append((torque + (mass * MOTION_STD) ** 2) / cut.count + (mass * 0.008) ** 2)
+        variances.append(noise_variance(d.view, cut, torque_noise, mass))
         parts.append(columns)
     stacked = np.ascontiguousarray(np.vstack(rows))
     extra = 1 + order + 2 * curved

@@ -69,7 +69,7 @@ def show(done: Reproduction) -> list[str]:
     from rich.table import Table
 
     from weighbridge.papers import jensen2022 as paper
-    from weighbridge.signals.units import scalar_from_si
+    from weighbridge.signals.units import scalar_from_si, scalar_to_si
 
     def degrees(angle: float) -> str:
         return f"{scalar_from_si(angle, 'deg'):.3f}"
@@ -115,12 +115,12 @@ def show(done: Reproduction) -> list[str]:
         ("largest gear ratio error", "2 %", f"{100.0 * ratio:.2f} %", ratio <= 0.01),
         ("torque fit R²", f"{paper.PAPER_R_SQUARED}", f"{r_squared:.3f}", r_squared >= 0.95),
         ("largest grade RMS error", "at most 1°", f"{degrees(grade)}°",
-         grade <= scalar_to_rad(0.35)),
+         grade <= scalar_to_si(0.35, "deg")),
         ("largest body pitch RMS error, constant lean under load aside", "at most 1°",
-         f"{degrees(pitch)}°", pitch <= scalar_to_rad(0.25)),
+         f"{degrees(pitch)}°", pitch <= scalar_to_si(0.25, "deg")),
         ("grade RMS in 120 s without fixes | with them", "",
          f"{degrees(with_outage)}° | {degrees(without)}°",
-         with_outage - without <= scalar_to_rad(0.3)),
+         with_outage - without <= scalar_to_si(0.3, "deg")),
         ("95 % intervals that hold the truth", "", f"{covered} of {total}", covered >= total - 3),
     )  # fmt: skip
     table = Table(title="Jensen et al. 2022", title_justify="left")
@@ -130,10 +130,3 @@ def show(done: Reproduction) -> list[str]:
         table.add_row(name, theirs, ours, "" if good else "behind")
     console.print(table)
     return [name for name, _, _, good in rows if not good]
-
-
-def scalar_to_rad(degrees: float) -> float:
-    """Convert degrees to radians."""
-    from weighbridge.signals.units import scalar_to_si
-
-    return scalar_to_si(degrees, "deg")

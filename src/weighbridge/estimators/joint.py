@@ -23,12 +23,10 @@ from weighbridge.kernels import disturbance as kernel
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
 
-FADING: Final = ("disturbance", "resistance", "wind_north", "wind_east")
-"""Fading states after the mass, in this order."""
-
 TIME_CONSTANTS: Final = (30.0, 900.0, 600.0, 600.0)
-"""How long they last [s]: gusts, grade and torque errors half a minute, rolling resistance
-and offsets a quarter of an hour, mean wind ten minutes."""
+"""How long disturbance, resistance and wind north and east last [s]: gusts, grade and
+torque errors half a minute, rolling resistance and offsets a quarter of an hour, mean wind
+ten minutes."""
 
 DISTURBANCE_STD: Final = 0.04
 """Standard deviation of the disturbance before the drive has told, over mass [m/s^2]."""
@@ -62,12 +60,9 @@ def design(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
     """
     phi, y = regression(view, vehicle)
     slope = view.air_density * vehicle.road_load.drag_area * view.speed
-    heading = np.where(np.isfinite(view.heading), view.heading, 0.0)
-    known = np.isfinite(view.heading)
+    north, east = view.direction
     one = np.ones_like(phi)
-    north = np.where(known, slope * np.cos(heading), 0.0)
-    east = np.where(known, slope * np.sin(heading), 0.0)
-    return np.column_stack([phi, one, one, north, east]), y
+    return np.column_stack([phi, one, one, slope * north, slope * east]), y
 
 
 def usable_rows(view: MergedView, rows: Floats, y: Floats) -> Bools:

@@ -91,10 +91,6 @@ class RawTable:
         """One column as it stands in the file."""
         return self.frame[str(index)]
 
-    def is_time(self, index: int) -> bool:
-        """Tell whether a column holds dates or times of day."""
-        return self.column(index).dtype.is_temporal()
-
     def numbers(self, index: int) -> tuple[Floats, list[str]]:
         """Read a column as numbers.
 
