@@ -8,7 +8,6 @@ CAN-bus data, Mechanical Systems and Signal Processing 171, 2022, 108925.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -16,16 +15,19 @@ import numpy as np
 
 from weighbridge.estimators.rls import estimate
 from weighbridge.navigation.select import find_motion
+from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
 from weighbridge.pipeline.calibrating import Calibration, CalibrationSettings, run_calibration
 from weighbridge.pipeline.weighing import Weighing, weigh
+from weighbridge.report.table import Table
 from weighbridge.signals import Drive, Floats
+from weighbridge.signals.units import scalar_from_si, scalar_to_si
 from weighbridge.simulation import MIDSIZE, make_scenario, simulate_car
 from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
-    from weighbridge.simulation import Scenario, SimulatedDrive
+    from pathlib import Path
 
-Progress = Callable[[int, int], None]
+    from weighbridge.simulation import Scenario, SimulatedDrive
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,6 +350,91 @@ def sensitivity(
         ),
     )
     return estimate(replace(balance, merged=changed), car).running_mass
+
+
+def reproduced(seed: int, progress: Progress | None) -> Reproduced:
+    """Reproduce the paper and put it beside its own figures; see `reproduce`."""
+    done = reproduce(seed=seed, progress=progress)
+
+    def write(path: Path) -> None:
+        from weighbridge.report import write_report
+
+        write_report(
+            [d.weighing for d in done.drives],
+            path,
+            calibration=done.calibration,
+            truth={d.weighing.drive.name: d.true_mass for d in done.drives},
+            title="Jensen et al. 2022, reproduced on simulated drives",
+        )
+
+    return Reproduced(
+        title="Jensen et al. 2022",
+        tables=(_drives_table(done),),
+        comparisons=_comparisons(done),
+        write_report=write,
+    )
+
+
+def _drives_table(done: Reproduction) -> Table:
+    rows = []
+    for d, known in zip(done.drives, done.informed, strict=True):
+        low, high = d.weighing.interval(0.95)
+        rows.append(
+            (
+                f"{d.drive.number}  {d.drive.kind}",
+                f"{d.true_mass:.0f}",
+                f"{d.weighing.mass:.0f}",
+                f"{0.5 * (high - low):.0f}",
+                f"{100.0 * d.error:+.2f}",
+                f"{100.0 * d.worst:.2f}",
+                f"{known.weighing.mass:.0f}",
+                f"{100.0 * known.error:+.2f}",
+                f"{100.0 * known.worst:.2f}",
+                _degrees(d.grade_rms),
+                _degrees(d.pitch_rms),
+            )
+        )
+    return Table(
+        "Drives of Table B.1, wind unknown | with the weather report of the day",
+        ("drive", "true kg", "mass kg", "± 95 %", "error %", "worst %",
+         "| mass kg", "error %", "worst %", "grade °", "pitch °"),
+        tuple(rows),
+    )  # fmt: skip
+
+
+def _comparisons(done: Reproduction) -> tuple[Comparison, ...]:
+    with_outage, without = done.outage_grade_rms
+    grade = max(d.grade_rms for d in done.drives)
+    pitch = max(d.pitch_std for d in done.drives)
+    ratio = float(max(abs(done.ratio_errors)))
+    r_squared = done.calibration.fit.r_squared
+    inside, informed = within(done.drives), within(done.informed)
+    total = len(done.drives)
+    covered = sum(d.covered for d in done.drives)
+    final = max(abs(d.error) for d in done.drives)
+    return (
+        Comparison("drives within ±5 % at every instant of the last two thirds",
+                   "generally within", f"{inside} of {total}", inside >= total - 2),
+        Comparison("the same, with the weather report of the day", "",
+                   f"{informed} of {total}", True),
+        Comparison("largest error of a drive's final mass", "",
+                   f"{100.0 * final:.2f} %", final <= 0.05),
+        Comparison("largest gear ratio error", "2 %", f"{100.0 * ratio:.2f} %", ratio <= 0.01),
+        Comparison("torque fit R²", f"{PAPER_R_SQUARED}", f"{r_squared:.3f}", r_squared >= 0.95),
+        Comparison("largest grade RMS error", "at most 1°", f"{_degrees(grade)}°",
+                   grade <= scalar_to_si(0.35, "deg")),
+        Comparison("largest body pitch RMS error, constant lean under load aside", "at most 1°",
+                   f"{_degrees(pitch)}°", pitch <= scalar_to_si(0.25, "deg")),
+        Comparison("grade RMS in 120 s without fixes | with them", "",
+                   f"{_degrees(with_outage)}° | {_degrees(without)}°",
+                   with_outage - without <= scalar_to_si(0.3, "deg")),
+        Comparison("95 % intervals that hold the truth", "",
+                   f"{covered} of {total}", covered >= total - 3),
+    )  # fmt: skip
+
+
+def _degrees(angle: float) -> str:
+    return f"{scalar_from_si(angle, 'deg'):.3f}"
 
 
 def _rms(values: Floats) -> float:

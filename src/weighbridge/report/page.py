@@ -106,6 +106,18 @@ def write_page(
     if calibration is not None:
         parts.append(_calibration(page, calibration, opened=not weighings))
     heading = title if title is not None else _title(weighings)
+    write_document(heading, parts, page, path)
+    log.info("report of %d drives written to %s", len(weighings), path)
+
+
+def write_document(heading: str, parts: Sequence[str], page: Page, path: Path) -> None:
+    """Put parts of HTML and the figures they place into one file that opens offline.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be written.
+    """
     here = files(__package__)
     html = "".join(
         [
@@ -133,7 +145,6 @@ def write_page(
         raise ConfigError(
             f"{path}: the report cannot be written ({error.strerror}); choose another file"
         ) from error
-    log.info("report of %d drives written to %s", len(weighings), path)
 
 
 def _title(weighings: Sequence[Weighing]) -> str:
@@ -168,7 +179,7 @@ def _summary(weighings: Sequence[Weighing], truth: Mapping[str, float]) -> str:
             cells += [(_kg(known), "n"), (_error(weighing.mass, known), "n")]
         cells.append((_outcome(weighing), ""))
         rows.append(cells)
-    return _table("All drives", heads, rows)
+    return html_table("All drives", heads, rows)
 
 
 def _drive(
@@ -248,7 +259,8 @@ def _segments(weighing: Weighing) -> str:
     ]
     heads = [("from", "n"), ("to", "n"), ("mass ± standard deviation", "n")]
     caption = "Mass between longer stops, where load can change"
-    return f"<details><summary>{caption} ({len(rows)})</summary>{_table('', heads, rows)}</details>"
+    table = html_table("", heads, rows)
+    return f"<details><summary>{caption} ({len(rows)})</summary>{table}</details>"
 
 
 def _calibration(page: Page, calibration: Calibration, *, opened: bool) -> str:
@@ -262,11 +274,13 @@ def _calibration(page: Page, calibration: Calibration, *, opened: bool) -> str:
     )
 
 
-def _table(
+def html_table(
     caption: str,
     heads: Sequence[tuple[str, str]],
     rows: Sequence[Sequence[tuple[str, str]]],
 ) -> str:
+    """Return a table of texts, each with its class ("n" for a number)."""
+
     def cell(tag: str, text: str, kind: str) -> str:
         return f"<{tag}{f' class={kind}' if kind else ''}>{escape(text)}</{tag}>"
 

@@ -1,0 +1,52 @@
+"""What every reproduction answers: tables, its figures against the paper's, a report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from weighbridge.report.table import Table
+
+Progress = Callable[[int, int], None]
+"""Called with steps done and steps in all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One figure beside the paper's.
+
+    Attributes
+    ----------
+    figure : what is compared
+    theirs, ours : as printed; ``theirs`` is empty where the paper has none
+    good : False where ours falls behind
+    """
+
+    figure: str
+    theirs: str
+    ours: str
+    good: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reproduced:
+    """A published system on our drives, against its own tables.
+
+    Attributes
+    ----------
+    title : paper and what was done
+    tables : of single drives or parameters
+    comparisons : figures beside the paper's
+    write_report : write a page with the paper's figures from our data
+    """
+
+    title: str
+    tables: tuple[Table, ...]
+    comparisons: tuple[Comparison, ...]
+    write_report: Callable[[Path], None]
+
+    @property
+    def behind(self) -> tuple[str, ...]:
+        """Names of the figures that fall behind."""
+        return tuple(c.figure for c in self.comparisons if not c.good)

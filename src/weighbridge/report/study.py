@@ -1,0 +1,38 @@
+"""One HTML page of tables and figures, for what is not a weighing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from weighbridge.report.page import Page, html_table, write_document
+from weighbridge.report.style import Panel
+from weighbridge.report.table import Table
+
+
+def write_study(title: str, tables: Sequence[Table], panels: Sequence[Panel], path: Path) -> None:
+    """Write tables and figures as one page that opens offline.
+
+    Parameters
+    ----------
+    title : heading of the page
+    tables : come first
+    panels : figures, after the tables
+    path : of the page
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be written.
+    """
+    page = Page()
+    parts = [
+        html_table(
+            table.title,
+            [(name, "" if k == 0 else "n") for k, name in enumerate(table.columns)],
+            [[(cell, "" if k == 0 else "n") for k, cell in enumerate(row)] for row in table.rows],
+        )
+        for table in tables
+    ]
+    body = "".join(parts) + page.place(panels)
+    write_document(title, [f"<main>{body}</main>"], page, path)
