@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from weighbridge.simulation import (
     MIDSIZE,
     Effects,
+    Loading,
     Scenario,
     Sensors,
     flat_route,
@@ -160,6 +161,27 @@ def test_locked_driveline_obeys_the_force_balance():
     assert moving.sum() > 10_000
     assert_allclose(inertia[moving] * drive.accel[moving], force[moving], atol=1e-3)
     assert_allclose(drive.engine_speed[moving], (gearing * drive.speed)[moving], rtol=1e-9)
+
+
+def test_what_is_loaded_is_accelerated_and_tilts_the_body():
+    loading = (Loading(distance=300.0, duration=20.0, load=400.0),)
+    effects = Effects.only(traffic=1.0, driver_ripple=1.0, load_pitch=1.0, tyre_slip=1.0)
+    scenario = short(duration=200.0, route=flat_route(2000.0), loading=loading, effects=effects)
+    drive, pose, _ = inside(scenario)
+    rotating = MIDSIZE.wheel_inertia / MIDSIZE.wheel_radius**2
+    force = drive.traction_force - drive.drag_force - drive.rolling_force - drive.brake_force
+    gearing = np.array(MIDSIZE.gearings)[drive.gear.astype(int) - 1]
+    slip = drive.engine_speed / (gearing * np.maximum(drive.speed, 1.0)) - 1.0
+    for after, mass in ((False, 1580.0), (True, 1980.0)):
+        rows = (drive.phase == 0) & (drive.speed > 3.0) & ((drive.loaded > 0.0) == after)
+        assert rows.sum() > 1000
+        assert_allclose((mass + rotating) * drive.accel[rows], force[rows], atol=1e-6 * mass)
+        assert_allclose(pose.pitch[rows], MIDSIZE.load_pitch * (mass - 1580.0), atol=1e-9)
+        # Slip is per traction over weight, whatever the weight; pulls of one step before.
+        pull = mass * drive.accel + drive.drag_force + drive.rolling_force
+        steady = rows & (np.abs(np.gradient(drive.accel)) < 1e-3)
+        expected = MIDSIZE.tyre_slip * pull[steady] / (mass * GRAVITY)
+        assert_allclose(slip[steady], expected, atol=2e-5)
 
 
 def test_resistance_in_steady_wind_is_the_textbooks():

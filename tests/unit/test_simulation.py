@@ -15,6 +15,7 @@ from weighbridge.simulation import (
     MIDSIZE,
     SCENARIOS,
     Effects,
+    Loading,
     Polling,
     Sensors,
     flat_route,
@@ -300,6 +301,45 @@ def test_driving_the_route_ends_near_its_start():
     assert abs(truth.altitude[-1] - truth.altitude[0]) < 1.0
 
 
+def test_load_changes_while_the_car_stands_and_the_engine_idles():
+    stops = (
+        Loading(distance=300.0, duration=20.0, load=240.0),
+        Loading(distance=700.0, duration=10.0, load=-90.0),
+    )
+    scenario = short(duration=200.0, loading=stops, effects=Effects().without("fuel_burn"))
+    made = simulate_car(scenario)
+    truth = made.truth
+    changing = np.flatnonzero(np.diff(truth.mass) != 0.0)
+    assert changing.size > 100
+    assert np.all(truth.speed[changing] == 0.0)
+    assert_allclose(truth.engine_speed[changing], MIDSIZE.idle_speed, rtol=0.01)
+    assert set(np.round(truth.distance[changing], -1)) == {300.0, 700.0}
+    assert_allclose(truth.mass[-1], 1580.0 + 150.0)
+    assert_allclose(np.max(truth.mass), 1580.0 + 240.0)
+    assert made.drive.info.mass == 1580.0
+
+
+def test_a_light_beside_a_place_of_loading_is_not_waited_at_twice():
+    scenario = short(sensors=Sensors(imu_rate=0.0, gnss_rate=0.0))
+    route = scenario.route
+    light = float(route.stops[0])
+    always = replace(route, stop_chance=np.ones_like(route.stop_chance))
+    loading = (Loading(distance=light + 20.0, duration=15.0, load=50.0),)
+    truth = simulate_car(replace(scenario, route=always, loading=loading)).truth
+    near = np.abs(truth.distance - light - 10.0) < 40.0
+    stood = np.unique(np.round(truth.distance[near & (truth.speed == 0.0)]))
+    assert_allclose(stood, light + 20.0, atol=3.0)
+
+
+def test_car_loading_takes_240_kg_after_twelve_minutes():
+    scenario = replace(make_scenario("car-loading", seed=4), duration=900.0)
+    truth = simulate_car(replace(scenario, sensors=Sensors(imu_rate=0.0, gnss_rate=0.0))).truth
+    loaded = truth.time[np.diff(truth.mass, append=truth.mass[-1]) > 0.1]
+    assert 11 * 60 < loaded[0] < 14 * 60
+    burnt = np.trapezoid(truth.fuel_flow, truth.time)
+    assert_allclose(truth.mass[-1] - truth.mass[0], 240.0 - burnt, atol=0.05)
+
+
 def test_a_quantity_named_twice_is_asked_twice():
     polling = Polling(fast=("engine_load", "vehicle_speed", "engine_load", "engine_speed"))
     signals = simulate_car(short(polling=polling, sensors=Sensors(imu_rate=0.0))).drive.signals
@@ -350,6 +390,16 @@ def test_every_scenario_is_described():
         (lambda: flat_route(10.0), "at least 50 m"),
         (lambda: mixed_route(out=[("city", 500)], back=[("city", 900)]), "as long back as out"),
         (lambda: short(duration=1.0), "duration"),
+        (lambda: Loading(distance=300.0, duration=1.0, load=10.0), "must last"),
+        (lambda: Loading(distance=300.0, duration=60.0, load=float("nan")), "must be numbers"),
+        (lambda: short(loading=(Loading(distance=9e4, duration=9.0, load=1.0),)), "before the end"),
+        (
+            lambda: short(
+                loading=tuple(Loading(distance=d, duration=9.0, load=1.0) for d in (900.0, 500.0))
+            ),
+            "rise in distance",
+        ),
+        (lambda: short(loading=(Loading(distance=900.0, duration=9.0, load=4e3),)), "must suit"),
         (lambda: simulate_car(short(polling=Polling(fast=("altitude",)))), "cannot poll"),
     ],
 )

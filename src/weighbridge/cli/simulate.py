@@ -14,8 +14,8 @@ def simulate(
     scenario: Annotated[
         str,
         typer.Argument(
-            help="car, car-calibration, car-short, highway, compact, compact-calibration or "
-            "electric.",
+            help="car, car-calibration, car-short, car-loading, highway, compact, "
+            "compact-calibration or electric.",
             show_default=False,
         ),
     ],

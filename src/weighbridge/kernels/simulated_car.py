@@ -12,11 +12,14 @@ from weighbridge.constants import GRAVITY
 from weighbridge.kernels._jit import kernel
 
 DISTANCE, SPEED, ACCEL, ENGINE_SPEED, GEAR, TORQUE, GROSS_TORQUE, TRACTION, BRAKE, DRAG = range(10)
-ROLLING, WIND_ALONG, MASS, FUEL_FLOW, PEDAL, PHASE, ACCESSORY = range(10, 17)
-FIELDS = 17
+ROLLING, WIND_ALONG, MASS, FUEL_FLOW, PEDAL, PHASE, ACCESSORY, LOADED = range(10, 18)
+FIELDS = 18
 
 DRIVING, SHIFTING, SLIPPING, OPEN = range(4)
 """Phases of the clutch: locked, changing gear, slipping at a launch, open."""
+
+LOADING_STARTS, LOADING_ENDS = 0.15, 0.85
+"""Part of a stop's time at which a load change starts and ends, evenly between."""
 
 NOISE_STRIDE = 20  # steps per row of random numbers: 10 Hz
 NOISE_CHANNELS = 6
@@ -38,6 +41,7 @@ class Road(NamedTuple):
     stop_distance: np.ndarray  # (k,) where to stop [m]
     stop_time: np.ndarray  # (k,) how long [s]
     stop_decel: np.ndarray  # (k,) how hard [m/s^2]
+    stop_load: np.ndarray  # (k,) what is loaded there, unloaded negative [kg]
 
 
 class Powertrain(NamedTuple):
@@ -161,6 +165,16 @@ def _downshift_speed(power, eager):
 
 
 @kernel
+def _loaded(road, stop, waiting):
+    """Load taken on since the start, while standing for ``waiting`` s more at ``stop``."""
+    if stop < 0:
+        return 0.0
+    done = 1.0 - waiting / road.stop_time[stop]
+    part = min(1.0, max(0.0, (done - LOADING_STARTS) / (LOADING_ENDS - LOADING_STARTS)))
+    return road.stop_load[:stop].sum() + part * road.stop_load[stop]
+
+
+@kernel
 def drive(road, power, resistance, driver, noise, dt, steps):
     """Drive the road from end to end.
 
@@ -177,7 +191,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
 
     Returns
     -------
-    out : (17, steps) float64
+    out : (18, steps) float64
         One row per field, see the constants of this module; SI.
     count : int
         Steps driven.
@@ -208,6 +222,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
     fuel_cut = False
     locked = power.electric
     fuel = 0.0
+    loaded = 0.0
     stop = 0
     approach = 0  # 1 foot lifted, 2 braking
     waiting = driver.rest
@@ -274,7 +289,9 @@ def drive(road, power, resistance, driver, noise, dt, steps):
 
         # Engine side.
         gearing = power.gearings[gear - 1]
-        slip = min(0.05, max(-0.05, resistance.tyre_slip * (mass * a + drag + rolling + slope)))
+        weight = resistance.mass / (resistance.mass + loaded)
+        pull = mass * a + drag + rolling + slope
+        slip = min(0.05, max(-0.05, resistance.tyre_slip * weight * pull))
         sync = gearing * v * (1.0 + slip)
         full = _full_torque(power, engine)
         warm = 1.0 + power.cold_friction * cold
@@ -349,6 +366,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         if at_stop:
             waiting -= dt
             wanted = -1.0
+            loaded = _loaded(road, stop - 1, waiting)
             if waiting <= 0.0:
                 at_stop = False
                 wanted = 0.0
@@ -515,7 +533,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
             efficiency = 0.385 - 0.05 * np.exp(-share / 0.12) - 0.04 * max(0.0, share - 0.75) / 0.25
             flow_fuel = 0.0 if cut else gross * engine / (efficiency * power.heating_value)
         fuel += flow_fuel * dt
-        mass = resistance.mass - resistance.fuel_burn * fuel
+        mass = resistance.mass - resistance.fuel_burn * fuel + loaded
 
         out[DISTANCE, k] = s
         out[SPEED, k] = v
@@ -534,6 +552,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         out[PEDAL, k] = 0.0 if braking else pedal
         out[PHASE, k] = phase
         out[ACCESSORY, k] = accessory
+        out[LOADED, k] = loaded
 
         s += 0.5 * (v + v_new) * dt
         v = v_new

@@ -107,7 +107,8 @@ def simulate_pose(scenario: Scenario, drive: Trajectory, rng: np.random.Generato
     lean = second_order(
         lateral * (-car.roll_gain * effects.roll), car.roll_frequency, 0.35, zero=False
     )
-    pitch = grade + squat + car.load_pitch * scenario.payload * effects.load_pitch
+    payload = scenario.payload + drive.loaded
+    pitch = grade + squat + car.load_pitch * payload * effects.load_pitch
     roll = second_order(np.interp(s, grid, route.bank), 3.0, 0.7, zero=False) + lean
     heave = np.zeros_like(s)
     if effects.roughness > 0.0:

@@ -45,6 +45,7 @@ class Trajectory(NamedTuple):
     pedal: Floats
     phase: Floats
     accessory_torque: Floats
+    loaded: Floats  # since the start [kg]
 
 
 def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
@@ -104,6 +105,7 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
     slow_down *= rng.uniform(0.85, 1.2)
     target = kernel.limit_target(target, STEP, slow_down)
     rolling = 1.0 + effects.surface * (route.surface - 1.0)
+    stops = _stops(scenario, np.stack((route.stops, pause, decel))[:, red], s[-1])
     return kernel.Road(
         step=STEP,
         grade=np.ascontiguousarray(route.grade, dtype=np.float64),
@@ -115,10 +117,37 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
         target_speed=target,
         accel_limit=accel_limit,
         revs=np.minimum(revs, 1.0),
-        stop_distance=np.append(route.stops[red], s[-1] - 3.0),
-        stop_time=np.append(pause[red], 10.0),
-        stop_decel=np.append(decel[red], 1.3),
+        stop_distance=stops[0],
+        stop_time=stops[1],
+        stop_decel=stops[2],
+        stop_load=stops[3],
     )
+
+
+def _stops(scenario: Scenario, red: Floats, end: float) -> Floats:
+    """Join red lights, stops for loading and the end of the road.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    red : (3, n) float64
+        Where [m], how long [s] and how hard the driver brakes [m/s^2].
+    end : float
+        Length of the road [m].
+
+    Returns
+    -------
+    (4, k) float64
+        As ``red``, and what is loaded [kg]; rising in distance.
+    """
+    loading = np.array([(x.distance, x.duration, 1.2, x.load) for x in scenario.loading])
+    loading = loading.reshape(-1, 4).T
+    # A light beside a place of loading is not waited at twice.
+    apart = np.abs(red[0][:, None] - loading[0]).min(axis=1, initial=np.inf) > 60.0
+    red = np.vstack((red[:, apart], np.zeros(np.count_nonzero(apart))))
+    last = np.array([[end - 3.0], [10.0], [1.3], [0.0]])
+    stops = np.hstack((red, loading, last))
+    return np.ascontiguousarray(stops[:, np.argsort(stops[0], kind="stable")])
 
 
 def _powertrain(scenario: Scenario) -> kernel.Powertrain:

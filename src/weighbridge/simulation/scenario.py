@@ -235,6 +235,31 @@ class Polling:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Loading:
+    """A stop at which the load changes, while the engine idles.
+
+    Attributes
+    ----------
+    distance : along the route [m]
+    duration : of the stop; the load changes evenly in the middle of it [s]
+    load : taken on; negative where it is taken off [kg]
+    """
+
+    distance: float
+    duration: float
+    load: float
+
+    def __post_init__(self) -> None:
+        if not 5.0 <= self.duration <= 7200.0:
+            raise ConfigError(f"a stop for loading must last 5 to 7200 s, got {self.duration}")
+        if not (math.isfinite(self.distance) and math.isfinite(self.load)):
+            raise ConfigError(
+                "distance and load of a stop for loading must be numbers, "
+                f"got {self.distance} m and {self.load} kg"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """One drive to be simulated.
 
@@ -242,7 +267,8 @@ class Scenario:
     ----------
     name : becomes the drive's name
     car, route : what drives where
-    payload : beside driver and fuel [kg]
+    payload : at the start, beside driver and fuel [kg]
+    loading : stops at which the load changes, rising in distance
     seed : of driver, weather and sensors; the route keeps its own
     effects, sensors, polling : see the classes
     wind_speed : mean at 10 m height [m/s]
@@ -270,6 +296,7 @@ class Scenario:
     car: SimulatedCar
     route: Route
     payload: float = 0.0
+    loading: tuple[Loading, ...] = ()
     seed: int = 0
     effects: Effects = field(default_factory=Effects)
     sensors: Sensors = field(default_factory=Sensors)
@@ -288,8 +315,18 @@ class Scenario:
     start_time: str = "2021-03-05T10:30:00+01:00"
 
     def __post_init__(self) -> None:
-        if not -0.5 * self.car.mass < self.payload < 2.0 * self.car.mass:
-            raise ConfigError(f"payload must suit a car of {self.car.mass} kg, got {self.payload}")
+        payload = self.payload
+        for load in (0.0, *(stop.load for stop in self.loading)):
+            payload += load
+            if not -0.5 * self.car.mass < payload < 2.0 * self.car.mass:
+                raise ConfigError(f"payload must suit a car of {self.car.mass} kg, got {payload}")
+        places = [150.0, *(stop.distance for stop in self.loading), self.route.length - 50.0]
+        if self.loading and min(np.diff(places)) < 20.0:
+            raise ConfigError(
+                "stops for loading must rise in distance, 20 m apart, and lie between 170 m and "
+                f"70 m before the end of the route of {self.route.length:.0f} m, "
+                f"got {', '.join(f'{x:g}' for x in places[1:-1])}"
+            )
         for name, low, high in (
             ("wind_speed", 0.0, 40.0),
             ("wind_from", -2.0 * math.pi, 2.0 * math.pi),
@@ -337,6 +374,11 @@ def _short(payload: float, seed: int) -> Scenario:
     return Scenario(name="car-short", car=MIDSIZE, route=short_route(), payload=payload, seed=seed)
 
 
+def _loading(payload: float, seed: int) -> Scenario:
+    stop = Loading(distance=11_000.0, duration=90.0, load=240.0)
+    return replace(_car(payload, seed), name="car-loading", loading=(stop,))
+
+
 def _highway(payload: float, seed: int) -> Scenario:
     return Scenario(name="highway", car=MIDSIZE, route=highway_route(), payload=payload, seed=seed)
 
@@ -366,6 +408,7 @@ SCENARIOS: Final[dict[str, Callable[[float, int], Scenario]]] = {
     "car": _car,
     "car-calibration": _calibration,
     "car-short": _short,
+    "car-loading": _loading,
     "highway": _highway,
     "compact": _compact,
     "compact-calibration": _compact_calibration,
@@ -377,6 +420,7 @@ ABOUT: Final[dict[str, str]] = {
     "car": "midsize petrol car, 83 km of city, country, highway and hills, about 75 min",
     "car-calibration": "the same car in all gears, loads and engine speeds, about 60 min",
     "car-short": "the same car, 8 km of city and country, about 10 min",
+    "car-loading": "as car, with 240 kg loaded at a stop of 90 s after about 12 min",
     "highway": "the same car on a highway, out and back",
     "compact": "small petrol car with a manual gearbox, about 75 min",
     "compact-calibration": "the small car in all gears, loads and engine speeds",
