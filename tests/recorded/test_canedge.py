@@ -177,3 +177,27 @@ def test_seat_leon_has_five_ratios_and_no_mass(shared_data):
     w = wb.weigh(drives[0], wb.Vehicle.load(SEAT / "vehicle.toml"), method="rls")
     assert w.status == "missing_signals"
     assert "engine_torque" in w.reason
+
+
+@pytest.mark.parametrize("part", [0.9, 0.7])
+def test_what_is_whole_of_a_file_that_was_cut_off(folder, drives, tmp_path, part):
+    path = folder / "00000164" / "00000001-60FE3F04.MF4"
+    raw = path.read_bytes()
+    cut = tmp_path / path.name
+    cut.write_bytes(raw[: int(part * len(raw))])
+    drive = wb.read_drive(cut, CANEDGE / "mapping.toml", folder / "canmod-gps.dbc")
+    assert "ends early" in drive.problems[0].text
+    assert drive.duration > 80.0
+    whole = drives["164/1"].signals
+    for name, signal in drive.signals.items():
+        n = len(signal)
+        np.testing.assert_array_equal(signal.time, whole[name].time[:n])
+        np.testing.assert_array_equal(signal.values, whole[name].values[:n])
+
+
+def test_a_file_without_the_bytes_of_its_frames_is_refused(folder, tmp_path):
+    raw = (folder / "00000164" / "00000001-60FE3F04.MF4").read_bytes()
+    cut = tmp_path / "cut.mf4"
+    cut.write_bytes(raw[: len(raw) // 3])
+    with pytest.raises(DriveError, match="ends early and of its 65296 records none is whole"):
+        wb.read_drive(cut, CANEDGE / "mapping.toml", folder / "canmod-gps.dbc")

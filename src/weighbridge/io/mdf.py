@@ -7,8 +7,11 @@ that a calibration has to find.
 from __future__ import annotations
 
 import gc
+import io
 import sys
+import tempfile
 import warnings
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,6 +24,7 @@ from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, resolved_unit
 from weighbridge.io.mdf_bus import bus_frames
+from weighbridge.io.mdf_salvage import Salvaged, salvage
 from weighbridge.io.table import column_list
 from weighbridge.signals import DriveInfo, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
@@ -46,20 +50,46 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         from asammdf import MDF
     except ImportError:
         raise MissingExtraError("asammdf", "mdf", f"reading {path.name}") from None
-    with warnings.catch_warnings():
+    saved = salvage(path)
+    if saved is not None and not saved.kept and not saved.unfinished:
+        records = f"of its {saved.told} records none is whole" if saved.told else "nothing is whole"
+        raise DriveError(
+            f"{path} ends early and {records}, as what they need stands further behind; "
+            "copy it again"
+        )
+    with (
+        warnings.catch_warnings(),
+        # Of an unfinished file the library makes a copy, which it leaves behind if that fails.
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
+    ):
         warnings.simplefilter("ignore")
-        with _open(MDF, path) as file:
-            return _read(file, path, table, mapping)
+        with _open(MDF, path, saved, folder) as file:
+            log = _read(file, path, table, mapping)
+    if saved is not None:
+        log.problems.insert(0, Problem("", _told(log, saved)))
+    return log
 
 
-def _open(opener: Any, path: Path) -> Any:
+def _told(log: Log, saved: Salvaged) -> str:
+    """Say what was salvaged of a file that was cut off."""
+    clocks = [s.time for s in log.signals if len(s)]
+    clocks += [log.frames.time] if log.frames is not None and len(log.frames) else []
+    span = max((float(c[-1]) for c in clocks), default=0.0) - min(
+        (float(c[0]) for c in clocks), default=0.0
+    )
+    counted = f"{saved.kept} of {saved.told} records" if saved.told else "what is left"
+    return f"{log.path.name} ends early: {counted} could be read, {span:.0f} s; copy it again"
+
+
+def _open(opener: Any, path: Path, saved: Salvaged | None, folder: str) -> Any:
     """Open the file; what the library raises for a broken one becomes one sentence."""
     hook = sys.unraisablehook
     # A half-opened file complains on standard error once more when it is collected.
     sys.unraisablehook = lambda _: None
     reason = ""
     try:
-        return opener(path)
+        with redirect_stdout(io.StringIO()):
+            return opener(path if saved is None else io.BytesIO(saved.raw), temporary_folder=folder)
     # The library's errors are of many kinds, down to struct.error.
     except Exception as e:
         reason = _first_line(e)
