@@ -60,7 +60,10 @@ vehicles = st.builds(
     driveline=drivelines,
     torque=torques,
     road_load=st.builds(
-        RoadLoad, drag_area=st.floats(0.0, 19.0), rolling_coefficient=st.floats(0.0, 0.09)
+        RoadLoad,
+        drag_area=st.floats(0.0, 19.0),
+        rolling_coefficient=st.floats(0.0, 0.09),
+        rolling_speed_coefficient=st.floats(0.0, 0.001),
     ),
     mounting=maybe(
         st.builds(
@@ -183,6 +186,7 @@ def test_empty_file_is_a_vehicle_of_defaults(tmp_path):
         ("[torque]\nload_range_pct = [50, 10]", 2, "the lower first"),
         ("[road_load]\ndrag_coefficient = 0.3", 2, "needs frontal_area_m2"),
         ("[road_load]\nrolling_coefficient = 0.9", 2, "must be in [0, 0.1)"),
+        ("[road_load]\nrolling_speed_coefficient_s_per_m = 0.9", 2, "must be in [0, 0.002) s/m"),
         ("[mounting]\nstd_deg = [1, 2]", 2, "must be three numbers"),
         ("[timing]\ntorque_delay_s = 120", 2, "must be in [-1, 3] s"),
         ("[provenance]\nformat_version = 99", 2, "reads version 1"),

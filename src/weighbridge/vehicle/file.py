@@ -137,6 +137,11 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
         (
             _Key("drag_area", "drag_area", "drag coefficient times frontal area", suffix="m2"),
             _Key("rolling_coefficient", "rolling_coefficient", "rolling resistance over weight"),
+            _Key(
+                "rolling_speed_coefficient_s_per_m",
+                "rolling_speed_coefficient",
+                "what is added to it per m/s of speed",
+            ),
             _Key("drag_area_std", "drag_area_std", "its standard deviation", suffix="m2"),
             _Key("rolling_coefficient_std", "rolling_coefficient_std", "its standard deviation"),
         ),

@@ -164,12 +164,15 @@ class RoadLoad:
     Attributes
     ----------
     drag_area : drag coefficient times frontal area C_d A [m^2]
-    rolling_coefficient : rolling resistance coefficient C_r [-]
+    rolling_coefficient : rolling resistance coefficient C_r [-]; at standstill
+        where it grows with speed
+    rolling_speed_coefficient : its growth with speed [s/m]
     drag_area_std, rolling_coefficient_std : their standard deviations
     """
 
     drag_area: float = 0.70
     rolling_coefficient: float = 0.010
+    rolling_speed_coefficient: float = 0.0
     drag_area_std: float | None = None
     rolling_coefficient_std: float | None = None
 
@@ -179,6 +182,11 @@ class RoadLoad:
         if not 0.0 <= self.rolling_coefficient < 0.1:
             raise ConfigError(
                 f"rolling_coefficient must be in [0, 0.1), got {self.rolling_coefficient}"
+            )
+        if not 0.0 <= self.rolling_speed_coefficient < 0.002:
+            raise ConfigError(
+                "rolling_speed_coefficient must be in [0, 0.002) s/m, "
+                f"got {self.rolling_speed_coefficient}"
             )
 
 
