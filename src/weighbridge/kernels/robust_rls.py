@@ -1,0 +1,222 @@
+"""Recursive least squares of one parameter, robust against outliers, with forgetting."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from weighbridge.kernels._jit import kernel
+
+CLIPPED = 0.7785
+"""Mean of min(z^2, 1.5^2) of a standard normal z: what clipping at 1.5 takes from a variance."""
+
+
+class RobustRlsParams(NamedTuple):
+    """What stays the same from row to row.
+
+    Attributes
+    ----------
+    window : length of the means that are folded in [s]
+    period : time that one row stands for [s]
+    pause : rows further apart belong to different windows [s]
+    forgetting : weight kept by the past at each window, in (0, 1] [-]
+    kept_information : sum of squared regressors below which nothing is forgotten
+        without being replaced: the guard against wind-up
+    threshold : Huber's, in standard deviations of the innovation [-]
+    scale_windows : windows over which the innovation variance is averaged [-]
+    settle_windows : windows before the threshold holds
+    noise_floor : standard deviation the innovations have at least [unit of y]
+    """
+
+    window: float
+    period: float
+    pause: float
+    forgetting: float
+    kept_information: float
+    threshold: float
+    scale_windows: float
+    settle_windows: int
+    noise_floor: float
+
+
+class RobustRlsState(NamedTuple):
+    """The estimate, what it is made from, and the window that is open.
+
+    Attributes
+    ----------
+    theta : the parameter
+    information : weighted sum of squared regressors, one over the paper's P
+    noise_var : running variance of the innovations [unit of y squared]
+    windows : windows folded in so far
+    count : rows in the open window
+    begin, last : first row of the open window, last row seen [s]
+    sum_phi, sum_y : over the open window
+    """
+
+    theta: float
+    information: float
+    noise_var: float
+    windows: int
+    count: int
+    begin: float
+    last: float
+    sum_phi: float
+    sum_y: float
+
+
+def initial_state(theta, information):
+    """Start from ``theta`` with an ``information`` > 0, small for none."""
+    return RobustRlsState(float(theta), float(information), 0.0, 0, 0, 0.0, -np.inf, 0.0, 0.0)
+
+
+@kernel
+def fold(state, phi, y, params):
+    """Fold the mean row ``y = phi * theta + noise`` into the estimate.
+
+    Returns
+    -------
+    state : RobustRlsState
+    weight : float
+        Huber's weight of the row, in (0, 1] [-].
+
+    References
+    ----------
+    Du et al. 2025, eqs. 15-20: the weight is 1 up to the threshold and falls as
+    its inverse beyond. Here it enters the covariance too, as in Huber and
+    Ronchetti, Robust Statistics, 2nd ed., 2009, ch. 7, and the threshold counts
+    in standard deviations of the innovation, that of the estimate included: a
+    start from nothing is no outlier.
+    """
+    innovation = y - phi * state.theta
+    spread = 1.0 + phi * phi / state.information
+    size = abs(innovation)
+    bound = params.threshold * np.sqrt(max(state.noise_var, params.noise_floor**2) * spread)
+    settled = state.windows >= params.settle_windows
+    weight = 1.0
+    if settled and size > bound:
+        weight = bound / size
+
+    # The first window says nothing of the noise: its innovation is the start's error.
+    noise_var = state.noise_var
+    if state.windows > 0:
+        seen = min(size, bound) if settled else size
+        correction = CLIPPED if settled else 1.0
+        share = 1.0 / min(float(state.windows), params.scale_windows)
+        noise_var = noise_var + share * (seen * seen / spread / correction - noise_var)
+
+    kept = max(
+        params.forgetting * state.information,
+        min(state.information, params.kept_information),
+    )
+    information = kept + weight * phi * phi
+    theta = state.theta + weight * phi * innovation / information
+    return (
+        RobustRlsState(
+            theta,
+            information,
+            noise_var,
+            state.windows + 1,
+            state.count,
+            state.begin,
+            state.last,
+            state.sum_phi,
+            state.sum_y,
+        ),
+        weight,
+    )
+
+
+@kernel
+def step(state, time, phi, y, valid, params):
+    """Take one row; when its window is full, fold the window's mean in.
+
+    Parameters
+    ----------
+    state : RobustRlsState
+    time : float
+        Instant of the row [s].
+    phi, y : float
+        Regressor and measurement; may be NaN where not valid.
+    valid : bool
+        False closes the open window without folding it in.
+    params : RobustRlsParams
+
+    Returns
+    -------
+    state : RobustRlsState
+    mean_phi, mean_y : float
+        Of the window folded in at this row; NaN if none was.
+    weight : float
+        Of that window; NaN if none was.
+    """
+    count, begin, sum_phi, sum_y = state.count, state.begin, state.sum_phi, state.sum_y
+    if not valid or time - state.last > params.pause:
+        count, sum_phi, sum_y = 0, 0.0, 0.0
+    mean_phi, mean_y, weight = np.nan, np.nan, np.nan
+    full = False
+    if valid:
+        if count == 0:
+            begin = time
+        count += 1
+        sum_phi += phi
+        sum_y += y
+        # Half a row of tolerance: stamps jitter.
+        full = time - begin + 1.5 * params.period >= params.window
+    if full:
+        mean_phi, mean_y = sum_phi / count, sum_y / count
+        count, sum_phi, sum_y = 0, 0.0, 0.0
+    state = RobustRlsState(
+        state.theta,
+        state.information,
+        state.noise_var,
+        state.windows,
+        count,
+        begin,
+        time,
+        sum_phi,
+        sum_y,
+    )
+    if full:
+        state, weight = fold(state, mean_phi, mean_y, params)
+    return state, mean_phi, mean_y, weight
+
+
+@kernel
+def variance(state):
+    """Variance of the parameter for independent windows."""
+    return state.noise_var / state.information
+
+
+@kernel
+def run(state, time, phi, y, valid, params):
+    """Apply ``step`` to each row.
+
+    Parameters
+    ----------
+    state : RobustRlsState
+    time, phi, y : (m,) float64
+    valid : (m,) bool
+    params : RobustRlsParams
+
+    Returns
+    -------
+    state : RobustRlsState
+        After the last row.
+    theta, var, information : (m,) float64
+        Estimate, its variance and the information behind it after each row.
+    mean_phi, mean_y, weight : (m,) float64
+        Of the window folded in at each row; NaN where none was.
+    """
+    theta = np.empty(time.size)
+    var = np.empty(time.size)
+    information = np.empty(time.size)
+    mean_phi = np.empty(time.size)
+    mean_y = np.empty(time.size)
+    weight = np.empty(time.size)
+    for k in range(time.size):
+        state, mean_phi[k], mean_y[k], weight[k] = step(
+            state, time[k], phi[k], y[k], valid[k], params
+        )
+        theta[k] = state.theta
+        var[k] = variance(state)
+        information[k] = state.information
+    return state, theta, var, information, mean_phi, mean_y, weight
