@@ -14,6 +14,7 @@ from weighbridge.vehicle.model import (
     Mounting,
     Provenance,
     RoadLoad,
+    SpeedModel,
     Timing,
     TorqueModel,
     Vehicle,
@@ -50,6 +51,19 @@ torques = st.builds(
     load_range=maybe(pairs),
     speed_range=maybe(pairs),
 )
+speed_models = st.builds(
+    SpeedModel,
+    mass=positive,
+    sample_time=st.floats(1.0, 60.0),
+    force_gain=positive,
+    drag=positive,
+    rolling_coefficient=st.floats(0.0, 0.099),
+    rotating_mass=positive,
+    corrections=st.tuples(*[finite] * 7),
+    r_squared=maybe(st.floats(0.0, 1.0)),
+    samples=maybe(st.integers(0, 10_000)),
+    scale_std=positive,
+)
 vehicles = st.builds(
     Vehicle,
     name=text,
@@ -81,6 +95,7 @@ vehicles = st.builds(
         torque_delay=maybe(st.floats(-1.0, 3.0)),
         torque_delay_std=maybe(positive),
     ),
+    speed_model=maybe(speed_models),
     provenance=st.builds(
         Provenance,
         drives=st.lists(text, max_size=3).map(tuple),
@@ -162,6 +177,14 @@ def test_empty_file_is_a_vehicle_of_defaults(tmp_path):
     assert load(tmp_path, "") == Vehicle()
 
 
+SPEED_MODEL = """[speed_model]
+mass_kg = 1092
+force_gain_per_m = 20
+drag_kg_per_m = 0.9
+rotating_mass_kg = 71
+scale_std = 0.2"""
+
+
 @pytest.mark.parametrize(
     ("content", "line", "words"),
     [
@@ -191,6 +214,8 @@ def test_empty_file_is_a_vehicle_of_defaults(tmp_path):
         ("[timing]\ntorque_delay_s = 120", 2, "must be in [-1, 3] s"),
         ("[provenance]\nformat_version = 99", 2, "reads version 1"),
         ("[provenance]\nsamples = 1.5", 2, "a whole number"),
+        ("[speed_model]\nmass_kg = 1092", 1, "lacks force_gain_per_m, drag_kg_per_m, rotating_"),
+        (SPEED_MODEL + "\ncorrections = [1, 2]", 7, "seven numbers, p1 to p7"),
         ("[roadload]\n", 1, "did you mean road_load"),
         ("vehicle = 3", 1, "must be a section"),
     ],

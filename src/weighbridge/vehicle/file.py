@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -24,6 +24,7 @@ from weighbridge.vehicle.model import (
     Mounting,
     Provenance,
     RoadLoad,
+    SpeedModel,
     Timing,
     TorqueModel,
     Vehicle,
@@ -176,6 +177,21 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             _Key("torque_lag", "torque_lag", "time constant of its smoothing", suffix="s"),
         ),
     ),
+    "speed_model": (
+        SpeedModel,
+        (
+            _Key("mass", "mass", "known mass of the fit; the filter starts there", suffix="kg"),
+            _Key("sample_time", "sample_time", "windows of the speed's means", suffix="s"),
+            _Key("force_gain_per_m", "force_gain", "a1, traction force per engine torque"),
+            _Key("drag_kg_per_m", "drag", "a2, air density times drag area"),
+            _Key("rolling_coefficient", "rolling_coefficient", "f_r, rolling resistance / weight"),
+            _Key("rotating_mass", "rotating_mass", "m_r of wheels and driveline", suffix="kg"),
+            _Key("corrections", "corrections", "p1 to p7 of the fit, in SI", "numbers"),
+            _Key("r_squared", "r_squared", "part of the speed's changes that the fit explains"),
+            _Key("samples", "samples", "windows of the fit", "count"),
+            _Key("scale_std", "scale_std", "part of any mass found so, as standard deviation"),
+        ),
+    ),
     "provenance": (
         Provenance,
         (
@@ -229,6 +245,7 @@ def load_vehicle(path: str | Path) -> Vehicle:
         elif name == "provenance":
             section.count("format_version")
         section.done()
+        _refuse_gaps(section, build, keys, values)
         sections[name] = _built(build, section, values)
     section = root.section("vehicle") or Section({}, root.name, root.lines, ("vehicle",))
     values = {key.field: value for key in _VEHICLE if (value := _value(section, key)) is not None}
@@ -266,6 +283,18 @@ def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:
         path.write_text(tomlkit.dumps(document), encoding="utf-8")
     except OSError as e:
         raise ConfigError(f"{path} cannot be written: {e.strerror or e}") from None
+
+
+def _refuse_gaps(
+    section: Section, build: type[Any], keys: tuple[_Key, ...], values: Mapping[str, Any]
+) -> None:
+    """Refuse a section that lacks a key without a default."""
+    needed = {
+        f.name for f in fields(build) if f.default is MISSING and f.default_factory is MISSING
+    }
+    lacking = [key.name for key in keys if key.field in needed - values.keys()]
+    if lacking:
+        section.fail("", f"lacks {', '.join(lacking)}; calibrate writes the whole section")
 
 
 def _check_version(root: Section) -> None:
