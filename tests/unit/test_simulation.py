@@ -10,10 +10,12 @@ from weighbridge.io import read_drive
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import (
     ABOUT,
+    BUS,
     COMPACT,
     ELECTRIC,
     MIDSIZE,
     SCENARIOS,
+    Braking,
     Effects,
     Loading,
     Polling,
@@ -365,6 +367,92 @@ def test_random_cars_drive():
         assert truth.speed.max() > 8.0
 
 
+@pytest.fixture(scope="module", params=[0.0, 6000.0])
+def bus(request):
+    return simulate_car(make_scenario("bus", payload=request.param, seed=2))
+
+
+def test_bus_brakes_when_du_2025_says(bus):
+    truth = bus.truth
+    assert_allclose(truth.mass[0], 7000.0 + bus.scenario.payload)
+    assert_allclose(truth.time[-1], 180.0, atol=0.1)
+    braking = (truth.brake_force > 2000.0) & (truth.time > 20.0)
+    starts = truth.time[np.flatnonzero(np.diff(braking.astype(int)) == 1)]
+    assert_allclose(starts, [115.3, 147.3], atol=0.4)
+    cruising = (truth.time > 60.0) & (truth.time < 110.0)
+    assert truth.speed[cruising].std() < 1.0
+    assert truth.speed[truth.time < 35.0].max() > 15.0
+
+
+def test_bus_interrupts_its_torque_for_every_shift(bus):
+    truth = bus.truth
+    changes = np.flatnonzero(np.diff(truth.gear) > 0)
+    assert changes.size >= 4
+    for k in changes[truth.time[changes] < 40.0]:
+        shift = slice(k, k + 20)
+        assert np.abs(truth.traction_force[shift]).min() < 0.05 * np.max(truth.traction_force)
+
+
+def test_bus_sends_100_times_a_second_with_the_resolution_of_j1939(bus):
+    signals = bus.drive.signals
+    for name, step in (
+        ("vehicle_speed", 1 / 256 / 3.6),
+        ("engine_speed", 0.125 * np.pi / 30),
+        ("engine_torque_fraction", 0.01),
+    ):
+        assert_allclose(np.median(np.diff(signals[name].time)), 0.01, rtol=0.05)
+        counts = signals[name].values / step
+        assert_allclose(counts, np.round(counts), atol=1e-6)
+    assert_allclose(signals["accel_x"].period, 0.01, rtol=0.01)
+
+
+def test_bus_tells_the_torque_of_its_flywheel_nearly(bus):
+    truth, signals = bus.truth, bus.drive.signals
+    told = signals["engine_torque_fraction"]
+    reference = float(np.median(signals["reference_torque"].values))
+    torque = np.interp(told.time, truth.time, truth.engine_torque)
+    driving = np.interp(told.time, truth.time, truth.pedal) > 0.3
+    driving &= np.interp(told.time, truth.time, truth.phase) == 0.0
+    error = (told.values * reference - torque)[driving]
+    # Cold friction and accessories are believed to reach the flywheel.
+    assert 0.01 * reference < error.mean() < 0.12 * reference
+
+
+def test_retarder_brakes_without_the_pedal():
+    scenario = replace(
+        make_scenario("bus", seed=3),
+        brakings=(
+            Braking(time=70.0, duration=3.0, decel=0.8),
+            Braking(time=95.0, duration=3.0, decel=2.5),
+        ),
+        duration=110.0,
+    )
+    made = simulate_car(scenario)
+    signals = made.drive.signals
+    retarder, switch = signals["retarder_torque"], signals["brake_switch"]
+    for start, pressed in ((70.0, False), (95.0, True)):
+        during = (retarder.time > start + 1.5) & (retarder.time < start + 2.9)
+        assert np.all(retarder.values[during] < -0.2)
+        assert np.all(switch.at(retarder.time[during]) == float(pressed))
+    cruise = (retarder.time > 60.0) & (retarder.time < 69.0)
+    assert np.all(retarder.values[cruise] == 0.0)
+    assert np.all(switch.at(retarder.time[cruise]) == 0.0)
+
+
+def test_passengers_get_on_and_off_the_urban_bus():
+    scenario = make_scenario("bus-urban", payload=710.0, seed=6)
+    load = np.cumsum([710.0, *(stop.load for stop in scenario.loading)])
+    assert load.min() >= 0.0
+    assert load.max() <= 80 * 71.0
+    assert len(scenario.loading) > 20
+    assert any(stop.load < 0.0 for stop in scenario.loading)
+    sensors = Sensors(imu_rate=0.0, gnss_rate=0.0)
+    truth = simulate_car(replace(scenario, sensors=sensors, duration=600.0)).truth
+    changing = np.diff(truth.mass) > 1.0
+    assert np.all(truth.speed[:-1][changing] == 0.0)
+    assert truth.mass.max() > BUS.mass + 800.0
+
+
 def test_every_scenario_is_described():
     assert set(ABOUT) == set(SCENARIOS)
 
@@ -384,6 +472,10 @@ def test_every_scenario_is_described():
         (lambda: Polling(rate=0.0), "poll rate"),
         (lambda: Polling(speed_rounding="up"), "speed_rounding"),
         (lambda: Polling(fast=()), "at least one"),
+        (lambda: Polling(speed_step=0.0), "speed_step must be positive"),
+        (lambda: Braking(time=5.0, duration=0.0, decel=1.0), "a braking needs"),
+        (lambda: replace(BUS, launch_gear=9), "launch_gear"),
+        (lambda: replace(BUS, transmission="automatic"), "converter_capacity"),
         (lambda: replace(MIDSIZE, gear_ratios=(1.0, 2.0)), "gear_ratios"),
         (lambda: replace(MIDSIZE, mass=-1.0), "mass"),
         (lambda: replace(MIDSIZE, curve_torque=(1.0,)), "curve_speed"),

@@ -15,7 +15,7 @@ def simulate(
         str,
         typer.Argument(
             help="car, car-calibration, car-short, car-loading, highway, compact, "
-            "compact-calibration or electric.",
+            "compact-calibration, electric, bus or bus-urban.",
             show_default=False,
         ),
     ],

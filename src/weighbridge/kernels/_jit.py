@@ -18,3 +18,7 @@ fast_kernel = njit(
     fastmath={"reassoc", "contract", "arcp", "nsz"},
 )
 """As `kernel`, with sums free to be reordered; NaN keeps its meaning."""
+
+inlined_kernel = njit(error_model="numpy", nogil=True, cache=INSTALLED, forceinline=True)
+"""As `kernel`, put in the place of its call: for small steps of a loop whose arguments
+hold many arrays, which a call would count references of."""

@@ -1,18 +1,21 @@
 """Simulated cars on simulated roads, seen through simulated sensors."""
 
-from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar, random_car
+from weighbridge.simulation.car import BUS, COMPACT, ELECTRIC, MIDSIZE, SimulatedCar, random_car
 from weighbridge.simulation.route import (
     Route,
+    bus_route,
     flat_route,
     highway_route,
     hilly_route,
     jensen_route,
     mixed_route,
     short_route,
+    straight_route,
 )
 from weighbridge.simulation.scenario import (
     ABOUT,
     SCENARIOS,
+    Braking,
     Effects,
     Loading,
     Polling,
@@ -24,10 +27,12 @@ from weighbridge.simulation.simulate import SimulatedDrive, Truth, simulate_car
 
 __all__ = [
     "ABOUT",
+    "BUS",
     "COMPACT",
     "ELECTRIC",
     "MIDSIZE",
     "SCENARIOS",
+    "Braking",
     "Effects",
     "Loading",
     "Polling",
@@ -37,6 +42,7 @@ __all__ = [
     "SimulatedCar",
     "SimulatedDrive",
     "Truth",
+    "bus_route",
     "flat_route",
     "highway_route",
     "hilly_route",
@@ -46,4 +52,5 @@ __all__ = [
     "random_car",
     "short_route",
     "simulate_car",
+    "straight_route",
 ]

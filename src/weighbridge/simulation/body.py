@@ -20,9 +20,6 @@ ROAD_ROUGHNESS = 48.0e-6
 """Displacement spectral density at 0.1 cycles/m, the better half of class B of
 ISO 8608 (32e-6 to 128e-6) [m^3]."""
 
-_WHEELBASE = 2.75  # [m]
-_TRACK = 1.55  # [m]
-
 
 class Pose(NamedTuple):
     """Where the body is and how it is turned; the point at the rear axle."""
@@ -103,11 +100,12 @@ def simulate_pose(scenario: Scenario, drive: Trajectory, rng: np.random.Generato
     course = np.interp(s, grid, route.heading)
     lateral = second_order(v * v * np.interp(s, grid, route.curvature), 3.0, 0.9, zero=False)
     accel = np.gradient(v, DT)
-    squat = second_order(accel * (car.squat * effects.squat), car.pitch_frequency, 0.45, zero=False)
+    payload = scenario.payload + (drive.loaded if scenario.loading else 0.0)
+    lever = car.squat * effects.squat * (1.0 + car.squat_load * payload / car.mass)
+    squat = second_order(accel * lever, car.pitch_frequency, 0.45, zero=False)
     lean = second_order(
         lateral * (-car.roll_gain * effects.roll), car.roll_frequency, 0.35, zero=False
     )
-    payload = scenario.payload + drive.loaded
     pitch = grade + squat + car.load_pitch * payload * effects.load_pitch
     roll = second_order(np.interp(s, grid, route.bank), 3.0, 0.7, zero=False) + lean
     heave = np.zeros_like(s)
@@ -117,8 +115,8 @@ def simulate_pose(scenario: Scenario, drive: Trajectory, rng: np.random.Generato
         )
         uneven *= effects.roughness
         heave = _road_shake(0.75 * uneven, rng, car.heave_frequency, 0.3)
-        pitch = pitch + _road_shake(uneven / _WHEELBASE, rng, car.pitch_frequency, 0.35)
-        roll = roll + _road_shake(0.7 * uneven / _TRACK, rng, car.roll_frequency, 0.3)
+        pitch = pitch + _road_shake(uneven / car.wheelbase, rng, car.pitch_frequency, 0.35)
+        roll = roll + _road_shake(0.7 * uneven / car.track, rng, car.roll_frequency, 0.3)
     heading = course + car.side_slip * effects.side_slip * lateral
 
     climb = np.gradient(heave, DT)

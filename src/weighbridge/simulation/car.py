@@ -9,20 +9,23 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.errors import ConfigError
+from weighbridge.vehicle.model import VehicleClass
 
 _RPM = math.pi / 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedCar:
-    """The physics of one car.
+    """The physics of one car, van, truck or bus.
 
     Attributes
     ----------
     name : for people
+    kind : "car", "van", "truck" or "bus"
     mass : with driver and full tank, without payload [kg]
-    engine : "petrol" or "electric"
-    transmission : "dual_clutch", "manual" or "single"
+    engine : "petrol", "diesel" or "electric"
+    transmission : "dual_clutch", "manual", "automatic" (torque converter and power
+        shifts), "automated" (a clutch and interrupted torque) or "single"
     gear_ratios : gears 1..n [-]
     final_drive : [-]
     wheel_radius : effective rolling radius [m]
@@ -39,16 +42,38 @@ class SimulatedCar:
     torque_lag : first-order lag of the torque [s]
     shift_time, shift_floor : length of a shift [s], part of the torque kept [-]
     upshift, downshift : engine speeds of a calm driver or gearbox [rad/s]
+    launch_gear : gear to pull away in
+    gear_skip : gears that one shift may pass
+    converter_capacity : torque of a converter's pump at stall over its squared
+        speed; 0 where there is none [N m s^2/rad^2]
+    stall_ratio : turbine over pump torque at stall [-]
+    lock_gear, lock_speed : gear and turbine speed from which the converter is
+        locked, [-], [rad/s]
     accessory_power, compressor_power : taken from the crank [W]
-    load_full : reading of the calculated load at full torque [-]
+    load_full : reading of the calculated load at full torque [-]; a diesel's is
+        of the torque there is at the engine speed of the moment (SAE J1979)
     load_curvature, load_speed_slope : how far the reading departs from a
         straight line in torque and with engine speed, relative [-]
+    torque_curvature : how far a torque reading of the bus bends away from the
+        torque at part load, relative [-]
     load_smoothing : first-order lag of the reading [s]
     regeneration : largest braking torque of an electric motor [N m]
-    squat : pitch of the body per forward acceleration [rad per m/s^2]
+    brake_rise, brake_fall : lags of the brakes [s]
+    brake_drag : what released brakes still hold, fading within 15 s [N]
+    retarder_force : largest braking force of a retarder, at the wheels; half of
+        it is used without the pedal [N]
+    top_speed : of a speed limiter [m/s]
+    liveliness : of the driver in this vehicle, 1 in a car [-]
+    wind_height : height of the middle of its front [m]
+    yaw_drag : growth of the drag area with the squared sine of the flow angle [-]
+    tyre_cooling : growth of rolling resistance per kelvin colder, ISO 28580 [1/K]
+    warm_up_time : of tyres and oil [s]
+    squat : pitch of the body per forward acceleration, without payload [rad per m/s^2]
+    squat_load : growth of the squat with payload over empty mass [-]
     load_pitch : static pitch per payload, nose up [rad/kg]
     roll_gain : roll to the outside per lateral acceleration [rad per m/s^2]
     pitch_frequency, roll_frequency, heave_frequency : undamped, of the body [Hz]
+    wheelbase, track : [m]
     tyre_slip : wheel slip per traction over weight [-]
     side_slip : slip angle of the rear axle per lateral acceleration [rad per m/s^2]
     cylinders : of a four-stroke engine; 0 for a motor
@@ -61,9 +86,12 @@ class SimulatedCar:
     """
 
     name: str
+    kind: VehicleClass = "car"
     mass: float
-    engine: Literal["petrol", "electric"] = "petrol"
-    transmission: Literal["dual_clutch", "manual", "single"] = "dual_clutch"
+    engine: Literal["petrol", "diesel", "electric"] = "petrol"
+    transmission: Literal["dual_clutch", "manual", "automatic", "automated", "single"] = (
+        "dual_clutch"
+    )
     gear_ratios: tuple[float, ...]
     final_drive: float
     wheel_radius: float
@@ -83,19 +111,39 @@ class SimulatedCar:
     shift_floor: float = 0.5
     upshift: float = 1900 * _RPM
     downshift: float = 1200 * _RPM
+    launch_gear: int = 1
+    gear_skip: int = 1
+    converter_capacity: float = 0.0
+    stall_ratio: float = 1.0
+    lock_gear: int = 1
+    lock_speed: float = 0.0
     accessory_power: float = 700.0
     compressor_power: float = 1500.0
     load_full: float = 0.35
     load_curvature: float = 0.06
     load_speed_slope: float = 0.05
+    torque_curvature: float = 0.0
     load_smoothing: float = 0.15
     regeneration: float = 0.0
+    brake_rise: float = 0.2
+    brake_fall: float = 0.12
+    brake_drag: float = 0.0
+    retarder_force: float = 0.0
+    top_speed: float = math.inf
+    liveliness: float = 1.0
+    wind_height: float = 1.0
+    yaw_drag: float = 2.5
+    tyre_cooling: float = 0.008
+    warm_up_time: float = 600.0
     squat: float = math.radians(0.21)
+    squat_load: float = 0.0
     load_pitch: float = 2.0e-5
     roll_gain: float = math.radians(0.40)
     pitch_frequency: float = 1.35
     roll_frequency: float = 1.6
     heave_frequency: float = 1.25
+    wheelbase: float = 2.75
+    track: float = 1.55
     tyre_slip: float = 0.035
     side_slip: float = 0.0035
     cylinders: int = 4
@@ -112,6 +160,15 @@ class SimulatedCar:
             )
         if len(self.curve_speed) != len(self.curve_torque) or len(self.curve_speed) < 2:
             raise ConfigError("curve_speed and curve_torque must be two or more pairs")
+        if not 1 <= self.launch_gear <= len(self.gear_ratios):
+            raise ConfigError(
+                f"launch_gear must be one of {len(self.gear_ratios)} gears, got {self.launch_gear}"
+            )
+        if (self.transmission == "automatic") != (self.converter_capacity > 0.0):
+            raise ConfigError(
+                "an automatic has a converter_capacity above zero and others have none, got "
+                f"{self.converter_capacity} for transmission {self.transmission!r}"
+            )
 
     @property
     def gearings(self) -> tuple[float, ...]:
@@ -211,6 +268,68 @@ ELECTRIC: Final = SimulatedCar(
     cylinders=0,
 )
 """A car with one fixed gear whose control unit reports the motor torque."""
+
+
+BUS: Final = SimulatedCar(
+    name="bus, diesel, 6-speed automated",
+    kind="bus",
+    mass=7000.0,
+    engine="diesel",
+    transmission="automated",
+    gear_ratios=(6.75, 3.60, 2.13, 1.39, 1.00, 0.78),
+    final_drive=3.545,
+    wheel_radius=0.49,
+    engine_inertia=1.1,
+    wheel_inertia=62.0,
+    drag_area=0.69 * 7.9,
+    rolling_coefficient=0.0075,
+    curve_speed=_rpm(600, 800, 1000, 1200, 1600, 1900, 2300, 2600),
+    curve_torque=(420.0, 560.0, 750.0, 850.0, 850.0, 800.0, 685.0, 420.0),
+    idle_speed=700 * _RPM,
+    max_speed=2600 * _RPM,
+    drag_torque=(50.0, 0.10, 7.0e-4),
+    loss_constant=8.0,
+    loss_slope=0.035,
+    torque_lag=0.25,
+    shift_time=0.8,
+    shift_floor=0.0,
+    upshift=1450 * _RPM,
+    downshift=950 * _RPM,
+    accessory_power=4500.0,
+    compressor_power=3500.0,
+    load_full=1.0,
+    load_curvature=0.03,
+    load_speed_slope=0.03,
+    torque_curvature=0.03,
+    load_smoothing=0.05,
+    brake_rise=0.35,
+    brake_fall=0.30,
+    brake_drag=60.0,
+    retarder_force=9000.0,
+    top_speed=100 / 3.6,
+    liveliness=0.6,
+    wind_height=1.6,
+    yaw_drag=5.0,
+    tyre_cooling=0.006,
+    warm_up_time=1800.0,
+    squat=math.radians(0.10),
+    squat_load=1.0,
+    load_pitch=1.5e-7,
+    roll_gain=math.radians(0.55),
+    pitch_frequency=1.1,
+    roll_frequency=0.8,
+    heave_frequency=1.15,
+    wheelbase=5.2,
+    track=2.05,
+    tyre_slip=0.030,
+    side_slip=0.004,
+    cylinders=6,
+)
+"""The bus of Du 2025, Table 1: empty mass, C_d, frontal area, tyre radius, axle ratio and,
+nearly, driveline efficiency (0.95). Its rolling coefficient of 0.0005 is a tenth of any tyre's;
+0.0075 is usual for buses (Wong, Theory of Ground Vehicles, ch. 3, gives 0.006 to 0.01 for truck
+tyres). The table gives no powertrain: a six-cylinder diesel of 6.7 l and 165 kW and a six-speed
+box of a medium bus, its clutch opened by the control unit for every shift."""
 
 
 def random_car(rng: np.random.Generator) -> SimulatedCar:

@@ -9,6 +9,8 @@ import numpy as np
 
 from weighbridge.constants import GAS_CONSTANT_DRY_AIR, GRAVITY, PETROL_HEATING_VALUE
 from weighbridge.kernels import simulated_car as kernel
+from weighbridge.kernels.simulated_driveline import Powertrain
+from weighbridge.kernels.simulated_driver import Driver, Road, limit_target
 from weighbridge.signals import Floats
 from weighbridge.simulation.route import STEP
 
@@ -18,8 +20,11 @@ if TYPE_CHECKING:
 DT = 1.0 / 200.0
 """Step of the simulation [s]."""
 
-WIND_HEIGHT_FACTOR = math.log(1.0 / 0.1) / math.log(10.0 / 0.1)
-"""Wind at 1 m over wind at 10 m, logarithmic profile, roughness length 0.1 m [-]."""
+DIESEL_HEATING_VALUE = 42.8e6
+"""Lower heating value of diesel fuel [J/kg] (Heywood 1988, app. D)."""
+
+ROUGHNESS_LENGTH = 0.1
+"""Of open country with hedges, for the profile of the wind over height [m]."""
 
 _REFERENCE_TEMPERATURE = 298.15  # of rolling resistance, ISO 28580 [K]
 
@@ -48,13 +53,13 @@ class Trajectory(NamedTuple):
     loaded: Floats  # since the start [kg]
 
 
-def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
+def _plan(scenario: Scenario, rng: np.random.Generator) -> Road:
     """Decide what the driver will do: speeds, stops, how hard to pull away."""
     route, effects = scenario.route, scenario.effects
     n = route.grade.size
     s = np.arange(n) * STEP
     curvature = route.curvature
-    lively = scenario.aggressiveness
+    lively = scenario.aggressiveness * scenario.car.liveliness
     target = route.limit * (1.0 + 0.02 * float(rng.standard_normal()) * effects.driver_ripple)
     # Traffic, villages, overtaking: stretches driven slower or faster.
     x = 200.0
@@ -99,14 +104,14 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
         if not is_red and rng.random() < 0.3:
             k = int(at / STEP)
             target[k : k + 10] = np.minimum(target[k : k + 10], slow)
-    target = np.maximum(target, 2.5)
+    target = np.minimum(np.maximum(target, 2.5), scenario.car.top_speed)
     # Braking on purpose in town, mostly lifting the foot on the highway.
     slow_down = np.where(city, 0.95, np.where(fast, 0.5, 0.75)) * lively**0.5
     slow_down *= rng.uniform(0.85, 1.2)
-    target = kernel.limit_target(target, STEP, slow_down)
+    target = limit_target(target, STEP, slow_down)
     rolling = 1.0 + effects.surface * (route.surface - 1.0)
     stops = _stops(scenario, np.stack((route.stops, pause, decel))[:, red], s[-1])
-    return kernel.Road(
+    return Road(
         step=STEP,
         grade=np.ascontiguousarray(route.grade, dtype=np.float64),
         altitude=route.height,
@@ -121,6 +126,9 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> kernel.Road:
         stop_time=stops[1],
         stop_decel=stops[2],
         stop_load=stops[3],
+        brake_start=np.array([b.time for b in scenario.brakings], dtype=np.float64),
+        brake_end=np.array([b.time + b.duration for b in scenario.brakings], dtype=np.float64),
+        brake_decel=np.array([b.decel for b in scenario.brakings], dtype=np.float64),
     )
 
 
@@ -150,12 +158,14 @@ def _stops(scenario: Scenario, red: Floats, end: float) -> Floats:
     return np.ascontiguousarray(stops[:, np.argsort(stops[0], kind="stable")])
 
 
-def _powertrain(scenario: Scenario) -> kernel.Powertrain:
+def _powertrain(scenario: Scenario) -> Powertrain:
     car, effects = scenario.car, scenario.effects
     warm = min(1.0, max(0.0, (scenario.ambient_temperature - 283.15) / 20.0))
-    return kernel.Powertrain(
+    return Powertrain(
         electric=car.electric,
         gearings=np.array(car.gearings),
+        launch_gear=car.launch_gear,
+        skip=car.gear_skip,
         curve_speed=np.array(car.curve_speed),
         curve_torque=np.array(car.curve_torque),
         engine_inertia=car.engine_inertia,
@@ -173,8 +183,14 @@ def _powertrain(scenario: Scenario) -> kernel.Powertrain:
         accessory_power=car.accessory_power * effects.accessories,
         compressor_power=car.compressor_power * warm * effects.accessories,
         cold_friction=0.35 * effects.warm_up,
-        heating_value=PETROL_HEATING_VALUE,
+        heating_value=DIESEL_HEATING_VALUE if car.engine == "diesel" else PETROL_HEATING_VALUE,
+        # Best indicated efficiencies of the two kinds of engine, Heywood 1988, ch. 5.
+        fuel_efficiency=0.45 if car.engine == "diesel" else 0.385,
         regeneration=car.regeneration,
+        converter=car.converter_capacity,
+        stall_ratio=car.stall_ratio,
+        lock_gear=car.lock_gear,
+        lock_speed=car.lock_speed,
     )
 
 
@@ -182,18 +198,18 @@ def _resistance(scenario: Scenario) -> kernel.Resistance:
     car, effects = scenario.car, scenario.effects
     density = scenario.pressure / (GAS_CONSTANT_DRY_AIR * scenario.ambient_temperature)
     colder = _REFERENCE_TEMPERATURE - scenario.ambient_temperature
-    # ISO 28580 corrects rolling resistance of car tyres by 0.8 % per kelvin.
     rolling = car.rolling_coefficient * scenario.tyre_factor
-    rolling *= 1.0 + effects.tyre_temperature * 0.008 * colder
-    wind = scenario.wind_speed * WIND_HEIGHT_FACTOR
+    rolling *= 1.0 + effects.tyre_temperature * car.tyre_cooling * colder
+    height = math.log(car.wind_height / ROUGHNESS_LENGTH) / math.log(10.0 / ROUGHNESS_LENGTH)
+    wind = scenario.wind_speed * height
     return kernel.Resistance(
         mass=scenario.mass,
         drag_area=car.drag_area + scenario.drag_area_addition,
-        yaw_drag=2.5 * effects.yaw_drag,
+        yaw_drag=car.yaw_drag * effects.yaw_drag,
         rolling=rolling,
         rolling_speed=0.20 * effects.tyre_speed,
         rolling_cold=0.22 * effects.warm_up,
-        warm_up_time=600.0,
+        warm_up_time=car.warm_up_time,
         cornering=0.005 * effects.cornering_drag,
         tyre_slip=car.tyre_slip / (scenario.mass * GRAVITY) * effects.tyre_slip,
         density=density,
@@ -204,6 +220,10 @@ def _resistance(scenario: Scenario) -> kernel.Resistance:
         gust_length=60.0,
         slow_wind_std=0.12 * effects.gusts,
         fuel_burn=effects.fuel_burn,
+        brake_rise=car.brake_rise,
+        brake_fall=car.brake_fall,
+        brake_drag=car.brake_drag * effects.brake_drag,
+        brake_drag_time=15.0,
     )
 
 
@@ -230,7 +250,7 @@ def simulate_trajectory(
     steps = int(longest / DT)
     noise = noise_rng.standard_normal((steps // kernel.NOISE_STRIDE + 1, kernel.NOISE_CHANNELS))
     ripple = scenario.effects.driver_ripple
-    driver = kernel.Driver(
+    driver = Driver(
         ripple=0.09 * ripple, speed_ripple=0.018 * ripple, gain=0.4, rest=scenario.start_rest
     )
     out, count = kernel.drive(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -336,6 +336,34 @@ def jensen_route(seed: int = 1) -> Route:
         ],
         name="city, country, highway and hills, 83 km",
     )
+
+
+def straight_route(seed: int = 11, *, length: float = 5000.0, limit: float = 70 / 3.6) -> Route:
+    """Return a straight road that undulates gently, 0.4 % in the mean [m], [m/s]."""
+    rng = np.random.default_rng(seed)
+    flat = flat_route(length, limit=limit)
+    grade = 0.004 * _patches(rng, flat.grade.size, 700.0)
+    return replace(
+        flat,
+        name="straight",
+        grade=grade * np.clip(np.arange(grade.size) * STEP / 150.0, 0.0, 1.0),
+        surface=1.0 + 0.03 * _patches(rng, flat.grade.size, 2500.0),
+    )
+
+
+def bus_route(seed: int = 12) -> tuple[Route, Floats]:
+    """Return an urban bus line, out and back, 18 km, and where it stops [m]."""
+    route = mixed_route(
+        seed,
+        out=[("city", 5000), ("hills", 1500), ("city", 2500)],
+        back=[("city", 2500), ("hills", 1500), ("city", 5000)],
+        heading=math.radians(70.0),
+        peak_grade=0.045,
+        name="urban bus line, 18 km",
+    )
+    rng = np.random.default_rng([seed, 1])
+    places = np.cumsum(rng.uniform(380.0, 720.0, 60))
+    return route, places[places < route.length - 200.0]
 
 
 def short_route(seed: int = 2) -> Route:

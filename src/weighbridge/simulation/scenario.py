@@ -10,13 +10,15 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import ConfigError
-from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar
+from weighbridge.simulation.car import BUS, COMPACT, ELECTRIC, MIDSIZE, SimulatedCar
 from weighbridge.simulation.route import (
     Route,
+    bus_route,
     highway_route,
     hilly_route,
     jensen_route,
     short_route,
+    straight_route,
 )
 
 
@@ -41,6 +43,7 @@ class Effects:
     shift_gap : torque dips or is interrupted while the gear changes
     load_nonlinearity : the load reading bends away from the torque
     load_smoothing : the control unit smooths the load reading
+    brake_drag : released brakes still hold a little
     fuel_burn : the fuel's mass is lost
     driver_ripple : foot and speed of the driver wander
     traffic : others slow the driver down
@@ -71,6 +74,7 @@ class Effects:
     shift_gap: float = 1.0
     load_nonlinearity: float = 1.0
     load_smoothing: float = 1.0
+    brake_drag: float = 1.0
     fuel_burn: float = 1.0
     driver_ripple: float = 1.0
     traffic: float = 1.0
@@ -204,7 +208,10 @@ class Polling:
     delay_spread : from quantity to quantity [s]
     delay_jitter : from sample to sample [s]
     speed_scale : indicated over true speed [-]
-    speed_rounding : "nearest" or "down" to whole km/h
+    speed_rounding : "nearest" or "down" to whole steps
+    speed_step, engine_speed_step : resolution of the two [km/h], [rpm]
+    net_torque : torque percent is that at the flywheel, as from J1939, not the
+        indicated one of OBD
     """
 
     fast: tuple[str, ...] = (
@@ -222,6 +229,9 @@ class Polling:
     delay_jitter: float = 0.012
     speed_scale: float = 1.008
     speed_rounding: str = "nearest"
+    speed_step: float = 1.0
+    engine_speed_step: float = 0.25
+    net_torque: bool = False
 
     def __post_init__(self) -> None:
         if not 0.2 <= self.rate <= 100.0:
@@ -230,6 +240,9 @@ class Polling:
             raise ConfigError(
                 f"speed_rounding must be nearest or down, got {self.speed_rounding!r}"
             )
+        for name in ("speed_step", "engine_speed_step"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}")
         if not self.fast:
             raise ConfigError("polling needs at least one fast quantity, got none")
 
@@ -260,6 +273,28 @@ class Loading:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Braking:
+    """Braking at a time, whatever the road is like.
+
+    Attributes
+    ----------
+    time, duration : since the start [s]
+    decel : wanted [m/s^2]
+    """
+
+    time: float
+    duration: float
+    decel: float
+
+    def __post_init__(self) -> None:
+        if not (self.time >= 0.0 and self.duration > 0.0 and 0.0 < self.decel <= 8.0):
+            raise ConfigError(
+                "a braking needs a time, a duration above 0 s and a deceleration in (0, 8] m/s^2, "
+                f"got {self.time} s, {self.duration} s and {self.decel} m/s^2"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """One drive to be simulated.
 
@@ -269,6 +304,7 @@ class Scenario:
     car, route : what drives where
     payload : at the start, beside driver and fuel [kg]
     loading : stops at which the load changes, rising in distance
+    brakings : at times, beside those the road asks for
     seed : of driver, weather and sensors; the route keeps its own
     effects, sensors, polling : see the classes
     wind_speed : mean at 10 m height [m/s]
@@ -288,8 +324,8 @@ class Scenario:
     -----
     Wind is reported at 10 m and acts on a car at about 1 m. By the logarithmic
     profile over open country with hedges, roughness length 0.1 m, the car sees
-    ln(1 / 0.1) / ln(10 / 0.1) = 0.5 of it, on country roads 0.85 and in cities
-    half of that (exposure of the route).
+    ln(1 / 0.1) / ln(10 / 0.1) = 0.5 of it, a truck at 1.9 m 0.64, on country
+    roads 0.85 and in cities half of that (exposure of the route).
     """
 
     name: str
@@ -297,6 +333,7 @@ class Scenario:
     route: Route
     payload: float = 0.0
     loading: tuple[Loading, ...] = ()
+    brakings: tuple[Braking, ...] = ()
     seed: int = 0
     effects: Effects = field(default_factory=Effects)
     sensors: Sensors = field(default_factory=Sensors)
@@ -404,6 +441,80 @@ def _electric(payload: float, seed: int) -> Scenario:
     )
 
 
+_BUS_POLLING: Final = Polling(
+    fast=(
+        "engine_torque_fraction",
+        "engine_speed",
+        "vehicle_speed",
+        "gear",
+        "brake_switch",
+        "retarder_torque",
+    ),
+    slow=("reference_torque", "ambient_temperature", "barometric_pressure"),
+    rate=100.0,
+    delay=0.03,
+    delay_spread=0.005,
+    delay_jitter=0.002,
+    speed_scale=1.003,
+    speed_step=1.0 / 256.0,
+    engine_speed_step=0.125,
+    net_torque=True,
+)
+
+
+def _bus(payload: float, seed: int) -> Scenario:
+    return Scenario(
+        name="bus",
+        car=BUS,
+        route=straight_route(),
+        payload=payload,
+        seed=seed,
+        brakings=(
+            Braking(time=115.0, duration=3.5, decel=1.6),
+            Braking(time=147.0, duration=4.0, decel=2.0),
+        ),
+        effects=replace(Effects(), traffic=0.0),
+        sensors=Sensors(imu_rate=100.0),
+        polling=_BUS_POLLING,
+        wind_speed=2.0,
+        start_rest=3.0,
+        duration=180.0,
+    )
+
+
+def _bus_urban(payload: float, seed: int) -> Scenario:
+    route, places = bus_route()
+    return Scenario(
+        name="bus-urban",
+        car=BUS,
+        route=route,
+        payload=payload,
+        loading=_passengers(places, payload, seed),
+        seed=seed,
+        sensors=Sensors(imu_rate=100.0),
+        polling=_BUS_POLLING,
+    )
+
+
+def _passengers(places: Iterable[float], payload: float, seed: int) -> tuple[Loading, ...]:
+    """Let passengers of 71 kg on and off a bus for at most 80."""
+    rng = np.random.default_rng([seed, 71])
+    aboard = max(0, round(payload / 71.0))
+    stops = []
+    for place in places:
+        leaving = int(rng.binomial(aboard, 0.25))
+        coming = min(int(rng.poisson(9.0)), 80 - aboard + leaving)
+        aboard += coming - leaving
+        stops.append(
+            Loading(
+                distance=float(place),
+                duration=8.0 + 1.6 * max(leaving, coming),
+                load=71.0 * (coming - leaving),
+            )
+        )
+    return tuple(stops)
+
+
 SCENARIOS: Final[dict[str, Callable[[float, int], Scenario]]] = {
     "car": _car,
     "car-calibration": _calibration,
@@ -413,6 +524,8 @@ SCENARIOS: Final[dict[str, Callable[[float, int], Scenario]]] = {
     "compact": _compact,
     "compact-calibration": _compact_calibration,
     "electric": _electric,
+    "bus": _bus,
+    "bus-urban": _bus_urban,
 }
 """Makers of the named scenarios, from payload [kg] and seed."""
 
@@ -425,6 +538,8 @@ ABOUT: Final[dict[str, str]] = {
     "compact": "small petrol car with a manual gearbox, about 75 min",
     "compact-calibration": "the small car in all gears, loads and engine speeds",
     "electric": "electric car whose control unit reports motor torque, about 75 min",
+    "bus": "diesel bus at 100 Hz on a straight road: drives off, brakes at 115 and 147 s, 3 min",
+    "bus-urban": "the same bus in a city, passengers getting on and off at stops, about 50 min",
 }
 """One line for each named scenario."""
 

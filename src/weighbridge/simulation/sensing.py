@@ -15,7 +15,7 @@ from weighbridge.constants import (
     STANDARD_TEMPERATURE,
     TEMPERATURE_LAPSE,
 )
-from weighbridge.kernels import simulated_car as kernel
+from weighbridge.kernels.simulated_driveline import DRIVING
 from weighbridge.signals import QUANTITIES, Floats, Signal
 from weighbridge.signals.units import scalar_to_si
 from weighbridge.simulation.longitudinal import DT
@@ -241,6 +241,10 @@ def engine_load(scenario: Scenario, drive: Trajectory) -> Floats:
     c = np.array(car.drag_torque)
     peak = max(car.curve_torque)
     top = peak + c[0] + c[1] * 200.0 + c[2] * 200.0**2
+    if car.engine == "diesel":
+        # Of the torque there is at that engine speed (SAE J1979).
+        w = drive.engine_speed
+        top = np.interp(w, car.curve_speed, car.curve_torque) + c[0] + c[1] * w + c[2] * w * w
     part = drive.gross_torque / top
     bend = effects.load_nonlinearity * car.load_curvature * 2.0 * part * (1.0 - part)
     lean = effects.load_nonlinearity * car.load_speed_slope
@@ -249,6 +253,36 @@ def engine_load(scenario: Scenario, drive: Trajectory) -> Floats:
     load = car.load_full * np.maximum(load, 0.03)
     load = _smooth(load, car.load_smoothing * effects.load_smoothing)
     return np.asarray(np.clip(load, 0.0, 1.0))
+
+
+def _retarder_fade(drive: Trajectory) -> Floats:
+    """Part of a retarder's force there is: none below walking pace."""
+    return np.clip((drive.speed - 1.5) / 3.0, 0.0, 1.0)
+
+
+def _retarder(scenario: Scenario, drive: Trajectory) -> Floats:
+    """Braking force of the retarder [N]: it works before the brakes do."""
+    most = scenario.car.retarder_force * _retarder_fade(drive)
+    braking = np.where(drive.brake_force > 1.5 * scenario.car.brake_drag, drive.brake_force, 0.0)
+    return np.minimum(braking, most)
+
+
+def _net_fraction(scenario: Scenario, drive: Trajectory) -> Floats:
+    """Torque at the flywheel as a part of the reference torque, as read from J1939.
+
+    The control unit tells the indicated torque it believes in, which bends away
+    from the true one at part load, and the friction of the warm engine without its
+    accessories, each in percent (SAE J1939-71, SPN 513 and 514).
+    """
+    car, effects = scenario.car, scenario.effects
+    reference = round(max(car.curve_torque))
+    part = drive.gross_torque / reference
+    bend = 2.0 * car.torque_curvature * effects.load_nonlinearity
+    told = part * (1.0 + bend * (1.0 - part))
+    told = _smooth(told, car.load_smoothing * effects.load_smoothing)
+    c = car.drag_torque
+    friction = c[0] + c[1] * drive.engine_speed + c[2] * drive.engine_speed**2
+    return np.asarray(told - np.round(friction / reference, 2))
 
 
 def _values(scenario: Scenario, drive: Trajectory, name: str, pose: Pose) -> tuple[Floats, float]:
@@ -262,15 +296,17 @@ def _values(scenario: Scenario, drive: Trajectory, name: str, pose: Pose) -> tup
     )
     if name == "vehicle_speed":
         scale = 1.0 + effects.obd_speed_scale * (polling.speed_scale - 1.0)
-        return drive.speed * scale, scalar_to_si(1.0, "kmh")
+        return drive.speed * scale, scalar_to_si(polling.speed_step, "kmh")
     if name == "engine_speed":
-        return drive.engine_speed, scalar_to_si(0.25, "rpm")
+        return drive.engine_speed, scalar_to_si(polling.engine_speed_step, "rpm")
     if name == "engine_load":
         return engine_load(scenario, drive), _LOAD_STEP
     if name == "engine_torque":
         # Motor torque is computed from currents, a little off at part load.
         off = 0.02 * effects.load_nonlinearity * (1.0 - np.abs(drive.engine_torque) / peak)
         return drive.engine_torque * (1.0 - off), 0.5
+    if name == "engine_torque_fraction" and polling.net_torque:
+        return _net_fraction(scenario, drive), 0.01
     if name == "engine_torque_fraction":
         # Indicated torque, friction and accessories included (SAE J1979).
         return (drive.engine_torque + friction + drive.accessory_torque) / peak, 0.01
@@ -300,18 +336,23 @@ def _values(scenario: Scenario, drive: Trajectory, name: str, pose: Pose) -> tup
         return scenario.pressure * fall, 1000.0
     if name == "gear":
         return drive.gear, 1.0
+    if name == "retarder_torque":
+        return -_retarder(scenario, drive) / max(car.retarder_force, 1.0), 0.01
     if name == "brake_switch":
         held = (drive.speed < 0.05) & (drive.pedal <= 0.0)
-        return ((drive.brake_force > 20.0) | held).astype(np.float64), 1.0
+        # Released brakes are not felt by the pedal; half of a retarder has a lever.
+        by_lever = 0.5 * car.retarder_force * _retarder_fade(drive)
+        touched = drive.brake_force > np.maximum(max(20.0, 1.5 * car.brake_drag), by_lever)
+        return (touched | held).astype(np.float64), 1.0
     if name == "clutch_switch":
-        return (drive.phase != kernel.DRIVING).astype(np.float64), 1.0
+        return (drive.phase != DRIVING).astype(np.float64), 1.0
     raise KeyError(name)
 
 
 POLLABLE = (
     "vehicle_speed", "engine_speed", "engine_load", "engine_torque", "engine_torque_fraction",
     "reference_torque", "mass_air_flow", "lambda_1", "throttle", "ambient_temperature",
-    "barometric_pressure", "gear", "brake_switch", "clutch_switch",
+    "barometric_pressure", "gear", "brake_switch", "clutch_switch", "retarder_torque",
 )  # fmt: skip
 """Quantities the simulated control units can be asked for."""
 

@@ -1,0 +1,182 @@
+"""The driver of a simulated vehicle: where to stop, how fast to go, pedal or brake."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from weighbridge.kernels._jit import inlined_kernel, kernel
+
+LOADING_STARTS, LOADING_ENDS = 0.15, 0.85
+"""Part of a stop's time at which a load change starts and ends, evenly between."""
+
+
+class Road(NamedTuple):
+    """The road over distance, on an even grid, and what the driver will do on it."""
+
+    step: float  # [m]
+    grade: np.ndarray  # (n,) [rad]
+    altitude: np.ndarray  # (n,) [m]
+    heading: np.ndarray  # (n,) unwrapped [rad]
+    curvature: np.ndarray  # (n,) positive to the right [1/m]
+    surface: np.ndarray  # (n,) rolling resistance factor [-]
+    exposure: np.ndarray  # (n,) wind over wind in the open [-]
+    target_speed: np.ndarray  # (n,) what the driver wants to drive [m/s]
+    accel_limit: np.ndarray  # (n,) pull-away acceleration the driver uses [m/s^2]
+    revs: np.ndarray  # (n,) eagerness to rev, 0 calm to 1 to the limiter [-]
+    stop_distance: np.ndarray  # (k,) where to stop [m]
+    stop_time: np.ndarray  # (k,) how long [s]
+    stop_decel: np.ndarray  # (k,) how hard [m/s^2]
+    stop_load: np.ndarray  # (k,) what is loaded there, unloaded negative [kg]
+    brake_start: np.ndarray  # (b,) when to brake, whatever the road is like [s]
+    brake_end: np.ndarray  # (b,) [s]
+    brake_decel: np.ndarray  # (b,) how hard [m/s^2]
+
+
+class Driver(NamedTuple):
+    """How the driver drives."""
+
+    ripple: float  # of the acceleration wanted [m/s^2]
+    speed_ripple: float  # of the speed wanted, relative [-]
+    gain: float  # acceleration per speed error [1/s]
+    rest: float  # standing before the start [s]
+
+
+class Intent(NamedTuple):
+    """What the driver has in mind."""
+
+    wanted: float  # acceleration [m/s^2]
+    integral: float  # of the speed error [m/s^2]
+    approach: int  # towards a stop: 1 foot lifted, 2 braking
+    coast: bool  # foot off the pedal
+    stop: int  # the next one
+    at_stop: bool
+    waiting: float  # time left to stand [s]
+
+
+@kernel
+def limit_target(speed, step, decel):
+    """Lower a speed profile so that it can be followed with a deceleration.
+
+    Parameters
+    ----------
+    speed : (n,) float64
+        Speed wanted over distance [m/s].
+    step : float
+        Grid step [m].
+    decel : (n,) float64
+        Deceleration the driver uses [m/s^2].
+
+    Returns
+    -------
+    speed : (n,) float64
+    """
+    out = speed.copy()
+    for k in range(out.size - 2, -1, -1):
+        out[k] = min(out[k], np.sqrt(out[k + 1] ** 2 + 2.0 * decel[k] * step))
+    return out
+
+
+@inlined_kernel
+def look_up(values, where):
+    """Interpolate on a grid of unit step, held at the ends."""
+    if where <= 0.0:
+        return values[0]
+    last = values.size - 1
+    if where >= last:
+        return values[last]
+    i = int(where)
+    part = where - i
+    return values[i] + part * (values[i + 1] - values[i])
+
+
+@inlined_kernel
+def loaded(road, intent):
+    """Load taken on since the start [kg]."""
+    stop = intent.stop - 1 if intent.at_stop else intent.stop
+    before = road.stop_load[: max(stop, 0)].sum()
+    if stop < 0 or not intent.at_stop:
+        return before
+    done = 1.0 - intent.waiting / road.stop_time[stop]
+    part = min(1.0, max(0.0, (done - LOADING_STARTS) / (LOADING_ENDS - LOADING_STARTS)))
+    return before + part * road.stop_load[stop]
+
+
+@inlined_kernel
+def steer(road, driver, intent, t, s, v, ripple, speed_ripple, dt):
+    """Decide the acceleration wanted.
+
+    Parameters
+    ----------
+    road, driver, intent
+        See the types.
+    t, s, v : float
+        Time [s], distance [m] and speed [m/s].
+    ripple, speed_ripple : float
+        Wandering of foot and speed, unit standard deviation.
+    dt : float
+        Step [s].
+
+    Returns
+    -------
+    Intent
+    """
+    wanted, integral, approach = intent.wanted, intent.integral, intent.approach
+    stop, at_stop, waiting = intent.stop, intent.at_stop, intent.waiting
+    where = s / road.step
+    gap = 1e9
+    stop_decel = 1.5
+    if stop < road.stop_distance.size:
+        gap = road.stop_distance[stop] - s
+        stop_decel = road.stop_decel[stop]
+    if not at_stop and v < 0.5 and gap < 2.5:
+        at_stop = True
+        waiting = road.stop_time[stop]
+        stop += 1
+        approach = 0
+    here = look_up(road.target_speed, where)
+    target = here * (1.0 + driver.speed_ripple * speed_ripple)
+    ahead = look_up(road.target_speed, where + 2.5 * v / road.step)
+    # The front tyres grip no more than that.
+    limit = min(4.0, look_up(road.accel_limit, where) / (1.0 + v / 13.0))
+    error = target - v
+    if abs(error) < 2.0:
+        integral = min(0.4, max(-0.4, integral + 0.05 * error * dt))
+    else:
+        integral *= 1.0 - 0.3 * dt
+    demand = min(limit, driver.gain * error + integral) + driver.ripple * ripple * min(1.0, v / 5.0)
+    coast = False
+    slope_ahead = (look_up(road.target_speed, where + 3.0) - here) / (3.0 * road.step)
+    if slope_ahead < -0.002 and v > 0.95 * target:
+        demand += v * slope_ahead
+    elif ahead < 0.93 * v:
+        coast = True
+    # Towards a stop the driver lifts the foot, then follows a braking parabola.
+    needed = v * v / (2.0 * max(gap - 1.0, 0.3))
+    brake_at = max(0.75 * stop_decel, 0.95)
+    lift_at = max(0.5 * stop_decel, 0.7)
+    if approach == 0 and needed > lift_at:
+        approach = 1
+    if approach == 1 and needed > brake_at:
+        approach = 2
+    if approach > 0 and needed < 0.3 * brake_at:
+        approach = 0
+    if approach == 2:
+        demand = min(demand, -min(1.1 * needed, 3.5, 0.7 + 0.9 * v))
+    elif approach == 1:
+        coast = True
+        demand = min(demand, 0.0)
+    elif gap < 30.0:
+        # Short of the stop: creep up to it.
+        demand = min(demand, 0.8 * (np.sqrt(1.2 * max(gap - 1.0, 0.0)) + 0.2 - v))
+    for j in range(road.brake_start.size):
+        if road.brake_start[j] <= t < road.brake_end[j]:
+            demand = min(demand, -road.brake_decel[j])
+    wanted += (demand - wanted) * dt / 0.35
+    if at_stop:
+        waiting -= dt
+        wanted = -1.0
+        if waiting <= 0.0:
+            at_stop = False
+            wanted = 0.0
+            integral = 0.0
+    return Intent(wanted, integral, approach, coast, stop, at_stop, waiting)
