@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import weighbridge as wb
+from weighbridge.errors import DriveError
 from weighbridge.io.candump import read_candump
 from weighbridge.io.frames import Frames
 from weighbridge.io.j1939 import decode_j1939
@@ -113,3 +114,20 @@ def test_the_force_grows_with_acceleration_as_with_a_truck_of_some_tonnes(truck)
     (mass, rest), *_ = np.linalg.lstsq(design, force, rcond=None)
     assert 4000.0 < mass < 12000.0
     assert abs(rest / mass / 9.81) < 0.05
+
+
+def test_without_friction_the_vehicle_file_must_state_it(truck, tmp_path):
+    lines = truck.read_text().splitlines(keepends=True)
+    log = tmp_path / "lacking.log"
+    log.write_text("".join(line for line in lines if "18FEDF00" not in line))
+    drive = wb.read_drive(log)
+    assert drive.has("indicated_torque_fraction")
+    example = EXAMPLE / "vehicle.toml"
+    with pytest.raises(DriveError, match="EEC3"):
+        wb.weigh(drive, wb.Vehicle.load(example))
+    stated = tmp_path / "stated.toml"
+    source = 'source = "percent"'
+    stated.write_text(
+        example.read_text().replace(source, f"{source}\ncoefficients = [-130.0, 1.0]")
+    )
+    assert wb.weigh(drive, wb.Vehicle.load(stated)).status == "not_excited"

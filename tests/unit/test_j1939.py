@@ -104,10 +104,12 @@ def test_parasitic_losses_that_are_not_known_count_nothing():
     assert_allclose(value(rows, "engine_torque_fraction"), 0.40)
 
 
-def test_torque_without_friction_is_a_serious_doubt():
+def test_torque_without_friction_is_told_and_marked_as_the_indicated_one():
     found = decode_j1939(frames((0.1, 0x0CF00400, "FF FF AF 68 13 FF FF FF")))
-    assert [p.signal for p in found.summary.problems if p.serious] == ["engine_torque_fraction"]
     assert "EEC3" in found.summary.problems[0].text
+    values = {s.name: s.values for s in found.signals}
+    assert_allclose(values["indicated_torque_fraction"], 0.50)
+    assert_allclose(values["engine_torque_fraction"], 0.50)
 
 
 def test_torque_far_from_any_friction_is_left_out():

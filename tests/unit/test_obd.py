@@ -151,3 +151,12 @@ def test_other_services_alone_are_no_obd_drive():
     found = decode_obd(frames)
     assert found.signals == []
     assert not found.used.any()
+
+
+def test_lists_of_supported_parameters_that_change_are_told():
+    one, other = bytes.fromhex("41 00 BE 3E B8 11"), bytes.fromhex("41 00 98 3B 80 13")
+    speed = bytes.fromhex("41 0D 32")
+    said = [p.text for p in decode_obd(answers([one, speed, other])).problems]
+    assert len(said) == 1
+    assert "2 ways" in said[0]
+    assert decode_obd(answers([one, speed, one])).problems == []

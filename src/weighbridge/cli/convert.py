@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 
 def convert(
     drive: Annotated[
-        Path, typer.Argument(help="Drive: a folder of tables, or a log.", show_default=False)
+        Path,
+        typer.Argument(
+            help="Drive: a folder of tables or of logs (joined by time), or one log.",
+            show_default=False,
+        ),
     ],
     out: Annotated[
         Path, typer.Argument(help="Folder to write, or a file .mf4.", show_default=False)

@@ -14,7 +14,12 @@ if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
 
 DrivePaths = Annotated[
-    list[Path], typer.Argument(help="Drives: folders of tables, or log files.", show_default=False)
+    list[Path],
+    typer.Argument(
+        help="Drives, each for itself: a folder of tables, a folder of logs that are one drive "
+        "(joined by time), or one log.",
+        show_default=False,
+    ),
 ]
 MappingPath = Annotated[
     Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)

@@ -205,7 +205,7 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
         )
     ]  # fmt: skip
     signals += [
-        _net_torque(reader),
+        *_net_torque(reader),
         reader.pressed("brake_switch", ("brake", "ebs_brake", "brake_pedal", "retarder_torque")),
         reader.pressed("clutch_switch", ("clutch", "driveline_engaged", "shift_in_process")),
     ]
@@ -330,12 +330,16 @@ def _values(part: Frames, spn: Spn) -> Floats:
     return to_si(values, spn.unit) if spn.unit else values
 
 
-def _net_torque(reader: _Reader) -> Signal | None:
-    """Net torque fraction: actual less friction and parasitic losses."""
+def _net_torque(reader: _Reader) -> list[Signal]:
+    """Net torque fraction: actual less friction and parasitic losses.
+
+    Where no friction is told, the indicated torque under both names, so that its friction is not
+    forgotten.
+    """
     actual = reader.best("actual_torque")
     reader.summary.sources.pop("actual_torque", None)
     if actual is None:
-        return None
+        return []
     address = reader.senders(_SPN["actual_torque"])[0][0]
     reader.summary.sources["engine_torque_fraction"] = address
     reader.summary.extras["actual_torque"] = actual
@@ -345,10 +349,12 @@ def _net_torque(reader: _Reader) -> Signal | None:
         reader.note(
             "engine_torque_fraction",
             "no nominal friction torque (EEC3, PGN 65247): the torque is the engine's indicated "
-            "one, friction included; log EEC3 as well",
-            serious=True,
+            "one, friction included; log EEC3 as well, or state the friction in the vehicle file",
         )
-        return Signal("engine_torque_fraction", actual.time, actual.values)
+        return [
+            Signal(name, actual.time, actual.values)
+            for name in ("engine_torque_fraction", "indicated_torque_fraction")
+        ]
     reader.summary.extras["friction_torque"] = friction
     lost = np.interp(actual.time, friction.time, friction.values)
     parasitic = reader.best("parasitic_torque")
@@ -365,8 +371,8 @@ def _net_torque(reader: _Reader) -> Signal | None:
             f"friction torque within {_FRICTION_AGE:g} s and were left out",
         )
     if not near.any():
-        return None
-    return Signal("engine_torque_fraction", actual.time[near], (actual.values - lost)[near])
+        return []
+    return [Signal("engine_torque_fraction", actual.time[near], (actual.values - lost)[near])]
 
 
 def _assemble(control: Frames, data: Frames, wanted: int) -> tuple[Frames, int]:

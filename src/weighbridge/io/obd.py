@@ -152,6 +152,7 @@ class _Sender:
     cut: int = 0
     refused: int = 0
     vins: set[bytes] = field(default_factory=set)
+    supported: int = 1
 
 
 def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
@@ -252,6 +253,10 @@ def _read_messages(messages: Messages, sender: _Sender) -> None:
         rows = rows[at[rows] < length[rows]]
     for number, pieces in parts.items():
         sender.counts[number] = sum(t.size for t, _ in pieces)
+        if number % 0x20 == 0:
+            # Which parameters a control unit supports is fixed.
+            lists = np.unique(np.concatenate([raw for _, raw in pieces]), axis=0)
+            sender.supported = max(sender.supported, len(lists))
     for p in PIDS:
         if p.number in parts:
             times = np.concatenate([t for t, _ in parts[p.number]])
@@ -294,6 +299,14 @@ def _tell(senders: list[_Sender], name: str, found: Obd) -> None:
                     "",
                     f"{name}: {s.cut} answers of {s.name} are cut off or hold a parameter of "
                     "unknown length; what stood before it was read",
+                )
+            )
+        if s.supported > 1:
+            found.problems.append(
+                Problem(
+                    "",
+                    f"{name}: {s.name} lists its parameters in {s.supported} ways, as control "
+                    "units of two vehicles would; split the log where the vehicle changes",
                 )
             )
     vins = set().union(*(s.vins for s in senders))

@@ -15,6 +15,7 @@ import numpy as np
 
 from weighbridge.pipeline.imu_checks import check_imu
 from weighbridge.pipeline.speed_checks import check_scales
+from weighbridge.pipeline.vehicle_checks import check_vehicle
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.units import scalar_from_si
@@ -41,6 +42,11 @@ _WEIGHING: Final = frozenset(
 
 # Samples that a noisy sensor does not repeat by chance.
 _FROZEN: Final = 200
+# Engine speeds of an idle [rad/s], and coolant of an engine that is warm [K].
+_IDLE: Final = (45.0, 135.0)
+_WARM: Final = 343.0
+# Torque at idle that alternator and pumps do not take [part of the reference torque].
+_IDLE_TORQUE: Final = 0.03
 
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
@@ -222,6 +228,55 @@ def _check_load(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             )
 
 
+def _check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find friction of the engine in a torque that is taken for the one at its shaft."""
+    torque = drive.get("engine_torque_fraction")
+    if torque is None or (vehicle is not None and vehicle.torque.source != "percent"):
+        return
+    if vehicle is not None and vehicle.torque.coefficients and vehicle.torque.coefficients[0] < 0.0:
+        return
+    idle = _idle_torque(drive, torque)
+    remedy = (
+        "state it as coefficients = [-F, 1.0], F the friction in N m, under [torque] of the "
+        "vehicle file"
+    )
+    if drive.has("indicated_torque_fraction"):
+        seen = f" (at most {100.0 * idle:.0f} %, its reading at idle)" if idle is not None else ""
+        yield Problem(
+            "engine_torque_fraction",
+            f"the torque is the engine's indicated one, friction included{seen}: log its nominal "
+            f"friction (EEC3), or {remedy}",
+            serious=vehicle is not None,
+        )
+    elif idle is not None and idle > _IDLE_TORQUE:
+        yield Problem(
+            "engine_torque_fraction",
+            f"warm at idle and standing the torque reads {100.0 * idle:.0f} %: friction seems to "
+            f"be in it, as PID 62 may have it, beside what alternator and pumps take; {remedy}",
+        )
+
+
+def _idle_torque(drive: Drive, torque: Signal) -> float | None:
+    """Least torque of an engine that idles warm and standing; None where that was not seen."""
+    engine, speed = drive.get("engine_speed"), drive.get("vehicle_speed")
+    if engine is None or speed is None or not len(speed) or not len(engine):
+        return None
+    at = torque.time
+    turning = engine.at(at)
+    with np.errstate(invalid="ignore"):
+        idle = (turning > _IDLE[0]) & (turning < _IDLE[1]) & (np.abs(speed.at(at)) < 0.3)
+        # No pull-away just before or after.
+        for side in (-2.0, 2.0):
+            idle &= np.abs(speed.at(at + side)) < 0.3
+        coolant = drive.get("coolant_temperature")
+        if coolant is not None and len(coolant):
+            idle &= coolant.at(at) > _WARM
+    if np.count_nonzero(idle) < 20:
+        return None
+    # Fans, air conditioning and a gearbox in gear come and go.
+    return float(np.percentile(torque.values[idle], 10.0))
+
+
 def _check_engine_speed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find an engine that would turn too slowly for the road speed."""
     engine, speed = drive.get("engine_speed"), drive.get("vehicle_speed")
@@ -306,10 +361,12 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     _check_long_gaps,
     _check_stuck,
     _check_load,
+    _check_friction,
     _check_engine_speed,
     _check_sign,
     check_scales,
     check_imu,
+    check_vehicle,
     _check_range,
     _check_standstill,
 )

@@ -56,6 +56,8 @@ _ROWS: Final = (
              "torque at the shaft of engine or motor"),
     Quantity("engine_torque_fraction", "obd", "engine_torque", "pct", -1.3, 1.3,
              "torque as a part of the reference torque (PID 62, SPN 513)"),
+    Quantity("indicated_torque_fraction", "obd", "indicated_torque", "pct", -1.3, 1.3,
+             "torque of combustion, friction included (SPN 513 without SPN 514)"),
     Quantity("reference_torque", "obd", "reference_torque", "nm", 10.0, 6000.0,
              "reference torque (PID 63, SPN 544)"),
     Quantity("mass_air_flow", "obd", "mass_air_flow", "gps", 0.0, 1.5, "intake air mass flow (PID 10)"),

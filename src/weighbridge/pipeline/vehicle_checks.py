@@ -1,0 +1,127 @@
+"""Is a drive of one vehicle? Its gears, and its reference torque, do not change on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import DriveError
+from weighbridge.signals import Drive, Floats, Problem
+from weighbridge.vehicle.gear import detect_gearings, effective_gearing, steady
+from weighbridge.vehicle.model import Vehicle
+
+# Whoever changes vehicles takes longer than this [s], and the vehicle left stands.
+_PAUSE: Final = 5.0
+_STANDS: Final = 0.5  # [m/s]
+# The longest pauses only: where vehicles are changed, there is a long one.
+_PAUSES: Final = 6
+# Samples in gear enough to know the gears of a part.
+_ENOUGH: Final = 150
+# A gear's ratio is sharper than this [-].
+_NEAR: Final = 0.02
+# Parts of the samples that lie on the gears of their own part, and on those of the other one:
+# six gears and their surroundings cover some 15 % of all ratios by chance.
+_OWN: Final = 0.7
+_FOREIGN: Final = 0.35
+# Gears that both parts must show, and the part of a part's samples that shows one.
+_GEARS: Final = 3
+_SHOWN: Final = 0.02
+# Samples below show slip of converter and clutch, and the steps of the speed [m/s].
+_SLOW: Final = 4.0
+
+
+def check_vehicle(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find a second vehicle in a drive by what is the same all the time in one."""
+    yield from _check_reference(drive)
+    yield from _check_gears(drive)
+
+
+def _check_reference(drive: Drive) -> Iterator[Problem]:
+    reference = drive.get("reference_torque")
+    if reference is None or len(reference) < 2:
+        return
+    usual = float(np.median(reference.values))
+    other = np.abs(reference.values / usual - 1.0) > 0.02
+    if np.mean(other) > 0.1:
+        k = int(np.argmax(other))
+        yield Problem(
+            "reference_torque",
+            f"reference_torque is {usual:.0f} N m and from {reference.time[k]:.6g} s "
+            f"{reference.values[k]:.0f} N m: it is a constant of an engine, so these are two "
+            "vehicles; split the recording where it changes",
+            serious=True,
+        )
+
+
+def _check_gears(drive: Drive) -> Iterator[Problem]:
+    """Compare the ratios of engine to vehicle speed before and after each long pause."""
+    engine, speed = drive.get("engine_speed"), drive.get("vehicle_speed")
+    if engine is None or speed is None or len(speed) < _ENOUGH or len(engine) < 2 * _ENOUGH:
+        return
+    time = engine.time
+    wheels = np.where(speed.age(time) < 1.0, speed.at(time), np.nan)
+    gearing = effective_gearing(engine.values, wheels)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        moving = np.isfinite(gearing) & (wheels > _SLOW) & (gearing > 0.0)
+        moving &= steady(time, gearing, _NEAR + 0.15 / np.maximum(wheels, 1.0))
+    if np.count_nonzero(moving) < 2 * _ENOUGH:
+        return
+    for cut in _pauses(time, wheels):
+        parts = [moving & (time < cut), moving & (time >= cut)]
+        if min(np.count_nonzero(p) for p in parts) < _ENOUGH:
+            continue
+        before, after = (_gears(time[p], engine.values[p], wheels[p], gearing[p]) for p in parts)
+        if not _apart(before, after):
+            continue
+        own = (_on(gearing[parts[0]], before), _on(gearing[parts[1]], after))
+        foreign = (_on(gearing[parts[0]], after), _on(gearing[parts[1]], before))
+        if min(own) > _OWN and max(foreign) < _FOREIGN:
+            yield Problem(
+                "engine_speed",
+                f"the gears change at {cut:.6g} s: {100.0 * own[0]:.0f} % of the samples before "
+                f"lie on gears of their own and {100.0 * foreign[0]:.0f} % on those after, as with "
+                "two vehicles in one recording; split it there if so",
+            )
+            return
+
+
+def _pauses(time: Floats, wheels: Floats) -> list[float]:
+    """Middles of the longest times in which a vehicle could have been changed."""
+    with np.errstate(invalid="ignore"):
+        driving = time[wheels > _STANDS]
+    if driving.size < 2:
+        return []
+    length = np.diff(driving)
+    longest = np.argsort(-length, kind="stable")[:_PAUSES]
+    return [float(driving[k] + 0.5 * length[k]) for k in longest if length[k] > _PAUSE]
+
+
+def _gears(time: Floats, engine_speed: Floats, wheels: Floats, gearing: Floats) -> Floats:
+    """Gears that a part of a drive shows well; empty where it shows none."""
+    try:
+        found = detect_gearings(time, engine_speed, wheels, idle_speed=0.0).gearings
+    except DriveError:
+        return np.empty(0)
+    return np.array([g for g in found if _on(gearing, np.array([g])) > _SHOWN])
+
+
+def _apart(a: Floats, b: Floats) -> bool:
+    """Tell whether two sets of gears cannot be of one gearbox.
+
+    Gears that one part never used lie beside those it used. Between the gears of one gearbox
+    there are none of its own.
+    """
+    if min(a.size, b.size) < _GEARS:
+        return False
+    near = np.abs(np.log(a[:, None] / b[None, :])) < 1.5 * _NEAR
+    between = [np.count_nonzero((x > y.min()) & (x < y.max())) for x, y in ((a, b), (b, a))]
+    alike = np.count_nonzero(near.any(axis=1))
+    return bool(min(between) >= _GEARS - 1 and alike <= 0.25 * min(a.size, b.size))
+
+
+def _on(gearing: Floats, gears: Floats) -> float:
+    """Part of the samples that lie on one of the gears."""
+    near = np.abs(np.log(gearing[:, None] / gears[None, :])).min(axis=1)
+    return float(np.mean(near < 1.5 * _NEAR))

@@ -1,0 +1,130 @@
+"""Two vehicles in one recording, and friction in a torque, are told; one car is left alone."""
+
+import numpy as np
+import pytest
+
+from weighbridge.pipeline.checks import check_drive
+from weighbridge.pipeline.vehicle_checks import check_vehicle
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
+
+SMALL = (42.6, 21.96, 14.04, 9.708, 7.634, 6.315)
+LARGE = (50.5, 25.3, 16.9, 12.7, 9.0, 8.1)
+AUTOMATIC = (36.0, 23.5, 16.0, 12.0, 10.1, 8.0, 6.8, 5.3)
+
+
+def driven(gears, seed, *, top=34.0, low=0.0, duration=900.0, slip=0.0):
+    """Polled speeds of a car that shifts with its speed, standing before and after."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, duration, 0.5)
+    wave = 0.5 - 0.5 * np.cos(2 * np.pi * t / 150.0 + rng.uniform(-0.5, 0.5) * np.sin(t / 90.0))
+    v = low + (top - low) * wave
+    v *= np.clip(np.minimum(t, duration - t) / 20.0, 0.0, 1.0)
+    shift = np.linspace(4.0, 30.0, len(gears) - 1)
+    gear = np.searchsorted(shift, v)
+    engine = np.maximum(v * np.array(gears)[gear], 85.0)
+    engine *= 1.0 + slip * rng.uniform(0.0, 1.0, t.size) + rng.normal(0.0, 0.003, t.size)
+    return t, np.round(v * 3.6) / 3.6, engine
+
+
+def drive(*parts, pause=60.0):
+    start, time, speed, engine = 0.0, [], [], []
+    for t, v, n in parts:
+        time.append(t + start)
+        speed.append(v)
+        engine.append(n)
+        start += t[-1] + pause
+    t = np.concatenate(time)
+    return Drive(
+        "made",
+        {
+            "vehicle_speed": Signal("vehicle_speed", t, np.concatenate(speed)),
+            "engine_speed": Signal("engine_speed", t + 0.1, np.concatenate(engine)),
+        },
+    )
+
+
+def told(found):
+    return [p.text for p in check_vehicle(found, None)]
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [(SMALL, LARGE), (LARGE, SMALL), (AUTOMATIC, LARGE), (SMALL, AUTOMATIC)]
+)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_gears_of_two_cars(first, second, seed):
+    found = told(drive(driven(first, seed), driven(second, seed + 10)))
+    assert len(found) == 1
+    assert "two vehicles" in found[0]
+    at = float(found[0].split(" s:")[0].rpartition(" ")[2])
+    assert 880.0 < at < 990.0
+
+
+@pytest.mark.parametrize("gears", [SMALL, LARGE, AUTOMATIC])
+def test_one_car_twice_in_town_and_on_the_motorway(gears):
+    town, motorway = driven(gears, 1, top=14.0), driven(gears, 2, low=24.0)
+    assert told(drive(driven(gears, 3), driven(gears, 4))) == []
+    assert told(drive(town, motorway)) == []
+    assert told(drive(motorway, town)) == []
+
+
+def test_a_stepless_gearbox_has_no_gears_to_compare():
+    assert told(drive(driven(SMALL, 1), driven(SMALL, 2, slip=0.6))) == []
+
+
+def test_reference_torque_that_changes():
+    one = drive(driven(SMALL, 1))
+    time = np.arange(0.0, 900.0, 5.0)
+    values = np.where(time < 500.0, 250.0, 400.0)
+    (problem,) = check_vehicle(one.with_signals(Signal("reference_torque", time, values)), None)
+    assert problem.serious
+    assert "500 s" in problem.text
+    assert "400 N m" in problem.text
+    values[:] = 250.0
+    values[7] = 65.0  # a frame that was disturbed
+    assert told(one.with_signals(Signal("reference_torque", time, values))) == []
+
+
+def idling(torque, coolant=363.0, **signals):
+    t = np.arange(0.0, 300.0, 0.5)
+    still = t < 100.0
+    values = {
+        "vehicle_speed": np.where(still, 0.0, 15.0),
+        "engine_speed": np.where(still, 90.0, 200.0),
+        "engine_torque_fraction": np.where(still, torque, 0.4),
+        "coolant_temperature": np.full(t.size, coolant),
+        **signals,
+    }
+    return Drive("made", {n: Signal(n, t, np.broadcast_to(v, t.shape)) for n, v in values.items()})
+
+
+def car(source="percent", coefficients=()):
+    return Vehicle(
+        driveline=Driveline(gearings=SMALL),
+        torque=TorqueModel(source=source, coefficients=coefficients, reference_torque=250.0),
+    )
+
+
+def friction(found, vehicle=None):
+    return [p for p in check_drive(found, vehicle) if "friction" in p.text]
+
+
+def test_friction_in_the_torque_shows_at_idle():
+    for vehicle in (None, car(), car(coefficients=(0.0, 1.0))):
+        (problem,) = friction(idling(0.07), vehicle)
+        assert "reads 7 %" in problem.text
+        assert not problem.serious
+    assert friction(idling(0.07), car(coefficients=(-14.0, 1.0))) == []
+    assert friction(idling(0.07), car("measured")) == []
+    assert friction(idling(0.01)) == []
+    assert friction(idling(0.07, coolant=300.0)) == []
+
+
+def test_indicated_torque_is_refused_until_its_friction_is_stated():
+    found = idling(0.10, indicated_torque_fraction=0.1)
+    (problem,) = friction(found, car())
+    assert problem.serious
+    assert "at most 10 %" in problem.text
+    assert "coefficients" in problem.text
+    assert [p.serious for p in friction(found)] == [False]
+    assert friction(found, car(coefficients=(-25.0, 1.0))) == []
