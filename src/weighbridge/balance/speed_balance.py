@@ -1,0 +1,188 @@
+"""Both sides of the balance from speed alone: traction by a model of the speed itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance.force_balance import ForceBalance, ForceSide, MergedView, Reason
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError
+from weighbridge.kernels import speed_ekf as kernel
+from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.select import find_motion
+from weighbridge.signals import Bools, Drive, Floats
+from weighbridge.vehicle.model import SpeedModel, Vehicle
+
+SPEEDS: Final = ("vehicle_speed", "gnss_speed")
+"""Signals of which one is enough, the better first."""
+
+SLOW: Final = 5.0
+"""Windows with a lower mean speed are left out: clutch, first gears and stops [m/s]."""
+
+BRAKING: Final = 0.4
+"""A window this much slower per second than the one before it is braked: over 7 s no car
+in a high gear coasts down like that on a low grade [m/s^2]."""
+
+FULL: Final = 0.8
+"""Part of a window in which the speed must be known [-]."""
+
+
+def model_of(vehicle: Vehicle) -> SpeedModel:
+    """Return the vehicle's speed model.
+
+    Raises
+    ------
+    ConfigError
+        It has none.
+    """
+    if vehicle.speed_model is None:
+        raise ConfigError(
+            f"the vehicle file of {vehicle.name} has no [speed_model], which weighing by speed "
+            "alone needs: run weighbridge calibrate --method speed-ekf"
+        )
+    return vehicle.speed_model
+
+
+def speed_motion_of(drive: Drive, vehicle: Vehicle) -> Motion:
+    """Find the motion by speed alone, whatever else the drive holds.
+
+    Raises
+    ------
+    DriveError
+        There is too little of it.
+    """
+    chosen = next((name for name in SPEEDS if drive.has(name)), SPEEDS[0])
+    alone = drive.without(*(name for name in drive.signals if name != chosen))
+    motion = find_motion(alone, vehicle)
+    return replace(motion, notes=("speed alone: torque by the vehicle file's speed model",))
+
+
+def window_means(motion: Motion, values: Floats, length: float) -> Floats:
+    """Average over windows of ``length`` [s]; NaN where less than `FULL` of one is there.
+
+    Parameters
+    ----------
+    motion : its clock and gaps
+    values : (n,) at its instants
+    length : [s]
+
+    Returns
+    -------
+    (m,)
+    """
+    window = ((motion.time - motion.time[0]) / length + 1e-9).astype(np.int64)
+    count = int((motion.time[-1] - motion.time[0] + 1.0 / motion.rate) / length + 1e-9)
+    inside = window < count
+    good = inside & motion.valid & np.isfinite(values)
+    total = np.bincount(window[good], values[good], count)
+    known = np.bincount(window[good], minlength=count).astype(np.float64)
+    there = np.bincount(window[inside], minlength=count)
+    enough = known >= FULL * np.maximum(there, 1)
+    return np.where(enough, total / np.maximum(known, 1.0), np.nan)
+
+
+def running(speed: Floats, length: float) -> tuple[Bools, Bools, Bools]:
+    """Judge windows by their mean speeds alone.
+
+    Parameters
+    ----------
+    speed : (m,) mean of each window; NaN where unknown [m/s]
+    length : of a window [s]
+
+    Returns
+    -------
+    known : (m,) there is a speed
+    slow : (m,) slower than `SLOW`
+    braked : (m,) slowed by more than `BRAKING` since the window before
+    """
+    known = np.isfinite(speed)
+    filled = np.where(known, speed, 0.0)
+    change = np.concatenate(([0.0], np.diff(filled)))
+    both = known & np.concatenate(([False], known[:-1]))
+    return known, filled < SLOW, both & (change < -BRAKING * length)
+
+
+def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
+    """Balance the forces of windows by the model of the vehicle's ``speed_model``.
+
+    A row is one window, stamped with its end. Grade is unknown and stands as
+    level; the estimator finds it.
+
+    Raises
+    ------
+    ConfigError
+        The vehicle was not calibrated for it.
+    DriveError
+        There is too little speed.
+    """
+    model = model_of(vehicle)
+    motion = speed_motion_of(drive, vehicle)
+    length = model.sample_time
+    speed = window_means(motion, motion.speed, length)
+    known, slow, braked = running(speed, length)
+    time = motion.time[0] + length * np.arange(1, speed.size + 1)
+    params = kernel_parameters(model, (0.0, 0.0, 0.0), 0.0)
+    traction = kernel.traction_force(speed, params)
+    reason = np.zeros(speed.size, dtype=np.uint8)
+    for flag, why in (
+        (~known, Reason.NO_MOTION),
+        (slow, Reason.STANDING),
+        (braked, Reason.BRAKING),
+    ):
+        reason[(reason == 0) & flag] = why
+    nowhere = np.full(speed.size, np.nan)
+    accel = np.concatenate(([np.nan], np.diff(speed))) / length
+    drag = 0.5 * (model.drag + model.corrections[2] + model.corrections[3] * speed) * speed**2
+    torque = model.corrections[6] * speed
+    gear = np.zeros(speed.size, dtype=np.int64)
+    return ForceBalance(
+        force=ForceSide(
+            time=time,
+            traction_force=traction,
+            torque=torque,
+            engine_speed=nowhere,
+            gear=gear,
+            gearing=nowhere,
+            reason=reason,
+            delay=0.0,
+            noise_std=math.nan,
+        ),
+        motion=motion,
+        merged=MergedView(
+            time=time,
+            traction_force=traction,
+            speed=speed,
+            accel=accel,
+            specific_force=accel,
+            grade=np.zeros(speed.size),
+            pitch=nowhere,
+            heading=nowhere,
+            gear=gear,
+            gearing=nowhere,
+            rotating_mass=np.full(speed.size, model.rotating_mass),
+            air_speed=speed,
+            drag_force=drag,
+            air_density=nowhere,
+            reason=reason,
+        ),
+    )
+
+
+def kernel_parameters(
+    model: SpeedModel, process_var: tuple[float, float, float], speed_var: float
+) -> kernel.SpeedEkfParams:
+    """Make the kernel's parameters of a vehicle's speed model."""
+    return kernel.SpeedEkfParams(
+        sample_time=model.sample_time,
+        force_gain=model.force_gain,
+        drag=model.drag,
+        gravity=GRAVITY / math.cos(math.atan(model.rolling_coefficient)),
+        rotating_mass=model.rotating_mass,
+        corrections=np.array(model.corrections),
+        process_var=np.array(process_var),
+        speed_var=speed_var,
+    )

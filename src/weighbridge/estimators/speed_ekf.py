@@ -1,0 +1,243 @@
+"""Extended Kalman filter on speed alone (Galvão et al.).
+
+S. L. J. Galvão, R. M. Fontes, D. D. Santana, R. Requião: An Extended Kalman Filter
+implementation for estimating the mass of passengers vehicles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance import ForceBalance, Reason
+from weighbridge.balance.speed_balance import kernel_parameters, model_of
+from weighbridge.errors import ConfigError
+from weighbridge.estimators.judging import converged_at
+from weighbridge.estimators.track import MassTrack, Status
+from weighbridge.kernels import speed_ekf as kernel
+from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.model import MASS_RANGE, Vehicle
+
+TAIL: Final = 0.75
+"""Part of the samples, the last, that counts as converged [-]: the paper's filter settles
+in a quarter of the drive."""
+
+GROUPS: Final = 10
+"""Equal groups that the converged samples are cut into; chosen, the paper does not say."""
+
+FEWEST: Final = 30
+"""Fewer samples carry no mass."""
+
+LARGEST_SHARE: Final = 0.5
+"""A mass that is the start by more than this was not found in the drive [-]."""
+
+STARTS: Final = (0.8, 1.25)
+"""Starts over the calibration's mass between which the answer's share of its start is
+measured [-]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedEkfSettings:
+    """Settings of the filter.
+
+    Attributes
+    ----------
+    initial_mass : the mass of the vehicle's calibration when None [kg]
+    initial_slope : sin(theta + beta) at the start [-]
+    process_var : diagonal of Q for speed, inverse mass and slope; P starts there
+    speed_var : R [m^2/s^2]
+    """
+
+    initial_mass: float | None = None
+    initial_slope: float = 0.01
+    process_var: tuple[float, float, float] = (0.1, 1e-12, 0.005)
+    speed_var: float = 1e-4
+
+    def __post_init__(self) -> None:
+        if self.initial_mass is not None and not self.initial_mass > 0.0:
+            raise ConfigError(f"initial_mass must be positive, got {self.initial_mass}")
+        if not (min(self.process_var) >= 0.0 and self.speed_var > 0.0):
+            raise ConfigError(
+                "process_var must not be negative and speed_var must be positive, "
+                f"got {self.process_var} and {self.speed_var}"
+            )
+
+
+PRINTED: Final = SpeedEkfSettings(initial_mass=1500.0, process_var=(0.1, 1e-10, 0.005))
+"""Start and noise as the paper prints them (sec. 5.3)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilterRun:
+    """What the filter made of one drive; arrays (n,), one value per sample.
+
+    Attributes
+    ----------
+    mass, std : running mass and the filter's own standard deviation [kg]
+    slope : sin(theta + beta) [-]
+    innovation, innovation_var : of the speed [m/s], [m^2/s^2]; NaN where it was off
+    used : where the estimation was on
+    """
+
+    mass: Floats
+    std: Floats
+    slope: Floats
+    innovation: Floats
+    innovation_var: Floats
+    used: Bools
+
+
+def run_filter(
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    settings: SpeedEkfSettings | None = None,
+    *,
+    flat: bool = False,
+) -> FilterRun:
+    """Run the filter over the windows of a drive.
+
+    Parameters
+    ----------
+    balance : of `weighbridge.balance.speed_balance`
+    vehicle : with a speed model
+    settings : ours when None
+    flat : start with an inverse mass as uncertain as it is large, and let it be
+        constant: what the drive says without a start
+    """
+    settings = settings or SpeedEkfSettings()
+    model = model_of(vehicle)
+    mass = model.mass if settings.initial_mass is None else settings.initial_mass
+    params = kernel_parameters(model, settings.process_var, settings.speed_var)
+    state = kernel.initial_state(mass, settings.initial_slope, params)  # type: ignore[no-untyped-call]
+    if flat:
+        constant = params.process_var * np.array([1.0, 0.0, 1.0])
+        params = params._replace(process_var=constant)
+        cov = np.diag([0.0, 1.0 / mass**2, settings.process_var[2]])
+        state = state._replace(cov=cov)
+    view = balance.merged
+    used = view.reason == Reason.USED
+    speed = np.nan_to_num(view.speed)
+    _, x, var, innovation, innovation_var = kernel.run(state, speed, used, params)
+    running = 1.0 / x[:, 1]
+    return FilterRun(
+        mass=running,
+        std=np.sqrt(var[:, 1]) * running**2,
+        slope=x[:, 2],
+        innovation=innovation,
+        innovation_var=innovation_var,
+        used=used,
+    )
+
+
+def mean_mass(mass: Floats, used: Bools) -> float:
+    """Average the converged masses, groups that still move left out (sec. 4).
+
+    The last `TAIL` of the samples used is cut into `GROUPS` equal groups; those
+    whose standard deviation is not above the average one count.
+
+    Parameters
+    ----------
+    mass : (n,) running [kg]
+    used : (n,)
+
+    Returns
+    -------
+    [kg]; NaN without a sample
+    """
+    rows = mass[used]
+    rows = rows[rows.size - int(np.ceil(TAIL * rows.size)) :]
+    if rows.size == 0:
+        return float("nan")
+    parts = np.array_split(rows, min(GROUPS, rows.size))
+    spread = np.array([np.std(part) for part in parts])
+    # Equal spreads differ from their mean by rounding.
+    calm = spread <= spread.mean() * (1.0 + 1e-9)
+    return float(np.mean(np.concatenate([p for p, keep in zip(parts, calm, strict=True) if keep])))
+
+
+def start_share(balance: ForceBalance, vehicle: Vehicle, settings: SpeedEkfSettings) -> float:
+    """Measure which part of the answer is the mass the filter was started from [-].
+
+    1 where the answer moves as far as the start does, 0 where it does not care.
+    """
+    model = model_of(vehicle)
+    starts = [model.mass * factor for factor in STARTS]
+    ends = []
+    for start in starts:
+        done = run_filter(balance, vehicle, replace(settings, initial_mass=start))
+        ends.append(mean_mass(done.mass, done.used))
+    return (ends[1] - ends[0]) / (starts[1] - starts[0])
+
+
+def estimate(
+    balance: ForceBalance, vehicle: Vehicle, settings: SpeedEkfSettings | None = None
+) -> MassTrack:
+    """Weigh by speed alone, and say how much of the answer is the filter's start.
+
+    Parameters
+    ----------
+    balance : of `weighbridge.balance.speed_balance`
+    vehicle : with a speed model
+    settings : ours when None
+    """
+    settings = settings or SpeedEkfSettings()
+    model = model_of(vehicle)
+    done = run_filter(balance, vehicle, settings)
+    view = balance.merged
+    used = done.used
+    count = int(np.count_nonzero(used))
+    mass, std, share, bound = float("nan"), float("inf"), float("nan"), float("nan")
+    if count:
+        mass = mean_mass(done.mass, used)
+        std = float(np.hypot(done.std[-1], model.scale_std * mass))
+        share = start_share(balance, vehicle, settings)
+        bound = float(run_filter(balance, vehicle, settings, flat=True).std[-1])
+    status, why = _judge(vehicle, count, mass, std, share)
+    running = np.where(np.cumsum(used) > 0, done.mass, np.nan)
+    return MassTrack(
+        method="speed-ekf",
+        balance=balance,
+        running_mass=running,
+        running_std=np.hypot(done.std, model.scale_std * running),
+        residual=np.where(used, done.innovation * mass / model.sample_time, np.nan),
+        reason=view.reason,
+        mass=mass,
+        std=std,
+        degrees_of_freedom=float("inf"),
+        bound_std=bound,
+        converged_at=converged_at(view.time, running, mass, used),
+        status=status,
+        why=why,
+        segments=(),
+    )
+
+
+def _judge(
+    vehicle: Vehicle, count: int, mass: float, std: float, share: float
+) -> tuple[Status, str]:
+    model = model_of(vehicle)
+    if count < FEWEST:
+        return Status.NOT_EXCITED, (
+            f"only {count} usable samples of {model.sample_time:g} s, and {FEWEST} are needed: "
+            "drive longer, faster than walking pace and without braking"
+        )
+    low, high = MASS_RANGE[vehicle.kind]
+    if not low < mass < high:
+        return Status.INCONSISTENT, (
+            f"the estimate is {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "
+            f"{high:.0f} kg; calibrate again with --method speed-ekf"
+        )
+    if share > LARGEST_SHARE:
+        return Status.NOT_EXCITED, (
+            f"{100.0 * min(share, 1.0):.0f} % of the estimate of {mass:.0f} kg is the mass that "
+            f"the filter was started from, {model.mass:.0f} kg of the calibration: speed alone "
+            "does not show the mass here; record torque or engine load"
+        )
+    if not std <= 0.15 * mass:
+        return Status.NOT_EXCITED, (
+            f"speed alone says {mass:.0f} kg give or take {std:.0f} kg, which is no weighing; "
+            "record torque or engine load"
+        )
+    return Status.CONVERGED, ""
