@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from weighbridge.pipeline.calibrating import Calibration
+    from weighbridge.pipeline.speed_calibrating import SpeedCalibration
 
 
 def calibrate(
@@ -45,7 +46,7 @@ def calibrate(
         typer.Option("--tare", help="Mass without payload in kg; payloads count from it."),
     ] = None,
     method: Annotated[
-        str, typer.Option("--method", help="Estimator to calibrate for: rls or joint.")
+        str, typer.Option("--method", help="Estimator to calibrate for: rls, joint or speed-ekf.")
     ] = "rls",
     order: Annotated[
         Optional[int],  # noqa: UP045
@@ -75,7 +76,11 @@ def calibrate(
     from rich.console import Console
 
     from weighbridge.errors import ConfigError
-    from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
+    from weighbridge.pipeline.calibrating import (
+        CalibrationSettings,
+        run_calibration,
+        run_speed_calibration,
+    )
     from weighbridge.vehicle.model import Vehicle
 
     refuse_missing_folder(output)
@@ -92,18 +97,58 @@ def calibrate(
         method=method,  # type: ignore[arg-type]
     )
     masses = mass[0] if mass is not None and len(mass) == 1 else mass
-    done = run_calibration(recorded, masses, vehicle=base, settings=settings)
-    lightest = min(done.vehicle.provenance.masses)
+    if settings.method == "speed-ekf":
+        _refuse_torque_options(torque, order, grid, straight)
+        by_speed = run_speed_calibration(recorded, masses, vehicle=base)
+        car, shown = by_speed.vehicle, speed_table(by_speed)
+        lightest = min(rows.mass for rows in by_speed.rows)
+    else:
+        done = run_calibration(recorded, masses, vehicle=base, settings=settings)
+        car, shown = done.vehicle, table(done)
+        lightest = min(car.provenance.masses)
     if tare is not None and not 0.3 * lightest <= tare <= 1.02 * lightest:
         raise ConfigError(
             f"--tare {tare:g}: must not be above the known mass of {lightest:g} kg nor far below; "
             "it is the vehicle without payload"
         )
     if tare is not None:
-        done = replace(done, vehicle=replace(done.vehicle, tare=tare))
-    done.vehicle.save(output)
-    Console().print(table(done))
+        car = replace(car, tare=tare)
+    car.save(output)
+    Console().print(shown)
     typer.echo(f"written: {output}")
+
+
+def _refuse_torque_options(
+    torque: str | None, order: int | None, grid: bool, straight: bool
+) -> None:
+    from weighbridge.errors import ConfigError
+
+    asked = {"--torque": torque, "--order": order, "--grid": grid, "--straight": straight}
+    for name, value in asked.items():
+        if value not in (None, False):
+            raise ConfigError(f"{name} is about torque, which --method speed-ekf does not read")
+
+
+def speed_table(done: SpeedCalibration) -> Table:
+    """Show what was fitted to the speed, and what it is worth."""
+    from rich.table import Table
+
+    model = done.vehicle.speed_model
+    assert model is not None
+    shown = Table(title=f"speed model of {done.vehicle.name}", title_justify="left")
+    shown.add_column("parameter")
+    shown.add_column("value", justify="right")
+    shown.add_row("known mass (kg)", ", ".join(f"{rows.mass:.0f}" for rows in done.rows))
+    for k, p in enumerate(model.corrections, 1):
+        shown.add_row(f"correction p{k}", f"{p:.5g}")
+    shown.add_row("R² of the change of speed", f"{done.fit.r_squared:.3f}")
+    shown.add_row(f"steps of {model.sample_time:g} s", str(done.fit.samples))
+    shown.add_row("left in every mass (%)", f"{100.0 * model.scale_std:.0f}")
+    shown.caption = (
+        "Torque in proportion to speed hardly shows the mass: weighing by speed alone gives back "
+        "the mass of this calibration."
+    )
+    return shown
 
 
 def table(done: Calibration) -> Table:

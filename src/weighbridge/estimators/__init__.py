@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from weighbridge.balance import ForceBalance
-from weighbridge.estimators import joint, rls
+from weighbridge.estimators import joint, rls, speed_ekf
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.vehicle.model import Vehicle
 
@@ -13,7 +13,12 @@ Estimator = Callable[[ForceBalance, Vehicle], MassTrack]
 ESTIMATORS: Final[dict[str, Estimator]] = {
     "joint": joint.estimate,
     "rls": rls.estimate,
+    "speed-ekf": speed_ekf.estimate,
 }
 """Every method of `weighbridge weigh`, by its name."""
 
-__all__ = ["ESTIMATORS", "Estimator", "MassTrack", "Segment", "Status"]
+SPEED_ALONE: Final = frozenset({"speed-ekf"})
+"""Methods that need a speed and no torque; they take a balance of
+`weighbridge.balance.speed_balance`."""
+
+__all__ = ["ESTIMATORS", "SPEED_ALONE", "Estimator", "MassTrack", "Segment", "Status"]

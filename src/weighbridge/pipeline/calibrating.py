@@ -30,6 +30,7 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.joint_calibrating import BalanceAt, JointProblem, refine
+from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
@@ -73,22 +74,23 @@ class CalibrationSettings:
     grid : solve on the grid of Jensen 2022, Table 5, in place of the bounds
     curved : let the torque per load change with engine speed and load; off for
         the regression of eq. 49 as printed
-    method : estimator the vehicle is calibrated for, "rls" by eq. 48 or "joint"
+    method : estimator the vehicle is calibrated for: "rls" by eq. 48, "joint", or
+        "speed-ekf", which fits a model of the speed alone
     """
 
     order: int | None = None
     source: TorqueSource | None = None
     grid: bool = False
     curved: bool = True
-    method: Literal["rls", "joint"] = "rls"
+    method: Literal["rls", "joint", "speed-ekf"] = "rls"
 
     def __post_init__(self) -> None:
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
         if self.source is not None and self.source not in SIGNALS:
             raise ConfigError(f"source must be one of {', '.join(SIGNALS)}, got {self.source!r}")
-        if self.method not in ("rls", "joint"):
-            raise ConfigError(f"method must be rls or joint, got {self.method!r}")
+        if self.method not in ("rls", "joint", "speed-ekf"):
+            raise ConfigError(f"method must be rls, joint or speed-ekf, got {self.method!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +134,36 @@ def calibrate(
     DriveError, ConfigError
         A drive or an argument cannot be used; the sentence says why.
     """
+    if settings is not None and settings.method == "speed-ekf":
+        return run_speed_calibration(drives, mass, vehicle=vehicle).vehicle
     return run_calibration(drives, mass, vehicle=vehicle, settings=settings).vehicle
+
+
+def run_speed_calibration(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None = None,
+    *,
+    vehicle: Vehicle | None = None,
+) -> SpeedCalibration:
+    """As `calibrate` for the method "speed-ekf", keeping what was fitted."""
+    drives, base, masses = _checked(drives, mass, vehicle)
+    return calibrate_by_speed(drives, masses, base)
+
+
+def _checked(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None,
+    vehicle: Vehicle | None,
+) -> tuple[list[Drive], Vehicle, list[float]]:
+    """List the drives, what is known of the vehicle, and the drives' masses; check them."""
+    drives = [drives] if isinstance(drives, Drive) else list(drives)
+    base = vehicle or Vehicle(name=_name(drives))
+    masses = _masses(drives, mass, base.kind)
+    for drive in drives:
+        for problem in check_drive(drive, base):
+            if problem.serious:
+                raise DriveError(f"{drive.name}: {problem.text}")
+    return drives, base, masses
 
 
 def run_calibration(
@@ -143,14 +174,10 @@ def run_calibration(
     settings: CalibrationSettings | None = None,
 ) -> Calibration:
     """As `calibrate`, keeping what the report shows."""
-    drives = [drives] if isinstance(drives, Drive) else list(drives)
     settings = settings or CalibrationSettings()
-    base = vehicle or Vehicle(name=_name(drives))
-    masses = _masses(drives, mass, base.kind)
-    for drive in drives:
-        for problem in check_drive(drive, base):
-            if problem.serious:
-                raise DriveError(f"{drive.name}: {problem.text}")
+    if settings.method == "speed-ekf":
+        raise ConfigError("method speed-ekf has no torque fit; use run_speed_calibration")
+    drives, base, masses = _checked(drives, mass, vehicle)
     source = settings.source or best_source(drives, base)
     for drive in drives:
         if missing := drive.missing(SIGNALS[source]):

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import t as student
 
-from weighbridge.balance import REASON_TEXT, Reason, force_balance
+from weighbridge.balance import REASON_TEXT, ForceBalance, Reason, force_balance
 from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
+from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators import ESTIMATORS, MassTrack, Segment, Status
+from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle
@@ -240,7 +241,8 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
             raise DriveError(f"{drive.name}: {problem.text}")
     warnings = tuple(p.text for p in drive.problems)
 
-    lacking = what_is_missing(drive, vehicle)
+    alone = method in SPEED_ALONE
+    lacking = no_speed(drive) if alone else what_is_missing(drive, vehicle)
     if lacking:
         return Weighing(
             drive=drive,
@@ -251,25 +253,15 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
             result=None,
             warnings=warnings,
         )
-    motion = find_motion(drive, vehicle)
-    warnings += motion.notes
-    delay = vehicle.timing.torque_delay
-    if delay is None:
-        delay = estimate_torque_delay(drive, vehicle, motion)
-        if math.isfinite(delay):
-            warnings += (f"torque delay {delay:+.2f} s found from this drive",)
-        else:
-            delay = 0.0
-            warnings += ("the drive does not show how late its torque is; taken as 0 s",)
-    if vehicle.provenance.mass_scale_std is None:
-        warnings += (
-            f"the vehicle file of {vehicle.name} was not made by a calibration: errors of its "
-            "torque, efficiency and road load are not in the interval",
-        )
-    balance = force_balance(drive, vehicle, motion, delay=delay)
+    if alone:
+        balance = speed_balance(drive, vehicle)
+        warnings += balance.motion.notes
+    else:
+        balance, notes = torque_balance(drive, vehicle)
+        warnings += notes
     result = estimator(balance, vehicle)
     status, reason = result.status, result.why
-    share = share_on_gears(balance, vehicle)
+    share = None if alone else share_on_gears(balance, vehicle)
     if share is not None and share < ENOUGH:
         status = Status.INCONSISTENT
         reason = (
@@ -287,6 +279,32 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
         result=result,
         warnings=warnings,
     )
+
+
+def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[str, ...]]:
+    """Balance measured or modelled torque against the best motion the drive allows.
+
+    Returns
+    -------
+    balance
+    notes : what was found or doubted, one sentence each
+    """
+    motion = find_motion(drive, vehicle)
+    notes = motion.notes
+    delay = vehicle.timing.torque_delay
+    if delay is None:
+        delay = estimate_torque_delay(drive, vehicle, motion)
+        if math.isfinite(delay):
+            notes += (f"torque delay {delay:+.2f} s found from this drive",)
+        else:
+            delay = 0.0
+            notes += ("the drive does not show how late its torque is; taken as 0 s",)
+    if vehicle.provenance.mass_scale_std is None:
+        notes += (
+            f"the vehicle file of {vehicle.name} was not made by a calibration: errors of its "
+            "torque, efficiency and road load are not in the interval",
+        )
+    return force_balance(drive, vehicle, motion, delay=delay), notes
 
 
 def overload(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
@@ -340,6 +358,13 @@ def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
             f"of torque source {others[0]!r} (weighbridge calibrate --torque {others[0]})"
         )
     return f"{sentence}; nothing can be weighed"
+
+
+def no_speed(drive: Drive) -> str:
+    """Say that a drive has no speed, which is all some methods need; empty if it has."""
+    if any(drive.has(name) for name in SPEEDS):
+        return ""
+    return f"the drive has no {' and no '.join(SPEEDS)}, of which this method needs one"
 
 
 def _number(value: float) -> float | None:

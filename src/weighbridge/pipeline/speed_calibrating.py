@@ -1,0 +1,151 @@
+"""From drives of known mass and grade to a vehicle that ``--method speed-ekf`` can weigh."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance.speed_balance import SPEEDS, running, speed_motion_of, window_means
+from weighbridge.calibration.speed_fit import (
+    Nominal,
+    SpeedFit,
+    SpeedRows,
+    fit_speed_model,
+)
+from weighbridge.errors import DriveError
+from weighbridge.navigation.select import find_motion
+from weighbridge.signals import Drive
+from weighbridge.vehicle.model import Provenance, SpeedModel, Vehicle
+
+SAMPLE_TIME: Final = 7.0
+"""Length of a window [s] (Galvão et al., sec. 5.1)."""
+
+AIR_DENSITY: Final = 1.22
+"""Density of the air [kg/m^3] (Galvão et al., sec. 2.1)."""
+
+GEARING: Final = 6.39 / 0.29
+"""Gear ratios over wheel radius where no gearings are known [1/m] (Galvão et al., sec. 2.1)."""
+
+SCALE_STD: Final = 0.20
+"""Relative standard deviation that the method leaves in every mass [-]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedCalibration:
+    """A vehicle with a speed model and what it was made from.
+
+    Attributes
+    ----------
+    vehicle : the result
+    fit : of the corrections
+    rows : windows of each drive
+    """
+
+    vehicle: Vehicle
+    fit: SpeedFit
+    rows: tuple[SpeedRows, ...]
+
+
+def nominal_of(vehicle: Vehicle) -> Nominal:
+    """Take the model's constants from the vehicle; its middle gear stands for all.
+
+    The corrections make up for what is only roughly so.
+    """
+    line = vehicle.driveline
+    gearing = float(np.median(line.gearings)) if line.gearings else GEARING
+    return Nominal(
+        force_gain=line.efficiency * gearing,
+        drag=AIR_DENSITY * vehicle.road_load.drag_area,
+        rolling_coefficient=vehicle.road_load.rolling_coefficient,
+        rotating_mass=line.wheel_inertia / line.wheel_radius**2 + line.engine_inertia * gearing**2,
+    )
+
+
+def speed_rows(drive: Drive, vehicle: Vehicle, mass: float, sample_time: float) -> SpeedRows:
+    """Average speed and grade of a drive over windows.
+
+    Raises
+    ------
+    DriveError
+        There is too little speed, or nothing tells the grade.
+    """
+    if not any(drive.has(name) for name in SPEEDS):
+        raise DriveError(
+            f"{drive.name}: no {' and no '.join(SPEEDS)}, of which the speed model needs one"
+        )
+    graded = find_motion(drive, vehicle)
+    if graded.source == "speed":
+        raise DriveError(
+            f"{drive.name}: nothing tells the grade, which a calibration for speed-ekf needs; "
+            "record altitude, grade or an inertial sensor with it"
+        )
+    motion = speed_motion_of(drive, vehicle)
+    seen = np.where(graded.valid, graded.grade, np.nan)
+    grade = np.interp(motion.time, graded.time, seen, left=np.nan, right=np.nan)
+    speed = window_means(motion, motion.speed, sample_time)
+    known, slow, braked = running(speed, sample_time)
+    return SpeedRows(
+        name=drive.name,
+        mass=mass,
+        speed=speed,
+        grade=window_means(motion, grade, sample_time),
+        used=known & ~slow & ~braked,
+    )
+
+
+def calibrate_by_speed(
+    drives: Sequence[Drive],
+    masses: Sequence[float],
+    base: Vehicle,
+    *,
+    nominal: Nominal | None = None,
+    sample_time: float = SAMPLE_TIME,
+) -> SpeedCalibration:
+    """Fit the speed model of a vehicle; all else of the vehicle stays.
+
+    Parameters
+    ----------
+    drives : with speed, and with what tells the grade
+    masses : known mass of each [kg]
+    base : what is known of the vehicle
+    nominal : constants of the model; from the vehicle when None
+    sample_time : length of the windows [s]
+
+    Raises
+    ------
+    DriveError
+        A drive lacks speed or grade, or is too short or too even.
+    """
+    nominal = nominal or nominal_of(base)
+    rows = tuple(
+        speed_rows(drive, base, mass, sample_time)
+        for drive, mass in zip(drives, masses, strict=True)
+    )
+    fit = fit_speed_model(rows, nominal, sample_time)
+    model = SpeedModel(
+        mass=float(np.mean(masses)),
+        sample_time=sample_time,
+        force_gain=nominal.force_gain,
+        drag=nominal.drag,
+        rolling_coefficient=nominal.rolling_coefficient,
+        rotating_mass=nominal.rotating_mass,
+        corrections=fit.corrections,
+        r_squared=fit.r_squared,
+        samples=fit.samples,
+        scale_std=SCALE_STD,
+    )
+    vehicle = replace(base, speed_model=model)
+    if not base.provenance.drives:
+        made = Provenance(
+            drives=tuple(drive.name for drive in drives),
+            masses=tuple(masses),
+            date=datetime.date.today().isoformat(),
+            mass_scale_std=base.provenance.mass_scale_std,
+            notes="calibrated for method speed-ekf alone",
+        )
+        vehicle = replace(vehicle, provenance=made)
+    return SpeedCalibration(vehicle=vehicle, fit=fit, rows=rows)
