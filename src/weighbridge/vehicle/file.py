@@ -23,6 +23,7 @@ from weighbridge.vehicle.model import (
     Driveline,
     Mounting,
     Provenance,
+    Ride,
     RoadLoad,
     SpeedModel,
     Timing,
@@ -190,6 +191,60 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             _Key("r_squared", "r_squared", "part of the speed's changes that the fit explains"),
             _Key("samples", "samples", "windows of the fit", "count"),
             _Key("scale_std", "scale_std", "part of any mass found so, as standard deviation"),
+        ),
+    ),
+    "ride": (
+        Ride,
+        (
+            _Key(
+                "front_stiffness",
+                "front_stiffness",
+                "of the spring at each front wheel",
+                suffix="npm",
+            ),
+            _Key(
+                "rear_stiffness", "rear_stiffness", "of the spring at each rear wheel", suffix="npm"
+            ),
+            _Key(
+                "front_damping", "front_damping", "of the damper at each front wheel", suffix="nspm"
+            ),
+            _Key("rear_damping", "rear_damping", "of the damper at each rear wheel", suffix="nspm"),
+            _Key("front_track", "front_track", "between the front wheels", suffix="m"),
+            _Key("rear_track", "rear_track", "between the rear wheels", suffix="m"),
+            _Key(
+                "front_axle",
+                "front_axle",
+                "from the centre of gravity to the front axle",
+                suffix="m",
+            ),
+            _Key(
+                "rear_axle", "rear_axle", "from the centre of gravity to the rear axle", suffix="m"
+            ),
+            _Key("front_unsprung", "front_unsprung", "front axle and its wheels", suffix="kg"),
+            _Key("rear_unsprung", "rear_unsprung", "rear axle and its wheels", suffix="kg"),
+            _Key("sprung_mass", "sprung_mass", "roughly; an estimate begins here", suffix="kg"),
+            _Key("roll_inertia", "roll_inertia", "of the sprung mass, roughly", suffix="kgm2"),
+            _Key("pitch_inertia", "pitch_inertia", "of the sprung mass, roughly", suffix="kgm2"),
+            _Key(
+                "zero_mass",
+                "zero_mass",
+                "sprung mass with which the travel sensors read zero at rest",
+                suffix="kg",
+            ),
+            _Key(
+                "force_std",
+                "force_std",
+                "part by which all springs and dampers together may be off",
+            ),
+            _Key(
+                "travel_noise", "travel_noise", "of one sample, as standard deviation", suffix="m"
+            ),
+            _Key("rate_noise", "rate_noise", "of one sample", suffix="mps"),
+            _Key(
+                "vertical_velocity_noise", "vertical_velocity_noise", "of one sample", suffix="mps"
+            ),
+            _Key("roll_rate_noise", "roll_rate_noise", "of one sample", suffix="radps"),
+            _Key("pitch_rate_noise", "pitch_rate_noise", "of one sample", suffix="radps"),
         ),
     ),
     "provenance": (
