@@ -12,6 +12,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.model import SpeedModel
 
 FEWEST: Final = 40
 """Fewer steps between windows do not settle five coefficients."""
@@ -154,3 +155,27 @@ def _least_change(c: Floats, nominal: Nominal, speed: float) -> tuple[float, ...
     if size == 0.0:
         p2, p3 = 0.0, -2.0 * short
     return tuple(float(p) for p in (0.0, p2, p3, -2.0 * c[2], c[3] - nominal.gravity, c[4], p7))
+
+
+def model_speed(rows: SpeedRows, model: SpeedModel) -> Floats:
+    """Predict each window's speed from the measured one before and the known grade.
+
+    Parameters
+    ----------
+    rows : windows of one drive
+    model : fitted
+
+    Returns
+    -------
+    (n,) [m/s]; NaN for the first window and after one that was not used
+    """
+    p = model.corrections
+    v = rows.speed[:-1]
+    slope = np.sin(rows.grade + math.atan(model.rolling_coefficient))
+    slope = 0.5 * (slope[:-1] + slope[1:])
+    gravity = GRAVITY / math.cos(math.atan(model.rolling_coefficient)) + p[4] + p[5] * v
+    force = (model.force_gain + p[0] + p[1] * v) * p[6] * v
+    force -= 0.5 * (model.drag + p[2] + p[3] * v) * v**2
+    accel = (force / rows.mass - gravity * slope) / (1.0 + model.rotating_mass / rows.mass)
+    ahead = np.where(rows.used[:-1] & rows.used[1:], v + model.sample_time * accel, np.nan)
+    return np.concatenate(([np.nan], ahead))

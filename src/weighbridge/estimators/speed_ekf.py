@@ -193,7 +193,8 @@ def estimate(
         mass = mean_mass(done.mass, used)
         std = float(np.hypot(done.std[-1], model.scale_std * mass))
         share = start_share(balance, vehicle, settings)
-        bound = float(run_filter(balance, vehicle, settings, flat=True).std[-1])
+        free = run_filter(balance, vehicle, settings, flat=True)
+        bound = float(free.std[-1] * (mass / free.mass[-1]) ** 2)
     status, why = _judge(vehicle, count, mass, std, share)
     running = np.where(np.cumsum(used) > 0, done.mass, np.nan)
     return MassTrack(

@@ -9,6 +9,7 @@ from typing import Final
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
 
 PAPERS: Final[dict[str, str]] = {
+    "galvao": "weighbridge.papers.galvao",
     "jensen2022": "weighbridge.papers.jensen2022",
 }
 """Module of each paper that ``weighbridge reproduce`` knows; it has a function ``reproduced``

@@ -1,0 +1,538 @@
+"""Galvão et al.: the mass of a small car from its speed alone, on simulated drives.
+
+S. L. J. Galvão, R. M. Fontes, D. D. Santana, R. Requião: An Extended Kalman Filter
+implementation for estimating the mass of passengers vehicles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from weighbridge.balance import ForceBalance
+from weighbridge.balance.speed_balance import speed_balance
+from weighbridge.calibration.speed_fit import Nominal, SpeedRows, model_speed
+from weighbridge.estimators.speed_ekf import (
+    PRINTED,
+    FilterRun,
+    SpeedEkfSettings,
+    mean_mass,
+    run_filter,
+)
+from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
+from weighbridge.pipeline.speed_calibrating import (
+    SAMPLE_TIME,
+    calibrate_by_speed,
+    speed_rows,
+)
+from weighbridge.report.study import write_study
+from weighbridge.report.style import (
+    BAND,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    Panel,
+    blank,
+    dots,
+    line,
+)
+from weighbridge.report.table import Table
+from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.units import from_si
+from weighbridge.simulation import (
+    COMPACT,
+    Effects,
+    Polling,
+    Route,
+    Scenario,
+    Sensors,
+    mixed_route,
+    simulate_car,
+)
+from weighbridge.vehicle.model import Vehicle
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import plotly.graph_objects as go
+
+    from weighbridge.simulation import SimulatedCar, SimulatedDrive
+
+DRAG_AREA: Final = 0.35 * 2.15
+"""Drag coefficient times frontal area [m^2] (sec. 2.1)."""
+
+CAR: Final = replace(
+    COMPACT, name="compact car of 1092 kg", mass=1092.0, wheel_radius=0.29, drag_area=DRAG_AREA
+)
+"""A small petrol car with the paper's mass, driver included, wheel radius and drag area;
+engine and gearbox, which the paper does not give, are those of our small car."""
+
+NOMINAL: Final = Nominal(
+    force_gain=6.39 * 0.90 / 0.29,
+    drag=1.22 * DRAG_AREA,
+    rolling_coefficient=0.01,
+    rotating_mass=71.0,
+)
+"""Constants of the model (sec. 2.1)."""
+
+DURATION: Final = 1200.0
+"""Of a test, about [s] (sec. 5.1)."""
+
+LAST: Final = 200
+"""Samples over which Table 2 tells the band."""
+
+PAPER_MASSES: Final = (1092.07, 1095.58, 1092.02)
+PAPER_ERRORS: Final = ("0.0069", "0.33", "0.0025")
+PAPER_BANDS: Final = (100.0, 200.0, 200.0)
+PAPER_WORST: Final = 0.0033
+
+PINNED: Final = SpeedEkfSettings(process_var=(0.1, 0.0, 1e-10))
+"""The grade held level and the mass constant: the most that speed can say of the mass."""
+
+STARTS: Final = (800.0, 1092.0, 1500.0, 2000.0)
+"""Masses the filter is started from, to see where it ends [kg]."""
+
+TOLD: Final = (900.0, 1092.0, 1400.0)
+"""Masses the calibration is told of one and the same drive [kg]."""
+
+PAYLOADS: Final = (0.0, 100.0, 200.0, 300.0, 400.0)
+"""Loads that the paper did not try [kg]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Test:
+    """One of the three drives.
+
+    Attributes
+    ----------
+    number : 1 to 3
+    mass : true mean [kg]
+    balance : windows of the drive
+    rows : the same with the true grade
+    predicted : (n,) speed of the model one window ahead, with the true grade [m/s]
+    ours, printed : runs of the filter started at the calibration's mass with a
+        constant mass, and with start and noise as printed
+    """
+
+    number: int
+    mass: float
+    balance: ForceBalance
+    rows: SpeedRows
+    predicted: Floats
+    ours: FilterRun
+    printed: FilterRun
+
+    def error(self, run: FilterRun) -> float:
+        """Relative error of the mean mass of a run [-]."""
+        return mean_mass(run.mass, run.used) / self.mass - 1.0
+
+    def band(self, run: FilterRun) -> float:
+        """Widest half of the 95 % band over the last samples used [kg]."""
+        return float(np.max(1.96 * run.std[run.used][-LAST:]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """Drives that the paper did not try, of one kind.
+
+    Attributes
+    ----------
+    kind : what is different
+    masses : true masses [kg]
+    answers : of our settings [kg]
+    pinned : of the filter that starts from nothing and knows the road to be level [kg]
+    """
+
+    kind: str
+    masses: Floats
+    answers: Floats
+    pinned: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reproduction:
+    """All the figures of the study.
+
+    Attributes
+    ----------
+    vehicle : with the speed model fitted to the first drive
+    r_squared : of the fit
+    tests : the three drives
+    starts : `STARTS` against where the second drive ends, ours and noise as printed [kg]
+    told : `TOLD` against what the second drive then weighs [kg], and R² of the fit
+    trials : drives the paper did not try
+    """
+
+    vehicle: Vehicle
+    r_squared: float
+    tests: tuple[Test, ...]
+    starts: tuple[tuple[float, float, float], ...]
+    told: tuple[tuple[float, float, float], ...]
+    trials: tuple[Trial, ...]
+
+
+def easy_route(seed: int) -> Route:
+    """Return a country road with few bends, low grades and no stops."""
+    long = ("country", 30_000.0)
+    made = mixed_route(seed, out=[long], back=[long], name="country road, few bends, low grades")  # type: ignore[list-item]
+    return replace(
+        made,
+        grade=0.35 * made.grade,
+        heading=0.3 * made.heading,
+        stop_chance=0.0 * made.stop_chance,
+    )
+
+
+def scenario(
+    seed: int,
+    route: Route,
+    *,
+    car: SimulatedCar = CAR,
+    payload: float = 0.0,
+    traffic: bool = False,
+) -> Scenario:
+    """Make a drive of which nothing but the vehicle speed is recorded, at 4 Hz in km/h."""
+    effects = Effects() if traffic else Effects().without("traffic")
+    return Scenario(
+        name=f"speed-{seed}",
+        car=car,
+        route=route,
+        payload=payload,
+        seed=seed,
+        effects=effects,
+        sensors=Sensors(imu_rate=0.0, gnss_rate=0.0),
+        polling=Polling(fast=("vehicle_speed",), slow=(), speed_scale=1.0),
+        start_rest=5.0,
+        duration=DURATION,
+    )
+
+
+def with_grade(made: SimulatedDrive) -> Drive:
+    """Add the reference inclination that a calibration needs."""
+    return made.drive.with_signals(Signal("grade", made.truth.time, made.truth.grade))
+
+
+def mass_of(made: SimulatedDrive) -> float:
+    """Return the true mean mass of a drive [kg]."""
+    return float(np.mean(made.truth.mass))
+
+
+def reproduce(*, seed: int = 777, progress: Progress | None = None) -> Reproduction:
+    """Fit the model to the first of three drives, weigh all three, and try what they did not.
+
+    Parameters
+    ----------
+    seed : of the road and the first drive; the other drives count on from it
+    progress : called with steps done and steps in all
+    """
+    total = 7
+    route = easy_route(seed)
+    drives = [simulate_car(scenario(seed + k, route)) for k in range(3)]
+    base = Vehicle(name=CAR.name)
+    known = with_grade(drives[0])
+    fitted = calibrate_by_speed([known], [mass_of(drives[0])], base, nominal=NOMINAL)
+    vehicle = fitted.vehicle
+    tests = tuple(_test(k, made, vehicle) for k, made in enumerate(drives, 1))
+    _tell(progress, 1, total)
+
+    second = tests[1]
+    starts = []
+    for start in STARTS:
+        ends = []
+        for settings in (
+            SpeedEkfSettings(initial_mass=start),
+            replace(PRINTED, initial_mass=start),
+        ):
+            run = run_filter(second.balance, vehicle, settings)
+            ends.append(mean_mass(run.mass, run.used))
+        starts.append((start, ends[0], ends[1]))
+    told = []
+    for mass in TOLD:
+        other = calibrate_by_speed([known], [mass], base, nominal=NOMINAL)
+        run = run_filter(speed_balance(drives[1].drive, other.vehicle), other.vehicle)
+        told.append((mass, mean_mass(run.mass, run.used), other.fit.r_squared))
+    _tell(progress, 2, total)
+
+    trials = []
+    for step, (kind, loads, traffic, roads) in enumerate(
+        (
+            ("same road and load, other days", (0.0,) * 10, False, (seed,)),
+            ("other roads", (0.0,) * 10, False, range(seed + 1, seed + 11)),
+            ("traffic", (0.0,) * 10, True, (seed,)),
+            ("other masses", PAYLOADS * 6, False, (seed,)),
+            ("other masses, roads, traffic", PAYLOADS * 6, True, range(seed + 1, seed + 11)),
+        )
+    ):
+        made = [
+            scenario(
+                seed + 100 * (step + 1) + k,
+                easy_route(roads[k % len(roads)]),
+                payload=load,
+                traffic=traffic,
+            )
+            for k, load in enumerate(loads)
+        ]
+        trials.append(_trial(kind, made, vehicle))
+        _tell(progress, 3 + step, total)
+    return Reproduction(
+        vehicle=vehicle,
+        r_squared=fitted.fit.r_squared,
+        tests=tests,
+        starts=tuple(starts),
+        told=tuple(told),
+        trials=tuple(trials),
+    )
+
+
+def _tell(progress: Progress | None, done: int, total: int) -> None:
+    if progress:
+        progress(done, total)
+
+
+def _test(number: int, made: SimulatedDrive, vehicle: Vehicle) -> Test:
+    mass = mass_of(made)
+    rows = speed_rows(with_grade(made), vehicle, mass, SAMPLE_TIME)
+    balance = speed_balance(made.drive, vehicle)
+    assert vehicle.speed_model is not None
+    return Test(
+        number=number,
+        mass=mass,
+        balance=balance,
+        rows=rows,
+        predicted=model_speed(rows, vehicle.speed_model),
+        ours=run_filter(balance, vehicle),
+        printed=run_filter(balance, vehicle, PRINTED),
+    )
+
+
+def _trial(kind: str, scenarios: Sequence[Scenario], vehicle: Vehicle) -> Trial:
+    masses, answers, pinned = [], [], []
+    for chosen in scenarios:
+        made = simulate_car(chosen)
+        balance = speed_balance(made.drive, vehicle)
+        ours = run_filter(balance, vehicle)
+        free = run_filter(balance, vehicle, PINNED, flat=True)
+        masses.append(mass_of(made))
+        answers.append(mean_mass(ours.mass, ours.used))
+        pinned.append(float(free.mass[-1]))
+    return Trial(
+        kind=kind, masses=np.array(masses), answers=np.array(answers), pinned=np.array(pinned)
+    )
+
+
+def slope(masses: Floats, answers: Floats) -> tuple[float, float]:
+    """Regress answers on true masses.
+
+    Parameters
+    ----------
+    masses, answers : (n,) [kg]
+
+    Returns
+    -------
+    slope, std : kg answered per kg loaded, and its standard error [-]
+    """
+    away = masses - masses.mean()
+    power = float(np.sum(away**2))
+    found = float(away @ answers) / power
+    residual = answers - answers.mean() - found * away
+    return found, float(np.sqrt(residual @ residual / (masses.size - 2) / power))
+
+
+def rank_correlation(masses: Floats, answers: Floats) -> float:
+    """Spearman's: 1 where heavier drives always get heavier answers; wild answers do no harm."""
+    return float(spearmanr(masses, answers).statistic)
+
+
+def reproduced(seed: int, progress: Progress | None) -> Reproduced:
+    """Reproduce the paper and put it beside its own figures; see `reproduce`."""
+    done = reproduce(seed=seed, progress=progress)
+    tables = (_tests_table(done), _starts_table(done), _trials_table(done))
+
+    def write(path: Path) -> None:
+        write_study(
+            "Galvão et al., reproduced on simulated drives",
+            tables,
+            [*(p for test in done.tests for p in _panels(test)), _mass_panel(done.trials[-2])],
+            path,
+        )
+
+    return Reproduced(
+        title="Galvão et al.: speed alone gives back the mass it was calibrated with",
+        tables=tables,
+        comparisons=_comparisons(done),
+        write_report=write,
+    )
+
+
+def _tests_table(done: Reproduction) -> Table:
+    rows = []
+    for test, theirs, error, band in zip(
+        done.tests, PAPER_MASSES, PAPER_ERRORS, PAPER_BANDS, strict=True
+    ):
+        rows.append(
+            (
+                f"Test {test.number:02d}",
+                f"{theirs:.2f}",
+                error,
+                f"± {band:.0f}",
+                f"{test.mass:.1f}",
+                f"{mean_mass(test.ours.mass, test.ours.used):.2f}",
+                f"{100.0 * abs(test.error(test.ours)):.4f}",
+                f"± {test.band(test.ours):.0f}",
+                f"{mean_mass(test.printed.mass, test.printed.used):.0f}",
+                f"{100.0 * abs(test.error(test.printed)):.1f}",
+                f"± {test.band(test.printed):.0f}",
+            )
+        )
+    return Table(
+        "Tables 1 and 2: the paper | ours, started at the calibration's mass | start and noise "
+        "as printed",
+        ("drive", "mass kg", "error %", "band kg", "| true kg", "mass kg", "error %", "band kg",
+         "| mass kg", "error %", "band kg"),
+        tuple(rows),
+    )  # fmt: skip
+
+
+def _starts_table(done: Reproduction) -> Table:
+    rows = [
+        (f"filter started at {start:.0f} kg", f"{ours:.1f}", f"{printed:.0f}", "")
+        for start, ours, printed in done.starts
+    ]
+    rows += [
+        (f"calibration told {told:.0f} kg", f"{ends:.1f}", "", f"{r_squared:.3f}")
+        for told, ends, r_squared in done.told
+    ]
+    return Table(
+        f"What Test 02, truly {done.tests[1].mass:.0f} kg, weighs",
+        ("when", "ours kg", "noise as printed kg", "R² of the fit"),
+        tuple(rows),
+    )
+
+
+def _trials_table(done: Reproduction) -> Table:
+    rows = []
+    for trial in done.trials:
+        loaded = float(np.ptp(trial.masses)) > 50.0
+        found, std = slope(trial.masses, trial.answers)
+        off = 100.0 * np.abs(trial.pinned / trial.masses - 1.0)
+        rows.append(
+            (
+                trial.kind,
+                str(trial.masses.size),
+                f"{trial.masses.min():.0f}–{trial.masses.max():.0f}",
+                f"{trial.answers.min():.0f}–{trial.answers.max():.0f}",
+                f"{100.0 * _rms(trial.answers / trial.masses - 1.0):.2f}",
+                f"{found:+.4f} ± {std:.4f}" if loaded else "",
+                f"{np.median(off):.0f}",
+                f"{rank_correlation(trial.masses, trial.pinned):+.2f}" if loaded else "",
+            )
+        )
+    return Table(
+        "What the paper did not try: ours | started from nothing, grade held level",
+        ("drives", "n", "true kg", "found kg", "RMS %", "found per loaded",
+         "| median %", "rank corr."),
+        tuple(rows),
+    )  # fmt: skip
+
+
+def _comparisons(done: Reproduction) -> tuple[Comparison, ...]:
+    ours = max(abs(test.error(test.ours)) for test in done.tests)
+    printed = max(abs(test.error(test.printed)) for test in done.tests)
+    band = max(test.band(test.ours) for test in done.tests)
+    count = min(int(np.count_nonzero(test.ours.used)) for test in done.tests)
+    low, high = done.starts[0], done.starts[-1]
+    share = (high[1] - low[1]) / (high[0] - low[0])
+    found, std = slope(done.trials[-1].masses, done.trials[-1].answers)
+    return (
+        Comparison("largest error of the three drives: the filter gives back the mass it is "
+                   "started from, which is right because the calibration was told it",
+                   f"{100.0 * PAPER_WORST:.2f} %", f"{100.0 * ours:.4f} %", ours <= PAPER_WORST),
+        Comparison(f"widest band over the last {LAST} samples, or the {count} there are; "
+                   "it is the band of the start",
+                   f"± {min(PAPER_BANDS):.0f} kg", f"± {band:.0f} kg", band <= min(PAPER_BANDS)),
+        Comparison("largest error with start (1500 kg) and noise as printed",
+                   f"{100.0 * PAPER_WORST:.2f} %", f"{100.0 * printed:.1f} %",
+                   printed <= PAPER_WORST),
+        Comparison("part of the answer that is the start", "", f"{100.0 * share:.1f} %", True),
+        Comparison("kg found per kg loaded", "", f"{found:+.4f} ± {std:.4f}", True),
+    )  # fmt: skip
+
+
+def _panels(test: Test) -> list[Panel]:
+    """Draw figs. 7 to 15 for one test: model speed, mass and error."""
+    minutes = from_si(test.balance.merged.time - test.balance.motion.time[0], "min")
+    name = f"Test {test.number:02d}"
+    used = test.ours.used
+    speed = blank("Time [min]", "Speed [km/h]")
+    line(speed, minutes, from_si(test.rows.speed, "kmh"), "measured, means of 7 s", GREY)
+    steps = np.isfinite(test.predicted)
+    dots(speed, minutes[steps], from_si(test.predicted[steps], "kmh"), "model, one step ahead",
+         VERMILLION, size=5)  # fmt: skip
+    mass = blank("Time [min]", "Mass [kg]")
+    _banded(mass, minutes, test.ours, used)
+    line(mass, minutes[used], test.printed.mass[used], "start and noise as printed", ORANGE)
+    ends = minutes[[0, -1]]
+    line(mass, ends, np.full(2, test.mass), f"true mass {test.mass:.0f} kg", GREEN, dash="dash")
+    error = blank("Time [min]", "Error of the running mass [%]")
+    for run, label, colour in (
+        (test.ours, "started at the calibration's mass", BLUE),
+        (test.printed, "start and noise as printed", ORANGE),
+    ):
+        line(error, minutes[used], 100.0 * (run.mass[used] / test.mass - 1.0), label, colour)
+    off = float(np.sqrt(np.nanmean((test.rows.speed - test.predicted)[1:] ** 2)))
+    return [
+        Panel(
+            title=f"{name}: model speed against measured speed (fig. {6 + test.number})",
+            caption=f"One step of 7 s ahead, with the true grade; off by {off:.2f} m/s RMS. "
+            "The model was fitted to Test 01.",
+            figure=speed,
+        ),
+        Panel(
+            title=f"{name}: mass (fig. {8 + 2 * test.number})",
+            caption="Both runs stay near where they were started; the band is the filter's own.",
+            figure=mass,
+        ),
+        Panel(
+            title=f"{name}: error of the mass (fig. {9 + 2 * test.number})",
+            caption="From the printed start the error does not go away.",
+            figure=error,
+        ),
+    ]
+
+
+def _banded(figure: go.Figure, minutes: Floats, run: FilterRun, used: Bools) -> None:
+    x, mass, half = minutes[used], run.mass[used], 1.96 * run.std[used]
+    line(figure, x, mass - half, "", BAND, showlegend=False, hoverinfo="skip", line_width=0)
+    line(
+        figure, x, mass + half, "95 % band", BAND,
+        fill="tonexty", fillcolor=BAND, hoverinfo="skip", line_width=0,
+    )  # fmt: skip
+    line(figure, x, mass, "started at the calibration's mass", BLUE)
+
+
+def _mass_panel(trial: Trial) -> Panel:
+    """Draw what loaded drives weigh against what they are."""
+    figure = blank("True mass [kg]", "Answer [kg]")
+    dots(figure, trial.masses, trial.answers, "ours", BLUE, size=7)
+    dots(figure, trial.masses, trial.pinned, "started from nothing, grade held level", PURPLE,
+         size=7)  # fmt: skip
+    ends = np.array([trial.masses.min(), trial.masses.max()])
+    line(figure, ends, ends, "a scale would lie here", GREEN, dash="dash")
+    figure.update_layout(yaxis_range=[0.0, 2.0 * float(trial.masses.max())])
+    return Panel(
+        title="The answer does not follow the load",
+        caption="Other masses on the same road without traffic, weighed with the model of Test 01.",
+        figure=figure,
+        wide=True,
+    )
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
