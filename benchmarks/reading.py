@@ -3,7 +3,7 @@
 Run from the checkout: ``python benchmarks/reading.py``. Recorded: the MF4 files of
 ``../shared/data`` of about 2.5 MB. Synthetic: one hour of a 500 kbit/s bus, 2400 frames a
 second (about 60 % load), with 40 identifiers of which a DBC decodes two signals of 100 Hz,
-and OBD-II answers ten times a second; as MF4, BLF and candump log. The loop of python-can
+and OBD-II answers ten times a second; as MF4, BLF, candump, ASC and TRC. The loop of python-can
 and cantools over the same frames, with the same signals, is timed on the first five minutes.
 Every reading is a process of its own, so that its memory is its own.
 """
@@ -17,6 +17,8 @@ import sys
 import tempfile
 import time
 import zlib
+from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -53,8 +55,6 @@ def synthetic(seconds: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def write_mf4(path: Path, seconds: int) -> None:
-    from datetime import UTC, datetime
-
     from asammdf import MDF, Signal, Source
 
     t, identifier, data = synthetic(seconds)
@@ -96,17 +96,44 @@ def write_blf(path: Path, seconds: int) -> None:
             file.write(struct.pack("<H6xL4x", 2, len(plain)) + packed + bytes(size % 4))
 
 
-def write_candump(path: Path, seconds: int) -> None:
+def lines(path: Path, seconds: int, head: str, line: Callable[[int, float, int, str], str]) -> None:
+    """Write one line of text a frame, of its number, time, identifier and bytes."""
     t, identifier, data = synthetic(seconds)
     with path.open("w") as file:
+        file.write(head)
         for at in range(0, t.size, 100_000):
             part = slice(at, at + 100_000)
+            rows = zip(t[part].tolist(), identifier[part].tolist(), data[part], strict=True)
             file.writelines(
-                f"({START + s:.6f}) can1 {i:03X}#{d.tobytes().hex().upper()}\n"
-                for s, i, d in zip(t[part].tolist(), identifier[part].tolist(), data[part],
-                                   strict=True)
-            )  # fmt: skip
+                line(at + k, s, i, d.tobytes().hex(" ").upper()) for k, (s, i, d) in enumerate(rows)
+            )
 
+
+def write_candump(path: Path, seconds: int) -> None:
+    lines(path, seconds, "", lambda _, s, i, d: f"({START + s:.6f}) can1 {i:03X}#"
+          f"{d.replace(' ', '')}\n")  # fmt: skip
+
+
+def write_asc(path: Path, seconds: int) -> None:
+    date = datetime.fromtimestamp(START).strftime("%a %b %d %H:%M:%S.0 %Y")
+    head = f"date {date}\nbase hex  timestamps absolute\ninternal events logged\n"
+    lines(path, seconds, f"{head}Begin Triggerblock {date}\n 0.000000 Start of measurement\n",
+          lambda _, s, i, d: f" {s:.6f} 1  {i:<15X} Rx   d 8 {d}\n")  # fmt: skip
+
+
+def write_trc(path: Path, seconds: int) -> None:
+    head = f";$FILEVERSION=2.1\n;$STARTTIME={START / 86400 + 25569}\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n"
+    lines(path, seconds, head,
+          lambda k, s, i, d: f"{k:>7} {1e3 * s:13.3f} DT  1 {i:>8X} Rx -  8    {d}\n")  # fmt: skip
+
+
+WRITERS = {
+    ".mf4": write_mf4,
+    ".blf": write_blf,
+    ".log": write_candump,
+    ".asc": write_asc,
+    ".trc": write_trc,
+}
 
 # The largest the process itself ever was; getrusage would count its parent's before exec.
 PEAK = """
@@ -180,16 +207,16 @@ def main(seconds: int = 3600) -> None:
         dbc = Path(folder, "motion.dbc")
         dbc.write_text(DBC)
         mapping = json.dumps(MAPPING)
-        for suffix, write in ((".mf4", write_mf4), (".blf", write_blf), (".log", write_candump)):
+        for suffix, write in WRITERS.items():
             log = Path(folder, f"hour{suffix}")
             began = time.perf_counter()
             write(log, seconds)
             print(f"# written in {time.perf_counter() - began:.0f} s", file=sys.stderr)
             show(f"synthetic {suffix}", log, run(READ, log, mapping, dbc))
             log.unlink()
-        for suffix, write in ((".blf", write_blf), (".log", write_candump)):
+        for suffix in (".blf", ".log", ".asc", ".trc"):
             log = Path(folder, f"loop{suffix}")
-            write(log, 300)
+            WRITERS[suffix](log, 300)
             show(f"five minutes {suffix}", log, run(READ, log, mapping, dbc))
             show(f"five minutes {suffix}, python-can and cantools", log, run(LOOP, log, "", dbc))
 

@@ -128,5 +128,8 @@ if __name__ == "__main__":
         with can.Logger(HERE / f"can{suffix}") as logger:
             for message in frames():
                 logger(message)
+    # python-can writes where the file lay on this machine.
+    trace = HERE / "can.trc"
+    trace.write_bytes(trace.read_bytes().replace(str(HERE).encode() + b"/", b""))
     write_mf4(HERE / "can.mf4", frames())
     (HERE / "golden.dbc").write_text(DBC, encoding="utf-8")

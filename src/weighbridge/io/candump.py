@@ -45,7 +45,7 @@ def read_candump(path: Path, table: str | None, mapping: TableMapping | None) ->
     parts: list[Frames] = []
     channels: dict[str, int] = {}
     lines = strange = 0
-    for block in _blocks(path):
+    for block in whole_lines(path):
         frames, total, bad = _parse(block, channels)
         lines, strange = lines + total, strange + bad
         parts.append(frames)
@@ -63,8 +63,8 @@ def read_candump(path: Path, table: str | None, mapping: TableMapping | None) ->
     return log
 
 
-def _blocks(path: Path) -> Iterator[bytes]:
-    """Whole lines of a file, many at a time."""
+def whole_lines(path: Path) -> Iterator[bytes]:
+    """Whole lines of a text file, many at a time."""
     with path.open("rb") as file:
         rest = b""
         while block := file.read(_BLOCK):

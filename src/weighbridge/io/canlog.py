@@ -1,20 +1,27 @@
-"""Frames of ASC, TRC and python-can's CSV, as python-can parses them."""
+"""Frames of Vector's ASC, PEAK's TRC and python-can's CSV.
+
+The forms of ASC and TRC are those that python-can reads and writes; an hour of a busy bus is too
+much for its loop over messages.
+"""
 
 from __future__ import annotations
 
-import logging
-from array import array
-from collections.abc import Iterable, Iterator
+import math
+import re
+from datetime import datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
-from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io.frames import EXTENDED_MASK, Frames
+from weighbridge.errors import DriveError
+from weighbridge.io.candump import whole_lines
+from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
+from weighbridge.kernels.frame_text import FrameRows, TraceColumns, parse_asc, parse_trace
 from weighbridge.signals import Problem
 
 CSV_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
@@ -23,21 +30,76 @@ CSV_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 _EPOCH_LIKE: Final = 1e8
 _LONGEST: Final = 64
 
+# Lines of an ASC log that change how the lines after them are read.
+_ASC_MARK: Final = re.compile(
+    rb"^[ \t]*(?:(?:date|begin[ \t]+triggerblock)[ \t]+\w+[ \t]+(?P<date>[^\r\n]+)"
+    rb"|base[ \t]+(?P<base>hex|dec)(?:[ \t]+timestamps[ \t]+(?P<stamps>absolute|relative))?)",
+    re.IGNORECASE | re.MULTILINE,
+)
+_ASC_DATE: Final = re.compile(
+    r"(?P<month>[^\W\d]{3})\w*\s+(?P<day>\d{1,2})\s+(?P<hour>\d{1,2}):(?P<minute>\d{2}):"
+    r"(?P<second>\d{2})(?P<part>\.\d+)?(?:\s+(?P<half>[ap]m))?\s+(?P<year>\d{4})",
+    re.IGNORECASE,
+)
+_MONTHS: Final = {
+    name: k + 1
+    for names in (
+        "jan feb mar apr may jun jul aug sep oct nov dec",
+        "jan feb mär apr mai jun jul aug sep okt nov dez",
+    )
+    for k, name in enumerate(names.split())
+}
+
+_TRACE_KEY: Final = re.compile(rb"^;\$(?P<key>[A-Z]+)=(?P<value>[^\r\n]*)", re.MULTILINE)
+
+
+def _kinds(*words: str) -> NDArray[np.int64]:
+    return np.array([256 * ord(w[0]) + ord(w[1]) for w in words], np.int64)
+
+
+_RECEIVED: Final = _kinds("Rx", "Tx")
+_TYPES: Final = _kinds("DT", "FD", "FB", "FE", "BI")
+_TRACE_VERSIONS: Final[dict[str, TraceColumns]] = {
+    "1.0": TraceColumns(1, -1, -1, 2, 3, 4, False, _kinds()),
+    "1.1": TraceColumns(1, -1, 2, 3, 4, 5, False, _RECEIVED),
+    "1.3": TraceColumns(1, 2, 3, 4, 6, 7, False, _RECEIVED),
+    "2.0": TraceColumns(1, -1, 2, 3, 5, 6, True, _TYPES),
+    "2.1": TraceColumns(1, 3, 2, 4, 7, 8, True, _TYPES),
+}
+"""Where the words of a line stand, by version of the file."""
+
 
 def read_asc(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
     """Read the frames of a Vector ASC log; see `weighbridge.io.log.Reader`.
+
+    Dates are those of the recording computer's clock, taken in the time zone of this one.
 
     Raises
     ------
     DriveError
         No frame in it.
-    MissingExtraError
-        python-can is not installed.
     """
-    can = _library(path)
-    with path.open("r", encoding="utf-8", errors="replace") as file:
-        # Counts buses from 0 where the log counts from 1.
-        return _read(path, can.ASCReader(file, relative_timestamp=False), 1)
+    parts: list[Frames] = []
+    strange, start, clock = 0, 0.0, 0.0
+    decimal = relative = False
+    for k, block in enumerate(whole_lines(path)):
+        marks = [*_ASC_MARK.finditer(block)] if k == 0 or b"riggerblock" in block else []
+        edges = [0, *(m.start() for m in marks), len(block)]
+        for mark, begin, end in zip([None, *marks], edges[:-1], edges[1:], strict=True):
+            if mark is not None and mark["date"] is not None:
+                start = _asc_date(mark["date"].decode("latin-1")) or start
+                clock = 0.0
+            elif mark is not None:
+                decimal = mark["base"].lower() == b"dec"
+                relative = (mark["stamps"] or b"").lower() == b"relative"
+            text = block[begin:end]
+            rows = _room(text, _LONGEST if b"CANFD" in text else 8)
+            count, bad, clock = parse_asc(
+                np.frombuffer(text, np.uint8), rows, decimal, relative, clock
+            )
+            strange += bad
+            parts.append(_frames(rows, count, start))
+    return _log(path, parts, strange)
 
 
 def read_trc(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -46,13 +108,102 @@ def read_trc(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     Raises
     ------
     DriveError
-        No frame in it.
-    MissingExtraError
-        python-can is not installed.
+        No frame in it, or its version is not known.
     """
-    can = _library(path)
-    with path.open("r", encoding="utf-8", errors="replace") as file:
-        return _read(path, can.TRCReader(file), 0)
+    parts: list[Frames] = []
+    strange = 0
+    columns, start = _TRACE_VERSIONS["1.0"], 0.0
+    for k, block in enumerate(whole_lines(path)):
+        if k == 0:
+            columns, start = _trace_head(path, block)
+        for width in (8, _LONGEST):
+            rows = _room(block, width)
+            count, bad = parse_trace(np.frombuffer(block, np.uint8), rows, columns)
+            if not bad:
+                break
+        strange += bad
+        parts.append(_frames(rows, count, start))
+    return _log(path, parts, strange)
+
+
+def _room(text: bytes, width: int) -> FrameRows:
+    """Room for one frame a line."""
+    n = text.count(b"\n") + 1
+    return FrameRows(
+        np.zeros(n), np.zeros(n, np.int16), np.zeros(n, np.uint32), np.zeros(n, np.bool_),
+        np.zeros(n, np.uint8), np.zeros((n, width), np.uint8),
+    )  # fmt: skip
+
+
+def _frames(rows: FrameRows, count: int, start: float) -> Frames:
+    return Frames(rows[0][:count] + start, *(r[:count].copy() for r in rows[1:]))
+
+
+def _log(path: Path, parts: list[Frames], strange: int) -> Log:
+    frames = in_order(parts)
+    if not len(frames):
+        raise DriveError(
+            f"{path} holds no CAN frame that can be read; record it again, or copy it again"
+        )
+    log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
+    if strange:
+        log.problems.append(
+            Problem(
+                "",
+                f"{path.name}: {strange} of {strange + len(frames)} lines with frames are damaged "
+                "and were left out",
+            )
+        )
+    return log
+
+
+def _asc_date(text: str) -> float | None:
+    """Seconds since 1970 of ``Sep 13 12:26:40.0 2020``, with or without am and pm."""
+    found = _ASC_DATE.match(text.strip())
+    month = _MONTHS.get(found["month"].lower()) if found else None
+    if found is None or month is None:
+        return None
+    hour = int(found["hour"])
+    if found["half"]:
+        hour = hour % 12 + (12 if found["half"].lower() == "pm" else 0)
+    try:
+        day = datetime(
+            int(found["year"]), month, int(found["day"]), hour, int(found["minute"]),
+            int(found["second"]),
+        )  # fmt: skip
+        return day.timestamp() + float(found["part"] or 0.0)
+    except (ValueError, OverflowError, OSError):
+        return None
+
+
+def _trace_head(path: Path, block: bytes) -> tuple[TraceColumns, float]:
+    """Columns and start [s since 1970] that the head of a TRC log tells."""
+    told = {m["key"].upper(): m["value"].strip() for m in _TRACE_KEY.finditer(block)}
+    version = told.get(b"FILEVERSION", b"1.0").decode("latin-1")
+    if version not in _TRACE_VERSIONS:
+        raise DriveError(
+            f"{path} is of TRC version {version}; known are {', '.join(_TRACE_VERSIONS)}: "
+            "convert it"
+        )
+    columns = _TRACE_VERSIONS[version]
+    if version.startswith("2"):
+        names = told.get(b"COLUMNS", b"N,O,T,B,I,d,R,L,D").decode("latin-1").split(",")
+        lacking = [n for n in ("O", "T", "I", "D") if n not in names]
+        if lacking or not {"l", "L"} & set(names):
+            raise DriveError(f"{path}: its $COLUMNS lack {', '.join(lacking) or 'l'}; convert it")
+        size = "l" if "l" in names else "L"
+        columns = columns._replace(
+            time=names.index("O"), bus=names.index("B") if "B" in names else -1,
+            kind=names.index("T"), identifier=names.index("I"), size=names.index(size),
+            data=names.index("D"), coded=size == "L",
+        )  # fmt: skip
+    try:
+        days = float(told.get(b"STARTTIME", b"nan"))
+    except ValueError:
+        days = math.nan
+    # Days since the end of 1899.
+    start = (days - 25569.0) * 86400.0
+    return columns, start if math.isfinite(start) else 0.0
 
 
 def is_can_csv(path: Path) -> bool:
@@ -114,65 +265,3 @@ def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) ->
             )
         )
     return log
-
-
-def _library(path: Path) -> Any:
-    try:
-        import can
-    except ImportError:
-        raise MissingExtraError("python-can", "can", f"reading {path.name}") from None
-    logging.getLogger("can").setLevel(logging.ERROR)
-    return can
-
-
-def _read(path: Path, messages: Iterable[Any], first_channel: int) -> Log:
-    time, identifier = array("d"), array("L")
-    channel, length = array("h"), array("B")
-    flags, data = bytearray(), bytearray()
-    found: list[str] = []
-    for m in _until_damaged(messages, found):
-        if m.is_error_frame or m.is_remote_frame:
-            continue
-        content = bytes(m.data[:_LONGEST])
-        time.append(m.timestamp)
-        identifier.append(m.arbitration_id & EXTENDED_MASK)
-        flags.append(m.is_extended_id)
-        bus = m.channel if isinstance(m.channel, int) else 0
-        channel.append(min(max(bus + first_channel, 0), 32_000))
-        length.append(len(content))
-        data += content.ljust(_LONGEST, b"\0")
-    damage = found[0] if found else ""
-    if not time:
-        raise DriveError(
-            f"{path} holds no CAN frame that can be read{f' ({damage})' if damage else ''}; "
-            "record it again, or copy it again"
-        )
-    sizes = np.array(length, np.uint8)
-    width = 8 if sizes.max() <= 8 else _LONGEST
-    frames = Frames(
-        np.array(time),
-        np.array(channel, np.int16),
-        np.array(identifier, np.uint32),
-        np.frombuffer(flags, np.bool_).copy(),
-        sizes,
-        np.frombuffer(data, np.uint8).reshape(-1, _LONGEST)[:, :width].copy(),
-    )
-    log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
-    if damage:
-        log.problems.append(
-            Problem(
-                "",
-                f"{path.name} is damaged or was cut off ({damage}); {len(frames)} frames could be "
-                "read",
-            )
-        )
-    return log
-
-
-def _until_damaged(messages: Iterable[Any], damage: list[str]) -> Iterator[Any]:
-    """Messages up to the first that the library cannot parse."""
-    try:
-        yield from messages
-    # The library's errors on damaged text are of many kinds.
-    except Exception as error:
-        damage.append((str(error).split("\n", 1)[0] or type(error).__name__)[:80])
