@@ -437,7 +437,7 @@ def test_ways_follow_from_signals(sane):
     found = inspect_drive(sane, CAR)
     assert found.problems == ()
     assert [s.name for s in found.signals][:2] == ["accel_x", "accel_y"]
-    possible = [w for w in found.ways if w.possible]
+    possible = [w for w in found.ways if w.possible and w.torque != "speed"]
     assert {w.torque for w in possible} == {"load"}
     assert {w.motion for w in possible} == {"inertial", "speed_grade", "speed"}
     (chosen,) = (w for w in found.ways if w.chosen)
@@ -448,6 +448,15 @@ def test_ways_follow_from_signals(sane):
 
 def test_drive_without_torque_has_no_way(sane):
     found = inspect_drive(sane.without("engine_load"))
-    assert not any(w.possible for w in found.ways)
+    *with_torque, by_speed = found.ways
+    assert not any(w.possible for w in with_torque)
     assert not any(w.chosen for w in found.ways)
-    assert all(w.needs for w in found.ways)
+    assert all(w.needs for w in with_torque)
+    assert by_speed.torque == "speed"
+    assert by_speed.possible
+
+
+def test_drive_without_speed_has_no_way_at_all(sane):
+    found = inspect_drive(sane.without("vehicle_speed", "gnss_speed", "latitude", "longitude"))
+    assert not any(w.possible for w in found.ways)
+    assert found.ways[-1].needs == ("vehicle_speed",)

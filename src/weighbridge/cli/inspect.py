@@ -64,8 +64,7 @@ def _show(console: Console, found: Inspection, every_way: bool) -> None:
             console.print(f"  {mark}: {escape(p.text)}", soft_wrap=True)
     else:
         console.print("No problems found")
-    possible = [w for w in found.ways if w.possible]
-    if not possible:
+    if not any(w.possible and w.torque != "speed" for w in found.ways):
         console.print("No way to weigh by this drive; the nearest one:")
     console.print(_way_table(found, every_way))
     console.print()
@@ -101,7 +100,9 @@ def _signal_table(found: Inspection) -> Table:
 def _way_table(found: Inspection, every_way: bool) -> Table:
     from rich.table import Table
 
-    ways = [w for w in found.ways if w.possible or every_way] or list(found.ways[:1])
+    ways = [w for w in found.ways if w.possible or every_way]
+    if not any(w.torque != "speed" for w in ways):
+        ways = [found.ways[0], *ways]
     table = Table()
     for name in ("way to weigh by", "expect", "because", "lacks"):
         table.add_column(name)

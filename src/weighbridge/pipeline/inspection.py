@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
+from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.navigation.select import IMU_SIGNALS
 from weighbridge.pipeline.checks import check_drive
+from weighbridge.pipeline.speed_calibrating import SCALE_STD
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import TorqueSource, Vehicle
@@ -65,7 +67,8 @@ class Way:
     Attributes
     ----------
     motion : where motion comes from, see `weighbridge.navigation.Motion`
-    torque : where torque comes from, see `weighbridge.vehicle.model.TorqueModel`
+    torque : where torque comes from, see `weighbridge.vehicle.model.TorqueModel`, or
+        "speed" where it is taken as proportional to the speed
     possible : whether nothing is missing
     needs : what is missing
     accuracy : what to expect of the mass after a calibration
@@ -74,7 +77,7 @@ class Way:
     """
 
     motion: MotionSource
-    torque: TorqueSource
+    torque: TorqueSource | Literal["speed"]
     possible: bool
     needs: tuple[str, ...]
     accuracy: str
@@ -84,6 +87,8 @@ class Way:
     @property
     def name(self) -> str:
         """The way in words."""
+        if self.torque == "speed":
+            return "speed without torque (speed-ekf)"
         return f"{_MOTIONS[self.motion]} and {_TORQUES[self.torque]}"
 
 
@@ -96,7 +101,8 @@ class Inspection:
     drive : the drive
     signals : one report each, table by table
     problems : found while reading and by the checks; serious ones first
-    ways : possible ones first, the most accurate first
+    ways : possible ones first, the most accurate first; last of all the one by speed
+        alone, possible or not
     """
 
     drive: Drive
@@ -234,7 +240,20 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
                 )
             )
     ways.sort(key=lambda w: (not w[1].possible, len(w[1].needs), w[0]))
-    return _mark_chosen([w for _, w in ways], vehicle)
+    return _mark_chosen([*(w for _, w in ways), _by_speed_alone(drive)], vehicle)
+
+
+def _by_speed_alone(drive: Drive) -> Way:
+    """Return the way that nearly every drive could go, and that nearly never ends in a mass."""
+    needs = () if any(drive.has(name) for name in SPEEDS) else ("vehicle_speed",)
+    return Way(
+        motion="speed",
+        torque="speed",
+        possible=not needs,
+        needs=needs,
+        accuracy=f"{100.0 * SCALE_STD:.0f} %",
+        because="no mass: speed gives back that of the calibration",
+    )
 
 
 def _mark_chosen(ways: list[Way], vehicle: Vehicle | None) -> tuple[Way, ...]:
