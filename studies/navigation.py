@@ -221,7 +221,7 @@ def pyins_pitch(drive: Drive, truth, mounting, *, motion: Motion, start: float =
 
 def compare_with_pyins(scenario: str = "car-short", seed: int = 1) -> dict[str, float]:
     """RMS error of body pitch on one simulated drive after 60 s, while moving [deg]."""
-    from weighbridge.simulation.scenario import make_scenario
+    from weighbridge.simulation import make_scenario
     from weighbridge.simulation.simulate import simulate_car
 
     made = simulate_car(make_scenario(scenario, seed=seed))

@@ -12,9 +12,12 @@ from weighbridge.simulation import (
     ABOUT,
     BUS,
     COMPACT,
+    DIESEL_AUTOMATIC,
     ELECTRIC,
     MIDSIZE,
     SCENARIOS,
+    TRUCK18,
+    VAN,
     Braking,
     Effects,
     Loading,
@@ -25,7 +28,9 @@ from weighbridge.simulation import (
     make_scenario,
     mixed_route,
     random_car,
+    random_vehicle,
     simulate_car,
+    usual_polling,
 )
 from weighbridge.simulation.route import _turn
 
@@ -453,6 +458,138 @@ def test_passengers_get_on_and_off_the_urban_bus():
     assert truth.mass.max() > BUS.mass + 800.0
 
 
+def quiet(name, duration=None, **changes):
+    sensors = Sensors(imu_rate=0.0, gnss_rate=0.0)
+    return replace(make_scenario(name, seed=4), sensors=sensors, duration=duration, **changes)
+
+
+def test_converter_slips_below_its_lock_up_and_stands_idling():
+    truth = simulate_car(quiet("diesel", 700.0)).truth
+    car = DIESEL_AUTOMATIC
+    gearing = np.array(car.gearings)[truth.gear.astype(int) - 1]
+    moving = truth.speed > 3.0
+    ratio = gearing * truth.speed / truth.engine_speed
+    locked = moving & (truth.phase == 0)
+    open_converter = (truth.speed > 0.5) & (truth.phase == 2) & (truth.pedal > 0.1)
+    assert_allclose(ratio[locked], 1.0, atol=0.05)
+    assert locked.sum() > 3000
+    assert open_converter.sum() > 100
+    assert np.all(ratio[open_converter] < 1.02)
+    assert ratio[open_converter].min() < 0.5
+    assert ratio[open_converter & moving].min() < 0.95
+    assert truth.gear[locked].min() >= car.lock_gear
+    standing = truth.speed == 0.0
+    assert standing.sum() > 500
+    assert_allclose(np.median(truth.engine_speed[standing]), car.idle_speed, rtol=0.01)
+
+
+def test_converter_multiplies_torque_at_a_launch():
+    scenario = quiet("diesel", 60.0, start_rest=4.0, effects=Effects.none())
+    truth = simulate_car(replace(scenario, route=flat_route(3000.0))).truth
+    start = np.flatnonzero(truth.speed > 0.3)[0]
+    first = DIESEL_AUTOMATIC.gearings[0]
+    assert truth.gear[start] == 1.0
+    assert truth.traction_force[start] > 1.4 * first * truth.engine_torque[start]
+
+
+def test_powershift_keeps_pulling_and_an_automated_box_does_not():
+    least = {}
+    for name in ("diesel", "truck"):
+        truth = simulate_car(quiet(name, 60.0, start_rest=4.0, route=flat_route(3000.0))).truth
+        upshifts = np.flatnonzero((np.diff(truth.gear) > 0) & (truth.pedal[1:] > 0.3))
+        assert upshifts.size >= 2
+        pulls = [truth.traction_force[k : k + 20].min() / truth.traction_force[k - 1]
+                 for k in upshifts[:2]]  # fmt: skip
+        least[name] = max(pulls)
+    assert least["diesel"] > 0.3
+    assert least["truck"] < 0.05
+
+
+@pytest.mark.parametrize("payload", [0.0, 9000.0])
+def test_truck_drives_like_a_truck(payload):
+    truth = simulate_car(quiet("truck", 2700.0, payload=payload)).truth
+    assert_allclose(truth.mass[0], 9000.0 + payload)
+    assert 85.0 < truth.speed.max() * 3.6 < 97.0
+    assert truth.accel.max() < 1.8
+    assert truth.engine_speed.max() < TRUCK18.max_speed * 1.03
+    assert truth.engine_speed.min() > 0.95 * TRUCK18.idle_speed
+    assert set(np.unique(truth.gear)) >= {4.0, 6.0, 8.0, 10.0, 12.0}
+    litres = np.trapezoid(truth.fuel_flow, truth.time) / 0.835 / truth.distance[-1] * 1e5
+    assert 18.0 < litres < 42.0
+
+
+def test_full_truck_slows_down_on_a_hill_and_holds_the_power_of_its_engine():
+    up = flat_route(5000.0)
+    up = replace(up, grade=np.where(np.arange(up.grade.size) > 1000, 0.06, 0.0))
+    scenario = quiet("truck", 300.0, start_rest=2.0, payload=9000.0, route=up)
+    truth = simulate_car(replace(scenario, effects=Effects.only())).truth
+    steady = (truth.distance > 3000.0) & (truth.distance < 4500.0) & (truth.phase == 0)
+    power = np.mean((truth.engine_torque * truth.engine_speed)[steady])
+    # Weight lifted and rolled, and air at this speed, by an engine of at most 213 kW.
+    speed = truth.speed[steady].mean()
+    needed = 18_000 * 9.81 * (np.sin(0.06) + 0.0065) * speed + 0.5 * 1.2 * 5.5 * speed**3
+    assert 9.0 < speed < 16.0
+    assert needed < power < 1.08 * needed
+    assert 140e3 < power < 215e3
+
+
+def test_heavy_vehicles_broadcast_and_others_are_polled():
+    assert usual_polling(TRUCK18).net_torque
+    assert usual_polling(VAN).fast == ("vehicle_speed", "engine_speed", "engine_load", "throttle")
+    assert "engine_torque" in usual_polling(ELECTRIC).fast
+    assert "mass_air_flow" in usual_polling(MIDSIZE).fast
+    signals = simulate_car(quiet("truck", 60.0)).drive.signals
+    assert_allclose(np.median(np.diff(signals["engine_torque_fraction"].time)), 0.05, rtol=0.02)
+    assert_allclose(np.median(np.diff(signals["vehicle_speed"].time)), 0.1, rtol=0.02)
+
+
+def test_load_of_a_diesel_is_of_the_torque_there_is_at_that_speed():
+    effects = replace(Effects(), load_nonlinearity=0.0, load_smoothing=0.0, warm_up=0.0)
+    truth = simulate_car(quiet("van", 400.0, effects=effects)).truth
+    full = np.interp(truth.engine_speed, VAN.curve_speed, VAN.curve_torque)
+    pulling = (truth.phase == 0) & (truth.engine_torque > 50.0)
+    share = (truth.engine_torque / full)[pulling]
+    # Friction and accessories count on both sides.
+    assert np.all(truth.load[pulling] > share - 0.01)
+    assert_allclose(truth.load[pulling], share, atol=0.25)
+    assert np.corrcoef(truth.load[pulling], share)[0, 1] > 0.99
+
+
+def test_squat_of_a_van_grows_with_its_load():
+    lean = []
+    for payload in (0.0, 1400.0):
+        effects = Effects.only(squat=1.0, traffic=1.0)
+        truth = simulate_car(
+            quiet("van", 120.0, payload=payload, effects=effects, route=flat_route(2000.0))
+        ).truth
+        lean.append((truth.accel @ truth.pitch) / (truth.accel @ truth.accel))
+    assert_allclose(lean[1] / lean[0], 1.0 + 0.7 * 1400 / 2100, rtol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("kind", "vehicle_class"),
+    [
+        ("petrol_manual", "car"),
+        ("petrol_dct", "car"),
+        ("diesel_automatic", "car"),
+        ("electric", "car"),
+        ("van", "van"),
+        ("truck", "truck"),
+    ],
+)
+def test_random_vehicles_of_every_kind_drive(kind, vehicle_class):
+    rng = np.random.default_rng(12)
+    drawn = [random_vehicle(rng, kind) for _ in range(2)]
+    assert drawn[0].mass != drawn[1].mass
+    for car in drawn:
+        assert car.kind == vehicle_class
+        truth = simulate_car(short(car=car, sensors=Sensors(imu_rate=0.0, gnss_rate=0.0))).truth
+        assert truth.speed.max() > 6.0
+    if kind.startswith("petrol"):
+        wanted = {"petrol_manual": "manual", "petrol_dct": "dual_clutch"}[kind]
+        assert {car.transmission for car in drawn} == {wanted}
+
+
 def test_every_scenario_is_described():
     assert set(ABOUT) == set(SCENARIOS)
 
@@ -475,6 +612,7 @@ def test_every_scenario_is_described():
         (lambda: Polling(speed_step=0.0), "speed_step must be positive"),
         (lambda: Braking(time=5.0, duration=0.0, decel=1.0), "a braking needs"),
         (lambda: replace(BUS, launch_gear=9), "launch_gear"),
+        (lambda: random_vehicle(np.random.default_rng(1), "tank"), "unknown kind of vehicle"),
         (lambda: replace(BUS, transmission="automatic"), "converter_capacity"),
         (lambda: replace(MIDSIZE, gear_ratios=(1.0, 2.0)), "gear_ratios"),
         (lambda: replace(MIDSIZE, mass=-1.0), "mass"),

@@ -15,7 +15,8 @@ def simulate(
         str,
         typer.Argument(
             help="car, car-calibration, car-short, car-loading, highway, compact, "
-            "compact-calibration, electric, bus or bus-urban.",
+            "compact-calibration, electric, bus, bus-urban, bus-calibration, diesel, "
+            "diesel-calibration, van, van-calibration, truck or truck-calibration.",
             show_default=False,
         ),
     ],

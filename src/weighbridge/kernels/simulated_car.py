@@ -17,6 +17,7 @@ from weighbridge.kernels.simulated_driveline import (
     choose_gear,
     converter_torques,
     crank_drag,
+    foot_off,
     fuel_flow,
     transmit,
 )
@@ -123,9 +124,9 @@ def _resist(road, resistance, weather, where, v, mass, cold):
 
 
 @inlined_kernel
-def _brake(brake, braking, electric, wanted, coasting, at_stop, inertia, slope, resistance, dt):
+def _brake(brake, braking, electric, wanted, coasting, at_stop, inertia, push, resistance, dt):
     """Brake force [N], and whether the pedal is pressed, from the acceleration wanted and
-    the one the vehicle has with the foot off the pedal.
+    the one the vehicle has with the foot off the pedal; at a stop, against what pushes.
     """
     if electric:
         braking = wanted < coasting - 0.02 or at_stop
@@ -137,7 +138,7 @@ def _brake(brake, braking, electric, wanted, coasting, at_stop, inertia, slope, 
     if braking:
         asked = max(0.0, inertia * (coasting - wanted))
         if at_stop:
-            asked = inertia + abs(slope)
+            asked = inertia + push
     lag = resistance.brake_fall if asked < brake else resistance.brake_rise
     brake += (asked - brake) * dt / lag
     if brake < 5.0 and not braking:
@@ -156,7 +157,7 @@ def _press(power, shaft, drag, torque_wanted, coast, braking, v, dt):
         torque_wanted = drag.lowest
     torque_wanted = min(drag.full, max(drag.lowest, torque_wanted))
     pedal_torque = shaft.pedal_torque + (torque_wanted - shaft.pedal_torque) * dt / 0.25
-    return pedal_torque, max(0.0, pedal_torque / max(drag.full, 1.0))
+    return pedal_torque, min(2.0, max(0.0, pedal_torque / max(drag.full, 1.0)))
 
 
 @inlined_kernel
@@ -254,20 +255,18 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         if stood:
             load = loaded(road, intent)
         inertia = mass + power.wheel_mass
-        coasting = (
-            gearing
-            * (crank_side.lowest - crank_side.loss_constant)
-            * (1.0 if shaft.locked else 0.0)
-            - resist
-        ) / inertia
+        idle_force = gearing * foot_off(power, shaft, crank_side, sync)
+        coasting = (idle_force - resist) / inertia
         brake, braking = _brake(
             brake, braking, power.electric, intent.wanted, coasting, intent.at_stop, inertia,
-            slope, resistance, dt,
+            abs(slope) + max(0.0, idle_force), resistance, dt,
         )  # fmt: skip
+        turning = power.engine_inertia * gearing * gearing
+        if power.automated and shaft.phase != DRIVING:
+            # Behind a slipping clutch the engine need not gain speed with the vehicle.
+            turning = 0.0
         torque_wanted = (
-            ((inertia + power.engine_inertia * gearing * gearing) * intent.wanted + resist)
-            / gearing
-            + crank_side.loss_constant
+            ((inertia + turning) * intent.wanted + resist) / gearing + crank_side.loss_constant
         ) * (1.0 + power.loss_slope)
         if power.converter > 0.0 and not shaft.locked and torque_wanted > 0.0:
             torque_wanted /= converter_torques(power, shaft.engine, sync, 1.0)[1]
@@ -277,9 +276,8 @@ def drive(road, power, resistance, driver, noise, dt, steps):
 
         # Gearbox and clutch.
         shaft = _shift(power, shaft, road, where, sync, braking, pedal_torque, pedal, dt)
-        holding = braking and v < 0.3
         shaft, gearing, net, crank = transmit(
-            power, shaft, crank_side, gearing, v, slip, pedal, braking, holding, dt
+            power, shaft, crank_side, gearing, v, slip, pedal, braking, dt
         )
 
         # Motion.

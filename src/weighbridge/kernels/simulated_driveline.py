@@ -13,9 +13,9 @@ COUPLING_POINT = 0.86
 """Turbine over pump speed from which a converter no longer multiplies torque [-]
 (Gillespie, Fundamentals of Vehicle Dynamics, 1992, ch. 2)."""
 
-STANDING_CAPACITY = 0.2
-"""Part of the converter's capacity left while the brake holds the vehicle [-]: automatics
-open a clutch at standstill to save fuel."""
+CREEPING_CAPACITY = 0.3
+"""Part of the converter's capacity left with the foot off the pedal [-]: automatics open a
+clutch a little then, to save fuel and to creep gently."""
 
 
 class Powertrain(NamedTuple):
@@ -45,6 +45,7 @@ class Powertrain(NamedTuple):
     heating_value: float  # [J/kg]
     fuel_efficiency: float  # best indicated [-]
     regeneration: float  # largest braking torque of a motor [N m]
+    automated: bool  # a control unit works the clutch: no shift stalls the engine
     converter: float  # pump torque at stall over squared speed, 0 for a clutch [N m s^2/rad^2]
     stall_ratio: float  # turbine over pump torque at stall [-]
     lock_gear: int  # lowest gear in which the converter is locked
@@ -218,7 +219,7 @@ def converter_torques(power, engine, turbine, capacity):
     straight line from stall to the coupling point. The turbine drags the pump when it is
     the faster one.
     """
-    nu = min(1.06, max(0.0, turbine / max(engine, 1.0)))
+    nu = min(1.02, max(0.0, turbine / max(engine, 1.0)))
     square = nu * nu
     pump = capacity * power.converter * (1.0 - square * square * square) * engine * engine
     ratio = 1.0
@@ -228,13 +229,26 @@ def converter_torques(power, engine, turbine, capacity):
 
 
 @inlined_kernel
+def foot_off(power, shaft, drag, sync):
+    """Torque at the gearbox input with the foot off the pedal [N m]: the engine drags, or
+    an idling one creeps through the converter.
+    """
+    if shaft.locked:
+        return drag.lowest - drag.loss_constant
+    if power.converter == 0.0:
+        return 0.0
+    pump, ratio = converter_torques(power, power.idle_speed, sync, CREEPING_CAPACITY)
+    return pump * ratio
+
+
+@inlined_kernel
 def _idling(power, engine, load):
     """Torque that brings a slow engine back to idling against a load [N m]."""
     return load + power.engine_inertia * (power.idle_speed - engine) / 0.15
 
 
 @inlined_kernel
-def through_converter(power, shaft, drag, turbine, holding, keep, dt):
+def through_converter(power, shaft, drag, turbine, pedal, keep, dt):
     """Run the engine against an open converter for one step.
 
     Parameters
@@ -243,8 +257,8 @@ def through_converter(power, shaft, drag, turbine, holding, keep, dt):
         See the types.
     turbine : float
         Speed of the turbine [rad/s].
-    holding : bool
-        Whether the brake holds the vehicle.
+    pedal : float
+        Torque asked for over torque there is [-].
     keep : float
         Part of the turbine's torque that a shift lets through [-].
     dt : float
@@ -262,18 +276,14 @@ def through_converter(power, shaft, drag, turbine, holding, keep, dt):
     before = shaft.engine
     asked = min(drag.full, max(drag.lowest, shaft.pedal_torque))
     torque = shaft.torque + (asked - shaft.torque) * dt / power.torque_lag
-    closing = (
-        shaft.gear >= power.lock_gear
-        and turbine > power.lock_speed
-        and shaft.shifting <= 0.0
-        and not holding
-    )
+    closing = shaft.gear >= power.lock_gear and turbine > power.lock_speed and shaft.shifting <= 0.0
     if closing:
         # The clutch draws the engine to the turbine's speed.
         engine = before + (turbine - before) * dt / 0.15
         net = torque - power.engine_inertia * (engine - before) / dt
         return engine, torque, net, torque, abs(engine - turbine) < 2.0
-    pump, ratio = converter_torques(power, before, turbine, STANDING_CAPACITY if holding else 1.0)
+    capacity = min(1.0, CREEPING_CAPACITY + 10.0 * pedal)
+    pump, ratio = converter_torques(power, before, turbine, capacity)
     if before < 1.05 * power.idle_speed:
         torque = max(torque, min(drag.full, _idling(power, before, pump)))
     engine = before + (torque - pump) / power.engine_inertia * dt
@@ -281,7 +291,7 @@ def through_converter(power, shaft, drag, turbine, holding, keep, dt):
 
 
 @inlined_kernel
-def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, holding, dt):
+def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
     """Turn engine, clutch and gearbox for one step.
 
     Parameters
@@ -296,8 +306,7 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, holding, dt):
         Of the driven tyres [-].
     pedal : float
         Torque asked for over torque there is [-].
-    braking, holding : bool
-        Whether the brake works, and holds the vehicle at a stop.
+    braking : bool
     dt : float
         Step [s].
 
@@ -330,10 +339,10 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, holding, dt):
         turbine = gearing * v * (1.0 + slip)
         if power.converter > 0.0 and not locked:
             engine, torque, net, crank, locked = through_converter(
-                power, shaft, drag, turbine, holding, keep, dt
+                power, shaft, drag, turbine, pedal, keep, dt
             )
         else:
-            engine = turbine
+            engine = max(turbine, power.idle_speed) if power.automated else turbine
             torque += (asked - torque) * dt / power.torque_lag
             locked = True
             net = torque * keep
@@ -341,7 +350,7 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, holding, dt):
             crank = min(full, max(lowest, crank))
         if shifting <= 0.0:
             shifting = 0.0
-    elif power.electric or (locked and sync > _lowest_locked(power)):
+    elif power.electric or (locked and sync > _lowest_locked(power, gear)):
         phase = DRIVING
         torque += (asked - torque) * dt / power.torque_lag
         if not power.electric:
@@ -354,13 +363,16 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, holding, dt):
             if gross < 0.0:
                 torque = lowest
         engine = sync
+        if engine > power.max_speed:
+            # A limiter cuts the fuel at once.
+            torque = min(torque, full)
         net = torque
         crank = torque
     elif power.converter > 0.0:
         phase = SLIPPING
         shifting = 0.0
         engine, torque, net, crank, locked = through_converter(
-            power, shaft, drag, sync, holding, 1.0, dt
+            power, shaft, drag, sync, pedal, 1.0, dt
         )
         fuel_cut = False
     else:
@@ -388,7 +400,7 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, holding, dt):
         crank = net + power.engine_inertia * (engine - before) / dt
         crank = min(full, max(lowest, crank))
         fuel_cut = False
-    slow = not power.electric and sync <= _lowest_locked(power)
+    slow = not power.electric and sync <= _lowest_locked(power, gear)
     if slow and (phase == DRIVING or (gear <= power.launch_gear and phase != SLIPPING)):
         locked = False
     return (
@@ -403,9 +415,11 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, holding, dt):
 
 
 @inlined_kernel
-def _lowest_locked(power):
+def _lowest_locked(power, gear):
     """Speed of the gearbox input below which clutch or lock-up opens [rad/s]."""
-    return 0.85 * power.lock_speed if power.converter > 0.0 else power.idle_speed * 0.98
+    if power.converter == 0.0:
+        return power.idle_speed * 0.98
+    return 0.85 * power.lock_speed if gear >= power.lock_gear else np.inf
 
 
 @inlined_kernel

@@ -39,6 +39,7 @@ class Driver(NamedTuple):
     speed_ripple: float  # of the speed wanted, relative [-]
     gain: float  # acceleration per speed error [1/s]
     rest: float  # standing before the start [s]
+    grip: float  # acceleration the driven tyres can hold [m/s^2]
 
 
 class Intent(NamedTuple):
@@ -136,8 +137,7 @@ def steer(road, driver, intent, t, s, v, ripple, speed_ripple, dt):
     here = look_up(road.target_speed, where)
     target = here * (1.0 + driver.speed_ripple * speed_ripple)
     ahead = look_up(road.target_speed, where + 2.5 * v / road.step)
-    # The front tyres grip no more than that.
-    limit = min(4.0, look_up(road.accel_limit, where) / (1.0 + v / 13.0))
+    limit = min(driver.grip, look_up(road.accel_limit, where) / (1.0 + v / 13.0))
     error = target - v
     if abs(error) < 2.0:
         integral = min(0.4, max(-0.4, integral + 0.05 * error * dt))

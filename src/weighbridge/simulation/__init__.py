@@ -1,6 +1,7 @@
 """Simulated cars on simulated roads, seen through simulated sensors."""
 
-from weighbridge.simulation.car import BUS, COMPACT, ELECTRIC, MIDSIZE, SimulatedCar, random_car
+from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar, random_car
+from weighbridge.simulation.named import ABOUT, SCENARIOS, make_scenario, usual_polling
 from weighbridge.simulation.route import (
     Route,
     bus_route,
@@ -13,25 +14,33 @@ from weighbridge.simulation.route import (
     straight_route,
 )
 from weighbridge.simulation.scenario import (
-    ABOUT,
-    SCENARIOS,
     Braking,
     Effects,
     Loading,
     Polling,
     Scenario,
     Sensors,
-    make_scenario,
 )
 from weighbridge.simulation.simulate import SimulatedDrive, Truth, simulate_car
+from weighbridge.simulation.vehicles import (
+    BUS,
+    DIESEL_AUTOMATIC,
+    TRUCK18,
+    VAN,
+    VehicleKind,
+    random_vehicle,
+)
 
 __all__ = [
     "ABOUT",
     "BUS",
     "COMPACT",
+    "DIESEL_AUTOMATIC",
     "ELECTRIC",
     "MIDSIZE",
     "SCENARIOS",
+    "TRUCK18",
+    "VAN",
     "Braking",
     "Effects",
     "Loading",
@@ -42,6 +51,7 @@ __all__ = [
     "SimulatedCar",
     "SimulatedDrive",
     "Truth",
+    "VehicleKind",
     "bus_route",
     "flat_route",
     "highway_route",
@@ -50,7 +60,9 @@ __all__ = [
     "make_scenario",
     "mixed_route",
     "random_car",
+    "random_vehicle",
     "short_route",
     "simulate_car",
     "straight_route",
+    "usual_polling",
 ]

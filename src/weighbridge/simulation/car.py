@@ -11,7 +11,8 @@ import numpy as np
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.model import VehicleClass
 
-_RPM = math.pi / 30.0
+RPM = math.pi / 30.0
+"""One turn per minute [rad/s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,8 +110,8 @@ class SimulatedCar:
     torque_lag: float = 0.15
     shift_time: float = 0.35
     shift_floor: float = 0.5
-    upshift: float = 1900 * _RPM
-    downshift: float = 1200 * _RPM
+    upshift: float = 1900 * RPM
+    downshift: float = 1200 * RPM
     launch_gear: int = 1
     gear_skip: int = 1
     converter_capacity: float = 0.0
@@ -181,8 +182,9 @@ class SimulatedCar:
         return self.engine == "electric"
 
 
-def _rpm(*values: float) -> tuple[float, ...]:
-    return tuple(v * _RPM for v in values)
+def rpm(*values: float) -> tuple[float, ...]:
+    """Return speeds in turns per minute as rad/s."""
+    return tuple(v * RPM for v in values)
 
 
 MIDSIZE: Final = SimulatedCar(
@@ -195,10 +197,10 @@ MIDSIZE: Final = SimulatedCar(
     wheel_inertia=5.5,
     drag_area=0.27 * 2.2,
     rolling_coefficient=0.0085,
-    curve_speed=_rpm(700, 1000, 1450, 4200, 5000, 6000, 6200),
+    curve_speed=rpm(700, 1000, 1450, 4200, 5000, 6000, 6200),
     curve_torque=(120.0, 200.0, 320.0, 320.0, 271.0, 226.0, 215.0),
-    idle_speed=850 * _RPM,
-    max_speed=6200 * _RPM,
+    idle_speed=850 * RPM,
+    max_speed=6200 * RPM,
     drag_torque=(21.0, 0.010, 9.0e-5),
 )
 """The car of Jensen 2022, Table 1 (2018 Audi A4 2.0 petrol); what the table
@@ -215,18 +217,18 @@ COMPACT: Final = SimulatedCar(
     wheel_inertia=3.4,
     drag_area=0.32 * 2.10,
     rolling_coefficient=0.0092,
-    curve_speed=_rpm(700, 1000, 2000, 3000, 4000, 5000, 6000, 6500),
+    curve_speed=rpm(700, 1000, 2000, 3000, 4000, 5000, 6000, 6500),
     curve_torque=(60.0, 95.0, 112.0, 121.0, 127.0, 122.0, 110.0, 98.0),
-    idle_speed=750 * _RPM,
-    max_speed=6500 * _RPM,
+    idle_speed=750 * RPM,
+    max_speed=6500 * RPM,
     drag_torque=(13.0, 0.008, 6.0e-5),
     loss_constant=2.5,
     loss_slope=0.035,
     torque_lag=0.10,
     shift_time=0.9,
     shift_floor=0.0,
-    upshift=2400 * _RPM,
-    downshift=1450 * _RPM,
+    upshift=2400 * RPM,
+    downshift=1450 * RPM,
     accessory_power=550.0,
     load_full=0.90,
     load_curvature=-0.05,
@@ -252,10 +254,10 @@ ELECTRIC: Final = SimulatedCar(
     wheel_inertia=4.8,
     drag_area=0.28 * 2.3,
     rolling_coefficient=0.0080,
-    curve_speed=_rpm(0, 3600, 5000, 7000, 9000, 12000),
+    curve_speed=rpm(0, 3600, 5000, 7000, 9000, 12000),
     curve_torque=(290.0, 290.0, 210.0, 150.0, 115.0, 86.0),
     idle_speed=0.0,
-    max_speed=12000 * _RPM,
+    max_speed=12000 * RPM,
     drag_torque=(0.0, 0.0, 0.0),
     loss_constant=1.0,
     loss_slope=0.025,
@@ -268,68 +270,6 @@ ELECTRIC: Final = SimulatedCar(
     cylinders=0,
 )
 """A car with one fixed gear whose control unit reports the motor torque."""
-
-
-BUS: Final = SimulatedCar(
-    name="bus, diesel, 6-speed automated",
-    kind="bus",
-    mass=7000.0,
-    engine="diesel",
-    transmission="automated",
-    gear_ratios=(6.75, 3.60, 2.13, 1.39, 1.00, 0.78),
-    final_drive=3.545,
-    wheel_radius=0.49,
-    engine_inertia=1.1,
-    wheel_inertia=62.0,
-    drag_area=0.69 * 7.9,
-    rolling_coefficient=0.0075,
-    curve_speed=_rpm(600, 800, 1000, 1200, 1600, 1900, 2300, 2600),
-    curve_torque=(420.0, 560.0, 750.0, 850.0, 850.0, 800.0, 685.0, 420.0),
-    idle_speed=700 * _RPM,
-    max_speed=2600 * _RPM,
-    drag_torque=(50.0, 0.10, 7.0e-4),
-    loss_constant=8.0,
-    loss_slope=0.035,
-    torque_lag=0.25,
-    shift_time=0.8,
-    shift_floor=0.0,
-    upshift=1450 * _RPM,
-    downshift=950 * _RPM,
-    accessory_power=4500.0,
-    compressor_power=3500.0,
-    load_full=1.0,
-    load_curvature=0.03,
-    load_speed_slope=0.03,
-    torque_curvature=0.03,
-    load_smoothing=0.05,
-    brake_rise=0.35,
-    brake_fall=0.30,
-    brake_drag=60.0,
-    retarder_force=9000.0,
-    top_speed=100 / 3.6,
-    liveliness=0.6,
-    wind_height=1.6,
-    yaw_drag=5.0,
-    tyre_cooling=0.006,
-    warm_up_time=1800.0,
-    squat=math.radians(0.10),
-    squat_load=1.0,
-    load_pitch=1.5e-7,
-    roll_gain=math.radians(0.55),
-    pitch_frequency=1.1,
-    roll_frequency=0.8,
-    heave_frequency=1.15,
-    wheelbase=5.2,
-    track=2.05,
-    tyre_slip=0.030,
-    side_slip=0.004,
-    cylinders=6,
-)
-"""The bus of Du 2025, Table 1: empty mass, C_d, frontal area, tyre radius, axle ratio and,
-nearly, driveline efficiency (0.95). Its rolling coefficient of 0.0005 is a tenth of any tyre's;
-0.0075 is usual for buses (Wong, Theory of Ground Vehicles, ch. 3, gives 0.006 to 0.01 for truck
-tyres). The table gives no powertrain: a six-cylinder diesel of 6.7 l and 165 kW and a six-speed
-box of a medium bus, its clutch opened by the control unit for every shift."""
 
 
 def random_car(rng: np.random.Generator) -> SimulatedCar:
@@ -357,10 +297,10 @@ def random_car(rng: np.random.Generator) -> SimulatedCar:
     ratios = first * (last / first) ** (1.25 * step - 0.25 * step**2)
     top = float(rng.uniform(6000.0, 6600.0))
     if turbo:
-        speeds = _rpm(700.0, 1000.0, 1600.0, 4200.0, 5200.0, top)
+        speeds = rpm(700.0, 1000.0, 1600.0, 4200.0, 5200.0, top)
         shape = (0.42, 0.62, 1.0, 1.0, 0.85, 0.66)
     else:
-        speeds = _rpm(700.0, 1000.0, 2000.0, 4000.0, 5200.0, top)
+        speeds = rpm(700.0, 1000.0, 2000.0, 4000.0, 5200.0, top)
         shape = (0.5, 0.74, 0.89, 1.0, 0.94, 0.78)
     calm = float(rng.uniform(1.0, 1.25)) * (1.0 if turbo else 1.2)
     return SimulatedCar(
@@ -376,16 +316,16 @@ def random_car(rng: np.random.Generator) -> SimulatedCar:
         rolling_coefficient=float(rng.uniform(0.0075, 0.0100)),
         curve_speed=speeds,
         curve_torque=tuple(peak * part for part in shape),
-        idle_speed=float(rng.uniform(700.0, 880.0)) * _RPM,
-        max_speed=top * _RPM,
+        idle_speed=float(rng.uniform(700.0, 880.0)) * RPM,
+        max_speed=top * RPM,
         drag_torque=(10.5 * displacement, 0.005 * displacement, 4.5e-5 * displacement),
         loss_constant=float(rng.uniform(2.0, 5.0)),
         loss_slope=float(rng.uniform(0.02, 0.04)),
         torque_lag=float(rng.uniform(0.12, 0.25) if turbo else rng.uniform(0.07, 0.12)),
         shift_time=float(rng.uniform(0.7, 1.1) if manual else rng.uniform(0.25, 0.5)),
         shift_floor=0.0 if manual else float(rng.uniform(0.3, 0.7)),
-        upshift=1800.0 * calm * _RPM,
-        downshift=1150.0 * calm * _RPM,
+        upshift=1800.0 * calm * RPM,
+        downshift=1150.0 * calm * RPM,
         accessory_power=float(rng.uniform(400.0, 900.0)),
         load_full=float(rng.choice([0.35, 0.8, 0.95, 1.0])),
         load_curvature=float(rng.uniform(-0.10, 0.10)),

@@ -187,6 +187,7 @@ def _powertrain(scenario: Scenario) -> Powertrain:
         # Best indicated efficiencies of the two kinds of engine, Heywood 1988, ch. 5.
         fuel_efficiency=0.45 if car.engine == "diesel" else 0.385,
         regeneration=car.regeneration,
+        automated=car.transmission == "automated",
         converter=car.converter_capacity,
         stall_ratio=car.stall_ratio,
         lock_gear=car.lock_gear,
@@ -251,7 +252,12 @@ def simulate_trajectory(
     noise = noise_rng.standard_normal((steps // kernel.NOISE_STRIDE + 1, kernel.NOISE_CHANNELS))
     ripple = scenario.effects.driver_ripple
     driver = Driver(
-        ripple=0.09 * ripple, speed_ripple=0.018 * ripple, gain=0.4, rest=scenario.start_rest
+        ripple=0.09 * ripple,
+        speed_ripple=0.018 * ripple,
+        gain=0.4,
+        rest=scenario.start_rest,
+        # What the driven axle of a heavy vehicle grips, or its standing passengers bear.
+        grip=4.0 * min(1.0, scenario.car.liveliness),
     )
     out, count = kernel.drive(
         road, _powertrain(scenario), _resistance(scenario), driver, noise, DT, steps

@@ -1,0 +1,318 @@
+"""Scenarios with a name: what ``weighbridge simulate`` offers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import ConfigError
+from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar
+from weighbridge.simulation.route import (
+    bus_route,
+    highway_route,
+    hilly_route,
+    jensen_route,
+    short_route,
+    straight_route,
+)
+from weighbridge.simulation.scenario import Braking, Effects, Loading, Polling, Scenario, Sensors
+from weighbridge.simulation.vehicles import BUS, DIESEL_AUTOMATIC, TRUCK18, VAN
+
+Maker = Callable[[float, int], Scenario]
+"""Makes a scenario from payload [kg] and seed."""
+
+_ELECTRIC_POLLING: Final = Polling(
+    fast=("vehicle_speed", "engine_speed", "engine_torque"), rate=10.0, delay=0.08
+)
+
+
+def _car(payload: float, seed: int) -> Scenario:
+    return Scenario(name="car", car=MIDSIZE, route=jensen_route(), payload=payload, seed=seed)
+
+
+def _calibration(payload: float, seed: int) -> Scenario:
+    return Scenario(
+        name="car-calibration",
+        car=MIDSIZE,
+        route=hilly_route(),
+        payload=payload,
+        seed=seed,
+        calibration=True,
+        aggressiveness=1.2,
+        wind_speed=2.0,
+    )
+
+
+def _short(payload: float, seed: int) -> Scenario:
+    return Scenario(name="car-short", car=MIDSIZE, route=short_route(), payload=payload, seed=seed)
+
+
+def _loading(payload: float, seed: int) -> Scenario:
+    stop = Loading(distance=11_000.0, duration=90.0, load=240.0)
+    return replace(_car(payload, seed), name="car-loading", loading=(stop,))
+
+
+def _highway(payload: float, seed: int) -> Scenario:
+    return Scenario(name="highway", car=MIDSIZE, route=highway_route(), payload=payload, seed=seed)
+
+
+def _compact(payload: float, seed: int) -> Scenario:
+    return Scenario(name="compact", car=COMPACT, route=jensen_route(6), payload=payload, seed=seed)
+
+
+def _compact_calibration(payload: float, seed: int) -> Scenario:
+    return replace(
+        _calibration(payload, seed), name="compact-calibration", car=COMPACT, route=hilly_route(7)
+    )
+
+
+def _electric(payload: float, seed: int) -> Scenario:
+    return Scenario(
+        name="electric",
+        car=ELECTRIC,
+        route=jensen_route(8),
+        payload=payload,
+        seed=seed,
+        polling=_ELECTRIC_POLLING,
+    )
+
+
+_BUS_POLLING: Final = Polling(
+    fast=(
+        "engine_torque_fraction",
+        "engine_speed",
+        "vehicle_speed",
+        "gear",
+        "brake_switch",
+        "retarder_torque",
+    ),
+    slow=("reference_torque", "ambient_temperature", "barometric_pressure"),
+    rate=100.0,
+    delay=0.03,
+    delay_spread=0.005,
+    delay_jitter=0.002,
+    speed_scale=1.003,
+    speed_step=1.0 / 256.0,
+    engine_speed_step=0.125,
+    net_torque=True,
+)
+
+
+_TRUCK_POLLING: Final = replace(
+    _BUS_POLLING,
+    # Torque and engine speed (EEC1) twice as often as the rest.
+    fast=(
+        "engine_torque_fraction",
+        "engine_speed",
+        "vehicle_speed",
+        "brake_switch",
+        "engine_torque_fraction",
+        "engine_speed",
+        "retarder_torque",
+        "gear",
+    ),
+    rate=10.0,
+)
+_DIESEL_POLLING: Final = Polling(
+    fast=("vehicle_speed", "engine_speed", "engine_load", "throttle"), rate=5.0
+)
+
+
+def usual_polling(car: SimulatedCar) -> Polling:
+    """Return what the control units of such a vehicle are usually asked for.
+
+    Parameters
+    ----------
+    car : SimulatedCar
+
+    Returns
+    -------
+    Polling
+        J1939 for bus and truck, motor torque for an electric car, calculated load
+        (with air flow for petrol) for the others.
+    """
+    if car.kind in ("bus", "truck"):
+        return _TRUCK_POLLING
+    if car.electric:
+        return _ELECTRIC_POLLING
+    return _DIESEL_POLLING if car.engine == "diesel" else Polling()
+
+
+def _on_the_road(name: str, car: SimulatedCar, seed: int) -> Maker:
+    def make(payload: float, drive_seed: int) -> Scenario:
+        return Scenario(
+            name=name,
+            car=car,
+            route=jensen_route(seed),
+            payload=payload,
+            seed=drive_seed,
+            polling=usual_polling(car),
+        )
+
+    return make
+
+
+def _calibrating(name: str, car: SimulatedCar, seed: int) -> Maker:
+    def make(payload: float, drive_seed: int) -> Scenario:
+        return replace(
+            _calibration(payload, drive_seed),
+            name=name,
+            car=car,
+            route=hilly_route(seed),
+            payload=payload,
+            polling=usual_polling(car),
+        )
+
+    return make
+
+
+def _bus(payload: float, seed: int) -> Scenario:
+    return Scenario(
+        name="bus",
+        car=BUS,
+        route=straight_route(),
+        payload=payload,
+        seed=seed,
+        brakings=(
+            Braking(time=115.0, duration=3.5, decel=1.6),
+            Braking(time=147.0, duration=4.0, decel=2.0),
+        ),
+        effects=replace(Effects(), traffic=0.0),
+        sensors=Sensors(imu_rate=100.0),
+        polling=_BUS_POLLING,
+        wind_speed=2.0,
+        start_rest=3.0,
+        duration=180.0,
+    )
+
+
+def _bus_urban(payload: float, seed: int) -> Scenario:
+    route, places = bus_route()
+    return Scenario(
+        name="bus-urban",
+        car=BUS,
+        route=route,
+        payload=payload,
+        loading=_passengers(places, payload, seed),
+        seed=seed,
+        sensors=Sensors(imu_rate=100.0),
+        polling=_BUS_POLLING,
+    )
+
+
+def _passengers(places: Iterable[float], payload: float, seed: int) -> tuple[Loading, ...]:
+    """Let passengers of 71 kg on and off a bus for at most 80."""
+    rng = np.random.default_rng([seed, 71])
+    aboard = max(0, round(payload / 71.0))
+    stops = []
+    for place in places:
+        leaving = int(rng.binomial(aboard, 0.25))
+        coming = min(int(rng.poisson(9.0)), 80 - aboard + leaving)
+        aboard += coming - leaving
+        stops.append(
+            Loading(
+                distance=float(place),
+                duration=8.0 + 1.6 * max(leaving, coming),
+                load=71.0 * (coming - leaving),
+            )
+        )
+    return tuple(stops)
+
+
+SCENARIOS: Final[dict[str, Maker]] = {
+    "car": _car,
+    "car-calibration": _calibration,
+    "car-short": _short,
+    "car-loading": _loading,
+    "highway": _highway,
+    "compact": _compact,
+    "compact-calibration": _compact_calibration,
+    "electric": _electric,
+    "bus": _bus,
+    "bus-urban": _bus_urban,
+    "bus-calibration": _calibrating("bus-calibration", BUS, 13),
+    "diesel": _on_the_road("diesel", DIESEL_AUTOMATIC, 14),
+    "diesel-calibration": _calibrating("diesel-calibration", DIESEL_AUTOMATIC, 15),
+    "van": _on_the_road("van", VAN, 16),
+    "van-calibration": _calibrating("van-calibration", VAN, 17),
+    "truck": _on_the_road("truck", TRUCK18, 18),
+    "truck-calibration": _calibrating("truck-calibration", TRUCK18, 19),
+}
+"""Makers of the named scenarios, from payload [kg] and seed."""
+
+ABOUT: Final[dict[str, str]] = {
+    "car": "midsize petrol car, 83 km of city, country, highway and hills, about 75 min",
+    "car-calibration": "the same car in all gears, loads and engine speeds, about 60 min",
+    "car-short": "the same car, 8 km of city and country, about 10 min",
+    "car-loading": "as car, with 240 kg loaded at a stop of 90 s after about 12 min",
+    "highway": "the same car on a highway, out and back",
+    "compact": "small petrol car with a manual gearbox, about 75 min",
+    "compact-calibration": "the small car in all gears, loads and engine speeds",
+    "electric": "electric car whose control unit reports motor torque, about 75 min",
+    "bus": "diesel bus at 100 Hz on a straight road: drives off, brakes at 115 and 147 s, 3 min",
+    "bus-urban": "the same bus in a city, passengers getting on and off at stops, about 55 min",
+    "bus-calibration": "the bus in all gears, loads and engine speeds",
+    "diesel": "diesel car with an 8-speed automatic, about 75 min",
+    "diesel-calibration": "the diesel car in all gears, loads and engine speeds",
+    "van": "diesel van with a manual gearbox, 2100 kg empty to 3500 kg, about 80 min",
+    "van-calibration": "the van in all gears, loads and engine speeds",
+    "truck": "rigid truck of 18 t, 9000 kg empty, J1939, about 95 min",
+    "truck-calibration": "the truck in all gears, loads and engine speeds",
+}
+"""One line for each named scenario."""
+
+
+def make_scenario(
+    name: str,
+    *,
+    payload: float | None = None,
+    mass: float | None = None,
+    seed: int = 1,
+    wind: float | None = None,
+    wind_from: float | None = None,
+    without: Iterable[str] = (),
+) -> Scenario:
+    """Make a named scenario; `dataclasses.replace` changes the rest.
+
+    Parameters
+    ----------
+    name : str
+        One of `SCENARIOS`.
+    payload : float, optional
+        Beside driver and fuel, none by default [kg].
+    mass : float, optional
+        At the start, instead of the payload [kg].
+    seed : int
+        Of driver, weather and sensors.
+    wind : float, optional
+        Mean wind at 10 m height [m/s].
+    wind_from : float, optional
+        Direction it blows from, clockwise from north [rad].
+    without : iterable of str
+        Effects to switch off, see `Effects`.
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    ConfigError
+        There is no scenario or effect of that name, or a value cannot be.
+    """
+    maker = SCENARIOS.get(name)
+    if maker is None:
+        raise ConfigError(f"unknown scenario {name!r}; known are {', '.join(SCENARIOS)}")
+    if payload is not None and mass is not None:
+        raise ConfigError("give a payload or a mass, not both")
+    made = maker(payload or 0.0, seed)
+    if mass is not None:
+        made = replace(made, payload=mass - made.car.mass)
+    if wind is not None:
+        made = replace(made, wind_speed=wind)
+    if wind_from is not None:
+        made = replace(made, wind_from=wind_from)
+    return replace(made, effects=made.effects.without(*without))
