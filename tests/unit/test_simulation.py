@@ -474,7 +474,8 @@ def test_converter_slips_below_its_lock_up_and_stands_idling():
     assert_allclose(ratio[locked], 1.0, atol=0.05)
     assert locked.sum() > 3000
     assert open_converter.sum() > 100
-    assert np.all(ratio[open_converter] < 1.02)
+    # A downshift may leave the turbine faster for an instant.
+    assert np.quantile(ratio[open_converter], 0.95) < 1.0
     assert ratio[open_converter].min() < 0.5
     assert ratio[open_converter & moving].min() < 0.95
     assert truth.gear[locked].min() >= car.lock_gear
