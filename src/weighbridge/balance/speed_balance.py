@@ -48,7 +48,7 @@ def model_of(vehicle: Vehicle) -> SpeedModel:
 
 
 def speed_motion_of(drive: Drive, vehicle: Vehicle) -> Motion:
-    """Find the motion by speed alone, whatever else the drive holds.
+    """Find the motion by speed alone, whatever else the drive holds; its grade is unknown.
 
     Raises
     ------
@@ -58,7 +58,14 @@ def speed_motion_of(drive: Drive, vehicle: Vehicle) -> Motion:
     chosen = next((name for name in SPEEDS if drive.has(name)), SPEEDS[0])
     alone = drive.without(*(name for name in drive.signals if name != chosen))
     motion = find_motion(alone, vehicle)
-    return replace(motion, notes=("speed alone: torque by the vehicle file's speed model",))
+    nowhere = np.full(motion.time.size, np.nan)
+    return replace(
+        motion,
+        specific_force=nowhere,
+        grade=nowhere,
+        pitch=nowhere,
+        notes=("speed alone: torque by the vehicle file's speed model, grade unknown",),
+    )
 
 
 def window_means(motion: Motion, values: Floats, length: float) -> Floats:
@@ -109,8 +116,8 @@ def running(speed: Floats, length: float) -> tuple[Bools, Bools, Bools]:
 def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
     """Balance the forces of windows by the model of the vehicle's ``speed_model``.
 
-    A row is one window, stamped with its end. Grade is unknown and stands as
-    level; the estimator finds it.
+    A row is one window, stamped with its end. Grade and specific force are
+    unknown; the estimator has a state for the slope.
 
     Raises
     ------
@@ -157,8 +164,8 @@ def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
             traction_force=traction,
             speed=speed,
             accel=accel,
-            specific_force=accel,
-            grade=np.zeros(speed.size),
+            specific_force=nowhere,
+            grade=nowhere,
             pitch=nowhere,
             heading=nowhere,
             gear=gear,

@@ -232,8 +232,8 @@ def _judge(
         )
     if share > LARGEST_SHARE:
         return Status.NOT_EXCITED, (
-            f"{100.0 * min(share, 1.0):.0f} % of the estimate of {mass:.0f} kg is the mass that "
-            f"the filter was started from, {model.mass:.0f} kg of the calibration: speed alone "
+            f"the estimate of {mass:.0f} kg follows the mass that the filter was started from "
+            f"({model.mass:.0f} kg, of the calibration) by {100.0 * share:.0f} %: speed alone "
             "does not show the mass here; record torque or engine load"
         )
     if not std <= 0.15 * mass:

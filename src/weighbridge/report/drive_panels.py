@@ -164,10 +164,13 @@ def fit_panel(weighing: Weighing) -> Panel:
     if result is None or not result.used.any():
         return Panel(title=title, absent="no force over specific force: not one sample was used.")
     phi, y = regression(result.balance.merged, weighing.vehicle)
-    index = spread(result.used & np.isfinite(phi) & np.isfinite(y))
+    known = result.used & np.isfinite(phi) & np.isfinite(y)
+    if not known.any():
+        return Panel(title=title, absent="no force over specific force: the grade is not known.")
+    index = spread(known)
     figure = blank("Specific force with rolling resistance [m/s²]", "Force on the mass [N]")
     dots(figure, single(phi[index]), single(y[index]), "used samples", BLUE)
-    ends = np.array([0.0, float(np.nanmax(phi[result.used]))])
+    ends = np.array([0.0, float(np.max(phi[known]))])
     name = f"{result.mass:.0f} kg"
     title = f"The slope of force over specific force is the mass: {name}"
     if weighing.status is not Status.CONVERGED:
@@ -295,8 +298,11 @@ def pitch_panel(weighing: Weighing, result: MassTrack) -> Panel:
     known = moving & np.isfinite(altitude)
     if np.count_nonzero(known) < 2:
         return Panel(
-            title=title, absent="no pitch against altitude: no altitude is known for this drive."
+            title=title,
+            absent="no pitch against altitude: no altitude is known for this drive.",
         )
+    if not np.isfinite(motion.grade).any():
+        return Panel(title=title, absent="no pitch against altitude: the grade is not known.")
     distance = from_si(motion.distance, "km")
     figure = blank("Distance [km]", "Altitude [m]", height=460)
     figure.update_layout(
