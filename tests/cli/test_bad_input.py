@@ -147,7 +147,8 @@ def test_swapped_axes(weigh, changed, kind, axes, gone):
 
 @pytest.mark.parametrize("gone", [(), ("gnss",)])
 @pytest.mark.parametrize(
-    "columns", [*([c] for c in ACCEL), ["gyro_y_radps"], ["gyro_z_radps"], GYRO]
+    "columns",
+    [*([c] for c in ACCEL), ["gyro_x_radps"], ["gyro_y_radps"], ["gyro_z_radps"], GYRO],
 )
 def test_wrong_sign(weigh, changed, columns, gone):
     ran = weigh(changed(imu=times(columns, -1.0), **dict.fromkeys(gone)))

@@ -10,6 +10,7 @@ import pytest
 import weighbridge as wb
 from weighbridge.errors import DriveError
 from weighbridge.kernels.rotation import euler_to_matrix
+from weighbridge.pipeline.checks import check_drive
 from weighbridge.vehicle.gear import detect_gearings
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -201,3 +202,13 @@ def test_a_file_without_the_bytes_of_its_frames_is_refused(folder, tmp_path):
     cut.write_bytes(raw[: len(raw) // 3])
     with pytest.raises(DriveError, match="ends early and of its 65296 records none is whole"):
         wb.read_drive(cut, CANEDGE / "mapping.toml", folder / "canmod-gps.dbc")
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_mirrored_axis_of_the_gyro_is_found(long, axis):
+    name = f"gyro_{axis}"
+    for drive in long.values():
+        assert not any(p.serious for p in check_drive(drive))
+        turned = replace(drive.signals[name], values=-drive.signals[name].values)
+        found = [p for p in check_drive(drive.with_signals(turned)) if p.serious]
+        assert found, drive.name

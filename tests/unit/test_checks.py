@@ -266,6 +266,38 @@ def test_load_in_percent_under_a_ratio(sane):
     assert "engine_load are outside 0 pct to 102 pct" in only(scaled(sane, engine_load=100.0)).text
 
 
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (10.0, "in hpa under kpa"),
+        (0.1, "in kpa under hpa"),
+        (1e3, "in pa under kpa"),
+        (0.0, "leave the column out"),
+    ],
+)
+def test_barometer_in_another_unit(sane, factor, words):
+    t = np.arange(0.0, 900.0, 10.0)
+    values = np.full(t.size, 95e3)
+    assert serious(sane.with_signals(Signal("barometric_pressure", t, values))) == []
+    wrong = Signal("barometric_pressure", t, values * factor)
+    assert words in only(sane.with_signals(wrong)).text
+
+
+def test_percent_under_newton_metres_is_a_note(sane):
+    t = np.arange(0.0, 900.0, 0.5)
+    values = np.round(40.0 + 45.0 * np.sin(t / 7.0))
+    found = check_drive(sane.with_signals(Signal("engine_torque", t, values)))
+    assert ["engine_torque_pct" in p.text for p in found if p.signal == "engine_torque"] == [True]
+    finer = Signal("engine_torque", t, values + 0.25)
+    assert check_drive(sane.with_signals(finer)) == ()
+
+
+def test_newton_metres_under_percent(sane):
+    t = np.arange(0.0, 900.0, 0.5)
+    wrong = Signal("engine_torque_fraction", t, 0.01 * (120.0 + 100.0 * np.sin(t / 7.0)))
+    assert "engine_torque_fraction are outside" in only(sane.with_signals(wrong)).text
+
+
 def test_engine_speed_in_radians(sane):
     problem = only(scaled(sane, engine_speed=np.pi / 30))
     assert "name the column engine_speed_radps" in problem.text

@@ -8,7 +8,7 @@ can show never counts as serious.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations
+from itertools import combinations, permutations
 from typing import Final
 
 import numpy as np
@@ -18,7 +18,7 @@ from weighbridge.pipeline.speed_checks import check_scales
 from weighbridge.pipeline.vehicle_checks import check_vehicle
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
-from weighbridge.signals.units import scalar_from_si
+from weighbridge.signals.units import UNITS, scalar_from_si
 from weighbridge.vehicle.model import Vehicle
 
 _IMU: Final = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
@@ -228,6 +228,51 @@ def _check_load(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             )
 
 
+def _check_pressure(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find a barometer in another unit: drag goes with the air's density."""
+    s = drive.get("barometric_pressure")
+    if s is None or not len(s):
+        return
+    usual = float(np.median(s.values))
+    q = QUANTITIES[s.name]
+    if q.low <= usual <= q.high:
+        return
+    swapped = next(
+        (
+            (said, meant)
+            for said, meant in permutations(("pa", "hpa", "kpa"), 2)
+            if q.low <= usual * UNITS[meant].factor / UNITS[said].factor <= q.high
+        ),
+        None,
+    )
+    remedy = (
+        f"it seems to be in {swapped[1]} under {swapped[0]}: name the column {q.stem}_{swapped[1]}"
+        if swapped
+        else "check its unit, or leave the column out"
+    )
+    yield Problem(
+        s.name,
+        f"barometric_pressure is {_show(s.name, usual)} in the median, which is no air pressure; "
+        f"{remedy}",
+        serious=True,
+    )
+
+
+def _check_whole_torque(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Doubt a torque in N m that looks like one in percent."""
+    s = drive.get("engine_torque")
+    if s is None or len(s) < 200:
+        return
+    low, high = float(np.min(s.values)), float(np.max(s.values))
+    whole = bool(np.all(np.abs(s.values - np.round(s.values)) < 1e-6))
+    if whole and low >= -40.0 and 60.0 <= high <= 100.0 and np.unique(s.values).size > 20:
+        yield Problem(
+            s.name,
+            f"engine_torque runs from {low:.0f} to {high:.0f} in whole N m; if that is percent of "
+            "a reference torque, name the column engine_torque_pct",
+        )
+
+
 def _check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find friction of the engine in a torque that is taken for the one at its shaft."""
     torque = drive.get("engine_torque_fraction")
@@ -361,6 +406,8 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     _check_long_gaps,
     _check_stuck,
     _check_load,
+    _check_pressure,
+    _check_whole_torque,
     _check_friction,
     _check_engine_speed,
     _check_sign,

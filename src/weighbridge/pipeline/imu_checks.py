@@ -24,6 +24,9 @@ _WINDOW: Final = 2.0  # [s]
 _YAWS: Final = 0.1
 # Windows enough for a correlation of 0.3 to be no chance.
 _MANY: Final = 150
+_SOME: Final = 100
+# Sane drives tie tilt and gravity by 0.3 to 0.8; a mirrored axis turns the sign.
+_AGAINST: Final = -0.12
 
 
 def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -210,7 +213,8 @@ def _check_axes(
     if forward is None or agreement < 0.7:
         return
     right = np.cross(down, forward)
-    centripetal = v[full] * ((rate[full] - np.median(rate[full], axis=0)) @ down)
+    bias = np.median(rate[full], axis=0)
+    centripetal = v[full] * ((rate[full] - bias) @ down)
     lateral = force[full] @ right
     seen = min(float(np.std(centripetal)), float(np.std(lateral))) >= 0.08
     agreement = float(np.corrcoef(lateral, centripetal)[0, 1]) if seen else 0.0
@@ -231,14 +235,48 @@ def _check_axes(
             "its axes are swapped; map them the other way round",
             serious=True,
         )
-    elif pitch < -0.15:
-        yield Problem(
-            "gyro_y",
-            "the gyro says nose down where the accelerometer says nose up "
-            f"(correlation {pitch:.2f}): one axis of the inertial sensor has the wrong sign; "
-            "correct it in the mapping (factor = -1)",
-            serious=True,
-        )
+    elif pitch < -0.15 or _tilt_tie(force @ forward - accel_along, rate @ right, full) < _AGAINST:
+        yield _mirrored("gyro_y", "nose down", "nose up")
+    elif _tilt_tie(v * ((rate - bias) @ down) - force @ right, rate @ forward, full) < _AGAINST:
+        yield _mirrored("gyro_x", "right side down", "right side up")
+
+
+def _mirrored(name: str, said: str, felt: str) -> Problem:
+    return Problem(
+        name,
+        f"the gyro says {said} where the accelerometer says {felt}: one axis of the inertial "
+        "sensor has the wrong sign; correct it in the mapping (factor = -1)",
+        serious=True,
+    )
+
+
+def _tilt_tie(gravity: Floats, rate: Floats, full: Bools) -> float:
+    """Correlate a rate of tilt with the change of what gravity adds to the specific force.
+
+    Along the vehicle the specific force is acceleration and gravity times the sine of pitch, across
+    it speed times yaw rate less gravity times the sine of roll, be it by the springs, a hill or the
+    banking of a bend: what is left of it changes as the vehicle tilts.
+
+    Parameters
+    ----------
+    gravity : (n,) specific force without the acceleration, of windows [m/s^2]
+    rate : (n,) rate of tilt that makes it grow [rad/s]
+    full : (n,) windows without gaps
+
+    Returns
+    -------
+    1 at best; 0 where there are too few windows to tell
+    """
+    inner = full[1:-1] & full[2:] & full[:-2]
+    if np.count_nonzero(inner) < _SOME:
+        return 0.0
+    change = (gravity[2:] - gravity[:-2])[inner]
+    # Kerbs and gaps of the speed are no tilt.
+    usual = np.abs(change) <= np.percentile(np.abs(change), 98.0)
+    x, y = change[usual], rate[1:-1][inner][usual]
+    if float(np.std(x)) < 0.02 or float(np.std(y)) < 1e-3:
+        return 0.0
+    return float(np.corrcoef(x, y)[0, 1])
 
 
 def _ties(
@@ -248,7 +286,7 @@ def _ties(
 
     Gravity and the springs tie pitch to what is felt along and roll to what is
     felt across, whatever the road. A nose that rises is always felt as force
-    forward; how a roll is felt depends on the banking of the bends.
+    forward; how a roll is felt depends on the banking of the bends, see `_tilt_tie`.
 
     Returns
     -------
