@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from weighbridge import __version__
-from weighbridge.cli import calibrate, convert, demo, inspect, reproduce, simulate, weigh
+from weighbridge.cli import calibrate, convert, demo, inertia, inspect, reproduce, simulate, weigh
 from weighbridge.errors import WeighbridgeError
 
 app = typer.Typer(
@@ -22,6 +22,7 @@ app = typer.Typer(
 
 for _command in (demo.demo, inspect.inspect, calibrate.calibrate, weigh.weigh):
     app.command()(_command)
+app.command()(inertia.inertia)
 app.command()(simulate.simulate)
 app.command()(convert.convert)
 app.command()(reproduce.reproduce)

@@ -16,7 +16,7 @@ def simulate(
         typer.Argument(
             help="car, car-calibration, car-short, car-loading, highway, compact, "
             "compact-calibration, electric, bus, bus-urban, bus-calibration, diesel, "
-            "diesel-calibration, van, van-calibration, truck or truck-calibration.",
+            "diesel-calibration, van, van-calibration, truck, truck-calibration or ride.",
             show_default=False,
         ),
     ],
@@ -40,6 +40,14 @@ def simulate(
         Optional[list[str]],  # noqa: UP045
         typer.Option("--without", help="Effect to switch off, such as squat; repeatable."),
     ] = None,
+    road: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--road", help="For ride: ISO 8608 class A to H; C by default."),
+    ] = None,
+    speed: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--speed", help="For ride: km/h; 60 by default."),
+    ] = None,
     table: Annotated[str, typer.Option("--format", help="csv or parquet.")] = "parquet",
     force: Annotated[bool, typer.Option("--force", help="Write into an existing folder.")] = False,
 ) -> None:
@@ -56,6 +64,13 @@ def simulate(
     refuse_overwriting(output, force, "folder")
     if table not in ("csv", "parquet"):
         raise ConfigError(f"--format {table}: must be csv or parquet")
+    if scenario == "ride":
+        if wind is not None or wind_from is not None or without:
+            raise ConfigError("a ride knows no --wind, --wind-from and --without; leave them out")
+        _simulate_ride(output, mass, seed, road, speed, table)
+        return
+    if road is not None or speed is not None:
+        raise ConfigError(f"--road and --speed are for the scenario ride, not for {scenario}")
     chosen = make_scenario(scenario, seed=seed)
     if mass is not None:
         chosen = replace(chosen, payload=mass - chosen.car.mass)
@@ -69,3 +84,32 @@ def simulate(
     made.write(output, format=table)  # type: ignore[arg-type]
     minutes = made.drive.duration / 60.0
     typer.echo(f"{output}: {minutes:.1f} min, {made.truth.mass[0]:.0f} kg at the start")
+
+
+def _simulate_ride(
+    output: Path,
+    mass: float | None,
+    seed: int,
+    road: str | None,
+    speed: float | None,
+    table: str,
+) -> None:
+    """Simulate and write the ride of a two-axle truck on a rough road."""
+    from weighbridge.errors import ConfigError
+    from weighbridge.signals.units import scalar_to_si
+    from weighbridge.simulation.ride import TRUCK, RideScenario, simulate_ride
+
+    sprung = TRUCK.sprung_mass if mass is None else mass - sum(TRUCK.unsprung_mass)
+    if not sprung > 0.0:
+        raise ConfigError(f"--mass {mass}: axles and wheels alone are {sum(TRUCK.unsprung_mass)}")
+    made = simulate_ride(
+        RideScenario(
+            vehicle=TRUCK.loaded(sprung / TRUCK.sprung_mass),
+            road_class=road or "C",
+            speed=scalar_to_si(60.0 if speed is None else speed, "kmh"),
+            zero_mass=TRUCK.sprung_mass,
+            seed=seed,
+        )
+    )
+    made.write(output, format=table)  # type: ignore[arg-type]
+    typer.echo(f"{output}: {made.drive.duration:.0f} s, {made.scenario.vehicle.mass:.0f} kg")

@@ -1,0 +1,109 @@
+"""``weighbridge inertia``: sprung mass, roll and pitch inertia from the ride."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Optional
+
+import typer
+
+from weighbridge.cli.options import (
+    DbcPaths,
+    MappingPath,
+    load,
+    mapping_for,
+    refuse_missing_folder,
+)
+
+if TYPE_CHECKING:
+    from weighbridge.pipeline.inertia import Inertia
+
+
+def inertia(
+    drive: Annotated[
+        Path, typer.Argument(help="Drive: folder of tables, or log file.", show_default=False)
+    ],
+    vehicle: Annotated[
+        Path,
+        typer.Option("--vehicle", help="Vehicle file with a [ride] section.", show_default=False),
+    ],
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            help="kalman-bucy, or with one fixed process noise inverse, extended, printed.",
+        ),
+    ] = "kalman-bucy",
+    json_path: Annotated[
+        Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
+        typer.Option("--json", help="Write a JSON object to a file, or - for here."),
+    ] = None,
+    track: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--track", help="Write the parameters over time: .csv or .parquet."),
+    ] = None,
+    report: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--report", help="Write a self-contained HTML report."),
+    ] = None,
+    mapping: MappingPath = None,
+    dbc: DbcPaths = None,
+) -> None:
+    """Estimate sprung mass, roll and pitch inertia from how a vehicle rides.
+
+    Needs suspension travel and rate at four wheels and the body's vertical, roll and pitch
+    velocity. Exits with 0 where the ride gave a mass, with 1 where it could not.
+
+    Example: weighbridge inertia ride/ --vehicle truck.toml --report ride.html
+    """
+    from weighbridge.errors import ConfigError
+    from weighbridge.pipeline.inertia import estimate_inertia
+    from weighbridge.vehicle.model import Vehicle
+
+    if track is not None and track.suffix.lower() not in (".csv", ".parquet"):
+        raise ConfigError(f"--track {track}: a track is written as .csv or .parquet")
+    outputs = (track, report, Path(json_path) if json_path and json_path != "-" else None)
+    refuse_missing_folder(*outputs)
+    for output in outputs:
+        if output is not None and output.resolve() in (drive.resolve(), vehicle.resolve()):
+            raise ConfigError(f"{output}: is an input; results must go to another file")
+    car = Vehicle.load(vehicle)
+    found = estimate_inertia(load(drive, mapping_for(mapping, car, vehicle), dbc), car, method)
+    if track is not None:
+        found.write_track(track)
+    if report is not None:
+        found.report(report)
+    if json_path == "-":
+        typer.echo(found.to_json())
+    else:
+        if json_path is not None:
+            Path(json_path).write_text(found.to_json() + "\n", encoding="utf-8")
+        _show(found)
+    if found.status != "converged":
+        raise typer.Exit(1)
+
+
+def _show(found: Inertia) -> None:
+    name = found.drive.name
+    if found.status == "converged":
+        low, high = found.intervals()
+        for k, (what, unit) in enumerate(
+            (("sprung mass", "kg"), ("roll inertia", "kg m²"), ("pitch inertia", "kg m²"))
+        ):
+            if found.values[k] == found.values[k]:
+                typer.echo(
+                    f"{name}: {what} {found.values[k]:.0f} {unit}, "
+                    f"95 % between {low[k]:.0f} and {high[k]:.0f} {unit}"
+                )
+        front, rear = found.axle_loads
+        typer.echo(f"mass {found.mass:.0f} kg: front axle {front:.0f} kg, rear axle {rear:.0f} kg")
+        if found.vehicle.tare is not None:
+            typer.echo(f"payload {found.payload:.0f} kg over a tare of {found.vehicle.tare:.0f} kg")
+        if len(found.segments) > 1:
+            typer.echo("the load changed:")
+            for s in found.segments:
+                typer.echo(f"  {s.start:.1f} to {s.end:.1f} s: sprung mass {s.values[0]:.0f} kg")
+    else:
+        typer.echo(f"{name}: no mass ({found.status}): {found.reason}")
+    for warning in found.warnings:
+        typer.echo(f"  note: {warning}")

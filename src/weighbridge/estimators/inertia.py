@@ -1,0 +1,437 @@
+"""Sprung mass, roll inertia and pitch inertia from the ride, by Kalman-Bucy filters.
+
+Nguyen, Real-time estimation of vehicle inertia parameters based on Kalman-Bucy filter,
+Transport and Communications Science Journal 75(4), 2024. The method ``kalman-bucy`` is the
+inverse form with hypotheses of jumps; ``inverse``, ``extended`` and ``printed`` are the
+paper's filter with one fixed process noise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from scipy.special import ndtri
+
+from weighbridge.errors import ConfigError
+from weighbridge.kernels import inertia as kernel
+from weighbridge.kernels import kalman_bucy
+from weighbridge.signals import Floats
+from weighbridge.vehicle.model import Ride
+
+Method = Literal["kalman-bucy", "inverse", "extended", "printed"]
+METHODS: Final[tuple[Method, ...]] = ("kalman-bucy", "inverse", "extended", "printed")
+"""Filters by name."""
+
+AXES: Final = ("sprung mass", "roll inertia", "pitch inertia")
+
+HYPOTHESES: Final = 24
+"""Moments of a last jump that are kept in mind for each parameter."""
+
+_LONGEST: Final = 0.012
+"""Longest step over which the suspension force is integrated [s]: an axle hops at some 12 Hz,
+and a seventh of its period is still a smooth piece."""
+
+_FORMS: Final = {
+    "printed": kalman_bucy.PRINTED,
+    "extended": kalman_bucy.EXTENDED,
+    "inverse": kalman_bucy.INVERSE,
+}
+
+_GAIN: Final = 10.0
+"""A larger noise must raise the logarithm of the likelihood by so much to be believed."""
+
+_NOISIEST: Final = 64.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RideSamples:
+    """The ride, on one clock.
+
+    Attributes
+    ----------
+    time : (n,) rising [s]
+    travel, rate : (n, 4) of the suspension front left, front right, rear left, rear
+        right, positive in extension [m], [m/s]
+    velocity : (n, 3) vertical up [m/s], roll right side down and pitch nose up [rad/s];
+        NaN where it was not measured
+    """
+
+    time: Floats
+    travel: Floats
+    rate: Floats
+    velocity: Floats
+
+    @property
+    def period(self) -> float:
+        """Median time between samples [s]; NaN below two samples."""
+        return float(np.median(np.diff(self.time))) if self.time.size > 1 else math.nan
+
+    def since(self, time: float) -> RideSamples:
+        """Return the samples from ``time`` on [s]."""
+        k = int(np.searchsorted(self.time, time))
+        return RideSamples(
+            time=self.time[k:], travel=self.travel[k:], rate=self.rate[k:],
+            velocity=self.velocity[k:],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InertiaSettings:
+    """What the filters assume beside the vehicle file.
+
+    Attributes
+    ----------
+    range : least and largest parameter over that of the vehicle file [-]
+    start_std : standard deviation of the inverse parameter at the start, relative [-]
+    jump_rate : jumps expected per time [1/s]
+    jump_std : standard deviation of the inverse parameter after a jump, relative [-]
+    spawn : time between two hypotheses of a jump [s]
+    drift : relative growth of the inverse parameter's standard deviation over the root
+        of time [1/s^0.5]
+    offset_std : standard deviation of the constant acceleration that sensor offsets and
+        the weight of the payload seem to cause; 0 for none, as printed [m/s^2], [rad/s^2]
+    offset_drift : its growth over the root of time [m/s^2.5], [rad/s^2.5]
+    process : spectral density of the fixed process noise of velocities [m^2/s^3] and of
+        parameters relative to the vehicle file's [1/s]; for the filters without jumps
+    """
+
+    range: tuple[float, float] = (0.125, 8.0)
+    start_std: float = 1.0
+    jump_rate: float = 1e-4
+    jump_std: float = 1.0
+    spawn: float = 2e-3
+    drift: float = 3e-5
+    offset_std: float = 10.0
+    offset_drift: float = 3e-3
+    process: tuple[float, float] = (1e-4, 0.1)
+
+    def __post_init__(self) -> None:
+        low, high = self.range
+        if not 0.0 < low < 1.0 < high:
+            raise ConfigError(f"range must be two numbers around 1, got {self.range}")
+        for name in ("start_std", "jump_rate", "jump_std", "spawn"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InertiaTrack:
+    """The parameters over time; columns are sprung mass, roll and pitch inertia.
+
+    Attributes
+    ----------
+    method : name of the filter
+    time : (n,) [s]
+    reference : (3,) the vehicle file's parameters [kg], [kg m^2]
+    alpha, alpha_std : (n, 3) reference over parameter, as known at each sample and not
+        later [-]
+    velocity : (n, 3) vertical, roll and pitch velocity [m/s], [rad/s]
+    offset : (n, 3) constant acceleration of offsets and weight [m/s^2], [rad/s^2]
+    innovation, innovation_var : (n, 3) measured less predicted velocity, and the variance
+        it should have; NaN where it is not known
+    jumped : (n, 3) when each parameter jumped last [s]; -inf for never
+    noise_factor : standard deviation of the suspension signals over that of the vehicle
+        file, as the innovations have it [-]
+    """
+
+    method: Method
+    time: Floats
+    reference: Floats
+    alpha: Floats
+    alpha_std: Floats
+    velocity: Floats
+    offset: Floats
+    innovation: Floats
+    innovation_var: Floats
+    jumped: Floats
+    noise_factor: float
+
+    @property
+    def parameters(self) -> Floats:
+        """(n, 3) sprung mass [kg], roll and pitch inertia [kg m^2]."""
+        return np.asarray(self.reference / self.alpha)
+
+    @property
+    def stds(self) -> Floats:
+        """(n, 3) their standard deviations by the filter alone."""
+        return np.asarray(self.parameters * self.alpha_std / self.alpha)
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the velocities, each by those before it."""
+        var = self.innovation_var
+        terms = np.log(var) + self.innovation**2 / var
+        return float(-0.5 * np.nansum(terms))
+
+    def interval(self, level: float = 0.95) -> tuple[Floats, Floats]:
+        """(n, 3) bounds that hold the parameters by the filter alone.
+
+        They lie evenly about the inverse parameter, as the filter is linear in it.
+        """
+        return inverse_interval(self.reference, self.alpha, self.alpha_std, level)
+
+
+def inverse_interval(
+    reference: Floats, alpha: Floats, alpha_std: Floats, level: float
+) -> tuple[Floats, Floats]:
+    """Bounds of ``reference / alpha``; the upper one infinite where alpha may be zero."""
+    reach = float(ndtri(0.5 + 0.5 * level)) * alpha_std
+    with np.errstate(divide="ignore"):
+        high = np.where(alpha > reach, reference / np.maximum(alpha - reach, 0.0), np.inf)
+    return np.asarray(reference / (alpha + reach)), high
+
+
+def corners(ride: Ride) -> Floats:
+    """(4, 3) height of the body above each wheel per heave, roll and pitch."""
+    a, b = 0.5 * ride.front_track, 0.5 * ride.rear_track
+    front, rear = ride.front_axle, ride.rear_axle
+    return np.array([[1.0, a, front], [1.0, -a, front], [1.0, b, -rear], [1.0, -b, -rear]])
+
+
+def stiffness(ride: Ride) -> Floats:
+    """(4,) of the springs [N/m]."""
+    return np.repeat((ride.front_stiffness, ride.rear_stiffness), 2)
+
+
+def damping(ride: Ride) -> Floats:
+    """(4,) of the dampers [N s/m]."""
+    return np.repeat((ride.front_damping, ride.rear_damping), 2)
+
+
+def reference(ride: Ride) -> Floats:
+    """(3,) sprung mass, roll and pitch inertia of the vehicle file."""
+    return np.array([ride.sprung_mass, ride.roll_inertia, ride.pitch_inertia])
+
+
+def body_noise(ride: Ride) -> Floats:
+    """(3,) standard deviation of one sample of the velocities."""
+    return np.array([ride.vertical_velocity_noise, ride.roll_rate_noise, ride.pitch_rate_noise])
+
+
+def push_var(ride: Ride) -> Floats:
+    """(3,) variance of the reference's acceleration from the suspension sensors' noise."""
+    spring, damper = _accelerations(ride)
+    return np.asarray(
+        np.sum((spring * ride.travel_noise) ** 2 + (damper * ride.rate_noise) ** 2, axis=1)
+    )
+
+
+def _accelerations(ride: Ride) -> tuple[Floats, Floats]:
+    """(3, 4) acceleration of the reference per travel and per rate at each wheel."""
+    arms = corners(ride).T / reference(ride)[:, np.newaxis]
+    return np.ascontiguousarray(arms * stiffness(ride)), np.ascontiguousarray(arms * damping(ride))
+
+
+def longest_step(period: float) -> float:
+    """Step above which velocities count as unknown [s]."""
+    return max(_LONGEST, 1.5 * period)
+
+
+def jump_params(
+    ride: Ride, period: float, settings: InertiaSettings, noise_factor: float = 1.0
+) -> kernel.InertiaParams:
+    """Put together what the filter with jumps reads."""
+    spring, damper = _accelerations(ride)
+    low, high = settings.range
+    return kernel.InertiaParams(
+        spring=spring,
+        damper=damper,
+        push_var=push_var(ride) * noise_factor**2,
+        noise_var=body_noise(ride) ** 2,
+        alpha_drift=settings.drift**2,
+        beta_drift=settings.offset_drift**2 if settings.offset_std > 0.0 else 0.0,
+        jump_std=settings.jump_std,
+        beta_std=np.full(3, settings.offset_std),
+        lowest=1.0 / high,
+        highest=1.0 / low,
+        jump_rate=settings.jump_rate,
+        spawn=settings.spawn,
+        longest=longest_step(period),
+    )
+
+
+def jump_state(params: kernel.InertiaParams, settings: InertiaSettings) -> kernel.InertiaState:
+    """Start the filter with jumps."""
+    return kernel.initial_state(np.full(3, settings.start_std), params, HYPOTHESES)
+
+
+class InertiaFilter:
+    """Sample by sample: what `run_filter` gives for all samples, to the last bit.
+
+    Parameters
+    ----------
+    ride : the vehicle's suspension
+    period : between samples, roughly [s]
+    settings : of the filter
+    """
+
+    def __init__(self, ride: Ride, period: float, settings: InertiaSettings | None = None) -> None:
+        chosen = settings or InertiaSettings()
+        self.reference = reference(ride)
+        self.params = jump_params(ride, period, chosen)
+        self.state = jump_state(self.params, chosen)
+
+    def update(
+        self, time: float, travel: Floats, rate: Floats, velocity: Floats
+    ) -> kernel.InertiaSample:
+        """Fold one sample in; parameters are ``reference / sample.alpha``.
+
+        Parameters
+        ----------
+        time : after the sample before [s]
+        travel, rate : (4,) [m], [m/s]
+        velocity : (3,) [m/s], [rad/s]; NaN where it was not measured
+        """
+        self.state, sample = kernel.step(
+            self.state,
+            float(time),
+            np.asarray(travel, dtype=np.float64),
+            np.asarray(rate, dtype=np.float64),
+            np.asarray(velocity, dtype=np.float64),
+            self.params,
+        )
+        return sample  # type: ignore[no-any-return]
+
+
+def estimate(
+    samples: RideSamples,
+    ride: Ride,
+    method: Method = "kalman-bucy",
+    settings: InertiaSettings | None = None,
+) -> InertiaTrack:
+    """Estimate the parameters over a ride.
+
+    With ``kalman-bucy`` the noise of the suspension signals is raised, by powers of two,
+    as long as the innovations become likelier.
+
+    Raises
+    ------
+    ConfigError
+        The method is not known.
+    """
+    if method not in METHODS:
+        raise ConfigError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
+    chosen = settings or InertiaSettings()
+    if method != "kalman-bucy":
+        return _run_fixed(samples, ride, method, chosen)
+    best = run_filter(samples, ride, chosen)
+    while best.noise_factor < _NOISIEST:
+        louder = run_filter(samples, ride, chosen, noise_factor=2.0 * best.noise_factor)
+        if louder.log_likelihood < best.log_likelihood + _GAIN:
+            break
+        best = louder
+    return best
+
+
+def run_filter(
+    samples: RideSamples, ride: Ride, settings: InertiaSettings, *, noise_factor: float = 1.0
+) -> InertiaTrack:
+    """Run the filter with jumps once over all samples."""
+    params = jump_params(ride, samples.period, settings, noise_factor)
+    _, found = kernel.run(
+        jump_state(params, settings),
+        samples.time,
+        samples.travel,
+        samples.rate,
+        samples.velocity,
+        params,
+    )
+    unknown = np.isnan(found.impulse)
+    return InertiaTrack(
+        method="kalman-bucy",
+        time=samples.time,
+        reference=reference(ride),
+        alpha=found.alpha,
+        alpha_std=found.alpha_std,
+        velocity=found.velocity,
+        offset=found.beta,
+        innovation=np.where(unknown, np.nan, found.innovation),
+        innovation_var=np.where(unknown, np.nan, found.innovation_var),
+        jumped=found.jumped,
+        noise_factor=noise_factor,
+    )
+
+
+def fixed_params(
+    ride: Ride, period: float, method: Method, settings: InertiaSettings
+) -> kalman_bucy.KalmanBucyParams:
+    """Put together what the filters with one fixed process noise read."""
+    spring, damper = _accelerations(ride)
+    low, high = settings.range
+    bounds = (1.0 / high, 1.0 / low) if method == "inverse" else (low, high)
+    of_velocity, of_parameter = settings.process
+    return kalman_bucy.KalmanBucyParams(
+        spring=spring,
+        damper=damper,
+        process=np.diag((*3 * (of_velocity,), *3 * (of_parameter,))),
+        noise=body_noise(ride) ** 2 * period,
+        lowest=bounds[0],
+        highest=bounds[1],
+        longest=longest_step(period),
+        form=_FORMS[method],
+    )
+
+
+def _run_fixed(
+    samples: RideSamples, ride: Ride, method: Method, settings: InertiaSettings
+) -> InertiaTrack:
+    params = fixed_params(ride, samples.period, method, settings)
+    start = np.diag((*3 * (100.0,), *3 * (settings.start_std**2,)))
+    _, mean, std = kalman_bucy.run(
+        kalman_bucy.initial_state(np.repeat((0.0, 1.0), 3), start),
+        samples.time,
+        samples.travel,
+        samples.rate,
+        samples.velocity,
+        params,
+    )
+    q, q_std = mean[:, 3:], std[:, 3:]
+    inverse = method == "inverse"
+    nothing = np.full_like(q, np.nan)
+    return InertiaTrack(
+        method=method,
+        time=samples.time,
+        reference=reference(ride),
+        alpha=q if inverse else 1.0 / q,
+        alpha_std=q_std if inverse else q_std / q**2,
+        velocity=mean[:, :3],
+        offset=np.zeros_like(q),
+        innovation=nothing,
+        innovation_var=nothing,
+        jumped=np.full_like(q, -np.inf),
+        noise_factor=1.0,
+    )
+
+
+MERGED: Final = 0.5
+"""Jumps of several parameters within this time are one [s]."""
+
+HELD: Final = 0.5
+"""A jump counts once the likeliest hypothesis has held it for so long [s]."""
+
+
+def jumps(track: InertiaTrack) -> tuple[float, ...]:
+    """Find when the load changed, as the filter came to believe.
+
+    Returns
+    -------
+    Times [s], rising.
+    """
+    if track.time.size < 2:
+        return ()
+    step = np.diff(track.time, append=track.time[-1])
+    believed: list[float] = []
+    for j in range(3):
+        born, place = np.unique(track.jumped[:, j], return_inverse=True)
+        held = np.bincount(place, weights=step)
+        last = track.jumped[-1, j]
+        recent = (born == last) & (held > 0.2 * HELD)
+        believed += born[np.isfinite(born) & ((held >= HELD) | recent)].tolist()
+    found: list[float] = []
+    for time in sorted(believed):
+        if not found or time - found[-1] > MERGED:
+            found.append(float(time))
+    return tuple(found)

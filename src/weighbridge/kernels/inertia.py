@@ -1,0 +1,427 @@
+"""Kalman-Bucy filter of sprung mass and inertias, with hypotheses of when they jumped.
+
+The sprung mass, its roll inertia and its pitch inertia obey, each for itself,
+
+    v' = alpha phi + beta,   alpha' = 0,   beta' = 0
+
+with the velocity v, the known acceleration phi = f / p0 of the reference parameter p0
+under the suspension force or moment f, alpha = p0 / p, and an offset beta of sensors and
+weight. It is linear in (v, alpha, beta), so between two samples it is integrated exactly,
+whatever the rate, and the covariance stays positive definite.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from weighbridge.kernels._jit import kernel
+
+AXES = 3
+
+
+class InertiaParams(NamedTuple):
+    """What stays the same from sample to sample.
+
+    Attributes
+    ----------
+    spring, damper : (3, 4) acceleration of each axis per travel and per rate of each
+        wheel, of the reference parameters [1/s^2], [1/s], and for the rotations over m
+    push_var : (3,) variance of phi from the noise of the suspension sensors
+    noise_var : (3,) of the measured velocities [m^2/s^2], [rad^2/s^2]
+    alpha_drift, beta_drift : growth of the variance of alpha and beta with time [1/s],
+        [m^2/s^5]
+    jump_std : standard deviation of alpha after a jump, relative to before it [-]
+    beta_std : (3,) of beta at the start and after a jump [m/s^2], [rad/s^2]
+    lowest, highest : bounds of alpha, outside of which no vehicle is [-]
+    jump_rate : jumps expected per time [1/s]
+    spawn : time between two hypotheses of a jump [s]; infinite to allow none
+    longest : step between samples above which velocities are unknown [s]
+    """
+
+    spring: np.ndarray
+    damper: np.ndarray
+    push_var: np.ndarray
+    noise_var: np.ndarray
+    alpha_drift: float
+    beta_drift: float
+    jump_std: float
+    beta_std: np.ndarray
+    lowest: float
+    highest: float
+    jump_rate: float
+    spawn: float
+    longest: float
+
+
+class InertiaState(NamedTuple):
+    """All hypotheses of the three axes.
+
+    Attributes
+    ----------
+    time : of the last sample [s]
+    phi : (2, 3) at the last sample and the one before
+    old_step : between them [s]; 0 where there is none
+    next_spawn : (3,) when the next hypothesis is due [s]
+    count : (3,) hypotheses in use
+    born : (3, m) when each says the parameter jumped last [s], rising
+    weight : (3, m) logarithm of its probability, the largest 0
+    mean : (3, m, 3) v, alpha, beta
+    cov : (3, m, 3, 3) their covariance
+    """
+
+    time: float
+    phi: np.ndarray
+    old_step: float
+    next_spawn: np.ndarray
+    count: np.ndarray
+    born: np.ndarray
+    weight: np.ndarray
+    mean: np.ndarray
+    cov: np.ndarray
+
+
+class InertiaSample(NamedTuple):
+    """What is known after one sample.
+
+    Attributes
+    ----------
+    alpha, alpha_std : (3,) inverse parameters over those of the reference [-]
+    beta : (3,) offset [m/s^2], [rad/s^2]
+    velocity : (3,) [m/s], [rad/s]
+    innovation, innovation_var : (3,) of the likeliest hypothesis [m/s], [rad/s] and their
+        squares; NaN where nothing was measured
+    impulse : (3,) change of phi's integral since the sample before [m/s], [rad/s]; NaN
+        where it is unknown
+    jumped : (3,) when the most likely hypothesis says the parameter jumped last [s]
+    """
+
+    alpha: np.ndarray
+    alpha_std: np.ndarray
+    beta: np.ndarray
+    velocity: np.ndarray
+    innovation: np.ndarray
+    innovation_var: np.ndarray
+    impulse: np.ndarray
+    jumped: np.ndarray
+
+
+VELOCITY_STD = 10.0
+"""Of a velocity nothing is known of [m/s], [rad/s]."""
+
+SPIKE = 5.0
+"""Innovations of more standard deviations count less [-]."""
+
+NEGLIGIBLE = np.log(1e-3)
+"""Hypotheses less likely than this, over the likeliest, are left out of the answer. A jump just
+supposed knows nothing yet: however unlikely, its spread would count."""
+
+
+def initial_state(alpha_std, params, hypotheses):
+    """Start with alpha = 1 and its standard deviation (3,) at no time yet."""
+    mean = np.zeros((AXES, hypotheses, 3))
+    cov = np.zeros((AXES, hypotheses, 3, 3))
+    mean[:, :, 1] = 1.0
+    cov[:, :, 0, 0] = VELOCITY_STD**2
+    cov[:, :, 1, 1] = np.asarray(alpha_std)[:, np.newaxis] ** 2
+    cov[:, :, 2, 2] = params.beta_std[:, np.newaxis] ** 2
+    return InertiaState(
+        np.nan,
+        np.full((2, AXES), np.nan),
+        0.0,
+        np.full(AXES, -np.inf),
+        np.ones(AXES, dtype=np.int64),
+        np.full((AXES, hypotheses), -np.inf),
+        np.zeros((AXES, hypotheses)),
+        mean,
+        cov,
+    )
+
+
+@kernel
+def integral(older, old, new, old_step, step):
+    """Integrate over the last step by the parabola through three samples, or the chord of two.
+
+    Parameters
+    ----------
+    older, old, new : float
+        Samples; ``older`` counts where ``old_step`` is comparable to ``step``.
+    old_step, step : float
+        Between them [s].
+
+    References
+    ----------
+    Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993,
+    sec. III.5, variable step size Adams method, one corrector of order three.
+    """
+    if not (old_step > 0.0 and old_step < 3.0 * step and step < 3.0 * old_step):
+        return 0.5 * step * (old + new)
+    both = old_step + step
+    return step * (
+        new * (2.0 * step + 3.0 * old_step) / (6.0 * both)
+        + old * (step + 3.0 * old_step) / (6.0 * old_step)
+        - older * step * step / (6.0 * old_step * both)
+    )
+
+
+@kernel
+def predict(mean, cov, impulse, step, velocity_var, params):
+    """Integrate one hypothesis over a step; exact for a known impulse."""
+    mean[0] += mean[1] * impulse + mean[2] * step
+    # F P F' with F = [[1, impulse, step], [0, 1, 0], [0, 0, 1]].
+    c01 = cov[0, 1] + impulse * cov[1, 1] + step * cov[1, 2]
+    c02 = cov[0, 2] + impulse * cov[1, 2] + step * cov[2, 2]
+    c00 = cov[0, 0] + impulse * (cov[0, 1] + c01) + step * (cov[0, 2] + c02)
+    cov[0, 0] = c00 + velocity_var
+    cov[0, 1] = c01
+    cov[1, 0] = c01
+    cov[0, 2] = c02
+    cov[2, 0] = c02
+    cov[1, 1] += params.alpha_drift * step
+    cov[2, 2] += params.beta_drift * step
+
+
+@kernel
+def forget_velocity(mean, cov, velocity):
+    """Make the velocity unknown; what is known of the rest stays."""
+    mean[0] = velocity
+    for i in range(1, 3):
+        cov[0, i] = 0.0
+        cov[i, 0] = 0.0
+    cov[0, 0] = VELOCITY_STD**2
+
+
+@kernel
+def correct(mean, cov, measured, noise_var):
+    """Fold a measured velocity in, by the Joseph form; return innovation and its variance.
+
+    A velocity far off counts as noisier in proportion, as Huber weighs it: a
+    spike of the sensor moves nothing much.
+    """
+    innovation = measured - mean[0]
+    var = cov[0, 0] + noise_var
+    far = abs(innovation) / (SPIKE * np.sqrt(var))
+    if far > 1.0:
+        noise_var += (far - 1.0) * var
+        var *= far
+    g0, g1, g2 = cov[0, 0] / var, cov[1, 0] / var, cov[2, 0] / var
+    mean[0] += g0 * innovation
+    mean[1] += g1 * innovation
+    mean[2] += g2 * innovation
+    # (I - g h) P (I - g h)' + g r g' of h = [1, 0, 0].
+    c00, c01, c02 = cov[0, 0], cov[0, 1], cov[0, 2]
+    keep = 1.0 - g0
+    cov[0, 0] = keep * keep * c00 + g0 * g0 * noise_var
+    cov[0, 1] = keep * (c01 - g1 * c00) + g0 * g1 * noise_var
+    cov[0, 2] = keep * (c02 - g2 * c00) + g0 * g2 * noise_var
+    cov[1, 1] += -2.0 * g1 * c01 + g1 * g1 * var
+    cov[1, 2] += -g1 * c02 - g2 * c01 + g1 * g2 * var
+    cov[2, 2] += -2.0 * g2 * c02 + g2 * g2 * var
+    cov[1, 0] = cov[0, 1]
+    cov[2, 0] = cov[0, 2]
+    cov[2, 1] = cov[1, 2]
+    return innovation, var
+
+
+@kernel
+def within(mean, std, lowest, highest):
+    """Mean and standard deviation of a Gaussian of which only a range is possible.
+
+    References
+    ----------
+    Johnson, Kotz, Balakrishnan, Continuous Univariate Distributions, vol. 1, 2nd ed., 1994,
+    sec. 13.10.1.
+    """
+    low, high = (lowest - mean) / std, (highest - mean) / std
+    if low < -6.0 and high > 6.0:
+        return mean, std
+    share = 0.5 * (math.erf(high / np.sqrt(2.0)) - math.erf(low / np.sqrt(2.0)))
+    if not share > 1e-12:
+        return min(max(mean, lowest), highest), std
+    at_low = np.exp(-0.5 * low * low) / np.sqrt(2.0 * np.pi)
+    at_high = np.exp(-0.5 * high * high) / np.sqrt(2.0 * np.pi)
+    shift = (at_low - at_high) / share
+    var = 1.0 + (low * at_low - high * at_high) / share - shift * shift
+    return mean + std * shift, std * np.sqrt(max(var, 0.0))
+
+
+@kernel
+def make_room(count, time, born, weight, mean, cov):
+    """Drop the less likely of the two hypotheses whose ages differ least in proportion."""
+    least, at = np.inf, 1
+    for i in range(count - 1):
+        ratio = (time - born[i]) / max(time - born[i + 1], 1e-9)
+        if np.isinf(born[i]):
+            ratio = 1e12 / max(time - born[i + 1], 1e-9)
+        if ratio < least:
+            least, at = ratio, i
+    drop = at if weight[at] < weight[at + 1] else at + 1
+    # What the dropped one believed goes to its neighbour: both tell nearly the same jump.
+    kept = 2 * at + 1 - drop
+    weight[kept] += np.log1p(np.exp(weight[drop] - weight[kept]))
+    for i in range(drop, count - 1):
+        born[i] = born[i + 1]
+        weight[i] = weight[i + 1]
+        mean[i] = mean[i + 1]
+        cov[i] = cov[i + 1]
+    return count - 1
+
+
+@kernel
+def suppose_jump(axis, state_time, count, born, weight, mean, cov, params):
+    """Add the hypothesis that the parameter jumps now, from the likeliest one."""
+    if count == born.size:
+        count = make_room(count, state_time, born, weight, mean, cov)
+    best = 0
+    for i in range(1, count):
+        if weight[i] > weight[best]:
+            best = i
+    born[count] = state_time
+    weight[count] = weight[best] + np.log(params.jump_rate * params.spawn)
+    mean[count] = mean[best]
+    cov[count] = cov[best]
+    for i in range(3):
+        if i != 1:
+            cov[count, 1, i] = 0.0
+            cov[count, i, 1] = 0.0
+    cov[count, 1, 1] += (params.jump_std * mean[best, 1]) ** 2
+    if params.beta_std[axis] > 0.0:
+        for i in range(2):
+            cov[count, 2, i] = 0.0
+            cov[count, i, 2] = 0.0
+        cov[count, 2, 2] += params.beta_std[axis] ** 2
+    return count + 1
+
+
+@kernel
+def step(state, time, travel, rate, velocity, params):
+    """Fold one sample in.
+
+    Parameters
+    ----------
+    state : InertiaState
+    time : float
+        After the sample before [s].
+    travel, rate : (4,) float64
+        Of the suspension at the wheels, positive in extension [m], [m/s].
+    velocity : (3,) float64
+        Measured vertical velocity up, roll rate right side down and pitch rate nose up
+        [m/s], [rad/s]; NaN where it was not measured.
+    params : InertiaParams
+
+    Returns
+    -------
+    state : InertiaState
+    sample : InertiaSample
+
+    References
+    ----------
+    Nguyen 2024, eqs. 6-9, in inverse parameters; Andersson, Adaptive forgetting in recursive
+    identification through multiple models, Int. J. Control 42(5), 1985, for the hypotheses.
+    """
+    phi = np.empty((2, AXES))
+    impulse = np.full(AXES, np.nan)
+    length = time - state.time
+    known = length > 0.0 and length <= params.longest
+    for j in range(AXES):
+        phi[1, j] = state.phi[0, j]
+        phi[0, j] = 0.0
+        for w in range(4):
+            phi[0, j] -= params.spring[j, w] * travel[w] + params.damper[j, w] * rate[w]
+        if known:
+            old_step = state.old_step
+            if not np.isfinite(state.phi[1, j]):
+                old_step = 0.0
+            impulse[j] = integral(state.phi[1, j], phi[1, j], phi[0, j], old_step, length)
+
+    next_spawn, count = state.next_spawn.copy(), state.count.copy()
+    born, weight = state.born.copy(), state.weight.copy()
+    mean, cov = state.mean.copy(), state.cov.copy()
+    alpha, alpha_std, beta = np.empty(AXES), np.empty(AXES), np.empty(AXES)
+    speed, jumped = np.empty(AXES), np.empty(AXES)
+    innovation, innovation_var = np.full(AXES, np.nan), np.full(AXES, np.nan)
+    for j in range(AXES):
+        measured = velocity[j]
+        for i in range(count[j]):
+            if np.isfinite(impulse[j]):
+                # What the parabola adds to the chord is what neither knows.
+                doubt = impulse[j] - 0.5 * length * (phi[0, j] + phi[1, j])
+                push_var = params.push_var[j] * length * length + doubt * doubt
+                var = mean[j, i, 1] * mean[j, i, 1] * push_var
+                predict(mean[j, i], cov[j, i], impulse[j], length, var, params)
+            elif not np.isfinite(state.time) or length > 0.0:
+                held = measured if np.isfinite(measured) else mean[j, i, 0]
+                forget_velocity(mean[j, i], cov[j, i], held)
+        best = 0
+        for i in range(1, count[j]):
+            if weight[j, i] > weight[j, best]:
+                best = i
+        if np.isfinite(measured):
+            innovation[j] = measured - mean[j, best, 0]
+            innovation_var[j] = cov[j, best, 0, 0] + params.noise_var[j]
+            top = -np.inf
+            for i in range(count[j]):
+                e, var = correct(mean[j, i], cov[j, i], measured, params.noise_var[j])
+                weight[j, i] -= 0.5 * (np.log(var) + e * e / var)
+                if weight[j, i] > top:
+                    top = weight[j, i]
+                    best = i
+            for i in range(count[j]):
+                weight[j, i] -= top
+        if time >= next_spawn[j] and params.spawn < np.inf:
+            count[j] = suppose_jump(j, time, count[j], born[j], weight[j], mean[j], cov[j], params)
+            next_spawn[j] = time + params.spawn
+
+        # The likeliest hypothesis answers; its spread has in it what the others say.
+        speed[j], beta[j] = mean[j, best, 0], mean[j, best, 2]
+        total, spread = 0.0, 0.0
+        for i in range(count[j]):
+            if weight[j, i] > NEGLIGIBLE:
+                p = np.exp(weight[j, i])
+                off = mean[j, i, 1] - mean[j, best, 1]
+                total += p
+                spread += p * (cov[j, i, 1, 1] + off * off)
+        alpha[j], alpha_std[j] = within(
+            mean[j, best, 1], np.sqrt(spread / total), params.lowest, params.highest
+        )
+        jumped[j] = born[j, best]
+    return (
+        InertiaState(
+            time, phi, length if known else 0.0, next_spawn, count, born, weight, mean, cov
+        ),
+        InertiaSample(alpha, alpha_std, beta, speed, innovation, innovation_var, impulse, jumped),
+    )
+
+
+@kernel
+def run(state, time, travel, rate, velocity, params):
+    """Apply ``step`` to each sample; see there.
+
+    Parameters
+    ----------
+    state : InertiaState
+    time : (n,) float64
+    travel, rate : (n, 4) float64
+    velocity : (n, 3) float64
+    params : InertiaParams
+
+    Returns
+    -------
+    state : InertiaState
+        After the last sample.
+    samples : InertiaSample
+        Arrays (n, 3).
+    """
+    n = time.size
+    alpha, alpha_std, beta = np.empty((n, AXES)), np.empty((n, AXES)), np.empty((n, AXES))
+    speed, innovation = np.empty((n, AXES)), np.empty((n, AXES))
+    innovation_var = np.empty((n, AXES))
+    impulse, jumped = np.empty((n, AXES)), np.empty((n, AXES))
+    for k in range(n):
+        state, s = step(state, time[k], travel[k], rate[k], velocity[k], params)
+        alpha[k], alpha_std[k], beta[k] = s.alpha, s.alpha_std, s.beta
+        speed[k], innovation[k], innovation_var[k] = s.velocity, s.innovation, s.innovation_var
+        impulse[k], jumped[k] = s.impulse, s.jumped
+    return state, InertiaSample(
+        alpha, alpha_std, beta, speed, innovation, innovation_var, impulse, jumped
+    )

@@ -1,0 +1,523 @@
+"""From a drive and a vehicle to sprung mass and inertias."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.inertia import (
+    AXES,
+    METHODS,
+    InertiaSettings,
+    InertiaTrack,
+    Method,
+    RideSamples,
+    estimate,
+    inverse_interval,
+    jumps,
+)
+from weighbridge.estimators.suspension import (
+    PARTS,
+    SuspensionCheck,
+    attenuation,
+    check_suspension,
+    response,
+    static_mass,
+)
+from weighbridge.estimators.track import Status
+from weighbridge.pipeline.checks import check_drive
+from weighbridge.pipeline.ride_checks import (
+    NEEDED,
+    SLOWEST,
+    check_response,
+    check_signals,
+    ride_of,
+    ride_samples,
+)
+from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle.model import MASS_RANGE, Ride, Vehicle
+
+if TYPE_CHECKING:
+    import polars as pl
+
+DEFAULT_METHOD: Final[Method] = "kalman-bucy"
+
+UNKNOWN_FORCE_STD: Final = 0.05
+"""Relative standard deviation of what all springs and dampers have in common where the vehicle
+file does not say [-]: chosen, for data-sheet values of springs (some 3 %) and dampers
+(some 10 %), of which springs carry most of the force."""
+
+TOO_WIDE: Final = 0.15
+"""Relative standard deviation above which a parameter is not known [-]."""
+
+WRONG_PART: Final = 0.5
+"""A spring or damper off by more than this part is broken or not the file's [-]."""
+
+WRONG_SHARE: Final = 0.05
+"""Part of the accelerations' power that wrong parts may explain [-]."""
+
+STATIC_PART: Final = 0.04
+"""Weight at rest and mass in motion may differ by this part of the mass [-]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadSegment:
+    """Parameters between two changes of load.
+
+    Attributes
+    ----------
+    start, end : [s]
+    values, stds : (3,) sprung mass [kg], roll and pitch inertia [kg m^2], at its end
+    """
+
+    start: float
+    end: float
+    values: Floats
+    stds: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inertia:
+    """Sprung mass and inertias at the end of a drive, how sure they are, and why.
+
+    Attributes
+    ----------
+    drive, vehicle : what it was made from
+    method : name of the filter
+    status : `Status`
+    reason : why there is no mass, one sentence; empty where there is
+    track : the filter's parameters over time; None where nothing could be estimated
+    suspension : each spring and damper against the vehicle file; None where the ride is
+        too short to tell
+    model_std : (3,) relative standard deviation beside the filter's: of the vehicle
+        file, of what does not fit, and of noise [-]
+    segments : parameters between changes of load
+    warnings : what was mended or doubted, one sentence each
+    """
+
+    drive: Drive
+    vehicle: Vehicle
+    method: Method
+    status: Status
+    reason: str
+    track: InertiaTrack | None
+    suspension: SuspensionCheck | None
+    model_std: Floats
+    segments: tuple[LoadSegment, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ride(self) -> Ride:
+        """The vehicle's suspension."""
+        assert self.vehicle.ride is not None
+        return self.vehicle.ride
+
+    @property
+    def values(self) -> Floats:
+        """(3,) sprung mass [kg], roll and pitch inertia [kg m^2]; NaN where unknown."""
+        if self.track is None or self.status is not Status.CONVERGED:
+            return np.full(3, np.nan)
+        return np.where(self._relative_std() <= TOO_WIDE, self.track.parameters[-1], np.nan)
+
+    @property
+    def stds(self) -> Floats:
+        """(3,) their standard deviations; NaN where unknown."""
+        return np.asarray(self.values * self._relative_std())
+
+    def _relative_std(self) -> Floats:
+        if self.track is None:
+            return np.full(3, np.inf)
+        by_filter = self.track.alpha_std[-1] / self.track.alpha[-1]
+        return np.asarray(np.hypot(by_filter, self.model_std))
+
+    def intervals(self, level: float = 0.95) -> tuple[Floats, Floats]:
+        """(3,) bounds that hold the parameters with the probability ``level``.
+
+        Raises
+        ------
+        ConfigError
+            The level is not between 0 and 1.
+        """
+        if not 0.0 < level < 1.0:
+            raise ConfigError(f"level must be between 0 and 1, got {level}")
+        known = np.isfinite(self.values)
+        relative = np.where(known, self._relative_std(), np.nan)
+        return inverse_interval(self.values, np.ones(3), relative, level)
+
+    @property
+    def mass(self) -> float:
+        """Of all that rolls: sprung and unsprung mass [kg]; NaN where unknown."""
+        return float(self.values[0]) + self.ride.front_unsprung + self.ride.rear_unsprung
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the mass [kg]; NaN where unknown."""
+        return float(self.stds[0])
+
+    @property
+    def axle_loads(self) -> tuple[float, float]:
+        """What scales under front and rear axle would show on the level [kg]."""
+        ride, sprung = self.ride, float(self.values[0])
+        base = ride.front_axle + ride.rear_axle
+        return (
+            sprung * ride.rear_axle / base + ride.front_unsprung,
+            sprung * ride.front_axle / base + ride.rear_unsprung,
+        )
+
+    @property
+    def payload(self) -> float:
+        """Mass minus the vehicle's tare [kg]; NaN where either is unknown."""
+        return self.mass - self.vehicle.tare if self.vehicle.tare is not None else math.nan
+
+    @property
+    def converged_at(self) -> float:
+        """Time until all that is known stays within 5 % of the result [s]; NaN if never."""
+        if self.track is None or not np.isfinite(self.values).any():
+            return math.nan
+        off = np.abs(self.track.parameters / self.values - 1.0) > 0.05
+        late = np.flatnonzero(off.any(axis=1))
+        at = self.track.time[late[-1] + 1] if late.size else self.track.time[0]
+        return float(at) - self.drive.start
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what ``inertia --json`` prints: numbers, None where unknown."""
+        low, high = self.intervals()
+        front, rear = self.axle_loads
+        parts: dict[str, Any] = {}
+        for k, name in enumerate(("sprung_mass_kg", "roll_inertia_kgm2", "pitch_inertia_kgm2")):
+            stem, unit = name.rsplit("_", 1)
+            parts[name] = _number(self.values[k])
+            parts[f"{stem}_std_{unit}"] = _number(self.stds[k])
+            parts[f"{stem}_interval95_{unit}"] = [_number(low[k]), _number(high[k])]
+        return {
+            "drive": self.drive.name,
+            "vehicle": self.vehicle.name,
+            "method": self.method,
+            "status": str(self.status),
+            "reason": self.reason,
+            **parts,
+            "mass_kg": _number(self.mass),
+            "std_kg": _number(self.std),
+            "axle_load_front_kg": _number(front),
+            "axle_load_rear_kg": _number(rear),
+            "payload_kg": _number(self.payload),
+            "duration_s": _number(self.drive.duration),
+            "converged_at_s": _number(self.converged_at),
+            "segments": [
+                {
+                    "start_s": _number(s.start),
+                    "end_s": _number(s.end),
+                    "sprung_mass_kg": _number(s.values[0]),
+                    "sprung_mass_std_kg": _number(s.stds[0]),
+                    "roll_inertia_kgm2": _number(s.values[1]),
+                    "roll_inertia_std_kgm2": _number(s.stds[1]),
+                    "pitch_inertia_kgm2": _number(s.values[2]),
+                    "pitch_inertia_std_kgm2": _number(s.stds[2]),
+                }
+                for s in (self.segments if self.status is Status.CONVERGED else ())
+            ],
+            "warnings": list(self.warnings),
+        }
+
+    def to_json(self) -> str:
+        """Return `to_dict` as one line of JSON."""
+        return json.dumps(self.to_dict(), ensure_ascii=False)
+
+    @property
+    def table(self) -> pl.DataFrame:
+        """Parameters and velocities over time, one row per sample."""
+        import polars as pl
+
+        t = self.track
+        if t is None:
+            return pl.DataFrame(schema=dict.fromkeys(TRACK_COLUMNS, pl.Float64))
+        values, stds = t.parameters, np.hypot(t.alpha_std / t.alpha, self.model_std)
+        stds = stds * values
+        columns = (
+            t.time, values[:, 0], stds[:, 0], values[:, 1], stds[:, 1], values[:, 2], stds[:, 2],
+            *t.velocity.T, *(t.innovation**2 / t.innovation_var).T,
+        )  # fmt: skip
+        return pl.DataFrame(dict(zip(TRACK_COLUMNS, columns, strict=True)), nan_to_null=True)
+
+    def write_track(self, path: str | Path) -> None:
+        """Write `table` as CSV or Parquet, by the suffix of ``path``.
+
+        Raises
+        ------
+        ConfigError
+            The suffix is neither.
+        """
+        path = Path(path)
+        match path.suffix.lower():
+            case ".csv":
+                self.table.write_csv(path)
+            case ".parquet":
+                self.table.write_parquet(path)
+            case _:
+                raise ConfigError(f"{path}: a track is written as .csv or .parquet")
+
+    def report(self, path: str | Path) -> None:
+        """Write a self-contained HTML report that opens offline."""
+        from weighbridge.report.inertia_panels import write_inertia
+
+        write_inertia(self, Path(path))
+
+
+TRACK_COLUMNS: Final = (
+    "time_s", "sprung_mass_kg", "sprung_mass_std_kg", "roll_inertia_kgm2",
+    "roll_inertia_std_kgm2", "pitch_inertia_kgm2", "pitch_inertia_std_kgm2",
+    "vertical_velocity_mps", "roll_rate_radps", "pitch_rate_radps",
+    "nis_vertical", "nis_roll", "nis_pitch",
+)  # fmt: skip
+"""Columns of the track, as files carry them; nis is the squared innovation over its variance."""
+
+
+def estimate_inertia(
+    drive: Drive,
+    vehicle: Vehicle,
+    method: str = DEFAULT_METHOD,
+    *,
+    settings: InertiaSettings | None = None,
+) -> Inertia:
+    """Estimate sprung mass, roll inertia and pitch inertia from the ride of a drive.
+
+    Parameters
+    ----------
+    drive : with suspension travel and rate at four wheels, vertical velocity, roll rate
+        and pitch rate
+    vehicle : with its suspension, ``[ride]`` of the vehicle file
+    method : name of the filter
+    settings : of the filter
+
+    Returns
+    -------
+    Inertia
+        At the end of the drive; a drive that carries none has a status and a reason.
+
+    Raises
+    ------
+    ConfigError
+        The method is not known, or the vehicle file has no suspension.
+    DriveError
+        What the drive says cannot be so, such as a wrong unit or sign.
+    """
+    chosen: Method | None = next((m for m in METHODS if m == method), None)
+    if chosen is None:
+        raise ConfigError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
+    ride = vehicle.ride
+    if ride is None:
+        raise ConfigError(
+            f"the vehicle file of {vehicle.name} has no [ride] section: add its springs, dampers "
+            "and axle distances, as in examples/ride-truck/vehicle.toml"
+        )
+
+    def nothing(status: Status, reason: str, warnings: tuple[str, ...] = ()) -> Inertia:
+        return Inertia(
+            drive=drive, vehicle=vehicle, method=chosen, status=status, reason=reason, track=None,
+            suspension=None, model_std=np.zeros(3), segments=(), warnings=warnings,
+        )  # fmt: skip
+
+    if lacking := drive.missing(NEEDED):
+        listed = ", ".join(lacking)
+        return nothing(
+            Status.MISSING_SIGNALS, f"the drive has no {listed}, which a ride is made of"
+        )
+    only = ride_of(drive)
+    problems = [*drive.problems, *check_drive(only), *check_signals(only)]
+    samples = ride_samples(only)
+    seen = response(samples, ride)
+    problems += check_response(seen) if seen is not None else ()
+    for problem in problems:
+        if problem.serious:
+            raise DriveError(f"{drive.name}: {problem.text}")
+    warnings = tuple(dict.fromkeys(p.text for p in problems))
+    if not samples.period <= SLOWEST:
+        return nothing(
+            Status.NOT_EXCITED,
+            f"the ride is sampled {1.0 / samples.period:.3g} times per second, and axles hop 10 to "
+            "15 times: record it at 100 Hz or more",
+            warnings,
+        )
+    track = estimate(samples, ride, chosen, settings)
+    average = np.ones(3) if seen is None else seen.slope
+    return _judged(drive, vehicle, ride, samples, track, average, warnings)
+
+
+def _judged(
+    drive: Drive,
+    vehicle: Vehicle,
+    ride: Ride,
+    samples: RideSamples,
+    track: InertiaTrack,
+    average: Floats,
+    warnings: tuple[str, ...],
+) -> Inertia:
+    """Say what the estimate is worth; ``average`` is that of alpha over the whole ride."""
+    changes = jumps(track)
+    begin = changes[-1] if changes else float(samples.time[0])
+    last = samples.since(begin)
+    alpha = np.asarray(track.alpha[-1])
+    restless = len(changes) > max(3.0, 0.1 * float(track.time[-1] - track.time[0]))
+    if ride.force_std is None:
+        warnings += (
+            "the vehicle file does not say how sure its springs and dampers are (force_std): "
+            f"{100.0 * UNKNOWN_FORCE_STD:.0f} % is in the interval",
+        )
+    common = UNKNOWN_FORCE_STD if ride.force_std is None else ride.force_std
+    std = np.hypot(common, attenuation(samples, ride, track.noise_factor, alpha))
+    if track.noise_factor > 1.0:
+        warnings += (
+            f"the ride fits as if the suspension signals had {track.noise_factor:.0f} times the "
+            "noise of the vehicle file: the sensors are noisier, or springs and dampers are not "
+            "the file's; the interval is widened",
+        )
+    if samples.period > 0.0105:
+        warnings += (
+            f"sampled at {1.0 / samples.period:.0f} Hz, axles that hop are hardly seen; "
+            "200 Hz or more is better",
+        )
+
+    # Loads that come and go are no loads: then only the whole ride can tell which part is off.
+    check = (
+        check_suspension(samples, ride, average)
+        if restless
+        else check_suspension(last, ride, alpha)
+    )
+    doubts: list[str] = []
+    if check is not None and check.off.any():
+        std = np.hypot(std, float(np.max(np.abs(check.factor - 1.0))))
+        doubts.append(_told(check))
+    carried, carried_std = static_mass(last, ride, GRAVITY)
+    found = float(track.parameters[-1, 0])
+    if abs(carried - found) > max(STATIC_PART * found, 4.0 * carried_std):
+        # Were it the stiffness, the inertias would be as wrong as the mass.
+        std = np.hypot(std, abs(carried / found - 1.0))
+        doubts.append(
+            f"at rest the springs carry {carried:.0f} kg, in motion the sprung mass is "
+            f"{found:.0f} kg: a travel sensor is offset, zero_mass_kg is not the mass with which "
+            "they read zero, or the stiffness is wrong; the interval holds both"
+        )
+    warnings += tuple(doubts)
+    if restless:
+        doubts.append(
+            f"the load seems to change {len(changes)} times: springs, dampers or sensors are not "
+            "those of the vehicle file"
+        )
+    status, reason = _status(vehicle, track, check, restless, doubts, std)
+    result = Inertia(
+        drive=drive,
+        vehicle=vehicle,
+        method=track.method,
+        status=status,
+        reason=reason,
+        track=track,
+        suspension=check,
+        model_std=std,
+        segments=_segments(track, changes, std),
+        warnings=warnings,
+    )
+    unknown = [
+        AXES[k] for k in (1, 2) if status is Status.CONVERGED and math.isnan(result.values[k])
+    ]
+    if unknown:
+        told = f"the ride says too little about the {' and the '.join(unknown)}"
+        return _with_warning(result, told)
+    if vehicle.gross is not None and result.mass > vehicle.gross:
+        sure = "surely" if result.mass - 2.0 * result.std > vehicle.gross else "perhaps"
+        return _with_warning(result, f"{sure} above the permitted mass of {vehicle.gross:.0f} kg")
+    return result
+
+
+def _with_warning(result: Inertia, text: str) -> Inertia:
+    return replace(result, warnings=(*result.warnings, text))
+
+
+def _told(check: SuspensionCheck) -> str:
+    """Name the parts that act otherwise than the vehicle file says."""
+    order = np.argsort(-check.off, kind="stable")[:4]
+    named = [f"{PARTS[k]} {check.factor[k]:.2f}" for k in order if check.off[k] > 0.0]
+    return (
+        f"against the others these act otherwise than the vehicle file says: {', '.join(named)} "
+        "times its value; check springs, dampers and their sensors; the interval is widened"
+    )
+
+
+def _status(
+    vehicle: Vehicle,
+    track: InertiaTrack,
+    check: SuspensionCheck | None,
+    restless: bool,
+    doubts: list[str],
+    std: Floats,
+) -> tuple[Status, str]:
+    """Say whether the ride carries a mass, and why not."""
+    mass, by_filter = float(track.parameters[-1, 0]), float(track.alpha_std[-1, 0])
+    by_filter /= float(track.alpha[-1, 0])
+    if check is not None and float(np.max(check.off)) > WRONG_PART:
+        k = int(np.argmax(check.off))
+        return Status.INCONSISTENT, (
+            f"the {PARTS[k]} acts {check.factor[k]:.2f} times as the vehicle file says: it is "
+            "locked, broken or another one, or its sensor is wrong"
+        )
+    if check is not None and float(np.max(check.misfit)) > WRONG_SHARE:
+        k = int(np.argmax(check.misfit))
+        return Status.INCONSISTENT, (
+            "springs and dampers of the vehicle file do not fit the ride: others explain "
+            f"{100.0 * check.misfit[k]:.0f} % more of the {('heave', 'roll', 'pitch')[k]}; "
+            f"{_told(check)}"
+        )
+    if restless:
+        return Status.INCONSISTENT, doubts[-1]
+    if not by_filter <= TOO_WIDE:
+        return Status.NOT_EXCITED, (
+            f"the ride says {mass:.0f} kg give or take {100.0 * by_filter:.0f} %, which is no "
+            "weighing; a longer or rougher road, or quieter sensors, would help"
+        )
+    if not math.hypot(by_filter, float(std[0])) <= TOO_WIDE:
+        return Status.INCONSISTENT, (
+            doubts[0].partition("; the interval")[0]
+            if doubts
+            else f"the sprung mass seems to be {mass:.0f} kg, but noise of the suspension signals "
+            f"may shift it by {100.0 * float(std[0]):.0f} %: a rougher road or quieter sensors "
+            "would help"
+        )
+    low, high = MASS_RANGE[vehicle.kind]
+    if not low < mass < high:
+        return Status.INCONSISTENT, (
+            f"the sprung mass is {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "
+            f"{high:.0f} kg; check the class and the [ride] section of the vehicle file"
+        )
+    return Status.CONVERGED, ""
+
+
+def _segments(
+    track: InertiaTrack, changes: tuple[float, ...], std: Floats
+) -> tuple[LoadSegment, ...]:
+    edges = [float(track.time[0]), *changes, np.inf]
+    found = []
+    for start, end in pairwise(edges):
+        k = min(int(np.searchsorted(track.time, end)), track.time.size) - 1
+        values = track.parameters[k]
+        relative = np.hypot(track.alpha_std[k] / track.alpha[k], std)
+        known = relative <= TOO_WIDE
+        found.append(
+            LoadSegment(
+                start=start,
+                end=float(track.time[k]),
+                values=np.where(known, values, np.nan),
+                stds=np.where(known, values * relative, np.nan),
+            )
+        )
+    return tuple(found)
+
+
+def _number(value: float) -> float | None:
+    return round(float(value), 6) if math.isfinite(value) else None

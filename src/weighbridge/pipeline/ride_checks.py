@@ -1,0 +1,172 @@
+"""From a drive to the samples of its ride, and what cannot be so in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import DriveError
+from weighbridge.estimators.inertia import RideSamples, longest_step
+from weighbridge.estimators.suspension import Response
+from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem
+
+WHEELS: Final = ("fl", "fr", "rl", "rr")
+TRAVELS: Final = tuple(f"suspension_travel_{w}" for w in WHEELS)
+RATES: Final = tuple(f"suspension_rate_{w}" for w in WHEELS)
+VELOCITIES: Final = ("vertical_velocity", "roll_rate", "pitch_rate")
+NEEDED: Final = (*TRAVELS, *RATES, *VELOCITIES)
+"""Signals of the ride."""
+
+SLOWEST: Final = 0.0175
+"""Longest period of a ride that can be used [s]: less than five samples in one hop of an axle."""
+
+FROZEN: Final = 1.0
+"""A suspension that repeats one value for so long while another moves is stuck [s]."""
+
+
+def ride_of(drive: Drive) -> Drive:
+    """Return the drive with the signals of its ride alone."""
+    return replace(drive, signals={n: s for n, s in drive.signals.items() if n in NEEDED})
+
+
+def ride_samples(drive: Drive) -> RideSamples:
+    """Bring the signals of a ride onto one clock.
+
+    The clock is that of the suspension signal with the most samples; others are
+    interpolated. Where a suspension signal is missing for longer than a force can be
+    integrated over, the row is left out; a missing velocity is NaN.
+
+    Raises
+    ------
+    DriveError
+        The signals share no time.
+    """
+    inputs = [drive.signals[name] for name in (*TRAVELS, *RATES)]
+    clock = max(inputs, key=len).time
+    longest = longest_step(float(np.median(np.diff(clock))) if clock.size > 1 else np.inf)
+    columns: dict[str, Floats] = {}
+    for name in NEEDED:
+        s = drive.signals[name]
+        if s.time is clock or np.array_equal(s.time, clock):
+            columns[name] = s.values
+            continue
+        values = s.at(clock)
+        # Between samples far apart the line between them says nothing.
+        after = np.clip(np.searchsorted(s.time, clock), 1, max(s.time.size - 1, 1))
+        apart = s.time[np.minimum(after, s.time.size - 1)] - s.time[after - 1]
+        exact = s.age(clock) == 0.0
+        columns[name] = np.where((apart <= longest) | exact, values, np.nan)
+    inputs_there = np.isfinite(np.column_stack([columns[n] for n in (*TRAVELS, *RATES)]))
+    keep = inputs_there.all(axis=1)
+    if np.count_nonzero(keep) < 2:
+        raise DriveError(
+            f"{drive.name}: travel and rate of the four wheels were never recorded together; "
+            "write them on one clock"
+        )
+
+    def block(names: tuple[str, ...]) -> Floats:
+        return np.ascontiguousarray(np.column_stack([columns[n][keep] for n in names]))
+
+    return RideSamples(
+        time=np.ascontiguousarray(clock[keep]),
+        travel=block(TRAVELS),
+        rate=block(RATES),
+        velocity=block(VELOCITIES),
+    )
+
+
+def check_signals(drive: Drive) -> Iterator[Problem]:
+    """Find values no suspension has, and sensors that are stuck."""
+    for name in NEEDED:
+        s, q = drive.signals[name], QUANTITIES[name]
+        outside = int(np.count_nonzero((s.values < q.low) | (s.values > q.high)))
+        if outside > 0.01 * len(s):
+            yield Problem(
+                name,
+                f"{outside} of {len(s)} values of {name} are outside {q.low:g} to {q.high:g} "
+                f"{q.suffix}, such as {float(s.values[np.argmax(np.abs(s.values))]):.4g}; check "
+                "the unit at the end of the column's name",
+                serious=True,
+            )
+    for names in (TRAVELS, RATES, VELOCITIES):
+        frozen = {name: _longest_still(drive, name) for name in names}
+        if min(frozen.values()) > FROZEN:
+            continue
+        for name, length in frozen.items():
+            share = length / max(drive.signals[name].duration, 1e-9)
+            if length > FROZEN:
+                yield Problem(
+                    name,
+                    f"{name} repeats one value for {length:.1f} s while others move; its sensor "
+                    "or suspension is stuck: mend it, or cut that part off",
+                    serious=share > 0.2,
+                )
+
+
+def _longest_still(drive: Drive, name: str) -> float:
+    """Longest time for which a signal repeats one value [s]."""
+    s = drive.signals[name]
+    changed = np.concatenate(([True], s.values[1:] != s.values[:-1]))
+    begins = s.time[changed]
+    ends = np.append(s.time[np.flatnonzero(changed)[1:] - 1], s.time[-1])
+    return float(np.max(ends - begins, initial=0.0))
+
+
+def check_response(found: Response) -> Iterator[Problem]:
+    """Find wrong signs, swapped wheels and wrong units by what must go together."""
+    for k, wheel in enumerate(WHEELS):
+        slope, row = float(found.rate_slope[k]), found.rate_correlation[k]
+        travel, rate = TRAVELS[k], RATES[k]
+        best = int(np.argmax(np.nan_to_num(row)))
+        if best != k and row[best] > 0.9 and row[k] < 0.8:
+            yield Problem(
+                travel,
+                f"{travel} goes with {RATES[best]}, not with {rate}: columns are swapped; name "
+                "them by their wheels",
+                serious=True,
+            )
+        elif slope < 0.0 and row[k] < -0.5:
+            yield Problem(
+                rate,
+                f"{rate} falls where {travel} rises: both are positive in extension; turn a sign "
+                "(factor = -1 in the mapping)",
+                serious=True,
+            )
+        elif row[k] > 0.5 and not 0.5 < slope < 2.0:
+            yield Problem(
+                rate,
+                f"{travel} changes {slope:.3g} times as fast as {rate} says; check their units",
+                serious=True,
+            )
+        elif row[k] > 0.5 and not (slope <= 1.1 and slope / row[k] ** 2 >= 0.9):
+            # Noise of the rate alone lowers the slope, by the square of the correlation.
+            yield Problem(
+                rate,
+                f"{travel} of wheel {wheel} changes {slope:.2f} times as fast as {rate} says: one "
+                "of the two is scaled wrongly",
+            )
+    turned = _turned(found)
+    if turned.all():
+        yield Problem(
+            TRAVELS[0],
+            "the body accelerates against its springs on every axis: suspension travel and rate "
+            "are positive in extension; turn their signs (factor = -1 in the mapping)",
+            serious=True,
+        )
+        return
+    says = ("upwards", "with the right side down", "with the nose up")
+    for name, wrong, positive in zip(VELOCITIES, turned, says, strict=True):
+        if wrong:
+            yield Problem(
+                name,
+                f"{name} runs against the forces of the suspension: it is positive {positive}; "
+                "turn its sign (factor = -1 in the mapping)",
+                serious=True,
+            )
+
+
+def _turned(found: Response) -> Bools:
+    return np.asarray((found.slope < 0.0) & (found.correlation < -0.5))

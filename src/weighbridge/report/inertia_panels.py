@@ -1,0 +1,221 @@
+"""Figures and page of sprung mass and inertias."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from weighbridge.estimators.inertia import AXES, InertiaTrack
+from weighbridge.estimators.suspension import PARTS, SuspensionCheck
+from weighbridge.report.study import write_study
+from weighbridge.report.style import BAND, BLUE, GREY, VERMILLION, Panel, blank, dots, line
+from weighbridge.report.table import Table
+from weighbridge.report.thinning import thin_line
+from weighbridge.signals import Floats
+
+if TYPE_CHECKING:
+    from weighbridge.pipeline.inertia import Inertia
+
+UNITS = ("kg", "kg m²", "kg m²")
+VELOCITIES = ("vertical velocity", "roll rate, right side down", "pitch rate, nose up")
+VELOCITY_UNITS = ("m/s", "rad/s", "rad/s")
+
+
+def parameter_panels(
+    track: InertiaTrack, model_std: Floats, *, truth: Floats | None = None
+) -> list[Panel]:
+    """Draw each parameter over time with its 95 % interval.
+
+    Parameters
+    ----------
+    track : of the filter
+    model_std : (3,) relative standard deviation beside the filter's [-]
+    truth : (n, 3) where it is known
+    """
+    panels = []
+    relative = np.hypot(track.alpha_std / track.alpha, model_std)
+    for k, (name, unit) in enumerate(zip(AXES, UNITS, strict=True)):
+        values = track.parameters[:, k]
+        reach = 1.96 * relative[:, k]
+        low = values / (1.0 + reach)
+        high = np.where(reach < 0.9, values / np.maximum(1.0 - reach, 0.1), 10.0 * values)
+        x, y, bottom, top = thin_line(track.time, values, low, high)
+        figure = blank("time [s]", f"{name} [{unit}]")
+        figure.add_scatter(x=x, y=bottom, mode="lines", line={"width": 0}, showlegend=False,
+                           hoverinfo="skip")  # fmt: skip
+        figure.add_scatter(x=x, y=top, name="95 %", mode="lines", line={"width": 0},
+                           fill="tonexty", fillcolor=BAND, hoverinfo="skip")  # fmt: skip
+        line(figure, x, y, "estimated", BLUE)
+        seen = values if truth is None else np.concatenate((truth[:, k], values[-1:]))
+        if truth is not None:
+            tx, ty = thin_line(track.time, truth[:, k])
+            line(figure, tx, ty, "true", VERMILLION, dash="dash")
+        # Some samples after the start or a change, an interval may reach to the sky.
+        settled = seen[seen.size // 10 :] if truth is None else seen
+        figure.update_yaxes(range=[0.0, 2.0 * float(np.nanmax(settled))], autorange=False)
+        panels.append(
+            Panel(
+                title=f"{name[0].upper()}{name[1:]}",
+                caption="As known at each moment, not later.",
+                figure=figure,
+            )
+        )
+    return panels
+
+
+def velocity_panels(
+    track: InertiaTrack, beside: Floats, label: str, seconds: float = 5.0
+) -> list[Panel]:
+    """Draw the first seconds of each velocity beside the measured or the true one.
+
+    Parameters
+    ----------
+    track : of the filter
+    beside : (n, 3) to draw beside
+    label : what that is
+    seconds : to draw, from a second after the start [s]
+    """
+    begin = float(track.time[0]) + 1.0
+    shown = (track.time >= begin) & (track.time <= begin + seconds)
+    panels = []
+    for k, (name, unit) in enumerate(zip(VELOCITIES, VELOCITY_UNITS, strict=True)):
+        figure = blank("time [s]", f"{name} [{unit}]", height=300)
+        x, y = thin_line(track.time[shown], beside[shown, k])
+        line(figure, x, y, label, GREY)
+        x, y = thin_line(track.time[shown], track.velocity[shown, k])
+        line(figure, x, y, "estimated", BLUE, dash="dot")
+        panels.append(Panel(title=f"{name[0].upper()}{name[1:]}", figure=figure))
+    return panels
+
+
+def innovation_panel(track: InertiaTrack) -> Panel:
+    """Draw the innovations against the size they should have, over seconds."""
+    title = "Innovations"
+    ratio = track.innovation**2 / track.innovation_var
+    if not np.isfinite(ratio).any():
+        return Panel(title=title, absent="this filter keeps no innovations")
+    second = np.floor(track.time - track.time[0]).astype(np.int64)
+    figure = blank("time [s]", "root mean square over its expectation [-]", height=300)
+    colours = (BLUE, VERMILLION, GREY)
+    for k, name in enumerate(("heave", "roll", "pitch")):
+        there = np.isfinite(ratio[:, k])
+        count = np.bincount(second[there], minlength=int(second[-1]) + 1)
+        total = np.bincount(second[there], weights=ratio[there, k], minlength=count.size)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            line(figure, np.arange(count.size) + track.time[0] + 0.5,
+                 np.sqrt(total / count), name, colours[k])  # fmt: skip
+    figure.add_hline(y=1.0, line={"color": GREY, "width": 1, "dash": "dot"})
+    return Panel(
+        title=title,
+        caption="Measured less predicted velocity, each second. One where model and noise of the "
+        "vehicle file hold.",
+        figure=figure,
+    )
+
+
+def suspension_panel(check: SuspensionCheck | None) -> Panel:
+    """Draw springs and dampers against the vehicle file."""
+    title = "Springs and dampers"
+    if check is None:
+        return Panel(title=title, absent="the ride is too short to tell springs and dampers apart")
+    figure = blank("over the vehicle file's value [-]", "", height=360)
+    dots(
+        figure, check.factor, list(PARTS), "found", BLUE, size=8.0, opacity=1.0,
+        error_x={"type": "data", "array": 1.96 * check.std, "color": BLUE},
+    )  # fmt: skip
+    figure.add_vline(x=1.0, line={"color": GREY, "width": 1, "dash": "dot"})
+    figure.update_yaxes(autorange="reversed")
+    return Panel(
+        title=title,
+        caption="Each against the others, with 95 % intervals. What all have in common is in the "
+        "mass and cannot be seen.",
+        figure=figure,
+    )
+
+
+def write_inertia(result: Inertia, path: Path) -> None:
+    """Write the page of one drive.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be written.
+    """
+    panels: Sequence[Panel] = ()
+    if result.track is not None:
+        measured = np.column_stack(
+            [
+                result.drive.signals[name].at(result.track.time)
+                for name in ("vertical_velocity", "roll_rate", "pitch_rate")
+            ]
+        )
+        panels = (
+            *parameter_panels(result.track, result.model_std),
+            innovation_panel(result.track),
+            *velocity_panels(result.track, measured, "measured"),
+            suspension_panel(result.suspension),
+        )
+    write_study(f"weighbridge: ride of {result.drive.name}", _tables(result), panels, path)
+
+
+def _tables(result: Inertia) -> list[Table]:
+    found = result.status == "converged"
+    low, high = result.intervals()
+    ride = result.ride
+    rows = []
+    if found:
+        rows += [
+            (f"{AXES[k]} [{UNITS[k]}]", _plain(result.values[k]), _between(low[k], high[k]),
+             _plain(start))
+            for k, start in enumerate((ride.sprung_mass, ride.roll_inertia, ride.pitch_inertia))
+        ]  # fmt: skip
+        front, rear = result.axle_loads
+        reach = 1.96 * result.std
+        rows += [
+            ("mass [kg]", _plain(result.mass), _between(result.mass - reach, result.mass + reach),
+             _plain(result.vehicle.tare) if result.vehicle.tare else ""),
+            ("front axle load [kg]", _plain(front), "", ""),
+            ("rear axle load [kg]", _plain(rear), "", ""),
+        ]  # fmt: skip
+        if math.isfinite(result.payload):
+            rows.append(("payload [kg]", _plain(result.payload), "", ""))
+    else:
+        rows.append(("no mass", str(result.status), "", ""))
+    tables = [
+        Table(
+            "At the end of the drive",
+            ("", "found", "95 % interval", "vehicle file"),
+            tuple(rows),
+        )
+    ]
+    if len(result.segments) > 1 and found:
+        tables.append(
+            Table(
+                "Between changes of load",
+                ("from s to s", "sprung mass kg", "roll inertia kg m²", "pitch inertia kg m²"),
+                tuple(
+                    (
+                        f"{s.start:.1f} to {s.end:.1f}",
+                        *(f"{v:.0f} ± {d:.0f}" for v, d in zip(s.values, s.stds, strict=True)),
+                    )
+                    for s in result.segments
+                ),
+            )
+        )
+    told = (*((result.reason,) if result.reason else ()), *result.warnings)
+    if told:
+        notes = tuple((f"{text[:1].upper()}{text[1:]}.",) for text in dict.fromkeys(told))
+        tables.append(Table("What was found, mended or doubted", ("",), notes))
+    return tables
+
+
+def _plain(value: float) -> str:
+    return f"{value:.0f}" if math.isfinite(value) else "unknown"
+
+
+def _between(low: float, high: float) -> str:
+    return f"{low:.0f} to {high:.0f}" if math.isfinite(high) else ""
