@@ -123,16 +123,25 @@ def test_dates_count_from_the_first_full_second(tmp_path, stamps, time_format, s
     assert drive.info.start_time.startswith(start)
 
 
-def test_absent_column_is_a_note_unless_optional(tmp_path):
+def test_absent_column_is_refused_unless_optional_or_in_another_file(tmp_path):
     log = write(tmp_path / "log.csv", "t,v\n0,36\n1,72\n")
     extra = {"throttle": {"column": "vv", "unit": "pct"}}
     mapping = {"time": {"column": "t"}, "signals": {**SPEED, **extra}}
     (problem,) = read_drive(log, mapping).problems
     assert problem.signal == "throttle"
-    assert "'vv' for throttle is not there" in problem.text
-    assert not problem.serious
+    assert "log.csv: column 'vv' for throttle is not there" in problem.text
+    assert "or set optional = true" in problem.text
+    assert problem.serious
+    other = write(tmp_path / "later.csv", "t,v,vv\n2,36,10\n3,72,20\n")
+    assert [p.serious for p in read_drive([log, other], mapping).problems] == [False]
     extra["throttle"]["optional"] = True
     assert read_drive(log, mapping).problems == ()
+
+
+def test_text_format_beside_tables_says_where_it_belongs(tmp_path):
+    mapping = {"csv": {"decimal": ","}, "tables": {"a": {"files": "a*.csv", "signals": SPEED}}}
+    with pytest.raises(ConfigError, match=r"as \[tables\.a\.csv\]"):
+        read_drive(write(tmp_path / "a.csv", "t,v\n0,36\n"), mapping)
 
 
 def test_several_kinds_of_file_in_one_folder(tmp_path):

@@ -14,7 +14,7 @@ from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffi
 from weighbridge.io.dbc import Database, Found, find_signal, is_readable, message_frames, physical
 from weighbridge.io.frames import Frames
 from weighbridge.io.j1939 import decode_j1939, is_j1939
-from weighbridge.io.mapping import MappedSignal, TableMapping, resolved_unit
+from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.obd import decode_obd
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_columns
@@ -32,11 +32,13 @@ class Decoded:
     ----------
     signals : by canonical name, in SI
     problems : what was left out
+    lacking : what the mapping names, not as optional, and no frame carries
     contents : what was found, decoded and ignored, with counts, for people
     """
 
     signals: dict[str, Signal] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
+    lacking: list[Problem] = field(default_factory=list)
     contents: list[str] = field(default_factory=list)
 
 
@@ -151,8 +153,8 @@ def _nothing(
             f"{seen}; they are neither OBD-II answers nor J1939: "
             "give the vehicle's DBC with --dbc and name its signals in a mapping"
         )
-    if done.problems and mapping is not None:
-        return f"{seen}; {done.problems[0].text}"
+    if mapping is not None and (why := [*done.problems, *done.lacking]):
+        return f"{seen}; {why[0].text}"
     return (
         f"{seen}; {names} gives no signal for them: name its signals in a mapping, or name "
         "the DBC that goes with the log"
@@ -244,11 +246,9 @@ def _mapped(
         found = find_signal(s.column, databases, carried)
         if not found:
             if not s.optional:
-                done.problems.append(
-                    Problem(
-                        s.name,
-                        f"{name}: no frame carries {s.column!r} for {s.name}; "
-                        "check the name in the DBC",
+                done.lacking.append(
+                    lacking(
+                        f"{name}: in its frames", s, mapping.source, "; check the name in the DBC"
                     )
                 )
             continue

@@ -20,6 +20,8 @@ class Log:
     path : the file
     signals : cleaned
     problems : what was left out
+    lacking : what a mapping names, not as optional, and the file does not have; serious unless
+        another file of the drive has it
     absolute : whether the clock counts from 1970
     start : where the clock begins [s since 1970], if it does not count from there
         and the file tells; None otherwise
@@ -31,6 +33,7 @@ class Log:
     path: Path
     signals: list[Signal] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
+    lacking: list[Problem] = field(default_factory=list)
     absolute: bool = False
     start: float | None = None
     align: bool = False

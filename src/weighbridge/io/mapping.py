@@ -25,7 +25,7 @@
     unit = "g"                       # else the brackets or the log's own unit
     factor = -1                      # value = factor * cell + offset, in that unit
     offset = 0.0
-    optional = true                  # no note where it is absent
+    optional = true                  # may be absent; else `weigh` refuses a drive without it
     valid = "AccValid"               # values count only where this signal is not 0; CAN only
 
 A drive of several kinds of file has one ``[tables.NAME]`` per kind, with
@@ -44,7 +44,7 @@ from typing import Any, Final
 from weighbridge.errors import ConfigError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
 from weighbridge.io.table import TextFormat
-from weighbridge.signals import QUANTITIES, Quantity
+from weighbridge.signals import QUANTITIES, Problem, Quantity
 from weighbridge.signals.tomlfile import Section, read_toml, suggestion
 from weighbridge.signals.units import UNITS
 
@@ -153,6 +153,11 @@ def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
             section = tables.section(name)
             if section is not None:
                 found.append(_table(section, section.text("files") or f"{name}.*"))
+    if tables is not None and "signals" not in root.data:
+        for key in ("csv", "time"):
+            if key in root.data:
+                places = ", ".join(f"[tables.{name}.{key}]" for name in tables.data)
+                root.fail(key, f"stands beside [tables]: write it for each table, as {places}")
     if tables is None or "signals" in root.data:
         found.append(_table(root, "*"))
     root.done()
@@ -276,6 +281,24 @@ def _signal(parent: Section, name: str) -> MappedSignal:
     )
     section.done()
     return signal
+
+
+def lacking(where: str, signal: MappedSignal, source: str, hint: str = "") -> Problem:
+    """Tell of a signal that is named and not there.
+
+    Parameters
+    ----------
+    where : the file, and what is named of it
+    signal : the mapped signal
+    source : the mapping
+    hint : what may be meant, from a semicolon on
+    """
+    return Problem(
+        signal.name,
+        f"{where} {signal.column!r} for {signal.name} is not there{hint}; correct column under "
+        f"signals.{signal.name} of {source}, or set optional = true there",
+        serious=True,
+    )
 
 
 def resolved_unit(signal: MappedSignal, stated: str | None, source: str) -> str:

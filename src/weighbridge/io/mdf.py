@@ -22,7 +22,7 @@ from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffi
 from weighbridge.io.frames import Frames
 from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import MappedSignal, TableMapping, resolved_unit
+from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.mdf_bus import bus_frames
 from weighbridge.io.mdf_salvage import Salvaged, salvage
 from weighbridge.io.table import column_list
@@ -113,6 +113,7 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
         log.frames = frames
         # What is no channel may be a signal of the frames.
         log.problems.clear()
+        log.lacking.clear()
     if not wanted and len(frames):
         return log
     if not wanted:
@@ -229,11 +230,7 @@ def _mapped(
         name = s.column if s.column in channels else plain.get(s.column.strip().casefold())
         if name is None:
             if not s.optional:
-                log.problems.append(
-                    Problem(
-                        s.name, f"{log.path.name}: channel {s.column!r} for {s.name} is not there"
-                    )
-                )
+                log.lacking.append(lacking(f"{log.path.name}: channel", s, mapping.source))
             continue
         place = _longest(file, channels[name])
         stated = unit_suffix(_unit_text(file, place))

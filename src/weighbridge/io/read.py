@@ -261,6 +261,7 @@ def _drive(
     for log in logs:
         for s in log.signals:
             parts.setdefault(s.name, []).append((log, s))
+    problems += [replace(p, serious=p.signal not in parts) for log in logs for p in log.lacking]
     if not parts:
         files = ", ".join(log.path.name for log in logs)
         why = f" ({problems[0].text})" if problems else ""
@@ -336,6 +337,7 @@ def _decode_frames(
         first.problems.append(Problem("", str(error)))
         return ()
     first.problems += found.problems
+    first.lacking += found.lacking
     for signal in found.signals.values():
         if signal.name in known:
             first.problems.append(

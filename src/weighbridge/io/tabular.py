@@ -15,7 +15,7 @@ from weighbridge.io.columns import (
     time_unit,
 )
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import TableMapping, resolved_unit
+from weighbridge.io.mapping import TableMapping, lacking, resolved_unit
 from weighbridge.io.table import (
     SEPARATORS,
     RawTable,
@@ -112,12 +112,8 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
         if index is not None:
             places[s.name] = index
         elif not s.optional:
-            log.problems.append(
-                Problem(
-                    s.name,
-                    f"{raw.path.name}: column {s.column!r} for {s.name} is not there"
-                    f"{_near(s.column, raw)}",
-                )
+            log.lacking.append(
+                lacking(f"{raw.path.name}: column", s, mapping.source, _near(s.column, raw))
             )
     if not places:
         raise DriveError(
