@@ -1,10 +1,13 @@
+import re
 from dataclasses import fields, replace
+from typing import get_type_hints
 
 import numpy as np
 import polars as pl
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from weighbridge.cli.simulate import simulate
 from weighbridge.errors import ConfigError
 from weighbridge.io import read_drive
 from weighbridge.signals import QUANTITIES
@@ -593,6 +596,17 @@ def test_random_vehicles_of_every_kind_drive(kind, vehicle_class):
 
 def test_every_scenario_is_described():
     assert set(ABOUT) == set(SCENARIOS)
+    hints = get_type_hints(simulate, include_extras=True)
+    told = hints["scenario"].__metadata__[0].help
+    assert set(SCENARIOS) <= set(re.findall(r"[a-z-]+", told))
+
+
+def test_scenarios_are_named_as_they_are_called():
+    for name in SCENARIOS:
+        made = make_scenario(name, payload=71.0, seed=3)
+        assert made.name == name
+        assert made.seed == 3
+        assert made.payload == 71.0
 
 
 @pytest.mark.parametrize(

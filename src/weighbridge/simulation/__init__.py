@@ -1,4 +1,4 @@
-"""Simulated cars on simulated roads, seen through simulated sensors."""
+"""Simulated vehicles on simulated roads, seen through simulated sensors."""
 
 from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar, random_car
 from weighbridge.simulation.named import ABOUT, SCENARIOS, make_scenario, usual_polling

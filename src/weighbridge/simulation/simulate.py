@@ -55,7 +55,7 @@ class Truth:
         taken off, its own inertia not yet [N m]
     load : calculated load before sampling and quantisation [-]
     gear : current one; during a shift the next
-    phase : 0 driving, 1 shifting, 2 clutch slips, 3 clutch open
+    phase : 0 driving, 1 shifting, 2 clutch or converter slips, 3 clutch open
     traction_force : of the driveline at the wheels, its losses and the engine's
         inertia taken off, the wheels' inertia not yet [N]
     brake_force, drag_force, rolling_force : against the motion [N]
