@@ -106,7 +106,7 @@ class InertiaSettings:
     drift: float = 3e-5
     offset_std: float = 10.0
     offset_drift: float = 3e-3
-    process: tuple[float, float] = (1e-4, 0.1)
+    process: tuple[float, float] = (1e-6, 0.01)
 
     def __post_init__(self) -> None:
         low, high = self.range

@@ -11,6 +11,7 @@ from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
 PAPERS: Final[dict[str, str]] = {
     "galvao": "weighbridge.papers.galvao",
     "jensen2022": "weighbridge.papers.jensen2022",
+    "nguyen2024": "weighbridge.papers.nguyen2024",
 }
 """Module of each paper that ``weighbridge reproduce`` knows; it has a function ``reproduced``
 of a seed and a `Progress`."""

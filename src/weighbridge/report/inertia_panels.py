@@ -56,7 +56,7 @@ def parameter_panels(
             line(figure, tx, ty, "true", VERMILLION, dash="dash")
         # Some samples after the start or a change, an interval may reach to the sky.
         settled = seen[seen.size // 10 :] if truth is None else seen
-        figure.update_yaxes(range=[0.0, 2.0 * float(np.nanmax(settled))], autorange=False)
+        figure.update_yaxes(range=[0.0, 1.5 * float(np.nanmax(settled))], autorange=False)
         panels.append(
             Panel(
                 title=f"{name[0].upper()}{name[1:]}",
@@ -99,15 +99,17 @@ def innovation_panel(track: InertiaTrack) -> Panel:
     if not np.isfinite(ratio).any():
         return Panel(title=title, absent="this filter keeps no innovations")
     second = np.floor(track.time - track.time[0]).astype(np.int64)
-    figure = blank("time [s]", "root mean square over its expectation [-]", height=300)
+    whole = int(second[-1])
+    figure = blank("time [s]", "RMS over expected [-]", height=300)
     colours = (BLUE, VERMILLION, GREY)
     for k, name in enumerate(("heave", "roll", "pitch")):
         there = np.isfinite(ratio[:, k])
         count = np.bincount(second[there], minlength=int(second[-1]) + 1)
         total = np.bincount(second[there], weights=ratio[there, k], minlength=count.size)
         with np.errstate(invalid="ignore", divide="ignore"):
-            line(figure, np.arange(count.size) + track.time[0] + 0.5,
-                 np.sqrt(total / count), name, colours[k])  # fmt: skip
+            size = np.sqrt(total / count)
+        # The last second is not whole.
+        line(figure, np.arange(whole) + track.time[0] + 0.5, size[:whole], name, colours[k])
     figure.add_hline(y=1.0, line={"color": GREY, "width": 1, "dash": "dot"})
     return Panel(
         title=title,
