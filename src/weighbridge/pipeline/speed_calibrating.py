@@ -31,7 +31,9 @@ GEARING: Final = 6.39 / 0.29
 """Gear ratios over wheel radius where no gearings are known [1/m] (Galvão et al., sec. 2.1)."""
 
 SCALE_STD: Final = 0.20
-"""Relative standard deviation that the method leaves in every mass [-]."""
+"""Relative standard deviation that the method leaves in every mass [-]. Simulated, eight cars
+each calibrated empty and weighed on eight other drives with loads to 35 % of the car: every
+answer was the empty car's mass, RMS error 18 % (studies/galvao.py, seeds from 5000)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

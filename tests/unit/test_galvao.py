@@ -1,0 +1,82 @@
+"""The reproduction of Galvão: figures beside the paper's, and what they are worth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weighbridge.papers import PAPERS, galvao
+
+
+@pytest.fixture(scope="module")
+def three():
+    return galvao.weigh_three(1234)
+
+
+@pytest.fixture
+def done(three):
+    fitted, _, tests = three
+    masses = np.linspace(1092.0, 1492.0, 9)
+    wild = 1000.0 + 700.0 * np.sin(np.arange(9.0))
+    trial = galvao.Trial(
+        kind="other masses", masses=masses, answers=np.full(9, 1092.0), pinned=wild
+    )
+    return galvao.Reproduction(
+        vehicle=fitted.vehicle,
+        r_squared=fitted.fit.r_squared,
+        tests=tests,
+        starts=((800.0, 800.4, 810.0), (2000.0, 1999.0, 1900.0)),
+        told=((900.0, 900.1, 0.5),),
+        trials=(trial, trial),
+    )
+
+
+def test_the_paper_is_known_to_reproduce():
+    assert PAPERS["galvao"] == galvao.__name__
+
+
+def test_the_road_is_easy_and_the_drives_are_as_long_as_the_papers(three):
+    _, drives, tests = three
+    for made, test in zip(drives, tests, strict=True):
+        assert set(made.drive.signals) == {"vehicle_speed"}
+        assert made.drive.duration == pytest.approx(1200.0, abs=15.0)
+        assert np.std(made.truth.grade) < 0.01
+        assert test.mass == pytest.approx(1092.0, abs=2.0)
+        assert np.count_nonzero(test.ours.used) > 100
+
+
+def test_same_mass_is_met_from_its_own_start_and_not_from_the_printed_one(three):
+    for test in three[2]:
+        assert abs(test.error(test.ours)) <= galvao.PAPER_WORST
+        assert test.band(test.ours) <= 100.0
+        assert abs(test.error(test.printed)) > 0.1
+
+
+def test_what_falls_behind_is_told(done):
+    by_start, band, printed, *_ = galvao.comparisons(done)
+    assert "gives back the mass it is started from" in by_start.figure
+    assert (by_start.good, band.good, printed.good) == (True, True, False)
+    off = done.tests[0]
+    moved = replace(off, mass=1.01 * off.mass)
+    worse = galvao.comparisons(replace(done, tests=(moved, *done.tests[1:])))
+    assert not worse[0].good
+
+
+def test_tables_have_a_text_for_every_column(done):
+    for made in (galvao.tests_table, galvao.starts_table, galvao.trials_table):
+        table = made(done)
+        assert all(len(row) == len(table.columns) for row in table.rows)
+
+
+def test_report_has_the_papers_nine_figures(done):
+    titles = [panel.title for test in done.tests for panel in galvao._panels(test)]
+    for number in range(7, 16):
+        assert sum(f"(fig. {number})" in title for title in titles) == 1
+
+
+def test_slope_is_that_of_the_straight_line():
+    masses = np.array([1000.0, 1100.0, 1300.0, 1400.0])
+    found, std = galvao.slope(masses, 300.0 + 0.5 * masses)
+    assert found == pytest.approx(0.5)
+    assert std == pytest.approx(0.0, abs=1e-9)
+    assert galvao.rank_correlation(masses, np.array([1.0, 2.0, 3.0, 1e9])) == pytest.approx(1.0)
