@@ -10,7 +10,12 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from weighbridge.simulation import (
+    BUS,
+    DIESEL_AUTOMATIC,
     MIDSIZE,
+    TRUCK18,
+    VAN,
+    Braking,
     Effects,
     Loading,
     Scenario,
@@ -128,10 +133,10 @@ def test_at_rest_the_sensor_reads_the_slope_and_gravity():
     assert_allclose(imu["accel_z"].values[k], expected, atol=1e-9)
 
 
-def test_work_of_the_driveline_is_energy_gained_and_lost():
-    scenario = short(duration=300.0, without=["fuel_burn"])
+@pytest.mark.parametrize("car", [MIDSIZE, DIESEL_AUTOMATIC, VAN, BUS, TRUCK18])
+def test_work_of_the_driveline_is_energy_gained_and_lost(car):
+    scenario = short(duration=300.0, without=["fuel_burn"], car=car)
     drive, _, _ = inside(scenario)
-    car = scenario.car
     way = np.diff(drive.distance)
     rotating = car.wheel_inertia / car.wheel_radius**2
     kinetic = 0.5 * (scenario.mass + rotating) * drive.speed[-1] ** 2
@@ -148,10 +153,11 @@ def test_work_of_the_driveline_is_energy_gained_and_lost():
     assert abs(driven - lost - kinetic - potential) < 5e-4 * turnover
 
 
-def test_locked_driveline_obeys_the_force_balance():
-    scenario = short(duration=200.0, effects=Effects.only(traffic=1.0, driver_ripple=1.0))
+@pytest.mark.parametrize("car", [MIDSIZE, DIESEL_AUTOMATIC, TRUCK18])
+def test_locked_driveline_obeys_the_force_balance(car):
+    effects = Effects.only(traffic=1.0, driver_ripple=1.0, brake_drag=1.0)
+    scenario = short(duration=200.0, effects=effects, car=car)
     drive, pose, _ = inside(scenario)
-    car = scenario.car
     moving = (drive.phase == 0) & (drive.speed > 3.0)
     gearing = np.array(car.gearings)[drive.gear.astype(int) - 1]
     inertia = scenario.mass + car.wheel_inertia / car.wheel_radius**2
@@ -182,6 +188,40 @@ def test_what_is_loaded_is_accelerated_and_tilts_the_body():
         steady = rows & (np.abs(np.gradient(drive.accel)) < 1e-3)
         expected = MIDSIZE.tyre_slip * pull[steady] / (mass * GRAVITY)
         assert_allclose(slip[steady], expected, atol=2e-5)
+
+
+def test_open_converter_gives_less_power_than_it_takes():
+    scenario = short(duration=200.0, effects=Effects.only(traffic=1.0), car=DIESEL_AUTOMATIC)
+    drive, _, _ = inside(scenario)
+    gearing = np.array(DIESEL_AUTOMATIC.gearings)[drive.gear.astype(int) - 1]
+    inertia = DIESEL_AUTOMATIC.engine_inertia
+    slipping = (drive.phase == 2) & (drive.pedal > 0.05) & (drive.speed > 0.5)
+    slipping &= gearing * drive.speed < 0.98 * drive.engine_speed
+    # Not where gear or lock-up change within the differences.
+    slipping &= (np.gradient(drive.phase) == 0.0) & (np.gradient(drive.gear) == 0.0)
+    speed = drive.engine_speed
+    gain = np.diff(speed, prepend=speed[0]) / DT
+    taken = (drive.engine_torque - inertia * gain) * speed
+    given = drive.traction_force * drive.speed
+    assert slipping.sum() > 1000
+    efficiency = (given / taken)[slipping]
+    nu = (gearing * drive.speed / speed)[slipping]
+    # Straight from stall ratio to the coupling point, then 1.
+    ratio = np.where(nu < 0.86, 2.0 - nu / 0.86, 1.0)
+    assert np.quantile(np.abs(efficiency - nu * ratio), 0.95) < 0.02
+    assert efficiency.max() < 1.0
+
+
+def test_braking_at_a_time_slows_the_vehicle_as_asked():
+    braking = Braking(time=60.0, duration=4.0, decel=1.5)
+    effects = Effects.only(driver_ripple=1.0)
+    scenario = short(
+        car=BUS, route=flat_route(3000.0), duration=80.0, brakings=(braking,), effects=effects
+    )
+    drive, _, _ = inside(scenario)
+    slowing = (drive.time > 62.0) & (drive.time < 63.9)
+    assert_allclose(drive.accel[slowing], -1.5, atol=0.1)
+    assert drive.brake_force[(drive.time > 50.0) & (drive.time < 59.9)].max() < 100.0
 
 
 def test_resistance_in_steady_wind_is_the_textbooks():
