@@ -6,6 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from weighbridge.kernels import disturbance as kernel
 
+NO_JUMPS = np.zeros(300)
+
 
 def problem(n=300, seed=1):
     rng = np.random.default_rng(seed)
@@ -28,7 +30,7 @@ def problem(n=300, seed=1):
 
 def test_equals_generalised_least_squares_with_the_dense_covariance():
     time, rows, y, noise, params, start, cov = problem()
-    state, *_ = kernel.run(start, time, rows, y, noise, params)
+    state, *_ = kernel.run(start, time, rows, y, noise, NO_JUMPS, params)
     phi, weight = rows[:, 0], np.linalg.inv(cov)
     information = phi @ weight @ phi + 1.0 / 500.0**2
     expected = (phi @ weight @ y + 1000.0 / 500.0**2) / information
@@ -38,7 +40,7 @@ def test_equals_generalised_least_squares_with_the_dense_covariance():
 
 def test_likelihood_is_that_of_the_dense_covariance():
     time, rows, y, noise, params, start, cov = problem()
-    state, *_ = kernel.run(start, time, rows, y, noise, params)
+    state, *_ = kernel.run(start, time, rows, y, noise, NO_JUMPS, params)
     whole = cov + 500.0**2 * np.outer(rows[:, 0], rows[:, 0])
     residual = y - 1000.0 * rows[:, 0]
     _, log_det = np.linalg.slogdet(whole)
@@ -48,7 +50,7 @@ def test_likelihood_is_that_of_the_dense_covariance():
 
 def test_batch_equals_sample_by_sample_to_the_last_bit():
     time, rows, y, noise, params, start, _ = problem()
-    last, first, var, innovation, taken = kernel.run(start, time, rows, y, noise, params)
+    last, first, var, innovation, taken = kernel.run(start, time, rows, y, noise, NO_JUMPS, params)
     state = start
     for k in range(y.size):
         state, e, took = kernel.step(state, time[k], rows[k], y[k], noise[k], params)
@@ -64,8 +66,8 @@ def test_outliers_are_left_out():
     spoiled = y.copy()
     spoiled[50::40] += 3000.0
     gated = params._replace(gate=5.0, settle=20)
-    state, _, _, _, taken = kernel.run(start, time, rows, spoiled, noise, gated)
-    clean, *_ = kernel.run(start, time, rows, y, noise, gated)
+    state, _, _, _, taken = kernel.run(start, time, rows, spoiled, noise, NO_JUMPS, gated)
+    clean, *_ = kernel.run(start, time, rows, y, noise, NO_JUMPS, gated)
     assert not taken[50::40].any()
     assert state.x[0] == pytest.approx(clean.x[0], rel=0.005)
 
@@ -76,6 +78,37 @@ def test_a_start_three_times_too_heavy_or_too_light_ends_alike():
     for guess in (500.0, 1500.0, 4500.0):
         prior = np.diag([guess**2, 60.0**2, 25.0**2])
         start = kernel.initial_state([guess, 0.0, 0.0], prior, time[0])
-        state, *_ = kernel.run(start, time, rows, y, noise, params)
+        state, *_ = kernel.run(start, time, rows, y, noise, NO_JUMPS, params)
         ends.append(state.x[0])
     assert max(ends) - min(ends) < 0.005 * 1500.0
+
+
+def test_smoothing_equals_the_conditional_mean_of_the_dense_covariance():
+    time, rows, y, noise, params, start, _ = problem()
+    added = np.zeros(y.size)
+    added[120] = 300.0**2
+    x, var = kernel.smooth(start, time, rows, y, noise, added, params)
+    jumped = (np.arange(y.size) >= 120).astype(float)
+    span = np.abs(time[:, None] - time)
+    states = [
+        500.0**2 + 300.0**2 * np.outer(jumped, jumped),
+        60.0**2 * np.exp(-span / 30.0),
+        25.0**2 * np.exp(-span / 200.0),
+    ]
+    whole = sum(c * np.outer(rows[:, i], rows[:, i]) for i, c in enumerate(states))
+    whole = whole + np.diag(noise)
+    residual = y - 1000.0 * rows[:, 0]
+    for i, cov in enumerate(states):
+        cross = cov * rows[:, i]
+        expected = cross @ np.linalg.solve(whole, residual) + (1000.0 if i == 0 else 0.0)
+        spread = np.diag(cov) - np.sum(cross * np.linalg.solve(whole, cross.T).T, axis=1)
+        assert_allclose(x[:, i], expected, rtol=1e-6, atol=1e-6)
+        assert_allclose(var[:, i], spread, rtol=1e-5, atol=1e-6)
+
+
+def test_smoothing_ends_where_the_filter_ends():
+    time, rows, y, noise, params, start, _ = problem()
+    state, *_ = kernel.run(start, time, rows, y, noise, NO_JUMPS, params)
+    x, var = kernel.smooth(start, time, rows, y, noise, NO_JUMPS, params)
+    assert_allclose(x[-1], state.x, rtol=1e-12)
+    assert_allclose(var[-1], np.diag(state.cov), rtol=1e-9)

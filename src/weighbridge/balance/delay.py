@@ -43,7 +43,7 @@ def best_delay(
         best = int(np.argmin(scores))
         if best in (0, grid.size - 1):
             return float("nan")
-        centre = _vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
+        centre = vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
         step = 0.02
         grid = centre + step * np.arange(-2, 3)
     return centre
@@ -95,7 +95,7 @@ def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> flo
     return best_delay(misfit)
 
 
-def _vertex(x: Floats, y: Floats) -> float:
+def vertex(x: Floats, y: Floats) -> float:
     """Abscissa of the lowest point of the parabola through three points."""
     curvature = y[0] - 2.0 * y[1] + y[2]
     if curvature <= 0.0:

@@ -202,7 +202,7 @@ def force_balance(
         delay = vehicle.timing.torque_delay or 0.0
     recorded = source.time
     time = recorded - delay
-    rows = _motion_at(_smoothed(motion, vehicle.timing.torque_lag if lag is None else lag), time)
+    rows = _motion_at(smoothed(motion, vehicle.timing.torque_lag if lag is None else lag), time)
     driveline = vehicle.driveline
 
     engine_speed = _engine_speed(drive, vehicle, time + motion.speed_delay, rows["speed"])
@@ -290,7 +290,7 @@ def headwind(drive: Drive, heading: Floats) -> Floats:
     return np.asarray(np.where(np.isfinite(along), along, 0.0))
 
 
-def _smoothed(motion: Motion, lag: float) -> Motion:
+def smoothed(motion: Motion, lag: float) -> Motion:
     """Pass what the force side is compared with through a first-order lag [s]."""
     if lag <= 0.0:
         return motion

@@ -8,36 +8,27 @@ averaged over the same windows.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.averaging import Windows, windows
+from weighbridge.balance.averaging import WINDOW, Windows, windows
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
-from weighbridge.estimators.joint import (
+from weighbridge.estimators.joint import GATE
+from weighbridge.estimators.slow_errors import (
+    COLD_TORQUE_STD,
     DISTURBANCE_STD,
-    GATE,
     RESISTANCE_STD,
     TIME_CONSTANTS,
     WIND_STD,
+    coldness,
     noise_variance,
 )
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import VehicleClass
+from weighbridge.vehicle.model import TorqueSource
 from weighbridge.vehicle.torque import torque_rows
-
-ROAD_PRIOR: Final[dict[VehicleClass, tuple[Floats, Floats]]] = {
-    "car": (np.array([0.65, 0.010, 0.15, 6.0]), np.array([0.25, 0.004, 0.06, 1.5])),
-    "van": (np.array([1.30, 0.010, 0.30, 9.0]), np.array([0.50, 0.004, 0.12, 3.0])),
-    "bus": (np.array([5.0, 0.008, 2.0, 80.0]), np.array([1.5, 0.003, 0.8, 30.0])),
-    "truck": (np.array([5.5, 0.007, 2.5, 120.0]), np.array([1.5, 0.003, 1.0, 50.0])),
-}
-"""C_d A [m^2], C_r [-], I_e and I_w [kg m^2] of a class and their standard deviations:
-Gillespie, Fundamentals of Vehicle Dynamics, 1992, ch. 4; inertias as in Jensen 2022,
-sec. 7.3, for cars and in proportion to engine and wheels for the others."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,17 +71,33 @@ class InverseFit:
     windows: int
 
 
-def fit(
-    drives: list[DriveRows],
-    kind: VehicleClass,
-    wheel_radius: float,
-    *,
-    order: int,
-    curved: bool,
-    torque_noise: float,
-    inertias: tuple[float, float] | None = None,
-    rounds: int = 3,
-) -> InverseFit:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitSettings:
+    """What is fitted, and what is known before.
+
+    Attributes
+    ----------
+    source : of the torque
+    order : highest power of engine speed
+    curved : let torque per load bend with engine speed and load
+    torque_noise : of one reading, as torque [N m]
+    wheel_radius : [m]
+    prior : mean and standard deviation (4,) of C_d A, C_r, I_e, I_w
+    window : length of the windows [s]
+    rounds : of refining the fitted reading
+    """
+
+    source: TorqueSource
+    order: int
+    curved: bool
+    torque_noise: float
+    wheel_radius: float
+    prior: tuple[Floats, Floats]
+    window: float = WINDOW
+    rounds: int = 3
+
+
+def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     """Fit the reading of the torque source to the force that the motion takes.
 
     With the fast noise on the side of the torque source, its reading is what
@@ -102,38 +109,26 @@ def fit(
     Parameters
     ----------
     drives : rows of each drive
-    kind : class of the vehicle, for `ROAD_PRIOR`
-    wheel_radius : [m]
-    order : highest power of engine speed
-    curved : let torque per load bend with engine speed and load
-    torque_noise : of one reading, as torque [N m]
-    inertias : I_e and I_w where the drives cannot tell them
-    rounds : of refining the fitted reading
+    settings
 
     Raises
     ------
     DriveError
         Too few usable windows.
     """
-    cuts = [windows(d.view.time, d.usable) for d in drives]
+    cuts = [windows(d.view.time, d.usable, length=settings.window) for d in drives]
     total = sum(cut.count.size for cut in cuts)
-    mean, std = (values.copy() for values in ROAD_PRIOR[kind])
-    if inertias is not None:
-        mean[2:], std[2:] = inertias, 1e-3 * np.array(inertias)
-    p = 2 + order + 2 * curved
-    if total < 15 * (p + 4):
+    p = 2 + settings.order + 2 * settings.curved
+    if total < 15 * (p + 4) or any(cut.count.size == 0 for cut in cuts):
         raise DriveError(
             f"only {total} usable stretches of {p + 4} needed parameters; drive longer, with more "
             "starts and in all gears"
         )
     scale = _torque_per_reading(drives)
     readings = [d.regressor for d in drives]
-    for _ in range(rounds):
-        state, fitted = _solve(
-            drives, cuts, readings, scale, mean, std, wheel_radius, order, curved, torque_noise
-        )
-        readings = fitted
-    return _unpack(state, scale, order, curved, total)
+    for _ in range(settings.rounds):
+        state, readings = _solve(drives, cuts, readings, scale, settings)
+    return _unpack(state, scale, settings.order, settings.curved, total)
 
 
 def _torque_per_reading(drives: list[DriveRows]) -> float:
@@ -170,6 +165,7 @@ def _columns(
         one,
         push * north,
         push * east,
+        gearing * coldness(view),
     ]
     return np.asarray(np.nan_to_num(np.column_stack(columns)))
 
@@ -179,19 +175,16 @@ def _solve(
     cuts: list[Windows],
     readings: list[Floats],
     scale: float,
-    mean: Floats,
-    std: Floats,
-    wheel_radius: float,
-    order: int,
-    curved: bool,
-    torque_noise: float,
+    settings: FitSettings,
 ) -> tuple[kernel.DisturbanceState, list[Floats]]:
     """Run the filter over all drives one after another."""
+    order, curved = settings.order, settings.curved
+    mean, std = settings.prior
     times, rows, targets, variances, parts = [], [], [], [], []
     clock = 0.0
     mass = float(np.mean([d.mass for d in drives]))
     for d, cut, reading in zip(drives, cuts, readings, strict=True):
-        columns = _columns(d, reading, wheel_radius, order, curved)
+        columns = _columns(d, reading, settings.wheel_radius, order, curved)
         gearing = np.nan_to_num(d.view.gearing)
         time = cut.mean(d.view.time)
         times.append(time - time[0] + clock)
@@ -199,12 +192,17 @@ def _solve(
         clock = float(times[-1][-1]) + 1e5
         rows.append(cut.mean(columns))
         targets.append(cut.mean(scale * gearing * np.nan_to_num(d.regressor)))
-        variances.append(noise_variance(d.view, cut, torque_noise, mass))
+        variances.append(noise_variance(d.view, cut, settings.torque_noise, mass))
         parts.append(columns)
     stacked = np.ascontiguousarray(np.vstack(rows))
     extra = 1 + order + 2 * curved
     typical = np.sqrt(np.mean(stacked[:, 5 : 5 + extra] ** 2, axis=0))
-    force = float(np.sqrt(np.mean(np.concatenate(targets) ** 2)))
+    reached = np.concatenate(targets)
+    force = float(np.sqrt(np.mean(reached**2)))
+    gearing = np.concatenate(
+        [cut.mean(np.nan_to_num(d.view.gearing)) for d, cut in zip(drives, cuts, strict=True)]
+    )
+    torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
     loose = 3.0 * force / np.maximum(typical, 1e-12)
     fading = np.array(
         [
@@ -212,9 +210,10 @@ def _solve(
             mass * RESISTANCE_STD,
             WIND_STD * 2 * mean[0],
             WIND_STD * 2 * mean[0],
+            COLD_TORQUE_STD[settings.source] * torque,
         ]
     )
-    x0 = np.concatenate(([1.0], mean, np.zeros(extra), np.zeros(4)))
+    x0 = np.concatenate(([1.0], mean, np.zeros(extra), np.zeros(fading.size)))
     prior = np.concatenate(([0.5], std, loose, fading)) ** 2
     params = kernel.DisturbanceParams(
         time_constant=np.concatenate((np.full(5 + extra, np.inf), TIME_CONSTANTS)),
@@ -224,8 +223,8 @@ def _solve(
     )
     start = kernel.initial_state(x0, np.diag(prior), 0.0)  # type: ignore[no-untyped-call]
     state, _, _, _, _ = kernel.run(
-        start, np.concatenate(times), stacked, np.concatenate(targets),
-        np.concatenate(variances), params,
+        start, np.concatenate(times), stacked, reached,
+        np.concatenate(variances), np.zeros(reached.size), params,
     )  # fmt: skip
     fitted = []
     for d, columns in zip(drives, parts, strict=True):

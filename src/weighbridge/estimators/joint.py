@@ -1,7 +1,8 @@
-"""Mass beside the slow errors that look like it: disturbance, wind, rolling resistance."""
+"""Mass beside the slow errors that look like it: disturbance, wind, resistance, cold."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -10,80 +11,38 @@ from scipy.optimize import minimize
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import MergedView
-from weighbridge.estimators.judging import (
-    consider_std,
-    converged_at,
-    judge,
-    nothing,
-    segments,
+from weighbridge.estimators.judging import STOP, calibration_std, converged_at, judge, nothing
+from weighbridge.estimators.slow_errors import (
+    SlowErrors,
+    design,
+    filter_params,
+    noise_variance,
+    prior_std,
+    usable_rows,
 )
-from weighbridge.estimators.rls import block_jackknife, regression
-from weighbridge.estimators.track import MassTrack
-from weighbridge.kernels import disturbance as kernel
+from weighbridge.estimators.track import MassTrack, Segment
+from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
-
-TIME_CONSTANTS: Final = (30.0, 900.0, 600.0, 600.0)
-"""How long disturbance, resistance and wind north and east last [s]: gusts, grade and
-torque errors half a minute, rolling resistance and offsets a quarter of an hour, mean wind
-ten minutes."""
-
-DISTURBANCE_STD: Final = 0.04
-"""Standard deviation of the disturbance before the drive has told, over mass [m/s^2]."""
-
-RESISTANCE_STD: Final = 0.017
-"""Of the slow resistance, over mass [m/s^2]: a fifth of the rolling resistance of a car."""
-
-WIND_STD: Final = 2.0
-"""Of each component of the wind at the vehicle [m/s]."""
-
-MOTION_STD: Final = 0.03
-"""Fast error of the specific force before the drive has told [m/s^2]."""
 
 GATE: Final = 5.0
 """Windows with a larger normalised innovation are left out [-]."""
 
-FEWEST_WINDOWS: Final = 40
+FEWEST_WINDOWS: Final = 8
 """Fewer usable windows carry no mass."""
 
+SETTLE: Final = 40
+"""Windows before the gate closes."""
 
-def design(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
-    """Rows of the model ``y = phi m + d + c + wind``.
+CHANGE_STD: Final = 0.25
+"""Standard deviation of a change of load at a stop, over mass [-]."""
 
-    The drag of a wind small against the speed is linear in it:
-    ``rho C_d A v`` times its component along the road.
+CHANGE_ODDS: Final = -2.2
+"""Logarithm of the odds that the load changes at a stop: one stop in ten."""
 
-    Returns
-    -------
-    rows : (n, 5) for mass, disturbance, resistance and headwind north and east
-    y : (n,) traction less drag and rotating inertia [N]
-    """
-    phi, y = regression(view, vehicle)
-    slope = view.air_density * vehicle.road_load.drag_area * view.speed
-    north, east = view.direction
-    one = np.ones_like(phi)
-    return np.column_stack([phi, one, one, slope * north, slope * east]), y
-
-
-def usable_rows(view: MergedView, rows: Floats, y: Floats) -> Bools:
-    """Rows without a reason against them and with finite numbers."""
-    return np.asarray(view.usable & np.isfinite(y) & np.isfinite(rows).all(axis=1))
-
-
-def noise_variance(view: MergedView, cut: Windows, torque_noise: float, mass: float) -> Floats:
-    """Variance of the fast noise of each window's mean force [N^2], both sides."""
-    torque = cut.mean((torque_noise * np.nan_to_num(view.gearing)) ** 2)
-    return np.asarray((torque + (mass * MOTION_STD) ** 2) / cut.count + (mass * 0.008) ** 2)
-
-
-def filter_params(mass: float, disturbance_std: float) -> kernel.DisturbanceParams:
-    """Make the kernel's parameters for a vehicle of about this mass [kg]."""
-    return kernel.DisturbanceParams(
-        time_constant=np.array([np.inf, *TIME_CONSTANTS]),
-        std=np.array([0.0, mass * disturbance_std, mass * RESISTANCE_STD, WIND_STD, WIND_STD]),
-        gate=GATE,
-        settle=FEWEST_WINDOWS,
-    )
+UNMODELLED: Final = 1.6
+"""Errors of the mass over what the filter says of them [-]: simulated drives of one
+calibration scatter so around their mean, after five minutes as after an hour."""
 
 
 def first_guess(phi: Floats, y: Floats) -> float:
@@ -96,14 +55,65 @@ def first_guess(phi: Floats, y: Floats) -> float:
     return float(np.clip(slope, 200.0, 60_000.0))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Problem:
+    """What the kernels need, one row per window."""
+
+    time: Floats
+    rows: Floats
+    y: Floats
+    variance: Floats
+    stopped: Bools
+    std: Floats
+
+    @property
+    def guess(self) -> float:
+        return float(self.std[0])
+
+    def kernel_input(
+        self, fast: float, slow: float
+    ) -> tuple[disturbance.DisturbanceState, Floats, disturbance.DisturbanceParams]:
+        """State to start from, noise variance and parameters at a level of noise."""
+        std = self.std.copy()
+        std[1] *= slow
+        begin = np.zeros(std.size)
+        begin[0] = self.guess
+        start = disturbance.initial_state(  # type: ignore[no-untyped-call]
+            begin, np.diag(std**2), self.time[0]
+        )
+        return start, fast**2 * self.variance, filter_params(std, GATE, SETTLE)
+
+    def changes(
+        self, fast: float, slow: float
+    ) -> tuple[load_change.LoadState, Floats, Floats, Bools]:
+        """Run both hypotheses of the load over the drive."""
+        start, noise, params = self.kernel_input(fast, slow)
+        return load_change.run(  # type: ignore[no-any-return]
+            load_change.initial_state(start),  # type: ignore[no-untyped-call]
+            self.time,
+            self.rows,
+            self.y,
+            noise,
+            self.stopped,
+            load_change.LoadParams(
+                filter=params,
+                jump_var=(CHANGE_STD * self.guess) ** 2,
+                prior=CHANGE_ODDS,
+                temper=1.0 / UNMODELLED**2,
+            ),
+        )
+
+
 def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
-    """Weigh by a Kalman filter of mass, disturbance, rolling resistance and wind.
+    """Weigh by a Kalman filter of the mass and the slow errors of `slow_errors`.
 
     Usable rows, braking and overrun aside, are averaged over windows of
     `weighbridge.balance.averaging.WINDOW`, both sides over the same rows. The
     levels of fast noise and of the disturbance are those of highest
-    likelihood. The mass of a drive is a constant, so the filter's last word
-    is the smoothed one.
+    likelihood. After every stop a second filter tries whether the load has
+    changed; the running mass is the mean of both. The final answer is that of
+    the whole drive smoothed, at its end: where the load has changed, the mass
+    after the last change, and the segments tell those before.
 
     Parameters
     ----------
@@ -126,64 +136,133 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     if cut.count.size < FEWEST_WINDOWS:
         return nothing("joint", balance, vehicle, reason, int(cut.count.size))
 
-    time, mean_rows, mean_y = cut.mean(view.time), cut.mean(rows), cut.mean(y)
-    guess = first_guess(mean_rows[:, 0], mean_y)
-    torque_noise = vehicle.torque.noise or 0.03 * float(
-        np.nanmax(np.abs(balance.force.torque[cut.index]))
-    )
-    variance = noise_variance(view, cut, torque_noise, guess)
+    problem = _problem(balance, vehicle, cut, rows, y)
+    level = minimize(
+        _misfit, np.zeros(2), args=(problem,), method="Nelder-Mead", options={"maxiter": 40}
+    ).x
+    fast, slow = (float(v) for v in np.exp(level))
+    _, running, running_var, begins = problem.changes(fast, slow)
+    start, noise, params = problem.kernel_input(fast, slow)
+    added = np.where(begins, (CHANGE_STD * problem.guess) ** 2, 0.0)
+    time = problem.time
+    *_, taken = disturbance.run(start, time, problem.rows, problem.y, noise, added, params)
+    x, var = disturbance.smooth(start, time, problem.rows, problem.y, noise, added, params)
 
-    def run(level: Floats) -> tuple[kernel.DisturbanceState, Floats, Floats, Floats, Bools]:
-        fast, slow = np.exp(level)
-        params = filter_params(guess, DISTURBANCE_STD * slow)
-        prior = np.diag(np.concatenate(([guess**2], params.std[1:] ** 2)))
-        start = kernel.initial_state(  # type: ignore[no-untyped-call]
-            [guess, 0.0, 0.0, 0.0, 0.0], prior, time[0]
-        )
-        return kernel.run(  # type: ignore[no-any-return]
-            start, time, mean_rows, mean_y, fast**2 * variance, params
-        )
-
-    def misfit(level: Floats) -> float:
-        # A weak prior keeps the levels within a factor of about three.
-        return -run(level)[0].log_likelihood + 0.5 * float(np.sum(level**2))
-
-    level = minimize(misfit, np.zeros(2), method="Nelder-Mead", options={"maxiter": 60}).x
-    state, mass_track, mass_var, _, taken = run(level)
     left_out = np.zeros(view.time.size, dtype=bool)
     left_out[cut.index] = ~taken[cut.window]
     reason[left_out] = Reason.BAD_FIT
     used = reason == Reason.USED
-
-    mass = float(state.x[0])
-    bound = float(np.sqrt(state.cov[0, 0]))
-    slow = consider_std(balance, rows[:, 0], used, vehicle)
-    std = float(np.hypot(bound, mass * slow))
+    mass, bound = float(x[-1, 0]), float(np.sqrt(var[-1, 0]))
+    left = calibration_std(balance, vehicle)
+    std = float(np.hypot(UNMODELLED * bound, mass * left))
     last = np.searchsorted(time, view.time, side="right") - 1
-    known = last >= 0
-    running = np.where(known, mass_track[np.maximum(last, 0)], np.nan)
-    running_std = np.where(known, np.sqrt(mass_var[np.maximum(last, 0)]), np.nan)
+    track = np.where(last >= 0, running[np.maximum(last, 0)], np.nan)
+    track_std = UNMODELLED * np.sqrt(running_var)[np.maximum(last, 0)]
     status, why = judge(view, vehicle, used, mass, std, cut.count.size)
-
-    def part(chosen: slice) -> tuple[float, float]:
-        wanted = (time >= view.time[chosen][0]) & (time <= view.time[chosen][-1])
-        return block_jackknife(
-            time[wanted], mean_rows[wanted, 0], mean_y[wanted], taken[wanted], 20.0
-        )[:2]
-
     return MassTrack(
         method="joint",
         balance=balance,
-        running_mass=running,
-        running_std=np.hypot(running_std, running * slow),
-        residual=np.where(used, y - rows[:, 0] * mass, np.nan),
+        running_mass=track,
+        running_std=np.where(last >= 0, np.hypot(track_std, track * left), np.nan),
+        residual=np.where(used, y - rows[:, 0] * x[np.maximum(last, 0), 0], np.nan),
         reason=reason,
         mass=mass,
         std=std,
         degrees_of_freedom=float("inf"),
         bound_std=bound,
-        converged_at=converged_at(view.time, running, mass, used),
+        converged_at=converged_at(view.time, track, mass, used),
         status=status,
         why=why,
-        segments=segments(balance, vehicle, rows[:, 0], used, part),
+        segments=_segments(view, time, begins, x[:, 0], np.sqrt(var[:, 0]), left),
+        slow_errors=SlowErrors(
+            time=time,
+            mass_bound=np.sqrt(running_var),
+            disturbance=x[:, 1],
+            disturbance_std=np.sqrt(var[:, 1]),
+            resistance=x[:, 2],
+            resistance_std=np.sqrt(var[:, 2]),
+            wind_north=x[:, 3],
+            wind_east=x[:, 4],
+            wind_std=np.sqrt(var[:, 3:5]),
+            cold_torque=float(x[0, 5]),
+            cold_torque_std=float(np.sqrt(var[0, 5])),
+        ),
+    )
+
+
+def _problem(
+    balance: ForceBalance, vehicle: Vehicle, cut: Windows, rows: Floats, y: Floats
+) -> _Problem:
+    view = balance.merged
+    time, mean_rows, mean_y = cut.mean(view.time), cut.mean(rows), cut.mean(y)
+    guess = first_guess(mean_rows[:, 0], mean_y)
+    torque = float(np.percentile(np.abs(balance.force.torque[cut.index]), 98.0))
+    return _Problem(
+        time=time,
+        rows=np.ascontiguousarray(mean_rows),
+        y=mean_y,
+        variance=noise_variance(view, cut, vehicle.torque.noise or 0.03 * torque, guess),
+        stopped=stopped(view, time),
+        std=prior_std(vehicle, guess, torque),
+    )
+
+
+def _misfit(level: Floats, problem: _Problem) -> float:
+    """Negative log-likelihood of noise levels, in logarithms.
+
+    A weak prior keeps them within a factor of about three.
+    """
+    fast, slow = np.exp(level)
+    state, *_ = problem.changes(float(fast), float(slow))
+    return float(-state.same.log_likelihood + 0.5 * np.sum(level**2))
+
+
+def stopped(view: MergedView, time: Floats) -> Bools:
+    """Whether the vehicle stood for `STOP` between each window and the one before it.
+
+    A gap in the log counts as standing: what happened in it is not known.
+
+    Parameters
+    ----------
+    view
+    time : (m,) instants of the windows [s]
+    """
+    standing = ~(np.nan_to_num(view.speed) > 0.5)
+    gap = np.diff(view.time, append=view.time[-1])
+    # Rows near in time stand for the time until the next; a long gap stands for itself.
+    still = np.cumsum(np.where(standing | (gap > STOP), gap, 0.0))
+    moved = np.flatnonzero(~standing)
+    found = np.zeros(time.size, dtype=bool)
+    if moved.size < 2:
+        return found
+    rest = still[moved[1:] - 1] - np.where(moved[:-1] > 0, still[moved[:-1] - 1], 0.0)
+    leaves = view.time[moved[1:]][rest >= STOP]
+    at = np.searchsorted(time, leaves)
+    found[at[at < time.size]] = True
+    found[0] = False
+    return found
+
+
+def _segments(
+    view: MergedView, time: Floats, begins: Bools, mass: Floats, bound: Floats, left: float
+) -> tuple[Segment, ...]:
+    """Stretches of one load: the mass of each, smoothed over the whole drive."""
+    first = np.concatenate(([0], np.flatnonzero(begins)))
+    last = np.concatenate((first[1:], [time.size])) - 1
+    edges = [float(view.time[0])]
+    moving = np.nan_to_num(view.speed) > 0.5
+    for k in first[1:]:
+        # The load changed while the vehicle stood: the segment begins as it drives off.
+        between = (view.time > time[k - 1]) & (view.time <= time[k])
+        rests = np.flatnonzero(between & ~moving)
+        edges.append(float(view.time[rests[-1]]) if rests.size else float(time[k]))
+    edges.append(float(view.time[-1]))
+    return tuple(
+        Segment(
+            start=edges[j],
+            end=edges[j + 1],
+            mass=float(mass[k]),
+            std=float(np.hypot(UNMODELLED * bound[k], mass[k] * left)),
+        )
+        for j, k in enumerate(last)
     )

@@ -64,12 +64,17 @@ def consider_std(balance: ForceBalance, phi: Floats, used: Bools, vehicle: Vehic
     as much as `COLD_STD` where all that was learnt is from the first `WARMING`
     of driving.
     """
+    share = cold_share(balance.merged.time, phi, used)
+    cold = share * COLD_STD[vehicle.torque.source]
+    return float(np.hypot(calibration_std(balance, vehicle), cold))
+
+
+def calibration_std(balance: ForceBalance, vehicle: Vehicle) -> float:
+    """Relative standard deviation by what the calibration left open and by the motion [-]."""
     scale = vehicle.provenance.mass_scale_std
     if scale is None:
         scale = UNCALIBRATED_STD
-    scale = float(np.hypot(scale, MOTION_STD[balance.motion.source]))
-    share = cold_share(balance.merged.time, phi, used)
-    return float(np.hypot(scale, share * COLD_STD[vehicle.torque.source]))
+    return float(np.hypot(scale, MOTION_STD[balance.motion.source]))
 
 
 def cold_share(time: Floats, phi: Floats, used: Bools, start: float | None = None) -> float:

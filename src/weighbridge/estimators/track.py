@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.signals import Bools, Floats
+
+if TYPE_CHECKING:
+    from weighbridge.estimators.slow_errors import SlowErrors
 
 
 class Status(StrEnum):
@@ -56,6 +60,7 @@ class MassTrack:
         for good [s]; NaN if never
     status : and ``why`` in a sentence where it is not converged
     segments : mass between stops
+    slow_errors : what was estimated beside the mass; None where a method does not
     """
 
     method: str
@@ -72,6 +77,7 @@ class MassTrack:
     status: Status
     why: str
     segments: tuple[Segment, ...]
+    slow_errors: SlowErrors | None = None
 
     @property
     def time(self) -> Floats:

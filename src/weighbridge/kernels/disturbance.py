@@ -101,7 +101,7 @@ def step(state, time, row, y, noise_var, params):
 
 
 @kernel
-def run(state, time, rows, y, noise_var, params):
+def run(state, time, rows, y, noise_var, added, params):
     """Apply ``step`` to each row.
 
     Parameters
@@ -111,6 +111,8 @@ def run(state, time, rows, y, noise_var, params):
         Not falling [s].
     rows : (m, n) float64
     y, noise_var : (m,) float64
+    added : (m,) float64
+        Variance added to the first state before the row, where it may jump.
     params : DisturbanceParams
 
     Returns
@@ -128,7 +130,84 @@ def run(state, time, rows, y, noise_var, params):
     innovation = np.empty(y.size)
     taken = np.empty(y.size, dtype=np.bool_)
     for k in range(y.size):
+        if added[k] > 0.0:
+            state = loosened(state, added[k])
         state, innovation[k], taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         first[k] = state.x[0]
         first_var[k] = state.cov[0, 0]
     return state, first, first_var, innovation, taken
+
+
+@kernel
+def loosened(state, variance):
+    """Return the state with ``variance`` added to that of the first one."""
+    cov = state.cov.copy()
+    cov[0, 0] += variance
+    return DisturbanceState(state.x, cov, state.time, state.rows, state.log_likelihood)
+
+
+@kernel
+def smooth(state, time, rows, y, noise_var, added, params):
+    """Estimate every state at every row from all rows, before and after.
+
+    Parameters
+    ----------
+    state, time, rows, y, noise_var, added, params
+        As of ``run``.
+
+    Returns
+    -------
+    x, var : (m, n) float64
+        States and their variances.
+
+    References
+    ----------
+    Fixed-interval smoother without inverses: Bierman, Automatica 9, 1973
+    (modified Bryson-Frazier). It stays exact where a state has no variance.
+    """
+    m, n = rows.shape
+    x_pred = np.empty((m, n))
+    cov_pred = np.empty((m, n, n))
+    keep = np.ones((m, n))
+    gain = np.zeros((m, n))
+    inverse = np.zeros(m)
+    error = np.zeros(m)
+    for k in range(m):
+        x = state.x.copy()
+        cov = state.cov.copy()
+        cov[0, 0] += added[k]
+        for i in range(n):
+            if params.std[i] > 0.0:
+                f = np.exp(-(time[k] - state.time) / params.time_constant[i])
+                keep[k, i] = f
+                x[i] *= f
+                cov[i, :] *= f
+                cov[:, i] *= f
+                cov[i, i] += params.std[i] ** 2 * (1.0 - f * f)
+        x_pred[k] = x
+        cov_pred[k] = cov
+        before = DisturbanceState(x, cov, time[k], state.rows, state.log_likelihood)
+        state, _, taken = step(before, time[k], rows[k], y[k], noise_var[k], params)
+        if taken:
+            cov_row = cov @ rows[k]
+            inverse[k] = 1.0 / (rows[k] @ cov_row + noise_var[k])
+            gain[k] = cov_row * inverse[k]
+            error[k] = y[k] - rows[k] @ x
+    adjoint = np.zeros(n)
+    information = np.zeros((n, n))
+    x_out = np.empty((m, n))
+    var_out = np.empty((m, n))
+    for k in range(m - 1, -1, -1):
+        row = rows[k]
+        back = np.eye(n) - np.outer(gain[k], row)
+        information = back.T @ information @ back + inverse[k] * np.outer(row, row)
+        adjoint = back.T @ adjoint - inverse[k] * error[k] * row
+        x_out[k] = x_pred[k] - cov_pred[k] @ adjoint
+        spread = cov_pred[k] @ information @ cov_pred[k]
+        for i in range(n):
+            var_out[k, i] = max(cov_pred[k, i, i] - spread[i, i], 0.0)
+        for i in range(n):
+            adjoint[i] *= keep[k, i]
+            information[i, :] *= keep[k, i]
+            information[:, i] *= keep[k, i]
+    return x_out, var_out

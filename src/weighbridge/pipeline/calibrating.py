@@ -11,7 +11,7 @@ import numpy as np
 
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.delay import best_delay, delay_std
-from weighbridge.balance.force_balance import ForceBalance
+from weighbridge.balance.force_balance import ForceBalance, smoothed
 from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.regression import (
     BOUNDS,
@@ -32,6 +32,7 @@ from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.joint_calibrating import BalanceAt, JointProblem, refine
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats
+from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
     MASS_RANGE,
@@ -276,6 +277,7 @@ def run_calibration(
             order=order,
             curved=curved,
             torque_noise=fitted.residual_std,
+            known=base.driveline,
         )
         finished = refine(
             finished,
@@ -299,6 +301,9 @@ def _draft(
             gearings=tuple(float(g) for g in gears.gearings),
             gearing_stds=tuple(float(g) for g in gears.stds),
         )
+    if driveline.single_speed and driveline.engine_inertia == Driveline().engine_inertia:
+        mean, _ = road_prior(base.kind, single_speed=True)
+        driveline = replace(driveline, engine_inertia=float(mean[2]))
     model = TorqueModel(
         source="measured" if source == "load" else source,
         reference_torque=base.torque.reference_torque,
@@ -330,9 +335,12 @@ def _balance_at(
     floors: Sequence[float],
 ) -> BalanceAt:
     """Return what makes the rows of drive ``k`` at a delay and a lag."""
+    lagged: dict[tuple[int, float], Motion] = {}
 
     def rows(k: int, delay: float, lag: float) -> tuple[ForceBalance, Floats, Bools]:
-        balance, x = _draft_balance(drives[k], motions[k], draft, source, delay, lag)
+        if (k, lag) not in lagged:
+            lagged[k, lag] = smoothed(motions[k], lag)
+        balance, x = _draft_balance(drives[k], lagged[k, lag], draft, source, delay)
         return balance, x, _finite(balance, x, floors[k])
 
     return rows
@@ -477,7 +485,6 @@ def _draft_balance(
     draft: Vehicle,
     source: TorqueSource,
     delay: float,
-    lag: float = 0.0,
 ) -> tuple[ForceBalance, Floats]:
     """Balance without a torque model yet, and the torque source at its stamps."""
     stamps = drive.signals[SIGNALS[source][0]].time
@@ -486,7 +493,7 @@ def _draft_balance(
     if source == "load":
         load = drive.signals["engine_load"]
         stand_in = drive.with_signals(replace(load, name="engine_torque"))
-    return force_balance(stand_in, draft, motion, delay=delay, lag=lag), x
+    return force_balance(stand_in, draft, motion, delay=delay, lag=0.0), x
 
 
 def _ranges(

@@ -8,20 +8,28 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.delay import best_delay
+from weighbridge.balance.delay import vertex
 from weighbridge.balance.force_balance import ForceBalance
-from weighbridge.calibration.inverse import DriveRows, InverseFit, fit
+from weighbridge.calibration.inverse import DriveRows, FitSettings, InverseFit, fit
+from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import RoadLoad, Vehicle
+from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.model import Driveline, Vehicle
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.45)
 """Time constants of the reading's smoothing that are tried [s]."""
 
-TRANSFER_STD: Final = 0.008
-"""What a joint calibration loses on other drives, relative [-]: simulated, twelve
-calibrations of nine cars on one ordinary drive each, ten drives weighed with each: their
-means scatter by 0.6 %, the drives of one calibration by 0.5 % around them."""
+DELAYS: Final = tuple(0.2 * k for k in range(-2, 7))
+"""Sums of delay and lag among which the search begins [s]."""
+
+TIMING_WINDOW: Final = 1.2
+"""Windows of the search [s]: shorter than those of the fit, for delay shows in what is fast."""
+
+TRANSFER_STD: Final = (0.003, 0.003)
+"""What a joint calibration loses on other drives, relative [-]: always, and from each
+drive of the calibration anew. Simulated, six vehicles, calibrated by one or three ordinary
+drives, six others weighed with each (`studies/accuracy.md`)."""
 
 BalanceAt = Callable[[int, float, float], tuple[ForceBalance, Floats, Bools]]
 """Balance, reading and usable rows of drive k at a delay and a lag [s]."""
@@ -37,6 +45,7 @@ class JointProblem:
     masses : known mass of each drive [kg]
     order, curved : of the torque regression
     torque_noise : of one reading [N m]
+    known : driveline of the vehicle file given to the calibration
     """
 
     balance_at: BalanceAt
@@ -44,6 +53,7 @@ class JointProblem:
     order: int
     curved: bool
     torque_noise: float
+    known: Driveline
 
 
 def refine(
@@ -64,12 +74,22 @@ def refine(
     DriveError
         The drives are too short.
     """
+    line = vehicle.driveline
+    settings = FitSettings(
+        source=vehicle.torque.source,
+        order=problem.order,
+        curved=problem.curved,
+        torque_noise=problem.torque_noise,
+        wheel_radius=line.wheel_radius,
+        prior=_prior(vehicle, problem.known),
+    )
+    quick = replace(settings, window=TIMING_WINDOW, rounds=1)
 
-    def solve(delay: float, lag: float, rounds: int) -> InverseFit:
-        rows = []
+    def rows_at(delay: float, lag: float) -> list[DriveRows]:
+        found = []
         for k, mass in enumerate(problem.masses):
             balance, reading, usable = problem.balance_at(k, delay, lag)
-            rows.append(
+            found.append(
                 DriveRows(
                     view=balance.merged,
                     regressor=reading,
@@ -78,36 +98,58 @@ def refine(
                     mass=mass,
                 )
             )
-        line = vehicle.driveline
-        return fit(
-            rows,
-            vehicle.kind,
-            line.wheel_radius,
-            order=problem.order,
-            curved=problem.curved,
-            torque_noise=problem.torque_noise,
-            inertias=(line.engine_inertia, line.wheel_inertia) if line.single_speed else None,
-            rounds=rounds,
+        return found
+
+    def misfits(pairs: Sequence[tuple[float, float]]) -> Floats:
+        tried = [rows_at(delay, lag) for delay, lag in pairs]
+        # Other rows would make other likelihoods: only those count that are usable at all.
+        shared = [
+            np.logical_and.reduce([rows[k].usable for rows in tried])
+            for k in range(len(problem.masses))
+        ]
+        return np.array(
+            [
+                -fit(
+                    [replace(row, usable=u) for row, u in zip(rows, shared, strict=True)], quick
+                ).log_likelihood
+                for rows in tried
+            ]
         )
 
-    def misfit(delay: float, lag: float) -> float:
-        found = solve(delay, lag, 1)
-        return -found.log_likelihood / found.windows
+    delay, lag = _timing(misfits)
+    found = fit(rows_at(delay, lag), settings)
+    return _self_weighed(_with(vehicle, found, delay, lag, problem), problem, rebalance)
 
-    start = vehicle.timing.torque_delay or 0.0
-    best = (np.inf, start, 0.0)
-    for lag in LAGS:
-        delay = best_delay(
-            lambda d, lag=lag: misfit(d, lag),  # type: ignore[misc]
-            start=start - lag - 0.25,
-            end=start - lag + 0.25,
-        )
-        if np.isfinite(delay):
-            best = min(best, (misfit(delay, lag), delay, lag))
-    _, delay, lag = best
-    return _self_weighed(
-        _with(vehicle, solve(delay, lag, 3), delay, lag, problem), problem, rebalance
-    )
+
+def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
+    """Road load and inertias of the class, and what the given vehicle file says of them."""
+    mean, std = road_prior(vehicle.kind, single_speed=vehicle.driveline.single_speed)
+    usual = Driveline()
+    for k, name in ((2, "engine_inertia"), (3, "wheel_inertia")):
+        given, given_std = getattr(known, name), getattr(known, f"{name}_std")
+        if given_std is not None or given != getattr(usual, name):
+            mean[k] = given
+            std[k] = given_std if given_std is not None else 0.15 * given
+    return mean, std
+
+
+def _timing(misfits: Callable[[Sequence[tuple[float, float]]], Floats]) -> tuple[float, float]:
+    """Find delay and lag of least misfit: their sum first, then both, then the delay finely.
+
+    Parameters
+    ----------
+    misfits : of pairs of delay and lag [s], all by the same rows
+    """
+    middle = LAGS[len(LAGS) // 2]
+    pairs = [(total - middle, middle) for total in DELAYS]
+    total = DELAYS[int(np.argmin(misfits(pairs)))]
+    pairs = [(total - lag + shift, lag) for lag in LAGS for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
+    delay, lag = pairs[int(np.argmin(misfits(pairs)))]
+    delays = np.asarray(delay + 0.03 * np.arange(-4, 5), dtype=np.float64)
+    scores = misfits([(float(d), lag) for d in delays])
+    best = int(np.clip(np.argmin(scores), 1, delays.size - 2))
+    near = slice(best - 1, best + 2)
+    return vertex(delays[near], scores[near]), lag
 
 
 def _with(
@@ -126,7 +168,9 @@ def _with(
             curvature=tuple(values[straight:]),
             curvature_stds=tuple(stds[straight : found.coefficients.size]),
         ),
-        road_load=RoadLoad(
+        road_load=replace(
+            vehicle.road_load,
+            rolling_speed_coefficient=0.0,
             drag_area=float(road[0]),
             rolling_coefficient=float(road[1]),
             drag_area_std=stds[-4],
@@ -160,15 +204,21 @@ def _self_weighed(
                 ratios.append(track.mass / mass)
                 stds.append(track.bound_std / mass)
         if not ratios:
-            return 1.0, TRANSFER_STD
+            raise DriveError(
+                "the drives of the calibration cannot be weighed: drive longer, with more starts"
+            )
         weight = 1.0 / np.square(stds)
-        return float(np.average(ratios, weights=weight)), float(1.0 / np.sqrt(weight.sum()))
+        return float(np.average(ratios, weights=weight)), float(1.0 / np.sqrt(np.mean(weight)))
 
-    ratio, std = found(1.0)
+    ratio, bound = found(1.0)
+    each = float(np.hypot(TRANSFER_STD[1], joint.UNMODELLED * bound))
     slope = (found(1.02)[0] - ratio) / 0.02
     scale = 1.0 + (1.0 - ratio) / slope if slope > 0.2 else 1.0 / ratio
     return replace(
         vehicle,
         torque=vehicle.torque.scaled(scale),
-        provenance=replace(vehicle.provenance, mass_scale_std=float(np.hypot(std, TRANSFER_STD))),
+        provenance=replace(
+            vehicle.provenance,
+            mass_scale_std=float(np.hypot(TRANSFER_STD[0], each / np.sqrt(len(problem.masses)))),
+        ),
     )

@@ -1,0 +1,163 @@
+"""The slow errors that look like mass, and how large each may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance.averaging import Windows
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.constants import GRAVITY
+from weighbridge.estimators.rls import regression
+from weighbridge.kernels.disturbance import DisturbanceParams
+from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.model import TorqueSource, Vehicle
+
+TIME_CONSTANTS: Final = (30.0, 900.0, 600.0, 600.0, 2e4)
+"""How long disturbance, resistance, wind north and east and cold torque last [s]: gusts,
+grade and torque errors half a minute, rolling resistance and offsets a quarter of an
+hour, mean wind ten minutes; how cold a drive began stays the same all along."""
+
+DISTURBANCE_STD: Final = 0.04
+"""Standard deviation of the disturbance before the drive has told, over mass [m/s^2]."""
+
+RESISTANCE_STD: Final = 0.017
+"""Of the slow resistance, over mass [m/s^2]: a fifth of the rolling resistance of a car."""
+
+WIND_STD: Final = 2.0
+"""Of each component of the wind at the vehicle [m/s]."""
+
+COLD_TORQUE_STD: Final[dict[TorqueSource, float]] = {
+    "load": 0.04,
+    "air_flow": 0.04,
+    "percent": 0.012,
+    "measured": 0.012,
+}
+"""Of the friction torque that a cold engine or driveline has beside the warm one's, over the
+highest torque of the drive [-]: friction is a tenth of the full load torque of a warm
+engine and half as much again at 20 degC (Heywood, Internal Combustion Engine
+Fundamentals, 1988, ch. 13). Load and air flow count it as torque; of measured torque only
+the gearbox and axle oil takes."""
+
+WARM_UP: Final = 500.0
+"""Time constant of engine and oil getting warm [s]."""
+
+MOTION_STD: Final = 0.03
+"""Fast error of the specific force before the drive has told [m/s^2]."""
+
+NAMES: Final = ("mass", "disturbance", "resistance", "wind_north", "wind_east", "cold_torque",
+                "drag_area")  # fmt: skip
+"""The states, in order."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowErrors:
+    """What stood beside the mass, smoothed over the whole drive, one row per window.
+
+    Attributes
+    ----------
+    time : (m,) [s]
+    mass_bound : (m,) standard deviation of the mass as known at each window, by the noise
+        of this drive alone [kg]
+    disturbance, disturbance_std : (m,) force of half a minute [N]
+    resistance, resistance_std : (m,) force of a quarter of an hour [N]
+    wind_north, wind_east : (m,) what the wind blows towards the south and west at the
+        vehicle, which is a head wind for one who drives north or east [m/s]
+    wind_std : (m, 2) their standard deviations [m/s]
+    cold_torque, cold_torque_std : friction torque of the start in the reading [N m]
+    """
+
+    time: Floats
+    mass_bound: Floats
+    disturbance: Floats
+    disturbance_std: Floats
+    resistance: Floats
+    resistance_std: Floats
+    wind_north: Floats
+    wind_east: Floats
+    wind_std: Floats
+    cold_torque: float
+    cold_torque_std: float
+
+
+def coldness(view: MergedView) -> Floats:
+    """How much of the cold of the start is left at each row (n,) [-]."""
+    moving = np.flatnonzero(np.nan_to_num(view.speed) > 0.5)
+    start = view.time[moving[0]] if moving.size else view.time[0]
+    return np.asarray(np.exp(-np.maximum(view.time - start, 0.0) / WARM_UP))
+
+
+def design(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
+    """Rows of the model ``y = phi m + d + c + wind + cold torque + drag``.
+
+    The drag of a wind small against the speed is linear in it:
+    ``rho C_d A v`` times its component along the road.
+
+    Returns
+    -------
+    rows : (n, 7) for `NAMES`
+    y : (n,) traction less drag and rotating inertia [N]
+    """
+    phi, y = regression(view, vehicle)
+    slope = view.air_density * vehicle.road_load.drag_area * view.speed
+    north, east = view.direction
+    one = np.ones_like(phi)
+    cold = coldness(view) * np.nan_to_num(view.gearing)
+    pressure = 0.5 * view.air_density * view.air_speed * np.abs(view.air_speed)
+    return np.column_stack([phi, one, one, slope * north, slope * east, cold, pressure]), y
+
+
+def usable_rows(view: MergedView, rows: Floats, y: Floats) -> Bools:
+    """Rows without a reason against them and with finite numbers."""
+    return np.asarray(view.usable & np.isfinite(y) & np.isfinite(rows).all(axis=1))
+
+
+def noise_variance(view: MergedView, cut: Windows, torque_noise: float, mass: float) -> Floats:
+    """Variance of the fast noise of each window's mean force [N^2], both sides."""
+    torque = cut.mean((torque_noise * np.nan_to_num(view.gearing)) ** 2)
+    return np.asarray((torque + (mass * MOTION_STD) ** 2) / cut.count + (mass * 0.008) ** 2)
+
+
+def prior_std(vehicle: Vehicle, mass: float, torque: float) -> Floats:
+    """Standard deviations (7,) of the states before the drive has told.
+
+    Parameters
+    ----------
+    vehicle : where it was not calibrated, its drag area and rolling resistance are as
+        uncertain as their standard deviations say, or as those of its class
+    mass : rough [kg]; its own standard deviation is as large
+    torque : highest of the drive [N m]
+    """
+    drag, rolling = 0.0, 0.0
+    if vehicle.provenance.mass_scale_std is None:
+        _, std = road_prior(vehicle.kind, single_speed=vehicle.driveline.single_speed)
+        load = vehicle.road_load
+        drag = load.drag_area_std if load.drag_area_std is not None else float(std[0])
+        known = load.rolling_coefficient_std
+        rolling = GRAVITY * (known if known is not None else float(std[1]))
+    return np.array(
+        [
+            mass,
+            mass * DISTURBANCE_STD,
+            mass * float(np.hypot(RESISTANCE_STD, rolling)),
+            WIND_STD,
+            WIND_STD,
+            COLD_TORQUE_STD[vehicle.torque.source] * torque,
+            drag,
+        ]
+    )
+
+
+def filter_params(std: Floats, gate: float, settle: int) -> DisturbanceParams:
+    """Make the kernel's parameters from the standard deviations of the states."""
+    fading = std.copy()
+    fading[[0, 6]] = 0.0
+    return DisturbanceParams(
+        time_constant=np.array([np.inf, *TIME_CONSTANTS, np.inf]),
+        std=fading,
+        gate=gate,
+        settle=settle,
+    )
