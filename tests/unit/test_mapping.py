@@ -255,3 +255,12 @@ def test_mapped_parquet(tmp_path):
     pl.DataFrame({"t": [0, 1], "v": [36.0, None]}).write_parquet(tmp_path / "log.parquet")
     drive = read_drive(tmp_path / "log.parquet", {"time": {"column": "t"}, "signals": SPEED})
     assert_array_equal(drive.signals["vehicle_speed"].values, np.array([10.0]))
+
+
+def test_decimal_commas_without_a_mapping_name_the_remedy(tmp_path):
+    log = write(tmp_path / "log.csv", "time_s;vehicle_speed_kmh\n0,0;10,5\n0,5;11,5\n")
+    with pytest.raises(DriveError, match='set decimal = "," in'):
+        read_drive(log)
+    mapping = {"csv": {"decimal": ","}, "signals": {"vehicle_speed": {
+        "column": "vehicle_speed_kmh", "unit": "kmh"}}}  # fmt: skip
+    assert_allclose(read_drive(log, mapping).signals["vehicle_speed"].values * 3.6, [10.5, 11.5])

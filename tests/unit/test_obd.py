@@ -107,9 +107,7 @@ def test_eleven_and_twenty_nine_bits_and_several_units():
     assert [c.split(",")[0] for c in found.contents] == [
         "CAN 1 7E8", "CAN 1 18DAF110", "CAN 1 18DAF118",
     ]  # fmt: skip
-    assert "of CAN 1 18DAF118 (3 answers) was left out for that of CAN 1 7E8 (6)" in (
-        found.problems[0].text
-    )
+    assert "left out of CAN 1 18DAF118: vehicle_speed (3 for 6)" in (found.problems[0].text)
 
 
 def test_missing_parts_cost_that_answer_only():

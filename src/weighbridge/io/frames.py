@@ -167,7 +167,7 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
                 Problem(
                     "",
                     f"{source}: the clock jumps {len(cuts)} times (by "
-                    f"{step[cuts[0] - 1]:.6g} s at {time[cuts[0] - 1]:.6g} s); "
+                    f"{step[cuts[0] - 1]:.6g} s, {time[cuts[0] - 1] - time[0]:.6g} s in); "
                     f"{time.size - int(lengths[best])} of {time.size} frames outside the longest "
                     "part were left out; split the log there to read the others",
                 )

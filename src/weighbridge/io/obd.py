@@ -328,6 +328,7 @@ _APART: Final = {"vehicle_speed": 4.0, "engine_speed": 60.0}
 def _choose(senders: list[_Sender], name: str, found: Obd) -> None:
     """Take every quantity from the control unit that gives it most often."""
     names = dict.fromkeys(q for s in senders for q in s.values)
+    left_out: dict[tuple[str, str], list[str]] = {}
     for quantity in names:
         giving = [s for s in senders if quantity in s.values]
         best = max(giving, key=lambda s: s.values[quantity][0].size)
@@ -345,13 +346,20 @@ def _choose(senders: list[_Sender], name: str, found: Obd) -> None:
                 gap = np.abs(signal.at(time) - values)
                 gap = gap[np.isfinite(gap) & (signal.age(time) < 2.0)]
                 doubt = gap.size >= 10 and float(np.median(gap)) > _APART[quantity]
-            text = (
-                f"{name}: {quantity} of {other.name} ({time.size} answers) was left out for that "
-                f"of {best.name} ({len(signal)})"
-            )
             if doubt:
                 text = (
                     f"{name}: {best.name} and {other.name} say different {quantity}, as two "
                     "vehicles would; keep the frames of one vehicle"
                 )
-            found.problems.append(Problem(quantity, text, serious=doubt))
+                found.problems.append(Problem(quantity, text, serious=True))
+            else:
+                told = f"{quantity} ({time.size} for {len(signal)})"
+                left_out.setdefault((other.name, best.name), []).append(told)
+    for (other_name, best_name), quantities in left_out.items():
+        found.problems.append(
+            Problem(
+                "",
+                f"{name}: what {best_name} answers as well was left out of {other_name}: "
+                f"{', '.join(quantities)}",
+            )
+        )

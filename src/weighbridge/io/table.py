@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import datetime as dt
 import io
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,8 @@ MISSING: Final = ("", "na", "n/a", "nan", "null", "none", "-", "#n/a")
 
 # Panics of the parser are no subclass of its errors, nor of Exception.
 _PARSE_ERRORS: Final = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
+
+_COMMA_NUMBER: Final = re.compile(r"[-+]?\d+,\d+$")
 
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
@@ -117,9 +120,14 @@ class RawTable:
                 row = int(wrong.arg_max() or 0) + 1
                 filled = int((~empty).sum())
                 if bad > _TEXT_PART * filled:
+                    remedy = (
+                        'set decimal = "," in [csv] of a mapping'
+                        if _COMMA_NUMBER.match(example)
+                        else "correct the file or map another column"
+                    )
                     raise DriveError(
                         f"{self.path}: column {name!r} holds text such as {example!r} "
-                        f"(row {row}), not numbers; correct the file or map another column"
+                        f"(row {row}), not numbers; {remedy}"
                     )
                 notes.append(
                     f"{bad} of {filled} cells of {name!r} are no numbers, such as {example!r} "
