@@ -139,3 +139,10 @@ def test_anything_gives_an_offset_or_a_reason(first, second):
     found = align(made(first), made(second))
     assert found.found == (found.refusal == "")
     assert not found.found or np.isfinite([found.offset, found.std]).all()
+
+
+def test_repeated_speed_without_noise_is_ambiguous_too():
+    t = np.arange(0.0, 600.0, 0.5)
+    v = 15.0 + 8.0 * np.sin(2.0 * np.pi * t / 40.0)
+    found = align(Signal("vehicle_speed", t, v), Signal("gnss_speed", t + 5000.0, v))
+    assert "two offsets fit alike" in found.refusal

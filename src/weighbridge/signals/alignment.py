@@ -29,6 +29,8 @@ AMBIGUOUS: Final = 0.5
 """Above this ratio of what is left unexplained, best over next best, two offsets are comparable."""
 
 _SHARE: Final = 0.3
+# Two sensors do not agree better [part of the variance]: below, the ends of a record decide.
+_EXACT: Final = 0.005
 _BLOCKS: Final = 12
 
 # Beyond a day of samples of 0.1 s the transform would fill the memory.
@@ -107,7 +109,8 @@ def align(reference: Signal, other: Signal, *, signed: bool = True) -> Alignment
     if not top >= LIKENESS:
         return _refused(f"they agree at no offset (the best correlation is {top:.2f})")
     second = float(np.max(np.where(_lobe(score, best), 0.0, score)))
-    ambiguity = min((1.0 - top**2) / max(1.0 - max(second, 0.0) ** 2, 1e-12), 1.0)
+    left, left_second = (max(1.0 - max(x, 0.0) ** 2, _EXACT) for x in (top, second))
+    ambiguity = min(left / left_second, 1.0)
     offset = float(reference.time[0] - other.time[0]) + shift * STEP
     offset, std = _refined(reference, other, offset)
     overlap = float(count[best]) * STEP
