@@ -7,8 +7,7 @@ known acceleration phi of the reference parameters p0 under the suspension force
     v' = phi q,     q = p0 / p     in inverse form, which is linear.
 
 The Riccati equation is integrated by a step of the transition and a fold of the
-measurement after Joseph, each exact for its part: the covariance stays positive definite
-at any rate.
+measurement, each exact for its part: the covariance stays positive definite at any rate.
 """
 
 from typing import NamedTuple
@@ -16,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weighbridge.kernels._jit import kernel
-from weighbridge.kernels.inertia import integral
+from weighbridge.kernels.inertia import VELOCITY_STD, integral
 
 PRINTED, EXTENDED, INVERSE = 0, 1, 2
 """As printed (A_02 = 0 in the Riccati equation), with the Jacobian, in inverse parameters."""
@@ -77,6 +76,26 @@ def initial_state(mean, cov):
 
 
 @kernel
+def fold(mean, cov, j, measured, noise):
+    """Fold a measurement of state ``j`` in.
+
+    What the measurement takes from its own row is written as the share that stays,
+    ``noise / var``: nothing small is a difference of large numbers.
+    """
+    var = cov[j, j] + noise
+    row = cov[j].copy()
+    innovation = measured - mean[j]
+    for i in range(6):
+        mean[i] += row[i] / var * innovation
+        for k in range(i, 6):
+            if i == j or k == j:
+                cov[i, k] = cov[i, k] * (noise / var)
+            else:
+                cov[i, k] -= row[i] * row[k] / var
+            cov[k, i] = cov[i, k]
+
+
+@kernel
 def step(state, time, travel, rate, velocity, params):
     """Fold one sample in.
 
@@ -102,9 +121,9 @@ def step(state, time, travel, rate, velocity, params):
     """
     mean, cov = state.mean.copy(), state.cov.copy()
     phi = np.empty((2, 3))
+    slope = np.zeros(3)  # of each velocity by its parameter
     length = time - state.time
     known = length > 0.0 and length <= params.longest
-    transition = np.eye(6)
     old_step = state.old_step if np.isfinite(state.phi[1, 0]) else 0.0
     for j in range(3):
         phi[1, j] = state.phi[0, j]
@@ -116,33 +135,36 @@ def step(state, time, travel, rate, velocity, params):
             q = mean[3 + j]
             if params.form == INVERSE:
                 mean[j] += impulse * q
-                transition[j, 3 + j] = impulse
+                slope[j] = impulse
             else:
                 mean[j] += impulse / q
                 if params.form == EXTENDED:
-                    transition[j, 3 + j] = -impulse / (q * q)
+                    slope[j] = -impulse / (q * q)
     if known:
         # Half of the process noise before and half after: of second order in the step.
-        half = (0.5 * length) * params.process
-        cov = transition @ (cov + half) @ transition.T + half
+        for i in range(6):
+            for k in range(6):
+                cov[i, k] += 0.5 * length * params.process[i, k]
+        for j in range(3):
+            for k in range(6):
+                cov[j, k] += slope[j] * cov[3 + j, k]
+        for j in range(3):
+            for k in range(6):
+                cov[k, j] += slope[j] * cov[k, 3 + j]
+        for i in range(6):
+            for k in range(6):
+                cov[i, k] += 0.5 * length * params.process[i, k]
     else:
         for j in range(3):
             for i in range(6):
                 cov[j, i] = 0.0
                 cov[i, j] = 0.0
-            cov[j, j] = 100.0
+            cov[j, j] = VELOCITY_STD**2
             if np.isfinite(velocity[j]):
                 mean[j] = velocity[j]
-    held = length if known else 1.0
     for j in range(3):
         if np.isfinite(velocity[j]):
-            noise = params.noise[j] / held
-            gain = cov[:, j] / (cov[j, j] + noise)
-            mean = mean + gain * (velocity[j] - mean[j])
-            keep = np.eye(6)
-            keep[:, j] -= gain
-            cov = keep @ cov @ keep.T + noise * np.outer(gain, gain)
-    cov = 0.5 * (cov + cov.T)
+            fold(mean, cov, j, velocity[j], params.noise[j] / (length if known else 1.0))
     for j in range(3, 6):
         mean[j] = min(max(mean[j], params.lowest), params.highest)
     return KalmanBucyState(time, phi, length if known else 0.0, mean, cov)

@@ -1,0 +1,262 @@
+"""Sprung mass and inertias from drives, whole and spoiled."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+from numpy.testing import assert_allclose
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io import read_drive
+from weighbridge.pipeline.inertia import estimate_inertia
+from weighbridge.signals import Drive, Signal
+from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
+from weighbridge.vehicle.model import Ride, Vehicle
+
+SENSORS = RideSensors(rate=250.0)
+RIDE = Ride(
+    front_stiffness=177000.0,
+    rear_stiffness=193844.0,
+    front_damping=7733.0,
+    rear_damping=9804.0,
+    front_track=1.705,
+    rear_track=1.495,
+    front_axle=2.4,
+    rear_axle=1.685,
+    front_unsprung=266.0,
+    rear_unsprung=427.0,
+    sprung_mass=5394.0,
+    roll_inertia=4600.0,
+    pitch_inertia=19632.0,
+    zero_mass=5394.0,
+    force_std=0.01,
+)
+CAR = Vehicle(name="truck", kind="truck", tare=6087.0, ride=RIDE)
+
+
+def simulated(vehicle=TRUCK, factor=1.3, sensors=SENSORS, seed=11, **more):
+    more = {"duration": 14.0, "zero_mass": TRUCK.sprung_mass, **more}
+    return simulate_ride(
+        RideScenario(vehicle=vehicle.loaded(factor), sensors=sensors, seed=seed, **more)
+    )
+
+
+@pytest.fixture(scope="module")
+def made():
+    return simulated()
+
+
+@pytest.fixture(scope="module")
+def found(made):
+    return estimate_inertia(made.drive, CAR)
+
+
+def changed(drive: Drive, **columns) -> Drive:
+    """Replace values of signals by a function of them."""
+    return drive.with_signals(
+        *(Signal(n, drive.signals[n].time, f(drive.signals[n].values)) for n, f in columns.items())
+    )
+
+
+def test_ride_gives_the_three_parameters(made, found):
+    true = made.inertias[-1]
+    low, high = found.intervals()
+
+    assert found.status == "converged"
+    assert found.warnings == ()
+    assert_allclose(found.values, true, rtol=0.02)
+    assert np.all((low < true) & (true < high))
+    assert found.converged_at < 2.0
+
+
+def test_axle_loads_balance_about_the_centre_of_gravity(found):
+    front, rear = found.axle_loads
+    assert_allclose(front + rear, found.mass)
+    assert_allclose((front - 266.0) * 2.4, (rear - 427.0) * 1.685)
+    assert_allclose(found.payload, found.mass - 6087.0)
+
+
+def test_json_and_track_say_the_same(found, tmp_path):
+    told = json.loads(found.to_json())
+    found.write_track(tmp_path / "track.csv")
+    table = pl.read_csv(tmp_path / "track.csv")
+
+    assert told["status"] == "converged"
+    assert_allclose(told["sprung_mass_kg"], table["sprung_mass_kg"][-1], rtol=1e-6)
+    assert_allclose(told["pitch_inertia_std_kgm2"], table["pitch_inertia_std_kgm2"][-1], rtol=1e-6)
+    assert told["mass_kg"] == pytest.approx(told["sprung_mass_kg"] + 693.0)
+    with pytest.raises(ConfigError, match=r"\.csv or \.parquet"):
+        found.write_track(tmp_path / "track.txt")
+
+
+def test_load_changes_are_found():
+    ride = simulated(factor=1.0, zero_mass=None, changes=((6.0, 1.5),), seed=12)
+    told = estimate_inertia(ride.drive, replace(CAR, ride=replace(RIDE, zero_mass=None)))
+
+    assert len(told.segments) == 2
+    assert told.segments[1].start == pytest.approx(6.0, abs=0.3)
+    assert_allclose(told.segments[0].values, TRUCK.inertias, rtol=0.03)
+    assert_allclose(told.segments[1].values, 1.5 * TRUCK.inertias, rtol=0.03)
+
+
+@pytest.mark.parametrize("method", ["inverse", "extended"])
+def test_fixed_noise_filters_come_near(made, method):
+    # They know no weight in the springs: the drive without it.
+    ride = simulated(zero_mass=None)
+    told = estimate_inertia(ride.drive, replace(CAR, ride=replace(RIDE, zero_mass=None)), method)
+    assert_allclose(told.track.parameters[-1], ride.inertias[-1], rtol=0.1)
+
+
+def test_common_error_of_springs_and_dampers_stays_in_the_interval(made, found):
+    unsure = estimate_inertia(made.drive, replace(CAR, ride=replace(RIDE, force_std=None)))
+    assert_allclose(unsure.values, found.values)
+    assert unsure.std == pytest.approx(0.05 * unsure.values[0], rel=0.05)
+    assert any("force_std" in w for w in unsure.warnings)
+
+
+def test_missing_signals_are_named(made):
+    told = estimate_inertia(made.drive.without("pitch_rate", "suspension_rate_rl"), CAR)
+    assert told.status == "missing_signals"
+    assert "pitch_rate" in told.reason
+    assert "suspension_rate_rl" in told.reason
+    assert json.loads(told.to_json())["sprung_mass_kg"] is None
+
+
+def test_vehicle_without_suspension_is_refused(made):
+    with pytest.raises(ConfigError, match=r"truck has no \[ride\] section"):
+        estimate_inertia(made.drive, replace(CAR, ride=None))
+    with pytest.raises(ConfigError, match="unknown method 'kalman'"):
+        estimate_inertia(made.drive, CAR, "kalman")
+
+
+def test_wrong_signs_are_refused(made):
+    for name in ("vertical_velocity", "roll_rate", "pitch_rate"):
+        with pytest.raises(DriveError, match=f"{name} runs against"):
+            estimate_inertia(changed(made.drive, **{name: np.negative}), CAR)
+    with pytest.raises(DriveError, match="suspension_rate_fr falls where"):
+        estimate_inertia(changed(made.drive, suspension_rate_fr=np.negative), CAR)
+    compression = {n: np.negative for n in made.drive.signals if n.startswith("suspension")}
+    with pytest.raises(DriveError, match="against its springs on every axis"):
+        estimate_inertia(changed(made.drive, **compression), CAR)
+
+
+def test_wrong_units_are_refused(made):
+    travels = [n for n in made.drive.signals if n.startswith("suspension_travel")]
+    with pytest.raises(DriveError, match="suspension_travel_fl"):
+        estimate_inertia(changed(made.drive, **{n: lambda v: 1e3 * v for n in travels}), CAR)
+
+
+def test_swapped_wheels_are_refused(made):
+    s = made.drive.signals
+    swapped = made.drive.with_signals(
+        replace(s["suspension_travel_fl"], values=s["suspension_travel_rr"].values),
+        replace(s["suspension_travel_rr"], values=s["suspension_travel_fl"].values),
+    )
+    with pytest.raises(DriveError, match="suspension_travel_fl goes with suspension_rate_rr"):
+        estimate_inertia(swapped, CAR)
+
+
+def test_stuck_sensor_is_refused(made):
+    with pytest.raises(DriveError, match="suspension_travel_rl repeats one value"):
+        estimate_inertia(changed(made.drive, suspension_travel_rl=np.zeros_like), CAR)
+
+
+def test_slow_recording_is_no_ride(made):
+    slow = {n: Signal(n, s.time[::10], s.values[::10]) for n, s in made.drive.signals.items()}
+    told = estimate_inertia(replace(made.drive, signals=slow), CAR)
+    assert told.status == "not_excited"
+    assert "25 times per second" in told.reason
+
+
+def test_signals_on_other_clocks_and_gaps_are_taken(made):
+    rng = np.random.default_rng(3)
+    torn = {}
+    for n, s in made.drive.signals.items():
+        keep = rng.random(len(s)) > 0.02
+        keep &= ~((s.time > 5.0) & (s.time < 6.5))
+        keep[0] = True
+        # Halfway between the others' samples, where the mean of two neighbours is near enough.
+        shift = 0.5 * s.period if n == "roll_rate" else 0.0
+        values = s.values + shift * np.gradient(s.values, s.time)
+        torn[n] = Signal(n, s.time[keep] + shift, values[keep])
+    told = estimate_inertia(replace(made.drive, signals=torn), CAR)
+    assert told.status == "converged"
+    assert_allclose(told.values, made.inertias[-1], rtol=0.05)
+
+
+def test_damaged_table_is_read_as_far_as_it_goes(made, tmp_path):
+    made.write(tmp_path, format="csv")
+    path = tmp_path / "ride.csv"
+    table = pl.read_csv(path)
+    table = pl.concat([table[:1000], table[900:]])
+    table = table.with_columns(
+        pl.when(pl.int_range(pl.len()) % 97 == 0)
+        .then(None)
+        .otherwise(pl.col("pitch_rate_radps"))
+        .alias("pitch_rate_radps")
+    )
+    table.write_csv(path)
+    told = estimate_inertia(read_drive(tmp_path), CAR)
+    assert_allclose(told.values, made.inertias[-1], rtol=0.03)
+    assert any("clock runs backwards" in w for w in told.warnings)
+
+
+def test_smooth_road_is_no_weighing(made):
+    still = {
+        n: (lambda v, k=k: 1e-4 * np.random.default_rng(k).normal(size=v.size))
+        for k, n in enumerate(made.drive.signals)
+    }
+    told = estimate_inertia(changed(made.drive, **still), CAR)
+    assert told.status != "converged"
+    assert np.isnan(told.mass)
+
+
+def locked(factor):
+    damping = (factor * TRUCK.damping[0], *TRUCK.damping[1:])
+    return simulated(replace(TRUCK, damping=damping))
+
+
+@pytest.mark.parametrize("factor", [0.05, 20.0])
+def test_broken_damper_is_named(factor):
+    told = estimate_inertia(locked(factor).drive, CAR)
+    assert told.status == "inconsistent"
+    assert "front left damper" in told.reason
+
+
+def test_soft_springs_are_told_and_widen_the_interval():
+    ride = simulated(replace(TRUCK, stiffness=tuple(0.9 * np.array(TRUCK.stiffness))))
+    told = estimate_inertia(ride.drive, CAR)
+    low, high = told.intervals()
+    assert any("damper" in w and "otherwise" in w for w in told.warnings)
+    assert low[0] < ride.inertias[-1, 0] < high[0]
+
+
+def test_offset_sensors_change_nothing_in_motion_and_are_told(found):
+    ride = simulated(sensors=replace(SENSORS, travel_offset=(0.012, 0.012, 0.012, 0.012)))
+    told = estimate_inertia(ride.drive, CAR)
+    assert_allclose(told.values, found.values, rtol=1e-3)
+    assert any("offset" in w for w in told.warnings)
+    blind = estimate_inertia(ride.drive, replace(CAR, ride=replace(RIDE, zero_mass=None)))
+    assert blind.warnings == ()
+
+
+def test_noisy_sensors_are_told():
+    ride = simulated(sensors=replace(SENSORS, travel_noise=2e-3, rate_noise=5e-2))
+    told = estimate_inertia(ride.drive, CAR)
+    assert told.track.noise_factor >= 4.0
+    assert any("times the noise" in w for w in told.warnings)
+
+
+def test_overload_is_told(made):
+    told = estimate_inertia(made.drive, replace(CAR, gross=7000.0))
+    assert "surely above the permitted mass of 7000 kg" in told.warnings
+
+
+def test_report_opens_offline(found, tmp_path):
+    found.report(tmp_path / "ride.html")
+    text = (tmp_path / "ride.html").read_text(encoding="utf-8")
+    assert "Sprung mass" in text
+    assert "front left spring" in text
+    assert "http://" not in text.split("<script>")[0]

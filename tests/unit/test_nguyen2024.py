@@ -1,0 +1,37 @@
+"""The reproduction of Nguyen 2024, on few roads."""
+
+import numpy as np
+import pytest
+
+from weighbridge.papers import nguyen2024 as paper
+
+
+@pytest.fixture(scope="module")
+def done():
+    cases = (paper.CASES[0], paper.CASES[3])
+    return paper.reproduce(seed=5, roads=2, cases=cases)
+
+
+def test_jumps_are_followed_faster_and_closer_than_in_print(done):
+    results, _ = done
+    for r in results[paper.CASES[0].name]:
+        assert np.all(r.mape < 0.01)
+        assert np.all(r.settled[1:] < 0.3)
+        assert np.all(r.velocity_rmse < paper.PAPER_VELOCITY_RMSE)
+
+
+def test_filter_as_printed_stays_where_it_began(done):
+    results, _ = done
+    # 1, 1/3 and 3 off for 7, 7 and 6 s of 20 s.
+    expected = (7.0 * 1.0 + 7.0 / 3.0 + 6.0 * 3.0) / 20.0
+    for r in results[paper.CASES[3].name]:
+        np.testing.assert_allclose(r.mape, expected, rtol=1e-3)
+        np.testing.assert_allclose(r.settled[:, 0], [7.0, 7.0, 6.001], atol=1e-9)
+
+
+def test_errors_are_those_of_eq_10(done):
+    results, shown = done
+    r = results[paper.CASES[0].name][0]
+    error = shown.track.parameters[:, 2] - shown.made.inertias[:, 2]
+    assert r.rmse[2] == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert r.mape[2] == pytest.approx(np.mean(np.abs(error) / shown.made.inertias[:, 2]))
