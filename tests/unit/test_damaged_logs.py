@@ -24,7 +24,8 @@ def read(path):
         told = str(error)
     assert drive.signals if drive else 10 < len(told) < 1000
     assert "\n" not in told
-    assert time.perf_counter() - began < 20.0
+    # No limit of speed: a reader that hangs, or is led to read far more than is there.
+    assert time.perf_counter() - began < 60.0
 
 
 @st.composite
