@@ -198,6 +198,11 @@ def test_short_drive_and_no_speed_are_told(car):
     assert "no vehicle_speed and no gnss_speed" in without.reason
 
 
+def test_speed_that_comes_too_rarely_is_told(car):
+    with pytest.raises(DriveError, match="vehicle_speed comes every 5 s"):
+        wb.weigh(drive(3, rate=0.2), car, method="speed-ekf")
+
+
 def test_vehicle_without_a_model_is_refused():
     with pytest.raises(ConfigError, match=r"no \[speed_model\].*calibrate --method speed-ekf"):
         wb.weigh(drive(2), Vehicle(name="new"), method="speed-ekf")

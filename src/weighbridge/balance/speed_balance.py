@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.balance.force_balance import ForceBalance, ForceSide, MergedView, Reason
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import ConfigError
+from weighbridge.errors import ConfigError, DriveError
 from weighbridge.kernels import speed_ekf as kernel
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
@@ -47,8 +47,13 @@ def model_of(vehicle: Vehicle) -> SpeedModel:
     return vehicle.speed_model
 
 
-def speed_motion_of(drive: Drive, vehicle: Vehicle) -> Motion:
+def speed_motion_of(drive: Drive, vehicle: Vehicle, length: float) -> Motion:
     """Find the motion by speed alone, whatever else the drive holds; its grade is unknown.
+
+    Parameters
+    ----------
+    drive, vehicle
+    length : of the windows over which it will be averaged [s]
 
     Raises
     ------
@@ -56,6 +61,12 @@ def speed_motion_of(drive: Drive, vehicle: Vehicle) -> Motion:
         There is too little of it.
     """
     chosen = next((name for name in SPEEDS if drive.has(name)), SPEEDS[0])
+    speed = drive.get(chosen)
+    if speed is not None and speed.period > 0.5 * length:
+        raise DriveError(
+            f"{drive.name}: {chosen} comes every {speed.period:.3g} s, and a mean over "
+            f"{length:g} s needs two values; record it more often"
+        )
     alone = drive.without(*(name for name in drive.signals if name != chosen))
     motion = find_motion(alone, vehicle)
     nowhere = np.full(motion.time.size, np.nan)
@@ -127,8 +138,8 @@ def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
         There is too little speed.
     """
     model = model_of(vehicle)
-    motion = speed_motion_of(drive, vehicle)
     length = model.sample_time
+    motion = speed_motion_of(drive, vehicle, length)
     speed = window_means(motion, motion.speed, length)
     known, slow, braked = running(speed, length)
     time = motion.time[0] + length * np.arange(1, speed.size + 1)

@@ -85,7 +85,7 @@ def speed_rows(drive: Drive, vehicle: Vehicle, mass: float, sample_time: float) 
             f"{drive.name}: nothing tells the grade, which a calibration for speed-ekf needs; "
             "record altitude, grade or an inertial sensor with it"
         )
-    motion = speed_motion_of(drive, vehicle)
+    motion = speed_motion_of(drive, vehicle, sample_time)
     seen = np.where(graded.valid, graded.grade, np.nan)
     grade = np.interp(motion.time, graded.time, seen, left=np.nan, right=np.nan)
     speed = window_means(motion, motion.speed, sample_time)
