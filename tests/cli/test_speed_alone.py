@@ -77,7 +77,7 @@ def test_vehicle_without_a_speed_model(weighbridge, alone, tmp_path):
     assert len(done.err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("option", [("--torque", "load"), ("--order", 1), ("--grid",)])
+@pytest.mark.parametrize("option", [("--torque", "load"), ("--order", 1), ("--straight",)])
 def test_options_about_torque_are_refused(weighbridge, known, tmp_path, option):
     done = weighbridge(
         "calibrate", known, "--mass", 1092, "--method", "speed-ekf", *option,
