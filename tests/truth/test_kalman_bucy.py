@@ -148,6 +148,8 @@ def jump_params(**changes):
         highest=1e9,
         jump_rate=1e-4,
         spawn=np.inf,
+        push_drift=np.zeros(3),
+        push_rate=0.1,
         longest=1.0,
     )
     return made._replace(**changes)

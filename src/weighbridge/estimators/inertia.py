@@ -18,7 +18,7 @@ from scipy.special import ndtri
 from weighbridge.errors import ConfigError
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
-from weighbridge.signals import Floats
+from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Ride
 
 Method = Literal["kalman-bucy", "inverse", "extended", "printed"]
@@ -27,8 +27,8 @@ METHODS: Final[tuple[Method, ...]] = ("kalman-bucy", "inverse", "extended", "pri
 
 AXES: Final = ("sprung mass", "roll inertia", "pitch inertia")
 
-HYPOTHESES: Final = 24
-"""Moments of a last jump that are kept in mind for each parameter."""
+HYPOTHESES: Final = 32
+"""Of what changed last and when, kept in mind for each parameter."""
 
 _LONGEST: Final = 0.012
 """Longest step over which the suspension force is integrated [s]: an axle hops at some 12 Hz,
@@ -89,6 +89,9 @@ class InertiaSettings:
     jump_rate : jumps expected per time [1/s]
     jump_std : standard deviation of the inverse parameter after a jump, relative [-]
     spawn : time between two hypotheses of a jump [s]
+    push_drift : growth of the angular acceleration that braking, starting or turning
+        causes, over the root of time; without offset_std not used [rad/s^2.5]
+    push_rate : beginnings and ends of braking and turning expected per time [1/s]
     drift : relative growth of the inverse parameter's standard deviation over the root
         of time [1/s^0.5]
     offset_std : standard deviation of the constant acceleration that sensor offsets and
@@ -103,6 +106,8 @@ class InertiaSettings:
     jump_rate: float = 1e-4
     jump_std: float = 1.0
     spawn: float = 2e-3
+    push_drift: float = 1.0
+    push_rate: float = 0.3
     drift: float = 3e-5
     offset_std: float = 10.0
     offset_drift: float = 3e-3
@@ -133,6 +138,7 @@ class InertiaTrack:
     innovation, innovation_var : (n, 3) measured less predicted velocity, and the variance
         it should have; NaN where it is not known
     jumped : (n, 3) when each parameter jumped last [s]; -inf for never
+    pushed : (n, 3) whether braking, starting or turning goes on
     noise_factor : standard deviation of the suspension signals over that of the vehicle
         file, as the innovations have it [-]
     """
@@ -147,6 +153,7 @@ class InertiaTrack:
     innovation: Floats
     innovation_var: Floats
     jumped: Floats
+    pushed: Bools
     noise_factor: float
 
     @property
@@ -236,6 +243,7 @@ def jump_params(
     """Put together what the filter with jumps reads."""
     spring, damper = _accelerations(ride)
     low, high = settings.range
+    push = settings.push_drift if settings.offset_std > 0.0 else 0.0
     return kernel.InertiaParams(
         spring=spring,
         damper=damper,
@@ -249,13 +257,19 @@ def jump_params(
         highest=1.0 / low,
         jump_rate=settings.jump_rate,
         spawn=settings.spawn,
+        push_drift=np.array([0.0, 1.0, 1.0]) * push**2,
+        push_rate=settings.push_rate,
         longest=longest_step(period),
     )
 
 
 def jump_state(params: kernel.InertiaParams, settings: InertiaSettings) -> kernel.InertiaState:
     """Start the filter with jumps."""
-    return kernel.initial_state(np.full(3, settings.start_std), params, HYPOTHESES)
+    start_std = np.full(3, settings.start_std)
+    state: kernel.InertiaState = kernel.initial_state(  # type: ignore[no-untyped-call]
+        start_std, params, HYPOTHESES
+    )
+    return state
 
 
 class InertiaFilter:
@@ -351,6 +365,7 @@ def run_filter(
         innovation=np.where(unknown, np.nan, found.innovation),
         innovation_var=np.where(unknown, np.nan, found.innovation_var),
         jumped=found.jumped,
+        pushed=found.pushed,
         noise_factor=noise_factor,
     )
 
@@ -380,8 +395,11 @@ def _run_fixed(
 ) -> InertiaTrack:
     params = fixed_params(ride, samples.period, method, settings)
     start = np.diag((*3 * (100.0,), *3 * (settings.start_std**2,)))
+    begin = kalman_bucy.initial_state(  # type: ignore[no-untyped-call]
+        np.repeat((0.0, 1.0), 3), start
+    )
     _, mean, std = kalman_bucy.run(
-        kalman_bucy.initial_state(np.repeat((0.0, 1.0), 3), start),
+        begin,
         samples.time,
         samples.travel,
         samples.rate,
@@ -402,6 +420,7 @@ def _run_fixed(
         innovation=nothing,
         innovation_var=nothing,
         jumped=np.full_like(q, -np.inf),
+        pushed=np.zeros(q.shape, dtype=bool),
         noise_factor=1.0,
     )
 

@@ -19,7 +19,7 @@ from weighbridge.estimators.inertia import (
     reference,
     stiffness,
 )
-from weighbridge.signals import Floats
+from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.model import Ride
 
 BAND: Final = (0.5, 10.0)
@@ -84,11 +84,18 @@ class SuspensionCheck:
         return np.where(wrong > np.maximum(0.05, 4.0 * self.std), wrong, 0.0)
 
 
-def _banded(samples: RideSamples) -> tuple[Floats, Floats, Floats, Floats] | None:
+def _banded(
+    samples: RideSamples, calm: Bools | None = None
+) -> tuple[Floats, Floats, Floats, Ints] | None:
     """Even rows of both sides of the balance within `BAND`.
 
     The mean of a force over two steps by Simpson's rule goes with the difference of the
     velocity over them, so that neither is smoothed more than the other.
+
+    Parameters
+    ----------
+    samples
+    calm : (n,) samples to keep; all when None
 
     Returns
     -------
@@ -122,6 +129,10 @@ def _banded(samples: RideSamples) -> tuple[Floats, Floats, Floats, Floats] | Non
     upcoming = np.append(edges, np.inf)[np.searchsorted(edges, at, side="right")]
     gap_before = np.interp(upcoming, time[1:], np.diff(time), right=0.0)
     keep = (at > began + 1.0 / BAND[0]) & (at < upcoming - gap_before)
+    if calm is not None:
+        # What the filter saw before and after a push has it in it, too.
+        near = np.convolve(~calm, np.ones(2 * round(1.0 / (BAND[0] * step)) + 1), "same") > 0.0
+        keep &= np.interp(at, time, near.astype(np.float64)) == 0.0
     block = ((at - at[0]) / BLOCK).astype(np.int64)
     if np.count_nonzero(keep) < 100:
         return None
@@ -153,7 +164,9 @@ def response(samples: RideSamples, ride: Ride) -> Response | None:
     )
 
 
-def check_suspension(samples: RideSamples, ride: Ride, alpha: Floats) -> SuspensionCheck | None:
+def check_suspension(
+    samples: RideSamples, ride: Ride, alpha: Floats, pushed: Bools | None = None
+) -> SuspensionCheck | None:
     """Fit a factor to each spring and damper.
 
     Parameters
@@ -161,6 +174,8 @@ def check_suspension(samples: RideSamples, ride: Ride, alpha: Floats) -> Suspens
     samples : of one load
     ride : what the vehicle file says
     alpha : (3,) inverse parameters found, over those of the vehicle file
+    pushed : (n,) samples during braking, starting or turning, whose forces are not the
+        suspension's
 
     Returns
     -------
@@ -168,7 +183,9 @@ def check_suspension(samples: RideSamples, ride: Ride, alpha: Floats) -> Suspens
     """
     if samples.time.size < 2 or samples.time[-1] - samples.time[0] < SHORTEST:
         return None
-    rows = _banded(samples.since(samples.time[-1] - LONGEST))
+    lately = samples.since(samples.time[-1] - LONGEST)
+    calm = None if pushed is None else ~pushed[samples.time.size - lately.time.size :]
+    rows = _banded(lately, calm)
     if rows is None:
         return None
     accel, parts, _, block = rows

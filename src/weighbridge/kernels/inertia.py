@@ -34,8 +34,11 @@ class InertiaParams(NamedTuple):
     jump_std : standard deviation of alpha after a jump, relative to before it [-]
     beta_std : (3,) of beta at the start and after a jump [m/s^2], [rad/s^2]
     lowest, highest : bounds of alpha, outside of which no vehicle is [-]
-    jump_rate : jumps expected per time [1/s]
-    spawn : time between two hypotheses of a jump [s]; infinite to allow none
+    jump_rate : changes of load expected per time [1/s]
+    spawn : time between two hypotheses of a change [s]; infinite to allow none
+    push_drift : (3,) growth of the variance of beta with time while the vehicle brakes,
+        starts or turns; 0 where that does not move the axis [rad^2/s^5]
+    push_rate : beginnings and ends of that expected per time [1/s]
     longest : step between samples above which velocities are unknown [s]
     """
 
@@ -51,6 +54,8 @@ class InertiaParams(NamedTuple):
     highest: float
     jump_rate: float
     spawn: float
+    push_drift: np.ndarray
+    push_rate: float
     longest: float
 
 
@@ -62,9 +67,12 @@ class InertiaState(NamedTuple):
     time : of the last sample [s]
     phi : (2, 3) at the last sample and the one before
     old_step : between them [s]; 0 where there is none
-    next_spawn : (3,) when the next hypothesis is due [s]
+    next_spawn, next_turn : (3,) when the next hypothesis of a change of load, and of a
+        push that begins or ends, is due [s]
     count : (3,) hypotheses in use
-    born : (3, m) when each says the parameter jumped last [s], rising
+    cause : (3, m) of each: LOAD changed, a push of braking or turning BEGAN or ENDED
+    born : (3, m) when that was [s], rising
+    loaded : (3, m) when each says the load changed last [s]
     weight : (3, m) logarithm of its probability, the largest 0
     mean : (3, m, 3) v, alpha, beta
     cov : (3, m, 3, 3) their covariance
@@ -74,8 +82,11 @@ class InertiaState(NamedTuple):
     phi: np.ndarray
     old_step: float
     next_spawn: np.ndarray
+    next_turn: np.ndarray
     count: np.ndarray
+    cause: np.ndarray
     born: np.ndarray
+    loaded: np.ndarray
     weight: np.ndarray
     mean: np.ndarray
     cov: np.ndarray
@@ -93,7 +104,8 @@ class InertiaSample(NamedTuple):
         squares; NaN where nothing was measured
     impulse : (3,) change of phi's integral since the sample before [m/s], [rad/s]; NaN
         where it is unknown
-    jumped : (3,) when the most likely hypothesis says the parameter jumped last [s]
+    jumped : (3,) when the likeliest hypothesis says the load changed last [s]
+    pushed : (3,) whether it says that braking, starting or turning goes on
     """
 
     alpha: np.ndarray
@@ -104,7 +116,14 @@ class InertiaSample(NamedTuple):
     innovation_var: np.ndarray
     impulse: np.ndarray
     jumped: np.ndarray
+    pushed: np.ndarray
 
+
+LOAD, BEGAN, ENDED = 0, 1, 2
+"""Causes of a hypothesis; without any it is as if the load had changed before the start."""
+
+TURN = 8.0
+"""Pushes take longer than changes of load: so many times ``spawn`` is between two hypotheses."""
 
 VELOCITY_STD = 10.0
 """Of a velocity nothing is known of [m/s], [rad/s]."""
@@ -130,7 +149,10 @@ def initial_state(alpha_std, params, hypotheses):
         np.full((2, AXES), np.nan),
         0.0,
         np.full(AXES, -np.inf),
+        np.full(AXES, -np.inf),
         np.ones(AXES, dtype=np.int64),
+        np.full((AXES, hypotheses), LOAD, dtype=np.int64),
+        np.full((AXES, hypotheses), -np.inf),
         np.full((AXES, hypotheses), -np.inf),
         np.zeros((AXES, hypotheses)),
         mean,
@@ -165,7 +187,7 @@ def integral(older, old, new, old_step, step):
 
 
 @kernel
-def predict(mean, cov, impulse, step, velocity_var, params):
+def predict(mean, cov, impulse, step, velocity_var, alpha_drift, beta_drift):
     """Integrate one hypothesis over a step; exact for a known impulse."""
     mean[0] += mean[1] * impulse + mean[2] * step
     # F P F' with F = [[1, impulse, step], [0, 1, 0], [0, 0, 1]].
@@ -177,8 +199,8 @@ def predict(mean, cov, impulse, step, velocity_var, params):
     cov[1, 0] = c01
     cov[0, 2] = c02
     cov[2, 0] = c02
-    cov[1, 1] += params.alpha_drift * step
-    cov[2, 2] += params.beta_drift * step
+    cov[1, 1] += alpha_drift * step
+    cov[2, 2] += beta_drift * step
 
 
 @kernel
@@ -246,50 +268,70 @@ def within(mean, std, lowest, highest):
 
 
 @kernel
-def make_room(count, time, born, weight, mean, cov):
-    """Drop the less likely of the two hypotheses whose ages differ least in proportion."""
-    least, at = np.inf, 1
+def make_room(j, count, time, cause, born, loaded, weight, mean, cov):
+    """Drop the less likely of two hypotheses of one cause whose ages differ least in proportion."""
+    least, at, beside = np.inf, 0, 1
     for i in range(count - 1):
-        ratio = (time - born[i]) / max(time - born[i + 1], 1e-9)
-        if np.isinf(born[i]):
-            ratio = 1e12 / max(time - born[i + 1], 1e-9)
+        k = i + 1
+        while k < count and cause[j, k] != cause[j, i]:
+            k += 1
+        if k == count:
+            continue
+        # The one from before the start is older than all by any measure.
+        age = min(time - born[j, i], 1e9)
+        ratio = age / max(time - born[j, k], 1e-9)
         if ratio < least:
-            least, at = ratio, i
-    drop = at if weight[at] < weight[at + 1] else at + 1
-    # What the dropped one believed goes to its neighbour: both tell nearly the same jump.
-    kept = 2 * at + 1 - drop
-    weight[kept] += np.log1p(np.exp(weight[drop] - weight[kept]))
+            least, at, beside = ratio, i, k
+    drop, kept = at, beside
+    if weight[j, at] >= weight[j, beside]:
+        drop, kept = beside, at
+    # What the dropped one believed goes to its neighbour: both tell nearly the same.
+    weight[j, kept] += np.log1p(np.exp(weight[j, drop] - weight[j, kept]))
     for i in range(drop, count - 1):
-        born[i] = born[i + 1]
-        weight[i] = weight[i + 1]
-        mean[i] = mean[i + 1]
-        cov[i] = cov[i + 1]
+        cause[j, i] = cause[j, i + 1]
+        born[j, i] = born[j, i + 1]
+        loaded[j, i] = loaded[j, i + 1]
+        weight[j, i] = weight[j, i + 1]
+        mean[j, i] = mean[j, i + 1]
+        cov[j, i] = cov[j, i + 1]
     return count - 1
 
 
 @kernel
-def suppose_jump(axis, state_time, count, born, weight, mean, cov, params):
-    """Add the hypothesis that the parameter jumps now, from the likeliest one."""
-    if count == born.size:
-        count = make_room(count, state_time, born, weight, mean, cov)
+def likeliest(weight, count):
+    """Index of the largest weight."""
     best = 0
     for i in range(1, count):
         if weight[i] > weight[best]:
             best = i
-    born[count] = state_time
-    weight[count] = weight[best] + np.log(params.jump_rate * params.spawn)
-    mean[count] = mean[best]
-    cov[count] = cov[best]
-    for i in range(3):
-        if i != 1:
-            cov[count, 1, i] = 0.0
-            cov[count, i, 1] = 0.0
-    cov[count, 1, 1] += (params.jump_std * mean[best, 1]) ** 2
-    if params.beta_std[axis] > 0.0:
-        for i in range(2):
-            cov[count, 2, i] = 0.0
-            cov[count, i, 2] = 0.0
-        cov[count, 2, 2] += params.beta_std[axis] ** 2
+    return best
+
+
+@kernel
+def suppose(j, why, log_rate, time, count, cause, born, loaded, weight, mean, cov, params):
+    """Add the hypothesis that something changes now, from the likeliest one."""
+    if count == born.shape[1]:
+        count = make_room(j, count, time, cause, born, loaded, weight, mean, cov)
+    best = likeliest(weight[j], count)
+    cause[j, count] = why
+    born[j, count] = time
+    loaded[j, count] = loaded[j, best]
+    weight[j, count] = weight[j, best] + log_rate
+    mean[j, count] = mean[j, best]
+    cov[j, count] = cov[j, best]
+    if why == LOAD:
+        loaded[j, count] = time
+        for i in range(3):
+            if i != 1:
+                cov[j, count, 1, i] = 0.0
+                cov[j, count, i, 1] = 0.0
+        cov[j, count, 1, 1] += (params.jump_std * mean[j, best, 1]) ** 2
+        # Another load has another weight.
+        if params.beta_std[j] > 0.0:
+            for i in range(2):
+                cov[j, count, 2, i] = 0.0
+                cov[j, count, i, 2] = 0.0
+            cov[j, count, 2, 2] += params.beta_std[j] ** 2
     return count + 1
 
 
@@ -334,11 +376,13 @@ def step(state, time, travel, rate, velocity, params):
                 old_step = 0.0
             impulse[j] = integral(state.phi[1, j], phi[1, j], phi[0, j], old_step, length)
 
-    next_spawn, count = state.next_spawn.copy(), state.count.copy()
-    born, weight = state.born.copy(), state.weight.copy()
+    next_spawn, next_turn = state.next_spawn.copy(), state.next_turn.copy()
+    count, cause = state.count.copy(), state.cause.copy()
+    born, loaded, weight = state.born.copy(), state.loaded.copy(), state.weight.copy()
     mean, cov = state.mean.copy(), state.cov.copy()
     alpha, alpha_std, beta = np.empty(AXES), np.empty(AXES), np.empty(AXES)
     speed, jumped = np.empty(AXES), np.empty(AXES)
+    pushed = np.zeros(AXES, dtype=np.bool_)
     innovation, innovation_var = np.full(AXES, np.nan), np.full(AXES, np.nan)
     for j in range(AXES):
         measured = velocity[j]
@@ -348,14 +392,14 @@ def step(state, time, travel, rate, velocity, params):
                 doubt = impulse[j] - 0.5 * length * (phi[0, j] + phi[1, j])
                 push_var = params.push_var[j] * length * length + doubt * doubt
                 var = mean[j, i, 1] * mean[j, i, 1] * push_var
-                predict(mean[j, i], cov[j, i], impulse[j], length, var, params)
+                drift = params.beta_drift
+                if cause[j, i] == BEGAN:
+                    drift = params.push_drift[j]
+                predict(mean[j, i], cov[j, i], impulse[j], length, var, params.alpha_drift, drift)
             elif not np.isfinite(state.time) or length > 0.0:
                 held = measured if np.isfinite(measured) else mean[j, i, 0]
                 forget_velocity(mean[j, i], cov[j, i], held)
-        best = 0
-        for i in range(1, count[j]):
-            if weight[j, i] > weight[j, best]:
-                best = i
+        best = likeliest(weight[j], count[j])
         if np.isfinite(measured):
             innovation[j] = measured - mean[j, best, 0]
             innovation_var[j] = cov[j, best, 0, 0] + params.noise_var[j]
@@ -368,9 +412,22 @@ def step(state, time, travel, rate, velocity, params):
                     best = i
             for i in range(count[j]):
                 weight[j, i] -= top
-        if time >= next_spawn[j] and params.spawn < np.inf:
-            count[j] = suppose_jump(j, time, count[j], born[j], weight[j], mean[j], cov[j], params)
+        # Dropping one moves the others up, so the likeliest is looked for again below.
+        if params.spawn < np.inf and time >= next_spawn[j]:
+            rate = np.log(params.jump_rate * params.spawn)
+            count[j] = suppose(
+                j, LOAD, rate, time, count[j], cause, born, loaded, weight, mean, cov, params
+            )
             next_spawn[j] = time + params.spawn
+        if params.spawn < np.inf and params.push_drift[j] > 0.0 and time >= next_turn[j]:
+            rate = np.log(min(params.push_rate * TURN * params.spawn, 0.5))
+            goes_on = cause[j, likeliest(weight[j], count[j])] == BEGAN
+            count[j] = suppose(
+                j, ENDED if goes_on else BEGAN, rate, time, count[j], cause, born, loaded, weight,
+                mean, cov, params,
+            )  # fmt: skip
+            next_turn[j] = time + TURN * params.spawn
+        best = likeliest(weight[j], count[j])
 
         # The likeliest hypothesis answers; its spread has in it what the others say.
         speed[j], beta[j] = mean[j, best, 0], mean[j, best, 2]
@@ -384,12 +441,26 @@ def step(state, time, travel, rate, velocity, params):
         alpha[j], alpha_std[j] = within(
             mean[j, best, 1], np.sqrt(spread / total), params.lowest, params.highest
         )
-        jumped[j] = born[j, best]
+        jumped[j] = loaded[j, best]
+        pushed[j] = cause[j, best] == BEGAN
     return (
         InertiaState(
-            time, phi, length if known else 0.0, next_spawn, count, born, weight, mean, cov
+            time,
+            phi,
+            length if known else 0.0,
+            next_spawn,
+            next_turn,
+            count,
+            cause,
+            born,
+            loaded,
+            weight,
+            mean,
+            cov,
         ),
-        InertiaSample(alpha, alpha_std, beta, speed, innovation, innovation_var, impulse, jumped),
+        InertiaSample(
+            alpha, alpha_std, beta, speed, innovation, innovation_var, impulse, jumped, pushed
+        ),
     )
 
 
@@ -417,11 +488,12 @@ def run(state, time, travel, rate, velocity, params):
     speed, innovation = np.empty((n, AXES)), np.empty((n, AXES))
     innovation_var = np.empty((n, AXES))
     impulse, jumped = np.empty((n, AXES)), np.empty((n, AXES))
+    pushed = np.zeros((n, AXES), dtype=np.bool_)
     for k in range(n):
         state, s = step(state, time[k], travel[k], rate[k], velocity[k], params)
         alpha[k], alpha_std[k], beta[k] = s.alpha, s.alpha_std, s.beta
         speed[k], innovation[k], innovation_var[k] = s.velocity, s.innovation, s.innovation_var
-        impulse[k], jumped[k] = s.impulse, s.jumped
+        impulse[k], jumped[k], pushed[k] = s.impulse, s.jumped, s.pushed
     return state, InertiaSample(
-        alpha, alpha_std, beta, speed, innovation, innovation_var, impulse, jumped
+        alpha, alpha_std, beta, speed, innovation, innovation_var, impulse, jumped, pushed
     )

@@ -64,6 +64,9 @@ WRONG_PART: Final = 0.5
 WRONG_SHARE: Final = 0.05
 """Part of the accelerations' power that wrong parts may explain [-]."""
 
+MOSTLY_CALM: Final = 0.3
+"""Braking, starting and turning are believed up to this part of a ride [-]."""
+
 STATIC_PART: Final = 0.04
 """Weight at rest and mass in motion may differ by this part of the mass [-]."""
 
@@ -386,10 +389,13 @@ def _judged(
         )
 
     # Loads that come and go are no loads: then only the whole ride can tell which part is off.
+    pushed = np.asarray(track.pushed.any(axis=1))[-last.time.size :]
+    # Nobody brakes and turns all the time: then it is the suspension that is not understood.
+    calm = float(np.mean(pushed)) < MOSTLY_CALM
     check = (
         check_suspension(samples, ride, average)
         if restless
-        else check_suspension(last, ride, alpha)
+        else check_suspension(last, ride, alpha, pushed if calm else None)
     )
     doubts: list[str] = []
     if check is not None and check.off.any():

@@ -37,6 +37,9 @@ OUTPUTS: Final = ("vertical_velocity", "roll_rate", "pitch_rate")
 SETTLING: Final = 6.0
 """Time on the road before the recording begins: ten periods of the body [s]."""
 
+ONSET: Final = 0.4
+"""Time in which a manoeuvre begins and ends [s]: a brake's rise and a quick turn of the wheel."""
+
 _LONGEST_STEP: Final = 5e-4
 """Step of the simulation at most [s]: the shortest wave of a road lasts 25 at 100 km/h."""
 
@@ -156,6 +159,9 @@ class RideScenario:
         of ``vehicle`` times the factor [s], [-]
     zero_mass : sprung mass with which the travel sensors read zero at rest [kg]; None
         where they read zero at the equilibrium of every load, as in the paper
+    manoeuvres : begin, end, forward and rightward acceleration of braking, starting and
+        turning, each reached within `ONSET` [s], [m/s^2]
+    height : of the sprung mass's centre above the road, on which they act [m]
     shake : standard deviation of a random acceleration of every degree of freedom,
         held over a step [m/s^2], [rad/s^2]
     sensors : what is recorded
@@ -168,6 +174,8 @@ class RideScenario:
     duration: float = 60.0
     changes: tuple[tuple[float, float], ...] = ()
     zero_mass: float | None = None
+    manoeuvres: tuple[tuple[float, float, float, float], ...] = ()
+    height: float = 1.2
     shake: float = 0.0
     sensors: RideSensors = field(default_factory=RideSensors)
     seed: int = 1
@@ -220,19 +228,22 @@ class SimulatedRide:
         write_drive(self.drive, folder, format, truth=columns)
 
 
-def system(vehicle: RideVehicle, zero_mass: float | None) -> tuple[Floats, Floats]:
+def system(
+    vehicle: RideVehicle, zero_mass: float | None, height: float = 0.0
+) -> tuple[Floats, Floats]:
     """State space of the vehicle on a road.
 
     Parameters
     ----------
     vehicle
-    zero_mass : see `RideScenario`
+    zero_mass, height : see `RideScenario`
 
     Returns
     -------
     a : (14, 14) of the state (heave, roll, pitch, two axles' heave, two axles' roll, and
         their rates)
-    b : (14, 5) of the road under the four wheels, and of a constant one for the weight
+    b : (14, 7) of the road under the four wheels, of a constant one for the weight, and of
+        forward and rightward acceleration
 
     References
     ----------
@@ -250,10 +261,14 @@ def system(vehicle: RideVehicle, zero_mass: float | None) -> tuple[Floats, Float
     a[:7, 7:] = np.eye(7)
     a[7:, :7] = -stiffness / mass[:, np.newaxis]
     a[7:, 7:] = -damping / mass[:, np.newaxis]
-    b = np.zeros((14, 5))
+    b = np.zeros((14, 7))
     b[7:, :4] = wheels.T @ tyre / mass[:, np.newaxis]
     if zero_mass is not None:
         b[7, 4] = -GRAVITY * (vehicle.sprung_mass - zero_mass) / vehicle.sprung_mass
+    # Tyres push at the road: the body's nose rises when starting, its left side sinks in a
+    # right-hand turn.
+    b[8, 6] = -vehicle.sprung_mass * height / vehicle.roll_inertia
+    b[9, 5] = vehicle.sprung_mass * height / vehicle.pitch_inertia
     return a, b
 
 
@@ -313,7 +328,8 @@ def simulate_ride(scenario: RideScenario) -> SimulatedRide:
         road_random,
     )
     under_front = scenario.speed * np.arange(rows) * step + sum(truck.axle_distance)
-    heights = np.ones((rows, 5))
+    heights = np.ones((rows, 7))
+    heights[:, 5:] = _pushes(scenario, rows, step, warm)
     for wheel, behind in enumerate((0.0, 0.0, *2 * (sum(truck.axle_distance),))):
         track = road.right if wheel % 2 else road.left
         heights[:, wheel] = track(under_front - behind)
@@ -322,7 +338,7 @@ def simulate_ride(scenario: RideScenario) -> SimulatedRide:
     begins = np.array([t for t, _ in scenario.changes])
     # A change on a sample holds from that sample on, whatever the last bit of its time.
     part = np.searchsorted(begins, time + 0.5 * step, side="right")
-    systems = [system(truck.loaded(f), scenario.zero_mass) for f in factors]
+    systems = [system(truck.loaded(f), scenario.zero_mass, scenario.height) for f in factors]
     steps = [discrete(a, b, step) for a, b in systems]
     push = np.zeros((rows, 14))
     if scenario.shake > 0.0:
@@ -364,6 +380,16 @@ def simulate_ride(scenario: RideScenario) -> SimulatedRide:
         inputs=inputs,
         velocities=velocities,
     )
+
+
+def _pushes(scenario: RideScenario, rows: int, step: float, warm: int) -> Floats:
+    """(n, 2) forward and rightward acceleration [m/s^2]."""
+    time = (np.arange(rows) - warm) * step
+    found = np.zeros((rows, 2))
+    for begin, end, forward, rightward in scenario.manoeuvres:
+        share = np.interp(time, (begin, begin + ONSET, end, end + ONSET), (0.0, 1.0, 1.0, 0.0))
+        found += share[:, np.newaxis] * (forward, rightward)
+    return found
 
 
 def _seen(
