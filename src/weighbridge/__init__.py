@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from weighbridge.estimators import Segment, Status
     from weighbridge.io import read_drive
     from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
+    from weighbridge.pipeline.inertia import Inertia, estimate_inertia
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.pipeline.weighing import Weighing, weigh
     from weighbridge.signals import Drive, DriveInfo, Problem, Signal
@@ -30,6 +31,7 @@ _HOMES = {
     "Drive": "weighbridge.signals",
     "DriveError": "weighbridge.errors",
     "DriveInfo": "weighbridge.signals",
+    "Inertia": "weighbridge.pipeline.inertia",
     "MissingExtraError": "weighbridge.errors",
     "Problem": "weighbridge.signals",
     "Segment": "weighbridge.estimators",
@@ -39,6 +41,7 @@ _HOMES = {
     "Weighing": "weighbridge.pipeline.weighing",
     "WeighbridgeError": "weighbridge.errors",
     "calibrate": "weighbridge.pipeline.calibrating",
+    "estimate_inertia": "weighbridge.pipeline.inertia",
     "inspect_drive": "weighbridge.pipeline.inspection",
     "read_drive": "weighbridge.io",
     "weigh": "weighbridge.pipeline.weighing",
@@ -50,6 +53,7 @@ __all__ = [
     "Drive",
     "DriveError",
     "DriveInfo",
+    "Inertia",
     "MissingExtraError",
     "Problem",
     "Segment",
@@ -59,6 +63,7 @@ __all__ = [
     "WeighbridgeError",
     "Weighing",
     "calibrate",
+    "estimate_inertia",
     "inspect_drive",
     "read_drive",
     "weigh",
