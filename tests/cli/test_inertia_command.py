@@ -27,6 +27,8 @@ def test_ride_is_simulated_and_weighed(weighbridge, ride, tmp_path):
     assert pl.read_parquet(track).height > 1000
     assert report.stat().st_size > 10_000
 
+    assert "weighbridge inertia" in weighbridge("inspect", ride).out
+
     ran = weighbridge("inertia", ride, "--vehicle", EXAMPLE, "--json", "-")
     told = json.loads(ran.out)
     low, high = told["sprung_mass_interval95_kg"]

@@ -25,7 +25,7 @@ def inertia(
     ],
     vehicle: Annotated[
         Path,
-        typer.Option("--vehicle", help="Vehicle file with a [ride] section.", show_default=False),
+        typer.Option("--vehicle", help="Vehicle file with its suspension.", show_default=False),
     ],
     method: Annotated[
         str,

@@ -52,6 +52,8 @@ def inspect(
 def _show(console: Console, found: Inspection, every_way: bool) -> None:
     from rich.markup import escape
 
+    from weighbridge.pipeline.ride_checks import NEEDED as RIDE
+
     drive = found.drive
     console.print(f"[bold]{escape(drive.name)}[/]: {drive.duration / 60.0:.1f} min")
     for line in drive.contents:
@@ -64,7 +66,13 @@ def _show(console: Console, found: Inspection, every_way: bool) -> None:
             console.print(f"  {mark}: {escape(p.text)}", soft_wrap=True)
     else:
         console.print("No problems found")
-    if not any(w.possible and w.torque != "speed" for w in found.ways):
+    weighable = any(w.possible and w.torque != "speed" for w in found.ways)
+    if drive.has(*RIDE):
+        console.print("The ride is there: weighbridge inertia finds sprung mass and inertias")
+        if not weighable:
+            console.print()
+            return
+    if not weighable:
         console.print("No way to weigh by this drive; the nearest one:")
     console.print(_way_table(found, every_way))
     console.print()

@@ -95,7 +95,8 @@ class InertiaSettings:
     drift : relative growth of the inverse parameter's standard deviation over the root
         of time [1/s^0.5]
     offset_std : standard deviation of the constant acceleration that sensor offsets and
-        the weight of the payload seem to cause; 0 for none, as printed [m/s^2], [rad/s^2]
+        the weight of the payload seem to cause; 0 for none, as printed [m/s^2], [rad/s^2].
+        The filters without jumps take the mean off the travel instead
     offset_drift : its growth over the root of time [m/s^2.5], [rad/s^2.5]
     process : spectral density of the fixed process noise of velocities [m^2/s^3] and of
         parameters relative to the vehicle file's [1/s]; for the filters without jumps
@@ -394,6 +395,10 @@ def _run_fixed(
     samples: RideSamples, ride: Ride, method: Method, settings: InertiaSettings
 ) -> InertiaTrack:
     params = fixed_params(ride, samples.period, method, settings)
+    travel = samples.travel
+    if settings.offset_std > 0.0:
+        # These filters know no offset: the travel counts from its mean.
+        travel = travel - np.mean(travel, axis=0)
     start = np.diag((*3 * (100.0,), *3 * (settings.start_std**2,)))
     begin = kalman_bucy.initial_state(  # type: ignore[no-untyped-call]
         np.repeat((0.0, 1.0), 3), start
@@ -401,7 +406,7 @@ def _run_fixed(
     _, mean, std = kalman_bucy.run(
         begin,
         samples.time,
-        samples.travel,
+        travel,
         samples.rate,
         samples.velocity,
         params,

@@ -368,7 +368,12 @@ def _judged(
     begin = changes[-1] if changes else float(samples.time[0])
     last = samples.since(begin)
     alpha = np.asarray(track.alpha[-1])
-    restless = len(changes) > max(3.0, 0.1 * float(track.time[-1] - track.time[0]))
+    pushed = np.asarray(track.pushed.any(axis=1))
+    trouble = ""
+    if len(changes) > max(3.0, 0.1 * float(track.time[-1] - track.time[0])):
+        trouble = f"the load seems to change {len(changes)} times"
+    elif float(np.mean(pushed)) > MOSTLY_CALM:
+        trouble = f"the vehicle seems to brake or turn {100.0 * np.mean(pushed):.0f} % of the time"
     if ride.force_std is None:
         warnings += (
             "the vehicle file does not say how sure its springs and dampers are (force_std): "
@@ -388,14 +393,12 @@ def _judged(
             "200 Hz or more is better",
         )
 
-    # Loads that come and go are no loads: then only the whole ride can tell which part is off.
-    pushed = np.asarray(track.pushed.any(axis=1))[-last.time.size :]
-    # Nobody brakes and turns all the time: then it is the suspension that is not understood.
-    calm = float(np.mean(pushed)) < MOSTLY_CALM
+    # Loads that come and go are no loads, and nobody brakes and turns all the time: then only
+    # the whole ride can tell which part is off.
     check = (
         check_suspension(samples, ride, average)
-        if restless
-        else check_suspension(last, ride, alpha, pushed if calm else None)
+        if trouble
+        else check_suspension(last, ride, alpha, pushed[-last.time.size :])
     )
     doubts: list[str] = []
     if check is not None and check.off.any():
@@ -412,12 +415,9 @@ def _judged(
             "they read zero, or the stiffness is wrong; the interval holds both"
         )
     warnings += tuple(doubts)
-    if restless:
-        doubts.append(
-            f"the load seems to change {len(changes)} times: springs, dampers or sensors are not "
-            "those of the vehicle file"
-        )
-    status, reason = _status(vehicle, track, check, restless, doubts, std)
+    if trouble:
+        trouble += ": springs, dampers or sensors are not those of the vehicle file"
+    status, reason = _status(vehicle, track, check, trouble, doubts, std)
     result = Inertia(
         drive=drive,
         vehicle=vehicle,
@@ -460,7 +460,7 @@ def _status(
     vehicle: Vehicle,
     track: InertiaTrack,
     check: SuspensionCheck | None,
-    restless: bool,
+    trouble: str,
     doubts: list[str],
     std: Floats,
 ) -> tuple[Status, str]:
@@ -480,8 +480,8 @@ def _status(
             f"{100.0 * check.misfit[k]:.0f} % more of the {('heave', 'roll', 'pitch')[k]}; "
             f"{_told(check)}"
         )
-    if restless:
-        return Status.INCONSISTENT, doubts[-1]
+    if trouble:
+        return Status.INCONSISTENT, trouble
     if not by_filter <= TOO_WIDE:
         return Status.NOT_EXCITED, (
             f"the ride says {mass:.0f} kg give or take {100.0 * by_filter:.0f} %, which is no "
