@@ -16,6 +16,8 @@ PARAMS = mass_ekf.MassEkfParams(
     grade_walk=1e-5,
     mass_walk=25.0,
     load_walk=1e4,
+    offset_var=1e-5,
+    offset_walk=1e-8,
     gate=5.0,
     pause=0.8,
     lightest=1500.0,
@@ -75,29 +77,25 @@ def test_derivatives_are_those_of_differences():
         assert derivatives[k] == pytest.approx(slope, rel=1e-6)
 
 
-def covariance(s):
-    return np.array([[s.p_vv, s.p_va, s.p_vm], [s.p_va, s.p_aa, s.p_am], [s.p_vm, s.p_am, s.p_mm]])
-
-
 def test_equals_the_filter_in_matrices():
     table = drive(1, n=1500)
-    state = mass_ekf.initial_state(9000.0, 1000.0**2, mass_ekf.row_at(table, 0))
-    x, cov = np.array([0.0, 0.0, 9000.0]), covariance(state)
-    measures = np.eye(3)[:2]
+    state = mass_ekf.initial_state(9000.0, 1000.0**2, mass_ekf.row_at(table, 0), PARAMS)
+    x, cov = np.array([0.0, 0.0, 9000.0, 0.0]), state.cov
+    measures = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
     for k in range(1, 1500):
         state, innovation, taken = mass_ekf.step(state, mass_ekf.row_at(table, k), PARAMS)
         assert taken
         span = table.time[k] - table.time[k - 1]
         mean = [0.5 * (c[k - 1] + c[k]) for c in table[:5]]
         row = mass_ekf.Row(*mean, 0.0, 0.0, True, False)
-        accel, *slopes = mass_ekf.acceleration(*x, row, PARAMS)
-        transition = np.eye(3)
-        transition[0] += span * np.array(slopes)
-        x = x + span * np.array([accel, 0.0, 0.0])
-        noise = span * np.array([PARAMS.accel_walk, 0.0, PARAMS.mass_walk])
-        # The grade walks before the speed is predicted, so its walk passes through.
-        cov = cov + np.diag([0.0, span * PARAMS.grade_walk, noise[2]])
-        cov = transition @ cov @ transition.T + np.diag([noise[0], 0.0, 0.0])
+        accel, *slopes = mass_ekf.acceleration(*x[:3], row, PARAMS)
+        transition = np.eye(4)
+        transition[0, :3] += span * np.array(slopes)
+        x = x + span * np.array([accel, 0.0, 0.0, 0.0])
+        # What walks does so before the speed is predicted, so its walk passes through.
+        cov = cov + span * np.diag([0.0, PARAMS.grade_walk, PARAMS.mass_walk, PARAMS.offset_walk])
+        cov = transition @ cov @ transition.T
+        cov[0, 0] += span * PARAMS.accel_walk
         total = measures @ cov @ measures.T + np.diag(
             [PARAMS.speed_density / span, PARAMS.grade_density / span]
         )
@@ -106,15 +104,17 @@ def test_equals_the_filter_in_matrices():
         gain = cov @ measures.T @ np.linalg.inv(total)
         x = x + gain @ residual
         cov = cov - gain @ measures @ cov
-        assert_allclose([state.speed, state.grade, state.mass], x, rtol=1e-6, atol=1e-9)
-    assert_allclose(covariance(state), cov, rtol=1e-4, atol=1e-12)
+        assert_allclose(state.x, x, rtol=1e-6, atol=1e-9)
+    assert_allclose(state.cov, cov, rtol=1e-4, atol=1e-12)
 
 
 def test_finds_the_mass_of_a_known_drive_and_how_sure_it_is():
     errors, spreads = [], []
     for seed in range(40):
         table = drive(100 + seed, n=2500)
-        start = mass_ekf.initial_state(MASS * 0.85, (0.15 * MASS) ** 2, mass_ekf.row_at(table, 0))
+        start = mass_ekf.initial_state(
+            MASS * 0.85, (0.15 * MASS) ** 2, mass_ekf.row_at(table, 0), PARAMS
+        )
         # The noise of the rows is white: 0.05 m/s and 0.02 rad at 50 Hz.
         known = PARAMS._replace(
             speed_density=0.05**2 * 0.02,
@@ -123,18 +123,31 @@ def test_finds_the_mass_of_a_known_drive_and_how_sure_it_is():
             mass_walk=0.0,
         )
         state = mass_ekf.run(start, table, 0, known)[0]
-        errors.append(state.mass - MASS)
-        spreads.append(np.sqrt(state.p_mm))
+        errors.append(state.x[2] - MASS)
+        spreads.append(np.sqrt(state.cov[2, 2]))
     scaled = np.array(errors) / np.array(spreads)
     assert np.mean(spreads) < 0.01 * MASS
     # Two-sided 99.9 % bounds of chi2(40) / 40.
     assert 0.39 < np.mean(scaled**2) < 2.0
 
 
+def test_tells_the_offset_of_the_measured_grade_from_the_grade():
+    table = drive(9, n=6000)
+    table.grade[:] += 0.01
+    start = mass_ekf.initial_state(MASS, (0.2 * MASS) ** 2, mass_ekf.row_at(table, 0), PARAMS)
+    known = PARAMS._replace(accel_walk=1e-6, offset_var=1e-4, mass_walk=0.0)
+    state = mass_ekf.run(start, table, 0, known)[0]
+    assert state.x[3] == pytest.approx(0.01, abs=0.001)
+    assert state.x[2] == pytest.approx(MASS, rel=0.02)
+    fixed = known._replace(offset_var=0.0, offset_walk=0.0)
+    start = mass_ekf.initial_state(MASS, (0.2 * MASS) ** 2, mass_ekf.row_at(table, 0), fixed)
+    assert abs(mass_ekf.run(start, table, 0, fixed)[0].x[2] / MASS - 1.0) > 0.03
+
+
 def test_a_brake_that_nobody_tells_is_gated_and_one_that_is_told_costs_nothing():
     table = drive(3, noise=0.0)
     table.speed[3000:] -= 4.0
-    start = mass_ekf.initial_state(MASS, 500.0**2, mass_ekf.row_at(table, 0))
+    start = mass_ekf.initial_state(MASS, 500.0**2, mass_ekf.row_at(table, 0), PARAMS)
     _, mass, _, innovation, taken = mass_ekf.run(start, table, 0, PARAMS)
     assert not taken[3000]
     assert abs(innovation[3000]) > PARAMS.gate
@@ -153,17 +166,17 @@ def test_missing_rows_leave_finite_numbers():
     table.traction[1000:1100] = np.nan
     table.driven[500:700] = False
     table.driven[1000:1100] = False
-    begin = mass_ekf.initial_state(0.8 * MASS, (0.2 * MASS) ** 2, mass_ekf.row_at(table, 0))
+    begin = mass_ekf.initial_state(0.8 * MASS, (0.2 * MASS) ** 2, mass_ekf.row_at(table, 0), PARAMS)
     mass = mass_ekf.run(begin, table, 0, PARAMS)[1]
     assert np.ptp(mass[995:1105]) < 100.0
     keep = np.ones(table.time.size, bool)
     keep[2000:2300] = False
     table = mass_ekf.Columns(*(c[keep] for c in table))
-    start = mass_ekf.initial_state(0.8 * MASS, (0.2 * MASS) ** 2, mass_ekf.row_at(table, 0))
+    start = mass_ekf.initial_state(0.8 * MASS, (0.2 * MASS) ** 2, mass_ekf.row_at(table, 0), PARAMS)
     state, mass, var, *_ = mass_ekf.run(start, table, 0, PARAMS)
     assert np.isfinite(mass).all()
     assert (var > 0.0).all()
-    assert state.mass == pytest.approx(MASS, rel=0.02)
+    assert state.x[2] == pytest.approx(MASS, rel=0.02)
 
 
 def test_a_change_of_load_at_a_stop_is_followed():
@@ -188,7 +201,7 @@ def test_a_change_of_load_at_a_stop_is_followed():
         time=time, speed=speed, traction=traction, drag=drag, rotating=rotating,
         driven=driven, standing=standing,
     )  # fmt: skip
-    start = mass_ekf.initial_state(MASS, (0.1 * MASS) ** 2, mass_ekf.row_at(table, 0))
+    start = mass_ekf.initial_state(MASS, (0.1 * MASS) ** 2, mass_ekf.row_at(table, 0), PARAMS)
     mass = mass_ekf.run(start, table, 0, params)[1]
     assert mass[n - 1] == pytest.approx(MASS, rel=0.02)
     assert mass[-1] == pytest.approx(0.8 * MASS, rel=0.02)
@@ -196,7 +209,9 @@ def test_a_change_of_load_at_a_stop_is_followed():
 
 def hybrid_params():
     return hybrid_mass.HybridParams(
-        rls=robust_rls.RobustRlsParams(0.5, 0.02, 0.8, 0.95, 20.0, 1.5, 100.0, 10, 1.0),
+        rls=robust_rls.RobustRlsParams(
+            0.5, 0.02, 0.8, 0.95, 20.0, 1.5, 100.0, 10, 0.03, 0.03, 10.0
+        ),
         ekf=PARAMS,
         first_information=2.0,
         start_std=0.1,
@@ -221,19 +236,19 @@ def mixed(seed):
 
 def test_batch_equals_sample_by_sample_to_the_last_bit():
     table, phi, y = mixed(7)
-    start = mass_ekf.initial_state(9000.0, 1e6, mass_ekf.row_at(table, 0))
+    start = mass_ekf.initial_state(9000.0, 1e6, mass_ekf.row_at(table, 0), PARAMS)
     last, mass, var, innovation, taken = mass_ekf.run(start, table, 0, PARAMS)
     state = start
     for k in range(1, table.time.size):
         state, seen, passed = mass_ekf.step(state, mass_ekf.row_at(table, k), PARAMS)
-        assert state.mass == mass[k]
-        assert state.p_mm == var[k]
+        assert state.x[2] == mass[k]
+        assert state.cov[2, 2] == var[k]
         assert np.array_equal(seen, innovation[k], equal_nan=True)
         assert (passed and np.isfinite(seen)) == taken[k]
-    assert np.array_equal(covariance(state), covariance(last))
+    assert np.array_equal(state.cov, last.cov)
 
     params = hybrid_params()
-    begin = hybrid_mass.initial_state(robust_rls.initial_state(0.0, 1e-9))
+    begin = hybrid_mass.initial_state(robust_rls.initial_state(0.0, 1e-9), params)
     last, *tracks = hybrid_mass.run(begin, table, phi, y, params)
     mass, var, share, rls_mass, ekf_mass, *means, taken = tracks
     state = begin
@@ -246,21 +261,21 @@ def test_batch_equals_sample_by_sample_to_the_last_bit():
         )
         assert np.array_equal(told, [m[k] for m in means], equal_nan=True)
         assert passed == taken[k]
-    assert state.ekf.mass == ekf_mass[-1]
-    assert state.rls.theta == rls_mass[-1]
+    assert state.ekf.x[2] == ekf_mass[-1]
+    assert state.rls.mass == rls_mass[-1]
 
 
 def test_the_blend_is_of_the_two_filters_run_alone():
     table, phi, y = mixed(8)
     params = hybrid_params()
-    begin = hybrid_mass.initial_state(robust_rls.initial_state(0.0, 1e-9))
+    begin = hybrid_mass.initial_state(robust_rls.initial_state(0.0, 1e-9), params)
     _, mass, _, share, rls_mass, ekf_mass, *_ = hybrid_mass.run(begin, table, phi, y, params)
     _, theta, _, information, *_ = robust_rls.run(
         robust_rls.initial_state(0.0, 1e-9), table.time, phi, y, table.driven, params.rls
     )
     k = int(np.flatnonzero(information >= params.first_information)[0])
     start = mass_ekf.initial_state(
-        theta[k], (params.start_std * theta[k]) ** 2, mass_ekf.row_at(table, k)
+        theta[k], (params.start_std * theta[k]) ** 2, mass_ekf.row_at(table, k), params.ekf
     )
     alone = mass_ekf.run(start, table, k, params.ekf)[1]
     assert np.array_equal(ekf_mass, alone, equal_nan=True)

@@ -51,10 +51,10 @@ class HybridState(NamedTuple):
     var: float
 
 
-def initial_state(rls):
+def initial_state(rls, params):
     """Start from a state of the least squares; the Kalman filter follows later."""
     nothing = mass_ekf.Row(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, False)
-    ekf = mass_ekf.initial_state(0.0, 0.0, nothing)
+    ekf = mass_ekf.initial_state(0.0, 0.0, nothing, params.ekf)
     return HybridState(rls, ekf, False, 1.0, np.nan, np.nan)
 
 
@@ -101,15 +101,17 @@ def step(state, row, phi, y, params):
         taken = passed and np.isfinite(innovation)
     elif rls.information >= params.first_information:
         started = True
-        spread = params.start_std * rls.theta
-        ekf = mass_ekf.initial_state(rls.theta, spread * spread, row)
+        spread = params.start_std * rls.mass
+        ekf = mass_ekf.initial_state(rls.mass, spread * spread, row, params.ekf)
     share, mass, var = state.share, state.mass, state.var
     if started:
         if np.isfinite(row.speed):
             share = share_of_rls(row.speed, params.blend_speed, params.blend_width)
-        mass = share * rls.theta + (1.0 - share) * ekf.mass
+        mass = share * rls.mass + (1.0 - share) * ekf.x[mass_ekf.MASS]
         # Both see the same rows, so their errors are taken as one.
-        std = share * np.sqrt(robust_rls.variance(rls)) + (1.0 - share) * np.sqrt(ekf.p_mm)
+        std = share * np.sqrt(robust_rls.variance(rls, params.rls)) + (1.0 - share) * np.sqrt(
+            ekf.cov[mass_ekf.MASS, mass_ekf.MASS]
+        )
         var = std * std
     return HybridState(rls, ekf, started, share, mass, var), mean_phi, mean_y, weight, taken
 
@@ -154,6 +156,6 @@ def run(state, columns, phi, y, params):
         )
         mass[k], var[k], share[k] = state.mass, state.var, state.share
         if state.started:
-            rls_mass[k] = state.rls.theta
-            ekf_mass[k] = state.ekf.mass
+            rls_mass[k] = state.rls.mass
+            ekf_mass[k] = state.ekf.x[mass_ekf.MASS]
     return state, mass, var, share, rls_mass, ekf_mass, mean_phi, mean_y, weight, taken

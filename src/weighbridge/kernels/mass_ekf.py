@@ -1,4 +1,4 @@
-"""Extended Kalman filter of speed, grade and mass."""
+"""Extended Kalman filter of speed, grade, mass and the offset of the measured grade."""
 
 from typing import NamedTuple
 
@@ -20,6 +20,8 @@ class MassEkfParams(NamedTuple):
     accel_walk : of the acceleration that the model does not know [m^2/s^3]
     grade_walk : of the road's slope [rad^2/s]
     mass_walk, load_walk : of the mass while driving and while standing [kg^2/s]
+    offset_var, offset_walk : of the offset of the measured grade at the start [rad^2]
+        and its walk [rad^2/s]
     gate : speed innovations beyond this many standard deviations are left out [-]
     pause : rows further apart are not connected [s]
     lightest, heaviest : bounds of the mass [kg]
@@ -34,6 +36,8 @@ class MassEkfParams(NamedTuple):
     grade_walk: float
     mass_walk: float
     load_walk: float
+    offset_var: float
+    offset_walk: float
     gate: float
     pause: float
     lightest: float
@@ -71,20 +75,13 @@ class MassEkfState(NamedTuple):
 
     Attributes
     ----------
-    speed, grade, mass : [m/s], [rad], [kg]
-    p_vv, p_va, p_vm, p_aa, p_am, p_mm : covariance of speed, grade a and mass
+    x : (4,) speed [m/s], grade [rad], mass [kg], offset of the measured grade [rad]
+    cov : (4, 4)
     row : the last one
     """
 
-    speed: float
-    grade: float
-    mass: float
-    p_vv: float
-    p_va: float
-    p_vm: float
-    p_aa: float
-    p_am: float
-    p_mm: float
+    x: np.ndarray
+    cov: np.ndarray
     row: Row
 
 
@@ -92,13 +89,23 @@ UNKNOWN_SPEED_VAR = 1e4
 UNKNOWN_GRADE_VAR = 4e-3
 """Variances before anything is measured [(m/s)^2], [rad^2]; a road is within 8 % or so."""
 
+SPEED, GRADE, MASS, OFFSET = range(4)
+"""Places in the state."""
+
+SHORTEST = 1e-3
+"""Rows nearer than this count as so far apart, in the noise of a row [s]."""
+
 
 @kernel
-def initial_state(mass, mass_var, row):
+def initial_state(mass, mass_var, row, params):
     """Start at a row, with a mass [kg] and its variance [kg^2]; the rest is unknown."""
-    return MassEkfState(
-        0.0, 0.0, mass, UNKNOWN_SPEED_VAR, 0.0, 0.0, UNKNOWN_GRADE_VAR, 0.0, mass_var, row
-    )
+    x = np.array([0.0, 0.0, mass, 0.0])
+    cov = np.zeros((4, 4))
+    cov[SPEED, SPEED] = UNKNOWN_SPEED_VAR
+    cov[GRADE, GRADE] = UNKNOWN_GRADE_VAR
+    cov[MASS, MASS] = mass_var
+    cov[OFFSET, OFFSET] = params.offset_var
+    return MassEkfState(x, cov, row)
 
 
 @kernel
@@ -140,6 +147,36 @@ def acceleration(speed, grade, mass, row, params):
 
 
 @kernel
+def fold(x, cov, part, measured, noise):
+    """Fold one scalar measurement in, in place, by Joseph's form.
+
+    Parameters
+    ----------
+    x, cov : (n,), (n, n) float64
+    part : (n,) float64
+        The measurement is ``part @ x`` and noise.
+    measured, noise : float
+        Value and variance of the noise.
+    """
+    n = x.size
+    shared = cov @ part
+    total = part @ shared + noise
+    residual = measured - part @ x
+    rest = np.eye(n)
+    for i in range(n):
+        gain = shared[i] / total
+        x[i] += gain * residual
+        for j in range(n):
+            rest[i, j] -= gain * part[j]
+    updated = rest @ cov @ rest.T
+    for i in range(n):
+        for j in range(n):
+            # Both halves the same, so that rounding leaves the matrix symmetric.
+            mean = 0.5 * (updated[i, j] + updated[j, i])
+            cov[i, j] = mean + shared[i] * shared[j] * noise / (total * total)
+
+
+@kernel
 def step(state, row, params):
     """Predict to a row and fold in its speed and grade.
 
@@ -165,15 +202,15 @@ def step(state, row, params):
 
     References
     ----------
-    Du et al. 2025, eqs. 21-33; sequential scalar updates in Joseph's form.
+    Du et al. 2025, eqs. 21-33, with a fourth state for the offset of the
+    measured grade.
     """
-    v, a, m = state.speed, state.grade, state.mass
-    p_vv, p_va, p_vm = state.p_vv, state.p_va, state.p_vm
-    p_aa, p_am, p_mm = state.p_aa, state.p_am, state.p_mm
-    before = state.row
+    x, cov, before = state.x.copy(), state.cov.copy(), state.row
     span = row.time - before.time
-    p_aa += params.grade_walk * span
-    p_mm += (params.load_walk if row.standing else params.mass_walk) * span
+    apart = max(span, SHORTEST)
+    cov[GRADE, GRADE] += params.grade_walk * span
+    cov[MASS, MASS] += (params.load_walk if row.standing else params.mass_walk) * span
+    cov[OFFSET, OFFSET] += params.offset_walk * span
 
     connected = row.driven and before.driven and span <= params.pause and np.isfinite(row.speed)
     innovation = np.nan
@@ -190,61 +227,32 @@ def step(state, row, params):
             True,
             False,
         )
-        accel, by_speed, by_grade, by_mass = acceleration(v, a, m, held, params)
-        v += accel * span
-        f_v, f_a, f_m = 1.0 + by_speed * span, by_grade * span, by_mass * span
-        c_v = f_v * p_vv + f_a * p_va + f_m * p_vm
-        c_a = f_v * p_va + f_a * p_aa + f_m * p_am
-        c_m = f_v * p_vm + f_a * p_am + f_m * p_mm
-        p_vv = f_v * c_v + f_a * c_a + f_m * c_m + params.accel_walk * span
-        p_va, p_vm = c_a, c_m
-
-        noise = params.speed_density / span
-        total = p_vv + noise
-        difference = row.speed - v
-        innovation = difference / np.sqrt(total)
+        accel, by_speed, by_grade, by_mass = acceleration(x[SPEED], x[GRADE], x[MASS], held, params)
+        x[SPEED] += accel * span
+        # Only the first row of the transition differs from the unit matrix.
+        slope = np.array([1.0 + by_speed * span, by_grade * span, by_mass * span, 0.0])
+        first = slope @ cov
+        cov[SPEED, SPEED] = first @ slope + params.accel_walk * span
+        for i in range(1, 4):
+            cov[SPEED, i] = first[i]
+            cov[i, SPEED] = first[i]
+        total = cov[SPEED, SPEED] + params.speed_density / apart
+        innovation = (row.speed - x[SPEED]) / np.sqrt(total)
         taken = abs(innovation) <= params.gate
         if taken:
-            k_v, k_a, k_m = p_vv / total, p_va / total, p_vm / total
-            v += k_v * difference
-            a += k_a * difference
-            m += k_m * difference
-            # Joseph's form for h = (1, 0, 0).
-            rest = 1.0 - k_v
-            j_vv = rest * rest * p_vv + k_v * k_v * noise
-            j_va = rest * (p_va - k_a * p_vv) + k_v * k_a * noise
-            j_vm = rest * (p_vm - k_m * p_vv) + k_v * k_m * noise
-            j_aa = p_aa - 2.0 * k_a * p_va + k_a * k_a * total
-            j_am = p_am - k_a * p_vm - k_m * p_va + k_a * k_m * total
-            j_mm = p_mm - 2.0 * k_m * p_vm + k_m * k_m * total
-            p_vv, p_va, p_vm, p_aa, p_am, p_mm = j_vv, j_va, j_vm, j_aa, j_am, j_mm
+            fold(x, cov, np.array([1.0, 0.0, 0.0, 0.0]), row.speed, params.speed_density / apart)
     if not connected or not taken:
-        p_va, p_vm = 0.0, 0.0
+        cov[SPEED, :] = 0.0
+        cov[:, SPEED] = 0.0
         if np.isfinite(row.speed):
-            v = row.speed
-            p_vv = params.speed_density / max(span, 1e-3)
+            x[SPEED] = row.speed
+            cov[SPEED, SPEED] = params.speed_density / apart
         else:
-            p_vv = UNKNOWN_SPEED_VAR
-
+            cov[SPEED, SPEED] = UNKNOWN_SPEED_VAR
     if np.isfinite(row.grade):
-        noise = params.grade_density / max(span, 1e-3)
-        total = p_aa + noise
-        difference = row.grade - a
-        k_v, k_a, k_m = p_va / total, p_aa / total, p_am / total
-        v += k_v * difference
-        a += k_a * difference
-        m += k_m * difference
-        rest = 1.0 - k_a
-        j_aa = rest * rest * p_aa + k_a * k_a * noise
-        j_va = rest * (p_va - k_v * p_aa) + k_a * k_v * noise
-        j_am = rest * (p_am - k_m * p_aa) + k_a * k_m * noise
-        j_vv = p_vv - 2.0 * k_v * p_va + k_v * k_v * total
-        j_vm = p_vm - k_v * p_am - k_m * p_va + k_v * k_m * total
-        j_mm = p_mm - 2.0 * k_m * p_am + k_m * k_m * total
-        p_vv, p_va, p_vm, p_aa, p_am, p_mm = j_vv, j_va, j_vm, j_aa, j_am, j_mm
-
-    m = min(max(m, params.lightest), params.heaviest)
-    return MassEkfState(v, a, m, p_vv, p_va, p_vm, p_aa, p_am, p_mm, row), innovation, taken
+        fold(x, cov, np.array([0.0, 1.0, 0.0, 1.0]), row.grade, params.grade_density / apart)
+    x[MASS] = min(max(x[MASS], params.lightest), params.heaviest)
+    return MassEkfState(x, cov, row), innovation, taken
 
 
 @kernel
@@ -306,11 +314,11 @@ def run(state, columns, begin, params):
     innovation = np.full(n, np.nan)
     taken = np.zeros(n, dtype=np.bool_)
     if begin < n:
-        mass[begin] = state.mass
-        mass_var[begin] = state.p_mm
+        mass[begin] = state.x[MASS]
+        mass_var[begin] = state.cov[MASS, MASS]
     for k in range(begin + 1, n):
         state, innovation[k], passed = step(state, row_at(columns, k), params)
         taken[k] = passed and np.isfinite(innovation[k])
-        mass[k] = state.mass
-        mass_var[k] = state.p_mm
+        mass[k] = state.x[MASS]
+        mass_var[k] = state.cov[MASS, MASS]
     return state, mass, mass_var, innovation, taken

@@ -1,4 +1,4 @@
-"""Recursive least squares of one parameter, robust against outliers, with forgetting."""
+"""Recursive least squares of mass and offset, robust against outliers, with forgetting."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,10 @@ class RobustRlsParams(NamedTuple):
     threshold : Huber's, in standard deviations of the innovation [-]
     scale_windows : windows over which the innovation variance is averaged [-]
     settle_windows : windows before the threshold holds
-    noise_floor : standard deviation the innovations have at least [unit of y]
+    offset_std : standard deviation of the offset over the mass before the drive
+        has told [m/s^2]; 0 for none, as the paper
+    noise_floor : standard deviation over the mass that a window has at least [m/s^2]
+    dependence : windows whose error is the same
     """
 
     window: float
@@ -35,7 +38,9 @@ class RobustRlsParams(NamedTuple):
     threshold: float
     scale_windows: float
     settle_windows: int
+    offset_std: float
     noise_floor: float
+    dependence: float
 
 
 class RobustRlsState(NamedTuple):
@@ -43,17 +48,22 @@ class RobustRlsState(NamedTuple):
 
     Attributes
     ----------
-    theta : the parameter
+    mass : the parameter theta of the paper [kg]
+    offset : of the force: rolling resistance, zero of the accelerometer [N]
     information : weighted sum of squared regressors, one over the paper's P
-    noise_var : running variance of the innovations [unit of y squared]
+    sum_weight, sum_weighted : weighted number of windows and sum of regressors
+    noise_var : running variance of the innovations [N^2]
     windows : windows folded in so far
     count : rows in the open window
     begin, last : first row of the open window, last row seen [s]
     sum_phi, sum_y : over the open window
     """
 
-    theta: float
+    mass: float
+    offset: float
     information: float
+    sum_weight: float
+    sum_weighted: float
     noise_var: float
     windows: int
     count: int
@@ -63,14 +73,42 @@ class RobustRlsState(NamedTuple):
     sum_y: float
 
 
-def initial_state(theta, information):
-    """Start from ``theta`` with an ``information`` > 0, small for none."""
-    return RobustRlsState(float(theta), float(information), 0.0, 0, 0, 0.0, -np.inf, 0.0, 0.0)
+def initial_state(mass, information):
+    """Start from ``mass`` with an ``information`` > 0, small for none."""
+    return RobustRlsState(
+        float(mass), 0.0, float(information), 0.0, 0.0, 0.0, 0, 0, 0.0, -np.inf, 0.0, 0.0
+    )
+
+
+@kernel
+def floor_var(state, params):
+    """Variance of a window, that at the floor at least [N^2]."""
+    least = params.noise_floor * state.mass
+    return max(state.noise_var, least * least, 1.0)
+
+
+@kernel
+def held(state, params):
+    """Weight of the prior on the offset, in windows; 0 where there is no offset."""
+    if params.offset_std <= 0.0:
+        return 0.0
+    # A mass of next to nothing would hold the offset without end.
+    prior = params.offset_std * max(abs(state.mass), 1.0)
+    return params.dependence * floor_var(state, params) / (prior * prior)
+
+
+@kernel
+def mass_information(state, params):
+    """What is known of the mass with the offset unknown, in squared regressors."""
+    if params.offset_std <= 0.0:
+        return state.information
+    known = state.sum_weight + held(state, params)
+    return state.information - state.sum_weighted * state.sum_weighted / known
 
 
 @kernel
 def fold(state, phi, y, params):
-    """Fold the mean row ``y = phi * theta + noise`` into the estimate.
+    """Fold the mean row ``y = phi * mass + offset + noise`` into the estimate.
 
     Returns
     -------
@@ -84,12 +122,14 @@ def fold(state, phi, y, params):
     its inverse beyond. Here it enters the covariance too, as in Huber and
     Ronchetti, Robust Statistics, 2nd ed., 2009, ch. 7, and the threshold counts
     in standard deviations of the innovation, that of the estimate included: a
-    start from nothing is no outlier.
+    start from nothing is no outlier. The mass alone is forgotten, not the
+    offset (a forgetting factor for each: Vahidi et al., Vehicle System Dynamics
+    43, 2005).
     """
-    innovation = y - phi * state.theta
-    spread = 1.0 + phi * phi / state.information
+    innovation = y - phi * state.mass - state.offset
+    spread = 1.0 + phi * phi / mass_information(state, params)
     size = abs(innovation)
-    bound = params.threshold * np.sqrt(max(state.noise_var, params.noise_floor**2) * spread)
+    bound = params.threshold * np.sqrt(floor_var(state, params) * spread)
     settled = state.windows >= params.settle_windows
     weight = 1.0
     if settled and size > bound:
@@ -103,16 +143,27 @@ def fold(state, phi, y, params):
         share = 1.0 / min(float(state.windows), params.scale_windows)
         noise_var = noise_var + share * (seen * seen / spread / correction - noise_var)
 
-    kept = max(
-        params.forgetting * state.information,
-        min(state.information, params.kept_information),
-    )
-    information = kept + weight * phi * phi
-    theta = state.theta + weight * phi * innovation / information
+    keep = params.forgetting
+    if keep * state.information < params.kept_information:
+        keep = min(1.0, params.kept_information / state.information)
+    information = keep * state.information + weight * phi * phi
+    sum_weighted = np.sqrt(keep) * state.sum_weighted + weight * phi
+    sum_weight = state.sum_weight + weight
+    mass, offset = state.mass, state.offset
+    if params.offset_std <= 0.0:
+        mass += weight * phi * innovation / information
+    else:
+        known = sum_weight + held(state, params)
+        determinant = information * known - sum_weighted * sum_weighted
+        mass += weight * innovation * (known * phi - sum_weighted) / determinant
+        offset += weight * innovation * (information - sum_weighted * phi) / determinant
     return (
         RobustRlsState(
-            theta,
+            mass,
+            offset,
             information,
+            sum_weight,
+            sum_weighted,
             noise_var,
             state.windows + 1,
             state.count,
@@ -165,8 +216,11 @@ def step(state, time, phi, y, valid, params):
         mean_phi, mean_y = sum_phi / count, sum_y / count
         count, sum_phi, sum_y = 0, 0.0, 0.0
     state = RobustRlsState(
-        state.theta,
+        state.mass,
+        state.offset,
         state.information,
+        state.sum_weight,
+        state.sum_weighted,
         state.noise_var,
         state.windows,
         count,
@@ -181,9 +235,9 @@ def step(state, time, phi, y, valid, params):
 
 
 @kernel
-def variance(state):
-    """Variance of the parameter for independent windows."""
-    return state.noise_var / state.information
+def variance(state, params):
+    """Variance of the mass, with the windows' dependence in it [kg^2]."""
+    return params.dependence * floor_var(state, params) / mass_information(state, params)
 
 
 @kernel
@@ -201,12 +255,13 @@ def run(state, time, phi, y, valid, params):
     -------
     state : RobustRlsState
         After the last row.
-    theta, var, information : (m,) float64
-        Estimate, its variance and the information behind it after each row.
+    mass, var, information : (m,) float64
+        Estimate, its variance and the weighted sum of squared regressors after
+        each row.
     mean_phi, mean_y, weight : (m,) float64
         Of the window folded in at each row; NaN where none was.
     """
-    theta = np.empty(time.size)
+    mass = np.empty(time.size)
     var = np.empty(time.size)
     information = np.empty(time.size)
     mean_phi = np.empty(time.size)
@@ -216,7 +271,7 @@ def run(state, time, phi, y, valid, params):
         state, mean_phi[k], mean_y[k], weight[k] = step(
             state, time[k], phi[k], y[k], valid[k], params
         )
-        theta[k] = state.theta
-        var[k] = variance(state)
+        mass[k] = state.mass
+        var[k] = variance(state, params)
         information[k] = state.information
-    return state, theta, var, information, mean_phi, mean_y, weight
+    return state, mass, var, information, mean_phi, mean_y, weight

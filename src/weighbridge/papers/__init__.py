@@ -9,6 +9,7 @@ from typing import Final
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
 
 PAPERS: Final[dict[str, str]] = {
+    "du2025": "weighbridge.papers.du2025",
     "galvao": "weighbridge.papers.galvao",
     "jensen2022": "weighbridge.papers.jensen2022",
     "nguyen2024": "weighbridge.papers.nguyen2024",

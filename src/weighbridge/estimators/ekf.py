@@ -1,0 +1,188 @@
+"""Extended Kalman filter of speed, grade and mass (Du et al. 2025, sec. 3.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.balance import ForceBalance, Reason
+from weighbridge.balance.averaging import PAUSE
+from weighbridge.balance.force_balance import SLOWEST, TYPICAL_MASS
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError
+from weighbridge.estimators import robust_rls
+from weighbridge.estimators.track import MassTrack
+from weighbridge.kernels import mass_ekf as kernel
+from weighbridge.kernels import robust_rls as rls_kernel
+from weighbridge.signals import Bools
+from weighbridge.vehicle.model import MASS_RANGE, Vehicle
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EkfSettings:
+    """Settings of the filter; the paper gives none.
+
+    Attributes
+    ----------
+    start : the least squares whose first estimate starts the filter
+    start_std : of the mass it starts from, relative [-]
+    speed_noise : error of the speed that stays for a second [m/s]
+    grade_noise : error of the grade that stays for a second [rad]
+    accel_walk : what unknown forces and torque errors do to the speed in one
+        second, over mass [m/s]
+    grade_walk : change of the road's slope in one second [rad]
+    mass_walk, load_walk : change of the mass in one second, driving and
+        standing, relative [-]
+    grade_offset : of the measured grade, at the start [rad]: zero of the
+        accelerometer, lean of the vehicle
+    offset_walk : change of that offset in one second [rad]
+    gate : speed innovations beyond this many standard deviations are left out [-]
+    """
+
+    start: robust_rls.RobustRlsSettings = field(default_factory=robust_rls.RobustRlsSettings)
+    start_std: float = 0.3
+    speed_noise: float = 0.01
+    grade_noise: float = 0.004
+    accel_walk: float = 0.02
+    grade_walk: float = 0.003
+    mass_walk: float = 0.0005
+    load_walk: float = 0.01
+    grade_offset: float = 0.004
+    offset_walk: float = 1e-4
+    gate: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("start_std", "speed_noise", "grade_noise", "accel_walk", "gate"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ConfigError(f"{name} must be a positive number, got {value}")
+        for name in ("grade_walk", "mass_walk", "load_walk", "grade_offset", "offset_walk"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0.0):
+                raise ConfigError(f"{name} must be zero or positive, got {value}")
+
+
+def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Columns:
+    """Collect what the filter needs of each row."""
+    view = balance.merged
+    return kernel.Columns(
+        time=view.time,
+        traction=view.traction_force,
+        drag=0.5 * view.air_density * vehicle.road_load.drag_area,
+        headwind=view.air_speed - view.speed,
+        rotating=view.rotating_mass,
+        speed=view.speed,
+        grade=view.grade,
+        driven=valid & np.isfinite(view.grade),
+        standing=np.asarray(view.speed < SLOWEST),
+    )
+
+
+def parameters(settings: EkfSettings, vehicle: Vehicle, period: float) -> kernel.MassEkfParams:
+    """Make the kernel's parameters for a vehicle and rows ``period`` apart [s]."""
+    lightest, heaviest = MASS_RANGE[vehicle.kind]
+    mass = vehicle.tare or TYPICAL_MASS[vehicle.kind]
+    return kernel.MassEkfParams(
+        gravity=GRAVITY,
+        rolling=vehicle.road_load.rolling_coefficient,
+        rolling_speed=vehicle.road_load.rolling_speed_coefficient,
+        speed_density=settings.speed_noise**2,
+        grade_density=settings.grade_noise**2,
+        accel_walk=settings.accel_walk**2,
+        grade_walk=settings.grade_walk**2,
+        mass_walk=(settings.mass_walk * mass) ** 2,
+        load_walk=(settings.load_walk * mass) ** 2,
+        offset_var=settings.grade_offset**2,
+        offset_walk=settings.offset_walk**2,
+        gate=settings.gate,
+        pause=max(PAUSE, 2.5 * period),
+        lightest=lightest,
+        heaviest=heaviest,
+    )
+
+
+def constant_mass(
+    table: kernel.Columns, chosen: slice, mass: float, params: kernel.MassEkfParams
+) -> float:
+    """Mass of some rows over which it does not change [kg]: the filter's last word.
+
+    Parameters
+    ----------
+    table : of the drive
+    chosen : its rows
+    mass : to start from [kg]
+    params : of the running filter
+    """
+    part = kernel.Columns(*(values[chosen] for values in table))
+    if part.time.size == 0 or not np.isfinite(mass):
+        return float("nan")
+    still = params._replace(mass_walk=0.0, load_walk=0.0)
+    start = kernel.initial_state(mass, (0.5 * mass) ** 2, kernel.row_at(part, 0), params)
+    return float(kernel.run(start, part, 0, still)[0].x[kernel.MASS])
+
+
+def filter_reason(balance: ForceBalance, valid: Bools, taken: Bools) -> NDArray[np.uint8]:
+    """Reasons of the rows: `Reason.BAD_FIT` where the filter left one out.
+
+    The first row of a stretch only says where the speed starts.
+    """
+    reason = balance.merged.reason.copy()
+    reason[(reason == 0) & ~valid] = Reason.NO_MOTION
+    first = valid & ~np.concatenate(([False], valid[:-1]))
+    reason[valid & ~taken] = Reason.BAD_FIT
+    reason[first & ~taken] = Reason.TOO_SHORT
+    return reason
+
+
+def estimate(
+    balance: ForceBalance, vehicle: Vehicle, settings: EkfSettings | None = None
+) -> MassTrack:
+    """Weigh by an extended Kalman filter of speed, grade and mass.
+
+    It starts from the first estimate of the robust least squares. The running
+    mass may walk; the final answer is that of the same filter with a mass that
+    does not. The standard deviation is that of the least squares: both see the
+    same errors, which last longer than the filter's white noise.
+
+    Parameters
+    ----------
+    balance, vehicle
+    settings : the defaults when None
+
+    References
+    ----------
+    Du et al. 2025, eqs. 21-33.
+    """
+    settings = settings or EkfSettings()
+    view = balance.merged
+    phi, y, valid = robust_rls.rows(view, vehicle, settings.start)
+    rls_params = robust_rls.parameters(settings.start, robust_rls.row_period(view.time))
+    _, theta, _, information, mean_phi, mean_y, _ = rls_kernel.run(
+        robust_rls.initial_state(), view.time, phi, y, valid, rls_params
+    )
+    fit = robust_rls.window_fit(view.time, mean_phi, mean_y, rls_params)
+    params = parameters(settings, vehicle, robust_rls.row_period(view.time))
+    table = columns(balance, vehicle, valid)
+    told = np.flatnonzero(information * rls_params.window >= settings.start.first_information)
+    n = view.time.size
+    mass, var, taken = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool)
+    if told.size:
+        k = int(told[0])
+        start = kernel.initial_state(
+            theta[k], (settings.start_std * theta[k]) ** 2, kernel.row_at(table, k), params
+        )
+        _, mass, var, _, taken = kernel.run(start, table, k, params)
+    return robust_rls.finish(
+        "ekf",
+        balance,
+        vehicle,
+        fit,
+        filter_reason(balance, valid, taken),
+        running=mass,
+        spread=np.sqrt(var),
+        phi=phi,
+        y=y,
+        final=lambda chosen: constant_mass(table, chosen, fit.mass()[0], params),
+    )

@@ -1,0 +1,325 @@
+"""Robust least squares with forgetting (Du et al. 2025, sec. 3.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.balance import ForceBalance, Reason
+from weighbridge.balance.averaging import PAUSE
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError
+from weighbridge.estimators.judging import consider_std, converged_at, judge, nothing, segments
+from weighbridge.estimators.rls import regression
+from weighbridge.estimators.track import MassTrack
+from weighbridge.kernels import robust_rls as kernel
+from weighbridge.signals import Bools, Floats, Ints
+from weighbridge.vehicle.model import Vehicle
+
+DEPENDENCE: Final = 5.0
+"""Rows nearer than this share their error, in the running standard deviation [s]."""
+
+BLOCKS: Final = (20.0, 60.0)
+"""Shortest and longest block of rows that share their error, for the standard deviation of
+the final mass [s]: a tenth of the drive, within these."""
+
+NOISE_FLOOR: Final = 0.03
+"""Standard deviation of a window over the mass, at least [m/s^2]: what is left of vibration
+and of the grade."""
+
+FEWEST_WINDOWS: Final = 20
+"""Fewer windows carry no mass."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobustRlsSettings:
+    """Settings of the filter.
+
+    Attributes
+    ----------
+    window : length of the means that are folded in [s]
+    memory : time in which the weight of a row falls to 1/e [s]; 10 s is the
+        paper's factor of 0.999 at 100 Hz
+    kept_information : sum over time of the squared regressor below which nothing
+        is forgotten that is not replaced [(m/s^2)^2 s]; 0 forgets as the paper
+    first_information : the same, from which a mass is told [(m/s^2)^2 s]
+    threshold : Huber's, in standard deviations of the innovation [-]
+    offset_std : of an offset of the force over the mass, estimated beside it
+        [m/s^2]: rolling resistance, zero of the accelerometer; 0 for the paper's
+        single parameter
+    count_grade_twice : add the grade to the regressor although the specific
+        force has it already, as eq. 14 of the paper is printed; to compare only
+    """
+
+    window: float = 0.5
+    memory: float = 10.0
+    kept_information: float = 10.0
+    first_information: float = 1.0
+    threshold: float = 1.5
+    offset_std: float = 0.03
+    count_grade_twice: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("window", "memory", "first_information", "threshold"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ConfigError(f"{name} must be a positive number, got {value}")
+        for name in ("kept_information", "offset_std"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0.0):
+                raise ConfigError(f"{name} must be zero or positive, got {value}")
+
+
+def rows(
+    view: MergedView, vehicle: Vehicle, settings: RobustRlsSettings
+) -> tuple[Floats, Floats, Bools]:
+    """Regressor, right-hand side and what is usable of both.
+
+    Returns
+    -------
+    phi : (n,) [m/s^2]
+    y : (n,) [N]
+    valid : (n,) no reason against the row, and finite numbers
+    """
+    phi, y = regression(view, vehicle)
+    if settings.count_grade_twice:
+        phi = phi + GRAVITY * np.sin(view.grade)
+    return phi, y, np.asarray(view.usable & np.isfinite(phi) & np.isfinite(y))
+
+
+def row_period(time: Floats) -> float:
+    """Spacing of the rows [s]."""
+    return float(np.median(np.diff(time))) if time.size > 1 else 1.0
+
+
+def parameters(settings: RobustRlsSettings, period: float) -> kernel.RobustRlsParams:
+    """Make the kernel's parameters for rows ``period`` apart [s]."""
+    window = max(settings.window, period)
+    return kernel.RobustRlsParams(
+        window=window,
+        period=period,
+        pause=max(PAUSE, 2.5 * period),
+        forgetting=float(np.exp(-window / settings.memory)),
+        kept_information=settings.kept_information / window,
+        threshold=settings.threshold,
+        scale_windows=100.0,
+        settle_windows=10,
+        offset_std=settings.offset_std,
+        noise_floor=NOISE_FLOOR,
+        dependence=max(1.0, DEPENDENCE / window),
+    )
+
+
+def initial_state() -> kernel.RobustRlsState:
+    """Start at a mass of zero, as the paper, and with next to no information."""
+    return kernel.initial_state(0.0, 1e-9)  # type: ignore[no-untyped-call,no-any-return]
+
+
+def window_reason(view: MergedView, valid: Bools, mean_phi: Floats) -> NDArray[np.uint8]:
+    """Reasons of the rows: `Reason.TOO_SHORT` for those of windows that never filled."""
+    reason = view.reason.copy()
+    reason[(reason == 0) & ~valid] = Reason.NO_MOTION
+    folded = np.isfinite(mean_phi)
+    # Rows of a window share what became of it: it ends at a fold or at an interruption.
+    window = np.cumsum(np.concatenate(([0], (folded | ~valid)[:-1]))) if folded.size else folded
+    filled = np.zeros(int(window[-1]) + 1 if window.size else 0, dtype=bool)
+    filled[window[folded]] = True
+    reason[valid & ~filled[window]] = Reason.TOO_SHORT
+    return reason
+
+
+@dataclass(frozen=True, slots=True)
+class WindowFit:
+    """The windows of a drive and the mass that they all say together.
+
+    Attributes
+    ----------
+    time, phi, y : (m,) of the windows
+    params : of the kernel
+    block : length of the blocks of dependent rows [s]
+    """
+
+    time: Floats
+    phi: Floats
+    y: Floats
+    params: kernel.RobustRlsParams
+    block: float
+
+    def mass(self, begin: float = -np.inf, end: float = np.inf) -> tuple[float, float, int]:
+        """Mass of a span of time, its standard deviation [kg] and the blocks behind it.
+
+        Huber's fit of mass and offset, the offset held by its prior. The
+        standard deviation comes from leaving out one block at a time; it is not
+        below what noise and the prior allow, for an offset that stays the same
+        shows in no block.
+
+        References
+        ----------
+        Huber and Ronchetti, Robust Statistics, 2nd ed., 2009, ch. 7; jackknife
+        over blocks: Künsch, Annals of Statistics 17, 1989.
+        """
+        chosen = (self.time >= begin) & (self.time <= end)
+        phi, y = self.phi[chosen], self.y[chosen]
+        if not np.any(phi):
+            return float("nan"), float("inf"), 0
+        mass, offset, ridge = float(np.sum(phi * y) / np.sum(phi**2)), 0.0, np.inf
+        weight, noise = np.ones_like(phi), 0.0
+        for _ in range(50):
+            before = mass
+            size = np.abs(y - phi * mass - offset)
+            noise = max(1.4826 * float(np.median(size)), self.params.noise_floor * abs(mass))
+            weight = np.minimum(1.0, self.params.threshold * noise / np.maximum(size, 1e-9))
+            if self.params.offset_std > 0.0:
+                ridge = self.params.dependence * (noise / (self.params.offset_std * mass)) ** 2
+            mass, offset = (float(x[0]) for x in _solve(_sums(phi, y, weight)[:, None], ridge))
+            if abs(mass - before) <= 1e-7 * abs(mass):
+                break
+        block = self.block if np.isinf(begin) else BLOCKS[0]
+        number = ((self.time[chosen] - self.time[chosen][0]) // block).astype(np.int64)
+        parts = _sums(phi, y, weight, number)
+        parts = parts[:, parts[2] > 0.0]
+        n = parts.shape[1]
+        if n < 3:
+            return mass, float("inf"), n
+        power, first, count = _sums(phi, y, weight)[:3]
+        known = power - first**2 / (count + ridge)
+        least = noise * float(np.sqrt(self.params.dependence / known))
+        without = _solve(parts.sum(axis=1, keepdims=True) - parts, ridge)[0]
+        std = float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
+        return mass, max(std, least), n
+
+    @property
+    def bound(self) -> float:
+        """Cramér-Rao bound if the windows were independent and the model true [kg]."""
+        noise = 1.4826 * float(np.median(np.abs(self.y - self.phi * self.mass()[0])))
+        return noise / float(np.sqrt(np.sum(self.phi**2)))
+
+
+def _sums(phi: Floats, y: Floats, weight: Floats, block: Ints | None = None) -> Floats:
+    """Weighted sums of phi^2, phi, 1, phi y and y: (5,), or (5, blocks)."""
+    rows = np.stack([phi * phi, phi, np.ones_like(phi), phi * y, y]) * weight
+    if block is None:
+        return np.asarray(rows.sum(axis=1))
+    return np.stack([np.bincount(block, row) for row in rows])
+
+
+def _solve(sums: Floats, ridge: float) -> tuple[Floats, Floats]:
+    """Mass and offset of `_sums` (5, k), the offset held with ``ridge`` windows."""
+    power, first, count, cross, force = sums
+    if np.isinf(ridge):
+        return cross / power, np.zeros_like(cross)
+    determinant = power * (count + ridge) - first**2
+    mass = ((count + ridge) * cross - first * force) / determinant
+    return mass, (power * force - first * cross) / determinant
+
+
+def window_fit(
+    time: Floats, mean_phi: Floats, mean_y: Floats, params: kernel.RobustRlsParams
+) -> WindowFit:
+    """Collect the windows that the kernel has folded in."""
+    folded = np.isfinite(mean_phi)
+    span = float(time[-1] - time[0]) if time.size else 0.0
+    block = float(np.clip(0.1 * span, *BLOCKS))
+    return WindowFit(time[folded], mean_phi[folded], mean_y[folded], params, block)
+
+
+def estimate(
+    balance: ForceBalance, vehicle: Vehicle, settings: RobustRlsSettings | None = None
+) -> MassTrack:
+    """Weigh by robust recursive least squares with forgetting.
+
+    The running mass is the filter's. The final answer is Huber's fit to all
+    windows of the drive, whose mass does not change unnoticed; a stop where it
+    may change begins another segment.
+
+    Parameters
+    ----------
+    balance, vehicle
+    settings : the defaults when None
+
+    References
+    ----------
+    Du et al. 2025, eqs. 13-20.
+    """
+    settings = settings or RobustRlsSettings()
+    view = balance.merged
+    phi, y, valid = rows(view, vehicle, settings)
+    params = parameters(settings, row_period(view.time))
+    _, running, var, information, mean_phi, mean_y, _ = kernel.run(
+        initial_state(), view.time, phi, y, valid, params
+    )
+    told = information * params.window >= settings.first_information
+    return finish(
+        "robust-rls",
+        balance,
+        vehicle,
+        window_fit(view.time, mean_phi, mean_y, params),
+        window_reason(view, valid, mean_phi),
+        running=np.where(told, running, np.nan),
+        spread=np.sqrt(var),
+        phi=phi,
+        y=y,
+    )
+
+
+def finish(
+    method: str,
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    fit: WindowFit,
+    reason: NDArray[np.uint8],
+    *,
+    running: Floats,
+    spread: Floats,
+    phi: Floats,
+    y: Floats,
+    final: Callable[[slice], float] | None = None,
+) -> MassTrack:
+    """Judge a running mass and make the track of it.
+
+    Parameters
+    ----------
+    method : name of the estimator
+    balance, vehicle
+    fit : windows of the drive, for standard deviation and bound
+    reason : (n,) why a row was not used
+    running, spread : (n,) running mass and its standard deviation from noise [kg]
+    phi, y : (n,) regressor and right-hand side
+    final : mass of some rows [kg]; that of ``fit`` when None
+    """
+    view = balance.merged
+    if fit.time.size < FEWEST_WINDOWS or not np.isfinite(running).any():
+        return nothing(method, balance, vehicle, reason, int(fit.time.size))
+    used = reason == Reason.USED
+    fitted, scatter, blocks = fit.mass()
+    mass = fitted if final is None else final(slice(0, view.time.size))
+    slow = consider_std(balance, phi, used, vehicle)
+    std = float(np.hypot(scatter, mass * slow))
+    status, why = judge(view, vehicle, used, mass, std, blocks)
+
+    def part(chosen: slice) -> tuple[float, float]:
+        time = view.time[chosen]
+        fitted, std, _ = fit.mass(float(time[0]), float(time[-1]))
+        return (fitted if final is None else final(chosen)), std
+
+    return MassTrack(
+        method=method,
+        balance=balance,
+        running_mass=running,
+        running_std=np.hypot(spread, running * slow),
+        residual=np.where(used, y - phi * mass, np.nan),
+        reason=reason,
+        mass=mass,
+        std=std,
+        degrees_of_freedom=float(max(blocks - 1, 1)),
+        bound_std=fit.bound,
+        converged_at=converged_at(view.time, running, mass, used),
+        status=status,
+        why=why,
+        segments=segments(balance, vehicle, phi, used, part),
+    )

@@ -1,0 +1,171 @@
+"""The three methods of Du 2025 on made-up force balances."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from weighbridge.balance import ForceBalance, Reason
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.errors import ConfigError
+from weighbridge.estimators import ESTIMATORS, Status, ekf, hybrid, robust_rls
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
+
+METHODS = ("robust-rls", "ekf", "hybrid")
+BUS = Vehicle(
+    kind="bus",
+    tare=7000.0,
+    driveline=Driveline(gearings=(10.0,)),
+    torque=TorqueModel(source="measured"),
+    road_load=RoadLoad(drag_area=5.4, rolling_coefficient=0.0075, rolling_speed_coefficient=4e-5),
+    provenance=Provenance(mass_scale_std=0.01),
+)
+
+
+def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset=0.0, rate=20.0):
+    """Rows of a bus that speeds up and slows down; ``swing`` 0 is a cruise."""
+    rng = np.random.default_rng(seed)
+    n = int(60.0 * minutes * rate)
+    time = np.arange(n) / rate
+    slope = grade * np.sin(time / 20.0)
+    speed = 14.0 - swing * 12.0 * np.cos(time / 15.0)
+    accel = swing * 0.8 * np.sin(time / 15.0)
+    rotating = np.full(n, 300.0)
+    drag = 0.5 * 1.2 * 5.4 * speed**2
+    rolling = mass * 9.81 * np.cos(slope) * (0.0075 + 4e-5 * speed)
+    force = (mass + rotating) * accel + drag + rolling + mass * 9.81 * np.sin(slope)
+    reason = np.where(speed < 3.0, Reason.STANDING, Reason.USED).astype(np.uint8)
+    braking = force < -2000.0
+    reason[braking] = Reason.BRAKING
+    noise = 0.02 * rng.normal(size=n)
+    view = MergedView(
+        time=time,
+        traction_force=force + rng.normal(0.0, 200.0, n),
+        speed=speed + rng.normal(0.0, 0.01, n),
+        accel=accel,
+        specific_force=accel + 9.81 * np.sin(slope) + offset + noise,
+        grade=slope + (offset + noise) / 9.81,
+        pitch=slope,
+        heading=np.zeros(n),
+        gear=np.ones(n, dtype=np.int64),
+        gearing=np.full(n, 10.0),
+        rotating_mass=rotating,
+        air_speed=speed,
+        drag_force=drag,
+        air_density=np.full(n, 1.2),
+        reason=reason,
+    )
+    return ForceBalance(force=None, motion=SimpleNamespace(source="inertial"), merged=view)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rate", [4.0, 20.0, 100.0])
+def test_finds_the_mass_at_any_rate(method, rate):
+    track = ESTIMATORS[method](balance(rate=rate), BUS)
+    assert track.method == method
+    assert track.status is Status.CONVERGED
+    assert track.mass == pytest.approx(10_000.0, rel=0.015)
+    assert abs(track.mass - 10_000.0) < 3.0 * track.std
+    known = np.isfinite(track.running_mass)
+    late = track.time > 60.0
+    assert known[late].all()
+    assert np.abs(track.running_mass[late] / 10_000.0 - 1.0).max() < 0.05
+    assert not known[0]
+    assert (track.running_std[known] > 0.0).all()
+    assert track.bound_std < track.std
+    assert len(track.segments) == 1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_cruise_carries_no_mass(method):
+    track = ESTIMATORS[method](balance(swing=0.0, grade=0.0), BUS)
+    assert track.status is Status.NOT_EXCITED
+    assert "more starts and hills" in track.why
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_usable_row_is_no_mass_and_no_error(method):
+    made = balance(minutes=1.0)
+    none = replace(made, merged=replace(made.merged, reason=np.full_like(made.merged.reason, 3)))
+    track = ESTIMATORS[method](none, BUS)
+    assert track.status is Status.NOT_EXCITED
+    assert np.isnan(track.mass)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_missing_numbers_are_left_out(method):
+    made = balance()
+    view = made.merged
+    broken = {
+        name: getattr(view, name).copy()
+        for name in ("traction_force", "specific_force", "grade", "speed", "air_speed")
+    }
+    for k, name in enumerate(broken):
+        broken[name][1000 + 150 * k : 1100 + 150 * k] = np.nan
+    track = ESTIMATORS[method](replace(made, merged=replace(view, **broken)), BUS)
+    assert track.status is Status.CONVERGED
+    assert track.mass == pytest.approx(10_000.0, rel=0.02)
+    assert np.isfinite(track.running_mass[2000:]).all()
+    gap = slice(1000, 1100)
+    assert (track.reason[gap] != Reason.USED).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_offset_of_the_accelerometer_is_told_from_the_mass(method):
+    found = ESTIMATORS[method](balance(offset=0.04, minutes=10.0), BUS).mass
+    assert found == pytest.approx(10_000.0, rel=0.02)
+
+
+def test_without_an_offset_the_paper_is_biased_by_one():
+    settings = robust_rls.RobustRlsSettings(offset_std=0.0)
+    found = robust_rls.estimate(balance(offset=0.04, minutes=10.0), BUS, settings).mass
+    assert found < 9800.0
+
+
+def test_counting_the_grade_twice_makes_a_climbing_bus_light():
+    made = balance(swing=0.4, grade=0.0)
+    view = made.merged
+    steep = np.full_like(view.grade, 0.03)
+    climbing = replace(
+        view,
+        grade=steep,
+        specific_force=view.specific_force + 9.81 * np.sin(steep),
+        traction_force=view.traction_force + 10_000.0 * 9.81 * np.sin(steep),
+    )
+    made = replace(made, merged=climbing)
+    once = robust_rls.RobustRlsSettings(offset_std=0.0)
+    assert robust_rls.estimate(made, BUS, once).mass == pytest.approx(10_000.0, rel=0.01)
+    twice = replace(once, count_grade_twice=True)
+    phi = (climbing.specific_force + 9.81 * (0.0075 + 4e-5 * view.speed))[view.usable]
+    more = phi + 9.81 * np.sin(0.03)
+    expected = 10_000.0 * np.sum(phi * more) / np.sum(more**2)
+    assert expected < 8000.0
+    assert robust_rls.estimate(made, BUS, twice).mass == pytest.approx(expected, rel=0.03)
+
+
+def test_the_ekf_alone_is_the_one_of_the_blend():
+    made = balance()
+    fast = hybrid.HybridSettings(blend_speed=-1e3)
+    alone, blended = ekf.estimate(made, BUS), hybrid.estimate(made, BUS, fast)
+    assert np.array_equal(alone.running_mass, blended.running_mass, equal_nan=True)
+    slow = hybrid.HybridSettings(blend_speed=1e3)
+    least, blended = robust_rls.estimate(made, BUS), hybrid.estimate(made, BUS, slow)
+    told = np.isfinite(least.running_mass)
+    assert np.array_equal(told, np.isfinite(blended.running_mass))
+    assert np.array_equal(least.running_mass[told], blended.running_mass[told])
+
+
+@pytest.mark.parametrize(
+    ("settings", "bad", "said"),
+    [
+        (robust_rls.RobustRlsSettings, {"memory": 0.0}, "memory must be a positive number, got 0"),
+        (robust_rls.RobustRlsSettings, {"offset_std": -1.0}, "offset_std must be zero or positive"),
+        (ekf.EkfSettings, {"speed_noise": np.nan}, "speed_noise must be a positive number"),
+        (ekf.EkfSettings, {"mass_walk": -1.0}, "mass_walk must be zero or positive"),
+        (hybrid.HybridSettings, {"blend_width": 0.0}, "blend_width must be positive, got 0"),
+    ],
+)
+def test_impossible_settings_are_refused(settings, bad, said):
+    with pytest.raises(ConfigError, match=said):
+        settings(**bad)
