@@ -85,6 +85,36 @@ def test_candump_as_shown_on_a_terminal(tmp_path):
     assert "1 of 5 lines" in log.problems[0].text
 
 
+def test_every_spelling_of_candump(tmp_path):
+    path = tmp_path / "spelled.log"
+    long = bytes(range(64))
+    path.write_text(
+        "(1436509052.249713) vcan0 123##1" + long.hex() + "\n"
+        "(1436509052.249714123) can3 12345678#0102 R\r\n"
+        "(1436509053.5)  can0  RX - -  7E8   [2]  01 0D\n"
+        "(1436509053.6)  can0  TX B E  7E0  [12]  " + long[:12].hex(" ") + "\n"
+        "(1436509054) can0 123#R8\n"
+        "(1436509054.1) can0 123#1122334455667788_9\n"
+        "(1436509054.2) can0 123#112\n"
+        "(1436509054.2) can0 1234#11\n"
+        "() can0 123#11\n"
+        "(1436509054.3) can0 123#GG"
+    )
+    log = read_candump(path, None, None)
+    frames = log.frames
+    start = 1436509052.0
+    assert_allclose(frames.time - start, [0.249713, 0.249714, 1.5, 1.6, 2.1], atol=1e-6)
+    assert_array_equal(frames.id, [0x123, 0x12345678, 0x7E8, 0x7E0, 0x123])
+    assert_array_equal(frames.extended, [False, True, False, False, False])
+    assert_array_equal(frames.channel, [0, 3, 1, 1, 1])
+    assert [bytes(d[:n]) for d, n in zip(frames.data, frames.length, strict=True)] == [
+        long, bytes((1, 2)), bytes((1, 13)), long[:12], bytes.fromhex("1122334455667788"),
+    ]  # fmt: skip
+    assert [p.text for p in log.problems] == [
+        "spelled.log: 4 of 10 lines are no frames and were left out"
+    ]
+
+
 def test_text_of_another_kind_says_what_is_expected(tmp_path):
     path = tmp_path / "x.log"
     path.write_text("2024-01-01 server started\n")

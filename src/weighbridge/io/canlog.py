@@ -17,11 +17,11 @@ import polars as pl
 from numpy.typing import NDArray
 
 from weighbridge.errors import DriveError
-from weighbridge.io.candump import whole_lines
+from weighbridge.io.candump import filled, room, whole_lines
 from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
-from weighbridge.kernels.frame_text import FrameRows, TraceColumns, parse_asc, parse_trace
+from weighbridge.kernels.frame_text import TraceColumns, parse_asc, parse_trace
 from weighbridge.signals import Problem
 
 CSV_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
@@ -93,12 +93,12 @@ def read_asc(path: Path, table: str | None, mapping: TableMapping | None) -> Log
                 decimal = mark["base"].lower() == b"dec"
                 relative = (mark["stamps"] or b"").lower() == b"relative"
             text = block[begin:end]
-            rows = _room(text, _LONGEST if b"CANFD" in text else 8)
+            rows = room(text, _LONGEST if b"CANFD" in text else 8)
             count, bad, clock = parse_asc(
                 np.frombuffer(text, np.uint8), rows, decimal, relative, clock
             )
             strange += bad
-            parts.append(_frames(rows, count, start))
+            parts.append(filled(rows, count, start))
     return _log(path, parts, strange)
 
 
@@ -117,26 +117,13 @@ def read_trc(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         if k == 0:
             columns, start = _trace_head(path, block)
         for width in (8, _LONGEST):
-            rows = _room(block, width)
+            rows = room(block, width)
             count, bad = parse_trace(np.frombuffer(block, np.uint8), rows, columns)
             if not bad:
                 break
         strange += bad
-        parts.append(_frames(rows, count, start))
+        parts.append(filled(rows, count, start))
     return _log(path, parts, strange)
-
-
-def _room(text: bytes, width: int) -> FrameRows:
-    """Room for one frame a line."""
-    n = text.count(b"\n") + 1
-    return FrameRows(
-        np.zeros(n), np.zeros(n, np.int16), np.zeros(n, np.uint32), np.zeros(n, np.bool_),
-        np.zeros(n, np.uint8), np.zeros((n, width), np.uint8),
-    )  # fmt: skip
-
-
-def _frames(rows: FrameRows, count: int, start: float) -> Frames:
-    return Frames(rows[0][:count] + start, *(r[:count].copy() for r in rows[1:]))
 
 
 def _log(path: Path, parts: list[Frames], strange: int) -> Log:

@@ -13,6 +13,7 @@ MOST_WORDS = 84
 
 _NEWLINE, _RETURN, _BLANK, _TAB = 10, 13, 32, 9
 _NOTHING = -1
+_REMOTE = -2
 
 
 class TraceColumns(NamedTuple):
@@ -207,6 +208,143 @@ def parse_trace(text, rows, columns):
 
 
 @kernel
+def parse_candump(text, rows, buses):
+    """Read lines of candump, as ``candump -l`` writes them or as a terminal shows them.
+
+    Parameters
+    ----------
+    text : (n,) uint8
+        Whole lines.
+    rows : FrameRows
+        Zeros; filled from the first on. The channel is a row of ``buses``.
+    buses : (b, 2) int64
+        Room for where the name of each interface begins and ends in ``text``.
+
+    Returns
+    -------
+    count, lines, strange : int
+        Frames, lines that are not empty, and those that are no frames of any kind.
+    seen : int
+        Rows of ``buses`` that were filled.
+    longest : int
+        Bytes of the longest frame; where they are more than ``rows`` has room for, that frame
+        was left out.
+    """
+    starts = np.empty(MOST_WORDS, np.int64)
+    ends = np.empty(MOST_WORDS, np.int64)
+    count = lines = strange = seen = longest = 0
+    at = 0
+    while at < text.size:
+        words, at = _words(text, at, starts, ends)
+        if words == 0:
+            continue
+        lines += 1
+        if words < 3 or text[starts[0]] != 40 or text[ends[0] - 1] != 41:  # ( )
+            strange += 1
+            continue
+        # Digits behind the nanosecond say nothing.
+        stamp = _real(text, starts[0] + 1, min(ends[0] - 1, starts[0] + 19))
+        bus = _interface(text, starts[1], ends[1], buses, seen)
+        place = 2
+        # candump -x tells the direction and two flags before the identifier.
+        if words > 5 and ends[2] - starts[2] == 2 and text[starts[2] + 1] == 88:  # RX, TX
+            place = 5
+        end = starts[place]
+        while end < ends[place] and text[end] != 35:  # #
+            end += 1
+        digits = end - starts[place]
+        identifier = _whole(text, starts[place], end, 16)
+        if not stamp >= 0.0 or bus < 0 or identifier < 0 or (digits != 3 and digits != 8):
+            strange += 1
+            continue
+        if end < ends[place]:
+            size = _packed(text, end + 1, ends[place], rows.data, count)
+        else:
+            size = _spaced(text, starts, ends, words, place + 1, rows.data, count)
+        longest = max(longest, size)
+        if size == _NOTHING:
+            strange += 1
+        if size < 0 or size > rows.data.shape[1]:
+            continue
+        seen = max(seen, bus + 1)
+        # An error of the bus is told under an identifier with this flag.
+        if identifier & 0x20000000 and digits == 8:
+            continue
+        rows.time[count] = stamp
+        rows.channel[count] = bus
+        rows.identifier[count] = identifier & 0x1FFFFFFF
+        rows.extended[count] = digits == 8
+        rows.length[count] = size
+        count += 1
+    return count, lines, strange, seen, longest
+
+
+@kernel
+def _interface(text, start, end, buses, seen):
+    """Row of an interface's name; a new one is written behind those seen, -1 where none fits."""
+    for k in range(seen):
+        first = buses[k, 0]
+        if buses[k, 1] - first != end - start:
+            continue
+        alike = True
+        for i in range(end - start):
+            if text[first + i] != text[start + i]:
+                alike = False
+                break
+        if alike:
+            return k
+    if seen == buses.shape[0]:
+        return _NOTHING
+    buses[seen, 0] = start
+    buses[seen, 1] = end
+    return seen
+
+
+@kernel
+def _packed(text, start, end, data, row):
+    """Bytes of ``DEADBEEF`` or, with CAN FD's flags, ``#1DEADBEEF``; -2 of a remote frame."""
+    if start < end and text[start] == 82:  # R
+        return _REMOTE
+    if start < end and text[start] == 35:
+        start += 2
+        if start > end or _whole(text, start - 1, start, 16) < 0:
+            return _NOTHING
+    # A code of data length above 8 may stand behind.
+    for k in range(start, end):
+        if text[k] == 95:  # _
+            end = k
+            break
+    size = (end - start) // 2
+    if size < 0 or size > 64 or (end - start) % 2:
+        return _NOTHING
+    for k in range(min(size, data.shape[1])):
+        value = _whole(text, start + 2 * k, start + 2 * k + 2, 16)
+        if value < 0:
+            return _NOTHING
+        data[row, k] = value
+    for k in range(size, data.shape[1]):
+        data[row, k] = 0
+    return size
+
+
+@kernel
+def _spaced(text, starts, ends, words, place, data, row):
+    """Bytes of ``[4]  DE AD BE EF``; -2 of a remote frame."""
+    if words <= place or text[starts[place]] != 91 or text[ends[place] - 1] != 93:  # [ ]
+        return _NOTHING
+    size = _whole(text, starts[place] + 1, ends[place] - 1, 10)
+    first = place + 1
+    # remote request
+    if words > first and ends[first] - starts[first] == 6 and text[starts[first]] == 114:
+        return _REMOTE
+    if size < 0 or size > 64 or words < first + size:
+        return _NOTHING
+    if size > data.shape[1]:
+        return size
+    return size if _bytes(text, starts, ends, words, first, size, 16, data, row) else _NOTHING
+
+
+@kernel
 def _decoded(code):
     """Bytes that a code of data length from 9 on stands for (ISO 11898-1)."""
     return 12 + 4 * (code - 9) if code <= 12 else 32 + 16 * (code - 13)
@@ -282,7 +420,7 @@ def _real(text, start, end):
     value = 0
     below = 1.0
     fraction = False
-    if end - start > 18:
+    if end <= start or end - start > 18:
         return np.nan
     for k in range(start, end):
         letter = np.int64(text[k])
