@@ -3,6 +3,8 @@ import pytest
 from numpy.testing import assert_allclose
 from test_frames import make, split
 
+from weighbridge.errors import DriveError
+from weighbridge.io.bus import decode
 from weighbridge.io.frames import join_frames
 from weighbridge.io.obd import LENGTHS, PIDS, decode_obd
 from weighbridge.signals import QUANTITIES
@@ -149,6 +151,24 @@ def test_other_services_alone_are_no_obd_drive():
     found = decode_obd(frames)
     assert found.signals == []
     assert not found.used.any()
+    with pytest.raises(DriveError, match=r"5 answers of other services .* \(service 01\)"):
+        decode(frames, "log", None, ())
+
+
+def test_full_scales_of_its_own_are_told():
+    flow, speed = bytes.fromhex("41 10 80 40"), bytes.fromhex("41 0D 32")
+    usual, other = bytes.fromhex("41 50 00 00 00 00"), bytes.fromhex("41 50 40 00 00 00")
+    assert decode_obd(answers([flow, speed, usual])).problems == []
+    assert decode_obd(answers([speed, other])).problems == []
+    said = [p.text for p in decode_obd(answers([flow, speed, other])).problems]
+    assert len(said) == 1
+    assert "for mass_air_flow," in said[0]
+
+
+def test_what_cannot_be_used_has_a_known_length():
+    said = decode_obd(answers([bytes.fromhex("41 41 00 07 E5 E5 0D 32")] * 3))
+    assert said.problems == []
+    assert_allclose(value(said, "vehicle_speed"), 50.0)
 
 
 def test_lists_of_supported_parameters_that_change_are_told():

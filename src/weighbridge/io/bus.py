@@ -94,7 +94,7 @@ def decode(
     if not used.all():
         done.contents.append(f"not known: {_counts(frames, ~used)}")
     if not done.signals:
-        raise DriveError(_nothing(frames, name, mapping, databases, done))
+        raise DriveError(_nothing(frames, name, mapping, databases, done, obd.contents))
     return done
 
 
@@ -143,12 +143,16 @@ def _nothing(
     mapping: TableMapping | None,
     databases: Sequence[Database],
     done: Decoded,
+    diagnosis: Sequence[str],
 ) -> str:
+    """Say why the traffic gave no signal; ``diagnosis`` is what OBD-II told nevertheless."""
     names = " and ".join(d.path.name for d in databases)
     if not len(frames):
         return f"{name} holds no CAN frames; record it again"
     seen = f"{name} holds {_counts(frames)}"
     if not databases:
+        if diagnosis:
+            return f"{seen}; {diagnosis[0]}: let the logger ask for current data (service 01)"
         return (
             f"{seen}; they are neither OBD-II answers nor J1939: "
             "give the vehicle's DBC with --dbc and name its signals in a mapping"

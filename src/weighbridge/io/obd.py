@@ -91,7 +91,7 @@ _LENGTHS: Final[dict[int, str]] = {
     1: "04-0B 0D-0F 11-13 1C-1E 2C-30 33 45-4C 51-52 5A-5C 5F 61 62 7D 7E 84 8D 8E A9",
     2: "02 03 0C 10 14-1B 1F 21-23 31 32 3C-3F 42-44 4D 4E 53-59 5D 5E 63 65 92 9E A2",
     3: "67 6F 90 93",
-    4: "00 01 20 24-2B 34-3B 40 4F 50 60 80 9B 9D A0 A4-A8 C0",
+    4: "00 01 20 24-2B 34-3B 40 41 4F 50 60 80 9B 9D A0 A4-A8 C0",
     5: "64 66 6A-6C 72-74 77 86 87 91",
     6: "71 9A",
     7: "68 69 75 76 7A 7B 8B 8F",
@@ -114,6 +114,13 @@ LENGTHS: Final[dict[int, int]] = {
     pid: size for size, text in _LENGTHS.items() for part in text.split() for pid in _spread(part)
 }
 """Bytes of value by parameter identifier."""
+
+# Full scales of other parameters by byte of the value: 0 for those of `PIDS`.
+_FULL_SCALES: Final[dict[tuple[int, int], str]] = {
+    (0x4F, 0): "lambda_1",
+    (0x4F, 3): "intake_pressure",
+    (0x50, 0): "mass_air_flow",
+}
 
 _CURRENT_DATA: Final = 0x41
 _VEHICLE_INFORMATION: Final = 0x49
@@ -153,6 +160,7 @@ class _Sender:
     refused: int = 0
     vins: set[bytes] = field(default_factory=set)
     supported: int = 1
+    rescaled: list[str] = field(default_factory=list)
 
 
 def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
@@ -202,6 +210,10 @@ def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
             found.used[which] = True
     if not any(s.counts for s in senders):
         found.used[:] = False
+        found.contents.extend(
+            f"{s.name}: {s.other} answers of other services than 01, {s.refused} requests declined"
+            for s in senders
+        )
         return found
     found.used[_requests(frames)] = True
     _tell(senders, name, found)
@@ -257,6 +269,9 @@ def _read_messages(messages: Messages, sender: _Sender) -> None:
             # Which parameters a control unit supports is fixed.
             lists = np.unique(np.concatenate([raw for _, raw in pieces]), axis=0)
             sender.supported = max(sender.supported, len(lists))
+    for (number, byte), quantity in _FULL_SCALES.items():
+        if any(raw[:, byte].any() for _, raw in parts.get(number, [])):
+            sender.rescaled.append(quantity)
     for p in PIDS:
         if p.number in parts:
             times = np.concatenate([t for t, _ in parts[p.number]])
@@ -299,6 +314,15 @@ def _tell(senders: list[_Sender], name: str, found: Obd) -> None:
                     "",
                     f"{name}: {s.cut} answers of {s.name} are cut off or hold a parameter of "
                     "unknown length; what stood before it was read",
+                )
+            )
+        if rescaled := [q for q in s.rescaled if q in s.values]:
+            found.problems.append(
+                Problem(
+                    "",
+                    f"{name}: {s.name} states full scales of its own (PID 4F or 50) for "
+                    f"{', '.join(rescaled)}, which were read with the usual ones; compare with "
+                    "what an idle or full throttle should show",
                 )
             )
         if s.supported > 1:
