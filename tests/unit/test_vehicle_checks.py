@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from weighbridge.errors import DriveError
+from weighbridge.pipeline.calibrating import calibrate
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.vehicle_checks import check_vehicle
 from weighbridge.signals import Drive, Signal
@@ -128,3 +130,10 @@ def test_indicated_torque_is_refused_until_its_friction_is_stated():
     assert "coefficients" in problem.text
     assert [p.serious for p in friction(found)] == [False]
     assert friction(found, car(coefficients=(-25.0, 1.0))) == []
+
+
+def test_a_calibration_finds_the_friction_itself():
+    found = idling(0.10, indicated_torque_fraction=0.1)
+    with pytest.raises(DriveError) as refused:
+        calibrate(found, 1500.0, vehicle=car())
+    assert "friction" not in str(refused.value)
