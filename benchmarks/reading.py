@@ -3,7 +3,8 @@
 Run from the checkout: ``python benchmarks/reading.py``. Recorded: the MF4 files of
 ``../shared/data`` of about 2.5 MB. Synthetic: one hour of a 500 kbit/s bus, 2400 frames a
 second (about 60 % load), with 40 identifiers of which a DBC decodes two signals of 100 Hz,
-and OBD-II answers ten times a second; as MF4, BLF, candump, ASC and TRC. The loop of python-can
+and OBD-II answers ten times a second; as MF4, BLF, candump, ASC and TRC; and one hour of 1000
+frames of CAN FD a second, of 64 bytes, as candump. The loop of python-can
 and cantools over the same frames, with the same signals, is timed on the first five minutes.
 Every reading is a process of its own, so that its memory is its own.
 """
@@ -114,6 +115,22 @@ def write_candump(path: Path, seconds: int) -> None:
           f"{d.replace(' ', '')}\n")  # fmt: skip
 
 
+def write_shown(path: Path, seconds: int) -> None:
+    """Write candump as a terminal shows it."""
+    lines(path, seconds, "",
+          lambda _, s, i, d: f" ({START + s:.6f})  can1  {i:03X}   [8]  {d}\n")  # fmt: skip
+
+
+def write_fd(path: Path, seconds: int) -> None:
+    """Write candump of 1000 frames of CAN FD a second, the answers among them classic."""
+    _, identifier, data = synthetic(seconds)
+    with path.open("w") as file:
+        for k in range(1000 * seconds):
+            text = data[k].tobytes().hex().upper()
+            text = f"#{text}" if identifier[k] == 0x7E8 else f"##1{8 * text}"
+            file.write(f"({START + k / 1000:.6f}) can1 {identifier[k]:03X}{text}\n")
+
+
 def write_asc(path: Path, seconds: int) -> None:
     date = datetime.fromtimestamp(START).strftime("%a %b %d %H:%M:%S.0 %Y")
     head = f"date {date}\nbase hex  timestamps absolute\ninternal events logged\n"
@@ -207,12 +224,14 @@ def main(seconds: int = 3600) -> None:
         dbc = Path(folder, "motion.dbc")
         dbc.write_text(DBC)
         mapping = json.dumps(MAPPING)
-        for suffix, write in WRITERS.items():
+        hours = [(suffix, suffix, write) for suffix, write in WRITERS.items()]
+        hours += [(".log, as shown", ".log", write_shown), (".log, CAN FD", ".log", write_fd)]
+        for what, suffix, write in hours:
             log = Path(folder, f"hour{suffix}")
             began = time.perf_counter()
             write(log, seconds)
             print(f"# written in {time.perf_counter() - began:.0f} s", file=sys.stderr)
-            show(f"synthetic {suffix}", log, run(READ, log, mapping, dbc))
+            show(f"synthetic {what}", log, run(READ, log, mapping, dbc))
             log.unlink()
         for suffix in (".blf", ".log", ".asc", ".trc"):
             log = Path(folder, f"loop{suffix}")

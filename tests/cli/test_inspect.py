@@ -71,3 +71,12 @@ def test_what_cannot_be_read_is_one_error(run, tmp_path):
 
 def test_help_has_an_example(run):
     assert "Example: weighbridge inspect drive/" in run("--help")
+
+
+def test_one_sample_has_no_rate(run, tmp_path):
+    (tmp_path / "obd.csv").write_text(
+        "time_s,vehicle_speed_kmh,reference_torque_nm\n0,10,400\n1,11,\n2,12,\n"
+    )
+    row = next(line for line in run(tmp_path).splitlines() if "reference_torque" in line)
+    assert "nan" not in row
+    assert row.count("400") == 2

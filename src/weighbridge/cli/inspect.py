@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Optional
 
@@ -92,9 +93,9 @@ def _signal_table(found: Inspection) -> Table:
         table.add_row(
             s.name,
             str(s.count),
-            f"{s.rate:.4g}",
-            f"{s.period:.4g}",
-            f"{1e3 * s.jitter:.3g}",
+            _shown(s.rate, 4),
+            _shown(s.period, 4),
+            _shown(1e3 * s.jitter, 3),
             str(s.gaps),
             f"{s.longest_gap:.3g}" if s.gaps else "",
             f"{s.low:.5g}",
@@ -103,6 +104,11 @@ def _signal_table(found: Inspection) -> Table:
             s.unit,
         )
     return table
+
+
+def _shown(value: float, digits: int) -> str:
+    """Text of a number; nothing of one that a single sample does not give."""
+    return "" if math.isnan(value) else f"{value:.{digits}g}"
 
 
 def _way_table(found: Inspection, every_way: bool) -> Table:
