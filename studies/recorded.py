@@ -183,6 +183,27 @@ def gear_line(name: str, drives: list[wb.Drive], known: tuple[float, ...]) -> st
     return f"| {name} | {' | '.join(told)} | {ratios.size} |"
 
 
+def idle_line(drives: list[tuple[str, wb.Drive]]) -> str:
+    """What PID 62 reads at idling speed with a warm engine, standing and rolling."""
+    standing, rolling = [], []
+    for _, drive in drives:
+        torque, speed = drive.signals["engine_torque_fraction"], drive.signals["vehicle_speed"]
+        time = torque.time
+        engine = drive.signals["engine_speed"].at(time) * 30.0 / np.pi
+        idle = (engine < 1200.0) & (drive.signals["coolant_temperature"].at(time) > 343.0)
+        # Neither pulling away nor stopping.
+        near = np.array([np.abs(speed.at(time + side)) for side in (-2.0, 0.0, 2.0)])
+        for told, where in ((standing, (near < 0.3).all(0)), (rolling, (near > 1.0).all(0))):
+            values = 100.0 * torque.values[idle & where & (torque.values > 0.0)]
+            if values.size >= 20:
+                told.append(float(np.median(values)))
+    return (
+        "PID 62 below 1200 rpm with a coolant above 70 °C: rolling, the medians of "
+        f"{len(rolling)} files are {', '.join(f'{v:.0f}' for v in sorted(rolling))} %; standing, of "
+        f"{len(standing)} files, {', '.join(f'{v:.0f}' for v in sorted(standing))} %."
+    )
+
+
 def canedge() -> str:
     """Eight MF4 files with OBD-II, IMU and GNSS: gear ratios, mounting, mass per torque."""
     drives = canedge_drives()
@@ -207,28 +228,31 @@ def canedge() -> str:
     )
     lines += [
         "",
-        "| file | s | used s | kg per N m | ± sd within the file | gross torque | "
+        "| file | s | used s | kg per N m | ± sd within the file | joint | ± sd | gross torque | "
         f"{small:.0f} N m | forward axis in the sensor's x, y, z | sd of roll, pitch, yaw ° |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     table = []
     for name, drive in drives:
         w = wb.weigh(drive, car, method="rls")
         if w.status != "converged" or w.result is None:
-            lines.append(f"| {name} | {drive.duration:.0f} | | {w.status} | | | | | |")
+            lines.append(f"| {name} | {drive.duration:.0f} | | {w.status} | | | | | | | |")
             continue
         motion = w.result.balance.motion
         forward = ", ".join(f"{x:+.2f}" for x in euler_to_matrix(*motion.mounting)[0])
         sd = ", ".join(f"{x:.1f}" for x in np.degrees(motion.mounting_std))
+        joint = wb.weigh(drive, car, method="joint")
         row = [
             w.mass / reference,
+            joint.mass / reference,
             wb.weigh(drive, gross, method="rls").mass / reference,
             wb.weigh(drive, other, method="rls").mass / small,
         ]
         table.append((drive.duration, *row))
         lines.append(
             f"| {name} | {drive.duration:.0f} | {w.used_time:.0f} | {row[0]:.2f} "
-            f"| {w.std / reference:.2f} | {row[1]:.2f} | {row[2]:.2f} | {forward} | {sd} |"
+            f"| {w.std / reference:.2f} | {row[1]:.2f} | {joint.std / reference:.2f} "
+            f"| {row[2]:.2f} | {row[3]:.2f} | {forward} | {sd} |"
         )
     rows = np.array(table)
     full = rows[rows[:, 0] > 500.0]
@@ -239,11 +263,29 @@ def canedge() -> str:
 
     lines += [
         "",
-        f"Agreement with `--method rls`: the {len(full)} files of nine minutes and more "
-        f"{agreement(full[:, 1])}; all {len(rows)} that give a mass {agreement(rows[:, 1])}; "
-        f"the long ones on gross torque {agreement(full[:, 2])}, with {small:.0f} N m "
-        f"{agreement(full[:, 3])}. With {reference:.0f} N m the long files say "
-        f"{reference * np.min(full[:, 1]):.0f} to {reference * np.max(full[:, 1]):.0f} kg.",
+        "Agreement of the files, mean and standard deviation:",
+        "",
+        f"| | {len(full)} files of nine minutes and more | all {len(rows)} that give a mass |",
+        "|---|---|---|",
+        *(
+            f"| {what} | {agreement(full[:, k])} | {agreement(rows[:, k])} |"
+            for k, what in enumerate(
+                (
+                    "`--method rls`",
+                    "`--method joint`",
+                    "`rls`, gross torque",
+                    f"`rls`, {small:.0f} N m",
+                ),
+                start=1,
+            )
+        ),
+        "",
+        f"With {reference:.0f} N m the long files say {reference * np.min(full[:, 1]):.0f} to "
+        f"{reference * np.max(full[:, 1]):.0f} kg by `rls` and "
+        f"{reference * np.min(full[:, 2]):.0f} to {reference * np.max(full[:, 2]):.0f} kg by "
+        "`joint`.",
+        "",
+        idle_line(drives),
     ]
     return "\n".join(lines)
 
