@@ -193,14 +193,14 @@ def idle_line(drives: list[tuple[str, wb.Drive]]) -> str:
         idle = (engine < 1200.0) & (drive.signals["coolant_temperature"].at(time) > 343.0)
         # Neither pulling away nor stopping.
         near = np.array([np.abs(speed.at(time + side)) for side in (-2.0, 0.0, 2.0)])
-        for told, where in ((standing, (near < 0.3).all(0)), (rolling, (near > 1.0).all(0))):
+        for found, where in ((standing, (near < 0.3).all(0)), (rolling, (near > 1.0).all(0))):
             values = 100.0 * torque.values[idle & where & (torque.values > 0.0)]
             if values.size >= 20:
-                told.append(float(np.median(values)))
+                found.append(float(np.median(values)))
+    told = [", ".join(f"{v:.0f}" for v in sorted(values)) for values in (rolling, standing)]
     return (
         "PID 62 below 1200 rpm with a coolant above 70 °C: rolling, the medians of "
-        f"{len(rolling)} files are {', '.join(f'{v:.0f}' for v in sorted(rolling))} %; standing, of "
-        f"{len(standing)} files, {', '.join(f'{v:.0f}' for v in sorted(standing))} %."
+        f"{len(rolling)} files are {told[0]} %; standing, of {len(standing)} files, {told[1]} %."
     )
 
 
