@@ -12,23 +12,22 @@ from pathlib import Path
 
 import numpy as np
 
-from weighbridge.balance import force_balance
+from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.navigation.select import find_motion
 from weighbridge.papers.jensen2022 import without_weather
 from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
-from weighbridge.simulation import (
-    COMPACT,
-    ELECTRIC,
-    MIDSIZE,
-    make_scenario,
-    random_car,
-    simulate_car,
-)
+from weighbridge.simulation import Scenario, random_vehicle, simulate_car, usual_polling
 from weighbridge.simulation.route import jensen_route
+from weighbridge.vehicle.model import Driveline, Vehicle
 
 HERE = Path(__file__).parent
+KINDS = ("petrol_manual", "petrol_dct", "diesel_automatic", "electric", "van", "truck")
 DRIVES = 10
+CALIBRATIONS = 3
+FULL = {"car": 0.3, "van": 0.65, "truck": 0.85}
+EARLY = 300.0
+METHODS = ("rls", "robust-rls", "ekf", "hybrid", "joint, one calibration drive", "joint")
 
 
 @dataclass(frozen=True)
@@ -40,70 +39,105 @@ class Outcome:
     error: float
     std: float
     early: float
+    early_std: float
 
 
-def cars(seed: int) -> dict[str, tuple[str, object]]:
-    """Name, scenario and car of each vehicle."""
-    drawn = {f"petrol {k}": ("car", random_car(np.random.default_rng(seed + k))) for k in (1, 2, 3)}
-    fixed = {
-        "midsize": ("car", MIDSIZE),
-        "small manual": ("compact", COMPACT),
-        "electric": ("electric", ELECTRIC),
-    }
-    return {**fixed, **drawn}
-
-
-def scenario(kind: str, car, rng: np.random.Generator, *, load: float, seed: int):
+def scenario(car, rng: np.random.Generator, *, load: float, seed: int) -> Scenario:
     """Draw one ordinary drive."""
-    made = make_scenario(kind, payload=load, seed=seed)
+    made = Scenario(
+        name=f"drive {seed}",
+        car=car,
+        route=jensen_route(int(rng.integers(1000, 2000))),
+        payload=load,
+        seed=seed,
+        polling=usual_polling(car),
+        wind_speed=float(rng.uniform(0.0, 10.0)),
+        wind_from=float(rng.uniform(0.0, 2.0 * math.pi)),
+        ambient_temperature=float(rng.uniform(268.0, 303.0)),
+        aggressiveness=float(rng.uniform(0.8, 1.25)),
+    )
     outages = ()
     if rng.random() < 0.3:
         begin = float(rng.uniform(300.0, 1200.0))
         outages = ((begin, begin + float(rng.uniform(30.0, 180.0))),)
     return replace(
         made,
-        car=car,
-        route=jensen_route(int(rng.integers(1000, 2000))),
-        wind_speed=float(rng.uniform(0.0, 10.0)),
-        wind_from=float(rng.uniform(0.0, 2.0 * math.pi)),
-        ambient_temperature=float(rng.uniform(268.0, 303.0)),
-        aggressiveness=float(rng.uniform(0.8, 1.25)),
         effects=replace(made.effects, warm_up=float(rng.uniform(0.0, 1.0))),
         sensors=replace(made.sensors, gnss_outages=outages),
     )
 
 
-def weigh_all(seed: int) -> list[Outcome]:
-    """Calibrate each car on one ordinary drive and weigh it on others."""
-    outcomes = []
-    for number, (name, (kind, car)) in enumerate(cars(seed).items()):
-        rng = np.random.default_rng(seed + 10 * number)
-        first = simulate_car(scenario(kind, car, rng, load=0.0, seed=seed + 100 * number))
-        known = float(np.mean(first.truth.mass))
-        vehicles = {
-            method: run_calibration(
-                without_weather(first.drive), known, settings=CalibrationSettings(method=method)
-            ).vehicle
-            for method in ("rls", "joint")
+def first_minutes(balance: ForceBalance) -> ForceBalance:
+    """Keep what was known after `EARLY` seconds of moving; the motion stays as it was found."""
+    view = balance.merged
+    moving = np.cumsum(np.nan_to_num(view.speed) > 0.5) * float(np.median(np.diff(view.time)))
+    end = int(np.searchsorted(moving, EARLY))
+
+    def cut(rows):
+        parts = {
+            name: getattr(rows, name)[:end]
+            for name in rows.__dataclass_fields__
+            if np.shape(getattr(rows, name))[:1] == view.time.shape
         }
-        for k in range(1, DRIVES + 1):
-            load = float(rng.uniform(0.0, 0.25 * car.mass))
-            made = simulate_car(scenario(kind, car, rng, load=load, seed=seed + 100 * number + k))
+        return replace(rows, **parts)
+
+    return replace(balance, merged=cut(view), force=cut(balance.force))
+
+
+def calibrated(car, rng: np.random.Generator, seed: int) -> dict[str, Vehicle]:
+    """Vehicle files made from ordinary drives of known mass: empty, half loaded, nearly full."""
+    known = [
+        simulate_car(scenario(car, rng, load=part * FULL[car.kind] * car.mass, seed=seed + k))
+        for k, part in enumerate((0.0, 0.5, 0.9)[:CALIBRATIONS])
+    ]
+    drives = [without_weather(made.drive) for made in known]
+    masses = [float(np.mean(made.truth.mass)) for made in known]
+    base = Vehicle(kind=car.kind, driveline=Driveline(wheel_radius=car.wheel_radius))
+
+    def fitted(method: str, count: int) -> Vehicle:
+        settings = CalibrationSettings(method=method)
+        return run_calibration(drives[:count], masses[:count], vehicle=base,
+                               settings=settings).vehicle  # fmt: skip
+
+    published = fitted("rls", CALIBRATIONS)
+    return {
+        **dict.fromkeys(("rls", "robust-rls", "ekf", "hybrid"), published),
+        "joint, one calibration drive": fitted("joint", 1),
+        "joint": fitted("joint", CALIBRATIONS),
+    }
+
+
+def weigh_all(seed: int) -> list[Outcome]:
+    """Calibrate each vehicle on ordinary drives and weigh it on others."""
+    outcomes = []
+    for number, kind in enumerate(KINDS):
+        rng = np.random.default_rng(seed + 10 * number)
+        car = random_vehicle(rng, kind)
+        vehicles = calibrated(car, rng, seed + 1000 * number)
+        for k in range(DRIVES):
+            load = float(rng.uniform(0.0, FULL[car.kind] * car.mass))
+            made = simulate_car(scenario(car, rng, load=load, seed=seed + 1000 * number + 100 + k))
             mass = float(np.mean(made.truth.mass))
             drive = without_weather(made.drive)
             motion = find_motion(drive, vehicles["joint"])
             for method, vehicle in vehicles.items():
-                track = ESTIMATORS[method](force_balance(drive, vehicle, motion), vehicle)
-                moving = np.cumsum(np.nan_to_num(track.balance.merged.speed) > 0.5) * np.median(
-                    np.diff(track.time)
-                )
-                at = int(np.searchsorted(moving, 300.0))
-                early = track.running_mass[min(at, track.time.size - 1)] / mass - 1.0
+                balance = force_balance(drive, vehicle, motion)
+                estimator = ESTIMATORS[method.split(",")[0]]
+                track = estimator(balance, vehicle)
+                early = estimator(first_minutes(balance), vehicle)
                 outcomes.append(
-                    Outcome(name, method, track.mass / mass - 1.0, track.std / mass, early)
+                    Outcome(
+                        kind,
+                        method,
+                        track.mass / mass - 1.0,
+                        track.std / mass,
+                        early.mass / mass - 1.0,
+                        early.std / mass,
+                    )
                 )
-        done = [o for o in outcomes if o.car == name and o.method == "joint"]
-        print(name, " ".join(f"{100 * o.error:+.2f}" for o in done), flush=True)
+        for method in METHODS[-2:]:
+            done = [o for o in outcomes if o.car == kind and o.method == method]
+            print(kind, method, " ".join(f"{100 * o.error:+.2f}" for o in done), flush=True)
     return outcomes
 
 
@@ -114,7 +148,7 @@ def table(outcomes: list[Outcome]) -> str:
         "| intervals that hold | (error / std)², mean |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for method in ("rls", "joint"):
+    for method in METHODS:
         chosen = [o for o in outcomes if o.method == method]
         error = 100.0 * np.array([o.error for o in chosen])
         scaled = np.array([o.error / o.std for o in chosen])
@@ -125,21 +159,17 @@ def table(outcomes: list[Outcome]) -> str:
             f"| {np.nanpercentile(early, 95):.1f} | {np.mean(np.abs(scaled) < 1.96):.0%} "
             f"| {np.mean(scaled**2):.2f} |"
         )
-    lines += [
-        "",
-        "| car | rls RMS % | joint RMS % | joint mean % | joint worst % |",
-        "|---|---|---|---|---|",
-    ]
-    for name in dict.fromkeys(o.car for o in outcomes):
+    lines += ["", "| vehicle, RMS % | " + " | ".join(METHODS) + " | joint: mean % | worst % |"]
+    lines.append("|---" * (len(METHODS) + 3) + "|")
+    for name in KINDS:
         by = {
             m: 100.0 * np.array([o.error for o in outcomes if o.car == name and o.method == m])
-            for m in ("rls", "joint")
+            for m in METHODS
         }
-        lines.append(
-            f"| {name} | {np.sqrt(np.mean(by['rls'] ** 2)):.2f} "
-            f"| {np.sqrt(np.mean(by['joint'] ** 2)):.2f} | {by['joint'].mean():+.2f} "
-            f"| {np.max(np.abs(by['joint'])):.2f} |"
-        )
+        cells = [f"{np.sqrt(np.mean(by[m] ** 2)):.2f}" for m in METHODS]
+        joint = by["joint"]
+        cells += [f"{joint.mean():+.2f}", f"{np.max(np.abs(joint)):.2f}"]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 

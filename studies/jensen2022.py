@@ -132,11 +132,13 @@ def other_cars() -> str:
             lines.append(f"| {seed} | electric | | | | left out: no load | |")
             continue
         vehicle = run_calibration(
-            paper.without_weather(made.drive), float(np.mean(made.truth.mass))
+            paper.without_weather(made.drive),
+            float(np.mean(made.truth.mass)),
+            settings=CalibrationSettings(method="rls"),
         ).vehicle
         loaded = simulate_car(trip)
         mass = float(np.mean(loaded.truth.mass))
-        w = weigh(paper.without_weather(loaded.drive), vehicle)
+        w = weigh(paper.without_weather(loaded.drive), vehicle, method="rls")
         low, high = w.interval()
         found, true = np.array(vehicle.driveline.gearings), np.array(car.gearings)
         ratio = (
@@ -245,7 +247,7 @@ def masses_figure(done: paper.Reproduction) -> None:
 
 def main() -> None:
     done = paper.reproduce(seed=SEED)
-    straight = paper.reproduce(seed=SEED, settings=CalibrationSettings(curved=False))
+    straight = paper.reproduce(seed=SEED, settings=CalibrationSettings(method="rls", curved=False))
     sensitivity_figure(done)
     masses_figure(done)
     template = (HERE / "jensen2022.template.md").read_text(encoding="utf-8")

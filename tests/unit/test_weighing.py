@@ -111,7 +111,7 @@ def test_track(good, tmp_path):
     assert track.height == STAMPS.size
     assert track["used"].sum() == np.count_nonzero(good.result.used)
     reasons = set(track["reason"])
-    assert reasons == {"", "not accelerating"}
+    assert reasons == {"", "not accelerating", "overrun"}
     for suffix, read in ((".csv", pl.read_csv), (".parquet", pl.read_parquet)):
         path = tmp_path / f"track{suffix}"
         good.write_track(path)
@@ -166,7 +166,7 @@ def test_another_torque_source_is_named():
 
 
 def test_method_and_serious_problems_are_refused():
-    with pytest.raises(ConfigError, match="unknown method 'guess'; known are .*joint.*rls"):
+    with pytest.raises(ConfigError, match=r"unknown method 'guess'; known are .*joint.*rls"):
         weigh(drive(), CAR, "guess")
     stuck = drive().with_signals(
         Signal("vehicle_speed", STAMPS, motion().speed[: STAMPS.size]),

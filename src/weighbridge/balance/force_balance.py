@@ -217,6 +217,10 @@ def force_balance(
     air_speed = rows["speed"] + headwind(drive, rows["heading"])
     drag = 0.5 * density * vehicle.road_load.drag_area * air_speed * np.abs(air_speed)
 
+    switch = drive.get("brake_switch")
+    # Where no switch tells, a driver who is off the pedal may brake a little as well.
+    brakes_unknown = switch is None or not len(switch)
+
     # The first reason that applies is the one told, so the order matters.
     reason = np.zeros(time.size, dtype=np.uint8)
     near = source.age(recorded) <= 3.0 * source.period
@@ -231,7 +235,7 @@ def force_balance(
         (changing, Reason.SHIFTING),
         (slipping, Reason.CLUTCH_SLIPPING),
         (~np.isfinite(traction) | ~near, Reason.NO_TORQUE),
-        (torque.overrun, Reason.OVERRUN),
+        (torque.overrun | (brakes_unknown & (torque.torque <= 0.0)), Reason.OVERRUN),
         (torque.extrapolated, Reason.EXTRAPOLATED),
     ):
         reason[(reason == 0) & flag] = why

@@ -31,6 +31,10 @@ from weighbridge.vehicle.model import TorqueSource
 from weighbridge.vehicle.torque import torque_rows
 
 
+class TooShort(DriveError):
+    """The drives have too few usable windows for the fit."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveRows:
     """What one drive of known mass gives to the fit, one row per usable sample.
@@ -113,16 +117,16 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
 
     Raises
     ------
-    DriveError
+    TooShort
         Too few usable windows.
     """
     cuts = [windows(d.view.time, d.usable, length=settings.window) for d in drives]
     total = sum(cut.count.size for cut in cuts)
     p = 2 + settings.order + 2 * settings.curved
     if total < 15 * (p + 4) or any(cut.count.size == 0 for cut in cuts):
-        raise DriveError(
-            f"only {total} usable stretches of {p + 4} needed parameters; drive longer, with more "
-            "starts and in all gears"
+        raise TooShort(
+            f"only {total} usable stretches of time for {p + 4} parameters; drive longer, with "
+            "more starts and in all gears"
         )
     scale = _torque_per_reading(drives)
     readings = [d.regressor for d in drives]

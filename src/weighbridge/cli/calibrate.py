@@ -47,7 +47,7 @@ def calibrate(
     ] = None,
     method: Annotated[
         str, typer.Option("--method", help="Estimator to calibrate for: rls, joint or speed-ekf.")
-    ] = "rls",
+    ] = "joint",
     order: Annotated[
         Optional[int],  # noqa: UP045
         typer.Option("--order", min=0, max=4, help="Power of engine speed in the torque fit."),

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 
 def reproduce(
-    paper: Annotated[str, typer.Argument(help="du2025, galvao, jensen2022, nguyen2024 or all.")] = "all",
+    paper: Annotated[
+        str, typer.Argument(help="du2025, galvao, jensen2022, nguyen2024 or all.")
+    ] = "all",
     report: Annotated[
         Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
         typer.Option(

@@ -26,13 +26,15 @@ if TYPE_CHECKING:
 # Width of the table where no terminal gives one: a reason needs room.
 _WIDTH = 160
 
+_METHODS = "Estimator: joint, rls, robust-rls, ekf, hybrid or speed-ekf."
+
 
 def weigh(
     drives: DrivePaths,
     vehicle: Annotated[
         Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
     ],
-    method: Annotated[str, typer.Option("--method", help="Estimator.")] = "rls",
+    method: Annotated[str, typer.Option("--method", help=_METHODS)] = "joint",
     json_path: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option("--json", help="Write one JSON object per drive to a file, or - for here."),

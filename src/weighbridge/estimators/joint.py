@@ -11,7 +11,14 @@ from scipy.optimize import minimize
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import MergedView
-from weighbridge.estimators.judging import STOP, calibration_std, converged_at, judge, nothing
+from weighbridge.estimators.judging import (
+    OTHER_METHOD_STD,
+    STOP,
+    calibration_std,
+    converged_at,
+    judge,
+    nothing,
+)
 from weighbridge.estimators.slow_errors import (
     SlowErrors,
     design,
@@ -154,6 +161,8 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     used = reason == Reason.USED
     mass, bound = float(x[-1, 0]), float(np.sqrt(var[-1, 0]))
     left = calibration_std(balance, vehicle)
+    if vehicle.provenance.method == "rls":
+        left = float(np.hypot(left, OTHER_METHOD_STD))
     std = float(np.hypot(UNMODELLED * bound, mass * left))
     last = np.searchsorted(time, view.time, side="right") - 1
     track = np.where(last >= 0, running[np.maximum(last, 0)], np.nan)

@@ -83,7 +83,7 @@ class InertiaState(NamedTuple):
     old_step: float
     next_spawn: np.ndarray
     next_turn: np.ndarray
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]
     cause: np.ndarray
     born: np.ndarray
     loaded: np.ndarray

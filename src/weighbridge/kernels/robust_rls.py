@@ -66,7 +66,7 @@ class RobustRlsState(NamedTuple):
     sum_weighted: float
     noise_var: float
     windows: int
-    count: int
+    count: int  # type: ignore[assignment]
     begin: float
     last: float
     sum_phi: float

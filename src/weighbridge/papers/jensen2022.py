@@ -233,6 +233,7 @@ def reproduce(
     total = len(drives) + 2
     known = simulate_car(make_scenario("car-calibration", seed=seed))
     mass = float(np.mean(known.truth.mass))
+    settings = settings or CalibrationSettings(method="rls")
     calibration = run_calibration(without_weather(known.drive), mass, settings=settings)
     car, informed_car = (
         replace(made.vehicle, name="Audi A4 2.0 (simulated)", tare=MIDSIZE.mass)

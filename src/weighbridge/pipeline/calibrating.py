@@ -75,7 +75,7 @@ class CalibrationSettings:
     grid : solve on the grid of Jensen 2022, Table 5, in place of the bounds
     curved : let the torque per load change with engine speed and load; off for
         the regression of eq. 49 as printed
-    method : estimator the vehicle is calibrated for: "rls" by eq. 48, "joint", or
+    method : estimator the vehicle is calibrated for: "joint", "rls" by eq. 48, or
         "speed-ekf", which fits a model of the speed alone
     """
 
@@ -83,15 +83,17 @@ class CalibrationSettings:
     source: TorqueSource | None = None
     grid: bool = False
     curved: bool = True
-    method: Literal["rls", "joint", "speed-ekf"] = "rls"
+    method: Literal["joint", "rls", "speed-ekf"] = "joint"
 
     def __post_init__(self) -> None:
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
         if self.source is not None and self.source not in SIGNALS:
             raise ConfigError(f"source must be one of {', '.join(SIGNALS)}, got {self.source!r}")
-        if self.method not in ("rls", "joint", "speed-ekf"):
-            raise ConfigError(f"method must be rls, joint or speed-ekf, got {self.method!r}")
+        if self.method not in ("joint", "rls", "speed-ekf"):
+            raise ConfigError(f"method must be joint, rls or speed-ekf, got {self.method!r}")
+        if self.grid and self.method != "rls":
+            raise ConfigError("the grid of Jensen 2022 is of method rls; calibrate with that")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -255,6 +257,7 @@ def run_calibration(
             r_squared=fitted.r_squared,
             residual_std=fitted.residual_std,
             samples=int(rows.target.size),
+            method="rls",
             notes=_notes(fitted, low < high, rows.target.size, found),
         ),
     )

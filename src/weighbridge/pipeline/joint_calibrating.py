@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.balance.delay import vertex
 from weighbridge.balance.force_balance import ForceBalance
-from weighbridge.calibration.inverse import DriveRows, FitSettings, InverseFit, fit
+from weighbridge.calibration.inverse import DriveRows, FitSettings, InverseFit, TooShort, fit
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.signals import Bools, Floats
@@ -22,6 +22,9 @@ LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.45)
 
 DELAYS: Final = tuple(0.2 * k for k in range(-2, 7))
 """Sums of delay and lag among which the search begins [s]."""
+
+USUAL_DELAY: Final = 0.3
+"""Sum of delay and lag where the drives do not show it [s]."""
 
 TIMING_WINDOW: Final = 1.2
 """Windows of the search [s]: shorter than those of the fit, for delay shows in what is fast."""
@@ -72,7 +75,7 @@ def refine(
     Raises
     ------
     DriveError
-        The drives are too short.
+        The drives cannot be weighed.
     """
     line = vehicle.driveline
     settings = FitSettings(
@@ -116,9 +119,19 @@ def refine(
             ]
         )
 
-    delay, lag = _timing(misfits)
-    found = fit(rows_at(delay, lag), settings)
+    try:
+        delay, lag = _timing(misfits)
+        found = fit(rows_at(delay, lag), settings)
+    except TooShort as short:
+        return _self_weighed(_as_it_is(vehicle, str(short)), problem, rebalance)
     return _self_weighed(_with(vehicle, found, delay, lag, problem), problem, rebalance)
+
+
+def _as_it_is(vehicle: Vehicle, why: str) -> Vehicle:
+    """Keep the torque of eq. 48, to be scaled alone."""
+    made = vehicle.provenance
+    notes = "; ".join(note for note in (made.notes, f"scaled, not fitted anew: {why}") if note)
+    return replace(vehicle, provenance=replace(made, method="joint", notes=notes))
 
 
 def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
@@ -142,7 +155,12 @@ def _timing(misfits: Callable[[Sequence[tuple[float, float]]], Floats]) -> tuple
     """
     middle = LAGS[len(LAGS) // 2]
     pairs = [(total - middle, middle) for total in DELAYS]
-    total = DELAYS[int(np.argmin(misfits(pairs)))]
+    scores = misfits(pairs)
+    # At the ends both sides have little in common, and little to disagree about.
+    lowest = [
+        k for k in range(1, len(DELAYS) - 1) if scores[k] <= min(scores[k - 1], scores[k + 1])
+    ]
+    total = DELAYS[min(lowest, key=lambda k: scores[k])] if lowest else USUAL_DELAY
     pairs = [(total - lag + shift, lag) for lag in LAGS for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
     delay, lag = pairs[int(np.argmin(misfits(pairs)))]
     delays = np.asarray(delay + 0.03 * np.arange(-4, 5), dtype=np.float64)
@@ -184,7 +202,7 @@ def _with(
             wheel_inertia_std=stds[-1],
         ),
         timing=replace(vehicle.timing, torque_delay=delay, torque_lag=lag),
-        provenance=replace(vehicle.provenance, notes="calibrated for method joint"),
+        provenance=replace(vehicle.provenance, method="joint", mass_scale_std=None),
     )
 
 
@@ -212,6 +230,8 @@ def _self_weighed(
 
     ratio, bound = found(1.0)
     each = float(np.hypot(TRANSFER_STD[1], joint.UNMODELLED * bound))
+    # Where the torque could not be fitted anew, what its own fit left open stays.
+    known = float(np.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0))
     slope = (found(1.02)[0] - ratio) / 0.02
     scale = 1.0 + (1.0 - ratio) / slope if slope > 0.2 else 1.0 / ratio
     return replace(
@@ -219,6 +239,6 @@ def _self_weighed(
         torque=vehicle.torque.scaled(scale),
         provenance=replace(
             vehicle.provenance,
-            mass_scale_std=float(np.hypot(TRANSFER_STD[0], each / np.sqrt(len(problem.masses)))),
+            mass_scale_std=float(np.hypot(known, each / np.sqrt(len(problem.masses)))),
         ),
     )

@@ -89,7 +89,7 @@ def draw_road(
     points = math.ceil(max(length, 2.0 / BAND[0]) / _STEP)
     frequency = np.fft.rfftfreq(points, _STEP)
     inside = (frequency >= BAND[0]) & (frequency <= BAND[1])
-    n = frequency[inside]
+    n = np.asarray(frequency[inside], dtype=np.float64)
     # Variance of a line of the one-sided spectrum, carried by two Gaussians.
     amplitude = np.sqrt(roughness * (n / REFERENCE) ** -2.0 / (points * _STEP))
     likeness = coherence(n, track)

@@ -380,6 +380,7 @@ class Provenance:
     r_squared : of the torque fit [-]
     residual_std : of the torque fit [N m]
     samples : samples used
+    method : estimator the torque was fitted for, "joint" or "rls"; None where it was not
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
     notes : free text
@@ -391,11 +392,14 @@ class Provenance:
     r_squared: float | None = None
     residual_std: float | None = None
     samples: int | None = None
+    method: str | None = None
     mass_scale_std: float | None = None
     notes: str | None = None
 
     def __post_init__(self) -> None:
         _not_negative("mass_scale_std", self.mass_scale_std)
+        if self.method not in (None, "joint", "rls"):
+            raise ConfigError(f"method must be joint or rls, got {self.method!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
