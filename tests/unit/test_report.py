@@ -21,7 +21,7 @@ from weighbridge.pipeline.calibrating import Calibration
 from weighbridge.pipeline.weighing import Weighing
 from weighbridge.report import mass_figure, write_report
 from weighbridge.report.page import Page
-from weighbridge.report.style import Panel, blank
+from weighbridge.report.style import REASON_STYLE, Panel, blank
 from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.gear import detect_gearings
@@ -476,3 +476,7 @@ def test_spread_is_even_over_the_marked_rows():
 def test_report_loads_plotly_only_when_used():
     code = "import sys, weighbridge.report; sys.exit('plotly' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_every_reason_has_its_mark():
+    assert set(REASON_STYLE) == set(Reason)

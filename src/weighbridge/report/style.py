@@ -42,6 +42,7 @@ REASON_STYLE: Final[dict[Reason, tuple[str, str]]] = {
     Reason.EXTRAPOLATED: (GREEN, "triangle-up"),
     Reason.NOT_ACCELERATING: ("#b3a24d", "circle-open"),
     Reason.BAD_FIT: ("#c0392b", "x-thin-open"),
+    Reason.TOO_SHORT: ("#c8c8c8", "diamond-open"),
 }
 """Colour and marker of used and excluded samples."""
 
