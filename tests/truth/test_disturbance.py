@@ -87,7 +87,7 @@ def test_smoothing_equals_the_conditional_mean_of_the_dense_covariance():
     time, rows, y, noise, params, start, _ = problem()
     added = np.zeros(y.size)
     added[120] = 300.0**2
-    x, var = kernel.smooth(start, time, rows, y, noise, added, params)
+    x, var, _ = kernel.smooth(start, time, rows, y, noise, added, params)
     jumped = (np.arange(y.size) >= 120).astype(float)
     span = np.abs(time[:, None] - time)
     states = [
@@ -109,6 +109,6 @@ def test_smoothing_equals_the_conditional_mean_of_the_dense_covariance():
 def test_smoothing_ends_where_the_filter_ends():
     time, rows, y, noise, params, start, _ = problem()
     state, *_ = kernel.run(start, time, rows, y, noise, NO_JUMPS, params)
-    x, var = kernel.smooth(start, time, rows, y, noise, NO_JUMPS, params)
+    x, var, _ = kernel.smooth(start, time, rows, y, noise, NO_JUMPS, params)
     assert_allclose(x[-1], state.x, rtol=1e-12)
     assert_allclose(var[-1], np.diag(state.cov), rtol=1e-9)

@@ -152,8 +152,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     start, noise, params = problem.kernel_input(fast, slow)
     added = np.where(begins, (CHANGE_STD * problem.guess) ** 2, 0.0)
     time = problem.time
-    *_, taken = disturbance.run(start, time, problem.rows, problem.y, noise, added, params)
-    x, var = disturbance.smooth(start, time, problem.rows, problem.y, noise, added, params)
+    x, var, taken = disturbance.smooth(start, time, problem.rows, problem.y, noise, added, params)
 
     left_out = np.zeros(view.time.size, dtype=bool)
     left_out[cut.index] = ~taken[cut.window]

@@ -153,11 +153,10 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float) -> Floats:
 
 def filter_params(std: Floats, gate: float, settle: int) -> DisturbanceParams:
     """Make the kernel's parameters from the standard deviations of the states."""
-    fading = std.copy()
-    fading[[0, 6]] = 0.0
+    lasting = np.array([np.inf, *TIME_CONSTANTS, np.inf])
     return DisturbanceParams(
-        time_constant=np.array([np.inf, *TIME_CONSTANTS, np.inf]),
-        std=fading,
+        time_constant=lasting,
+        std=np.where(np.isfinite(lasting), std, 0.0),
         gate=gate,
         settle=settle,
     )

@@ -52,6 +52,24 @@ def initial_state(x, cov, time):
 
 
 @kernel
+def _faded(state, time, params):
+    """Estimate and covariance at ``time``, and the part of each state that is left (n,)."""
+    x = state.x.copy()
+    cov = state.cov.copy()
+    left = np.ones(x.size)
+    span = time - state.time
+    for i in range(x.size):
+        if params.std[i] > 0.0:
+            keep = np.exp(-span / params.time_constant[i])
+            left[i] = keep
+            x[i] *= keep
+            cov[i, :] *= keep
+            cov[:, i] *= keep
+            cov[i, i] += params.std[i] ** 2 * (1.0 - keep * keep)
+    return x, cov, left
+
+
+@kernel
 def step(state, time, row, y, noise_var, params):
     """Let the states fade until ``time`` and fold in ``y = row @ x + noise``.
 
@@ -77,16 +95,7 @@ def step(state, time, row, y, noise_var, params):
     ----------
     Gelb, Applied Optimal Estimation, 1974, ch. 3.8 (Gauss-Markov), 4.2.
     """
-    x = state.x.copy()
-    cov = state.cov.copy()
-    span = time - state.time
-    for i in range(x.size):
-        if params.std[i] > 0.0:
-            keep = np.exp(-span / params.time_constant[i])
-            x[i] *= keep
-            cov[i, :] *= keep
-            cov[:, i] *= keep
-            cov[i, i] += params.std[i] ** 2 * (1.0 - keep * keep)
+    x, cov, _ = _faded(state, time, params)
     cov_row = cov @ row
     innovation_var = row @ cov_row + noise_var
     innovation = (y - row @ x) / np.sqrt(innovation_var)
@@ -159,6 +168,8 @@ def smooth(state, time, rows, y, noise_var, added, params):
     -------
     x, var : (m, n) float64
         States and their variances.
+    taken : (m,) bool
+        As of ``run``.
 
     References
     ----------
@@ -168,27 +179,19 @@ def smooth(state, time, rows, y, noise_var, added, params):
     m, n = rows.shape
     x_pred = np.empty((m, n))
     cov_pred = np.empty((m, n, n))
-    keep = np.ones((m, n))
+    keep = np.empty((m, n))
+    taken = np.empty(m, dtype=np.bool_)
     gain = np.zeros((m, n))
     inverse = np.zeros(m)
     error = np.zeros(m)
     for k in range(m):
-        x = state.x.copy()
-        cov = state.cov.copy()
-        cov[0, 0] += added[k]
-        for i in range(n):
-            if params.std[i] > 0.0:
-                f = np.exp(-(time[k] - state.time) / params.time_constant[i])
-                keep[k, i] = f
-                x[i] *= f
-                cov[i, :] *= f
-                cov[:, i] *= f
-                cov[i, i] += params.std[i] ** 2 * (1.0 - f * f)
+        if added[k] > 0.0:
+            state = loosened(state, added[k])
+        x, cov, keep[k] = _faded(state, time[k], params)
         x_pred[k] = x
         cov_pred[k] = cov
-        before = DisturbanceState(x, cov, time[k], state.rows, state.log_likelihood)
-        state, _, taken = step(before, time[k], rows[k], y[k], noise_var[k], params)
-        if taken:
+        state, _, taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
+        if taken[k]:
             cov_row = cov @ rows[k]
             inverse[k] = 1.0 / (rows[k] @ cov_row + noise_var[k])
             gain[k] = cov_row * inverse[k]
@@ -210,4 +213,4 @@ def smooth(state, time, rows, y, noise_var, added, params):
             adjoint[i] *= keep[k, i]
             information[i, :] *= keep[k, i]
             information[:, i] *= keep[k, i]
-    return x_out, var_out
+    return x_out, var_out, taken
