@@ -10,9 +10,10 @@ import typer
 from weighbridge.cli.options import (
     DbcPaths,
     MappingPath,
+    ReportPath,
     load,
     mapping_for,
-    refuse_missing_folder,
+    refuse_results,
 )
 
 if TYPE_CHECKING:
@@ -42,10 +43,7 @@ def inertia(
         Optional[Path],  # noqa: UP045
         typer.Option("--track", help="Write the parameters over time: .csv or .parquet."),
     ] = None,
-    report: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--report", help="Write a self-contained HTML report."),
-    ] = None,
+    report: ReportPath = None,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
@@ -56,17 +54,12 @@ def inertia(
 
     Example: weighbridge inertia ride/ --vehicle truck.toml --report ride.html
     """
-    from weighbridge.errors import ConfigError
     from weighbridge.pipeline.inertia import estimate_inertia
     from weighbridge.vehicle.model import Vehicle
 
-    if track is not None and track.suffix.lower() not in (".csv", ".parquet"):
-        raise ConfigError(f"--track {track}: a track is written as .csv or .parquet")
-    outputs = (track, report, Path(json_path) if json_path and json_path != "-" else None)
-    refuse_missing_folder(*outputs)
-    for output in outputs:
-        if output is not None and output.resolve() in (drive.resolve(), vehicle.resolve()):
-            raise ConfigError(f"{output}: is an input; results must go to another file")
+    refuse_results(
+        [drive, vehicle], what="an input", track=track, report=report, json_path=json_path
+    )
     car = Vehicle.load(vehicle)
     found = estimate_inertia(load(drive, mapping_for(mapping, car, vehicle), dbc), car, method)
     if track is not None:

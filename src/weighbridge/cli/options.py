@@ -25,6 +25,10 @@ MappingPath = Annotated[
     Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
     typer.Option("--mapping", help="TOML that names foreign columns, units and signs."),
 ]
+ReportPath = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--report", help="Write a self-contained HTML report."),
+]
 DbcPaths = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(
@@ -56,6 +60,32 @@ def refuse_overwriting(path: Path, force: bool, what: str) -> None:
         raise ConfigError(
             f"{path}: exists already; name another {what}, or give --force to replace it"
         )
+
+
+def refuse_results(
+    inputs: list[Path],
+    *,
+    what: str,
+    track: Path | None,
+    report: Path | None,
+    json_path: str | None,
+) -> None:
+    """Raise before the work where a result could not be written, or would replace an input.
+
+    Parameters
+    ----------
+    inputs : files and folders that are read
+    what : they are, in a word or two
+    track, report, json_path : where results go; None, or - for standard output
+    """
+    if track is not None and track.suffix.lower() not in (".csv", ".parquet"):
+        raise ConfigError(f"--track {track}: a track is written as .csv or .parquet")
+    outputs = (track, report, Path(json_path) if json_path and json_path != "-" else None)
+    refuse_missing_folder(*outputs)
+    known = {path.resolve() for path in inputs}
+    for output in outputs:
+        if output is not None and output.resolve() in known:
+            raise ConfigError(f"{output}: is {what}; results must go to another file")
 
 
 def refuse_missing_folder(*outputs: Path | None) -> None:

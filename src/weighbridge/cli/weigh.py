@@ -12,9 +12,10 @@ from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
     MappingPath,
+    ReportPath,
     load,
     mapping_for,
-    refuse_missing_folder,
+    refuse_results,
 )
 
 if TYPE_CHECKING:
@@ -43,10 +44,7 @@ def weigh(
         Optional[Path],  # noqa: UP045
         typer.Option("--track", help="Write the mass over time: .csv or .parquet. One drive."),
     ] = None,
-    report: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--report", help="Write a self-contained HTML report."),
-    ] = None,
+    report: ReportPath = None,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
@@ -61,9 +59,7 @@ def weigh(
 
     if track is not None and len(drives) > 1:
         raise ConfigError("--track takes one drive; weigh them one by one, or use --json")
-    if track is not None and track.suffix.lower() not in (".csv", ".parquet"):
-        raise ConfigError(f"--track {track}: a track is written as .csv or .parquet")
-    _refuse_inputs(drives, track, report, json_path)
+    refuse_results(drives, what="a drive", track=track, report=report, json_path=json_path)
     car = Vehicle.load(vehicle)
     chosen = mapping_for(mapping, car, vehicle)
     weighed: list[Weighing] = []
@@ -105,19 +101,6 @@ def _weigh_one(
     from weighbridge.pipeline.weighing import weigh as weigh_drive
 
     return weigh_drive(load(path, mapping, dbc), car, method)
-
-
-def _refuse_inputs(
-    drives: list[Path], track: Path | None, report: Path | None, json_path: str | None
-) -> None:
-    from weighbridge.errors import ConfigError
-
-    inputs = {path.resolve() for path in drives}
-    outputs = (track, report, Path(json_path) if json_path and json_path != "-" else None)
-    refuse_missing_folder(*outputs)
-    for output in outputs:
-        if output is not None and Path(output).resolve() in inputs:
-            raise ConfigError(f"{output}: is a drive; results must go to another file")
 
 
 def _progress(drives: list[Path]) -> Any:

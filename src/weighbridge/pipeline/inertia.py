@@ -34,6 +34,7 @@ from weighbridge.estimators.suspension import (
 )
 from weighbridge.estimators.track import Status
 from weighbridge.pipeline.checks import check_drive
+from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.pipeline.ride_checks import (
     NEEDED,
     SLOWEST,
@@ -149,8 +150,7 @@ class Inertia:
         ConfigError
             The level is not between 0 and 1.
         """
-        if not 0.0 < level < 1.0:
-            raise ConfigError(f"level must be between 0 and 1, got {level}")
+        check_level(level)
         known = np.isfinite(self.values)
         relative = np.where(known, self._relative_std(), np.nan)
         return inverse_interval(self.values, np.ones(3), relative, level)
@@ -197,9 +197,9 @@ class Inertia:
         parts: dict[str, Any] = {}
         for k, name in enumerate(("sprung_mass_kg", "roll_inertia_kgm2", "pitch_inertia_kgm2")):
             stem, unit = name.rsplit("_", 1)
-            parts[name] = _number(self.values[k])
-            parts[f"{stem}_std_{unit}"] = _number(self.stds[k])
-            parts[f"{stem}_interval95_{unit}"] = [_number(low[k]), _number(high[k])]
+            parts[name] = number(self.values[k])
+            parts[f"{stem}_std_{unit}"] = number(self.stds[k])
+            parts[f"{stem}_interval95_{unit}"] = [number(low[k]), number(high[k])]
         return {
             "drive": self.drive.name,
             "vehicle": self.vehicle.name,
@@ -207,23 +207,23 @@ class Inertia:
             "status": str(self.status),
             "reason": self.reason,
             **parts,
-            "mass_kg": _number(self.mass),
-            "std_kg": _number(self.std),
-            "axle_load_front_kg": _number(front),
-            "axle_load_rear_kg": _number(rear),
-            "payload_kg": _number(self.payload),
-            "duration_s": _number(self.drive.duration),
-            "converged_at_s": _number(self.converged_at),
+            "mass_kg": number(self.mass),
+            "std_kg": number(self.std),
+            "axle_load_front_kg": number(front),
+            "axle_load_rear_kg": number(rear),
+            "payload_kg": number(self.payload),
+            "duration_s": number(self.drive.duration),
+            "converged_at_s": number(self.converged_at),
             "segments": [
                 {
-                    "start_s": _number(s.start),
-                    "end_s": _number(s.end),
-                    "sprung_mass_kg": _number(s.values[0]),
-                    "sprung_mass_std_kg": _number(s.stds[0]),
-                    "roll_inertia_kgm2": _number(s.values[1]),
-                    "roll_inertia_std_kgm2": _number(s.stds[1]),
-                    "pitch_inertia_kgm2": _number(s.values[2]),
-                    "pitch_inertia_std_kgm2": _number(s.stds[2]),
+                    "start_s": number(s.start),
+                    "end_s": number(s.end),
+                    "sprung_mass_kg": number(s.values[0]),
+                    "sprung_mass_std_kg": number(s.stds[0]),
+                    "roll_inertia_kgm2": number(s.values[1]),
+                    "roll_inertia_std_kgm2": number(s.stds[1]),
+                    "pitch_inertia_kgm2": number(s.values[2]),
+                    "pitch_inertia_std_kgm2": number(s.stds[2]),
                 }
                 for s in (self.segments if self.status is Status.CONVERGED else ())
             ],
@@ -258,14 +258,7 @@ class Inertia:
         ConfigError
             The suffix is neither.
         """
-        path = Path(path)
-        match path.suffix.lower():
-            case ".csv":
-                self.table.write_csv(path)
-            case ".parquet":
-                self.table.write_parquet(path)
-            case _:
-                raise ConfigError(f"{path}: a track is written as .csv or .parquet")
+        write_track(self.table, path)
 
     def report(self, path: str | Path) -> None:
         """Write a self-contained HTML report that opens offline."""
@@ -523,7 +516,3 @@ def _segments(
             )
         )
     return tuple(found)
-
-
-def _number(value: float) -> float | None:
-    return round(float(value), 6) if math.isfinite(value) else None

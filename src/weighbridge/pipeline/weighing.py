@@ -18,6 +18,7 @@ from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
 from weighbridge.navigation.select import find_motion
+from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import SIGNALS
@@ -80,8 +81,7 @@ class Weighing:
         ConfigError
             The level is not between 0 and 1.
         """
-        if not 0.0 < level < 1.0:
-            raise ConfigError(f"level must be between 0 and 1, got {level}")
+        check_level(level)
         if self.result is None or not math.isfinite(self.mass):
             return math.nan, math.nan
         reach = float(student.ppf(0.5 + 0.5 * level, self.result.degrees_of_freedom)) * self.std
@@ -144,20 +144,20 @@ class Weighing:
             "method": self.method,
             "status": str(self.status),
             "reason": self.reason,
-            "mass_kg": _number(self.mass),
-            "std_kg": _number(self.std),
-            "interval95_kg": [_number(low), _number(high)],
-            "payload_kg": _number(self.payload),
-            "duration_s": _number(self.drive.duration),
-            "used_s": _number(self.used_time),
-            "converged_at_s": _number(self.converged_at),
-            "bound_std_kg": _number(r.bound_std) if r else None,
+            "mass_kg": number(self.mass),
+            "std_kg": number(self.std),
+            "interval95_kg": [number(low), number(high)],
+            "payload_kg": number(self.payload),
+            "duration_s": number(self.drive.duration),
+            "used_s": number(self.used_time),
+            "converged_at_s": number(self.converged_at),
+            "bound_std_kg": number(r.bound_std) if r else None,
             "segments": [
                 {
-                    "start_s": _number(s.start),
-                    "end_s": _number(s.end),
-                    "mass_kg": _number(s.mass),
-                    "std_kg": _number(s.std),
+                    "start_s": number(s.start),
+                    "end_s": number(s.end),
+                    "mass_kg": number(s.mass),
+                    "std_kg": number(s.std),
                 }
                 for s in self.segments
             ],
@@ -176,13 +176,7 @@ class Weighing:
         ConfigError
             The suffix is neither.
         """
-        path = Path(path)
-        if path.suffix.lower() == ".csv":
-            self.track.write_csv(path)
-        elif path.suffix.lower() == ".parquet":
-            self.track.write_parquet(path)
-        else:
-            raise ConfigError(f"{path}: a track is written as .csv or .parquet")
+        write_track(self.track, path)
 
     def report(self, path: str | Path) -> None:
         """Write a self-contained HTML report that opens offline."""
@@ -389,7 +383,3 @@ def no_speed(drive: Drive) -> str:
     if any(drive.has(name) for name in SPEEDS):
         return ""
     return f"the drive has no {' and no '.join(SPEEDS)}, of which this method needs one"
-
-
-def _number(value: float) -> float | None:
-    return round(float(value), 6) if math.isfinite(value) else None
