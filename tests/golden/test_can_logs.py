@@ -83,9 +83,33 @@ def test_files_of_one_drive_are_joined_by_time(tmp_path):
         assert_array_equal(joined.signals[name].values, whole.signals[name].values)
 
 
-def test_the_same_frames_twice_are_refused():
+def test_pieces_whose_dates_are_rounded_are_joined(tmp_path):
+    # The second piece begins at a date cut to whole milliseconds: 0.4 ms too early.
+    for name, start, first in (("a", "12:26:40.0", 0), ("b", "12:26:44.999", 50)):
+        lines = [
+            f" {0.1 * k:.6f} 1  7E8             Rx   d 8 03 41 0D {first + k:02X} 00 00 00 00\n"
+            for k in range(50)
+        ]
+        lines.append(
+            f" 4.999400 1  7E8             Rx   d 8 03 41 0D {first + 49:02X} 00 00 00 00\n"
+        )
+        head = f"date Sun Sep 13 {start} 2020\nbase hex  timestamps absolute\n"
+        (tmp_path / f"{name}.asc").write_text(head + "".join(lines))
+    drive = read_drive(tmp_path)
+    speed = drive.signals["vehicle_speed"]
+    assert len(speed) == 102
+    assert np.all(np.diff(speed.time) > 0.0)
+    assert speed.values[-1] == pytest.approx(99 / 3.6)
+
+
+def test_the_same_frames_twice_are_refused(tmp_path):
     with pytest.raises(DriveError, match="same frames at the same time"):
         read_drive([HERE / "can.asc", HERE / "can.blf"])
+    # A piece shorter than dates may be off by is no rounding where it lies inside another.
+    lines = (HERE / "can.log").read_text().splitlines(keepends=True)
+    (tmp_path / "piece.log").write_text("".join(lines[20:26]))
+    with pytest.raises(DriveError, match="same frames at the same time"):
+        read_drive([HERE / "can.log", tmp_path / "piece.log"])
 
 
 def test_unknown_identifiers_only_give_one_sentence(tmp_path):

@@ -63,6 +63,49 @@ def test_canonical_names_in_a_dbc_need_no_mapping(tmp_path):
     assert_allclose(done.signals["engine_speed"].values, 900 * np.pi / 30)
 
 
+def test_mapping_without_its_dbc_is_told():
+    mapping = load_mapping({"signals": {"accel_x": {"column": "AccX", "unit": "mps2"}}})[0]
+    done = decode(obd_speed(20, 0.5), "x.log", mapping, ())
+    assert list(done.signals) == ["vehicle_speed"]
+    (problem,) = done.lacking
+    assert problem.signal == "accel_x"
+    assert problem.serious
+    assert "give it with --dbc" in problem.text
+
+
+@pytest.mark.parametrize(
+    ("bus", "told"),
+    [
+        ("", "message M of test.dbc is not in the log)"),
+        ("2:", "none of the 2 messages of test.dbc is in the log on bus 2; they are on another"),
+    ],
+)
+def test_why_a_signal_of_a_dbc_is_not_there(tmp_path, bus, told):
+    signal = ' SG_ S : 0|8@1+ (1,0) [0|0] "km/h" X'
+    path = write(tmp_path, f"BO_ 16 M: 8 X\n{signal}", "BO_ 17 Other: 8 X")
+    mapping = load_mapping({"signals": {"vehicle_speed": {"column": "S"}}})[0]
+    frames = join_frames([obd_speed(20, 0.5), make(np.arange(9.0), 0x11, channel=1)])
+    done = decode(frames, "x.log", mapping, load_dbcs([f"{bus}{path}"]))
+    assert told.replace("test.dbc", path.name) in done.lacking[0].text
+    assert ("give it as 1:" in done.lacking[0].text) == bool(bus)
+
+
+def test_dbc_of_another_vehicle_is_told(tmp_path):
+    path = write(tmp_path, 'BO_ 18 M: 8 X\n SG_ S : 0|8@1+ (1,0) [0|0] "km/h" X')
+    mapping = load_mapping({"signals": {"gnss_speed": {"column": "S"}}})[0]
+    done = decode(obd_speed(20, 0.5), "x.log", mapping, load_dbcs([f"1:{path}"]))
+    assert "the DBC of another vehicle" in done.lacking[0].text
+    assert "the DBC of another vehicle" in done.problems[0].text
+
+
+def test_dbc_without_a_mapping_names_what_it_has(tmp_path):
+    path = write(tmp_path, 'BO_ 16 M: 8 X\n SG_ Speedy : 0|8@1+ (1,0) [0|0] "km/h" X')
+    frames = join_frames([obd_speed(20, 0.5), make(np.arange(9.0), 0x10)])
+    done = decode(frames, "x.log", None, load_dbcs([path]))
+    assert "name those wanted in a mapping" in done.problems[0].text
+    assert any(line.endswith("not used: M (9): Speedy") for line in done.contents)
+
+
 def test_nothing_known_and_nothing_at_all_are_told():
     with pytest.raises(DriveError, match=r"holds 3 frames: CAN 1 123 \(3\); they are neither"):
         decode(make(np.arange(3.0), 0x123), "x.log", None, ())

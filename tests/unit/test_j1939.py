@@ -133,8 +133,28 @@ def test_any_brake_marks_the_sample():
         (4.0, 0x18F0000F, "FF 7D FF FF FF FF FF FF"),
     ]
     brake = signals(*rows)["brake_switch"]
-    assert_array_equal(brake.time, [0, 1, 2, 3, 4])
-    assert_array_equal(brake.values, [0, 0, 1, 1, 0])
+    assert_array_equal(brake.held(np.arange(5.0)), [0, 0, 1, 1, 0])
+
+
+def test_brakes_told_by_several_in_one_breath_are_a_clock_without_gaps():
+    on = np.array([30, 31, 32, 70])  # the retarder alone, from frame to frame
+    rows = []
+    for k in range(100):
+        retarder = "4B" if k in on else "7D"
+        rows += [
+            (0.1 * k, 0x18FEF100, "FF FF FF 00 FF FF FF FF"),
+            (0.1 * k + 0.001, 0x18F0010B, "C0 00 FF FF FF FF FF FF"),
+            (0.1 * k + 0.002, 0x18F0000F, f"FF {retarder} FF FF FF FF FF FF"),
+        ]
+    # The first two fall silent, the retarder goes on.
+    rows += [(10.0 + 0.1 * k, 0x18F0000F, "FF 7D FF FF FF FF FF FF") for k in range(50)]
+    brake = signals(*rows)["brake_switch"]
+    steps = np.diff(brake.time)
+    assert_allclose(np.median(steps), 0.1, rtol=0.05)
+    assert steps.max() < 0.3
+    assert_allclose(brake.time[-1], 14.9)
+    told = np.isin(np.arange(100), on).astype(float)
+    assert_array_equal(brake.held(0.1 * np.arange(100) + 0.003), told)
 
 
 def test_the_sender_with_most_values_is_taken():

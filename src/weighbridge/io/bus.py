@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -74,6 +74,13 @@ def decode(
     )
     if databases:
         used |= _databases(frames, name, mapping, databases, done)
+    elif mapping is not None:
+        hint = "; without a DBC nothing in frames has a name: give it with --dbc"
+        done.lacking += [
+            lacking(f"{name}: in its frames", s, mapping.source, hint)
+            for s in mapping.signals
+            if not s.optional
+        ]
     obd = decode_obd(frames, name)
     used |= obd.used
     done.contents += obd.contents
@@ -175,18 +182,13 @@ def _databases(
     """Decode what the mapping names, or what has canonical names; mark the frames used."""
     used = np.zeros(len(frames), dtype=bool)
     carried = [message_frames(frames, d) for d in databases]
-    for d, found in zip(databases, carried, strict=True):
-        if not found:
-            bus = "" if d.channel is None else f" on bus {d.channel}"
-            done.problems.append(
-                Problem(
-                    "",
-                    f"{name}: none of the {len(d.messages)} messages of {d.path.name} is in the "
-                    f"log{bus}; it may be the DBC of another vehicle",
-                )
-            )
+    done.problems += [
+        Problem("", f"{name}: {_absent(frames, d)}")
+        for d, found in zip(databases, carried, strict=True)
+        if not found
+    ]
     wanted = (
-        _mapped(name, mapping, databases, carried, done)
+        _mapped(frames, name, mapping, databases, carried, done)
         if mapping is not None
         else _canonical(databases, carried)
     )
@@ -225,20 +227,61 @@ def _databases(
         done.signals.update({s.name: s for s in signals})
     for d, found in zip(databases, carried, strict=True):
         read = [f"{m} ({at.size}): {', '.join(taken[m])}" for m, at in found.items() if m in taken]
-        skipped = [f"{m} ({at.size})" for m, at in found.items() if m not in taken]
+        skipped = [m for m in found if m not in taken]
         if read:
             done.contents.append(f"{d.path.name}: {'; '.join(read)}")
         if skipped:
-            done.contents.append(f"{d.path.name}, not used: {', '.join(skipped)}")
+            named = {m.name: ", ".join(s.name for s in m.signals[:_NAMED]) for m in d.messages}
+            told = "; ".join(f"{m} ({found[m].size}): {named[m]}" for m in skipped[:_NAMED])
+            more = f" and {len(skipped) - _NAMED} more" if len(skipped) > _NAMED else ""
+            done.contents.append(f"{d.path.name}, not used: {told}{more}")
             for m in skipped:
-                used[found[m.rpartition(" (")[0]]] = True
+                used[found[m]] = True
+    if mapping is None and any(carried) and not wanted:
+        done.problems.append(
+            Problem(
+                "",
+                f"{name}: no signal of {' and '.join(d.path.name for d in databases)} has a "
+                "canonical name; name those wanted in a mapping, such as "
+                '[signals.vehicle_speed] column = "Speed"',
+            )
+        )
     return used
+
+
+def _absent(frames: Frames, database: Database) -> str:
+    """Say that no frame is a message of a database; name the buses that carry them."""
+    none = f"none of the {len(database.messages)} messages of {database.path.name} is in the log"
+    if database.channel is None:
+        return f"{none}; it may be the DBC of another vehicle"
+    anywhere = message_frames(frames, replace(database, channel=None))
+    buses = {int(c) for at in anywhere.values() for c in np.unique(frames.channel[at])}
+    if not buses:
+        return f"{none}; it may be the DBC of another vehicle"
+    remedy = " or ".join(f"{b}:{database.path.name}" for b in sorted(buses))
+    return f"{none} on bus {database.channel}; they are on another: give it as {remedy}"
+
+
+def _why_absent(frames: Frames, signal: MappedSignal, databases: Sequence[Database]) -> str:
+    """Say why no frame has a signal: its message is not in the log, or no DBC has it."""
+    for d in databases:
+        everything = {m.name: np.zeros(0, np.intp) for m in d.messages}
+        known = find_signal(signal.column, [d], [everything])
+        if known:
+            why = (
+                f"message {known[0].message.name} of {d.path.name} is not in the log"
+                if message_frames(frames, d)
+                else _absent(frames, d)
+            )
+            return f" ({why})"
+    return "; check the name in the DBC"
 
 
 _Wanted = dict[str, tuple[Found, str, MappedSignal | None]]
 
 
 def _mapped(
+    frames: Frames,
     name: str,
     mapping: TableMapping,
     databases: Sequence[Database],
@@ -250,11 +293,8 @@ def _mapped(
         found = find_signal(s.column, databases, carried)
         if not found:
             if not s.optional:
-                done.lacking.append(
-                    lacking(
-                        f"{name}: in its frames", s, mapping.source, "; check the name in the DBC"
-                    )
-                )
+                hint = _why_absent(frames, s, databases)
+                done.lacking.append(lacking(f"{name}: in its frames", s, mapping.source, hint))
             continue
         if len(found) > 1:
             names = ", ".join(f"{f.message.name}.{f.signal.name}" for f in found)

@@ -80,31 +80,42 @@ class Frames:
         )
 
 
-def in_order(parts: Sequence[Frames]) -> Frames:
-    """Frames one part after another, as they were written."""
-    parts = [p for p in parts if len(p)]
+def in_order(parts: list[Frames]) -> Frames:
+    """Frames one part after another, as they were written.
+
+    The list is emptied meanwhile: an hour of a busy bus does not fit into memory twice.
+    """
+    parts[:] = [p for p in reversed(parts) if len(p)]
     if not parts:
         return Frames.empty()
     if len(parts) == 1:
-        return parts[0]
-    data = np.zeros((sum(map(len, parts)), max(p.data.shape[1] for p in parts)), np.uint8)
-    at = 0
-    for p in parts:
-        data[at : at + len(p), : p.data.shape[1]] = p.data
-        at += len(p)
-    return Frames(
-        np.concatenate([p.time for p in parts]),
-        np.concatenate([p.channel for p in parts]),
-        np.concatenate([p.id for p in parts]),
-        np.concatenate([p.extended for p in parts]),
-        np.concatenate([p.length for p in parts]),
-        data,
+        return parts.pop()
+    count = sum(map(len, parts))
+    joined = Frames(
+        np.empty(count),
+        np.empty(count, np.int16),
+        np.empty(count, np.uint32),
+        np.empty(count, np.bool_),
+        np.empty(count, np.uint8),
+        np.zeros((count, max(p.data.shape[1] for p in parts)), np.uint8),
     )
+    at = 0
+    while parts:
+        part = parts.pop()
+        rows = slice(at, at + len(part))
+        joined.time[rows] = part.time
+        joined.channel[rows] = part.channel
+        joined.id[rows] = part.id
+        joined.extended[rows] = part.extended
+        joined.length[rows] = part.length
+        joined.data[rows, : part.data.shape[1]] = part.data
+        at = rows.stop
+    return joined
 
 
 def join_frames(parts: Sequence[Frames]) -> Frames:
     """Frames of several logs or buses as one, in the order of time."""
-    joined = in_order(parts)
+    joined = in_order(list(parts))
     if np.all(joined.time[1:] >= joined.time[:-1]):
         return joined
     return joined.select(np.argsort(joined.time, kind="stable"))

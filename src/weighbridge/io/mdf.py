@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import io
+import logging
 import sys
 import tempfile
 import warnings
@@ -83,13 +84,20 @@ def _told(log: Log, saved: Salvaged) -> str:
 
 def _open(opener: Any, path: Path, saved: Salvaged | None, folder: str) -> Any:
     """Open the file; what the library raises for a broken one becomes one sentence."""
+    # The library tells of damage with a traceback of its own, beside raising or not.
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)
     hook = sys.unraisablehook
     # A half-opened file complains on standard error once more when it is collected.
     sys.unraisablehook = lambda _: None
     reason = ""
     try:
         with redirect_stdout(io.StringIO()):
-            return opener(path if saved is None else io.BytesIO(saved.raw), temporary_folder=folder)
+            return opener(
+                path if saved is None else io.BytesIO(saved.raw),
+                temporary_folder=folder,
+                # Frames are sorted by identifier there, which takes long and is not used here.
+                process_bus_logging=False,
+            )
     # The library's errors are of many kinds, down to struct.error.
     except Exception as e:
         reason = _first_line(e)

@@ -37,10 +37,9 @@ def bus_frames(file: Any) -> Frames:
                 if found.samples.dtype.names:
                     parts.append(_frames(found.timestamps, found.samples))
                 break
-    if len(parts) < 2:
-        return in_order(parts)
+    several = len(parts) > 1
     joined = in_order(parts)
-    return joined.select(np.argsort(joined.time, kind="stable"))
+    return joined.select(np.argsort(joined.time, kind="stable")) if several else joined
 
 
 def _frames(time: NDArray[np.float64], samples: Any) -> Frames:

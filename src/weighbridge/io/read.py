@@ -96,6 +96,9 @@ READERS: Final[dict[str, Reader]] = {
 SELF_DESCRIBED: Final = frozenset({".nmea", ".ubx", ".gpx", ".vbo", ".blf", ".asc", ".trc", ".log"})
 """Formats that name their quantities and units themselves: a mapping need not know them."""
 
+# The dates that logs of one recording begin with are rounded, to a second in some ASC [s].
+_ROUNDING: Final = 1.0
+
 TRUTH_NAME: Final = "truth"
 """Table of a simulated drive's truth: never read as a signal."""
 
@@ -319,7 +322,7 @@ def _decode_frames(
         parts.append((log, frames))
     parts.sort(key=lambda p: float(p[1].time[0]) if len(p[1]) else 0.0)
     for (log_a, a), (log_b, b) in pairwise(parts):
-        if len(a) and len(b) and b.time[0] <= a.time[-1] and set(a.counts()) & set(b.counts()):
+        if _overlap(a, b) > _ROUNDING and set(a.counts()) & set(b.counts()):
             raise DriveError(
                 f"{log_a.path} and {log_b.path} hold the same frames at the same time; read them "
                 "as drives of their own, or leave one out"
@@ -350,6 +353,15 @@ def _decode_frames(
         else:
             first.signals.append(signal)
     return tuple(found.contents)
+
+
+def _overlap(a: Frames, b: Frames) -> float:
+    """How long both of two recordings ran, the earlier one first; 0 where one is too short [s]."""
+    if not (len(a) and len(b)):
+        return 0.0
+    both = float(min(a.time[-1], b.time[-1]) - b.time[0])
+    span = float(min(a.time[-1] - a.time[0], b.time[-1] - b.time[0]))
+    return math.inf if 0.0 <= 0.5 * span < both else both
 
 
 def _joined(
