@@ -22,7 +22,7 @@ from weighbridge.estimators.speed_ekf import (
 from weighbridge.navigation.speed import speed_motion
 from weighbridge.pipeline.speed_calibrating import nominal_of
 from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Driveline, SpeedModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, SpeedModel, Vehicle
 
 NOMINAL = Nominal(force_gain=19.83, drag=0.918, rolling_coefficient=0.01, rotating_mass=71.0)
 SPEED_EKF = wb.CalibrationSettings(method="speed-ekf")
@@ -239,6 +239,15 @@ def test_calibration_keeps_the_rest_of_the_vehicle():
     assert (made.name, made.tare, made.driveline) == ("mine", 1000.0, base.driveline)
     assert made.speed_model.mass == 1092.0
     assert nominal_of(base).force_gain == 20.0
+
+
+def test_a_file_says_what_was_fitted_unless_torque_was_fitted_before():
+    made = wb.calibrate(drive(1), mass=1092.0, settings=SPEED_EKF)
+    assert made.provenance.method == "speed-ekf"
+    before = Provenance(drives=("a",), masses=(1000.0,), method="joint", mass_scale_std=0.01)
+    base = Vehicle(driveline=Driveline(gearings=(30.0, 20.0)), provenance=before)
+    both = wb.calibrate(drive(1), mass=1092.0, vehicle=base, settings=SPEED_EKF)
+    assert both.provenance == before
 
 
 @pytest.mark.parametrize(

@@ -146,8 +146,9 @@ def calibrate_by_speed(
             drives=tuple(drive.name for drive in drives),
             masses=tuple(masses),
             date=datetime.date.today().isoformat(),
+            method="speed-ekf",
             mass_scale_std=base.provenance.mass_scale_std,
-            notes="calibrated for method speed-ekf alone",
+            notes="speed model alone: nothing of torque or road load was fitted",
         )
         vehicle = replace(vehicle, provenance=made)
     return SpeedCalibration(vehicle=vehicle, fit=fit, rows=rows)

@@ -17,6 +17,7 @@ from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
+from weighbridge.estimators.judging import UNCALIBRATED_STD
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
@@ -308,9 +309,12 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
             delay = 0.0
             notes += ("the drive does not show how late its torque is; taken as 0 s",)
     if vehicle.provenance.mass_scale_std is None:
+        by_speed = vehicle.provenance.method == "speed-ekf"
+        made = "calibrated for speed-ekf alone" if by_speed else "not made by a calibration"
         notes += (
-            f"the vehicle file of {vehicle.name} was not made by a calibration: errors of its "
-            "torque, efficiency and road load are not in the interval",
+            f"the vehicle file of {vehicle.name} was {made}: for errors of its torque, efficiency "
+            f"and road load {100.0 * UNCALIBRATED_STD:.0f} % of the mass, as standard deviation, "
+            "are in the interval",
         )
     return force_balance(drive, vehicle, motion, delay=delay), notes
 
@@ -367,6 +371,11 @@ def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
         missing.append("engine_speed")
     if not missing:
         return ""
+    if vehicle.provenance.method == "speed-ekf" and not vehicle.driveline.gearings:
+        return (
+            f"the vehicle file of {vehicle.name} was calibrated for speed-ekf alone and knows "
+            "neither gears nor torque: calibrate without --method speed-ekf to weigh by torque"
+        )
     names = " and ".join(dict.fromkeys(missing))
     sentence = f"the drive has no {names}, which torque source {source!r} needs"
     others = [s for s, needed in SIGNALS.items() if s != source and drive.has(*needed)]

@@ -256,7 +256,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             _Key("r_squared", "r_squared", "of the torque fit"),
             _Key("residual_std", "residual_std", "of the torque fit", suffix="nm"),
             _Key("samples", "samples", "used by the fit", "count"),
-            _Key("method", "method", "joint or rls: estimator the torque was fitted for", "text"),
+            _Key("method", "method", "what was fitted: joint, rls or speed-ekf", "text"),
             _Key(
                 "mass_scale_std",
                 "mass_scale_std",

@@ -380,7 +380,8 @@ class Provenance:
     r_squared : of the torque fit [-]
     residual_std : of the torque fit [N m]
     samples : samples used
-    method : estimator the torque was fitted for, "joint" or "rls"; None where it was not
+    method : what the drives were fitted for: the torque of "joint" or "rls", or the speed
+        model of "speed-ekf" alone; None where nothing was
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
     notes : free text
@@ -398,8 +399,8 @@ class Provenance:
 
     def __post_init__(self) -> None:
         _not_negative("mass_scale_std", self.mass_scale_std)
-        if self.method not in (None, "joint", "rls"):
-            raise ConfigError(f"method must be joint or rls, got {self.method!r}")
+        if self.method not in (None, "joint", "rls", "speed-ekf"):
+            raise ConfigError(f"method must be joint, rls or speed-ekf, got {self.method!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
