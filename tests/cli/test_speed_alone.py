@@ -57,15 +57,20 @@ def test_speed_alone_is_weighed_and_says_why_there_is_no_mass(weighbridge, car, 
     assert (said["status"], said["mass_kg"]) == ("not_excited", None)
     assert "the mass that the filter was started from (1092 kg" in said["reason"]
     assert said["used_s"] > 900.0
-    assert "No road grade" in report.read_text(encoding="utf-8")
+    page = report.read_text(encoding="utf-8")
+    assert "No road grade" in page
+    assert "No drive helps, however long or hilly" in page
+    assert "firm accelerations" not in page
     running = pl.read_csv(track)["mass_kg"].drop_nulls().to_numpy()
     assert running[-1] == pytest.approx(1092.0, rel=0.02)
 
 
 def test_other_methods_still_ask_for_torque(weighbridge, car, alone):
-    done = weighbridge("weigh", alone, "--vehicle", car, "--method", "rls")
-    assert done.code == 1
-    assert "engine_torque" in done.out
+    assert 'method = "speed-ekf"' in car.read_text(encoding="utf-8")
+    for method in ("rls", "ekf"):
+        done = weighbridge("weigh", alone, "--vehicle", car, "--method", method)
+        assert done.code == 1
+        assert "was calibrated for speed-ekf alone and knows neither gears nor torque" in done.out
 
 
 def test_vehicle_without_a_speed_model(weighbridge, alone, tmp_path):
@@ -100,3 +105,10 @@ def test_inspect_lists_the_way_and_promises_no_mass(weighbridge, alone):
     assert "No way to weigh by this drive" in done.out
     assert "speed-ekf" in done.out
     assert "no mass" in done.out
+
+
+def test_inspect_expects_no_mass_of_speed_alone(weighbridge, alone):
+    done = weighbridge("inspect", alone)
+    way = next(line for line in done.out.splitlines() if "speed-ekf" in line)
+    assert "none" in way
+    assert "±" not in way

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from weighbridge.pipeline.inspection import Inspection
+    from weighbridge.pipeline.inspection import Inspection, Way
 
 # Width of tables where no terminal gives one.
 _WIDTH = 140
@@ -124,8 +124,14 @@ def _way_table(found: Inspection, every_way: bool) -> Table:
         mark = " (weigh goes this way)" if w.chosen else ""
         table.add_row(
             w.name + mark,
-            f"± {w.accuracy}" if w.possible else "",
+            _expected(w),
             w.because if w.possible else "",
             ", ".join(w.needs),
         )
     return table
+
+
+def _expected(way: Way) -> str:
+    if not way.possible:
+        return ""
+    return way.accuracy if way.torque == "speed" else f"± {way.accuracy}"

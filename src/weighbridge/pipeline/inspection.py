@@ -12,7 +12,6 @@ from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.navigation.select import IMU_SIGNALS
 from weighbridge.pipeline.checks import check_drive
-from weighbridge.pipeline.speed_calibrating import SCALE_STD
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import TorqueSource, Vehicle
@@ -71,7 +70,7 @@ class Way:
         "speed" where it is taken as proportional to the speed
     possible : whether nothing is missing
     needs : what is missing
-    accuracy : what to expect of the mass after a calibration
+    accuracy : what to expect of the mass after a calibration, "none" where no mass comes of it
     because : what limits it
     chosen : the way `weigh` would go with the vehicle file given
     """
@@ -251,7 +250,7 @@ def _by_speed_alone(drive: Drive) -> Way:
         torque="speed",
         possible=not needs,
         needs=needs,
-        accuracy=f"{100.0 * SCALE_STD:.0f} %",
+        accuracy="none",
         because="no mass: speed gives back that of the calibration",
     )
 

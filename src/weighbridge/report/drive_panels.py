@@ -8,7 +8,7 @@ import numpy as np
 import pymap3d
 
 from weighbridge.balance import Reason
-from weighbridge.estimators import MassTrack, Status
+from weighbridge.estimators import SPEED_ALONE, MassTrack, Status
 from weighbridge.estimators.rls import regression
 from weighbridge.report.style import (
     AXIS,
@@ -194,7 +194,10 @@ def residual_panel(weighing: Weighing, result: MassTrack) -> Panel:
         )
     speed = from_si(result.balance.merged.speed, "kmh")
     index = spread(rows)
-    figure = blank("Speed [km/h]", "Measured less modelled force [N]")
+    alone = weighing.method in SPEED_ALONE
+    figure = blank(
+        "Speed [km/h]", "Innovation times mass [N]" if alone else "Measured less modelled force [N]"
+    )
     dots(figure, single(speed[index]), single(result.residual[index]), "used samples", BLUE)
     bins = (speed[rows] // 10.0).astype(np.int64)
     centres, medians = [], []
@@ -210,7 +213,10 @@ def residual_panel(weighing: Weighing, result: MassTrack) -> Panel:
         )  # fmt: skip
     return Panel(
         title="The residual should not depend on speed",
-        caption="A median that leaves zero at high speed points to air drag or wind, at low "
+        caption="The change of speed that the filter did not expect, as a force; it is not a "
+        "measured one, and says how well the speed model tells the next sample."
+        if alone
+        else "A median that leaves zero at high speed points to air drag or wind, at low "
         "speed to torque or rolling resistance.",
         figure=figure,
     )

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 from plotly.offline import get_plotlyjs
 
 from weighbridge.errors import ConfigError
-from weighbridge.estimators import Status
+from weighbridge.estimators import SPEED_ALONE, Status
 from weighbridge.report.calibration_panels import calibration_facts, calibration_panels
 from weighbridge.report.drive_panels import drive_panels
 from weighbridge.report.style import Panel
@@ -46,6 +46,19 @@ REMEDY_TEXT: Final[dict[Status, str]] = {
     Status.MISSING_SIGNALS: "Record the missing signals, or use a vehicle file whose torque source "
     "the drive has; weighbridge inspect lists what is there and what it allows.",
 }
+
+SPEED_REMEDY_TEXT: Final[dict[Status, str]] = {
+    Status.CONVERGED: "",
+    Status.NOT_EXCITED: "No drive helps, however long or hilly: with torque in proportion to "
+    "speed, force and mass drop out together, and the mass of the calibration comes back. "
+    "Record torque or engine load beside the speed, calibrate and weigh with method joint.",
+    Status.INCONSISTENT: "The speeds of this drive are not like those of the calibration. Check "
+    "the unit of the speed and whether the vehicle file belongs to this vehicle; for a mass, "
+    "record torque or engine load.",
+    Status.MISSING_SIGNALS: "Record the speed of the vehicle or of GNSS; weighbridge inspect lists "
+    "what is there and what it allows.",
+}
+"""The same where speed alone was weighed by."""
 
 
 class Page:
@@ -217,8 +230,13 @@ def _answer(weighing: Weighing, known: float | None) -> str:
     return (
         f'<p class="answer bad">{escape(_upper(STATUS_TEXT[weighing.status]))}</p>'
         f'<p class="why">{escape(reason)}</p>'
-        f'<p class="why">{escape(REMEDY_TEXT[weighing.status])}</p>'
+        f'<p class="why">{escape(_remedy(weighing))}</p>'
     )
+
+
+def _remedy(weighing: Weighing) -> str:
+    texts = SPEED_REMEDY_TEXT if weighing.method in SPEED_ALONE else REMEDY_TEXT
+    return texts[weighing.status]
 
 
 def _facts(weighing: Weighing, known: float | None) -> str:
