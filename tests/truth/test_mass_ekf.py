@@ -210,7 +210,7 @@ def test_a_change_of_load_at_a_stop_is_followed():
 def hybrid_params():
     return hybrid_mass.HybridParams(
         rls=robust_rls.RobustRlsParams(
-            0.5, 0.02, 0.8, 0.95, 20.0, 1.5, 100.0, 10, 0.03, 0.03, 10.0
+            0.5, 0.02, 0.8, 0.95, 20.0, 1.5, 100.0, 10, 0.03, 1.0, 0.03, 10.0
         ),
         ekf=PARAMS,
         first_information=2.0,

@@ -18,6 +18,7 @@ def params(**changed):
         "scale_windows": 100.0,
         "settle_windows": 10,
         "offset_std": 0.0,
+        "offset_forgetting": 1.0,
         "noise_floor": 1e-4,
         "dependence": 1.0,
     }
@@ -118,6 +119,21 @@ def test_the_offset_is_told_from_the_mass_and_held_by_its_prior():
     assert found.mass == pytest.approx(10_000.0, abs=40.0)
     assert found.offset == pytest.approx(400.0, abs=40.0)
     assert held.mass == pytest.approx(plain.mass, rel=1e-3)
+
+
+def test_an_offset_that_changes_is_forgotten():
+    time, phi, y = rows(6000, 11, noise=100.0)
+    y += np.where(time < 300.0, 400.0, -400.0)
+    chosen = {"offset_std": 0.1, "noise_floor": 0.005}
+    stale, fresh = (
+        robust_rls.run(
+            start(), time, phi, y, np.ones(6000, bool), params(offset_forgetting=kept, **chosen)
+        )[0]
+        for kept in (1.0, 0.98)
+    )
+    assert stale.offset > 0.0
+    assert fresh.offset == pytest.approx(-400.0, abs=80.0)
+    assert abs(fresh.mass - 10_000.0) < 0.3 * abs(stale.mass - 10_000.0)
 
 
 def test_with_an_offset_equals_ridge_regression():

@@ -31,7 +31,8 @@ class EkfSettings:
     speed_noise : error of the speed that stays for a second [m/s]
     grade_noise : error of the grade that stays for a second [rad]
     accel_walk : what unknown forces and torque errors do to the speed in one
-        second, over mass [m/s]
+        second, over mass [m/s]; an error of 0.03 m/s^2 that lasts 5 s is as much
+        as white noise of this level
     grade_walk : change of the road's slope in one second [rad]
     mass_walk, load_walk : change of the mass in one second, driving and
         standing, relative [-]
@@ -45,11 +46,11 @@ class EkfSettings:
     start_std: float = 0.3
     speed_noise: float = 0.01
     grade_noise: float = 0.004
-    accel_walk: float = 0.02
+    accel_walk: float = 0.1
     grade_walk: float = 0.003
     mass_walk: float = 0.0005
     load_walk: float = 0.01
-    grade_offset: float = 0.004
+    grade_offset: float = 0.003
     offset_walk: float = 1e-4
     gate: float = 5.0
 

@@ -14,7 +14,14 @@ from weighbridge.balance.averaging import PAUSE
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.judging import consider_std, converged_at, judge, nothing, segments
+from weighbridge.estimators.judging import (
+    UNMODELLED_STD,
+    consider_std,
+    converged_at,
+    judge,
+    nothing,
+    segments,
+)
 from weighbridge.estimators.rls import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
@@ -52,6 +59,8 @@ class RobustRlsSettings:
     offset_std : of an offset of the force over the mass, estimated beside it
         [m/s^2]: rolling resistance, zero of the accelerometer; 0 for the paper's
         single parameter
+    offset_memory : time of driving in which what was learnt of the offset falls to
+        1/e [s]: engine and tyres warm, the accelerometer drifts
     count_grade_twice : add the grade to the regressor although the specific
         force has it already, as eq. 14 of the paper is printed; to compare only
     """
@@ -62,10 +71,11 @@ class RobustRlsSettings:
     first_information: float = 1.0
     threshold: float = 1.5
     offset_std: float = 0.03
+    offset_memory: float = 100.0
     count_grade_twice: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("window", "memory", "first_information", "threshold"):
+        for name in ("window", "memory", "first_information", "threshold", "offset_memory"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise ConfigError(f"{name} must be a positive number, got {value}")
@@ -110,6 +120,7 @@ def parameters(settings: RobustRlsSettings, period: float) -> kernel.RobustRlsPa
         scale_windows=100.0,
         settle_windows=10,
         offset_std=settings.offset_std,
+        offset_forgetting=float(np.exp(-window / settings.offset_memory)),
         noise_floor=NOISE_FLOOR,
         dependence=max(1.0, DEPENDENCE / window),
     )
@@ -301,6 +312,8 @@ def finish(
     slow = consider_std(balance, phi, used, vehicle)
     std = float(np.hypot(scatter, mass * slow))
     status, why = judge(view, vehicle, used, mass, std, blocks)
+    # A running mass that forgets is that of a stretch of time.
+    passing = np.hypot(slow, UNMODELLED_STD)
 
     def part(chosen: slice) -> tuple[float, float]:
         time = view.time[chosen]
@@ -311,7 +324,7 @@ def finish(
         method=method,
         balance=balance,
         running_mass=running,
-        running_std=np.hypot(spread, running * slow),
+        running_std=np.hypot(spread, running * passing),
         residual=np.where(used, y - phi * mass, np.nan),
         reason=reason,
         mass=mass,

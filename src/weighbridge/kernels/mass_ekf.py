@@ -158,22 +158,24 @@ def fold(x, cov, part, measured, noise):
     measured, noise : float
         Value and variance of the noise.
     """
+    # Plain loops: matrix products of four rows would only take long to compile.
     n = x.size
-    shared = cov @ part
-    total = part @ shared + noise
-    residual = measured - part @ x
-    rest = np.eye(n)
+    shared = np.zeros(n)
+    spread, residual = 0.0, measured
+    for i in range(n):
+        for j in range(n):
+            shared[i] += cov[i, j] * part[j]
+        spread += part[i] * shared[i]
+        residual -= part[i] * x[i]
+    total = spread + noise
     for i in range(n):
         gain = shared[i] / total
         x[i] += gain * residual
-        for j in range(n):
-            rest[i, j] -= gain * part[j]
-    updated = rest @ cov @ rest.T
-    for i in range(n):
-        for j in range(n):
-            # Both halves the same, so that rounding leaves the matrix symmetric.
-            mean = 0.5 * (updated[i, j] + updated[j, i])
-            cov[i, j] = mean + shared[i] * shared[j] * noise / (total * total)
+        left = shared[i] - gain * spread
+        for j in range(i, n):
+            other = shared[j] / total
+            cov[i, j] += gain * other * noise - gain * shared[j] - left * other
+            cov[j, i] = cov[i, j]
 
 
 @kernel
@@ -230,9 +232,11 @@ def step(state, row, params):
         accel, by_speed, by_grade, by_mass = acceleration(x[SPEED], x[GRADE], x[MASS], held, params)
         x[SPEED] += accel * span
         # Only the first row of the transition differs from the unit matrix.
-        slope = np.array([1.0 + by_speed * span, by_grade * span, by_mass * span, 0.0])
-        first = slope @ cov
-        cov[SPEED, SPEED] = first @ slope + params.accel_walk * span
+        slope = (1.0 + by_speed * span, by_grade * span, by_mass * span)
+        first = slope[0] * cov[0] + slope[1] * cov[1] + slope[2] * cov[2]
+        cov[SPEED, SPEED] = (
+            slope[0] * first[0] + slope[1] * first[1] + slope[2] * first[2]
+        ) + params.accel_walk * span
         for i in range(1, 4):
             cov[SPEED, i] = first[i]
             cov[i, SPEED] = first[i]

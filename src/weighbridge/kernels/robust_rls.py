@@ -26,6 +26,8 @@ class RobustRlsParams(NamedTuple):
     settle_windows : windows before the threshold holds
     offset_std : standard deviation of the offset over the mass before the drive
         has told [m/s^2]; 0 for none, as the paper
+    offset_forgetting : weight kept by the past of the offset at each window, in
+        (0, 1] [-]
     noise_floor : standard deviation over the mass that a window has at least [m/s^2]
     dependence : windows whose error is the same
     """
@@ -39,6 +41,7 @@ class RobustRlsParams(NamedTuple):
     scale_windows: float
     settle_windows: int
     offset_std: float
+    offset_forgetting: float
     noise_floor: float
     dependence: float
 
@@ -122,9 +125,8 @@ def fold(state, phi, y, params):
     its inverse beyond. Here it enters the covariance too, as in Huber and
     Ronchetti, Robust Statistics, 2nd ed., 2009, ch. 7, and the threshold counts
     in standard deviations of the innovation, that of the estimate included: a
-    start from nothing is no outlier. The mass alone is forgotten, not the
-    offset (a forgetting factor for each: Vahidi et al., Vehicle System Dynamics
-    43, 2005).
+    start from nothing is no outlier. Mass and offset have a forgetting factor
+    each, as in Vahidi et al., Vehicle System Dynamics 43, 2005.
     """
     innovation = y - phi * state.mass - state.offset
     spread = 1.0 + phi * phi / mass_information(state, params)
@@ -147,8 +149,9 @@ def fold(state, phi, y, params):
     if keep * state.information < params.kept_information:
         keep = min(1.0, params.kept_information / state.information)
     information = keep * state.information + weight * phi * phi
-    sum_weighted = np.sqrt(keep) * state.sum_weighted + weight * phi
-    sum_weight = state.sum_weight + weight
+    stays = params.offset_forgetting
+    sum_weighted = np.sqrt(keep * stays) * state.sum_weighted + weight * phi
+    sum_weight = stays * state.sum_weight + weight
     mass, offset = state.mass, state.offset
     if params.offset_std <= 0.0:
         mass += weight * phi * innovation / information
