@@ -145,6 +145,22 @@ def test_weigh_writes_everything(weighbridge, car, loaded, tmp_path):
     assert f"{result['mass_kg']:.0f}" in outputs[".html"].read_text().replace(" ", "")
 
 
+def test_weigh_compares_every_method(weighbridge, car, loaded, tmp_path):
+    page = tmp_path / "out.html"
+    words = ("weigh", loaded.folder, "--vehicle", car, "--compare")
+    ran = weighbridge(*words, "--report", page)
+    assert ran.code == 0
+    rows = {line.split("│")[1].strip(): line for line in ran.out.splitlines() if "│" in line}
+    assert {"joint", "rls", "robust-rls", "ekf", "hybrid", "speed-ekf"} <= set(rows)
+    assert "converged" in rows["hybrid"]
+    assert "[speed_model]" in rows["speed-ekf"]
+    alone = json.loads(weighbridge(*words[:-1], "--method", "hybrid", "--json", "-").out)
+    assert f"{alone['mass_kg']:.0f}" in rows["hybrid"]
+    assert "All methods on this drive" in page.read_text(encoding="utf-8")
+    told = weighbridge(*words, "--json", "-").out.splitlines()
+    assert [json.loads(line)["method"] for line in told] == ["joint"]
+
+
 def test_one_broken_drive_of_two(weighbridge, car, loaded, tmp_path):
     broken = tmp_path / "broken"
     broken.mkdir()

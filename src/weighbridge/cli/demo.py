@@ -56,6 +56,7 @@ def demo(
         calibration=calibration,
         truth={w.drive.name: mass for w, mass in weighed},
         title="weighbridge demo: a simulated car, weighed three times",
+        comparisons=[w.compare() for w, _ in weighed],
     )
     typer.echo("told beside the recordings: the wind of the weather report")
     typer.echo(f"report: {output}")

@@ -45,6 +45,12 @@ def weigh(
         typer.Option("--track", help="Write the mass over time: .csv or .parquet. One drive."),
     ] = None,
     report: ReportPath = None,
+    compare: Annotated[
+        bool,
+        typer.Option(
+            "--compare", help="Weigh by every method; show them side by side, in the report too."
+        ),
+    ] = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
@@ -72,6 +78,7 @@ def weigh(
                 raise
             failed.append((path, str(error)))
 
+    compared = [w.compare() for w in weighed] if compare else []
     if track is not None:
         weighed[0].write_track(track)
     if report is not None:
@@ -79,7 +86,7 @@ def weigh(
 
         if not weighed:
             raise ConfigError(f"--report {report}: none of the drives could be read")
-        write_report(weighed, report)
+        write_report(weighed, report, comparisons=compared)
     lines = [w.to_json() for w in weighed] + [
         _failure(path, why, car, method) for path, why in failed
     ]
@@ -88,7 +95,7 @@ def weigh(
     else:
         if json_path is not None:
             Path(json_path).write_text("\n".join(lines) + "\n", encoding="utf-8")
-        _show(weighed, failed)
+        _show(weighed, failed, compared)
     if failed:
         raise typer.Exit(2)
     if any(w.status != "converged" for w in weighed):
@@ -122,7 +129,11 @@ def _failure(path: Path, why: str, car: Vehicle, method: str) -> str:
     return json.dumps(empty_result(path.name, car.name, method, why), ensure_ascii=False)
 
 
-def _show(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> None:
+def _show(
+    weighed: list[Weighing],
+    failed: list[tuple[Path, str]],
+    compared: list[tuple[Weighing, ...]],
+) -> None:
     from rich.console import Console
 
     console = Console()
@@ -130,8 +141,10 @@ def _show(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> None:
         console.width = _WIDTH
     if len(weighed) == 1 and not failed:
         _show_one(weighed[0])
-        return
-    console.print(result_table(weighed, failed))
+    else:
+        console.print(result_table(weighed, failed))
+    for methods in compared:
+        console.print(method_table(methods))
 
 
 def _show_one(w: Weighing) -> None:
@@ -150,8 +163,35 @@ def _show_one(w: Weighing) -> None:
         typer.echo(f"  note: {warning}")
 
 
+def method_table(methods: tuple[Weighing, ...]) -> Table:
+    """One row a method: its mass of one drive, or why there is none."""
+    from rich.table import Table
+
+    table = Table(title=methods[0].drive.name, title_justify="left")
+    table.add_column("method", no_wrap=True)
+    for name in ("mass kg", "95 % from", "to", "payload kg"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("status or reason")
+    for w in methods:
+        table.add_row(w.method, *_numbers(w), _outcome(w))
+    return table
+
+
+def _numbers(w: Weighing) -> list[str]:
+    """Mass, interval and payload; empty where there is none."""
+    return [f"{x:.0f}" if x == x else "" for x in (w.mass, *w.interval(0.95), w.payload)]
+
+
+def _outcome(w: Weighing) -> str:
+    from rich.markup import escape
+
+    # Sections of a vehicle file stand in brackets, as rich's own marks do.
+    return str(w.status) if w.status == "converged" else escape(f"{w.status}: {w.reason}")
+
+
 def result_table(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> Table:
     """One row a drive: its mass, or why there is none."""
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table()
@@ -162,14 +202,13 @@ def result_table(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> Tab
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("status or reason")
     for w in weighed:
-        low, high = w.interval(0.95)
         table.add_row(
             w.drive.name,
             f"{w.drive.duration / 60.0:.1f}",
             f"{w.used_time / 60.0:.1f}",
-            *(f"{x:.0f}" if x == x else "" for x in (w.mass, low, high, w.payload)),
-            str(w.status) if w.status == "converged" else f"{w.status}: {w.reason}",
+            *_numbers(w),
+            _outcome(w),
         )
     for path, why in failed:
-        table.add_row(path.name, "", "", "", "", "", "", f"unreadable: {why}")
+        table.add_row(path.name, "", "", "", "", "", "", escape(f"unreadable: {why}"))
     return table

@@ -36,6 +36,8 @@ BY_SPEED: Final = frozenset({"speed_grade", "speed"})
 which takes the noise of the force for the larger one; simulated drives without an inertial
 sensor came out 16 to 20 % light, by rls 3 % light to 9 % heavy."""
 
+NO_JOINT: Final = "without an accelerometer the joint estimator comes out 16 to 20 % light"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weighing:
@@ -179,11 +181,23 @@ class Weighing:
         """
         write_track(self.track, path)
 
-    def report(self, path: str | Path) -> None:
-        """Write a self-contained HTML report that opens offline."""
+    def compare(self) -> tuple[Weighing, ...]:
+        """Weigh the same drive by every method, this one included."""
+        from weighbridge.pipeline.comparing import compare
+
+        return compare(self)
+
+    def report(self, path: str | Path, *, compare: bool = False) -> None:
+        """Write a self-contained HTML report that opens offline.
+
+        Parameters
+        ----------
+        path : file to write
+        compare : weigh by every other method too, and show them side by side
+        """
         from weighbridge.report import write_report
 
-        write_report([self], path)
+        write_report([self], path, comparisons=[self.compare()] if compare else None)
 
     def plot(self) -> Any:
         """Return a plotly figure of the mass over time."""
@@ -231,8 +245,7 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     DriveError
         What the drive says cannot be so, such as a wrong unit.
     """
-    estimator = ESTIMATORS.get(method)
-    if estimator is None:
+    if method not in ESTIMATORS:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
 
     from weighbridge.pipeline.checks import check_drive
@@ -241,20 +254,16 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     for problem in drive.problems:
         if problem.serious:
             raise DriveError(f"{drive.name}: {problem.text}")
-    warnings = tuple(p.text for p in drive.problems)
+    return weigh_checked(drive, vehicle, method)
 
+
+def weigh_checked(drive: Drive, vehicle: Vehicle, method: str) -> Weighing:
+    """Weigh as `weigh` does, from a drive that was checked and a known method."""
+    warnings = tuple(p.text for p in drive.problems)
     alone = method in SPEED_ALONE
     lacking = no_speed(drive) if alone else what_is_missing(drive, vehicle)
     if lacking:
-        return Weighing(
-            drive=drive,
-            vehicle=vehicle,
-            method=method,
-            status=Status.MISSING_SIGNALS,
-            reason=lacking,
-            result=None,
-            warnings=warnings,
-        )
+        return without_mass(drive, vehicle, method, lacking, warnings)
     if alone:
         balance = speed_balance(drive, vehicle)
         warnings += balance.motion.notes
@@ -262,15 +271,23 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
         balance, notes = torque_balance(drive, vehicle)
         warnings += notes
         if method == "joint" and balance.motion.source in BY_SPEED:
-            method, estimator = "rls", ESTIMATORS["rls"]
-            warnings += (
-                "without an accelerometer the joint estimator comes out 16 to 20 % light; "
-                "weighed by rls",
-            )
+            method = "rls"
+            warnings += (f"{NO_JOINT}; weighed by rls",)
         warnings += fitted_for_another(vehicle, method)
-    result = estimator(balance, vehicle)
+    return weigh_balance(drive, vehicle, method, balance, warnings)
+
+
+def weigh_balance(
+    drive: Drive,
+    vehicle: Vehicle,
+    method: str,
+    balance: ForceBalance,
+    warnings: tuple[str, ...] = (),
+) -> Weighing:
+    """Weigh from forces and motion that are found already; parameters as of `weigh`."""
+    result = ESTIMATORS[method](balance, vehicle)
     status, reason = result.status, result.why
-    share = None if alone else share_on_gears(balance, vehicle)
+    share = None if method in SPEED_ALONE else share_on_gears(balance, vehicle)
     if share is not None and share < ENOUGH:
         status = Status.INCONSISTENT
         reason = (
@@ -278,7 +295,6 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
             f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
             "are wrong; calibrate this vehicle"
         )
-    warnings += overload(vehicle, result)
     return Weighing(
         drive=drive,
         vehicle=vehicle,
@@ -286,6 +302,21 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
         status=status,
         reason=reason,
         result=result,
+        warnings=warnings + overload(vehicle, result),
+    )
+
+
+def without_mass(
+    drive: Drive, vehicle: Vehicle, method: str, reason: str, warnings: tuple[str, ...] = ()
+) -> Weighing:
+    """Say why a method could not be tried."""
+    return Weighing(
+        drive=drive,
+        vehicle=vehicle,
+        method=method,
+        status=Status.MISSING_SIGNALS,
+        reason=reason,
+        result=None,
         warnings=warnings,
     )
 

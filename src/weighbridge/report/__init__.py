@@ -22,6 +22,7 @@ def write_report(
     calibration: Calibration | None = None,
     truth: Mapping[str, float] | None = None,
     title: str | None = None,
+    comparisons: Sequence[Sequence[Weighing]] | None = None,
 ) -> None:
     """Write one self-contained HTML page for one or many drives.
 
@@ -33,15 +34,25 @@ def write_report(
     truth : true mass by drive name [kg]; where a drive is not named, the known
         mass of its ``drive.toml`` serves
     title : heading of the page; made from the drives when None
+    comparisons : for each of ``weighings`` the same drive by every method, as of
+        `Weighing.compare`, to show side by side; none when None
 
     Raises
     ------
     ConfigError
-        There is nothing to report, or the file cannot be written.
+        There is nothing to report, there are not as many comparisons as weighings, or
+        the file cannot be written.
     """
     from weighbridge.report.page import write_page
 
-    write_page(weighings, Path(path), calibration=calibration, truth=truth or {}, title=title)
+    write_page(
+        weighings,
+        Path(path),
+        calibration=calibration,
+        truth=truth or {},
+        title=title,
+        comparisons=comparisons or (),
+    )
 
 
 def mass_figure(weighing: Weighing, *, truth: float | None = None) -> go.Figure:
@@ -58,7 +69,7 @@ def mass_figure(weighing: Weighing, *, truth: float | None = None) -> go.Figure:
         Nothing was estimated, so there is no mass to draw.
     """
     from weighbridge.errors import ConfigError
-    from weighbridge.report.drive_panels import mass_panel
+    from weighbridge.report.mass_section import mass_panel
 
     panel = mass_panel(weighing, truth if truth is not None else weighing.drive.info.mass)
     if panel.figure is None:

@@ -25,8 +25,11 @@ function draw(place) {
   place.dataset.drawn = "yes";
   const figure = figures[place.id];
   const now = colours();
+  // On a telephone the legend takes lines of its own, which the plot gets back in height.
+  const narrow = place.clientWidth < 480;
   const layout = Object.assign({}, figure.layout, {
-    font: Object.assign({}, figure.layout.font, { color: now["font.color"] }),
+    font: Object.assign({}, figure.layout.font, { color: now["font.color"] }, narrow && { size: 11 }),
+    height: figure.layout.height * (narrow ? 1.15 : 1),
     paper_bgcolor: now.paper_bgcolor,
     plot_bgcolor: now.plot_bgcolor,
     autosize: true,

@@ -16,9 +16,24 @@ from plotly.offline import get_plotlyjs
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import SPEED_ALONE, Status
 from weighbridge.report.calibration_panels import calibration_facts, calibration_panels
-from weighbridge.report.drive_panels import drive_panels
-from weighbridge.report.style import Panel
-from weighbridge.signals.units import scalar_from_si
+from weighbridge.report.information_section import information_section
+from weighbridge.report.mass_section import mass_section
+from weighbridge.report.methods_section import methods_section
+from weighbridge.report.residual_section import residual_section
+from weighbridge.report.road_section import road_section
+from weighbridge.report.slow_section import slow_section
+from weighbridge.report.style import Panel, Section
+from weighbridge.report.table import Table
+from weighbridge.report.text import (
+    capital,
+    duration,
+    error,
+    interval,
+    kg,
+    plus_minus,
+    sentence,
+    signed_kg,
+)
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.calibrating import Calibration
@@ -26,10 +41,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-NOTHING: Final = "–"
-
 STATUS_TEXT: Final[dict[Status, str]] = {
-    Status.CONVERGED: "mass found",
+    Status.CONVERGED: "converged",
     Status.NOT_EXCITED: "no mass: the drive says too little",
     Status.INCONSISTENT: "no mass: the data contradict each other",
     Status.MISSING_SIGNALS: "no mass: signals are missing",
@@ -69,25 +82,46 @@ class Page:
 
     def place(self, panels: Sequence[Panel]) -> str:
         """Return the HTML of the panels and keep their data for the end of the page."""
-        drawn, absent = [], []
+        absent = tuple(p.absent for p in panels if p.figure is None and p.absent)
+        return self.figures_of(panels) + left_out(absent)
+
+    def figures_of(self, panels: Sequence[Panel]) -> str:
+        """Return the HTML of the panels that have a figure."""
+        drawn = []
         for panel in panels:
             if panel.figure is None:
-                absent.append(panel.absent)
                 continue
             key = f"figure-{len(self.figures) + 1}"
             self.figures[key] = panel.figure.to_json(validate=False)
             height = int(panel.figure.layout.height)
             drawn.append(
-                f"<figure{' class=wide' if panel.wide else ''}><h3>{escape(panel.title)}</h3>"
+                f"<figure{' class=wide' if panel.wide else ''}><h4>{escape(panel.title)}</h4>"
                 f'<div class="plot" id="{key}" role="img" aria-label="{escape(panel.title)}" '
                 f'style="min-height:{height}px"></div>'
                 f"<figcaption>{escape(panel.caption)}</figcaption></figure>"
             )
-        html = f'<div class="panels">{"".join(drawn)}</div>' if drawn else ""
-        if absent:
-            listed = " ".join(_sentence(text) for text in absent)
-            html += f'<p class="absent">Left out: {escape(listed)}</p>'
-        return html
+        return f'<div class="panels">{"".join(drawn)}</div>' if drawn else ""
+
+    def sections(self, sections: Sequence[Section], prefix: str) -> str:
+        """Return the HTML of the sections that have something to show, with links to them.
+
+        Parameters
+        ----------
+        sections
+        prefix : of their anchors, another for each drive of the page
+        """
+        shown = [s for s in sections if s.present]
+        links = "".join(f'<a href="#{prefix}{s.key}">{escape(s.title)}</a>' for s in shown)
+        parts = [f'<nav aria-label="Sections">{links}</nav>']
+        for section in shown:
+            table = text_table(section.table) if section.table is not None else ""
+            parts.append(
+                f'<section id="{prefix}{section.key}"><h3>{escape(section.title)}</h3>'
+                f'<p class="lead">{escape(section.lead)}</p>{table}'
+                f"{self.figures_of(section.panels)}{left_out(section.missing)}</section>"
+            )
+        gone = tuple(text for s in sections if not s.present for text in s.missing)
+        return "".join(parts) + left_out(gone)
 
     def data(self) -> str:
         """Return all figures as one JSON text that may stand inside a script element.
@@ -105,17 +139,27 @@ def write_page(
     calibration: Calibration | None,
     truth: Mapping[str, float],
     title: str | None,
+    comparisons: Sequence[Sequence[Weighing]],
 ) -> None:
     """Write the page; see `weighbridge.report.write_report`."""
     if not weighings and calibration is None:
         raise ConfigError(f"{path}: no weighing and no calibration to report")
+    if len(comparisons) not in (0, len(weighings)):
+        raise ConfigError(
+            f"{path}: {len(comparisons)} comparisons for {len(weighings)} weighings; give one each"
+        )
     page = Page()
     parts = []
     if len(weighings) > 1:
         parts.append(_summary(weighings, truth))
     for k, weighing in enumerate(weighings):
-        parts.append(_drive(page, weighing, _truth(weighing, truth), alone=len(weighings) == 1,
-                            opened=k == 0))  # fmt: skip
+        compared = comparisons[k] if comparisons else ()
+        known = _truth(weighing, truth)
+        body = _drive(weighing, known) + page.sections(
+            drive_sections(weighing, known, compared), f"drive-{k + 1}-"
+        )
+        parts.append(_folded(weighing, body, opened=k == 0) if len(weighings) > 1
+                     else f"<main>{body}</main>")  # fmt: skip
     if calibration is not None:
         parts.append(_calibration(page, calibration, opened=not weighings))
     heading = title if title is not None else _title(weighings)
@@ -169,7 +213,15 @@ def _title(weighings: Sequence[Weighing]) -> str:
 
 
 def _truth(weighing: Weighing, truth: Mapping[str, float]) -> float | None:
-    return truth.get(weighing.drive.name, weighing.drive.info.mass)
+    """True mass at the end of the drive [kg]; that of ``drive.toml`` is of its start."""
+    at_start = None if load_changed(weighing) else weighing.drive.info.mass
+    return truth.get(weighing.drive.name, at_start)
+
+
+def load_changed(weighing: Weighing) -> bool:
+    """Whether segments are loads told apart, as joint has them, not just legs of a drive."""
+    result = weighing.result
+    return result is not None and result.slow_errors is not None and len(result.segments) > 1
 
 
 def _summary(weighings: Sequence[Weighing], truth: Mapping[str, float]) -> str:
@@ -184,30 +236,50 @@ def _summary(weighings: Sequence[Weighing], truth: Mapping[str, float]) -> str:
     for weighing, known in zip(weighings, truths, strict=True):
         cells = [
             (weighing.drive.name, ""),
-            (_kg(weighing.mass), "n"),
-            (_interval(weighing), "n"),
-            (_signed_kg(weighing.payload), "n"),
+            (kg(weighing.mass), "n"),
+            (interval(weighing), "n"),
+            (signed_kg(weighing.payload), "n"),
         ]
         if judged:
-            cells += [(_kg(known), "n"), (_error(weighing.mass, known), "n")]
+            cells += [(kg(known), "n"), (error(weighing.mass, known), "n")]
         cells.append((_outcome(weighing), ""))
         rows.append(cells)
     return html_table("All drives", heads, rows)
 
 
-def _drive(
-    page: Page, weighing: Weighing, known: float | None, *, alone: bool, opened: bool
-) -> str:
-    """Answer, facts, warnings and figures of one drive."""
+def drive_sections(
+    weighing: Weighing, known: float | None, comparison: Sequence[Weighing]
+) -> tuple[Section, ...]:
+    """Return the parts of a drive's report, in the order to show them.
+
+    Parameters
+    ----------
+    weighing : of the drive
+    known : true mass [kg]; None where unknown
+    comparison : the same drive by every method; empty where that was not asked for
+    """
+    return (
+        mass_section(weighing, known),
+        methods_section(comparison, known),
+        information_section(weighing),
+        slow_section(weighing),
+        residual_section(weighing, comparison),
+        road_section(weighing),
+    )
+
+
+def _drive(weighing: Weighing, known: float | None) -> str:
+    """Answer, facts, warnings and segments of one drive."""
     body = _answer(weighing, known) + _facts(weighing, known)
     if weighing.warnings:
-        told = "".join(f"<li>{escape(_sentence(w))}</li>" for w in weighing.warnings)
+        told = "".join(f"<li>{escape(sentence(w))}</li>" for w in weighing.warnings)
         body += f'<h3>What was found, mended or doubted</h3><ul class="warnings">{told}</ul>'
-    body += _segments(weighing)
-    body += page.place(drive_panels(weighing, known))
-    if alone:
-        return f"<main>{body}</main>"
-    brief = _plus_minus(weighing) if _found(weighing) else STATUS_TEXT[weighing.status]
+    return body + _segments(weighing)
+
+
+def _folded(weighing: Weighing, body: str, *, opened: bool) -> str:
+    """Put a drive of several under a heading that opens it."""
+    brief = plus_minus(weighing) if _found(weighing) else STATUS_TEXT[weighing.status]
     return (
         f"<details{' open' if opened else ''}><summary><h2>{escape(weighing.drive.name)}</h2>"
         f'<span class="brief">{escape(brief)}</span></summary>{body}</details>'
@@ -217,18 +289,18 @@ def _drive(
 def _answer(weighing: Weighing, known: float | None) -> str:
     if _found(weighing):
         html = (
-            f'<p class="answer good">{_plus_minus(weighing)} <small>95 % interval '
-            f"{_interval(weighing)}</small></p>"
+            f'<p class="answer good">{plus_minus(weighing)} <small>95 % interval '
+            f"{interval(weighing)}</small></p>"
         )
         if known is not None:
             html += (
-                f'<p class="why">True mass {_kg(known)}: the answer is '
-                f"{_error(weighing.mass, known)} off.</p>"
+                f'<p class="why">True mass {kg(known)}: the answer is '
+                f"{error(weighing.mass, known)} off.</p>"
             )
         return html
-    reason = _sentence(weighing.reason) if weighing.reason else ""
+    reason = sentence(weighing.reason) if weighing.reason else ""
     return (
-        f'<p class="answer bad">{escape(_upper(STATUS_TEXT[weighing.status]))}</p>'
+        f'<p class="answer bad">{escape(capital(STATUS_TEXT[weighing.status]))}</p>'
         f'<p class="why">{escape(reason)}</p>'
         f'<p class="why">{escape(_remedy(weighing))}</p>'
     )
@@ -243,21 +315,21 @@ def _facts(weighing: Weighing, known: float | None) -> str:
     result = weighing.result
     unladen = weighing.vehicle.tare
     facts = [
-        ("payload", "unknown without a tare" if unladen is None else _signed_kg(weighing.payload)),
+        ("payload", "unknown without a tare" if unladen is None else signed_kg(weighing.payload)),
         ("status", STATUS_TEXT[weighing.status]),
         ("vehicle", weighing.vehicle.name),
         ("drive", weighing.drive.name),
         ("method", weighing.method),
-        ("duration", _time(weighing.drive.duration)),
-        ("used", _time(weighing.used_time)),
+        ("duration", duration(weighing.drive.duration)),
+        ("used", duration(weighing.used_time)),
     ]
     if unladen is not None:
-        facts.insert(1, ("tare", _kg(unladen)))
+        facts.insert(1, ("tare", kg(unladen)))
     if known is not None:
-        facts.insert(1, ("true mass", _kg(known)))
+        facts.insert(1, ("true mass", kg(known)))
     if result is not None and _found(weighing):
         settled = result.converged_at - weighing.drive.start
-        facts.append(("within 5 % for good after", _time(settled)))
+        facts.append(("within 5 % for good after", duration(settled)))
         if math.isfinite(result.bound_std):
             facts.append(("Cramér-Rao bound", f"± {result.bound_std:.1f} kg (1 sd)"))
     return _list(facts)
@@ -269,13 +341,15 @@ def _segments(weighing: Weighing) -> str:
     start = weighing.drive.start
     rows = [
         [
-            (_time(max(s.start - start, 0.0)), "n"),
-            (_time(s.end - start), "n"),
+            (duration(max(s.start - start, 0.0)), "n"),
+            (duration(s.end - start), "n"),
             (f"{s.mass:.0f} ± {s.std:.0f} kg" if math.isfinite(s.mass) else "too little", "n"),
         ]
         for s in weighing.segments
     ]
     heads = [("from", "n"), ("to", "n"), ("mass ± standard deviation", "n")]
+    if load_changed(weighing):
+        return html_table("The load changed at a stop", heads, rows)
     caption = "Mass between longer stops, where load can change"
     table = html_table("", heads, rows)
     return f"<details><summary>{caption} ({len(rows)})</summary>{table}</details>"
@@ -292,12 +366,38 @@ def _calibration(page: Page, calibration: Calibration, *, opened: bool) -> str:
     )
 
 
+def left_out(reasons: Sequence[str]) -> str:
+    """Say what is not there and why; nothing where all is."""
+    if not reasons:
+        return ""
+    listed = " ".join(sentence(text) for text in reasons)
+    return f'<p class="absent">Left out: {escape(listed)}</p>'
+
+
+def text_table(table: Table) -> str:
+    """Return a table of texts: numbers to the right, the first column and sentences to the left."""
+    kinds = [
+        "w" if any(_wordy(row[k]) for row in table.rows) else "n" if k else ""
+        for k in range(len(table.columns))
+    ]
+    return html_table(
+        table.title,
+        list(zip(table.columns, kinds, strict=True)),
+        [list(zip(row, kinds, strict=True)) for row in table.rows],
+    )
+
+
+def _wordy(cell: str) -> bool:
+    """Whether a cell is a sentence rather than a number with its unit."""
+    return len(cell) > 24
+
+
 def html_table(
     caption: str,
     heads: Sequence[tuple[str, str]],
     rows: Sequence[Sequence[tuple[str, str]]],
 ) -> str:
-    """Return a table of texts, each with its class ("n" for a number)."""
+    """Return a table of texts, each with its class ("n" for a number, "w" for words)."""
 
     def cell(tag: str, text: str, kind: str) -> str:
         return f"<{tag}{f' class={kind}' if kind else ''}>{escape(text)}</{tag}>"
@@ -322,47 +422,3 @@ def _found(weighing: Weighing) -> bool:
 def _outcome(weighing: Weighing) -> str:
     text = STATUS_TEXT[weighing.status]
     return f"{text} ({weighing.reason})" if weighing.reason else text
-
-
-def _plus_minus(weighing: Weighing) -> str:
-    low, high = weighing.interval(0.95)
-    if not math.isfinite(high - low):
-        return _kg(weighing.mass)
-    return f"{weighing.mass:.0f} ± {0.5 * (high - low):.0f} kg"
-
-
-def _interval(weighing: Weighing) -> str:
-    low, high = weighing.interval(0.95)
-    return f"{low:.0f} to {high:.0f} kg" if math.isfinite(high - low) else NOTHING
-
-
-def _kg(mass: float | None) -> str:
-    return f"{mass:.0f} kg" if mass is not None and math.isfinite(mass) else NOTHING
-
-
-def _signed_kg(mass: float) -> str:
-    return f"{mass:+.0f} kg".replace("-", "−") if math.isfinite(mass) else NOTHING
-
-
-def _error(mass: float, known: float | None) -> str:
-    if known is None or not math.isfinite(mass):
-        return NOTHING
-    return f"{100.0 * (mass / known - 1.0):+.1f} %".replace("-", "−")
-
-
-def _time(seconds: float) -> str:
-    if not math.isfinite(seconds):
-        return NOTHING
-    if seconds < 120.0:
-        return f"{seconds:.0f} s"
-    return f"{scalar_from_si(seconds, 'min'):.1f} min"
-
-
-def _upper(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _sentence(text: str) -> str:
-    """Give a fragment a capital and a full stop."""
-    text = _upper(text.strip())
-    return text if text.endswith((".", "!", "?")) else text + "."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from weighbridge.report.page import Page, html_table, write_document
+from weighbridge.report.page import Page, text_table, write_document
 from weighbridge.report.style import Panel
 from weighbridge.report.table import Table
 
@@ -26,13 +26,6 @@ def write_study(title: str, tables: Sequence[Table], panels: Sequence[Panel], pa
         The file cannot be written.
     """
     page = Page()
-    parts = [
-        html_table(
-            table.title,
-            [(name, "" if k == 0 else "n") for k, name in enumerate(table.columns)],
-            [[(cell, "" if k == 0 else "n") for k, cell in enumerate(row)] for row in table.rows],
-        )
-        for table in tables
-    ]
+    parts = [text_table(table) for table in tables]
     body = "".join(parts) + page.place(panels)
     write_document(title, [f"<main>{body}</main>"], page, path)

@@ -8,6 +8,9 @@ from typing import Any, Final
 import plotly.graph_objects as go
 
 from weighbridge.balance import REASON_TEXT, Reason
+from weighbridge.report.table import Table
+from weighbridge.signals import Drive, Floats
+from weighbridge.signals.units import from_si
 
 BLUE: Final = "#2b7bba"
 BAND: Final = "rgba(43,123,186,0.22)"
@@ -18,6 +21,8 @@ PURPLE: Final = "#b0679b"
 ORANGE: Final = "#e69f00"
 """Mid tones told apart with any colour vision, on white and on dark grey; after Okabe and
 Ito, Color Universal Design, 2008."""
+
+TIME_AXIS: Final = "Time since start [min]"
 
 AXIS: Final = {
     "gridcolor": "rgba(128,128,128,0.22)",
@@ -67,6 +72,39 @@ class Panel:
     wide: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A part of a drive's report, or the sentence that says why it is not there.
+
+    Attributes
+    ----------
+    key : its anchor on the page
+    title : what it is about
+    lead : one sentence on what to read from it
+    panels : its figures
+    table : above them
+    absent : why there is nothing to show, where panels and table are missing
+    """
+
+    key: str
+    title: str
+    lead: str = ""
+    panels: tuple[Panel, ...] = ()
+    table: Table | None = None
+    absent: str = ""
+
+    @property
+    def present(self) -> bool:
+        """Whether there is anything to show."""
+        return self.table is not None or any(p.figure is not None for p in self.panels)
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Why the section, or some of its figures, are not there."""
+        told = (self.absent, *(p.absent for p in self.panels if p.figure is None))
+        return tuple(text for text in told if text)
+
+
 def reason_name(reason: Reason) -> str:
     """Name a reason in a legend."""
     return "used" if reason is Reason.USED else REASON_TEXT[reason]
@@ -86,6 +124,7 @@ def blank(x: str, y: str, *, height: int = 380, **layout: Any) -> go.Figure:
                 "yanchor": "bottom",
                 "x": 0,
                 "itemsizing": "constant",
+                "traceorder": "normal",
             },
             "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": GREY, "activecolor": BLUE},
             "hovermode": "closest",
@@ -108,6 +147,29 @@ def line(
         line={"color": colour, "width": 2 if dash == "solid" else 1.6, "dash": dash},
         **more,
     )
+
+
+def tint(colour: str, opacity: float = 0.22) -> str:
+    """Return a hex colour as one that lets through what lies below."""
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"
+
+
+def band(
+    figure: go.Figure, x: Any, low: Any, high: Any, name: str, colour: str = BLUE, **more: Any
+) -> None:
+    """Add the area between two lines."""
+    fill = tint(colour)
+    line(figure, x, low, "", fill, showlegend=False, hoverinfo="skip", line_width=0, **more)
+    line(
+        figure, x, high, name, fill,
+        fill="tonexty", fillcolor=fill, hoverinfo="skip", line_width=0, **more,
+    )  # fmt: skip
+
+
+def minutes(drive: Drive, time: Floats) -> Floats:
+    """Return instants of a drive as minutes since its start, for `TIME_AXIS`."""
+    return from_si(time - drive.start, "min")
 
 
 def dots(

@@ -1,0 +1,59 @@
+"""One drive by every method."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from weighbridge.errors import WeighbridgeError
+from weighbridge.estimators import SPEED_ALONE
+from weighbridge.pipeline.weighing import (
+    BY_SPEED,
+    NO_JOINT,
+    Weighing,
+    fitted_for_another,
+    weigh_balance,
+    weigh_checked,
+    without_mass,
+)
+
+METHODS: Final = ("joint", "rls", "robust-rls", "ekf", "hybrid", "speed-ekf")
+"""Every method, in the order to show them."""
+
+
+def compare(weighing: Weighing) -> tuple[Weighing, ...]:
+    """Weigh a drive that has been weighed by one method by all the others too.
+
+    The drive is not checked again, and forces and motion, which cost most, are
+    taken over.
+
+    Parameters
+    ----------
+    weighing : of the drive, by any method
+
+    Returns
+    -------
+    (6,) in the order of `METHODS`; a method that could not be tried says why
+    """
+    return tuple(
+        weighing if method == weighing.method else _by(weighing, method) for method in METHODS
+    )
+
+
+def _by(weighing: Weighing, method: str) -> Weighing:
+    """Weigh by another method."""
+    drive, vehicle, done = weighing.drive, weighing.vehicle, weighing.result
+    try:
+        if done is None or {method, weighing.method} & SPEED_ALONE:
+            other = weigh_checked(drive, vehicle, method)
+            # Where joint cannot weigh, rls does in its place, and has a row of its own.
+            return other if other.method == method else _refused(weighing, method)
+        if method == "joint" and done.balance.motion.source in BY_SPEED:
+            return _refused(weighing, method)
+        warnings = fitted_for_another(vehicle, method)
+        return weigh_balance(drive, vehicle, method, done.balance, warnings)
+    except WeighbridgeError as error:
+        return without_mass(drive, vehicle, method, str(error))
+
+
+def _refused(weighing: Weighing, method: str) -> Weighing:
+    return without_mass(weighing.drive, weighing.vehicle, method, NO_JOINT)

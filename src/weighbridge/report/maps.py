@@ -1,0 +1,127 @@
+"""Maps of a drive in local kilometres: no tiles, no network."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import plotly.graph_objects as go
+import pymap3d
+
+from weighbridge.report.style import GREEN, GREY, VERMILLION, blank
+from weighbridge.report.thinning import single, spread
+from weighbridge.signals import Bools, Floats
+from weighbridge.signals.units import from_si
+
+if TYPE_CHECKING:
+    from weighbridge.pipeline.weighing import Weighing
+
+
+@dataclass(frozen=True, slots=True)
+class Positions:
+    """Where the vehicle was, and when.
+
+    Attributes
+    ----------
+    time : (n,) rising [s]
+    east, north : (n,) of the middle of the drive [km]
+    speed : (n,) [m/s]; NaN where unknown
+    """
+
+    time: Floats
+    east: Floats
+    north: Floats
+    speed: Floats
+
+    def at(self, time: Floats) -> Positions:
+        """Interpolate to the instants ``time`` [s]."""
+        east, north, speed = (
+            np.interp(time, self.time, values) for values in (self.east, self.north, self.speed)
+        )
+        return Positions(time, east, north, speed)
+
+
+def positions(weighing: Weighing) -> Positions | None:
+    """Find where the vehicle was, from the motion or the recorded fixes; None if unknown."""
+    if weighing.result is not None:
+        motion = weighing.result.balance.motion
+        known = np.isfinite(motion.latitude) & np.isfinite(motion.longitude) & motion.valid
+        if np.count_nonzero(known) > 1:
+            return _local(motion.time, motion.latitude, motion.longitude, motion.speed, known)
+    latitude, longitude = weighing.drive.get("latitude"), weighing.drive.get("longitude")
+    if latitude is None or longitude is None or len(latitude) < 2:
+        return None
+    east = longitude.at(latitude.time)
+    speed = weighing.drive.get("vehicle_speed") or weighing.drive.get("gnss_speed")
+    pace = speed.at(latitude.time) if speed is not None else np.full(len(latitude), np.nan)
+    known = np.isfinite(east)
+    if np.count_nonzero(known) < 2:
+        return None
+    return _local(latitude.time, latitude.values, east, pace, known)
+
+
+def track_map(track: Positions) -> go.Figure:
+    """Draw the track with its start and end."""
+    index = spread(np.ones(track.time.size, dtype=bool))
+    figure = blank("East [km]", "North [km]", height=460)
+    figure.add_scatter(
+        x=single(track.east[index]), y=single(track.north[index]), mode="lines",
+        line={"color": GREY, "width": 1}, showlegend=False, hoverinfo="skip",
+    )  # fmt: skip
+    for k, name, colour, symbol in ((0, "start", GREEN, "square"), (-1, "end", VERMILLION, "x")):
+        figure.add_scatter(
+            x=[float(track.east[k])], y=[float(track.north[k])], mode="markers", name=name,
+            marker={"size": 12, "color": colour, "symbol": symbol},
+        )  # fmt: skip
+    figure.update_layout(yaxis_scaleanchor="x")
+    return figure
+
+
+def mark(
+    figure: go.Figure,
+    places: Positions,
+    values: Floats,
+    label: str,
+    colours: str | Sequence[tuple[float, str]],
+    limits: tuple[float | None, float | None] = (None, None),
+    **marker: object,
+) -> None:
+    """Add marks to a map whose colour tells a value.
+
+    Parameters
+    ----------
+    figure : of `track_map`
+    places : (n,) where they stand
+    values : (n,)
+    label : of the colour bar, with the unit
+    colours : name of a colour scale, or its colours
+    limits : of the scale; those of the values where None
+    marker : more of a plotly marker
+    """
+    figure.add_scatter(
+        x=single(places.east),
+        y=single(places.north),
+        mode="markers",
+        showlegend=False,
+        marker={
+            "size": 4,
+            "color": single(values),
+            "colorscale": colours,
+            "cmin": limits[0],
+            "cmax": limits[1],
+            "showscale": True,
+            "colorbar": {"title": {"text": label, "side": "right"}, "thickness": 12},
+            **marker,
+        },
+    )
+
+
+def _local(
+    time: Floats, latitude: Floats, longitude: Floats, speed: Floats, known: Bools
+) -> Positions:
+    latitude, longitude = latitude[known], longitude[known]
+    middle = float(np.median(latitude)), float(np.median(longitude))
+    east, north, _ = pymap3d.geodetic2enu(latitude, longitude, 0.0, *middle, 0.0, deg=False)
+    return Positions(time[known], from_si(east, "km"), from_si(north, "km"), speed[known])

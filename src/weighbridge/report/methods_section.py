@@ -1,0 +1,151 @@
+"""All methods on one drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from weighbridge.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    TIME_AXIS,
+    VERMILLION,
+    Panel,
+    Section,
+    blank,
+    line,
+    minutes,
+)
+from weighbridge.report.table import Table
+from weighbridge.report.text import error, interval, kg, signed_kg
+from weighbridge.report.thinning import thin_line
+
+if TYPE_CHECKING:
+    from weighbridge.pipeline.weighing import Weighing
+
+METHOD_STYLE: Final[dict[str, tuple[str, str]]] = {
+    "joint": (BLUE, "solid"),
+    "rls": (VERMILLION, "dash"),
+    "robust-rls": (ORANGE, "dot"),
+    "ekf": (GREEN, "dashdot"),
+    "hybrid": (PURPLE, "longdash"),
+    "speed-ekf": (GREY, "longdashdot"),
+}
+"""Colour and dash of each method."""
+
+TRACK_POINTS: Final = 600
+"""Points of a line where several are drawn together."""
+
+
+def methods_section(comparison: Sequence[Weighing], truth: float | None) -> Section:
+    """Return every method's mass side by side.
+
+    Parameters
+    ----------
+    comparison : of one drive, one per method; empty where none was asked for
+    truth : true mass [kg]; None where unknown
+    """
+    key, title = "methods", "All methods on this drive"
+    if not comparison:
+        return Section(key=key, title=title)
+    fitted = comparison[0].vehicle.provenance.method
+    return Section(
+        key=key,
+        title=title,
+        lead="Methods that agree within their intervals speak for the mass; one that stands "
+        "apart has met what it does not model"
+        + (
+            f", or a torque that was fitted for another: this vehicle file's was for {fitted}."
+            if fitted
+            else "."
+        ),
+        table=_table(comparison, truth),
+        panels=(interval_panel(comparison, truth), tracks_panel(comparison, truth)),
+    )
+
+
+def _table(comparison: Sequence[Weighing], truth: float | None) -> Table:
+    judged = truth is not None
+    columns = ("method", "mass", "95 % interval", "payload", *(("error",) if judged else ()),
+               "used", "why there is no mass")  # fmt: skip
+    rows = []
+    for w in comparison:
+        errors = (error(w.mass, truth),) if judged else ()
+        used = f"{w.used_time / 60.0:.1f} min" if w.result is not None else "–"
+        rows.append(
+            (w.method, kg(w.mass), interval(w), signed_kg(w.payload), *errors, used, w.reason)
+        )
+    return Table("", columns, tuple(rows))
+
+
+def interval_panel(comparison: Sequence[Weighing], truth: float | None) -> Panel:
+    """Mass and 95 % interval of each method."""
+    found = [w for w in comparison if math.isfinite(w.mass)]
+    if not found:
+        return Panel(title="Masses", absent="no masses side by side: no method found one.")
+    figure = blank("Mass [kg]", "", height=130 + 42 * len(found))
+    for w in reversed(found):
+        low, high = w.interval(0.95)
+        colour, _ = METHOD_STYLE[w.method]
+        figure.add_scatter(
+            x=[w.mass], y=[w.method], mode="markers", showlegend=False,
+            marker={"color": colour, "size": 11},
+            error_x={
+                "type": "data", "symmetric": False, "array": [high - w.mass],
+                "arrayminus": [w.mass - low], "color": colour, "thickness": 2.5, "width": 7,
+            },
+        )  # fmt: skip
+    if truth is not None:
+        figure.add_vline(x=truth, line={"color": GREEN, "width": 2, "dash": "longdashdot"})
+        figure.add_annotation(
+            x=truth, y=1.0, yref="paper", yanchor="bottom", showarrow=False,
+            text=f"true mass {truth:.0f} kg", font={"color": GREEN},
+        )  # fmt: skip
+    masses = [w.mass for w in found]
+    return Panel(
+        title=f"{len(found)} of {len(comparison)} methods found a mass, "
+        f"within {max(masses) - min(masses):.0f} kg",
+        caption="Marks are the masses, lines their 95 % intervals.",
+        figure=figure,
+    )
+
+
+def tracks_panel(comparison: Sequence[Weighing], truth: float | None) -> Panel:
+    """Running mass of each method over time."""
+    figure = blank(TIME_AXIS, "Running mass [kg]", height=380)
+    late: list[float] = []
+    for w in comparison:
+        result = w.result
+        if result is None or not result.used.any():
+            continue
+        begun = np.cumsum(result.used) > 0
+        mass = np.where(begun, result.running_mass, np.nan)
+        if not np.isfinite(mass).any():
+            continue
+        colour, dash = METHOD_STYLE[w.method]
+        name = w.method if math.isfinite(w.mass) else f"{w.method} (no mass)"
+        x, y = thin_line(minutes(w.drive, result.time), mass, points=TRACK_POINTS)
+        line(figure, x, y, name, colour, dash=dash)
+        if math.isfinite(w.mass):
+            settled = mass[np.isfinite(mass)]
+            late += [float(v) for v in np.percentile(settled[settled.size // 8 :], [1.0, 99.0])]
+    if not figure.data:
+        return Panel(title="Running masses", absent="no running masses: no method has any.")
+    if truth is not None:
+        ends = [figure.data[0].x[0], figure.data[0].x[-1]]
+        line(figure, ends, [truth, truth], "true mass", GREY, dash="solid", line_width=1)
+        late.append(truth)
+    if late:
+        margin = 0.08 * (max(late) - min(late)) + 0.005 * max(late)
+        figure.update_layout(yaxis_range=[min(late) - margin, max(late) + margin])
+    return Panel(
+        title="How each method came to its mass",
+        caption="What each knew at each moment; the masses above are made from the whole drive.",
+        figure=figure,
+    )

@@ -1,0 +1,213 @@
+"""What the model of each method leaves of the force, against what it should not depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.estimators import SPEED_ALONE, MassTrack
+from weighbridge.report.methods_section import METHOD_STYLE
+from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots
+from weighbridge.report.thinning import single, spread
+from weighbridge.signals import Bools, Floats
+from weighbridge.signals.units import from_si
+
+if TYPE_CHECKING:
+    from weighbridge.pipeline.weighing import Weighing
+
+POINTS: Final = 900
+"""Points of each cloud."""
+
+FEWEST: Final = 10
+"""Samples below which a bin has no mean."""
+
+SMALLEST: Final = 0.002
+"""Part of all samples below which a bin has no mean [-]: a few seconds, all of one moment."""
+
+BINS: Final = 14
+"""Bins of an axis that has no widths of its own, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Against:
+    """What residuals are drawn against.
+
+    Attributes
+    ----------
+    name : in words
+    axis : title of the axis, with the unit
+    values : of it, one per row of a view
+    widths : of a bin, of which the first that gives at most `BINS` is taken
+    says : what a mean that leaves zero points to
+    absent : why it may be missing
+    """
+
+    name: str
+    axis: str
+    values: Callable[[MergedView], Floats]
+    widths: tuple[float, ...]
+    says: str
+    absent: str
+
+
+def _compass(view: MergedView) -> Floats:
+    return np.mod(from_si(view.heading, "deg"), 360.0)
+
+
+_AXES: Final = (
+    _Against(
+        "speed",
+        "Speed [km/h]",
+        lambda view: from_si(view.speed, "kmh"),
+        (5.0, 10.0, 20.0),
+        "A mean that leaves zero at high speed points to air drag or wind, at low speed to "
+        "torque or rolling resistance.",
+        "the speed is not known",
+    ),
+    _Against(
+        "force",
+        "Traction force [N]",
+        lambda view: view.traction_force,
+        (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0),
+        "A bend points to the scale of the torque; a slight rise is natural, for the noise of "
+        "the torque is in both.",
+        "the force is not known",
+    ),
+    _Against(
+        "gear",
+        "Gear [-]",
+        lambda view: np.where(view.gear > 0, view.gear, np.nan).astype(np.float64),
+        (1.0,),
+        "One gear that stands apart has a wrong ratio, inertia or efficiency.",
+        "there is only one gear",
+    ),
+    _Against(
+        "heading",
+        "Heading [deg]",
+        _compass,
+        (30.0,),
+        "A wave with one crest in the round is wind, from where the residual is highest; 0 is "
+        "north, 90 east.",
+        "the heading is not known",
+    ),
+)
+
+
+def residual_section(weighing: Weighing, comparison: Sequence[Weighing]) -> Section:
+    """Return residuals against speed, force, gear and heading.
+
+    Parameters
+    ----------
+    weighing : whose residuals are drawn whole
+    comparison : of which the means are drawn beside; may be empty
+    """
+    key, title = "residuals", "Residuals"
+    if weighing.result is None:
+        return Section(key=key, title=title)
+    what = "the measured force less the model's at the final mass"
+    if weighing.method in SPEED_ALONE:
+        what = "the change of speed that the filter did not expect, as a force"
+    elif weighing.result.slow_errors is not None:
+        what += ", with disturbance and wind still in it"
+    return Section(
+        key=key,
+        title=title,
+        lead=f"A residual is {what}; its mean should stay near zero all along each axis.",
+        panels=tuple(residual_panel(weighing, comparison, against) for against in _AXES),
+    )
+
+
+def residual_panel(weighing: Weighing, comparison: Sequence[Weighing], against: _Against) -> Panel:
+    """Draw the cloud of one method with its mean and spread, and the means of the others."""
+    title = f"Residual over {against.name}"
+    result = weighing.result
+    nothing = f"no residual over {against.name}"
+    if result is None or not (result.used & np.isfinite(result.residual)).any():
+        return Panel(title=title, absent=f"{nothing}: not one sample was used.")
+    x, rows = _rows(result, against)
+    if not rows.any() or (against.name == "gear" and np.unique(x[rows]).size < 2):
+        return Panel(title=title, absent=f"{nothing}: {against.absent}.")
+    width = bin_width(x[rows], against.widths)
+    index = spread(rows, POINTS)
+    figure = blank(
+        against.axis,
+        "Innovation times mass [N]" if weighing.method in SPEED_ALONE else "Residual [N]",
+    )
+    dots(figure, single(x[index]), single(result.residual[index]), f"samples, {weighing.method}",
+         BLUE, opacity=0.45)  # fmt: skip
+    colour, _ = METHOD_STYLE[weighing.method] if comparison else (VERMILLION, "")
+    centres, mean, std = binned(x[rows], result.residual[rows], width, against.name == "gear")
+    figure.add_scatter(
+        x=single(centres), y=single(mean), mode="lines+markers",
+        name=f"mean, {weighing.method}" if comparison else "mean and spread",
+        line={"color": colour, "width": 2.5}, marker={"size": 7},
+        error_y={"type": "data", "array": single(std), "color": colour, "thickness": 1.2},
+    )  # fmt: skip
+    for other in comparison:
+        if other is weighing or other.result is None:
+            continue
+        ox, there = _rows(other.result, against)
+        oc, om, _ = binned(ox[there], other.result.residual[there], width, against.name == "gear")
+        if oc.size:
+            colour, dash = METHOD_STYLE[other.method]
+            figure.add_scatter(
+                x=single(oc), y=single(om), mode="lines+markers", name=other.method,
+                line={"color": colour, "width": 1.6, "dash": dash}, marker={"size": 5},
+            )  # fmt: skip
+    figure.add_hline(y=0.0, line={"color": GREY, "width": 1})
+    low, high = np.percentile(result.residual[rows], [0.5, 99.5])
+    figure.update_layout(yaxis_range=[float(1.15 * low), float(1.15 * high)])
+    if against.name == "gear":
+        figure.update_layout(xaxis_dtick=1)
+    if against.name == "heading":
+        figure.update_layout(xaxis_range=[0, 360], xaxis_dtick=90)
+    says = against.says
+    if weighing.method in SPEED_ALONE:
+        says = "It says how well the speed model tells the next sample; no force was measured."
+    return Panel(
+        title=f"The residual should not depend on {against.name}",
+        caption=f"{says} Bars are one standard deviation of the samples of a bin.",
+        figure=figure,
+    )
+
+
+def bin_width(x: Floats, widths: Sequence[float]) -> float:
+    """Return the first width that cuts nearly all of ``x`` into at most `BINS` bins."""
+    low, high = np.percentile(x, [0.5, 99.5])
+    return next((w for w in widths if (high - low) / w <= BINS), widths[-1])
+
+
+def binned(
+    x: Floats, y: Floats, width: float, centred: bool = False
+) -> tuple[Floats, Floats, Floats]:
+    """Mean and standard deviation of ``y`` in bins of ``x``.
+
+    Parameters
+    ----------
+    x, y : (n,)
+    width : of a bin, in the unit of x
+    centred : bins lie around the multiples of the width, not between them
+
+    Returns
+    -------
+    centres, mean, std : (k,) of bins of at least `FEWEST` samples and `SMALLEST` of all
+    """
+    number = np.floor(x / width + (0.5 if centred else 0.0)).astype(np.int64)
+    bins, where = np.unique(number, return_inverse=True)
+    count = np.bincount(where, minlength=bins.size)
+    mean = np.bincount(where, y, bins.size) / np.maximum(count, 1)
+    square = np.bincount(where, (y - mean[where]) ** 2, bins.size)
+    full = count >= max(FEWEST, SMALLEST * x.size)
+    std = np.sqrt(square[full] / (count[full] - 1))
+    centres = (bins[full] + (0.0 if centred else 0.5)) * width
+    return np.asarray(centres), np.asarray(mean[full]), np.asarray(std)
+
+
+def _rows(result: MassTrack, against: _Against) -> tuple[Floats, Bools]:
+    """Values to draw against, and the rows that have both."""
+    x = against.values(result.balance.merged)
+    return x, np.asarray(result.used & np.isfinite(result.residual) & np.isfinite(x))

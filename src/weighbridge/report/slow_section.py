@@ -1,0 +1,263 @@
+"""What was estimated beside the mass: disturbance, slow resistance and wind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from weighbridge.balance.force_balance import WIND_AT_VEHICLE
+from weighbridge.constants import GRAVITY
+from weighbridge.estimators.slow_errors import WIND_STD, SlowErrors
+from weighbridge.report.maps import mark, positions, track_map
+from weighbridge.report.style import (
+    BLUE,
+    GREY,
+    TIME_AXIS,
+    VERMILLION,
+    Panel,
+    Section,
+    band,
+    blank,
+    line,
+    minutes,
+)
+from weighbridge.report.thinning import SCATTER_POINTS, single, thin_line
+from weighbridge.signals import Bools, Drive, Floats
+from weighbridge.signals.units import from_si, scalar_from_si
+
+if TYPE_CHECKING:
+    from weighbridge.pipeline.weighing import Weighing
+
+ARROWS: Final = 26
+"""Arrows of wind along a drive."""
+
+SEEN: Final = 0.75
+"""A component of the wind is seen where its standard deviation has fallen below this part of
+what it was before the drive [-]."""
+
+POINTS: Final = 800
+"""Points of a line of which several stand together."""
+
+COMPASS: Final = (
+    "north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Wind:
+    """Wind at the vehicle, the reported and the estimated part together; rows are windows.
+
+    Attributes
+    ----------
+    time : (m,) [s]
+    north, east : (m,) how much of it comes from north and from east [m/s]
+    std : (m, 2) their standard deviations [m/s]
+    reported : (2,) the part of the weather report, the same all along [m/s]
+    """
+
+    time: Floats
+    north: Floats
+    east: Floats
+    std: Floats
+    reported: tuple[float, float]
+
+    @property
+    def strength(self) -> Floats:
+        """(m,) [m/s]."""
+        return np.hypot(self.north, self.east)
+
+    @property
+    def blows_to(self) -> Floats:
+        """(m,) where it goes, clockwise from north [rad]."""
+        return np.arctan2(-self.east, -self.north)
+
+    @property
+    def seen(self) -> Bools:
+        """(m,) whether the drive told both components."""
+        return np.asarray((self.std < SEEN * WIND_STD).all(axis=1))
+
+
+def wind_at_vehicle(slow: SlowErrors, drive: Drive) -> Wind:
+    """Add what was estimated to what the weather report says.
+
+    The drag is taken in the reported wind, so the estimate is what that leaves.
+    """
+    speed, direction = drive.info.wind_speed, drive.info.wind_from
+    north = east = 0.0
+    if speed and direction is not None:
+        north = float(WIND_AT_VEHICLE * speed * np.cos(direction))
+        east = float(WIND_AT_VEHICLE * speed * np.sin(direction))
+    return Wind(
+        time=slow.time,
+        north=slow.wind_north + north,
+        east=slow.wind_east + east,
+        std=slow.wind_std,
+        reported=(north, east),
+    )
+
+
+def slow_section(weighing: Weighing) -> Section:
+    """Return disturbance, slow resistance and wind, over time and on the map."""
+    key, title = "slow", "Disturbance and wind"
+    result = weighing.result
+    if result is None or result.slow_errors is None or not result.slow_errors.time.size:
+        # That another method estimates none is said where the information is left out.
+        return Section(key=key, title=title)
+    slow = result.slow_errors
+    wind = wind_at_vehicle(slow, weighing.drive)
+    blind = not np.isfinite(result.balance.merged.heading).any()
+    return Section(
+        key=key,
+        title=title,
+        lead="These forces look like mass; where a line leaves zero by more than its band, they "
+        "were there, and the mass was freed of them.",
+        panels=(
+            force_panel(
+                weighing,
+                "Force that lasts half a minute",
+                "gusts, faults of grade and torque, unseen braking",
+                slow.disturbance,
+                slow.disturbance_std,
+            ),
+            force_panel(
+                weighing,
+                "Force that lasts a quarter of an hour",
+                "tyres and oil that warm, an accelerometer that drifts",
+                slow.resistance,
+                slow.resistance_std,
+            ),
+            wind_panel(weighing, wind, blind),
+            disturbance_map(weighing, slow),
+            wind_map(weighing, wind, blind),
+        ),
+    )
+
+
+def force_panel(weighing: Weighing, what: str, causes: str, force: Floats, std: Floats) -> Panel:
+    """Draw a force over time with its band."""
+    assert weighing.result is not None
+    assert weighing.result.slow_errors is not None
+    time = minutes(weighing.drive, weighing.result.slow_errors.time)
+    figure = blank(TIME_AXIS, "Force against the motion [N]")
+    half = 1.96 * std
+    x, middle, low, high = thin_line(time, force, force - half, force + half, points=POINTS)
+    band(figure, x, low, high, "95 % band")
+    line(figure, x, middle, "estimated", BLUE, line_width=1.6)
+    figure.add_hline(y=0.0, line={"color": GREY, "width": 1})
+    size = float(np.sqrt(np.mean(force**2)))
+    slope = 100.0 * size / (weighing.result.mass * GRAVITY)
+    return Panel(
+        title=f"{what}: {size:.0f} N, as a slope of {slope:.2g} %",
+        caption=f"Root mean square over the drive; causes are {causes}. Positive holds back.",
+        figure=figure,
+    )
+
+
+def wind_panel(weighing: Weighing, wind: Wind, blind: bool) -> Panel:
+    """Draw both components of the wind over time with their bands."""
+    if blind:
+        return Panel(
+            title="Wind over time", absent="no wind: the heading of this drive is not known."
+        )
+    figure = blank(TIME_AXIS, "Wind at the vehicle [m/s]")
+    time = minutes(weighing.drive, wind.time)
+    ends = [float(time[0]), float(time[-1])]
+    for k, (values, name, colour) in enumerate(
+        ((wind.north, "from north", BLUE), (wind.east, "from east", VERMILLION))
+    ):
+        half = 1.96 * wind.std[:, k]
+        x, middle, low, high = thin_line(time, values, values - half, values + half, points=POINTS)
+        band(figure, x, low, high, f"95 % band, {name}", colour)
+        line(figure, x, middle, name, colour)
+        if any(wind.reported):
+            line(
+                figure, ends, [wind.reported[k]] * 2, f"reported, {name}", colour, dash="dash",
+                line_width=1,
+            )  # fmt: skip
+    figure.add_hline(y=0.0, line={"color": GREY, "width": 1})
+    return Panel(
+        title=_wind_title(wind),
+        caption="At the height of the vehicle, about half of what a weather report says for 10 m"
+        + (", which is taken in and dashed" if any(wind.reported) else "")
+        + "; a negative line is wind from south or west. Where the vehicle drives slowly or "
+        "always one way, the band stays as wide as it was before the drive, "
+        f"± {1.96 * WIND_STD:.1f} m/s.",
+        figure=figure,
+        wide=True,
+    )
+
+
+def disturbance_map(weighing: Weighing, slow: SlowErrors) -> Panel:
+    """Draw where the disturbance was."""
+    track = positions(weighing)
+    if track is None:
+        # The map of the road says so.
+        return Panel(title="Disturbance on the map")
+    rows = np.unique(np.linspace(0, slow.time.size - 1, SCATTER_POINTS).astype(np.int64))
+    figure = track_map(track)
+    reach = float(np.percentile(np.abs(slow.disturbance), 98.0))
+    mark(
+        figure, track.at(slow.time[rows]), slow.disturbance[rows], "Force [N]", "RdBu",
+        (-reach, reach), size=6, reversescale=True,
+    )  # fmt: skip
+    return Panel(
+        title="Where the half-minute force was",
+        caption="Red holds back, blue pushes. The same colour on every pass of a place is the "
+        "road, or its grade; another each time is traffic or gusts.",
+        figure=figure,
+    )
+
+
+def wind_map(weighing: Weighing, wind: Wind, blind: bool) -> Panel:
+    """Draw the wind where the drive told it."""
+    title = "Wind on the map"
+    track = positions(weighing)
+    if track is None or blind:
+        return Panel(title=title)
+    rows = np.flatnonzero(wind.seen)
+    if not rows.size:
+        return Panel(
+            title=title,
+            absent="no wind on the map: the drive is too slow, or goes too much one way, to "
+            "tell it.",
+        )
+    places = track.at(wind.time[rows])
+    rows = rows[_evenly(places.east, places.north)]
+    figure = track_map(track)
+    strength = wind.strength[rows]
+    top = max(float(np.max(strength)), 1.0)
+    mark(
+        figure, track.at(wind.time[rows]), strength, "Wind [m/s]",
+        ((0.0, GREY), (1.0, VERMILLION)), (0.0, top),
+        symbol="arrow", angle=single(from_si(wind.blows_to[rows], "deg")),
+        size=single(9.0 + 9.0 * strength / top), line={"color": GREY, "width": 0.5},
+    )  # fmt: skip
+    return Panel(
+        title="How the wind blew",
+        caption="Arrows point where the wind goes; they stand where the drive told both "
+        "components.",
+        figure=figure,
+    )
+
+
+def _wind_title(wind: Wind) -> str:
+    """Say the mean wind of the drive, if it is more than its uncertainty."""
+    if not wind.seen.any():
+        return "The drive does not show the wind"
+    north, east = float(np.mean(wind.north[wind.seen])), float(np.mean(wind.east[wind.seen]))
+    std = float(np.mean(np.hypot(*wind.std[wind.seen].T))) / np.sqrt(2.0)
+    strength = float(np.hypot(north, east))
+    if strength < std:
+        return f"No wind stands out: {strength:.1f} ± {std:.1f} m/s on the whole"
+    origin = scalar_from_si(float(np.arctan2(east, north)), "deg")
+    name = COMPASS[round(origin / 45.0) % 8]
+    return f"Wind from the {name}, {strength:.1f} ± {std:.1f} m/s on the whole (1 sd)"
+
+
+def _evenly(east: Floats, north: Floats) -> Sequence[int]:
+    """Choose `ARROWS` places evenly along the way."""
+    way = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(east), np.diff(north)))))
+    return list(np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], ARROWS))))
