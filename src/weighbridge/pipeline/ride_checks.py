@@ -42,11 +42,14 @@ def ride_samples(drive: Drive) -> RideSamples:
     Raises
     ------
     DriveError
-        The signals share no time.
+        The signals share no time, or there is one sample of them.
     """
     inputs = [drive.signals[name] for name in (*TRAVELS, *RATES)]
     clock = max(inputs, key=len).time
-    longest = longest_step(float(np.median(np.diff(clock))) if clock.size > 1 else np.inf)
+    if clock.size < 2:
+        why = "; ".join(p.text for p in drive.problems) or "record it again"
+        raise DriveError(f"{drive.name}: one row of the ride is all that is left: {why}")
+    longest = longest_step(float(np.median(np.diff(clock))))
     columns: dict[str, Floats] = {}
     for name in NEEDED:
         s = drive.signals[name]

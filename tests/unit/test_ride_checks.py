@@ -1,0 +1,16 @@
+"""What is said of rides that cannot be put on one clock."""
+
+import numpy as np
+import pytest
+
+from weighbridge.errors import DriveError
+from weighbridge.pipeline.ride_checks import NEEDED, ride_samples
+from weighbridge.signals import Drive, Problem, Signal
+
+
+def test_a_clock_that_left_one_row_is_told_by_its_cause():
+    signals = {name: Signal(name, np.zeros(1), np.zeros(1)) for name in NEEDED}
+    reversed_clock = Problem("ride.csv", "the clock runs backwards; 99 of 100 rows were left out")
+    drive = Drive(name="back", signals=signals, problems=(reversed_clock,))
+    with pytest.raises(DriveError, match=r"one row of the ride .* the clock runs backwards"):
+        ride_samples(drive)
