@@ -39,15 +39,17 @@ def reproduce(
         raise ConfigError(f"{paper}: known papers are {', '.join(papers.PAPERS)} and all")
     refuse_missing_folder(report)
     names = list(papers.PAPERS) if paper == "all" else [paper]
-    behind = False
+    behind: list[str] = []
     for name in names:
         done = papers.paper(name)(seed, _bar())
         show(done)
-        behind |= bool(done.behind)
+        behind += [f"{name}: {figure}" for figure in done.behind]
         if report is not None:
             page = report if paper != "all" else report.with_stem(f"{report.stem}-{name}")
             done.write_report(page)
             typer.echo(f"written: {page}")
+    for figure in behind:
+        typer.echo(f"behind, {figure}")
     if behind:
         raise typer.Exit(1)
 
@@ -73,7 +75,8 @@ def show(done: Reproduced) -> None:
     for shown in done.tables:
         table = Table(title=shown.title)
         for k, name in enumerate(shown.columns):
-            table.add_column(name, justify="left" if k == 0 else "right", no_wrap=True)
+            # The widest column gives way first, by lines: nothing of a table is cut off.
+            table.add_column(name, justify="left" if k == 0 else "right", overflow="fold")
         for row in shown.rows:
             table.add_row(*row)
         console.print(table)
