@@ -264,3 +264,16 @@ def test_decimal_commas_without_a_mapping_name_the_remedy(tmp_path):
     mapping = {"csv": {"decimal": ","}, "signals": {"vehicle_speed": {
         "column": "vehicle_speed_kmh", "unit": "kmh"}}}  # fmt: skip
     assert_allclose(read_drive(log, mapping).signals["vehicle_speed"].values * 3.6, [10.5, 11.5])
+
+
+def test_canonical_names_need_no_more_than_how_the_text_is_written(tmp_path):
+    (tmp_path / "d").mkdir()
+    write(tmp_path / "d" / "obd.csv", "time_s;vehicle_speed_kmh\n0,5;36,0\n1,5;72,0\n")
+    write(tmp_path / "d" / "gnss.csv", "time_s;speed_kmh\n0,5;36,0\n1,5;72,0\n")
+    mapping = write(tmp_path / "map.toml", '[csv]\ndecimal = ","\n[time]\noffset_s = 2\n')
+    with pytest.raises(DriveError, match=r'set decimal = "," in \[csv\] of a mapping'):
+        read_drive(tmp_path / "d")
+    for drive in (read_drive(tmp_path / "d", mapping), read_drive(tmp_path / "d/obd.csv", mapping)):
+        assert_allclose(drive.signals["vehicle_speed"].time, [2.5, 3.5])
+        assert_allclose(drive.signals["vehicle_speed"].values, [10.0, 20.0])
+    assert_allclose(read_drive(tmp_path / "d", mapping).signals["gnss_speed"].values, [10.0, 20.0])

@@ -30,7 +30,7 @@
 
 A drive of several kinds of file has one ``[tables.NAME]`` per kind, with
 ``files = "pattern*.csv"`` and the same sections inside. A file that needs no
-names, such as a GPX or one with canonical columns, may have ``[time]`` alone.
+names, such as a GPX or one with canonical columns, may have ``[time]`` or ``[csv]`` alone.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class TableMapping:
     files : file names it is for, as a pattern
     text : how text tables are written
     time : the time column
-    signals : the columns; none where only the clock of the file is told
+    signals : the columns; none where the file has names of its own or canonical ones
     source : the mapping's file, for messages
     """
 
@@ -174,10 +174,9 @@ def _table(root: Section, files: str) -> TableMapping:
     text = _text_format(root.section("csv"))
     time = _time(root.section("time"))
     section = root.section("signals")
-    clock_only = (time.align or time.offset != 0.0) and time == TimeColumn(
-        offset=time.offset, align=time.align
-    )
-    if section is None and clock_only and text == TextFormat():
+    own_names = time == TimeColumn(offset=time.offset, align=time.align)
+    told = time != TimeColumn() or text != TextFormat()
+    if section is None and own_names and told:
         root.done()
         return TableMapping(files=files, text=text, time=time, signals=(), source=root.name)
     if section is None or not section.data:

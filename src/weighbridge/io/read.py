@@ -64,7 +64,7 @@ def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     """
     if canlog.is_can_csv(path):
         return canlog.read_can_csv(path, table, mapping)
-    if mapping is None:
+    if mapping is None or not mapping.signals:
         with path.open("rb") as file:
             head = file.read(4096)
         for recognised, reader in APPS:
@@ -92,6 +92,9 @@ READERS: Final[dict[str, Reader]] = {
     ".npy": npy.read_npy,
 }
 """Every log format, by file suffix."""
+
+TEXT_TABLES: Final = frozenset({".csv", ".tsv", ".txt"})
+"""Formats whose separator, encoding and decimal mark a mapping may tell."""
 
 SELF_DESCRIBED: Final = frozenset({".nmea", ".ubx", ".gpx", ".vbo", ".blf", ".asc", ".trc", ".log"})
 """Formats that name their quantities and units themselves: a mapping need not know them."""
@@ -232,8 +235,10 @@ def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]
         )
     self_described = path.suffix.lower() in SELF_DESCRIBED
     named = mapping if mapping is not None and (mapping.signals or self_described) else None
+    written = path.suffix.lower() in TEXT_TABLES and mapping is not None
     try:
-        log = reader(path, table, named)
+        # A mapping that names nothing may still tell how a text table is written.
+        log = reader(path, table, mapping if written else named)
     except OSError as e:
         raise DriveError(f"{path} cannot be read: {e.strerror or e}") from None
     if mapping is not None:

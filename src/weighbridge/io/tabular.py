@@ -33,13 +33,13 @@ from weighbridge.signals.units import UNITS, to_si
 def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
     """Read separated text; see `weighbridge.io.log.Reader`."""
     raw = read_text(path, mapping.text if mapping else None)
-    return read_mapped(raw, mapping) if mapping else _canonical(raw, table)
+    return read_mapped(raw, mapping) if mapping and mapping.signals else _canonical(raw, table)
 
 
 def read_pq(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
     """Read Parquet; see `weighbridge.io.log.Reader`."""
     raw = read_parquet(path)
-    return read_mapped(raw, mapping) if mapping else _canonical(raw, table)
+    return read_mapped(raw, mapping) if mapping and mapping.signals else _canonical(raw, table)
 
 
 def _canonical(raw: RawTable, table: str | None) -> Log:
