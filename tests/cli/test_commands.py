@@ -197,6 +197,17 @@ def test_weigh_into_a_folder_that_is_not_there(weighbridge, car, loaded, tmp_pat
     assert "no folder" in ran.err
 
 
+@pytest.mark.parametrize("option", ["--json", "--report"])
+def test_weigh_never_replaces_what_it_reads(weighbridge, car, loaded, option):
+    for path in (car, next(loaded.folder.glob("obd.*")), loaded.folder / "drive.toml"):
+        before = path.read_bytes()
+        ran = weighbridge("weigh", loaded.folder, "--vehicle", car, option, path)
+        assert ran.code == 2
+        assert ran.out == ""
+        assert f"{path}: is " in ran.err
+        assert path.read_bytes() == before
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

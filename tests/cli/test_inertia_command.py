@@ -44,6 +44,18 @@ def test_ride_without_a_signal_exits_with_1(weighbridge, ride):
     assert "roll_rate" in ran.out
 
 
+def test_nothing_that_is_read_is_replaced(weighbridge, ride):
+    table = ride / "ride.csv"
+    before = table.read_bytes()
+    ran = weighbridge("inertia", ride, "--vehicle", EXAMPLE, "--track", table)
+    assert ran.code == 2
+    assert "in the folder of a drive" in ran.err
+    assert table.read_bytes() == before
+    ran = weighbridge("inertia", ride, "--vehicle", EXAMPLE, "--json", EXAMPLE)
+    assert ran.code == 2
+    assert "is an input" in ran.err
+
+
 def test_bad_input_exits_with_2(weighbridge, ride, tmp_path):
     car = tmp_path / "car.toml"
     car.write_text('[vehicle]\nname = "a car"\n')

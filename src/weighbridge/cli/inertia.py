@@ -57,9 +57,7 @@ def inertia(
     from weighbridge.pipeline.inertia import estimate_inertia
     from weighbridge.vehicle.model import Vehicle
 
-    refuse_results(
-        [drive, vehicle], what="an input", track=track, report=report, json_path=json_path
-    )
+    refuse_results([drive, vehicle], track=track, report=report, json_path=json_path)
     car = Vehicle.load(vehicle)
     found = estimate_inertia(load(drive, mapping_for(mapping, car, vehicle), dbc), car, method)
     if track is not None:

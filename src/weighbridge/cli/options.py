@@ -65,7 +65,6 @@ def refuse_overwriting(path: Path, force: bool, what: str) -> None:
 def refuse_results(
     inputs: list[Path],
     *,
-    what: str,
     track: Path | None,
     report: Path | None,
     json_path: str | None,
@@ -75,7 +74,6 @@ def refuse_results(
     Parameters
     ----------
     inputs : files and folders that are read
-    what : they are, in a word or two
     track, report, json_path : where results go; None, or - for standard output
     """
     if track is not None and track.suffix.lower() not in (".csv", ".parquet"):
@@ -84,8 +82,22 @@ def refuse_results(
     refuse_missing_folder(*outputs)
     known = {path.resolve() for path in inputs}
     for output in outputs:
-        if output is not None and output.resolve() in known:
-            raise ConfigError(f"{output}: is {what}; results must go to another file")
+        if output is None:
+            continue
+        if output.resolve() in known:
+            raise ConfigError(f"{output}: is an input; results must go to another file")
+        # A table of a drive's folder, or what else may be one.
+        if output.exists() and output.resolve().parent in known and _may_be_read(output):
+            raise ConfigError(
+                f"{output}: is there already, in the folder of a drive that is read; results must "
+                "go to another file"
+            )
+
+
+def _may_be_read(path: Path) -> bool:
+    from weighbridge.io import READERS
+
+    return path.suffix.lower() in (*READERS, ".toml")
 
 
 def refuse_missing_folder(*outputs: Path | None) -> None:

@@ -65,7 +65,7 @@ def weigh(
 
     if track is not None and len(drives) > 1:
         raise ConfigError("--track takes one drive; weigh them one by one, or use --json")
-    refuse_results(drives, what="a drive", track=track, report=report, json_path=json_path)
+    refuse_results([*drives, vehicle], track=track, report=report, json_path=json_path)
     car = Vehicle.load(vehicle)
     chosen = mapping_for(mapping, car, vehicle)
     weighed: list[Weighing] = []
