@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.integrate import solve_ivp
+from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.stats import truncnorm
 
 from weighbridge.estimators.inertia import (
@@ -15,26 +15,10 @@ from weighbridge.estimators.inertia import (
 )
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
-from weighbridge.vehicle.model import Ride
+from weighbridge.papers.nguyen2024 import suspension_of
+from weighbridge.simulation.ride import TRUCK, RideSensors
 
-RIDE = Ride(
-    front_stiffness=177000.0,
-    rear_stiffness=193844.0,
-    front_damping=7733.0,
-    rear_damping=9804.0,
-    front_track=1.705,
-    rear_track=1.495,
-    front_axle=2.4,
-    rear_axle=1.685,
-    front_unsprung=266.0,
-    rear_unsprung=427.0,
-    sprung_mass=5394.0,
-    roll_inertia=4600.0,
-    pitch_inertia=19632.0,
-    vertical_velocity_noise=0.05,
-    roll_rate_noise=0.05,
-    pitch_rate_noise=0.05,
-)
+RIDE = suspension_of(TRUCK, RideSensors(body_noise=(0.05, 0.05, 0.05)))
 SETTINGS = InertiaSettings(process=(1e-3, 0.3))
 PHASE = np.array([0.0, 0.7, 1.9, 2.6])
 
@@ -220,7 +204,7 @@ def rough_ride(hz, seconds, seed):
     return RideSamples(time=time, travel=travel, rate=rate, velocity=velocity)
 
 
-@pytest.mark.parametrize("hz", [100, 333, 1000])
+@pytest.mark.parametrize("hz", [100, 200, 333, 500, 1000])
 def test_covariance_stays_positive_definite(hz):
     ride = rough_ride(hz, 20.0, seed=hz)
     live = InertiaFilter(RIDE, 1.0 / hz)
@@ -256,6 +240,49 @@ def test_printed_and_fixed_filters_step_as_they_run():
         state = kalman_bucy.step(state, *(a[k] for a in inputs), params)
         assert_array_equal(state.mean, mean[k])
     np.linalg.cholesky(state.cov)
+
+
+@pytest.mark.parametrize("hz", [100, 200, 500, 1000])
+@pytest.mark.parametrize("method", ["inverse", "extended"])
+def test_fixed_filters_are_stable_at_the_rates_of_loggers(hz, method):
+    # Forces of a body of 1.3 times the parameters, so that the truth is known.
+    fine = np.arange(4001) * 1e-3
+    accel = np.array([accelerations(t) for t in fine]) / 1.3
+    velocity = cumulative_trapezoid(accel, fine, axis=0, initial=0.0)
+    params = fixed_params(RIDE, 1.0 / hz, method, InertiaSettings())
+    state = kalman_bucy.initial_state(np.repeat((0.0, 1.0), 3), START)
+    for k in range(0, fine.size, 1000 // hz):
+        state = kalman_bucy.step(
+            state, fine[k], travel(fine[k]), rate(fine[k]), velocity[k], params
+        )
+        if k % 100 == 0:
+            np.linalg.cholesky(state.cov)
+    expected = 1.0 / 1.3 if method == "inverse" else 1.3
+    assert_allclose(state.mean[3:], expected, rtol=0.02)
+    assert_array_equal(state.cov, state.cov.T)
+
+
+def test_change_between_two_hypotheses_leaves_an_honest_error():
+    # Hypotheses are 20 ms apart: the load changes in the middle between two, under full force,
+    # and velocities are known far better than what that half of the step makes of it.
+    time = np.arange(1200) * 2e-3
+    phi = np.column_stack([np.cos(9.0 * time + p) for p in (0.0, 1.0, 2.0)]) * 5.0
+    truth = np.where(time < 1.01, 1.0, 0.6)
+    mid = 0.5 * (time[1:] + time[:-1])
+    accel = np.where(mid < 1.01, 1.0, 0.6)[:, None] * 0.5 * (phi[1:] + phi[:-1])
+    velocity = np.vstack((np.zeros(3), np.cumsum(accel * 2e-3, axis=0)))
+    velocity = velocity + np.random.default_rng(4).normal(scale=1e-3, size=velocity.shape)
+    params = jump_params(
+        noise_var=np.full(3, 1e-6), beta_std=np.zeros(3), spawn=0.02, jump_rate=1e-2
+    )
+    state = kernel.initial_state(np.full(3, 1.0), params, 16)
+    travel = np.column_stack((-phi, np.zeros(time.size)))
+    _, samples = kernel.run(state, time, travel, np.zeros((time.size, 4)), velocity, params)
+
+    late = time > 1.1
+    error = (samples.alpha - truth[:, None]) / samples.alpha_std
+    assert np.max(np.abs(error[late])) < 5.0
+    assert np.all(np.abs(samples.jumped[-1] - 1.01) < 0.03)
 
 
 def test_spike_of_a_velocity_moves_little():

@@ -308,8 +308,12 @@ def likeliest(weight, count):
 
 
 @kernel
-def suppose(j, why, log_rate, time, count, cause, born, loaded, weight, mean, cov, params):
-    """Add the hypothesis that something changes now, from the likeliest one."""
+def suppose(j, why, log_rate, slip, time, count, cause, born, loaded, weight, mean, cov, params):
+    """Add the hypothesis that something changes now, from the likeliest one.
+
+    ``slip`` is what the velocity may be off by, for the change came a moment earlier or
+    later than supposed [m/s], [rad/s].
+    """
     if count == born.shape[1]:
         count = make_room(j, count, time, cause, born, loaded, weight, mean, cov)
     best = likeliest(weight[j], count)
@@ -325,6 +329,7 @@ def suppose(j, why, log_rate, time, count, cause, born, loaded, weight, mean, co
             if i != 1:
                 cov[j, count, 1, i] = 0.0
                 cov[j, count, i, 1] = 0.0
+        cov[j, count, 0, 0] += slip * slip
         cov[j, count, 1, 1] += (params.jump_std * mean[j, best, 1]) ** 2
         # Another load has another weight.
         if params.beta_std[j] > 0.0:
@@ -333,6 +338,90 @@ def suppose(j, why, log_rate, time, count, cause, born, loaded, weight, mean, co
                 cov[j, count, i, 2] = 0.0
             cov[j, count, 2, 2] += params.beta_std[j] ** 2
     return count + 1
+
+
+@kernel
+def accelerations(travel, rate, spring, damper):
+    """(3,) acceleration of the reference parameters under the suspension's forces."""
+    phi = np.zeros(AXES)
+    for j in range(AXES):
+        for w in range(4):
+            phi[j] -= spring[j, w] * travel[w] + damper[j, w] * rate[w]
+    return phi
+
+
+@kernel
+def impulses(phi, old_step, length, longest):
+    """Integrate accelerations over the step from the sample before.
+
+    Parameters
+    ----------
+    phi : (3, 3) float64
+        At this sample, the one before and the one before that.
+    old_step, length : float
+        Between the older two and the newer two [s].
+    longest : float
+        Step above which nothing is known [s].
+
+    Returns
+    -------
+    impulse : (3,)
+        NaN where it is unknown.
+    doubt : (3,)
+        What the parabola adds to the chord, which neither knows.
+    """
+    impulse, doubt = np.full(AXES, np.nan), np.zeros(AXES)
+    if length > 0.0 and length <= longest:
+        for j in range(AXES):
+            known_step = old_step if np.isfinite(phi[2, j]) else 0.0
+            impulse[j] = integral(phi[2, j], phi[1, j], phi[0, j], known_step, length)
+            doubt[j] = impulse[j] - 0.5 * length * (phi[0, j] + phi[1, j])
+    return impulse, doubt
+
+
+@kernel
+def predict_all(j, count, cause, mean, cov, impulse, doubt, length, params):
+    """Integrate all hypotheses of one axis over a step."""
+    push_var = params.push_var[j] * length * length + doubt * doubt
+    for i in range(count):
+        var = mean[j, i, 1] * mean[j, i, 1] * push_var
+        drift = params.push_drift[j] if cause[j, i] == BEGAN else params.beta_drift
+        predict(mean[j, i], cov[j, i], impulse, length, var, params.alpha_drift, drift)
+
+
+@kernel
+def correct_all(weight, mean, cov, measured, noise_var):
+    """Fold a measured velocity into all hypotheses of one axis, and weigh them by it.
+
+    Parameters
+    ----------
+    weight : (c,) float64
+    mean, cov : (c, 3), (c, 3, 3) float64
+    measured, noise_var : float
+        Velocity and the variance of its noise [m/s], [rad/s] and their squares.
+    """
+    top = -np.inf
+    for i in range(weight.size):
+        e, var = correct(mean[i], cov[i], measured, noise_var)
+        weight[i] -= 0.5 * (np.log(var) + e * e / var)
+        top = max(top, weight[i])
+    for i in range(weight.size):
+        weight[i] -= top
+
+
+@kernel
+def answer(weight, mean, cov, best):
+    """Mean and standard deviation of alpha by one hypothesis; its spread has in it what
+    the others say.
+    """
+    total, spread = 0.0, 0.0
+    for i in range(weight.size):
+        if weight[i] > NEGLIGIBLE:
+            p = np.exp(weight[i])
+            off = mean[i, 1] - mean[best, 1]
+            total += p
+            spread += p * (cov[i, 1, 1] + off * off)
+    return mean[best, 1], np.sqrt(spread / total)
 
 
 @kernel
@@ -361,20 +450,12 @@ def step(state, time, travel, rate, velocity, params):
     Nguyen 2024, eqs. 6-9, in inverse parameters; Andersson, Adaptive forgetting in recursive
     identification through multiple models, Int. J. Control 42(5), 1985, for the hypotheses.
     """
-    phi = np.empty((2, AXES))
-    impulse = np.full(AXES, np.nan)
     length = time - state.time
-    known = length > 0.0 and length <= params.longest
-    for j in range(AXES):
-        phi[1, j] = state.phi[0, j]
-        phi[0, j] = 0.0
-        for w in range(4):
-            phi[0, j] -= params.spring[j, w] * travel[w] + params.damper[j, w] * rate[w]
-        if known:
-            old_step = state.old_step
-            if not np.isfinite(state.phi[1, j]):
-                old_step = 0.0
-            impulse[j] = integral(state.phi[1, j], phi[1, j], phi[0, j], old_step, length)
+    phi = np.empty((3, AXES))
+    phi[0] = accelerations(travel, rate, params.spring, params.damper)
+    phi[1:] = state.phi
+    impulse, doubt = impulses(phi, state.old_step, length, params.longest)
+    known = np.isfinite(impulse[0])
 
     next_spawn, next_turn = state.next_spawn.copy(), state.next_turn.copy()
     count, cause = state.count.copy(), state.cause.copy()
@@ -385,68 +466,50 @@ def step(state, time, travel, rate, velocity, params):
     pushed = np.zeros(AXES, dtype=np.bool_)
     innovation, innovation_var = np.full(AXES, np.nan), np.full(AXES, np.nan)
     for j in range(AXES):
-        measured = velocity[j]
-        for i in range(count[j]):
-            if np.isfinite(impulse[j]):
-                # What the parabola adds to the chord is what neither knows.
-                doubt = impulse[j] - 0.5 * length * (phi[0, j] + phi[1, j])
-                push_var = params.push_var[j] * length * length + doubt * doubt
-                var = mean[j, i, 1] * mean[j, i, 1] * push_var
-                drift = params.beta_drift
-                if cause[j, i] == BEGAN:
-                    drift = params.push_drift[j]
-                predict(mean[j, i], cov[j, i], impulse[j], length, var, params.alpha_drift, drift)
-            elif not np.isfinite(state.time) or length > 0.0:
+        measured, n = velocity[j], count[j]
+        if np.isfinite(impulse[j]):
+            predict_all(j, n, cause, mean, cov, impulse[j], doubt[j], length, params)
+        elif not np.isfinite(state.time) or length > 0.0:
+            for i in range(n):
                 held = measured if np.isfinite(measured) else mean[j, i, 0]
                 forget_velocity(mean[j, i], cov[j, i], held)
-        best = likeliest(weight[j], count[j])
         if np.isfinite(measured):
+            best = likeliest(weight[j], n)
             innovation[j] = measured - mean[j, best, 0]
             innovation_var[j] = cov[j, best, 0, 0] + params.noise_var[j]
-            top = -np.inf
-            for i in range(count[j]):
-                e, var = correct(mean[j, i], cov[j, i], measured, params.noise_var[j])
-                weight[j, i] -= 0.5 * (np.log(var) + e * e / var)
-                if weight[j, i] > top:
-                    top = weight[j, i]
-                    best = i
-            for i in range(count[j]):
-                weight[j, i] -= top
-        # Dropping one moves the others up, so the likeliest is looked for again below.
+            correct_all(weight[j, :n], mean[j, :n], cov[j, :n], measured, params.noise_var[j])
         if params.spawn < np.inf and time >= next_spawn[j]:
-            rate = np.log(params.jump_rate * params.spawn)
+            log_rate = np.log(params.jump_rate * params.spawn)
+            # A change is at most half the time between two hypotheses from the nearest: one
+            # millisecond of another load is more than a quiet velocity forgives.
+            apart = max(params.spawn, length) if known else params.spawn
+            change = params.jump_std * mean[j, likeliest(weight[j], n), 1] * phi[0, j]
+            slip = change * apart / np.sqrt(12.0)
             count[j] = suppose(
-                j, LOAD, rate, time, count[j], cause, born, loaded, weight, mean, cov, params
-            )
+                j, LOAD, log_rate, slip, time, count[j], cause, born, loaded, weight, mean,
+                cov, params,
+            )  # fmt: skip
             next_spawn[j] = time + params.spawn
         if params.spawn < np.inf and params.push_drift[j] > 0.0 and time >= next_turn[j]:
-            rate = np.log(min(params.push_rate * TURN * params.spawn, 0.5))
+            log_rate = np.log(min(params.push_rate * TURN * params.spawn, 0.5))
             goes_on = cause[j, likeliest(weight[j], count[j])] == BEGAN
             count[j] = suppose(
-                j, ENDED if goes_on else BEGAN, rate, time, count[j], cause, born, loaded, weight,
-                mean, cov, params,
+                j, ENDED if goes_on else BEGAN, log_rate, 0.0, time, count[j], cause, born, loaded,
+                weight, mean, cov, params,
             )  # fmt: skip
             next_turn[j] = time + TURN * params.spawn
-        best = likeliest(weight[j], count[j])
 
-        # The likeliest hypothesis answers; its spread has in it what the others say.
+        n = count[j]
+        best = likeliest(weight[j], n)
         speed[j], beta[j] = mean[j, best, 0], mean[j, best, 2]
-        total, spread = 0.0, 0.0
-        for i in range(count[j]):
-            if weight[j, i] > NEGLIGIBLE:
-                p = np.exp(weight[j, i])
-                off = mean[j, i, 1] - mean[j, best, 1]
-                total += p
-                spread += p * (cov[j, i, 1, 1] + off * off)
-        alpha[j], alpha_std[j] = within(
-            mean[j, best, 1], np.sqrt(spread / total), params.lowest, params.highest
-        )
+        middle, std = answer(weight[j, :n], mean[j, :n], cov[j, :n], best)
+        alpha[j], alpha_std[j] = within(middle, std, params.lowest, params.highest)
         jumped[j] = loaded[j, best]
         pushed[j] = cause[j, best] == BEGAN
     return (
         InertiaState(
             time,
-            phi,
+            phi[:2].copy(),
             length if known else 0.0,
             next_spawn,
             next_turn,
