@@ -9,30 +9,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.suspension import check_suspension
 from weighbridge.io import read_drive
+from weighbridge.papers.nguyen2024 import suspension_of
 from weighbridge.pipeline.inertia import estimate_inertia
+from weighbridge.pipeline.ride_checks import ride_samples
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
-from weighbridge.vehicle.model import Ride, Vehicle
+from weighbridge.vehicle.model import Vehicle
 
 SENSORS = RideSensors(rate=250.0)
-RIDE = Ride(
-    front_stiffness=177000.0,
-    rear_stiffness=193844.0,
-    front_damping=7733.0,
-    rear_damping=9804.0,
-    front_track=1.705,
-    rear_track=1.495,
-    front_axle=2.4,
-    rear_axle=1.685,
-    front_unsprung=266.0,
-    rear_unsprung=427.0,
-    sprung_mass=5394.0,
-    roll_inertia=4600.0,
-    pitch_inertia=19632.0,
-    zero_mass=5394.0,
-    force_std=0.01,
-)
+RIDE = replace(suspension_of(TRUCK, SENSORS), zero_mass=TRUCK.sprung_mass, force_std=0.01)
 CAR = Vehicle(name="truck", kind="truck", tare=6087.0, ride=RIDE)
 
 
@@ -235,6 +222,44 @@ def test_broken_damper_is_named(factor):
     told = estimate_inertia(locked(factor).drive, CAR)
     assert told.status == "inconsistent"
     assert "front left damper" in told.reason
+
+
+def test_parts_are_found_by_the_heave_where_nothing_is_calm():
+    ride = simulated(sensors=replace(SENSORS, travel_factor=(0.7, 1.0, 1.0, 1.0)))
+    samples = ride_samples(ride.drive)
+    alpha = TRUCK.inertias / ride.inertias[-1]
+    told = check_suspension(samples, RIDE, alpha, np.ones(samples.time.size, dtype=bool))
+    # What the sensor makes of the part is the inverse of its factor.
+    assert told.factor[0] == pytest.approx(1.0 / 0.7, rel=0.1)
+    assert np.argmax(told.off[:4]) == 0
+    assert np.all(told.misfit[1:] == 0.0)
+
+
+def test_broken_part_is_named_though_the_load_changes_at_the_end():
+    damping = (0.05 * TRUCK.damping[0], *TRUCK.damping[1:])
+    ride = simulated(replace(TRUCK, damping=damping), changes=((12.0, 1.5),), seed=16)
+    told = estimate_inertia(ride.drive, CAR)
+    assert told.status == "inconsistent"
+    assert "front left damper" in told.reason
+
+
+def test_short_ride_is_not_believed_beyond_its_check():
+    ride = simulated(duration=6.0)
+    told = estimate_inertia(ride.drive, CAR)
+    assert told.status == "converged"
+    assert any("could not be checked" in w for w in told.warnings)
+    noisy = simulated(sensors=replace(SENSORS, travel_noise=2e-3), duration=6.0)
+    told = estimate_inertia(noisy.drive, CAR)
+    assert told.status == "inconsistent"
+    assert "too short to tell noise from" in told.reason
+
+
+def test_one_offset_sensor_is_told_by_the_lean(made, found):
+    ride = simulated(sensors=replace(SENSORS, travel_offset=(0.0, 0.0, 0.0, 0.01)))
+    told = estimate_inertia(ride.drive, replace(CAR, ride=replace(RIDE, zero_mass=None)))
+    assert_allclose(told.values, found.values, rtol=1e-3)
+    assert len(told.warnings) == 1
+    assert "a travel sensor is offset" in told.warnings[0]
 
 
 def test_soft_springs_are_told_and_widen_the_interval():

@@ -69,12 +69,17 @@ class RideSamples:
         """Median time between samples [s]; NaN below two samples."""
         return float(np.median(np.diff(self.time))) if self.time.size > 1 else math.nan
 
-    def since(self, time: float) -> RideSamples:
-        """Return the samples from ``time`` on [s]."""
-        k = int(np.searchsorted(self.time, time))
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.time[-1] - self.time[0]) if self.time.size else 0.0
+
+    def between(self, begin: float, end: float = math.inf) -> RideSamples:
+        """Return the samples from ``begin`` on and before ``end`` [s]."""
+        part = slice(*np.searchsorted(self.time, (begin, end)))
         return RideSamples(
-            time=self.time[k:], travel=self.travel[k:], rate=self.rate[k:],
-            velocity=self.velocity[k:],
+            time=self.time[part], travel=self.travel[part], rate=self.rate[part],
+            velocity=self.velocity[part],
         )  # fmt: skip
 
 

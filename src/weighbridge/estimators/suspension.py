@@ -29,6 +29,9 @@ differences of velocities are noise."""
 BLOCK: Final = 0.5
 """Rows within so long count as dependent [s]."""
 
+STILL: Final = 2.0
+"""Travels count as dependent within so long, three periods of the body [s]."""
+
 SHORTEST: Final = 10.0
 """A ride of less does not tell eight parts apart [s]."""
 
@@ -70,7 +73,8 @@ class SuspensionCheck:
     ----------
     factor, std : (8,) of four springs and four dampers, over the vehicle file's [-]; what
         they have in common is in the mass and cannot be seen
-    misfit : (3,) part of the accelerations' power that other factors explain [-]
+    misfit : (3,) part of the accelerations' power that other factors explain; 0 for axes
+        that were not looked at [-]
     """
 
     factor: Floats
@@ -175,26 +179,33 @@ def check_suspension(
     ride : what the vehicle file says
     alpha : (3,) inverse parameters found, over those of the vehicle file
     pushed : (n,) samples during braking, starting or turning, whose forces are not the
-        suspension's
+        suspension's: left out where enough remains, else the heave alone is looked at
 
     Returns
     -------
     None where the ride is too short to tell.
     """
-    if samples.time.size < 2 or samples.time[-1] - samples.time[0] < SHORTEST:
+    if samples.duration < SHORTEST:
         return None
-    lately = samples.since(samples.time[-1] - LONGEST)
-    calm = None if pushed is None else ~pushed[samples.time.size - lately.time.size :]
-    rows = _banded(lately, calm)
+    lately = samples.between(samples.time[-1] - LONGEST)
+    axes, rows = 3, None
+    if pushed is not None:
+        rows = _banded(lately, ~pushed[samples.time.size - lately.time.size :])
+        # Pushes every few seconds leave too little, and may be the very fault that is looked
+        # for: they do not move the heave.
+        axes = 1 if rows is None else 3
+    if rows is None:
+        rows = _banded(lately)
     if rows is None:
         return None
     accel, parts, _, block = rows
+    accel = accel[:, :axes]
     force = -parts * np.concatenate((stiffness(ride), damping(ride)))
-    arms = np.vstack((corners(ride), corners(ride))) * (alpha / reference(ride))
+    arms = (np.vstack((corners(ride), corners(ride))) * (alpha / reference(ride)))[:, :axes]
     before = accel - force @ arms
     # Rows weigh by what is left of them, so that no unit counts.
     scale = 1.0 / np.maximum(np.std(before, axis=0), 1e-12)
-    design = np.stack([force * arms[:, j] * scale[j] for j in range(3)])
+    design = np.stack([force * arms[:, j] * scale[j] for j in range(axes)])
     target = (accel * scale).T
     hessian = np.einsum("jni,jnk->ik", design, design)
     if not np.linalg.cond(hessian) < 1e12:
@@ -208,7 +219,8 @@ def check_suspension(
     inverse = np.linalg.inv(hessian)
     std = np.sqrt(np.diag(inverse @ (sums.T @ sums) @ inverse))
     power = np.mean(target**2, axis=1)
-    misfit = (np.mean((before * scale) ** 2, axis=0) - np.mean(left**2, axis=1)) / power
+    misfit = np.zeros(3)
+    misfit[:axes] = (np.mean((before * scale) ** 2, axis=0) - np.mean(left**2, axis=1)) / power
     return SuspensionCheck(factor=factor, std=std, misfit=misfit)
 
 
@@ -236,12 +248,40 @@ def static_mass(samples: RideSamples, ride: Ride, gravity: float) -> tuple[float
 
     NaN where the vehicle file does not say with which mass the sensors read zero.
     """
-    if ride.zero_mass is None or samples.time.size < 2:
+    if ride.zero_mass is None:
         return math.nan, math.nan
-    lift = -samples.travel @ stiffness(ride) / gravity
-    block = ((samples.time - samples.time[0]) / (4.0 * BLOCK)).astype(np.int64)
+    mean, std = _mean(samples.time, -samples.travel @ stiffness(ride) / gravity)
+    return ride.zero_mass + mean, std
+
+
+def lean(samples: RideSamples, ride: Ride) -> tuple[float, float, float]:
+    """Angles by which the mean travel says the body leans over the front and the rear axle.
+
+    A stiff body leans alike over both, whatever its load and the turns it takes, but for the
+    tyres' give: the rest is an offset of a travel sensor.
+
+    Returns
+    -------
+    front, rear : right side down [rad]; NaN where the ride is too short
+    std : standard deviation of their difference [rad]
+    """
+    x = samples.travel
+    front = (x[:, 0] - x[:, 1]) / ride.front_track
+    rear = (x[:, 2] - x[:, 3]) / ride.rear_track
+    return (
+        _mean(samples.time, front)[0],
+        _mean(samples.time, rear)[0],
+        _mean(samples.time, front - rear)[1],
+    )
+
+
+def _mean(time: Floats, values: Floats) -> tuple[float, float]:
+    """Mean of a part of a ride and its standard deviation, by blocks; NaN below four blocks."""
+    if time.size < 2:
+        return math.nan, math.nan
+    block = ((time - time[0]) / STILL).astype(np.int64)
     count = np.bincount(block)
-    means = np.bincount(block, weights=lift)[count > 0] / count[count > 0]
+    means = np.bincount(block, weights=values)[count > 0] / count[count > 0]
     if means.size < 4:
         return math.nan, math.nan
-    return ride.zero_mass + float(np.mean(lift)), float(np.std(means) / math.sqrt(means.size))
+    return float(np.mean(values)), float(np.std(means) / math.sqrt(means.size))

@@ -26,9 +26,11 @@ from weighbridge.estimators.inertia import (
 )
 from weighbridge.estimators.suspension import (
     PARTS,
+    SHORTEST,
     SuspensionCheck,
     attenuation,
     check_suspension,
+    lean,
     response,
     static_mass,
 )
@@ -70,6 +72,12 @@ MOSTLY_CALM: Final = 0.3
 
 STATIC_PART: Final = 0.04
 """Weight at rest and mass in motion may differ by this part of the mass [-]."""
+
+LEAN: Final = 0.003
+"""Angles of the body over its two axles may differ by so much [rad]: 5 mm over a track."""
+
+LEAN_PART: Final = 0.3
+"""Or by this part of them: tyres give, and differently at front and rear [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -358,45 +366,23 @@ def _judged(
 ) -> Inertia:
     """Say what the estimate is worth; ``average`` is that of alpha over the whole ride."""
     changes = jumps(track)
-    begin = changes[-1] if changes else float(samples.time[0])
-    last = samples.since(begin)
-    alpha = np.asarray(track.alpha[-1])
-    pushed = np.asarray(track.pushed.any(axis=1))
-    trouble = ""
-    if len(changes) > max(3.0, 0.1 * float(track.time[-1] - track.time[0])):
-        trouble = f"the load seems to change {len(changes)} times"
-    elif float(np.mean(pushed)) > MOSTLY_CALM:
-        trouble = f"the vehicle seems to brake or turn {100.0 * np.mean(pushed):.0f} % of the time"
-    if ride.force_std is None:
-        warnings += (
-            "the vehicle file does not say how sure its springs and dampers are (force_std): "
-            f"{100.0 * UNKNOWN_FORCE_STD:.0f} % is in the interval",
-        )
-    common = UNKNOWN_FORCE_STD if ride.force_std is None else ride.force_std
-    std = np.hypot(common, attenuation(samples, ride, track.noise_factor, alpha))
-    if track.noise_factor > 1.0:
-        warnings += (
+    trouble = _trouble(track, changes)
+    check = _check(samples, ride, track, changes, average, bool(trouble))
+    if check is None and not trouble and track.noise_factor > 1.0:
+        trouble = (
             f"the ride fits as if the suspension signals had {track.noise_factor:.0f} times the "
-            "noise of the vehicle file: the sensors are noisier, or springs and dampers are not "
-            "the file's; the interval is widened",
+            "noise of the vehicle file, and is too short to tell noise from wrong springs and "
+            f"dampers: record more than {SHORTEST:.0f} s of one load"
         )
-    if samples.period > 0.0105:
-        warnings += (
-            f"sampled at {1.0 / samples.period:.0f} Hz, axles that hop are hardly seen; "
-            "200 Hz or more is better",
-        )
-
-    # Loads that come and go are no loads, and nobody brakes and turns all the time: then only
-    # the whole ride can tell which part is off.
-    check = (
-        check_suspension(samples, ride, average)
-        if trouble
-        else check_suspension(last, ride, alpha, pushed[-last.time.size :])
-    )
+    warnings += _limits(samples, ride, track, check)
+    common = UNKNOWN_FORCE_STD if ride.force_std is None else ride.force_std
+    noisy = attenuation(samples, ride, track.noise_factor, np.asarray(track.alpha[-1]))
+    std = np.hypot(common, noisy)
     doubts: list[str] = []
     if check is not None and check.off.any():
         std = np.hypot(std, float(np.max(np.abs(check.factor - 1.0))))
         doubts.append(_told(check))
+    last = samples.between(changes[-1] if changes else -math.inf)
     carried, carried_std = static_mass(last, ride, GRAVITY)
     found = float(track.parameters[-1, 0])
     if abs(carried - found) > max(STATIC_PART * found, 4.0 * carried_std):
@@ -407,9 +393,7 @@ def _judged(
             f"{found:.0f} kg: a travel sensor is offset, zero_mass_kg is not the mass with which "
             "they read zero, or the stiffness is wrong; the interval holds both"
         )
-    warnings += tuple(doubts)
-    if trouble:
-        trouble += ": springs, dampers or sensors are not those of the vehicle file"
+    warnings += (*doubts, *_leaning(last, ride))
     status, reason = _status(vehicle, track, check, trouble, doubts, std)
     result = Inertia(
         drive=drive,
@@ -433,6 +417,83 @@ def _judged(
         sure = "surely" if result.mass - 2.0 * result.std > vehicle.gross else "perhaps"
         return _with_warning(result, f"{sure} above the permitted mass of {vehicle.gross:.0f} kg")
     return result
+
+
+def _trouble(track: InertiaTrack, changes: tuple[float, ...]) -> str:
+    """Say what no vehicle does, in the hypotheses that the filter came to believe."""
+    pushed = float(np.mean(track.pushed.any(axis=1)))
+    told = ""
+    if len(changes) > max(3.0, 0.1 * float(track.time[-1] - track.time[0])):
+        told = f"the load seems to change {len(changes)} times"
+    elif pushed > MOSTLY_CALM:
+        told = f"the vehicle seems to brake or turn {100.0 * pushed:.0f} % of the time"
+    return told and f"{told}: springs, dampers or sensors are not those of the vehicle file"
+
+
+def _check(
+    samples: RideSamples,
+    ride: Ride,
+    track: InertiaTrack,
+    changes: tuple[float, ...],
+    average: Floats,
+    troubled: bool,
+) -> SuspensionCheck | None:
+    """Fit springs and dampers to the last load, or to the longest where that is too short."""
+    if troubled:
+        # Loads that come and go are no loads, and nobody brakes and turns all the time: then
+        # only the whole ride can tell which part is off.
+        return check_suspension(samples, ride, average)
+    edges = np.searchsorted(samples.time, (-np.inf, *changes, np.inf))
+    longest = int(np.argmax(np.diff(edges)))
+    pushed = np.asarray(track.pushed.any(axis=1))
+    for k in (len(changes), longest):
+        a, b = edges[k], edges[k + 1]
+        part = samples.between(samples.time[a], math.inf if k == len(changes) else changes[k])
+        check = check_suspension(part, ride, np.asarray(track.alpha[b - 1]), pushed[a:b])
+        if check is not None:
+            return check
+    return None
+
+
+def _limits(
+    samples: RideSamples, ride: Ride, track: InertiaTrack, check: SuspensionCheck | None
+) -> tuple[str, ...]:
+    """Say what limits the result: the vehicle file, noise, the logger, a short ride."""
+    told = []
+    if ride.force_std is None:
+        told.append(
+            "the vehicle file does not say how sure its springs and dampers are (force_std): "
+            f"{100.0 * UNKNOWN_FORCE_STD:.0f} % is in the interval"
+        )
+    if track.noise_factor > 1.0:
+        told.append(
+            f"the ride fits as if the suspension signals had {track.noise_factor:.0f} times the "
+            "noise of the vehicle file: the sensors are noisier, or springs and dampers are not "
+            "the file's; the interval is widened"
+        )
+    if samples.period > 0.0105:
+        told.append(
+            f"sampled at {1.0 / samples.period:.0f} Hz, axles that hop are hardly seen; "
+            "200 Hz or more is better"
+        )
+    if check is None:
+        told.append(
+            f"springs and dampers could not be checked one by one, which takes {SHORTEST:.0f} s "
+            "of one load: a broken one would not be told"
+        )
+    return tuple(told)
+
+
+def _leaning(samples: RideSamples, ride: Ride) -> tuple[str, ...]:
+    """Tell where front and rear springs contradict each other about how the body leans."""
+    front, rear, std = lean(samples, ride)
+    if abs(front - rear) > max(LEAN, LEAN_PART * max(abs(front), abs(rear)), 4.0 * std):
+        return (
+            f"on average the body leans by {1e3 * front:.0f} mrad to the right over the front axle "
+            f"and by {1e3 * rear:.0f} mrad over the rear axle: a travel sensor is offset; the "
+            "parameters do not suffer from it",
+        )
+    return ()
 
 
 def _with_warning(result: Inertia, text: str) -> Inertia:
