@@ -277,3 +277,9 @@ def test_canonical_names_need_no_more_than_how_the_text_is_written(tmp_path):
         assert_allclose(drive.signals["vehicle_speed"].time, [2.5, 3.5])
         assert_allclose(drive.signals["vehicle_speed"].values, [10.0, 20.0])
     assert_allclose(read_drive(tmp_path / "d", mapping).signals["gnss_speed"].values, [10.0, 20.0])
+
+
+def test_a_mapping_in_another_encoding_is_told_with_its_line(tmp_path):
+    path = write(tmp_path / "m.toml", '[signals.vehicle_speed]\ncolumn = "Größe"\n', "latin-1")
+    with pytest.raises(ConfigError, match=r"m\.toml is not UTF-8 \(line 2\): save it as UTF-8"):
+        load_mapping(path)

@@ -265,8 +265,11 @@ def read_toml(path: Path, error: type[WeighbridgeError] = ConfigError) -> Sectio
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise error(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as e:
-        raise error(f"{path} cannot be read as text: {e}") from None
+    except UnicodeDecodeError as e:
+        line = e.object[: e.start].count(b"\n") + 1
+        raise error(f"{path} is not UTF-8 (line {line}): save it as UTF-8") from None
+    except OSError as e:
+        raise error(f"{path} cannot be read: {e.strerror or e}") from None
     try:
         data = tomllib.loads(text, parse_float=Decimal)
     except tomllib.TOMLDecodeError as e:
