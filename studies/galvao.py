@@ -13,17 +13,19 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from scipy.optimize import least_squares
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 import weighbridge as wb
 from weighbridge.balance.speed_balance import speed_balance, window_means
+from weighbridge.calibration.speed_fit import SpeedRows
 from weighbridge.estimators.speed_ekf import SpeedEkfSettings, mean_mass, run_filter, start_share
 from weighbridge.papers import galvao as paper
-from weighbridge.pipeline.speed_calibrating import calibrate_by_speed
+from weighbridge.pipeline.speed_calibrating import calibrate_by_speed, speed_rows
 from weighbridge.report.table import Table
-from weighbridge.simulation import jensen_route, random_car, simulate_car
+from weighbridge.simulation import Route, jensen_route, mixed_route, random_car, simulate_car
 from weighbridge.vehicle.model import Vehicle
 
 HERE = Path(__file__).parent
@@ -103,6 +105,132 @@ def readings() -> str:
         lines.append(
             f"| {name} | {np.median(errors):.1f} | {min(errors):.2f} | {max(errors):.1f} |"
         )
+    return "\n".join(lines)
+
+
+def courses(route: Route, seed: int) -> list[SpeedRows]:
+    """Drive one road three times; means of 7 s with the true grade."""
+    made = [simulate_car(paper.scenario(seed + k, route)) for k in range(3)]
+    base = Vehicle(name=paper.CAR.name)
+    return [speed_rows(paper.with_grade(m), base, paper.mass_of(m), 7.0) for m in made]
+
+
+def city_road(seed: int) -> Route:
+    """Return streets of a city as easy as the country road: low grades, few bends, no stops."""
+    long = ("city", 30_000.0)
+    made = mixed_route(seed, out=[long], back=[long], name="city road, few bends, low grades")
+    return replace(
+        made,
+        grade=0.35 * made.grade,
+        heading=0.3 * made.heading,
+        stop_chance=0.0 * made.stop_chance,
+    )
+
+
+def model_accel(c, before, speed, slope, phi1):
+    """Eq. 11 with six coefficients: torque by speed and its square, a2, p4, a3, p6."""
+    drag, gravity = c[2] + c[3] * before, c[4] + c[5] * before
+    force = c[0] * before + c[1] * before**2 - 0.5 * drag * speed**2
+    inertia = 1.0 + phi1 * paper.NOMINAL.rotating_mass
+    accel = (phi1 * force - gravity * slope) / inertia
+    by_mass = (force - accel * paper.NOMINAL.rotating_mass) / inertia
+    return accel, np.array([-phi1 * drag * speed / inertia, by_mass, -gravity / inertia])
+
+
+def fit_steps(rows: SpeedRows, lag: int, free: tuple[int, ...]) -> np.ndarray:
+    """Fit the coefficients ``free`` to the change of speed; the others stay nominal."""
+    c = np.array([0.0, 0.0, paper.NOMINAL.drag, 0.0, paper.NOMINAL.gravity, 0.0])
+    if 5 not in free and 4 in free:  # the grade is left out altogether
+        c[4], free = 0.0, tuple(k for k in free if k != 4)
+    now, after = slice(1, -1), slice(2, None)
+    v, before = rows.speed[now], rows.speed[1 - lag : -1 - lag]
+    slope = np.sin(rows.grade + np.arctan(paper.NOMINAL.rolling_coefficient))
+    slope = 0.5 * (slope[now] + slope[after])
+    phi1 = 1.0 / rows.mass
+    parts = [phi1 * before, phi1 * before**2, -0.5 * phi1 * v**2, -0.5 * phi1 * before * v**2,
+             -slope, -slope * before]  # fmt: skip
+    design = np.column_stack(parts)
+    target = (1.0 + phi1 * paper.NOMINAL.rotating_mass) * (rows.speed[after] - v) / 7.0
+    good = rows.used[:-2] & rows.used[now] & rows.used[after] & np.isfinite(slope)
+    left = (target - design @ c)[good]
+    chosen = list(free)
+    c[chosen] += np.linalg.lstsq(design[good][:, chosen], left, rcond=None)[0]
+    return c
+
+
+def fit_course(rows: SpeedRows, lag: int) -> np.ndarray:
+    """Fit all coefficients to the whole course: the model runs on its own speed."""
+    slope = np.nan_to_num(np.sin(rows.grade + np.arctan(paper.NOMINAL.rolling_coefficient)))
+    slope = 0.5 * (slope[:-1] + slope[1:])
+    size = np.array([20.0, 1.0, 1.0, 0.1, 5.0, 0.5])
+
+    def off(q: np.ndarray) -> np.ndarray:
+        x, out = rows.speed[0], np.zeros(rows.speed.size)
+        for k in range(rows.speed.size - 1):
+            if not rows.used[k]:
+                x = rows.speed[k]
+            accel, _ = model_accel(
+                q * size, rows.speed[max(k - lag, 0)], x, slope[k], 1.0 / rows.mass
+            )
+            x = float(np.clip(x + 7.0 * accel, 0.0, 60.0))
+            if rows.used[k] and rows.used[k + 1]:
+                out[k + 1] = x - rows.speed[k + 1]
+        return out
+
+    return least_squares(off, fit_steps(rows, lag, (0, 1, 3, 4, 5)) / size, max_nfev=60).x * size
+
+
+def printed_filter(rows: SpeedRows, c: np.ndarray, lag: int) -> float:
+    """Run eqs. 13 to 26 from 1500 kg as printed; the mean mass [kg]."""
+    q = np.diag(paper.PRINTED.process_var)
+    x, cov = np.array([rows.speed[0], 1.0 / 1500.0, 0.01]), q.copy()
+    mass, used = np.full(rows.speed.size, 1500.0), np.zeros(rows.speed.size, dtype=bool)
+    for k in range(1 + lag, rows.speed.size):
+        used[k] = rows.used[k - 1 - lag : k + 1].all()
+        if not used[k]:
+            x[0], cov[0, :], cov[:, 0] = rows.speed[k], 0.0, 0.0
+            cov[0, 0] = q[0, 0]
+        else:
+            accel, slopes = model_accel(c, rows.speed[k - 1 - lag], x[0], x[2], x[1])
+            transition = np.eye(3)
+            transition[0] += 7.0 * slopes
+            x = x + np.array([7.0 * accel, 0.0, 0.0])
+            cov = transition @ cov @ transition.T + q
+            gain = cov[:, 0] / (cov[0, 0] + paper.PRINTED.speed_var)
+            x = x + gain * (rows.speed[k] - x[0])
+            cov = cov - np.outer(gain, cov[0])
+        mass[k] = 1.0 / x[1]
+    return mean_mass(mass, used)
+
+
+def other_models() -> str:
+    """Fit the model in other ways that the print allows; filter, noise and start as printed."""
+    every = (0, 1, 3, 4, 5)
+    cases = (
+        ("as printed", 0, lambda r: fit_steps(r, 0, every)),
+        ("a3 not corrected", 0, lambda r: fit_steps(r, 0, (0, 1, 3))),
+        ("grade left out", 0, lambda r: fit_steps(r, 0, (0, 1, 3, 4))),
+        ("torque from one sample earlier", 1, lambda r: fit_steps(r, 1, (0, 1, 2, 3, 4, 5))),
+        ("torque earlier, a3 not corrected", 1, lambda r: fit_steps(r, 1, (0, 1, 2, 3))),
+        ("torque earlier, grade left out", 1, lambda r: fit_steps(r, 1, (0, 1, 2, 3, 4))),
+        ("fitted to the whole course", 0, lambda r: fit_course(r, 0)),
+        ("torque earlier, whole course", 1, lambda r: fit_course(r, 1)),
+    )
+    lines = [
+        "| fit of the model | road | median error % | smallest % | best road's worst drive % |",
+        "|---|---|---|---|---|",
+    ]
+    for place, road in (("country", paper.easy_route), ("city", city_road)):
+        drives = [courses(road(seed), seed) for seed in OTHER_SEEDS]
+        for name, lag, fit in cases:
+            off = []
+            for three in drives:
+                c = fit(three[0])
+                off.append([100.0 * abs(printed_filter(r, c, lag) / r.mass - 1.0) for r in three])
+            lines.append(
+                f"| {name} | {place} | {np.median(off):.1f} | {np.min(off):.2f} "
+                f"| {np.min(np.max(off, axis=1)):.1f} |"
+            )
     return "\n".join(lines)
 
 
@@ -270,6 +398,7 @@ def main() -> None:
         ("trials", markdown(paper.trials_table(done))),
         ("roads", other_roads()),
         ("readings", readings()),
+        ("models", other_models()),
         ("sampling", sampling()),
         ("transfer", transfer_text(JUDGING)),
         ("bmw-i3", bmw_i3()),
