@@ -5,11 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, ekf, hybrid, robust_rls
+from weighbridge.kernels import mass_ekf as kernel
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 
 METHODS = ("robust-rls", "ekf", "hybrid")
@@ -121,6 +123,32 @@ def test_without_an_offset_the_paper_is_biased_by_one():
     settings = robust_rls.RobustRlsSettings(offset_std=0.0)
     found = robust_rls.estimate(balance(offset=0.04, minutes=10.0), BUS, settings).mass
     assert found < 9800.0
+
+
+def filtered(made, settings):
+    """Errors of the Kalman filter's running mass over the standard deviation it has itself."""
+    _, _, valid = robust_rls.rows(made.merged, BUS, settings.start)
+    table = ekf.columns(made, BUS, valid)
+    params = ekf.parameters(settings, BUS, robust_rls.row_period(made.merged.time))
+    start = kernel.initial_state(10_000.0, 1000.0**2, kernel.row_at(table, 0), params)
+    _, mass, var, *_ = kernel.run(start, table, 0, params)
+    return ((mass - 10_000.0) / np.sqrt(var))[made.merged.time > 60.0]
+
+
+def test_the_kalman_filter_is_as_sure_as_torque_errors_that_last_allow():
+    keep = np.exp(-0.1 / 5.0)  # errors of 0.03 m/s^2 that last 5 s, in rows of 0.1 s
+    usual, white = [], []
+    for seed in range(6):
+        made = balance(seed=seed, rate=10.0)
+        view = made.merged
+        shocks = np.random.default_rng([seed, 5]).normal(size=view.time.size)
+        error = 300.0 * lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], shocks)
+        made = replace(made, merged=replace(view, traction_force=view.traction_force + error))
+        usual.append(filtered(made, ekf.EkfSettings()))
+        white.append(filtered(made, ekf.EkfSettings(accel_walk=0.02)))
+    assert np.mean(np.abs(np.concatenate(usual)) < 1.96) > 0.93
+    assert np.sqrt(np.mean(np.concatenate(usual) ** 2)) > 0.4
+    assert np.mean(np.abs(np.concatenate(white)) < 1.96) < 0.8
 
 
 def test_counting_the_grade_twice_makes_a_climbing_bus_light():
