@@ -1,31 +1,36 @@
 """Accuracy of the estimators on simulated drives whose seeds and vehicles no tuning saw.
 
-Run from the checkout: ``python studies/accuracy.py [FIRST_SEED]``.
+Run from the checkout: ``python studies/accuracy.py``, which writes ``accuracy.md``;
+``--part wind`` prints one part alone, ``--seed 92000`` takes other drives for the table.
 """
 
 from __future__ import annotations
 
-import math
-import sys
+import argparse
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from accuracy_claims import PARTS, Part, Rows, run_parts
+from accuracy_drives import (
+    FULL,
+    KINDS,
+    calibrated,
+    known_drives,
+    scenario,
+    true_mass,
+)
 
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.navigation.select import find_motion
 from weighbridge.papers.jensen2022 import without_weather
-from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
-from weighbridge.simulation import Scenario, random_vehicle, simulate_car, usual_polling
-from weighbridge.simulation.route import jensen_route
-from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.simulation import random_vehicle, simulate_car
 
 HERE = Path(__file__).parent
-KINDS = ("petrol_manual", "petrol_dct", "diesel_automatic", "electric", "van", "truck")
 DRIVES = 10
 CALIBRATIONS = 3
-FULL = {"car": 0.3, "van": 0.65, "truck": 0.85}
+FIRST_SEED = 91_000
 EARLY = 300.0
 METHODS = ("rls", "robust-rls", "ekf", "hybrid", "joint, one calibration drive", "joint")
 
@@ -40,31 +45,6 @@ class Outcome:
     std: float
     early: float
     early_std: float
-
-
-def scenario(car, rng: np.random.Generator, *, load: float, seed: int) -> Scenario:
-    """Draw one ordinary drive."""
-    made = Scenario(
-        name=f"drive {seed}",
-        car=car,
-        route=jensen_route(int(rng.integers(1000, 2000))),
-        payload=load,
-        seed=seed,
-        polling=usual_polling(car),
-        wind_speed=float(rng.uniform(0.0, 10.0)),
-        wind_from=float(rng.uniform(0.0, 2.0 * math.pi)),
-        ambient_temperature=float(rng.uniform(268.0, 303.0)),
-        aggressiveness=float(rng.uniform(0.8, 1.25)),
-    )
-    outages = ()
-    if rng.random() < 0.3:
-        begin = float(rng.uniform(300.0, 1200.0))
-        outages = ((begin, begin + float(rng.uniform(30.0, 180.0))),)
-    return replace(
-        made,
-        effects=replace(made.effects, warm_up=float(rng.uniform(0.0, 1.0))),
-        sensors=replace(made.sensors, gnss_outages=outages),
-    )
 
 
 def first_minutes(balance: ForceBalance) -> ForceBalance:
@@ -84,60 +64,41 @@ def first_minutes(balance: ForceBalance) -> ForceBalance:
     return replace(balance, merged=cut(view), force=cut(balance.force))
 
 
-def calibrated(car, rng: np.random.Generator, seed: int) -> dict[str, Vehicle]:
-    """Vehicle files made from ordinary drives of known mass: empty, half loaded, nearly full."""
-    known = [
-        simulate_car(scenario(car, rng, load=part * FULL[car.kind] * car.mass, seed=seed + k))
-        for k, part in enumerate((0.0, 0.5, 0.9)[:CALIBRATIONS])
-    ]
-    drives = [without_weather(made.drive) for made in known]
-    masses = [float(np.mean(made.truth.mass)) for made in known]
-    base = Vehicle(kind=car.kind, driveline=Driveline(wheel_radius=car.wheel_radius))
-
-    def fitted(method: str, count: int) -> Vehicle:
-        settings = CalibrationSettings(method=method)
-        return run_calibration(drives[:count], masses[:count], vehicle=base,
-                               settings=settings).vehicle  # fmt: skip
-
-    published = fitted("rls", CALIBRATIONS)
-    return {
+def weigh_all(job: tuple[int, int]) -> list[Outcome]:
+    """Calibrate one vehicle on ordinary drives and weigh it on others."""
+    seed, number = job
+    kind = KINDS[number]
+    rng = np.random.default_rng(seed + 10 * number)
+    car = random_vehicle(rng, kind)
+    known = known_drives(car, rng, seed + 1000 * number, count=CALIBRATIONS)
+    published = calibrated(car, known, method="rls")
+    vehicles = {
         **dict.fromkeys(("rls", "robust-rls", "ekf", "hybrid"), published),
-        "joint, one calibration drive": fitted("joint", 1),
-        "joint": fitted("joint", CALIBRATIONS),
+        "joint, one calibration drive": calibrated(car, known[:1]),
+        "joint": calibrated(car, known),
     }
-
-
-def weigh_all(seed: int) -> list[Outcome]:
-    """Calibrate each vehicle on ordinary drives and weigh it on others."""
     outcomes = []
-    for number, kind in enumerate(KINDS):
-        rng = np.random.default_rng(seed + 10 * number)
-        car = random_vehicle(rng, kind)
-        vehicles = calibrated(car, rng, seed + 1000 * number)
-        for k in range(DRIVES):
-            load = float(rng.uniform(0.0, FULL[car.kind] * car.mass))
-            made = simulate_car(scenario(car, rng, load=load, seed=seed + 1000 * number + 100 + k))
-            mass = float(np.mean(made.truth.mass))
-            drive = without_weather(made.drive)
-            motion = find_motion(drive, vehicles["joint"])
-            for method, vehicle in vehicles.items():
-                balance = force_balance(drive, vehicle, motion)
-                estimator = ESTIMATORS[method.split(",")[0]]
-                track = estimator(balance, vehicle)
-                early = estimator(first_minutes(balance), vehicle)
-                outcomes.append(
-                    Outcome(
-                        kind,
-                        method,
-                        track.mass / mass - 1.0,
-                        track.std / mass,
-                        early.mass / mass - 1.0,
-                        early.std / mass,
-                    )
+    for k in range(DRIVES):
+        load = float(rng.uniform(0.0, FULL[car.kind] * car.mass))
+        made = simulate_car(scenario(car, rng, load=load, seed=seed + 1000 * number + 100 + k))
+        mass = true_mass(made)
+        drive = without_weather(made.drive)
+        motion = find_motion(drive, vehicles["joint"])
+        for method, vehicle in vehicles.items():
+            balance = force_balance(drive, vehicle, motion)
+            estimator = ESTIMATORS[method.split(",")[0]]
+            track = estimator(balance, vehicle)
+            early = estimator(first_minutes(balance), vehicle)
+            outcomes.append(
+                Outcome(
+                    kind,
+                    method,
+                    track.mass / mass - 1.0,
+                    track.std / mass,
+                    early.mass / mass - 1.0,
+                    early.std / mass,
                 )
-        for method in METHODS[-2:]:
-            done = [o for o in outcomes if o.car == kind and o.method == method]
-            print(kind, method, " ".join(f"{100 * o.error:+.2f}" for o in done), flush=True)
+            )
     return outcomes
 
 
@@ -173,13 +134,26 @@ def table(outcomes: list[Outcome]) -> str:
     return "\n".join(lines)
 
 
+def tell_methods(done: Rows) -> str:
+    return table([outcome for _, part in done for outcome in part])
+
+
 def main() -> None:
-    seed = int(sys.argv[1]) if len(sys.argv) > 1 else 70_000
-    text = table(weigh_all(seed))
-    print(text)
-    template = HERE / "accuracy.template.md"
-    if len(sys.argv) == 1 and template.is_file():
-        page = template.read_text(encoding="utf-8").replace("<!-- table -->", text)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--part", choices=("table", *PARTS), help="print this part alone")
+    parser.add_argument("--seed", type=int, default=FIRST_SEED, help="of the table of methods")
+    given = parser.parse_args()
+    methods = Part(
+        tuple((given.seed, n) for n in range(len(KINDS))), weigh_all, tell_methods, filed=False
+    )
+    parts = {"table": methods, **PARTS}
+    if given.part:
+        parts = {given.part: parts[given.part]}
+    page = (HERE / "accuracy.template.md").read_text(encoding="utf-8")
+    for name, text in run_parts(parts).items():
+        print(f"{name}\n\n{text}\n", flush=True)
+        page = page.replace(f"<!-- {name} -->", text)
+    if len(parts) > 1 and given.seed == FIRST_SEED:
         (HERE / "accuracy.md").write_text(page, encoding="utf-8")
 
 

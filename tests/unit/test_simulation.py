@@ -119,6 +119,25 @@ def test_rounding_down_reads_half_a_step_less():
     assert_allclose((nearest - down)[moving].mean(), 0.5 / 3.6, rtol=0.2)
 
 
+@pytest.mark.parametrize(
+    ("name", "full"),
+    [("engine_load", MIDSIZE.load_full), ("engine_torque", max(MIDSIZE.curve_torque))],
+)
+def test_noise_of_the_torque_reading_is_a_part_of_its_full_value(name, full):
+    def read(noise):
+        polling = Polling(
+            fast=(name,), slow=(), rate=50.0, delay_spread=0.0, delay_jitter=0.0, torque_noise=noise
+        )
+        effects = Effects().without("obd_quantisation", "obd_jitter")
+        return simulate_car(short(polling=polling, effects=effects)).drive.signals[name].values
+
+    quiet, noisy = read(0.0), read(0.01)
+    # Near its lowest a load is cut off at zero.
+    above = quiet > 0.2 * full
+    assert_allclose((noisy - quiet)[above].std(), 0.01 * full, rtol=0.1)
+    assert abs((noisy - quiet)[above].mean()) < 0.01 * full * 4.0 / np.sqrt(above.sum())
+
+
 def test_polled_values_are_late_by_the_delay():
     polling = Polling(
         fast=("vehicle_speed", "engine_speed"), slow=(), rate=20.0, delay=0.13, delay_spread=0.0

@@ -202,6 +202,8 @@ class Polling:
     speed_step, engine_speed_step : resolution of the two [km/h], [rpm]
     net_torque : torque percent is that at the flywheel, as from J1939, not the
         indicated one of OBD
+    torque_noise : white noise of load and torque readings, before they are rounded,
+        over their value at full torque [-]
     """
 
     fast: tuple[str, ...] = (
@@ -222,6 +224,7 @@ class Polling:
     speed_step: float = 1.0
     engine_speed_step: float = 0.25
     net_torque: bool = False
+    torque_noise: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.2 <= self.rate <= 100.0:
@@ -233,6 +236,8 @@ class Polling:
         for name in ("speed_step", "engine_speed_step"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}")
+        if not 0.0 <= self.torque_noise <= 1.0:
+            raise ConfigError(f"torque_noise must be in [0, 1], got {self.torque_noise}")
         if not self.fast:
             raise ConfigError("polling needs at least one fast quantity, got none")
 

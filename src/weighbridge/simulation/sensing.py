@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy import signal as dsp
@@ -22,6 +23,7 @@ from weighbridge.simulation.longitudinal import DT
 
 if TYPE_CHECKING:
     from weighbridge.simulation.body import Pose
+    from weighbridge.simulation.car import SimulatedCar
     from weighbridge.simulation.longitudinal import Trajectory
     from weighbridge.simulation.scenario import Scenario
 
@@ -357,6 +359,14 @@ POLLABLE = (
 """Quantities the simulated control units can be asked for."""
 
 
+_FULL_TORQUE: Final[dict[str, Callable[[SimulatedCar], float]]] = {
+    "engine_load": lambda car: car.load_full,
+    "engine_torque": lambda car: max(car.curve_torque),
+    "engine_torque_fraction": lambda car: 1.0,
+}
+"""What the readings of torque are at full torque."""
+
+
 def simulate_polling(
     scenario: Scenario, drive: Trajectory, pose: Pose, rng: np.random.Generator
 ) -> list[Signal]:
@@ -405,6 +415,11 @@ def simulate_polling(
             row = values[np.clip(((time - delay) / DT).astype(int), 0, values.size - 1)]
         else:
             row = np.interp(time - delay, drive.time, values)
+        if polling.torque_noise > 0.0 and name in _FULL_TORQUE:
+            full = _FULL_TORQUE[name](scenario.car)
+            row = row + polling.torque_noise * full * rng.standard_normal(time.size)
+            if name == "engine_load":
+                row = np.clip(row, 0.0, 1.0)
         if effects.obd_quantisation > 0.0:
             row = _quantise(row, name, step, down=polling.speed_rounding == "down")
         signals.append(Signal(name, time, row))
