@@ -100,3 +100,16 @@ def test_container_that_claims_much_takes_no_memory(tmp_path):
     path = tmp_path / "log.blf"
     path.write_bytes(raw)
     read(path)
+
+
+def test_channels_outside_their_records_do_not_end_the_process(tmp_path):
+    raw = bytearray(LOGS["mf4"])
+    at = raw.find(b"##CN")
+    while at >= 0:
+        body = at + 24 + 8 * int.from_bytes(raw[at + 16 : at + 24], "little")
+        raw[body + 4 : body + 8] = (1 << 24).to_bytes(4, "little")
+        at = raw.find(b"##CN", at + 1)
+    path = tmp_path / "log.mf4"
+    path.write_bytes(raw)
+    with pytest.raises(WeighbridgeError, match="stands outside its records"):
+        read_drive(path)

@@ -24,7 +24,7 @@ from weighbridge.io.frames import Frames
 from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
-from weighbridge.io.mdf_bus import bus_frames
+from weighbridge.io.mdf_bus import bus_frames, check_places
 from weighbridge.io.mdf_salvage import Salvaged, salvage
 from weighbridge.io.table import column_list
 from weighbridge.signals import DriveInfo, Floats, Problem
@@ -269,6 +269,7 @@ def _unit_text(file: Any, place: _Place) -> str:
 def _samples(file: Any, path: Path, place: _Place) -> tuple[Floats, Floats | None]:
     """Time and physical values of one channel, samples marked invalid left out as NaN."""
     try:
+        check_places(file.groups[place[0]])
         found = file.get(group=place[0], index=place[1], ignore_invalidation_bits=True)
     except Exception as e:
         raise DriveError(

@@ -14,6 +14,29 @@ _DATA_FRAME: Final = "CAN_DataFrame"
 _DLC: Final = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64], np.uint8)
 
 
+# Channels that have no place in a record: virtual master and virtual data (ASAM MDF 4.1, CN).
+_VIRTUAL: Final = (3, 6)
+
+
+def check_places(group: Any) -> None:
+    """Refuse a group whose channels stand outside its records.
+
+    asammdf takes bytes from where a damaged description says, beyond the end of the data, and the
+    process would end there.
+
+    Raises
+    ------
+    ValueError
+        Such a channel.
+    """
+    size = int(group.channel_group.samples_byte_nr)
+    for channel in group.channels:
+        if channel.channel_type not in _VIRTUAL:
+            bits = int(channel.bit_offset) + int(channel.bit_count)
+            if int(channel.byte_offset) + (bits + 7) // 8 > size:
+                raise ValueError(f"channel {channel.name!r} stands outside its records")
+
+
 def bus_frames(file: Any) -> Frames:
     """All CAN data frames of an open MDF file.
 
@@ -33,6 +56,7 @@ def bus_frames(file: Any) -> Frames:
         for c, channel in enumerate(group.channels):
             # A frame is a structure of its fields; each of them is a channel, too.
             if channel.name.startswith(_DATA_FRAME) and "." not in channel.name:
+                check_places(group)
                 found = file.get(group=g, index=c, ignore_invalidation_bits=True)
                 if found.samples.dtype.names:
                     parts.append(_frames(found.timestamps, found.samples))
