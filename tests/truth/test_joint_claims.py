@@ -1,0 +1,146 @@
+"""What the joint estimator must stand: other loggers, a wrong start, a cruise."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.errors import DriveError
+from weighbridge.estimators import Status, joint
+from weighbridge.simulation import MIDSIZE, Scenario, flat_route, mixed_route, simulate_car
+
+DRIVES = 4
+MOST_MOVED = 0.003
+"""What another logger, or another start, may move the mean by [-]."""
+
+
+def town(seed, payload, *, length=1.0, rate=4.0, noise=0.02, roughness=1.0):
+    """Ten minutes of town and hills, or more, recorded by some logger."""
+    made = Scenario(
+        name=f"town {seed}",
+        car=MIDSIZE,
+        route=mixed_route(
+            seed,
+            out=[("city", 1500 * length), ("hills", 1800 * length)],
+            back=[("hills", 1800 * length), ("city", 1500 * length)],
+        ),
+        payload=payload,
+        seed=seed,
+        wind_speed=4.0,
+    )
+    sizes = dict.fromkeys(("imu_noise", "imu_vibration", "roughness"), roughness)
+    return replace(
+        made,
+        polling=replace(made.polling, rate=rate, torque_noise=noise),
+        effects=replace(made.effects, **sizes),
+    )
+
+
+@cache
+def recorded(**logger):
+    return [simulate_car(town(3200 + k, 100.0 * k, **logger)) for k in range(DRIVES)]
+
+
+def mean_mass(made):
+    return float(np.mean(made.truth.mass))
+
+
+def ratios(car, **logger):
+    """Masses of some drives over the true ones, by some logger."""
+    found = []
+    for made in recorded(**logger):
+        weighing = wb.weigh(made.drive, car)
+        assert weighing.method == "joint"
+        found.append(weighing.mass / mean_mass(made))
+    return np.array(found)
+
+
+@pytest.fixture(scope="module")
+def car():
+    known = [simulate_car(town(3100 + k, load, length=3.0)) for k, load in enumerate((0.0, 300.0))]
+    return wb.calibrate([made.drive for made in known], mass=[mean_mass(made) for made in known])
+
+
+@pytest.fixture(scope="module")
+def usual(car):
+    """Masses over the true ones by the logger that recorded the calibration."""
+    return ratios(car)
+
+
+@pytest.mark.parametrize(
+    "logger",
+    [
+        {"rate": 10.0},
+        {"rate": 2.0},
+        {"roughness": 2.0},
+        pytest.param(
+            {"noise": 0.04},
+            marks=pytest.mark.xfail(
+                strict=True, reason="which rows are overrun is told by the noisy reading itself"
+            ),
+        ),
+    ],
+    ids=lambda logger: "{}={}".format(*next(iter(logger.items()))),
+)
+def test_another_logger_does_not_move_the_mean(car, usual, logger):
+    moved = ratios(car, **logger) / usual - 1.0
+    chance = 2.0 * moved.std(ddof=1) / np.sqrt(moved.size)
+    # Ten minutes at 2 Hz scatter by one percent; an estimator that does worse proves nothing.
+    assert chance < 0.02
+    assert abs(moved.mean()) < MOST_MOVED + chance
+
+
+@pytest.mark.parametrize("factor", [1.0 / 3.0, 3.0])
+def test_a_start_three_times_off_costs_no_accuracy(car, usual, factor, monkeypatch):
+    guess = joint.first_guess
+    monkeypatch.setattr(joint, "first_guess", lambda phi, y: factor * guess(phi, y))
+    assert np.max(np.abs(ratios(car) / usual - 1.0)) < MOST_MOVED
+
+
+def cruise(seed, speed_step):
+    """Drive off and go on at 50 km/h, in a gear of the town, for twenty minutes on the flat."""
+    made = Scenario(
+        name="cruise",
+        car=MIDSIZE,
+        route=flat_route(20_000.0, limit=50.0 / 3.6),
+        payload=150.0,
+        seed=seed,
+        duration=1350.0,
+    )
+    return simulate_car(
+        replace(
+            made,
+            effects=made.effects.without("traffic"),
+            polling=replace(made.polling, speed_step=speed_step),
+        )
+    )
+
+
+@pytest.mark.parametrize("begin", [0.0, 150.0], ids=["launched", "cruising"])
+@pytest.mark.parametrize(
+    "speed_step",
+    [
+        pytest.param(
+            1.0 / 256.0,
+            marks=pytest.mark.xfail(
+                strict=True, reason="the interval is that of noise alone; the mass is 15 % heavy"
+            ),
+        ),
+        pytest.param(
+            1.0,
+            marks=pytest.mark.xfail(
+                strict=True,
+                raises=DriveError,
+                reason="where speed hardly changes, its steps are taken for a wrong unit",
+            ),
+        ),
+    ],
+)
+def test_a_cruise_is_never_a_confident_wrong_mass(car, speed_step, begin):
+    made = cruise(3301, speed_step)
+    weighing = wb.weigh(made.drive.between(begin, 1350.0), car)
+    if weighing.status is not Status.NOT_EXCITED:
+        low, high = weighing.interval(0.95)
+        assert low <= mean_mass(made) <= high
