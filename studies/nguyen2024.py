@@ -9,8 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.special import ndtr
 
-from weighbridge.estimators.inertia import InertiaSettings, estimate
+from weighbridge.estimators.inertia import (
+    InertiaSettings,
+    body_noise,
+    corners,
+    damping,
+    estimate,
+    push_var,
+    stiffness,
+)
 from weighbridge.papers import nguyen2024 as paper
 from weighbridge.pipeline.inertia import estimate_inertia
 from weighbridge.pipeline.ride_checks import ride_samples
@@ -20,8 +30,10 @@ from weighbridge.vehicle.model import Vehicle
 
 HERE = Path(__file__).parent
 
-# Judged here alone; the filter was made with seeds below 200 and 400 random rides of 1 and 21.
-FIRST_SEED = 9000
+# Judged here alone; the filter was made with seeds below 200, the roads of 9000 to 9029, and
+# random rides of 1, 21, 41, 43 and 9001.
+FIRST_SEED = 12_000
+EXPERIMENTS = 30
 ROADS = 100
 SETTLED = 2.0
 CLASSES = "ABCDE"
@@ -38,7 +50,7 @@ def three(values, form=".2f") -> str:
 
 
 def experiment() -> tuple[str, str]:
-    results, _ = paper.reproduce(seed=FIRST_SEED, roads=30)
+    results, _ = paper.reproduce(seed=FIRST_SEED, roads=EXPERIMENTS)
     rows = []
     for name, found in results.items():
         mape = 100.0 * np.array([r.mape for r in found])
@@ -94,6 +106,41 @@ def fixed_noise() -> str:
     return table(
         ("form", "density of the parameters' process noise, 1/s", "MAPE %",
          "scatter between the changes %"), rows,
+    )  # fmt: skip
+
+
+def bounds() -> str:
+    """Say how closely 0.3 s after a change can tell the parameters at best.
+
+    The Cramer-Rao bound, for an estimator that knows when the load changed, and the
+    velocities at that moment.
+    """
+    rows = []
+    for name in (paper.CASES[0].name, paper.CASES[5].name, paper.CASES[6].name):
+        sensors = next(case.sensors for case in paper.CASES if case.name == name)
+        ride = paper.suspension_of(TRUCK, sensors)
+        body, push, step = body_noise(ride), np.sqrt(push_var(ride)), 1.0 / sensors.rate
+        count = round(0.3 * sensors.rate)
+        sample = np.arange(1, count + 1)
+        stds = []
+        for k in range(EXPERIMENTS):
+            made = paper.simulate(FIRST_SEED + k, sensors)
+            force = -np.hstack((made.inputs[:, :4] * stiffness(ride),
+                                made.inputs[:, 4:] * damping(ride)))  # fmt: skip
+            accel = force @ np.vstack((corners(ride), corners(ride))) / made.inertias
+            for at, factor in paper.CHANGES:
+                first = np.searchsorted(made.time, at - 0.5 * step)
+                after = cumulative_trapezoid(accel[first : first + count + 1], dx=step, axis=0)
+                for j in range(3):
+                    walk = (push[j] * step / factor) ** 2 * np.minimum.outer(sample, sample)
+                    noise = walk + body[j] ** 2 * np.eye(count)
+                    stds.append(1.0 / np.sqrt(after[:, j] @ np.linalg.solve(noise, after[:, j])))
+        outside = 2.0 * np.sum(ndtr(-0.05 / np.array(stds)))
+        rows.append((name, f"{100 * np.median(stds):.2f}", f"{100 * np.max(stds):.1f}",
+                     f"{outside:.0f} of {len(stds)}"))  # fmt: skip
+    return table(
+        ("reading", "median least standard deviation %", "worst",
+         "expected outside 5 % after 0.3 s"), rows,
     )  # fmt: skip
 
 
@@ -163,9 +210,13 @@ def faults() -> str:
         return {"sensors": RideSensors(**parts)}
 
     pushes = ((8.0, 11.0, -3.0, 0.0), (14.0, 18.0, 1.0, 0.0), (20.0, 24.0, 0.0, 2.5))
+    busy = tuple(
+        (2.0 + 4.0 * k, 3.5 + 4.0 * k, (1.0, -2.0)[k % 2], (2.0, 0.0, 0.0)[k % 3]) for k in range(7)
+    )
     cases = {
         "none": {},
         "braking 3 m/s², starting 1 m/s², a turn of 2.5 m/s²": {"manoeuvres": pushes},
+        "braking or turning every 4 s": {"manoeuvres": busy},
         "springs 10 % softer": truck(stiffness=0.9 * c),
         "front springs 10 % softer": truck(stiffness=c * [0.9, 0.9, 1, 1]),
         "springs and dampers 10 % softer": truck(stiffness=0.9 * c, damping=0.9 * d),
@@ -179,6 +230,9 @@ def faults() -> str:
         "one damper locked (× 20)": truck(damping=d * [20, 1, 1, 1]),
         "one damper × 4": truck(damping=d * [4, 1, 1, 1]),
         "one damper without oil (× 0.05)": truck(damping=d * [0.05, 1, 1, 1]),
+        "the same, 8 s of ride": {**truck(damping=d * [0.05, 1, 1, 1]), "duration": 8.0},
+        "one damper locked, 8 s of ride": {**truck(damping=d * [20, 1, 1, 1]), "duration": 8.0},
+        "no fault, 8 s of ride": {"duration": 8.0},
     }
     known = paper.suspension_of(TRUCK, RideSensors())
     car = Vehicle(name="truck", kind="truck", ride=replace(known, zero_mass=EMPTY))
@@ -189,7 +243,7 @@ def faults() -> str:
         errors, held, reach, told, refused, blind_held = [], [], [], 0, 0, []
         count = 20
         for k in range(count):
-            made = simulate_ride(draw(rng, 500 + k, duration=30.0, **dict(parts)))
+            made = simulate_ride(draw(rng, 500 + k, **{"duration": 30.0, **parts}))
             found = estimate_inertia(Drive("ride", made.drive.signals), car)
             true = made.inertias[-1]
             refused += found.status != "converged"
@@ -211,7 +265,7 @@ def faults() -> str:
              f"{np.sum(blind_held)} of {np.size(blind_held)}" if blind_held else "")
         )  # fmt: skip
     return table(
-        ("what is wrong, 20 rides of 30 s each", "refused", "weighed with a warning",
+        ("what is wrong, 20 rides of 30 s unless said", "refused", "weighed with a warning",
          "RMS error %, mass / roll / pitch", "median ± 95 %", "intervals that hold",
          "the same without zero_mass_kg"),
         rows,
@@ -225,6 +279,7 @@ def main() -> None:
     for name, text in (
         ("table2", table_2),
         ("cases", cases),
+        ("bounds", bounds()),
         ("fixed", fixed_noise()),
         ("rates", rates),
         ("classes", classes),
