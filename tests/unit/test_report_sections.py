@@ -197,10 +197,15 @@ def test_what_only_comes_back_after_a_dip_is_no_gain():
     assert_allclose(_net_gain(information), expected)
 
 
+def loaded_on_the_way():
+    """Drive launches, stand a minute while 400 kg are loaded, and drive launches again."""
+    leg = launches()
+    speed = np.concatenate((leg, np.zeros(int(60.0 * RATE)), leg))
+    return driven(speed, load=np.where(np.arange(speed.size) <= leg.size, 0.0, 400.0))
+
+
 def test_information_is_counted_for_each_load():
-    speed = launches(60, rest=30.0)
-    load = np.where(np.arange(speed.size) < speed.size // 2, 0.0, 400.0)
-    w = driven(speed, load=load)
+    w = loaded_on_the_way()
     assert len(w.segments) == 2
     assert w.mass == pytest.approx(MASS + 400.0, rel=0.02)
     gained = information_gained(w.result)
@@ -362,8 +367,7 @@ def test_comparisons_must_be_as_many_as_drives(tmp_path):
 
 
 def test_mass_of_the_start_does_not_judge_a_drive_whose_load_changed(tmp_path):
-    speed = launches(60, rest=30.0)
-    w = driven(speed, load=np.where(np.arange(speed.size) < speed.size // 2, 0.0, 400.0))
+    w = loaded_on_the_way()
     w = replace(w, drive=replace(w.drive, info=replace(w.drive.info, mass=MASS)))
     write_report([w], tmp_path / "report.html")
     page = Elements((tmp_path / "report.html").read_text(encoding="utf-8"))
