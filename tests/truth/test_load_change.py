@@ -28,6 +28,7 @@ def drive(jump, seed=3, n=300, at=150):
         jump_var=400.0**2,
         prior=-2.2,
         temper=0.4,
+        fewest=8,
     )
     start = disturbance.initial_state([0.0, 0.0], np.diag([1500.0**2, 50.0**2]), time[0])
     return kernel.initial_state(start), time, rows, y, noise, stopped, params

@@ -36,7 +36,7 @@ GATE: Final = 5.0
 """Windows with a larger normalised innovation are left out [-]."""
 
 FEWEST_WINDOWS: Final = 8
-"""Fewer usable windows carry no mass."""
+"""Fewer usable windows carry no mass, after a stop no change of it."""
 
 SETTLE: Final = 40
 """Windows before the gate closes."""
@@ -107,6 +107,7 @@ class _Problem:
                 jump_var=(CHANGE_STD * self.guess) ** 2,
                 prior=CHANGE_ODDS,
                 temper=1.0 / UNMODELLED**2,
+                fewest=FEWEST_WINDOWS,
             ),
         )
 

@@ -18,12 +18,14 @@ class LoadParams(NamedTuple):
     prior : logarithm of the odds of a jump at a stop
     temper : part of the log-likelihood that counts, below one where the model is
         not the whole truth
+    fewest : rows after a stop without which no jump is believed
     """
 
     filter: disturbance.DisturbanceParams
     jump_var: float
     prior: float
     temper: float
+    fewest: int
 
 
 class LoadState(NamedTuple):
@@ -67,7 +69,8 @@ def decided(state, params):
     begun : int
         Row from which the first state has another value; -1 if it has not.
     """
-    if state.open and log_odds(state, params) > 0.0:
+    seen = state.rows - state.begun
+    if state.open and seen >= params.fewest and log_odds(state, params) > 0.0:
         return LoadState(state.changed, state.changed, False, state.begun, state.rows), state.begun
     return LoadState(state.same, state.same, False, state.begun, state.rows), -1
 
