@@ -15,7 +15,7 @@ from weighbridge.io import read_drive
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.inspection import describe, inspect_drive, quantisation
 from weighbridge.pipeline.weighing import weigh
-from weighbridge.signals import Drive, Signal
+from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
 
 GEARINGS = (45.0, 26.0, 17.5, 13.0, 10.5)
@@ -262,6 +262,50 @@ def test_load_as_a_part_of_one(sane):
     assert "name the column engine_load_ratio" in problem.text
 
 
+def with_torque(drive, highest):
+    t = np.arange(0.0, 900.0, 0.5)
+    values = 0.5 * highest * (1.0 + np.sin(t / 7.0))
+    return drive.with_signals(
+        Signal("engine_torque_fraction", t, values),
+        Signal("reference_torque", t[:2], np.array([400.0, 400.0])),
+    )
+
+
+PERCENT = replace(CAR, torque=TorqueModel(source="percent"))
+
+
+@pytest.mark.parametrize("highest", [0.0080, 0.0100, 0.0107, 0.0130])
+def test_torque_from_zero_to_one_under_percent(sane, highest):
+    drive = with_torque(sane, highest)
+    for vehicle in (None, PERCENT):
+        problem = only(drive, vehicle)
+        assert f"never exceeds {100 * highest:.3g} %" in problem.text
+        assert "name the column engine_torque_ratio" in problem.text
+    with pytest.raises(DriveError, match="engine_torque_ratio"):
+        weigh(drive, PERCENT)
+    assert serious(with_torque(sane, 100.0 * highest)) == []
+
+
+def test_what_a_person_vouches_for_is_told_and_not_refused(sane):
+    drive = with_torque(sane, 0.0107)
+    trusted = replace(drive, info=DriveInfo(trusted=("engine_torque_fraction",)))
+    assert ["engine_torque_ratio" in p.text for p in check_drive(trusted, PERCENT)] == [True]
+    assert serious(trusted, PERCENT) == []
+
+
+def test_small_percentages_of_a_vehicle_that_stands_are_no_doubt(sane):
+    still = scaled(with_torque(sane, 0.0107), vehicle_speed=0.0).without(*GNSS)
+    assert not any("ratio" in p.text for p in check_drive(still))
+
+
+@pytest.mark.parametrize("name", ["engine_load", "throttle", "accelerator_pedal"])
+def test_only_the_percentage_that_is_used_is_serious(sane, name):
+    t = sane.signals["engine_load"].time
+    small = Signal(name, t, 0.005 + 0.005 * np.sin(t / 7.0))
+    found = [p for p in check_drive(sane.with_signals(small), CAR) if p.signal == name]
+    assert [p.serious for p in found] == [name == "engine_load"]
+
+
 def test_load_in_percent_under_a_ratio(sane):
     assert "engine_load are outside 0 pct to 102 pct" in only(scaled(sane, engine_load=100.0)).text
 
@@ -315,6 +359,59 @@ def test_time_in_seconds_under_milliseconds(sane):
     assert "name the column time_s" in problem.text
 
 
+ALONE = (*ACCEL, *GYRO, *GNSS)
+
+
+@pytest.mark.parametrize("factor", [3.6, 3.6 / 1.609])
+def test_a_speed_that_only_its_own_course_and_the_engine_can_doubt(sane, factor):
+    found = scaled(sane.without(*ALONE), vehicle_speed=factor)
+    assert "as one in km/h or mph under vehicle_speed_mps would" in only(found).text
+    trusted = replace(found, info=DriveInfo(trusted=("vehicle_speed",)))
+    assert serious(trusted) == []
+    assert serious(sane.without(*ALONE)) == []
+
+
+def rolling(top, accel, engine=None):
+    """A vehicle that starts, holds its top speed and stops, again and again."""
+    t = np.arange(0.0, 900.0, 0.5)
+    ramp = top / accel
+    phase = t % (2.0 * ramp + 60.0)
+    v = np.clip(np.minimum(phase, 2.0 * ramp + 40.0 - phase) * accel, 0.0, top)
+    signals = [Signal("vehicle_speed", t, v)]
+    if engine is not None:
+        signals.append(Signal("engine_speed", t, np.maximum(v * engine, 80.0)))
+    return Drive("made", {s.name: s for s in signals})
+
+
+@pytest.mark.parametrize(
+    ("top", "accel", "engine", "words"),
+    [
+        (23.6, 0.3, 5.0, "reaches 306 km/h"),  # a truck on the motorway
+        (16.0, 1.2, None, "W drove each kg"),  # a bus in town
+        (16.0, 3.4, None, "more than tyres hold"),
+        (14.0, 0.5, 8.0, "turns 2.2 rad on each metre"),  # a car that saves fuel
+    ],
+)
+def test_kilometres_an_hour_under_metres_a_second(top, accel, engine, words):
+    true = rolling(top, accel, engine)
+    assert serious(true) == []
+    assert words in only(scaled(true, vehicle_speed=3.6)).text
+
+
+def test_trucks_are_judged_by_what_trucks_do():
+    fast = rolling(50.0, 0.5)
+    assert serious(fast, CAR) == []
+    assert "faster than such vehicles go" in only(fast, replace(CAR, kind="truck")).text
+
+
+def test_a_speed_over_ground_alone_is_judged_too():
+    t = np.arange(0.0, 900.0, 1.0)
+    v = rolling(16.0, 1.2).signals["vehicle_speed"].at(t)
+    drive = Drive("made", {"gnss_speed": Signal("gnss_speed", t, v)})
+    assert serious(drive) == []
+    assert "under speed_mps would" in only(scaled(drive, gnss_speed=3.6)).text
+
+
 # Axes
 
 
@@ -352,6 +449,17 @@ def test_constant_signal(sane, name):
     stuck = replace(s, values=np.full(len(s), s.values[0]))
     texts = [p.text for p in serious(sane.with_signals(stuck)) if p.signal == name]
     assert any("all the time; its source is stuck" in t for t in texts)
+
+
+def test_only_what_the_torque_source_needs_is_serious(sane):
+    load = sane.signals["engine_load"]
+    stuck = with_torque(sane, 0.9).with_signals(replace(load, values=np.full(len(load), 0.5)))
+    for vehicle, expected in ((PERCENT, False), (CAR, True), (None, False)):
+        found = [p for p in check_drive(stuck, vehicle) if p.signal == "engine_load"]
+        assert [p.serious for p in found] == [expected]
+    assert serious(stuck.without("engine_torque_fraction")) != []
+    # Its reference torque may come with a vehicle file, or load may have to do.
+    assert serious(stuck.without("reference_torque")) != []
 
 
 def test_sensor_that_froze_on_the_way(sane):

@@ -128,7 +128,10 @@ def test_written_drive_is_read_again(tmp_path, table_format):
         time = fast if q.table == "imu" else slow + 0.01 * rng.integers(0, 3)
         low, high = max(q.low, -50.0), min(q.high, 300.0)
         signals[name] = Signal(name, time, rng.uniform(low, max(high, low + 1.0), time.size))
-    info = DriveInfo(vehicle="x", mass=1500.0, wind_from=1.0, ambient_temperature=290.0, notes="a")
+    info = DriveInfo(
+        vehicle="x", mass=1500.0, wind_from=1.0, ambient_temperature=290.0, notes="a",
+        trusted=("vehicle_speed", "engine_load"),
+    )  # fmt: skip
     write_drive(Drive("d", signals, info), tmp_path / "d", table_format, truth={"time_s": fast})
     drive = read_drive(tmp_path / "d")
     assert drive.info == info
@@ -368,6 +371,7 @@ def test_clocks_of_two_kinds(tmp_path):
         ("mass = 1580", r"no unit; write it as mass_kg"),
         ("weight_kg = 3", r"weight_kg is not known"),
         ("vehicle = ", r"is not valid TOML"),
+        ('trusted = ["speed"]', r"line 1: trusted names 'speed', no quantity; did you mean"),
     ],
 )
 def test_bad_drive_toml(tmp_path, content, words):

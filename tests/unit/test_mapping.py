@@ -249,6 +249,19 @@ def test_units_as_people_write_them():
     assert unit_suffix("furlong") is None
 
 
+def test_a_mapping_vouches_for_a_signal(tmp_path):
+    text = "time_s,v,m\n" + "".join(f"{k},{k},{k % 7}\n" for k in range(20))
+    (tmp_path / "log.csv").write_text(text)
+    mapping = {
+        "time": {"column": "time_s"},
+        "signals": {
+            "vehicle_speed": {"column": "v", "unit": "m/s", "trusted": True},
+            "engine_torque_fraction": {"column": "m", "unit": "%"},
+        },
+    }
+    assert read_drive(tmp_path / "log.csv", mapping).info.trusted == ("vehicle_speed",)
+
+
 def test_mapped_parquet(tmp_path):
     import polars as pl
 

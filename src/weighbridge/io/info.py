@@ -10,8 +10,8 @@ from typing import Final
 import tomlkit
 
 from weighbridge.errors import DriveError
-from weighbridge.signals import DriveInfo
-from weighbridge.signals.tomlfile import Section, exact_text, read_toml
+from weighbridge.signals import QUANTITIES, DriveInfo
+from weighbridge.signals.tomlfile import Section, exact_text, read_toml, suggestion
 
 FILE_NAME: Final = "drive.toml"
 
@@ -63,8 +63,12 @@ def _info(root: Section) -> DriveInfo:
         if value is not None and value <= low:
             written = next(k for k in root.data if k.startswith(f"{key}_"))
             root.fail(written, f"must be above {'absolute zero' if 'temp' in key else 0}")
+    trusted = root.texts("trusted") or ()
+    for name in trusted:
+        if name not in QUANTITIES:
+            root.fail("trusted", f"names {name!r}, no quantity{suggestion(name, QUANTITIES)}")
     root.done()
-    return DriveInfo(**texts, **numbers)  # type: ignore[arg-type]
+    return DriveInfo(**texts, **numbers, trusted=trusted)  # type: ignore[arg-type]
 
 
 def write_info(info: DriveInfo, path: Path) -> None:
@@ -81,4 +85,6 @@ def info_text(info: DriveInfo) -> str:
     for stem, name, suffix in _NUMBERS:
         if (value := getattr(info, name)) is not None:
             document.add(f"{stem}_{suffix}", tomlkit.value(exact_text(value, suffix)))
+    if info.trusted:
+        document.add("trusted", tomlkit.item(list(info.trusted)))
     return tomlkit.dumps(document)

@@ -27,6 +27,7 @@
     offset = 0.0
     optional = true                  # may be absent; else `weigh` refuses a drive without it
     valid = "AccValid"               # values count only where this signal is not 0; CAN only
+    trusted = true                   # right as it is: a doubt of `inspect` is no refusal of `weigh`
 
 A drive of several kinds of file has one ``[tables.NAME]`` per kind, with
 ``files = "pattern*.csv"`` and the same sections inside. A file that needs no
@@ -87,6 +88,7 @@ class MappedSignal:
     offset : in ``unit``, added after the factor
     optional : its absence is not worth a note
     valid : signal of the same CAN message that is 0 where the value does not count
+    trusted : whether a person vouches for its values and unit
     """
 
     name: str
@@ -96,6 +98,7 @@ class MappedSignal:
     offset: float = 0.0
     optional: bool = False
     valid: str | None = None
+    trusted: bool = False
 
     @property
     def quantity(self) -> Quantity:
@@ -277,6 +280,7 @@ def _signal(parent: Section, name: str) -> MappedSignal:
         offset=section.number("offset") or 0.0,
         optional=section.flag("optional") or False,
         valid=section.text("valid"),
+        trusted=section.flag("trusted") or False,
     )
     section.done()
     return signal

@@ -260,6 +260,8 @@ def _drive(
 ) -> Drive:
     if info == DriveInfo():
         info = next((log.info for log in logs if log.info is not None), info)
+    trusted = (s.name for m in mappings for s in m.signals if s.trusted)
+    info = replace(info, trusted=tuple(dict.fromkeys((*info.trusted, *trusted))))
     _share_clock(logs)
     contents = _decode_frames(logs, mappings, databases)
     problems = [p for log in logs for p in log.problems]

@@ -8,37 +8,55 @@ can show never counts as serious.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import combinations, permutations
 from typing import Final
 
 import numpy as np
 
 from weighbridge.pipeline.imu_checks import check_imu
-from weighbridge.pipeline.speed_checks import check_scales
+from weighbridge.pipeline.speed_checks import SETTLED, check_scales
 from weighbridge.pipeline.vehicle_checks import check_vehicle
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.units import UNITS, scalar_from_si
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.signals.words import counted
+from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.torque import SIGNALS
 
 _IMU: Final = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
-_WEIGHING: Final = frozenset(
+_MOTION: Final = frozenset(
     (
         *_IMU,
         "longitudinal_accel",
         "vehicle_speed",
         "engine_speed",
-        "engine_load",
-        "engine_torque",
-        "engine_torque_fraction",
-        "mass_air_flow",
         "latitude",
         "longitude",
         "gnss_speed",
         "grade",
     )
 )
-"""Signals a mass is made from: what is wrong with them is serious."""
+"""Signals a mass is made from beside the torque's: what is wrong with them is serious."""
+
+_TORQUE: Final = frozenset(name for names in SIGNALS.values() for name in names) - _MOTION
+"""Signals of torque: only what is wrong with those of the source in use is serious."""
+
+_PERCENT: Final = (
+    "engine_load",
+    "engine_torque_fraction",
+    "indicated_torque_fraction",
+    "demanded_torque",
+    "absolute_load",
+    "throttle",
+    "accelerator_pedal",
+    "relative_pedal",
+)
+"""Signals in percent that a drive takes far beyond `_LEAST_PERCENT`."""
+
+# No drive that gets anywhere stays below: 0 to 1 under a percent name ends near 1 %, of a torque
+# with its boost below 2 %.
+_LEAST_PERCENT: Final = 0.02
 
 # Samples that a noisy sensor does not repeat by chance.
 _FROZEN: Final = 200
@@ -62,10 +80,29 @@ def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, 
     Returns
     -------
     What was found, serious problems first. The drive's own ``problems`` (from
-    reading it) are not repeated.
+    reading it) are not repeated. What is wrong with a signal that a person vouches for
+    (``drive.info.trusted``) is never serious.
     """
-    problems = [p for check in _CHECKS for p in check(drive, vehicle)]
+    problems = [
+        replace(p, serious=False) if p.signal in drive.info.trusted else p
+        for check in _CHECKS
+        for p in check(drive, vehicle)
+    ]
     return tuple(sorted(problems, key=lambda p: not p.serious))
+
+
+def _needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
+    """Signals a mass would be made from.
+
+    The torque is that of the vehicle file; without one, of the source that a calibration takes.
+    """
+    sources = [source for source, names in SIGNALS.items() if drive.has(*names)]
+    if vehicle is not None and vehicle.torque != TorqueModel():
+        sources = [vehicle.torque.source]
+    elif "percent" in sources[:1] and len(sources) > 1 and not drive.has("reference_torque"):
+        # A vehicle file may yet give the reference torque.
+        return _MOTION.union(SIGNALS["percent"], SIGNALS[sources[1]])
+    return _MOTION.union(*(SIGNALS[source] for source in sources[:1]))
 
 
 def _show(name: str, value: float) -> str:
@@ -144,6 +181,7 @@ def _check_long_gaps(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
 
 def _check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find values no road vehicle can have."""
+    needed = _needed(drive, vehicle)
     for s in drive.signals.values():
         q = QUANTITIES[s.name]
         outside = (s.values < q.low) | (s.values > q.high)
@@ -156,15 +194,16 @@ def _check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             f"{count} of {len(s)} values of {s.name} are outside {_show(s.name, q.low)} to "
             f"{_show(s.name, q.high)}, such as {_show(s.name, float(s.values[k]))} at "
             f"{s.time[k]:.6g} s; check its unit",
-            serious=s.name in _WEIGHING and count > 0.01 * len(s),
+            serious=s.name in needed and count > 0.01 * len(s),
         )
 
 
 def _check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find signals that never change, and sensors that froze on the way."""
     moving = _moves(drive)
+    needed = _needed(drive, vehicle)
     for s in drive.signals.values():
-        if s.name not in _WEIGHING or s.name == "grade" or len(s) < 50 or s.duration < 20.0:
+        if s.name not in _MOTION | _TORQUE or s.name == "grade" or len(s) < 50 or s.duration < 20.0:
             continue
         value = float(s.values[0])
         if bool(np.all(s.values == value)):
@@ -175,7 +214,7 @@ def _check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 s.name,
                 f"{s.name} is {_show(s.name, value)} all the time; its source is stuck: "
                 "leave the column out or record it again",
-                serious=True,
+                serious=s.name in needed,
             )
         elif s.name in _IMU:
             run, at = _longest_run(s.values)
@@ -213,18 +252,22 @@ def _moves(drive: Drive) -> bool:
 
 def _check_load(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find parts of one under a percent name."""
-    for name in ("engine_load", "engine_torque_fraction", "throttle"):
+    if not _moves(drive):
+        return
+    needed = _needed(drive, vehicle)
+    for name in _PERCENT:
         s = drive.get(name)
         if s is None or len(s) < 50:
             continue
         highest = float(np.max(np.abs(s.values)))
-        if 0.0 < highest <= 0.0102 and np.unique(s.values).size > 5:
+        if 0.0 < highest <= _LEAST_PERCENT and np.unique(s.values).size > 5:
             column = QUANTITIES[name].stem
             yield Problem(
                 name,
-                f"{name} never exceeds {100 * highest:.3g} %; it seems to run from 0 to 1: "
-                f"name the column {column}_ratio or set the unit ratio in the mapping",
-                serious=name in _WEIGHING,
+                f"{name} never exceeds {100 * highest:.3g} % though the vehicle drives; it seems "
+                f"to run from 0 to {'1' if highest <= 0.0102 else f'{100 * highest:.2f}'}: name "
+                f"the column {column}_ratio or set the unit ratio in the mapping{SETTLED}",
+                serious=name in needed,
             )
 
 
@@ -367,8 +410,9 @@ def _check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem
         k = int(np.argmax(np.where(cut, jump, 0.0)))
         yield Problem(
             s.name,
-            f"{s.name} jumps {count} times, as from {_show(s.name, float(s.values[k]))} to "
-            f"{_show(s.name, float(s.values[k + 1]))} within {step[k]:.2g} s at {s.time[k]:.6g} s; "
+            f"{s.name} jumps {counted(count, 'time')}, as from "
+            f"{_show(s.name, float(s.values[k]))} to {_show(s.name, float(s.values[k + 1]))} "
+            f"within {step[k]:.2g} s at {s.time[k]:.6g} s; "
             "a piece may be cut out of the recording there",
         )
 

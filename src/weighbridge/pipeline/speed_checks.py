@@ -37,6 +37,26 @@ _CONFUSIONS: Final = tuple(
 # A speedometer reads up to a tenth more than the wheels do.
 _TOLERANCE: Final = 0.10
 
+SETTLED: Final = (
+    "; if it is right as it is, set trusted = true for it in the mapping, or name it in trusted of "
+    "drive.toml"
+)
+"""How a person answers a doubt that only they can settle."""
+
+# Windows over which a speed is judged by itself, and how many of them must be beyond belief [s].
+_WINDOW: Final = 3.0
+_WINDOWS: Final = 3
+# No tyre holds more for so long [m/s^2].
+_GRIP: Final = 10.0
+# Speed [m/s], and acceleration times speed [W/kg], that road vehicles hardly reach: by class, and
+# of others. Recorded cars stay below 41 m/s and 55 W/kg; km/h under m/s multiplies by 3.6 and 13.
+_REACH: Final = {"truck": (45.0, 60.0), "bus": (45.0, 60.0)}
+_REACH_OF_ANY: Final = (72.0, 150.0)
+# Engine over vehicle speed in the longest gears that are built is 4.3 rad/m or more.
+_LONGEST_GEAR: Final = 3.3
+# An engine that turns slower is none, or its speed is in another unit [rad/s].
+_TURNS: Final = 62.0
+
 
 def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Compare speeds with each other, with positions, gears and acceleration."""
@@ -52,6 +72,8 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     yield from _check_altitude(drive)
     speed = drive.get("vehicle_speed")
     if speed is None or len(speed) < 20:
+        if gnss is not None and trusted is None:
+            yield from _check_alone(drive, gnss, vehicle)
         return
     for reference, source in ((gnss, "gnss_speed"), (trusted, "the positions")):
         ratio = _ratio(speed, reference) if reference is not None else None
@@ -69,6 +91,67 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         problem = _scale_problem("vehicle_speed", ratio, "the acceleration", only_units=True)
         if problem:
             yield problem
+        if problem or abs(ratio - 1.0) < 2.0 * _TOLERANCE:
+            return
+    yield from _check_alone(drive, speed, vehicle)
+
+
+def _check_alone(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Doubt a speed that nothing else of the drive can be compared with."""
+    if why := _beyond_belief(drive, speed, vehicle):
+        stem = "speed" if speed.name == "gnss_speed" else speed.name
+        yield Problem(
+            speed.name,
+            f"{speed.name} {why}, as one in km/h or mph under {stem}_mps would; name the column "
+            f"by its unit, or set the unit in the mapping{SETTLED}",
+            serious=True,
+        )
+
+
+def _beyond_belief(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> str:
+    """Say what no vehicle does; empty where nothing is."""
+    kind = vehicle.kind if vehicle is not None else ""
+    fastest, strongest = _REACH.get(kind, _REACH_OF_ANY)
+    at = windows.edges(float(speed.time[0]), float(speed.time[-1]), _WINDOW)
+    if at.size < 10:
+        return ""
+    v = speed.at(at)
+    known = np.isfinite(v) & (speed.age(at) < 0.5 * _WINDOW)
+    mean = (0.5 * (v[1:] + v[:-1]))[known[1:] & known[:-1]]
+    accel = (np.diff(v) / _WINDOW)[known[1:] & known[:-1]]
+    if mean.size < 10:
+        return ""
+    top, power, change = (float(np.sort(x)[-_WINDOWS]) for x in (mean, mean * accel, np.abs(accel)))
+    if top > fastest:
+        return f"reaches {3.6 * top:.0f} km/h, faster than such vehicles go"
+    if change > _GRIP:
+        return f"changes by {change:.0f} m/s^2 for {_WINDOW:.0f} s, more than tyres hold"
+    if power > strongest:
+        return f"rises as if {power:.0f} W drove each kg, far more than engines give"
+    gearing = _usual_gearing(drive, speed)
+    if gearing is not None and gearing < _LONGEST_GEAR:
+        return (
+            f"is fast for its engine, which turns {gearing:.1f} rad on each metre; the longest "
+            "gears have 4 and more"
+        )
+    return ""
+
+
+def _usual_gearing(drive: Drive, speed: Signal) -> float | None:
+    """Median of engine over vehicle speed in the fast part of a drive [rad/m]."""
+    engine = drive.get("engine_speed")
+    if engine is None or not len(engine):
+        return None
+    v = speed.at(engine.time)
+    near = np.isfinite(v) & (speed.age(engine.time) < 2.0)
+    if not near.any() or float(np.max(engine.values[near])) < _TURNS:
+        return None
+    fast = near & (v > 5.0) & (v > 0.4 * float(np.percentile(v[near], 90)))
+    # Engines that idle while the vehicle rolls say nothing of gears, nor do those that stand.
+    fast &= engine.values > 1.4 * _TURNS
+    if np.count_nonzero(fast) < 100:
+        return None
+    return float(np.median(engine.values[fast] / v[fast]))
 
 
 def _scale_problem(

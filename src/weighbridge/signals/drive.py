@@ -22,6 +22,7 @@ class DriveInfo:
     wind_speed : reported wind at 10 m height [m/s]
     wind_from : direction the wind blows from, clockwise from north [rad]
     notes : free text
+    trusted : signals whose values and units a person vouches for, whatever they look like
     """
 
     start_time: str | None = None
@@ -32,6 +33,7 @@ class DriveInfo:
     wind_speed: float | None = None
     wind_from: float | None = None
     notes: str | None = None
+    trusted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
