@@ -9,6 +9,7 @@ from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.vehicle_checks import check_vehicle
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
+from weighbridge.vehicle.torque import regressor
 
 SMALL = (42.6, 21.96, 14.04, 9.708, 7.634, 6.315)
 LARGE = (50.5, 25.3, 16.9, 12.7, 9.0, 8.1)
@@ -80,11 +81,45 @@ def test_reference_torque_that_changes():
     values = np.where(time < 500.0, 250.0, 400.0)
     (problem,) = check_vehicle(one.with_signals(Signal("reference_torque", time, values)), None)
     assert problem.serious
-    assert "500 s" in problem.text
-    assert "400 N m" in problem.text
+    assert "250 N m from 0 s and 400 N m from 500 s" in problem.text
+    assert "split the recording" in problem.text
     values[:] = 250.0
     values[7] = 65.0  # a frame that was disturbed
     assert told(one.with_signals(Signal("reference_torque", time, values))) == []
+
+
+def test_two_reference_torques_in_turn_are_both_told_and_settled_by_the_vehicle_file():
+    time = np.arange(0.0, 900.0, 5.0)
+    values = np.where(np.arange(time.size) % 2, 2100.0, 1500.0)
+    found = drive(driven(SMALL, 1)).with_signals(Signal("reference_torque", time, values))
+    stated = Vehicle(torque=TorqueModel(source="percent", reference_torque=2100.0))
+    lacking = Vehicle(torque=TorqueModel(source="percent"))
+    load = Vehicle(torque=TorqueModel(source="load", coefficients=(0.0, 200.0)))
+    for vehicle, expected in ((None, True), (lacking, True), (stated, False), (load, False)):
+        (problem,) = check_vehicle(found, vehicle)
+        assert problem.serious is expected
+        assert "1500 N m from 0 s and 2100 N m from 5 s, in turn" in problem.text
+        assert "1800" not in problem.text
+    (problem,) = check_vehicle(found, None)
+    assert "reference_torque_nm under [torque] of the vehicle file" in problem.text
+
+
+def test_the_reference_torque_that_is_taken():
+    time = np.arange(0.0, 900.0, 5.0)
+    fraction = Signal("engine_torque_fraction", time, np.full(time.size, 0.5))
+    values = np.where(time < 500.0, 1500.0, 2100.0)
+    two = Signal("reference_torque", time, values)
+    one = Signal("reference_torque", time, np.full(time.size, 1500.0))
+    model = TorqueModel(source="percent")
+    stated = TorqueModel(source="percent", reference_torque=2000.0)
+
+    def taken(reference, model):
+        found = Drive("made", {s.name: s for s in (fraction, reference)})
+        return set(regressor(found, "percent", np.array([0.0, 895.0]), model).tolist())
+
+    assert taken(one, model) == taken(one, stated) == {750.0}
+    assert taken(two, stated) == {1000.0}
+    assert taken(two, model) == {750.0, 1050.0}
 
 
 def idling(torque, coolant=363.0, **signals):

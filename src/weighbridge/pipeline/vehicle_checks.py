@@ -10,7 +10,8 @@ import numpy as np
 from weighbridge.errors import DriveError
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.vehicle.gear import detect_gearings, effective_gearing, steady
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.torque import reference_torques
 
 # Whoever changes vehicles takes longer than this [s], and the vehicle left stands.
 _PAUSE: Final = 5.0
@@ -34,25 +35,42 @@ _SLOW: Final = 4.0
 
 def check_vehicle(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find a second vehicle in a drive by what is the same all the time in one."""
-    yield from _check_reference(drive)
+    yield from _check_reference(drive, vehicle)
     yield from _check_gears(drive)
 
 
-def _check_reference(drive: Drive) -> Iterator[Problem]:
+def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find several reference torques: a constant of an engine."""
     reference = drive.get("reference_torque")
     if reference is None or len(reference) < 2:
         return
-    usual = float(np.median(reference.values))
-    other = np.abs(reference.values / usual - 1.0) > 0.02
-    if np.mean(other) > 0.1:
-        k = int(np.argmax(other))
+    told = reference_torques(reference)
+    if len(told) < 2:
+        return
+    model = TorqueModel() if vehicle is None else vehicle.torque
+    values = np.array([value for value, _ in told])
+    nearest = np.argmin(np.abs(reference.values[:, None] - values[None, :]), axis=1)
+    once = bool(np.count_nonzero(np.diff(nearest)) < len(told))
+    which = " and ".join(f"{value:.0f} N m from {time:.6g} s" for value, time in told)
+    said = (
+        f"reference_torque is {which}{'' if once else ', in turn'}: it is a constant of an engine"
+    )
+    if model.source == "percent" and model.reference_torque is not None:
         yield Problem(
-            "reference_torque",
-            f"reference_torque is {usual:.0f} N m and from {reference.time[k]:.6g} s "
-            f"{reference.values[k]:.0f} N m: it is a constant of an engine, so these are two "
-            "vehicles; split the recording where it changes",
-            serious=True,
+            reference.name,
+            f"{said}; the {model.reference_torque:.0f} N m of the vehicle file were taken all the "
+            "time; split the recording if it holds two vehicles",
         )
+        return
+    guess = "so these are two vehicles" if once else "so one is not of the engine that is weighed"
+    split = "split the recording where it changes, or " if once else ""
+    yield Problem(
+        reference.name,
+        f"{said}, {guess}; {split}state the right one as reference_torque_nm under [torque] of "
+        "the vehicle file",
+        # In turn it says nothing of two vehicles, and only percent torque needs it.
+        serious=once or model == TorqueModel() or model.source == "percent",
+    )
 
 
 def _check_gears(drive: Drive) -> Iterator[Problem]:

@@ -91,15 +91,7 @@ def regressor(drive: Drive, source: TorqueSource, time: Floats, model: TorqueMod
     """
     values = drive.signals[SIGNALS[source][0]].at(time)
     if source == "percent":
-        reference = drive.get("reference_torque")
-        if reference is not None and len(reference):
-            return values * float(np.median(reference.values))
-        if model.reference_torque is None:
-            raise DriveError(
-                f"{drive.name}: percent torque without a reference torque; give "
-                "reference_torque_nm in the drive or under [torque] in the vehicle file"
-            )
-        return values * model.reference_torque
+        return values * _reference(drive, time, model)
     if source == "air_flow":
         lambda_1 = drive.get("lambda_1")
         ratio = lambda_1.at(time) if lambda_1 is not None else np.ones_like(time)
@@ -107,6 +99,47 @@ def regressor(drive: Drive, source: TorqueSource, time: Floats, model: TorqueMod
         usable = np.where(np.isfinite(ratio), ratio, 1.0)
         return air_flow_torque(values, speed, usable, model.engine_efficiency)
     return values
+
+
+def reference_torques(reference: Signal) -> list[tuple[float, float]]:
+    """Reference torques that a drive tells, each in a tenth of the samples or more.
+
+    Parameters
+    ----------
+    reference : with at least one sample [N m]
+
+    Returns
+    -------
+    Values [N m] with the time each was told first [s], in the order of time
+    """
+    order = np.argsort(reference.values)
+    ascending = reference.values[order]
+    cuts = np.flatnonzero(np.diff(ascending) > 0.02 * np.abs(ascending[:-1])) + 1
+    groups = [g for g in np.split(order, cuts) if g.size >= 0.1 * order.size]
+    found = [
+        (float(np.median(reference.values[g])), float(reference.time[g].min())) for g in groups
+    ]
+    return sorted(found, key=lambda f: f[1])
+
+
+def _reference(drive: Drive, time: Floats, model: TorqueModel) -> Floats:
+    """Return the torque that a percent torque is a part of, at stamps [N m].
+
+    That of the log; where the log tells several, that of the vehicle file, else the one told last.
+    """
+    reference = drive.get("reference_torque")
+    if reference is not None and len(reference):
+        if len(reference_torques(reference)) < 2:
+            return np.full(time.size, np.median(reference.values))
+        if model.reference_torque is None:
+            last = np.searchsorted(reference.time, time, side="right") - 1
+            return np.asarray(reference.values[np.maximum(last, 0)])
+    if model.reference_torque is None:
+        raise DriveError(
+            f"{drive.name}: percent torque without a reference torque; give "
+            "reference_torque_nm in the drive or under [torque] in the vehicle file"
+        )
+    return np.full(time.size, model.reference_torque)
 
 
 def torque_rows(
