@@ -80,3 +80,25 @@ def test_one_sample_has_no_rate(run, tmp_path):
     row = next(line for line in run(tmp_path).splitlines() if "reference_torque" in line)
     assert "nan" not in row
     assert row.count("400") == 2
+
+
+def test_brackets_stay_in_tables_of_several_drives():
+    from rich.console import Console
+
+    from weighbridge.cli.weigh import method_table, result_table
+    from weighbridge.estimators import Status
+    from weighbridge.pipeline.weighing import without_mass
+    from weighbridge.signals import Drive
+    from weighbridge.vehicle.model import Vehicle
+
+    why = "state it under [torque] of the vehicle file"
+    none = without_mass(Drive("run[a]", {}), Vehicle(), "rls", why)
+    assert none.status is Status.MISSING_SIGNALS
+    console = Console(width=160)
+    with console.capture() as shown:
+        console.print(result_table([none], [(Path("logs[b]"), why)]))
+        console.print(method_table((none,)))
+    text = shown.get()
+    assert text.count("under [torque] of") == 3
+    assert text.count("run[a]") == 2
+    assert "logs[b]" in text

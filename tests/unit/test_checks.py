@@ -531,6 +531,41 @@ def test_clock_that_jumps_a_day(sane):
     assert "jumps by 1e+09 s" in problem.text
 
 
+def shifted(drive, names, after, by):
+    moved = [drive.signals[n] for n in names]
+    return drive.with_signals(
+        *(replace(s, time=np.where(s.time > after, s.time + by, s.time)) for s in moved)
+    )
+
+
+@pytest.mark.parametrize("by", [120.0, 3600.0, 18000.0])
+def test_clock_set_forward_by_less_than_a_day_is_a_note(sane, by):
+    (note,) = check_drive(shifted(sane, sane.signals, 400.0, by), CAR)
+    assert not note.serious
+    assert f"nothing was recorded for {by:.0f} s from 400 s, while the vehicle moves" in note.text
+    assert "the clock was set forward" in note.text
+
+
+def test_pauses_while_the_vehicle_stands_are_told_once():
+    once = rolling(14.0, 0.5).signals["vehicle_speed"]
+    speed = once.values * np.clip((900.0 - once.time) / 30.0 - 0.5, 0.0, 1.0)
+    time = np.concatenate([once.time + 1000.0 * k for k in range(3)])
+    s = Signal("vehicle_speed", time, np.tile(speed, 3))
+    (note,) = check_drive(Drive("made", {s.name: s}))
+    assert "recorded 2 times, the longest time for 100 s from 899.5 s, as if" in note.text
+
+
+def test_one_table_that_pauses_is_told(sane):
+    cut = {n: s for n, s in sane.signals.items() if n in GNSS}
+    kept = [
+        replace(s, time=s.time[(s.time < 300.0) | (s.time > 420.0)],
+                values=s.values[(s.time < 300.0) | (s.time > 420.0)])
+        for s in cut.values()
+    ]  # fmt: skip
+    (note,) = check_drive(sane.with_signals(*kept), CAR)
+    assert "gnss pauses for 122 s from 299 s while the rest goes on" in note.text
+
+
 def test_weigh_refuses_a_serious_problem(sane):
     with pytest.raises(DriveError, match=r"made: vehicle_speed is 0\.6.* in mph"):
         weigh(scaled(sane, vehicle_speed=MPH_UNDER_KMH), CAR)

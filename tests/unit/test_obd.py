@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -112,6 +114,41 @@ def test_eleven_and_twenty_nine_bits_and_several_units():
     assert "left out of CAN 1 18DAF118: vehicle_speed (3 for 6)" in (found.problems[0].text)
 
 
+def drive_answers(seconds, identifier, start, speed=50):
+    """Engine and vehicle speed in every answer, two a second."""
+    payloads = [bytes([0x41, 0x0C, 0x1A, k % 250, 0x0D, speed]) for k in range(2 * seconds)]
+    return answers(payloads, identifier, start)
+
+
+def test_answers_that_change_from_11_to_29_bits_are_read_on():
+    before, after = drive_answers(60, 0x7E8, 100.0), drive_answers(45, 0x18DAF110, 160.0, 60)
+    found = decode_obd(join_frames([before, after]))
+    for name in ("vehicle_speed", "engine_speed"):
+        signal = next(s for s in found.signals if s.name == name)
+        assert_allclose(signal.time, np.concatenate([before.time, after.time]))
+    assert_allclose(value(found, "vehicle_speed"), np.repeat([50.0, 60.0], [120, 90]))
+    (problem,) = found.problems
+    assert "CAN 1 18DAF110 does from 60 to 104 s into the log" in problem.text
+    assert "split the log there if they are two" in problem.text
+    assert found.used.all()
+
+
+def test_answers_in_both_lengths_at_once_are_taken_once():
+    found = decode_obd(
+        join_frames([drive_answers(60, 0x7E8, 0.0), drive_answers(60, 0x18DAF110, 0.1)])
+    )
+    assert [len(s) for s in found.signals] == [120, 120]
+    assert "left out of CAN 1 18DAF110" in found.problems[0].text
+
+
+def test_what_is_asked_seldom_of_two_units_is_no_silence():
+    payloads = [bytes([0x41, 0x05, 0x7B])] * 30
+    one, other = answers(payloads), answers(payloads, 0x7E9)
+    slow = [replace(f, time=f.time * 120.0 + 30.0 * k) for k, f in enumerate((one, other))]
+    (signal,) = decode_obd(join_frames(slow)).signals
+    assert len(signal) == 30
+
+
 def test_missing_parts_cost_that_answer_only():
     payload = bytes.fromhex("41 0C 1A F8 0D 32 62 AF 63 01 90")
     frames = answers([payload] * 5)
@@ -119,13 +156,13 @@ def test_missing_parts_cost_that_answer_only():
     keep[3] = False
     found = decode_obd(frames.select(keep))
     assert_allclose(found.signals[0].time, [0.0, 1.0, 1.5, 2.0])
-    assert "1 answers of CAN 1 7E8 lack frames" in found.problems[0].text
+    assert "left out 1 answer of CAN 1 7E8 with frames missing" in found.problems[0].text
 
 
 def test_cut_answer_gives_what_stood_before():
     found = decode_obd(answers([bytes.fromhex("41 0D 32 0C 1A")] * 3))
     assert [s.name for s in found.signals] == ["vehicle_speed"]
-    assert "3 answers of CAN 1 7E8 are cut off" in found.problems[0].text
+    assert "3 answers of CAN 1 7E8 cut off" in found.problems[0].text
 
 
 def test_identification_numbers_are_counted_and_never_kept():

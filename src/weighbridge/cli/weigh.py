@@ -165,9 +165,10 @@ def _show_one(w: Weighing) -> None:
 
 def method_table(methods: tuple[Weighing, ...]) -> Table:
     """One row a method: its mass of one drive, or why there is none."""
+    from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=methods[0].drive.name, title_justify="left")
+    table = Table(title=escape(methods[0].drive.name), title_justify="left")
     table.add_column("method", no_wrap=True)
     for name in ("mass kg", "95 % from", "to", "payload kg"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -203,12 +204,12 @@ def result_table(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> Tab
     table.add_column("status or reason")
     for w in weighed:
         table.add_row(
-            w.drive.name,
+            escape(w.drive.name),
             f"{w.drive.duration / 60.0:.1f}",
             f"{w.used_time / 60.0:.1f}",
             *_numbers(w),
             _outcome(w),
         )
     for path, why in failed:
-        table.add_row(path.name, "", "", "", "", "", "", escape(f"unreadable: {why}"))
+        table.add_row(escape(path.name), "", "", "", "", "", "", escape(f"unreadable: {why}"))
     return table

@@ -21,6 +21,7 @@ from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.signals import Floats, Problem
+from weighbridge.signals.words import counted
 
 _Bytes = NDArray[np.uint8]
 _Part = tuple[NDArray[np.int64], Frames]
@@ -71,8 +72,8 @@ def read_blf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         log.problems.append(
             Problem(
                 "",
-                f"{path.name} is damaged or was cut off; {sum(map(len, parts))} frames could be "
-                "read",
+                f"{path.name} is damaged or was cut off; "
+                f"{counted(sum(map(len, parts)), 'frame')} could be read",
             )
         )
     if not parts:

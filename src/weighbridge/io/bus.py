@@ -19,6 +19,7 @@ from weighbridge.io.obd import decode_obd
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
+from weighbridge.signals.words import counted
 
 # Identifiers named one by one; the others are counted.
 _NAMED: Final = 8
@@ -69,7 +70,7 @@ def decode(
     span = float(frames.time[-1] - frames.time[0]) if len(frames) else 0.0
     buses = np.unique(frames.channel).tolist()
     done.contents.append(
-        f"{name}: {len(frames)} CAN frames over {span:.0f} s on "
+        f"{name}: {counted(len(frames), 'CAN frame')} over {span:.0f} s on "
         f"{'bus' if len(buses) == 1 else 'buses'} {', '.join(map(str, buses))}"
     )
     if databases:
@@ -93,8 +94,8 @@ def decode(
         ignored = truck.summary.ignored
         told = ", ".join(f"{g} ({n})" for g, n in groups.items())
         done.contents.append(
-            f"J1939: {told}; not used: {len(ignored)} other parameter groups "
-            f"({sum(ignored.values())} frames)"
+            f"J1939: {told}; not used: {counted(len(ignored), 'other parameter group')} "
+            f"({counted(sum(ignored.values()), 'frame')})"
         )
         _add(truck.signals, truck.summary.problems, "J1939", name, done, settled)
         used |= frames.extended & ~obd.used
@@ -140,8 +141,10 @@ def _counts(frames: Frames, which: Bools | None = None) -> str:
     counts = sorted(frames.counts(which).items(), key=lambda item: -item[1])
     total = sum(n for _, n in counts)
     shown = ", ".join(f"CAN {c} {i:X} ({n})" for (c, i, _), n in counts[:_NAMED])
-    more = f" and {len(counts) - _NAMED} more identifiers" if len(counts) > _NAMED else ""
-    return f"{total} frames: {shown}{more}"
+    more = (
+        f" and {counted(len(counts) - _NAMED, 'more identifier')}" if len(counts) > _NAMED else ""
+    )
+    return f"{counted(total, 'frame')}: {shown}{more}"
 
 
 def _nothing(
@@ -251,7 +254,8 @@ def _databases(
 
 def _absent(frames: Frames, database: Database) -> str:
     """Say that no frame is a message of a database; name the buses that carry them."""
-    none = f"none of the {len(database.messages)} messages of {database.path.name} is in the log"
+    known = counted(len(database.messages), "message")
+    none = f"none of the {known} of {database.path.name} is in the log"
     if database.channel is None:
         return f"{none}; it may be the DBC of another vehicle"
     anywhere = message_frames(frames, replace(database, channel=None))

@@ -16,6 +16,7 @@ from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.kernels.frame_text import FrameRows, parse_candump
 from weighbridge.signals import Problem
+from weighbridge.signals.words import counted
 
 _BLOCK: Final = 1 << 25
 _INTERFACES: Final = 256
@@ -47,7 +48,10 @@ def read_candump(path: Path, table: str | None, mapping: TableMapping | None) ->
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
     if strange:
         log.problems.append(
-            Problem("", f"{path.name}: {strange} of {lines} lines are no frames and were left out")
+            Problem(
+                "",
+                f"{path.name}: left out {strange} of {counted(lines, 'line')}, which hold no frame",
+            )
         )
     return log
 

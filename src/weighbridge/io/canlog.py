@@ -23,6 +23,7 @@ from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.kernels.frame_text import TraceColumns, parse_asc, parse_trace
 from weighbridge.signals import Problem
+from weighbridge.signals.words import counted
 
 CSV_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 """First line of a CSV written by python-can."""
@@ -137,8 +138,8 @@ def _log(path: Path, parts: list[Frames], strange: int) -> Log:
         log.problems.append(
             Problem(
                 "",
-                f"{path.name}: {strange} of {strange + len(frames)} lines with frames are damaged "
-                "and were left out",
+                f"{path.name}: left out {strange} of "
+                f"{counted(strange + len(frames), 'line')} with frames, damaged",
             )
         )
     return log
@@ -248,7 +249,9 @@ def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) ->
     if strange:
         log.problems.append(
             Problem(
-                "", f"{path.name}: {strange} of {len(rows)} lines are no frames and were left out"
+                "",
+                f"{path.name}: left out {strange} of {counted(len(rows), 'line')}, which hold no "
+                "frame",
             )
         )
     return log

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.signals import Floats, Problem
+from weighbridge.signals.words import counted
 
 EXTENDED_MASK = 0x1FFFFFFF
 """The 29 bits of an extended identifier."""
@@ -148,7 +149,9 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
     if not finite.all():
         frames = frames.select(finite)
         problems.append(
-            Problem("", f"{source}: {int((~finite).sum())} frames without a time were left out")
+            Problem(
+                "", f"{source}: left out {counted(int((~finite).sum()), 'frame')} without a time"
+            )
         )
         time = frames.time
     if len(frames) < 2:
@@ -177,7 +180,7 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
             problems.append(
                 Problem(
                     "",
-                    f"{source}: the clock jumps {len(cuts)} times (by "
+                    f"{source}: the clock jumps {counted(len(cuts), 'time')} (by "
                     f"{step[cuts[0] - 1]:.6g} s, {time[cuts[0] - 1] - time[0]:.6g} s in); "
                     f"{time.size - int(lengths[best])} of {time.size} frames outside the longest "
                     "part were left out; split the log there to read the others",

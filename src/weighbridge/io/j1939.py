@@ -18,6 +18,7 @@ from weighbridge.io.frames import Frames
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_signal
 from weighbridge.signals.units import to_si
+from weighbridge.signals.words import counted
 
 EEC1, EEC2, EEC3 = 0xF004, 0xF003, 0xFEDF
 ETC1, ETC2 = 0xF002, 0xF005
@@ -219,8 +220,8 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
     if summary.incomplete:
         reader.note(
             "",
-            f"{summary.incomplete} multi-packet messages with the engine configuration have "
-            "parts missing and were left out",
+            f"left out {counted(summary.incomplete, 'multi-packet message')} of the engine "
+            "configuration with parts missing",
         )
     return J1939(found_signals, summary)
 

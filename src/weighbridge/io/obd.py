@@ -18,6 +18,7 @@ from weighbridge.io.isotp import Messages, assemble
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_signal
 from weighbridge.signals.units import to_si
+from weighbridge.signals.words import counted
 
 SOURCE: Final = "SAE J1979"
 """Where the facts of `PIDS` and `LENGTHS` are laid down."""
@@ -168,6 +169,8 @@ def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
 
     Where several control units answer the same parameter, the one that
     answers it most often is taken, and of equals the engine's (the lowest).
+    Where that one is silent for long, as after a change from 11 to 29 bits, the
+    others fill in.
 
     Parameters
     ----------
@@ -201,8 +204,8 @@ def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
             found.problems.append(
                 Problem(
                     "",
-                    f"{name}: {messages.broken} answers of {sender.name} lack frames and were "
-                    "left out",
+                    f"{name}: left out {counted(messages.broken, 'answer')} of {sender.name} with "
+                    "frames missing",
                 )
             )
         if sender.counts or sender.refused or sender.other:
@@ -211,13 +214,14 @@ def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
     if not any(s.counts for s in senders):
         found.used[:] = False
         found.contents.extend(
-            f"{s.name}: {s.other} answers of other services than 01, {s.refused} requests declined"
+            f"{s.name}: {counted(s.other, 'answer')} of other services than 01, "
+            f"{counted(s.refused, 'request')} declined"
             for s in senders
         )
         return found
     found.used[_requests(frames)] = True
     _tell(senders, name, found)
-    _choose(senders, name, found)
+    _choose(senders, name, found, float(frames.time[0]))
     return found
 
 
@@ -292,6 +296,22 @@ def _value(pid: Pid, raw: NDArray[np.uint8]) -> Floats:
     return np.where(raw[:, 0] & pid.needs == pid.needs, values, np.nan)
 
 
+def _in_silence(signal: Signal, time: Floats) -> Bools:
+    """Mark stamps between which a signal has stopped, or before or after it."""
+    first, last = min(signal.time[0], time[0]), max(signal.time[-1], time[-1])
+    seen = np.concatenate([[first], signal.time, [last]])
+    after = np.clip(np.searchsorted(seen, time), 1, seen.size - 1)
+    pause = seen[after] - seen[after - 1]
+    return np.asarray(pause > np.fmax(_SILENT, 5.0 * signal.period))
+
+
+def _differ(signal: Signal, time: Floats, values: Floats, limit: float) -> bool:
+    """Tell whether another source of a signal says something else at the same time."""
+    gap = np.abs(signal.at(time) - values)
+    gap = gap[np.isfinite(gap) & (signal.age(time) < 2.0)]
+    return gap.size >= 10 and float(np.median(gap)) > limit
+
+
 def _tell(senders: list[_Sender], name: str, found: Obd) -> None:
     """Say what each control unit answered, and what was not read."""
     wanted = {p.number for p in PIDS}
@@ -304,16 +324,16 @@ def _tell(senders: list[_Sender], name: str, found: Obd) -> None:
         if skipped:
             parts.append(f"not used: PIDs {skipped}")
         if s.other:
-            parts.append(f"{s.other} answers of other services, not used")
+            parts.append(f"{counted(s.other, 'answer')} of other services, not used")
         if s.refused:
-            parts.append(f"{s.refused} requests it declined")
+            parts.append(f"{counted(s.refused, 'request')} it declined")
         found.contents.append(f"{s.name}, OBD-II answers: {'; '.join(parts)}")
         if s.cut:
             found.problems.append(
                 Problem(
                     "",
-                    f"{name}: {s.cut} answers of {s.name} are cut off or hold a parameter of "
-                    "unknown length; what stood before it was read",
+                    f"{name}: {counted(s.cut, 'answer')} of {s.name} cut off or with a parameter "
+                    "of unknown length; what stood before it was read",
                 )
             )
         if rescaled := [q for q in s.rescaled if q in s.values]:
@@ -348,37 +368,57 @@ def _tell(senders: list[_Sender], name: str, found: Obd) -> None:
 # Speeds of one vehicle agree far better than this [SI]; clocks and polling are in it.
 _APART: Final = {"vehicle_speed": 4.0, "engine_speed": 60.0}
 
+# Who is silent longer, and for five times its period, has stopped [s].
+_SILENT: Final = 10.0
+_FILLED: Final = 10
+"""Fewer values than these fill no silence."""
 
-def _choose(senders: list[_Sender], name: str, found: Obd) -> None:
-    """Take every quantity from the control unit that gives it most often."""
+
+def _choose(senders: list[_Sender], name: str, found: Obd, start: float) -> None:
+    """Take every quantity from the control unit that gives it most often; others fill in."""
     names = dict.fromkeys(q for s in senders for q in s.values)
     left_out: dict[tuple[str, str], list[str]] = {}
+    filled: dict[tuple[str, str], list[tuple[str, float, float]]] = {}
     for quantity in names:
         giving = [s for s in senders if quantity in s.values]
-        best = max(giving, key=lambda s: s.values[quantity][0].size)
+        giving.sort(key=lambda s: -s.values[quantity][0].size)
+        best = giving[0]
         signal, problems = clean_signal(quantity, *best.values[quantity], name)
         found.problems.extend(problems)
         if signal is None:
             continue
-        found.signals.append(signal)
-        for other in giving:
-            if other is best:
-                continue
+        for other in giving[1:]:
             time, values = other.values[quantity]
-            doubt = False
-            if quantity in _APART:
-                gap = np.abs(signal.at(time) - values)
-                gap = gap[np.isfinite(gap) & (signal.age(time) < 2.0)]
-                doubt = gap.size >= 10 and float(np.median(gap)) > _APART[quantity]
-            if doubt:
+            alone = _in_silence(signal, time)
+            pair = (other.name, best.name)
+            if quantity in _APART and _differ(signal, time, values, _APART[quantity]):
                 text = (
                     f"{name}: {best.name} and {other.name} say different {quantity}, as two "
                     "vehicles would; keep the frames of one vehicle"
                 )
                 found.problems.append(Problem(quantity, text, serious=True))
+            elif np.count_nonzero(alone) >= _FILLED:
+                when = time[alone]
+                span = (quantity, float(when[0]) - start, float(when[-1]) - start)
+                filled.setdefault(pair, []).append(span)
+                both = np.concatenate([signal.time, when])
+                order = np.argsort(both, kind="stable")
+                joined = np.concatenate([signal.values, values[alone]])[order]
+                signal = clean_signal(quantity, both[order], joined, name)[0] or signal
             else:
                 told = f"{quantity} ({time.size} for {len(signal)})"
-                left_out.setdefault((other.name, best.name), []).append(told)
+                left_out.setdefault(pair, []).append(told)
+        found.signals.append(signal)
+    for (other_name, best_name), spans in filled.items():
+        first, last = min(s[1] for s in spans), max(s[2] for s in spans)
+        found.problems.append(
+            Problem(
+                "",
+                f"{name}: {best_name} does not answer all the time, and {other_name} does from "
+                f"{first:.0f} to {last:.0f} s into the log; {', '.join(s[0] for s in spans)} of "
+                "both were put together as of one vehicle: split the log there if they are two",
+            )
+        )
     for (other_name, best_name), quantities in left_out.items():
         found.problems.append(
             Problem(

@@ -66,6 +66,10 @@ _WARM: Final = 343.0
 # Torque at idle that alternator and pumps do not take [part of the reference torque].
 _IDLE_TORQUE: Final = 0.03
 
+# A pause in which nothing was recorded is told [s]; no drive has one so long [s].
+_PAUSE: Final = 60.0
+_NO_DRIVE: Final = 6 * 3600.0
+
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
 
@@ -170,13 +174,63 @@ def _check_long_gaps(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
         seen.add(id(s.time))
         step = np.diff(s.time)
         k = int(np.argmax(step))
-        if step[k] > 6 * 3600.0:
+        if step[k] > _NO_DRIVE:
             yield Problem(
                 s.name,
                 f"the clock of {s.name} jumps by {step[k]:.6g} s after {s.time[k]:.6g} s; "
                 "cut the recording there, or correct that time stamp",
                 serious=True,
             )
+
+
+def _check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Tell of times in which nothing was recorded, which a clock set forward looks like, too."""
+    clocks: dict[str, dict[int, Floats]] = {}
+    for s in drive.signals.values():
+        clocks.setdefault(QUANTITIES[s.name].table, {})[id(s.time)] = s.time
+    tables = {t: np.unique(np.concatenate(list(c.values()))) for t, c in clocks.items()}
+    if not tables:
+        return
+    whole = _pauses(np.unique(np.concatenate(list(tables.values()))))
+    if whole:
+        start, length = max(whole, key=lambda p: p[1])
+        speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+        ends = np.array([start, start + length])
+        moving = (
+            speed is not None
+            and bool(np.all(speed.age(ends) < 5.0))
+            and float(np.min(np.abs(speed.at(ends)))) > 3.0
+        )
+        several = f"{len(whole)} times, the longest time " if len(whole) > 1 else ""
+        why = (
+            "while the vehicle moves: the clock was set forward, or a piece of the recording is "
+            "missing"
+            if moving
+            else "as if the recording paused or its clock was set forward"
+        )
+        yield Problem(
+            "",
+            f"nothing was recorded {several}for {length:.0f} s from {start:.6g} s, {why}",
+        )
+    for table, time in tables.items():
+        own = [p for p in _pauses(time) if not any(abs(p[0] - w[0]) < _PAUSE for w in whole)]
+        if own:
+            start, length = max(own, key=lambda p: p[1])
+            several = f"{len(own)} times, the longest time " if len(own) > 1 else ""
+            yield Problem(
+                "",
+                f"{table} pauses {several}for {length:.0f} s from {start:.6g} s while the rest "
+                "goes on; if its clock was set there, cut the recording",
+            )
+
+
+def _pauses(time: Floats) -> list[tuple[float, float]]:
+    """Start and length of the pauses of a clock [s]."""
+    if time.size < 10:
+        return []
+    step = np.diff(time)
+    pause = (step > max(_PAUSE, 10.0 * float(np.median(step)))) & (step <= _NO_DRIVE)
+    return [(float(time[k]), float(step[k])) for k in np.flatnonzero(pause)]
 
 
 def _check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -448,6 +502,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     _check_rates,
     _check_overlap,
     _check_long_gaps,
+    _check_pauses,
     _check_stuck,
     _check_load,
     _check_pressure,
