@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
@@ -23,6 +24,10 @@ _TURN: Final = 0.5
 
 # Sensors are late by up to this; a clock that is off by more is a wrong clock [s].
 _LATE: Final = 1.5
+
+# How late one sensor may be beside another, as a standard deviation: two recorded loggers, which
+# stamp both by one clock, have GNSS 0.17 and 0.36 s behind the wheels (studies/recorded.md) [s].
+_LATENESS: Final = 0.3
 
 _REMEDY: Final = "give offset_s under [time] of the file's table in a mapping"
 
@@ -173,8 +178,17 @@ def _offset(fixed: Sequence[Log], group: Sequence[Log]) -> tuple[Alignment | Non
 
 
 def _told(found: Alignment) -> str:
+    """Offset with its standard deviations: how well the signals fit, and what that says of clocks.
+
+    An offset takes in how late the sensors are: the signals lie on each other, the clocks may not.
+    """
     digits = 3 if found.std < 0.1 else 2
-    return f"{found.offset:+.{digits}f} s (± {max(found.std, 10.0**-digits):.{digits}f} s)"
+    fit = f"{max(found.std, 10.0**-digits):.{digits}f}"
+    clocks = math.hypot(found.std, _LATENESS)
+    return (
+        f"{found.offset:+.{digits}f} s (± {clocks:.1f} s, of which ± {fit} s by the fit and "
+        f"± {_LATENESS:g} s for how late a sensor may be)"
+    )
 
 
 def _names(logs: Sequence[Log]) -> str:
