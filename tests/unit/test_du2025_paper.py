@@ -57,5 +57,7 @@ def test_tables_and_page_name_what_falls_behind(judged, tmp_path, monkeypatch):
     page = tmp_path / "page.html"
     done.write_report(page)
     text = page.read_text(encoding="utf-8")
+    assert text.index("RMSE, no-load, hybrid") < text.index("Table 2 as in the paper")
+    assert ">behind<" in text
     for title in ("Fig. 4: h(v)", "Fig. 5a", "Fig. 5d", "Fig. 6", "Fig. 7", "With all effects"):
         assert title in text

@@ -80,3 +80,11 @@ def test_slope_is_that_of_the_straight_line():
     assert found == pytest.approx(0.5)
     assert std == pytest.approx(0.0, abs=1e-9)
     assert galvao.rank_correlation(masses, np.array([1.0, 2.0, 3.0, 1e9])) == pytest.approx(1.0)
+
+
+def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
+    monkeypatch.setattr(galvao, "reproduce", lambda **_: done)
+    page = tmp_path / "page.html"
+    galvao.reproduced(1234, None).write_report(page)
+    text = page.read_text(encoding="utf-8")
+    assert text.index("largest error from 1500 kg") < text.index("Test 01")

@@ -35,3 +35,11 @@ def test_errors_are_those_of_eq_10(done):
     error = shown.track.parameters[:, 2] - shown.made.inertias[:, 2]
     assert r.rmse[2] == pytest.approx(np.sqrt(np.mean(error**2)))
     assert r.mape[2] == pytest.approx(np.mean(np.abs(error) / shown.made.inertias[:, 2]))
+
+
+def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
+    monkeypatch.setattr(paper, "reproduce", lambda **_: done)
+    page = tmp_path / "page.html"
+    paper.reproduced(5, None).write_report(page)
+    text = page.read_text(encoding="utf-8")
+    assert text.index("MAPE of the sprung mass, worst road") < text.index("Table 2 of the paper")

@@ -22,6 +22,7 @@ from weighbridge.pipeline.weighing import Weighing
 from weighbridge.report import mass_figure, write_report
 from weighbridge.report.page import Page
 from weighbridge.report.style import REASON_STYLE, Panel, blank
+from weighbridge.report.table import Table
 from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.gear import detect_gearings
@@ -484,3 +485,9 @@ def test_report_loads_plotly_only_when_used():
 
 def test_every_reason_has_its_mark():
     assert set(REASON_STYLE) == set(Reason)
+
+
+def test_given_tables_come_first(tmp_path):
+    given = Table("The paper's", ("figure", "paper"), (("RMSE <of all>", "1 kg"),))
+    text = Elements(written(tmp_path, [make_weighing()], tables=(given,))).text
+    assert 0 < text.index("RMSE <of all>") < text.index("Mass over time")

@@ -72,7 +72,7 @@ def show(done: Reproduced) -> None:
     from rich.table import Table
 
     console = Console(width=max(130, Console().width))
-    for shown in done.tables:
+    for shown in (*done.tables, done.comparison):
         table = Table(title=shown.title)
         for k, name in enumerate(shown.columns):
             # The widest column gives way first, by lines: nothing of a table is cut off.
@@ -80,9 +80,3 @@ def show(done: Reproduced) -> None:
         for row in shown.rows:
             table.add_row(*row)
         console.print(table)
-    table = Table(title=done.title, title_justify="left")
-    for name in ("figure", "paper", "ours", ""):
-        table.add_column(name)
-    for c in done.comparisons:
-        table.add_row(c.figure, c.theirs, c.ours, "" if c.good else "behind")
-    console.print(table)

@@ -8,7 +8,7 @@ Sensors 25(6), 2025, 1741.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
@@ -322,24 +322,23 @@ def cell(drives: tuple[DriveResult, ...], load: str, method: str, name: str) -> 
 def reproduced(seed: int, progress: Progress | None) -> Reproduced:
     """Reproduce the paper and put it beside its own figures; see `reproduce`."""
     done = reproduce(seed=seed, progress=progress)
-    tables = (
-        _cells(done.drives, "Table 2 as in the paper, the bus known"),
-        _cells(done.road, "Table 2 with all effects, the bus calibrated on other drives"),
-        _drives_table(done),
-        _settings_table(done),
-        _vehicle_table(done),
-    )
 
-    def write(path: Path) -> None:
+    def write(tables: Sequence[Table], path: Path) -> None:
         from weighbridge.report.study import write_study
 
         write_study("Du et al. 2025, reproduced on simulated drives", tables, panels(done), path)
 
     return Reproduced(
         title="Du et al. 2025",
-        tables=tables,
+        tables=(
+            _cells(done.drives, "Table 2 as in the paper, the bus known"),
+            _cells(done.road, "Table 2 with all effects, the bus calibrated on other drives"),
+            _drives_table(done),
+            _settings_table(done),
+            _vehicle_table(done),
+        ),
         comparisons=_comparisons(done),
-        write_report=write,
+        write_page=write,
     )
 
 

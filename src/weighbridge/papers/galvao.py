@@ -367,9 +367,8 @@ def rank_correlation(masses: Floats, answers: Floats) -> float:
 def reproduced(seed: int, progress: Progress | None) -> Reproduced:
     """Reproduce the paper and put it beside its own figures; see `reproduce`."""
     done = reproduce(seed=seed, progress=progress)
-    tables = (tests_table(done), starts_table(done), trials_table(done))
 
-    def write(path: Path) -> None:
+    def write(tables: Sequence[Table], path: Path) -> None:
         write_study(
             "Galvão et al., reproduced on simulated drives",
             tables,
@@ -379,9 +378,9 @@ def reproduced(seed: int, progress: Progress | None) -> Reproduced:
 
     return Reproduced(
         title="Galvão et al.: speed alone gives back the mass it was calibrated with",
-        tables=tables,
+        tables=(tests_table(done), starts_table(done), trials_table(done)),
         comparisons=comparisons(done),
-        write_report=write,
+        write_page=write,
     )
 
 

@@ -8,6 +8,7 @@ CAN-bus data, Mechanical Systems and Signal Processing 171, 2022, 108925.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -357,7 +358,7 @@ def reproduced(seed: int, progress: Progress | None) -> Reproduced:
     """Reproduce the paper and put it beside its own figures; see `reproduce`."""
     done = reproduce(seed=seed, progress=progress)
 
-    def write(path: Path) -> None:
+    def write(tables: Sequence[Table], path: Path) -> None:
         from weighbridge.report import write_report
 
         write_report(
@@ -366,13 +367,14 @@ def reproduced(seed: int, progress: Progress | None) -> Reproduced:
             calibration=done.calibration,
             truth={d.weighing.drive.name: d.true_mass for d in done.drives},
             title="Jensen et al. 2022, reproduced on simulated drives",
+            tables=tables,
         )
 
     return Reproduced(
         title="Jensen et al. 2022",
         tables=(_drives_table(done),),
         comparisons=_comparisons(done),
-        write_report=write,
+        write_page=write,
     )
 
 

@@ -6,6 +6,7 @@ filter, Transport and Communications Science Journal 75(4), 2024, 1593-1603.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -255,9 +256,8 @@ def reproduce(
 def reproduced(seed: int, progress: Progress | None) -> Reproduced:
     """Reproduce the paper and put it beside its own figures; see `reproduce`."""
     results, shown = reproduce(seed=seed, progress=progress)
-    tables = (_table_2(results[PAPERS_CASE.name]), _cases_table(results))
 
-    def write(path: Path) -> None:
+    def write(tables: Sequence[Table], path: Path) -> None:
         from weighbridge.report.inertia_panels import (
             innovation_panel,
             parameter_panels,
@@ -278,9 +278,9 @@ def reproduced(seed: int, progress: Progress | None) -> Reproduced:
 
     return Reproduced(
         title=f"Nguyen 2024, {ROADS} random roads of class C",
-        tables=tables,
+        tables=(_table_2(results[PAPERS_CASE.name]), _cases_table(results)),
         comparisons=_comparisons(results[PAPERS_CASE.name]),
-        write_report=write,
+        write_page=write,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,13 +38,33 @@ class Reproduced:
     title : paper and what was done
     tables : of single drives or parameters
     comparisons : figures beside the paper's
-    write_report : write a page with the paper's figures from our data
+    write_page : write a page of the given tables and the paper's figures from our data
     """
 
     title: str
     tables: tuple[Table, ...]
     comparisons: tuple[Comparison, ...]
-    write_report: Callable[[Path], None]
+    write_page: Callable[[Sequence[Table], Path], None]
+
+    @property
+    def comparison(self) -> Table:
+        """The figures beside the paper's, those behind marked."""
+        return Table(
+            self.title,
+            ("figure", "paper", "ours", ""),
+            tuple((c.figure, c.theirs, c.ours, "" if c.good else "behind")
+                  for c in self.comparisons),
+        )  # fmt: skip
+
+    def write_report(self, path: Path) -> None:
+        """Write a page that begins with what the paper has and what we have.
+
+        Raises
+        ------
+        ConfigError
+            The file cannot be written.
+        """
+        self.write_page((self.comparison, *self.tables), path)
 
     @property
     def behind(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from weighbridge.pipeline.calibrating import Calibration
     from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.report.table import Table
 
 __all__ = ["mass_figure", "write_report"]
 
@@ -23,6 +24,7 @@ def write_report(
     truth: Mapping[str, float] | None = None,
     title: str | None = None,
     comparisons: Sequence[Sequence[Weighing]] | None = None,
+    tables: Sequence[Table] = (),
 ) -> None:
     """Write one self-contained HTML page for one or many drives.
 
@@ -36,6 +38,7 @@ def write_report(
     title : heading of the page; made from the drives when None
     comparisons : for each of ``weighings`` the same drive by every method, as of
         `Weighing.compare`, to show side by side; none when None
+    tables : to begin the page with
 
     Raises
     ------
@@ -52,6 +55,7 @@ def write_report(
         truth=truth or {},
         title=title,
         comparisons=comparisons or (),
+        tables=tables,
     )
 
 

@@ -140,6 +140,7 @@ def write_page(
     truth: Mapping[str, float],
     title: str | None,
     comparisons: Sequence[Sequence[Weighing]],
+    tables: Sequence[Table],
 ) -> None:
     """Write the page; see `weighbridge.report.write_report`."""
     if not weighings and calibration is None:
@@ -149,7 +150,7 @@ def write_page(
             f"{path}: {len(comparisons)} comparisons for {len(weighings)} weighings; give one each"
         )
     page = Page()
-    parts = []
+    parts = [text_table(table) for table in tables]
     if len(weighings) > 1:
         parts.append(_summary(weighings, truth))
     for k, weighing in enumerate(weighings):
