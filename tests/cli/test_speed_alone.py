@@ -61,6 +61,9 @@ def test_speed_alone_is_weighed_and_says_why_there_is_no_mass(weighbridge, car, 
     assert "No road grade" in page
     assert "No drive helps, however long or hilly" in page
     assert "firm accelerations" not in page
+    assert "Do not read a mass off this line" in page
+    assert "Trust a running mass" not in page
+    assert "Force over specific force" not in page
     running = pl.read_csv(track)["mass_kg"].drop_nulls().to_numpy()
     assert running[-1] == pytest.approx(1092.0, rel=0.02)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from weighbridge.balance import Reason
-from weighbridge.estimators import MassTrack, Status
+from weighbridge.estimators import SPEED_ALONE, MassTrack, Status
 from weighbridge.estimators.rls import regression
 from weighbridge.report.style import (
     BLUE,
@@ -37,15 +37,22 @@ if TYPE_CHECKING:
 def mass_section(weighing: Weighing, truth: float | None) -> Section:
     """Return the mass over time and what was used for it."""
     panels = [mass_panel(weighing, truth), speed_panel(weighing)]
+    alone = weighing.method in SPEED_ALONE
     if weighing.result is not None:
-        panels += [fit_panel(weighing), share_panel(weighing.result)]
-    return Section(
-        key="mass",
-        title="Mass over time",
-        lead="Trust a running mass that settles early and stays within its band while the "
-        "used samples come from all parts of the drive.",
-        panels=tuple(panels),
+        # Without a torque there is no force to draw over the specific force.
+        panels += [] if alone else [fit_panel(weighing)]
+        panels.append(share_panel(weighing.result))
+    lead = (
+        "Trust a running mass that settles early and stays within its band while the used samples "
+        "come from all parts of the drive."
     )
+    if alone:
+        lead = (
+            "Do not read a mass off this line: it begins at the mass of the calibration and stays "
+            "near it on every drive and with every load, and its band is that of the start. That "
+            "it settles early and hardly moves says nothing about the vehicle."
+        )
+    return Section(key="mass", title="Mass over time", lead=lead, panels=tuple(panels))
 
 
 def mass_panel(weighing: Weighing, truth: float | None) -> Panel:
@@ -141,11 +148,15 @@ def speed_panel(weighing: Weighing) -> Panel:
     used = int(np.count_nonzero(result.used))
     return Panel(
         title=f"{used} of {total} samples were used",
-        caption="Each mark is one force sample, of frequent kinds every few; colour and shape "
-        "say why it was left out. Click a name in the legend to hide it.",
+        caption=f"Each mark is one {_sample(weighing)}, of frequent kinds every few; colour and "
+        "shape say why it was left out. Click a name in the legend to hide it.",
         figure=figure,
         wide=True,
     )
+
+
+def _sample(weighing: Weighing) -> str:
+    return "mean of the speed" if weighing.method in SPEED_ALONE else "force sample"
 
 
 def fit_panel(weighing: Weighing) -> Panel:
