@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge.errors import DriveError
-from weighbridge.pipeline.calibrating import calibrate
+from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.vehicle_checks import check_vehicle
 from weighbridge.signals import Drive, Signal
@@ -100,6 +100,8 @@ def test_two_reference_torques_in_turn_are_both_told_and_settled_by_the_vehicle_
         assert problem.serious is expected
         assert "1500 N m from 0 s and 2100 N m from 5 s, in turn" in problem.text
         assert "1800" not in problem.text
+    known = Vehicle(torque=TorqueModel(reference_torque=2100.0))  # before its calibration
+    assert [p.serious for p in check_vehicle(found, known)] == [False]
     (problem,) = check_vehicle(found, None)
     assert "reference_torque_nm under [torque] of the vehicle file" in problem.text
 
@@ -169,6 +171,16 @@ def test_indicated_torque_is_refused_until_its_friction_is_stated():
 
 def test_a_calibration_finds_the_friction_itself():
     found = idling(0.10, indicated_torque_fraction=0.1)
-    with pytest.raises(DriveError) as refused:
+    for source in (None, "percent"):
+        with pytest.raises(DriveError) as refused:
+            calibrate(found, 1500.0, vehicle=car(), settings=CalibrationSettings(source=source))
+        assert "friction" not in str(refused.value)
+
+
+def test_a_calibration_by_another_torque_passes_one_that_is_stuck():
+    found = idling(0.10, engine_load=0.5, engine_torque=0.0)
+    with pytest.raises(DriveError, match="engine_torque is 0 nm all the time"):
         calibrate(found, 1500.0, vehicle=car())
-    assert "friction" not in str(refused.value)
+    with pytest.raises(DriveError) as refused:
+        calibrate(found, 1500.0, vehicle=car(), settings=CalibrationSettings(source="percent"))
+    assert "all the time" not in str(refused.value)

@@ -157,13 +157,17 @@ def _checked(
     drives: Drive | Sequence[Drive],
     mass: float | Sequence[float] | None,
     vehicle: Vehicle | None,
+    source: TorqueSource | None = None,
 ) -> tuple[list[Drive], Vehicle, list[float]]:
     """List the drives, what is known of the vehicle, and the drives' masses; check them."""
     drives = [drives] if isinstance(drives, Drive) else list(drives)
     base = vehicle or Vehicle(name=_name(drives))
     masses = _masses(drives, mass, base.kind)
-    # Friction in the torque is no fault here: the fit finds it as an offset.
-    known = replace(base, torque=TorqueModel())
+    model = TorqueModel(reference_torque=base.torque.reference_torque)
+    if source is not None:
+        # Friction in the torque is no fault here: the fit finds it as an offset.
+        model = replace(model, source=source, coefficients=(-1.0, 1.0))
+    known = replace(base, torque=model)
     for drive in drives:
         for problem in check_drive(drive, known):
             if problem.serious:
@@ -182,7 +186,7 @@ def run_calibration(
     settings = settings or CalibrationSettings()
     if settings.method == "speed-ekf":
         raise ConfigError("method speed-ekf has no torque fit; use run_speed_calibration")
-    drives, base, masses = _checked(drives, mass, vehicle)
+    drives, base, masses = _checked(drives, mass, vehicle, settings.source)
     source = settings.source or best_source(drives, base)
     for drive in drives:
         if missing := drive.missing(SIGNALS[source]):

@@ -101,7 +101,7 @@ def _needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
     The torque is that of the vehicle file; without one, of the source that a calibration takes.
     """
     sources = [source for source, names in SIGNALS.items() if drive.has(*names)]
-    if vehicle is not None and vehicle.torque != TorqueModel():
+    if vehicle is not None and replace(vehicle.torque, reference_torque=None) != TorqueModel():
         sources = [vehicle.torque.source]
     elif "percent" in sources[:1] and len(sources) > 1 and not drive.has("reference_torque"):
         # A vehicle file may yet give the reference torque.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -55,7 +56,8 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     said = (
         f"reference_torque is {which}{'' if once else ', in turn'}: it is a constant of an engine"
     )
-    if model.source == "percent" and model.reference_torque is not None:
+    unknown = replace(model, reference_torque=None) == TorqueModel()
+    if (unknown or model.source == "percent") and model.reference_torque is not None:
         yield Problem(
             reference.name,
             f"{said}; the {model.reference_torque:.0f} N m of the vehicle file were taken all the "
@@ -69,7 +71,7 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
         f"{said}, {guess}; {split}state the right one as reference_torque_nm under [torque] of "
         "the vehicle file",
         # In turn it says nothing of two vehicles, and only percent torque needs it.
-        serious=once or model == TorqueModel() or model.source == "percent",
+        serious=once or unknown or model.source == "percent",
     )
 
 
