@@ -451,6 +451,27 @@ def test_constant_signal(sane, name):
     assert any("all the time; its source is stuck" in t for t in texts)
 
 
+def test_a_road_due_north_is_no_stuck_longitude():
+    t = np.arange(0.0, 600.0, 1.0)
+    v = 12.0 + 5.0 * np.sin(t / 20.0)
+    signals = [
+        Signal("latitude", t, np.radians(48.0) + np.cumsum(v) / 6.371e6),
+        Signal("longitude", t, np.full(t.size, np.radians(11.0))),
+        Signal("gnss_speed", t, v),
+        Signal("gnss_course", t, np.zeros(t.size)),
+    ]
+    drive = Drive("made", {s.name: s for s in signals})
+    assert serious(drive) == []
+    assert "longitude is 11 deg all the time" in only(drive.without("gnss_course")).text
+
+
+@pytest.mark.parametrize("name", ["latitude", "longitude"])
+def test_a_stuck_position_against_the_course(sane, name):
+    s = sane.signals[name]
+    stuck = sane.with_signals(replace(s, values=np.full(len(s), s.values[0])))
+    assert any(f"{name} is" in p.text and "stuck" in p.text for p in serious(stuck))
+
+
 def test_only_what_the_torque_source_needs_is_serious(sane):
     load = sane.signals["engine_load"]
     stuck = with_torque(sane, 0.9).with_signals(replace(load, values=np.full(len(load), 0.5)))

@@ -264,6 +264,8 @@ def _check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             standing = s.name in ("vehicle_speed", "gnss_speed", "latitude", "longitude")
             if (standing or s.name not in _IMU) and not moving:
                 continue
+            if _along_an_axis(drive, s.name):
+                continue
             yield Problem(
                 s.name,
                 f"{s.name} is {_show(s.name, value)} all the time; its source is stuck: "
@@ -279,6 +281,15 @@ def _check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                     f"{s.name} repeats one value for {length:.1f} s from {s.time[at]:.6g} s",
                     serious=length > 0.2 * s.duration,
                 )
+
+
+def _along_an_axis(drive: Drive, name: str) -> bool:
+    """Tell whether the course lets a latitude or longitude stay, as on a road due east."""
+    part = {"latitude": np.cos, "longitude": np.sin}.get(name)
+    course = drive.get("gnss_course")
+    if part is None or course is None or not len(course):
+        return False
+    return bool(np.percentile(np.abs(part(course.values)), 90) < 0.02)
 
 
 def _longest_run(values: Floats) -> tuple[int, int]:
