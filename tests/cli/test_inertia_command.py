@@ -1,6 +1,7 @@
 """``weighbridge simulate ride`` and ``weighbridge inertia``."""
 
 import json
+import re
 from pathlib import Path
 
 import polars as pl
@@ -24,6 +25,7 @@ def test_ride_is_simulated_and_weighed(weighbridge, ride, tmp_path):
     assert ran.code == 0, ran.err
     assert "sprung mass" in ran.out
     assert "payload" in ran.out
+    assert re.search(r"^mass \d+ kg, 95 % between \d+ and \d+ kg: front axle", ran.out, re.M)
     assert pl.read_parquet(track).height > 1000
     assert report.stat().st_size > 10_000
 
@@ -34,6 +36,7 @@ def test_ride_is_simulated_and_weighed(weighbridge, ride, tmp_path):
     low, high = told["sprung_mass_interval95_kg"]
     assert low < 8000.0 - 693.0 < high
     assert abs(told["mass_kg"] - 8000.0) < 80.0
+    assert told["interval95_kg"] == pytest.approx([low + 693.0, high + 693.0])
 
 
 def test_ride_without_a_signal_exits_with_1(weighbridge, ride):

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.inertia import jumps
 from weighbridge.estimators.suspension import check_suspension
 from weighbridge.io import read_drive
 from weighbridge.papers.nguyen2024 import suspension_of
@@ -21,6 +22,13 @@ from weighbridge.vehicle.model import Vehicle
 SENSORS = RideSensors(rate=250.0)
 RIDE = replace(suspension_of(TRUCK, SENSORS), zero_mass=TRUCK.sprung_mass, force_std=0.01)
 CAR = Vehicle(name="truck", kind="truck", tare=6087.0, ride=RIDE)
+LIGHT = replace(
+    TRUCK, sprung_mass=1400.0, roll_inertia=600.0, pitch_inertia=2100.0, unsprung_mass=(90.0, 90.0),
+    stiffness=(3e4, 3e4, 2.8e4, 2.8e4), damping=(2.5e3,) * 4, track=(1.5, 1.5),
+    axle_distance=(1.2, 1.5),
+)  # fmt: skip
+"""A car: the same turn pushes its small inertias harder."""
+LIGHT_CAR = Vehicle(name="car", ride=replace(suspension_of(LIGHT, SENSORS), force_std=0.01))
 
 
 def simulated(vehicle=TRUCK, factor=1.3, sensors=SENSORS, seed=11, **more):
@@ -91,6 +99,18 @@ def test_braking_and_turning_are_no_load():
     assert not told.track.pushed[:, 0].any()
 
 
+def test_a_turn_that_sets_in_hard_is_no_load():
+    ride = simulated(manoeuvres=((3.0, 5.5, -9.0, 0.0), (7.0, 11.0, 2.0, 5.0)), seed=23,
+                     vehicle=LIGHT, duration=16.0)  # fmt: skip
+    told = estimate_inertia(ride.drive, LIGHT_CAR)
+    assert jumps(told.track)  # what was taken for a jump, and moved no mass
+    assert told.status == "converged"
+    assert len(told.segments) == 1
+    assert told.suspension is not None
+    assert not told.suspension.off.any()
+    assert_allclose(told.values, ride.inertias[-1], rtol=0.02)
+
+
 def test_load_changes_are_found():
     ride = simulated(factor=1.0, zero_mass=None, changes=((6.0, 1.5),), seed=12)
     told = estimate_inertia(ride.drive, replace(CAR, ride=replace(RIDE, zero_mass=None)))
@@ -147,6 +167,23 @@ def test_wrong_units_are_refused(made):
         estimate_inertia(changed(made.drive, **{n: lambda v: 1e3 * v for n in travels}), CAR)
 
 
+@pytest.mark.parametrize("name", ["roll_rate", "pitch_rate"])
+def test_degrees_under_the_name_of_radians_are_named(made, name):
+    spoiled = changed(made.drive, **{name: np.degrees})
+    with pytest.raises(DriveError, match=rf"{name} .* degrees per second; check the unit"):
+        estimate_inertia(spoiled, CAR)
+    spoiled = changed(made.drive, **{name: np.radians})
+    with pytest.raises(DriveError, match=rf"{name} .* radians per second, and read as degrees"):
+        estimate_inertia(spoiled, CAR)
+
+
+def test_millimetres_of_the_whole_suspension_are_named(made):
+    signals = [n for n in made.drive.signals if n.startswith("suspension")]
+    spoiled = changed(made.drive, **dict.fromkeys(signals, lambda v: 0.01 * v))
+    with pytest.raises(DriveError, match=r"units of suspension travel and rate, and .* \[ride\]"):
+        estimate_inertia(spoiled, CAR)
+
+
 def test_swapped_wheels_are_refused(made):
     s = made.drive.signals
     swapped = made.drive.with_signals(
@@ -160,6 +197,38 @@ def test_swapped_wheels_are_refused(made):
 def test_stuck_sensor_is_refused(made):
     with pytest.raises(DriveError, match="suspension_travel_rl repeats one value"):
         estimate_inertia(changed(made.drive, suspension_travel_rl=np.zeros_like), CAR)
+
+
+def test_suspension_without_a_signal_is_refused(made):
+    still = {n: np.zeros_like for n in made.drive.signals if "travel" in n}
+    with pytest.raises(DriveError, match="every suspension travel repeats one value"):
+        estimate_inertia(changed(made.drive, **still), CAR)
+
+
+def test_a_ride_without_motion_is_told_plainly(made):
+    told = estimate_inertia(changed(made.drive, **dict.fromkeys(made.drive.signals, np.zeros_like)),
+                            CAR)  # fmt: skip
+    assert told.status == "not_excited"
+    assert "every signal of the ride repeats one value" in told.reason
+    assert told.warnings == ()
+    assert told.track is None
+
+
+def test_a_quarter_of_a_second_is_no_ride(made):
+    for seconds, status in ((0.25, "not_excited"), (3.5, "not_excited"), (4.5, "converged")):
+        count = round(seconds * SENSORS.rate) + 1
+        short = {n: Signal(n, s.time[:count], s.values[:count])
+                 for n, s in made.drive.signals.items()}  # fmt: skip
+        told = estimate_inertia(replace(made.drive, signals=short), CAR)
+        assert told.status == status
+        assert ("cannot be checked" in told.reason) is (status == "not_excited")
+
+
+def test_the_filter_as_printed_is_said_not_to_move(made):
+    told = estimate_inertia(made.drive, CAR, "printed")
+    assert told.status == "not_excited"
+    assert "printed never moves" in told.reason
+    assert not any("widened" in w for w in told.warnings)
 
 
 def test_slow_recording_is_no_ride(made):
@@ -289,6 +358,20 @@ def test_noisy_sensors_are_told():
 def test_overload_is_told(made):
     told = estimate_inertia(made.drive, replace(CAR, gross=7000.0))
     assert "surely above the permitted mass of 7000 kg" in told.warnings
+
+
+def test_interval_of_the_mass_is_that_of_the_sprung_mass_and_the_axles(found):
+    low, high = found.intervals(0.9)
+    lightest, heaviest = found.mass_interval(0.9)
+    assert lightest - low[0] == pytest.approx(266.0 + 427.0)
+    assert heaviest - high[0] == pytest.approx(266.0 + 427.0)
+    assert lightest < found.mass < heaviest
+
+
+def test_what_is_refused_has_no_interval_to_widen():
+    told = estimate_inertia(locked(20.0).drive, CAR)
+    assert told.status == "inconsistent"
+    assert not any("interval" in text for text in (told.reason, *told.warnings))
 
 
 def test_report_opens_offline(found, tmp_path):

@@ -87,7 +87,11 @@ def _show(found: Inertia) -> None:
                     f"95 % between {low[k]:.0f} and {high[k]:.0f} {unit}"
                 )
         front, rear = found.axle_loads
-        typer.echo(f"mass {found.mass:.0f} kg: front axle {front:.0f} kg, rear axle {rear:.0f} kg")
+        lightest, heaviest = found.mass_interval()
+        typer.echo(
+            f"mass {found.mass:.0f} kg, 95 % between {lightest:.0f} and {heaviest:.0f} kg: "
+            f"front axle {front:.0f} kg, rear axle {rear:.0f} kg"
+        )
         if found.vehicle.tare is not None:
             typer.echo(f"payload {found.payload:.0f} kg over a tare of {found.vehicle.tare:.0f} kg")
         if len(found.segments) > 1:

@@ -324,8 +324,8 @@ def estimate(
 ) -> InertiaTrack:
     """Estimate the parameters over a ride.
 
-    With ``kalman-bucy`` the noise of the suspension signals is raised, by powers of two,
-    as long as the innovations become likelier.
+    With ``kalman-bucy`` the noise of the suspension signals is raised as long as the
+    innovations become likelier: by powers of two, then by the root of two either way.
 
     Raises
     ------
@@ -343,6 +343,13 @@ def estimate(
         if louder.log_likelihood < best.log_likelihood + _GAIN:
             break
         best = louder
+    middle = best.noise_factor
+    factors = (math.sqrt(2.0) * middle, middle / math.sqrt(2.0))
+    for factor in factors if middle > 1.0 else factors[:1]:
+        between = run_filter(samples, ride, chosen, noise_factor=factor)
+        gain = _GAIN if middle == 1.0 else 0.0
+        if between.log_likelihood > best.log_likelihood + gain:
+            best = between
     return best
 
 
@@ -464,3 +471,43 @@ def jumps(track: InertiaTrack) -> tuple[float, ...]:
         if not found or time - found[-1] > MERGED:
             found.append(float(time))
     return tuple(found)
+
+
+APART: Final = 4.0
+"""Masses differ beyond doubt by so many standard deviations."""
+
+
+def load_changes(track: InertiaTrack, believed: tuple[float, ...]) -> tuple[float, ...]:
+    """Keep of the jumps those that moved the mass: a change of load.
+
+    Braking and turning push roll and pitch, never the heave. Where one begins so hard that a
+    jump of an inertia is likelier, the mass stays.
+
+    Parameters
+    ----------
+    track
+    believed : times of the jumps [s], rising
+
+    Returns
+    -------
+    Times [s], rising.
+    """
+    if not believed:
+        return ()
+    ends = np.searchsorted(track.time, (*believed, np.inf)) - 1
+    alpha, std = track.alpha[ends, 0], track.alpha_std[ends, 0]
+    moved = np.abs(np.diff(alpha)) > APART * np.hypot(std[1:], std[:-1])
+    return tuple(time for time, real in zip(believed, moved, strict=True) if real)
+
+
+def believed_otherwise(track: InertiaTrack, begin: int, end: int) -> Bools:
+    """Samples from ``begin`` on and before ``end`` at which the filter contradicts its end.
+
+    Returns
+    -------
+    (end - begin,) True where a parameter as known then was not what it proved to be.
+    """
+    alpha, std = track.alpha[begin:end], track.alpha_std[begin:end]
+    away = np.abs(alpha - alpha[-1])
+    # An inertia within some percent leaves little beside the springs' own errors.
+    return np.asarray(np.any(away > np.maximum(APART * std, 0.05 * alpha[-1]), axis=1))

@@ -20,9 +20,11 @@ from weighbridge.estimators.inertia import (
     InertiaTrack,
     Method,
     RideSamples,
+    believed_otherwise,
     estimate,
     inverse_interval,
     jumps,
+    load_changes,
 )
 from weighbridge.estimators.suspension import (
     PARTS,
@@ -38,10 +40,12 @@ from weighbridge.estimators.track import Status
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.pipeline.ride_checks import (
+    LEAST,
     NEEDED,
     SLOWEST,
     check_response,
     check_signals,
+    nothing_moves,
     ride_of,
     ride_samples,
 )
@@ -173,6 +177,18 @@ class Inertia:
         """Standard deviation of the mass [kg]; NaN where unknown."""
         return float(self.stds[0])
 
+    def mass_interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Bounds that hold the mass with the probability ``level`` [kg]; NaN where unknown.
+
+        Raises
+        ------
+        ConfigError
+            The level is not between 0 and 1.
+        """
+        low, high = self.intervals(level)
+        unsprung = self.ride.front_unsprung + self.ride.rear_unsprung
+        return float(low[0]) + unsprung, float(high[0]) + unsprung
+
     @property
     def axle_loads(self) -> tuple[float, float]:
         """What scales under front and rear axle would show on the level [kg]."""
@@ -201,6 +217,7 @@ class Inertia:
     def to_dict(self) -> dict[str, Any]:
         """Return what ``inertia --json`` prints: numbers, None where unknown."""
         low, high = self.intervals()
+        lightest, heaviest = self.mass_interval()
         front, rear = self.axle_loads
         parts: dict[str, Any] = {}
         for k, name in enumerate(("sprung_mass_kg", "roll_inertia_kgm2", "pitch_inertia_kgm2")):
@@ -217,6 +234,7 @@ class Inertia:
             **parts,
             "mass_kg": number(self.mass),
             "std_kg": number(self.std),
+            "interval95_kg": [number(lightest), number(heaviest)],
             "axle_load_front_kg": number(front),
             "axle_load_rear_kg": number(rear),
             "payload_kg": number(self.payload),
@@ -335,6 +353,12 @@ def estimate_inertia(
             Status.MISSING_SIGNALS, f"the drive has no {listed}, which a ride is made of"
         )
     only = ride_of(drive)
+    if nothing_moves(only):
+        return nothing(
+            Status.NOT_EXCITED,
+            "every signal of the ride repeats one value: the vehicle stood, or nothing was "
+            "measured; drive at 20 km/h or more while recording",
+        )
     problems = [*drive.problems, *check_drive(only), *check_signals(only)]
     samples = ride_samples(only)
     seen = response(samples, ride)
@@ -350,9 +374,23 @@ def estimate_inertia(
             "15 times: record it at 100 Hz or more",
             warnings,
         )
+    if samples.duration < LEAST or seen is None:
+        return nothing(
+            Status.NOT_EXCITED,
+            f"the ride lasts {samples.duration:.3g} s, and without {LEAST:.0f} s in one piece the "
+            f"signs and units of its signals cannot be checked: record {SHORTEST:.0f} s or more",
+            warnings,
+        )
     track = estimate(samples, ride, chosen, settings)
-    average = np.ones(3) if seen is None else seen.slope
-    return _judged(drive, vehicle, ride, samples, track, average, warnings)
+    if not np.ptp(track.alpha, axis=0).any():
+        return nothing(
+            Status.NOT_EXCITED,
+            f"the filter {chosen} never moves: the covariance of velocities and parameters that it "
+            "starts with, zero, stays zero, and the vehicle file's parameters come back; use "
+            f"{DEFAULT_METHOD}",
+            warnings,
+        )
+    return _judged(drive, vehicle, ride, samples, track, seen.slope, warnings)
 
 
 def _judged(
@@ -365,36 +403,43 @@ def _judged(
     warnings: tuple[str, ...],
 ) -> Inertia:
     """Say what the estimate is worth; ``average`` is that of alpha over the whole ride."""
-    changes = jumps(track)
-    trouble = _trouble(track, changes)
+    believed = jumps(track)
+    trouble = _trouble(track, believed)
+    changes = load_changes(track, believed)
     check = _check(samples, ride, track, changes, average, bool(trouble))
     if check is None and not trouble and track.noise_factor > 1.0:
         trouble = (
-            f"the ride fits as if the suspension signals had {track.noise_factor:.0f} times the "
+            f"the ride fits as if the suspension signals had {track.noise_factor:.2g} times the "
             "noise of the vehicle file, and is too short to tell noise from wrong springs and "
             f"dampers: record more than {SHORTEST:.0f} s of one load"
         )
-    warnings += _limits(samples, ride, track, check)
     common = UNKNOWN_FORCE_STD if ride.force_std is None else ride.force_std
     noisy = attenuation(samples, ride, track.noise_factor, np.asarray(track.alpha[-1]))
     std = np.hypot(common, noisy)
-    doubts: list[str] = []
+    # Each with what it does to the interval, which is said where there is one.
+    doubts: list[tuple[str, str]] = []
     if check is not None and check.off.any():
         std = np.hypot(std, float(np.max(np.abs(check.factor - 1.0))))
-        doubts.append(_told(check))
+        doubts.append((_told(check), "the interval is widened"))
     last = samples.between(changes[-1] if changes else -math.inf)
     carried, carried_std = static_mass(last, ride, GRAVITY)
     found = float(track.parameters[-1, 0])
-    if abs(carried - found) > max(STATIC_PART * found, 4.0 * carried_std):
+    if abs(carried - found) > max(
+        STATIC_PART * found, 4.0 * math.hypot(carried_std, float(track.stds[-1, 0]))
+    ):
         # Were it the stiffness, the inertias would be as wrong as the mass.
         std = np.hypot(std, abs(carried / found - 1.0))
-        doubts.append(
+        told = (
             f"at rest the springs carry {carried:.0f} kg, in motion the sprung mass is "
             f"{found:.0f} kg: a travel sensor is offset, zero_mass_kg is not the mass with which "
-            "they read zero, or the stiffness is wrong; the interval holds both"
+            "they read zero, or the stiffness is wrong"
         )
-    warnings += (*doubts, *_leaning(last, ride))
-    status, reason = _status(vehicle, track, check, trouble, doubts, std)
+        doubts.append((told, "the interval holds both"))
+    status, reason = _status(vehicle, track, check, trouble, [text for text, _ in doubts], std)
+    weighed = status is Status.CONVERGED
+    warnings += _limits(samples, ride, track, check, weighed)
+    warnings += tuple(f"{text}; {effect}" if weighed else text for text, effect in doubts)
+    warnings += _leaning(last, ride)
     result = Inertia(
         drive=drive,
         vehicle=vehicle,
@@ -447,29 +492,37 @@ def _check(
     longest = int(np.argmax(np.diff(edges)))
     pushed = np.asarray(track.pushed.any(axis=1))
     for k in (len(changes), longest):
-        a, b = edges[k], edges[k + 1]
+        a, b = int(edges[k]), int(edges[k + 1])
         part = samples.between(samples.time[a], math.inf if k == len(changes) else changes[k])
-        check = check_suspension(part, ride, np.asarray(track.alpha[b - 1]), pushed[a:b])
+        # A push that was taken for a jump of an inertia is one all the same.
+        otherwise = believed_otherwise(track, a, b)
+        check = check_suspension(
+            part, ride, np.asarray(track.alpha[b - 1]), pushed[a:b] | otherwise
+        )
         if check is not None:
             return check
     return None
 
 
 def _limits(
-    samples: RideSamples, ride: Ride, track: InertiaTrack, check: SuspensionCheck | None
+    samples: RideSamples,
+    ride: Ride,
+    track: InertiaTrack,
+    check: SuspensionCheck | None,
+    weighed: bool,
 ) -> tuple[str, ...]:
     """Say what limits the result: the vehicle file, noise, the logger, a short ride."""
     told = []
-    if ride.force_std is None:
+    if ride.force_std is None and weighed:
         told.append(
             "the vehicle file does not say how sure its springs and dampers are (force_std): "
             f"{100.0 * UNKNOWN_FORCE_STD:.0f} % is in the interval"
         )
     if track.noise_factor > 1.0:
         told.append(
-            f"the ride fits as if the suspension signals had {track.noise_factor:.0f} times the "
+            f"the ride fits as if the suspension signals had {track.noise_factor:.2g} times the "
             "noise of the vehicle file: the sensors are noisier, or springs and dampers are not "
-            "the file's; the interval is widened"
+            f"the file's{'; the interval is widened' if weighed else ''}"
         )
     if samples.period > 0.0105:
         told.append(
@@ -506,7 +559,7 @@ def _told(check: SuspensionCheck) -> str:
     named = [f"{PARTS[k]} {check.factor[k]:.2f}" for k in order if check.off[k] > 0.0]
     return (
         f"against the others these act otherwise than the vehicle file says: {', '.join(named)} "
-        "times its value; check springs, dampers and their sensors; the interval is widened"
+        "times its value; check springs, dampers and their sensors"
     )
 
 
@@ -543,7 +596,7 @@ def _status(
         )
     if not math.hypot(by_filter, float(std[0])) <= TOO_WIDE:
         return Status.INCONSISTENT, (
-            doubts[0].partition("; the interval")[0]
+            doubts[0]
             if doubts
             else f"the sprung mass seems to be {mass:.0f} kg, but noise of the suspension signals "
             f"may shift it by {100.0 * float(std[0]):.0f} %: a rougher road or quieter sensors "

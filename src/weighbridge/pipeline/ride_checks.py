@@ -23,6 +23,17 @@ NEEDED: Final = (*TRAVELS, *RATES, *VELOCITIES)
 SLOWEST: Final = 0.0175
 """Longest period of a ride that can be used [s]: less than five samples in one hop of an axle."""
 
+LEAST: Final = 4.0
+"""A ride of less is not looked at [s]: its signs and units cannot be checked, and the interval
+is known to hold from two seconds on."""
+
+UNIT: Final = 8.0
+"""A velocity so many times what the forces of the suspension make of it is in another unit [-]:
+no load changes a mass or an inertia by as much."""
+
+ALWAYS: Final = 0.9
+"""A signal that repeats one value for so much of a ride says nothing of it [-]."""
+
 FROZEN: Final = 1.0
 """A suspension that repeats one value for so long while another moves is stuck [s]."""
 
@@ -94,9 +105,21 @@ def check_signals(drive: Drive) -> Iterator[Problem]:
                 "the unit at the end of the column's name",
                 serious=True,
             )
-    for names in (TRAVELS, RATES, VELOCITIES):
+    kinds = {
+        "suspension travel": TRAVELS, "suspension rate": RATES, "velocity of the body": VELOCITIES
+    }  # fmt: skip
+    dead = [kind for kind, names in kinds.items() if _still(drive, names)]
+    for kind in dead if len(dead) < len(kinds) else ():
+        yield Problem(
+            kinds[kind][0],
+            f"every {kind} repeats one value all through the ride while others move: "
+            f"{', '.join(kinds[kind])}; nothing was measured there: mend the sensors or the logger",
+            serious=True,
+        )
+    for names in kinds.values():
         frozen = {name: _longest_still(drive, name) for name in names}
         if min(frozen.values()) > FROZEN:
+            # The vehicle stands, or, told above, all of a kind are dead.
             continue
         for name, length in frozen.items():
             share = length / max(drive.signals[name].duration, 1e-9)
@@ -107,6 +130,16 @@ def check_signals(drive: Drive) -> Iterator[Problem]:
                     "or suspension is stuck: mend it, or cut that part off",
                     serious=share > 0.2,
                 )
+
+
+def nothing_moves(drive: Drive) -> bool:
+    """Whether every signal of the ride repeats one value for nearly all of it."""
+    return _still(drive, NEEDED)
+
+
+def _still(drive: Drive, names: tuple[str, ...]) -> bool:
+    """Whether each of the signals repeats one value for nearly all of the ride."""
+    return all(_longest_still(drive, n) > ALWAYS * drive.signals[n].duration for n in names)
 
 
 def _longest_still(drive: Drive, name: str) -> float:
@@ -169,6 +202,38 @@ def check_response(found: Response) -> Iterator[Problem]:
                 "turn its sign (factor = -1 in the mapping)",
                 serious=True,
             )
+    yield from _units(found)
+
+
+def _units(found: Response) -> Iterator[Problem]:
+    """Find velocities in another unit than their names say."""
+    sure = found.correlation > 0.5
+    with np.errstate(invalid="ignore"):
+        far = sure & ((found.slope > UNIT) | (found.slope < 1.0 / UNIT))
+    if far.all():
+        yield Problem(
+            TRAVELS[0],
+            f"the body moves {found.slope[0]:.3g}, {found.slope[1]:.3g} and {found.slope[2]:.3g} "
+            "times (heave, roll, pitch) as the vehicle file's springs and dampers would move it; "
+            "check the units of suspension travel and rate, and those of the [ride] section",
+            serious=True,
+        )
+        return
+    for k, name in enumerate(VELOCITIES):
+        if not far[k]:
+            continue
+        slope, unit = float(found.slope[k]), QUANTITIES[name].suffix
+        likely = ""
+        if unit == "radps" and slope > UNIT:
+            likely = "it seems to be in degrees per second; "
+        elif unit == "radps":
+            likely = "it seems to be in radians per second, and read as degrees; "
+        yield Problem(
+            name,
+            f"{name} changes {slope:.3g} times as fast as the suspension's forces make it: "
+            f"{likely}check the unit at the end of the column's name (read as {unit})",
+            serious=True,
+        )
 
 
 def _turned(found: Response) -> Bools:

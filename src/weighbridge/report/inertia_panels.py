@@ -176,9 +176,8 @@ def _tables(result: Inertia) -> list[Table]:
             for k, start in enumerate((ride.sprung_mass, ride.roll_inertia, ride.pitch_inertia))
         ]  # fmt: skip
         front, rear = result.axle_loads
-        reach = 1.96 * result.std
         rows += [
-            ("mass [kg]", _plain(result.mass), _between(result.mass - reach, result.mass + reach),
+            ("mass [kg]", _plain(result.mass), _between(*result.mass_interval()),
              _plain(result.vehicle.tare) if result.vehicle.tare else ""),
             ("front axle load [kg]", _plain(front), "", ""),
             ("rear axle load [kg]", _plain(rear), "", ""),
