@@ -9,7 +9,7 @@ import numpy as np
 
 from weighbridge.balance.force_balance import force_balance
 from weighbridge.navigation.motion import Motion
-from weighbridge.signals import Drive, Floats
+from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.model import Vehicle
 
 EARLIEST: Final = -0.4
@@ -45,7 +45,7 @@ def best_delay(
             return float("nan")
         centre = vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
         step = 0.02
-        grid = centre + step * np.arange(-2, 3)
+        grid = centre + step * np.arange(-5, 6)
     return centre
 
 
@@ -83,10 +83,16 @@ def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> flo
     DriveError
         The drive lacks what the torque source needs.
     """
+    # Rows that come and go with the delay would make its misfit rough.
+    common: Bools | None = None
+    for delay in np.arange(EARLIEST, 0.41, 0.1):
+        view = force_balance(drive, vehicle, motion, delay=float(delay)).merged
+        rows = view.usable & np.isfinite(view.traction_force)
+        common = rows if common is None else common & rows
 
     def misfit(delay: float) -> float:
         view = force_balance(drive, vehicle, motion, delay=delay).merged
-        rows = view.usable & np.isfinite(view.traction_force)
+        rows = common & np.isfinite(view.traction_force) & np.isfinite(view.specific_force)
         if np.count_nonzero(rows) < 100:
             return float("nan")
         force = view.traction_force - view.drag_force - view.rotating_mass * view.accel

@@ -84,6 +84,21 @@ TYPICAL_MASS: Final[dict[VehicleClass, float]] = {
 BRAKING_FORCE: Final = 0.06
 """Braking force over weight that marks unseen braking [-]."""
 
+PRESSED: Final = 0.01
+"""Position of the accelerator from which a foot is on it [-]."""
+
+PEDAL_MARGIN: Final = 0.3
+"""Samples nearer than this to the foot leaving the pedal may see the brake [s]."""
+
+FILLED_TIME: Final = 10.0
+"""A fast reading that runs straight for so long was filled in, not measured [s]."""
+
+FINE: Final = 1e-3
+"""Steps of a reading over its range, above which it may well stay on one step for long [-]."""
+
+FILLED_RATE: Final = 5.0
+"""Slower readings may well be constant for long [Hz]."""
+
 RETARDING: Final = -0.005
 """Retarder torque over its reference below which it brakes [-]; SPN 520 has steps of 1 %."""
 
@@ -219,7 +234,8 @@ def force_balance(
 
     switch = drive.get("brake_switch")
     # Where no switch tells, a driver who is off the pedal may brake a little as well.
-    brakes_unknown = switch is None or not len(switch)
+    unknown = switch is None or not len(switch)
+    brakes_unknown = unknown & ~_foot_on_pedal(drive, vehicle, recorded)
 
     # The first reason that applies is the one told, so the order matters.
     reason = np.zeros(time.size, dtype=np.uint8)
@@ -234,8 +250,8 @@ def force_balance(
         (braking, Reason.BRAKING),
         (changing, Reason.SHIFTING),
         (slipping, Reason.CLUTCH_SLIPPING),
-        (~np.isfinite(traction) | ~near, Reason.NO_TORQUE),
-        (torque.overrun | (brakes_unknown & (torque.torque <= 0.0)), Reason.OVERRUN),
+        (~np.isfinite(traction) | ~near | filled(source, recorded), Reason.NO_TORQUE),
+        (torque.overrun | (brakes_unknown & (torque.level <= 0.0)), Reason.OVERRUN),
         (torque.extrapolated, Reason.EXTRAPOLATED),
     ):
         reason[(reason == 0) & flag] = why
@@ -273,6 +289,57 @@ def force_balance(
             reason=reason,
         ),
     )
+
+
+def _foot_on_pedal(drive: Drive, vehicle: Vehicle, recorded: Floats) -> Bools:
+    """Where the accelerator is pressed, so that the brake is not (n,).
+
+    With one pedal an electric car drives and recuperates; with an engine the throttle
+    may be the valve of the intake, which is never quite shut, and tells nothing.
+    """
+    pedal = drive.get("throttle")
+    if pedal is None or not len(pedal) or not vehicle.driveline.single_speed:
+        return np.zeros(recorded.size, dtype=bool)
+    pressed = np.ones(recorded.size, dtype=bool)
+    for side in (-PEDAL_MARGIN, 0.0, PEDAL_MARGIN):
+        near = pedal.age(recorded + side) <= 3.0 * pedal.period
+        pressed &= near & (np.nan_to_num(pedal.at(recorded + side)) > PRESSED)
+    return pressed
+
+
+def filled(signal: Signal, time: Floats) -> Bools:
+    """Where a signal holds one value or runs straight for longer than a real one does.
+
+    Loggers and makers of data sets fill gaps so, and the fill looks like data.
+
+    Parameters
+    ----------
+    signal : sampled faster than `FILLED_RATE` and in steps below `FINE`, else nothing is said
+    time : (n,) instants asked about [s]
+
+    Returns
+    -------
+    (n,)
+    """
+    values = signal.values
+    least = int(FILLED_TIME / signal.period) if len(signal) > 2 else 0
+    if len(signal) < 3 or signal.period > 1.0 / FILLED_RATE or values.size <= least:
+        return np.zeros(time.size, dtype=bool)
+    steps = np.abs(np.diff(values))
+    step = float(steps[steps > 0.0].min(initial=np.inf))
+    if not step < FINE * float(np.ptp(values)):
+        return np.zeros(time.size, dtype=bool)
+    # Rounding lets a straight line bend by one step of the reading.
+    tolerance = 1.01 * step
+    straight = np.concatenate(([False], np.abs(np.diff(values, 2)) <= tolerance, [False]))
+    # Idling and coasting read a constant zero for long, recuperation its limit.
+    straight &= ~np.isin(values, (0.0, np.nanmin(values)))
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], straight.astype(np.int8), [0]))))
+    runs = np.zeros(values.size, dtype=bool)
+    for begin, end in edges.reshape(-1, 2)[np.diff(edges)[::2] >= least]:
+        runs[begin:end] = True
+    index = np.clip(np.searchsorted(signal.time, time), 0, values.size - 1)
+    return np.asarray(runs[index])
 
 
 def headwind(drive: Drive, heading: Floats) -> Floats:

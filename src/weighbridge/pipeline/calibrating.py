@@ -46,7 +46,7 @@ from weighbridge.vehicle.model import (
     Vehicle,
     VehicleClass,
 )
-from weighbridge.vehicle.torque import SIGNALS, lowest_load, regressor
+from weighbridge.vehicle.torque import DRAGGED_TIME, SIGNALS, averaged, lowest_load, regressor
 
 FEW_SAMPLES: Final = 2000
 """Fewer usable samples, some twenty minutes of driving, make a poor calibration."""
@@ -442,6 +442,10 @@ def _masses(
     return [float(kg) for kg in known if kg is not None]
 
 
+def _level(balance: ForceBalance, x: Floats) -> Floats:
+    return averaged(x, float(np.median(np.diff(balance.force.time))), DRAGGED_TIME)
+
+
 def _load_floor(drive: Drive, source: TorqueSource) -> float:
     if source not in ("load", "air_flow"):
         return -np.inf
@@ -452,7 +456,7 @@ def _finite(balance: ForceBalance, x: Floats, floor: float) -> Bools:
     view = balance.merged
     return np.asarray(
         view.usable
-        & (x >= floor)
+        & (_level(balance, x) >= floor)
         & np.isfinite(view.specific_force)
         & np.isfinite(view.gearing)
         & np.isfinite(x)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import PETROL_HEATING_VALUE, PETROL_STOICHIOMETRIC_RATIO
 from weighbridge.errors import DriveError
@@ -20,6 +22,12 @@ SIGNALS: dict[TorqueSource, tuple[str, ...]] = {
 }
 """What each torque source needs of a drive."""
 
+DRAGGED_TIME: Final = 0.5
+"""Time over which a load tells whether the engine is dragged [s]."""
+
+BRAKED_TIME: Final = 2.0
+"""Time over which a torque at or below zero tells that a foot may be on the brake [s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Torque:
@@ -31,12 +39,14 @@ class Torque:
     torque : (n,) [N m]
     extrapolated : (n,) outside what the torque model has seen
     overrun : (n,) the source says nothing: load at its lowest, engine dragged
+    level : (n,) torque `averaged` over `BRAKED_TIME` [N m]
     """
 
     time: Floats
     torque: Floats
     extrapolated: Bools
     overrun: Bools
+    level: Floats
 
 
 def air_flow_torque(
@@ -169,6 +179,27 @@ def torque_rows(
     return np.column_stack(columns)
 
 
+def averaged(values: Floats, period: float, span: float) -> Floats:
+    """Mean over ``span`` around each sample.
+
+    Rows chosen by a noisy reading itself are chosen by its noise: of those near
+    the limit the high readings stay, and the mass comes out low.
+
+    Parameters
+    ----------
+    values : (n,) NaN where nothing is known
+    period : between samples [s]
+    span : [s]
+    """
+    if not period > 0.0:
+        return values
+    size = 2 * round(0.5 * span / period) + 1
+    known = np.isfinite(values)
+    share = uniform_filter1d(known.astype(np.float64), size)
+    mean = uniform_filter1d(np.where(known, values, 0.0), size)
+    return np.where(share > 0.5 / size, mean / np.maximum(share, 0.5 / size), np.nan)
+
+
 def lowest_load(load: Floats) -> float:
     """Load below which the engine may be dragged and the load says nothing [-]."""
     finite = load[np.isfinite(load)]
@@ -191,17 +222,19 @@ def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Fl
         The drive lacks what the torque source needs.
     """
     model = vehicle.torque
-    source_signal(drive, vehicle)
+    period = source_signal(drive, vehicle).period
     x = regressor(drive, model.source, time, model)
     nowhere = np.zeros(time.size, dtype=bool)
     if model.source in ("measured", "percent"):
         offset, scale = model.coefficients or (0.0, 1.0)
-        return Torque(time, offset + scale * x, nowhere, nowhere)
+        torque = offset + scale * x
+        return Torque(time, torque, nowhere, nowhere, averaged(torque, period, BRAKED_TIME))
+    dragged = averaged(x, period, DRAGGED_TIME)
     if not model.coefficients:
-        return Torque(time, x, nowhere, x <= 0.0)
+        return Torque(time, x, nowhere, dragged <= 0.0, averaged(x, period, BRAKED_TIME))
     rows = torque_rows(x, engine_speed, len(model.coefficients) - 2, curved=bool(model.curvature))
     torque = rows @ np.array([*model.coefficients, *model.curvature])
     low, high = model.load_range or (-math.inf, math.inf)
     slow, fast = model.speed_range or (-math.inf, math.inf)
     extrapolated = (x > high) | (engine_speed < slow) | (engine_speed > fast)
-    return Torque(time, torque, extrapolated, x < low)
+    return Torque(time, torque, extrapolated, dragged < low, averaged(torque, period, BRAKED_TIME))
