@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from weighbridge.errors import DriveError
 from weighbridge.estimators import Status, joint
 from weighbridge.simulation import MIDSIZE, Scenario, flat_route, mixed_route, simulate_car
 
@@ -75,12 +74,7 @@ def usual(car):
         {"rate": 10.0},
         {"rate": 2.0},
         {"roughness": 2.0},
-        pytest.param(
-            {"noise": 0.04},
-            marks=pytest.mark.xfail(
-                strict=True, reason="which rows are overrun is told by the noisy reading itself"
-            ),
-        ),
+        {"noise": 0.04},
     ],
     ids=lambda logger: "{}={}".format(*next(iter(logger.items()))),
 )
@@ -119,25 +113,7 @@ def cruise(seed, speed_step):
 
 
 @pytest.mark.parametrize("begin", [0.0, 150.0], ids=["launched", "cruising"])
-@pytest.mark.parametrize(
-    "speed_step",
-    [
-        pytest.param(
-            1.0 / 256.0,
-            marks=pytest.mark.xfail(
-                strict=True, reason="the interval is that of noise alone; the mass is 15 % heavy"
-            ),
-        ),
-        pytest.param(
-            1.0,
-            marks=pytest.mark.xfail(
-                strict=True,
-                raises=DriveError,
-                reason="where speed hardly changes, its steps are taken for a wrong unit",
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("speed_step", [1.0 / 256.0, 1.0])
 def test_a_cruise_is_never_a_confident_wrong_mass(car, speed_step, begin):
     made = cruise(3301, speed_step)
     weighing = wb.weigh(made.drive.between(begin, 1350.0), car)

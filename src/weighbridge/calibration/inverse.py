@@ -19,6 +19,7 @@ from weighbridge.estimators.joint import GATE
 from weighbridge.estimators.slow_errors import (
     COLD_TORQUE_STD,
     DISTURBANCE_STD,
+    GRADE_STD,
     RESISTANCE_STD,
     TIME_CONSTANTS,
     WIND_STD,
@@ -46,6 +47,7 @@ class DriveRows:
     engine_speed : [rad/s]
     usable : rows to take
     mass : known [kg]
+    by_speed : the motion has no accelerometer, so that the grade is a disturbance
     """
 
     view: MergedView
@@ -53,6 +55,7 @@ class DriveRows:
     engine_speed: Floats
     usable: Bools
     mass: float
+    by_speed: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +162,7 @@ def _columns(
     offset, _, *terms = torque_rows(reading, d.engine_speed, order, curved=curved).T
     one = np.ones_like(gearing)
     columns = [
-        d.mass * view.specific_force,
+        d.mass * (view.accel if d.by_speed else view.specific_force),
         0.5 * view.air_density * view.air_speed * np.abs(view.air_speed),
         d.mass * GRAVITY * np.cos(view.grade),
         gearing**2 * view.accel,
@@ -208,9 +211,10 @@ def _solve(
     )
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
     loose = 3.0 * force / np.maximum(typical, 1e-12)
+    grade = GRAVITY * GRADE_STD if any(d.by_speed for d in drives) else 0.0
     fading = np.array(
         [
-            mass * DISTURBANCE_STD,
+            mass * float(np.hypot(DISTURBANCE_STD, grade)),
             mass * RESISTANCE_STD,
             WIND_STD * 2 * mean[0],
             WIND_STD * 2 * mean[0],

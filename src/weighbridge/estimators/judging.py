@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 import numpy as np
@@ -74,12 +74,16 @@ def consider_std(balance: ForceBalance, phi: Floats, used: Bools, vehicle: Vehic
     return float(np.hypot(calibration_std(balance, vehicle), cold))
 
 
-def calibration_std(balance: ForceBalance, vehicle: Vehicle) -> float:
+def calibration_std(
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    motion_std: Mapping[MotionSource, float] = MOTION_STD,
+) -> float:
     """Relative standard deviation by what the calibration left open and by the motion [-]."""
     scale = vehicle.provenance.mass_scale_std
     if scale is None:
         scale = UNCALIBRATED_STD
-    return float(np.hypot(scale, MOTION_STD[balance.motion.source]))
+    return float(np.hypot(scale, motion_std[balance.motion.source]))
 
 
 def cold_share(time: Floats, phi: Floats, used: Bools, start: float | None = None) -> float:

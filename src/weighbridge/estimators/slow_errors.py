@@ -24,6 +24,9 @@ hour, mean wind ten minutes; how cold a drive began stays the same all along."""
 DISTURBANCE_STD: Final = 0.04
 """Standard deviation of the disturbance before the drive has told, over mass [m/s^2]."""
 
+GRADE_STD: Final = 0.02
+"""Standard deviation of the grade of roads, where nothing measures it [-]."""
+
 RESISTANCE_STD: Final = 0.017
 """Of the slow resistance, over mass [m/s^2]: a fifth of the rolling resistance of a car."""
 
@@ -90,11 +93,17 @@ def coldness(view: MergedView) -> Floats:
     return np.asarray(np.exp(-np.maximum(view.time - start, 0.0) / WARM_UP))
 
 
-def design(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
+def design(view: MergedView, vehicle: Vehicle, *, by_speed: bool = False) -> tuple[Floats, Floats]:
     """Rows of the model ``y = phi m + d + c + wind + cold torque + drag``.
 
     The drag of a wind small against the speed is linear in it:
     ``rho C_d A v`` times its component along the road.
+
+    Parameters
+    ----------
+    view, vehicle
+    by_speed : no accelerometer saw the grade, so that it is a disturbance: heights are too
+        rough to multiply the mass
 
     Returns
     -------
@@ -102,6 +111,8 @@ def design(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
     y : (n,) traction less drag and rotating inertia [N]
     """
     phi, y = regression(view, vehicle)
+    if by_speed:
+        phi = phi - view.specific_force + view.accel
     slope = view.air_density * vehicle.road_load.drag_area * view.speed
     north, east = view.direction
     one = np.ones_like(phi)
@@ -121,32 +132,34 @@ def noise_variance(view: MergedView, cut: Windows, torque_noise: float, mass: fl
     return np.asarray((torque + (mass * MOTION_STD) ** 2) / cut.count + (mass * 0.008) ** 2)
 
 
-def prior_std(vehicle: Vehicle, mass: float, torque: float) -> Floats:
+def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = False) -> Floats:
     """Standard deviations (7,) of the states before the drive has told.
 
     Parameters
     ----------
-    vehicle : where it was not calibrated, its drag area and rolling resistance are as
-        uncertain as their standard deviations say, or as those of its class
+    vehicle : its drag area and rolling resistance are as uncertain as their standard
+        deviations say; where there are none and it was not calibrated, as those of its class
     mass : rough [kg]; its own standard deviation is as large
     torque : highest of the drive [N m]
+    by_speed : the disturbance has to take the grade as well
     """
-    drag, rolling = 0.0, 0.0
+    load = vehicle.road_load
+    drag, rolling = load.drag_area_std, load.rolling_coefficient_std
     if vehicle.provenance.mass_scale_std is None:
         _, std = road_prior(vehicle.kind, single_speed=vehicle.driveline.single_speed)
-        load = vehicle.road_load
-        drag = load.drag_area_std if load.drag_area_std is not None else float(std[0])
-        known = load.rolling_coefficient_std
-        rolling = GRAVITY * (known if known is not None else float(std[1]))
+        drag = float(std[0]) if drag is None else drag
+        rolling = float(std[1]) if rolling is None else rolling
+    grade = GRAVITY * GRADE_STD if by_speed else 0.0
+    resistance = float(np.hypot(RESISTANCE_STD, GRAVITY * (rolling or 0.0)))
     return np.array(
         [
             mass,
-            mass * DISTURBANCE_STD,
-            mass * float(np.hypot(RESISTANCE_STD, rolling)),
+            mass * float(np.hypot(DISTURBANCE_STD, grade)),
+            mass * resistance,
             WIND_STD,
             WIND_STD,
             COLD_TORQUE_STD[vehicle.torque.source] * torque,
-            drag,
+            drag or 0.0,
         ]
     )
 

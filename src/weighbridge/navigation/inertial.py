@@ -280,7 +280,8 @@ def _align(
             delay = 0.0
     if coarse is not None and reference.name == "vehicle_speed":
         margin = 4.0 * coarse.forward_gain_std
-        if coarse.forward_gain - margin > 1.3 or coarse.forward_gain + margin < 0.75:
+        low = max(coarse.forward_gain + margin, coarse.forward_gain_most) < 0.75
+        if coarse.forward_gain - margin > 1.3 or low:
             raise DriveError(
                 f"{reference.name} changes by {1.0 / coarse.forward_gain:.2f} of what the "
                 "accelerometer shows: set its unit (kmh, mph or mps) in the mapping"

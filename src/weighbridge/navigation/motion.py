@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from weighbridge.signals import Bools, Floats
 
 MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
+
+BY_SPEED: Final = frozenset({"speed_grade", "speed"})
+"""Motion without an accelerometer: its acceleration is the slope of speed, its grade that of
+heights, or none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

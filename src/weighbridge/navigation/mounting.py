@@ -33,7 +33,10 @@ class CoarseMounting:
     yaw_std : standard deviation of the forward direction [rad]
     tilt_std : of the level [rad]
     forward_gain, forward_gain_std : specific force per rate of change of the
-        speed [-]; 1 plus a little squat where units fit
+        speed [-]; 1 plus a little squat where units fit, less where the steps of a
+        coarse speed are as large as its changes
+    forward_gain_most : the same by regression of the rate on the force, which the
+        noise of the force draws up instead [-]
     yaw_rate_bias : gyro bias about the body's z axis that lateral force shows
         [rad/s]; NaN where it does not
     """
@@ -43,6 +46,7 @@ class CoarseMounting:
     tilt_std: float
     forward_gain: float
     forward_gain_std: float
+    forward_gain_most: float
     yaw_rate_bias: float
 
 
@@ -149,8 +153,17 @@ def coarse_mounting(
         tilt_std=float(std[0]) / GRAVITY + 0.01,
         forward_gain=float(np.linalg.norm(forward)),
         forward_gain_std=float(std[1]),
+        forward_gain_most=_most_gain(f @ axis, a, weight),
         yaw_rate_bias=yaw_bias,
     )
+
+
+def _most_gain(force: Floats, rate: Floats, weight: Floats) -> float:
+    """Force per rate where all the noise is in the force; infinite where they do not fit."""
+    force = force - np.average(force, weights=weight)
+    rate = rate - np.average(rate, weights=weight)
+    common = float(np.average(force * rate, weights=weight))
+    return float(np.average(force**2, weights=weight)) / common if common > 0.0 else math.inf
 
 
 def _check_gravity(size: float) -> None:

@@ -7,8 +7,6 @@ from typing import Final
 from weighbridge.errors import WeighbridgeError
 from weighbridge.estimators import SPEED_ALONE
 from weighbridge.pipeline.weighing import (
-    BY_SPEED,
-    NO_JOINT,
     Weighing,
     fitted_for_another,
     weigh_balance,
@@ -44,16 +42,8 @@ def _by(weighing: Weighing, method: str) -> Weighing:
     drive, vehicle, done = weighing.drive, weighing.vehicle, weighing.result
     try:
         if done is None or {method, weighing.method} & SPEED_ALONE:
-            other = weigh_checked(drive, vehicle, method)
-            # Where joint cannot weigh, rls does in its place, and has a row of its own.
-            return other if other.method == method else _refused(weighing, method)
-        if method == "joint" and done.balance.motion.source in BY_SPEED:
-            return _refused(weighing, method)
+            return weigh_checked(drive, vehicle, method)
         warnings = fitted_for_another(vehicle, method)
         return weigh_balance(drive, vehicle, method, done.balance, warnings)
     except WeighbridgeError as error:
         return without_mass(drive, vehicle, method, str(error))
-
-
-def _refused(weighing: Weighing, method: str) -> Weighing:
-    return without_mass(weighing.drive, weighing.vehicle, method, NO_JOINT)

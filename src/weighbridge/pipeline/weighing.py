@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import t as student
@@ -29,14 +29,6 @@ if TYPE_CHECKING:
 
 DEFAULT_METHOD = "joint"
 """Estimator used unless one is named."""
-
-
-BY_SPEED: Final = frozenset({"speed_grade", "speed"})
-"""Motion whose acceleration is that of a polled speed: its noise draws the joint estimator,
-which takes the noise of the force for the larger one; simulated drives without an inertial
-sensor came out 16 to 20 % light, by rls 3 % light to 9 % heavy."""
-
-NO_JOINT: Final = "without an accelerometer the joint estimator comes out 16 to 20 % light"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -270,9 +262,6 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str) -> Weighing:
     else:
         balance, notes = torque_balance(drive, vehicle)
         warnings += notes
-        if method == "joint" and balance.motion.source in BY_SPEED:
-            method = "rls"
-            warnings += (f"{NO_JOINT}; weighed by rls",)
         warnings += fitted_for_another(vehicle, method)
     return weigh_balance(drive, vehicle, method, balance, warnings)
 
