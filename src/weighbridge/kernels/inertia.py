@@ -485,9 +485,10 @@ def step(state, time, travel, rate, velocity, params):
             apart = max(params.spawn, length) if known else params.spawn
             change = params.jump_std * mean[j, likeliest(weight[j], n), 1] * phi[0, j]
             slip = change * apart / np.sqrt(12.0)
+            # A literal would be compiled on its own.
             count[j] = suppose(
-                j, LOAD, log_rate, slip, time, count[j], cause, born, loaded, weight, mean,
-                cov, params,
+                j, np.int64(LOAD), log_rate, slip, time, count[j], cause, born, loaded, weight,
+                mean, cov, params,
             )  # fmt: skip
             next_spawn[j] = time + params.spawn
         if params.spawn < np.inf and params.push_drift[j] > 0.0 and time >= next_turn[j]:
