@@ -115,3 +115,19 @@ def test_inspect_expects_no_mass_of_speed_alone(weighbridge, alone):
     way = next(line for line in done.out.splitlines() if "speed-ekf" in line)
     assert "none" in way
     assert "±" not in way
+
+
+def test_a_poor_fit_is_told(weighbridge, known, tmp_path):
+    drive = tmp_path / "other"
+    drive.mkdir()
+    time, speed = speeds(1)
+    pl.DataFrame({"time_s": time, "vehicle_speed_kmh": speed}).write_csv(drive / "obd.csv")
+    # A grade that the speed answers: uphill it falls. The other has nothing to do with it.
+    kmh = 65.0 + np.convolve(speed - 65.0, np.ones(20) / 20.0, "same")
+    grade = -np.gradient(kmh / 3.6, time) / 9.81
+    pl.DataFrame({"time_s": time, "grade_rad": grade}).write_csv(drive / "gnss.csv")
+    for folder, told in ((known, True), (drive, False)):
+        path = tmp_path / f"{folder.name}.toml"
+        done = weighbridge("calibrate", folder, "--mass", 1092, "--method", "speed-ekf", "-o", path)
+        assert done.code == 0
+        assert ("note: " in done.out and "% of the changes of speed" in done.out) is told

@@ -101,10 +101,11 @@ def calibrate(
         _refuse_torque_options(torque, order, grid, straight)
         by_speed = run_speed_calibration(recorded, masses, vehicle=base)
         car, shown = by_speed.vehicle, speed_table(by_speed)
+        doubts = by_speed.warnings
         lightest = min(rows.mass for rows in by_speed.rows)
     else:
         done = run_calibration(recorded, masses, vehicle=base, settings=settings)
-        car, shown = done.vehicle, table(done)
+        car, shown, doubts = done.vehicle, table(done), ()
         lightest = min(car.provenance.masses)
     if tare is not None and not 0.3 * lightest <= tare <= 1.02 * lightest:
         raise ConfigError(
@@ -115,6 +116,8 @@ def calibrate(
         car = replace(car, tare=tare)
     car.save(output)
     Console().print(shown)
+    for doubt in doubts:
+        typer.echo(f"  note: {doubt}")
     typer.echo(f"written: {output}")
 
 

@@ -36,6 +36,11 @@ each calibrated empty and weighed on eight other drives with loads to 35 % of th
 answer was the empty car's mass, RMS error 18 % (studies/galvao.py, seeds from 5000)."""
 
 
+POOR: Final = 0.3
+"""Part of the speed's changes below which a fit is doubted [-]: chosen below the 0.46 to 0.71
+that simulated country roads reach (studies/galvao.md)."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedCalibration:
     """A vehicle with a speed model and what it was made from.
@@ -50,6 +55,18 @@ class SpeedCalibration:
     vehicle: Vehicle
     fit: SpeedFit
     rows: tuple[SpeedRows, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful in the fit, one sentence each."""
+        if self.fit.r_squared >= POOR:
+            return ()
+        names = ", ".join(rows.name for rows in self.rows)
+        return (
+            f"{names}: the speed model explains {100.0 * self.fit.r_squared:.0f} % of the changes "
+            f"of speed, where a road without traffic gives more than {100.0 * POOR:.0f} %: the "
+            "grade is wrong or comes late, or traffic made the speed; calibrate on another drive",
+        )
 
 
 def nominal_of(vehicle: Vehicle) -> Nominal:
