@@ -12,14 +12,18 @@ from weighbridge.io import read_drive
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 LOGS = {s: (GOLDEN / f"can.{s}").read_bytes() for s in ("blf", "asc", "trc", "log", "csv", "mf4")}
+TABLES = {
+    name.rpartition("/")[2]: (GOLDEN / name).read_bytes()
+    for name in ("csv/obd.csv", "parquet/obd.parquet", "log.mf4")
+}
 MAPPING = {"signals": {"altitude": {"column": "Height"}}}
 
 
-def read(path):
+def read(path, *naming):
     began = time.process_time()
     told, drive = "", None
     try:
-        drive = read_drive(path, MAPPING, GOLDEN / "golden.dbc")
+        drive = read_drive(path, *naming)
     except WeighbridgeError as error:
         told = str(error)
     assert drive.signals if drive else 10 < len(told) < 1000
@@ -68,6 +72,20 @@ def damaged(raw, damage):
 def test_damaged_files(suffix, tmp_path, damage):
     path = tmp_path / f"log.{suffix}"
     path.write_bytes(damaged(LOGS[suffix], damage))
+    read(path, MAPPING, GOLDEN / "golden.dbc")
+
+
+@pytest.mark.parametrize("name", TABLES)
+@settings(
+    max_examples=25,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+@given(damage=damages())
+def test_damaged_tables(name, tmp_path, damage):
+    path = tmp_path / name
+    path.write_bytes(damaged(TABLES[name], damage))
     read(path)
 
 
@@ -82,7 +100,7 @@ def test_damaged_files(suffix, tmp_path, damage):
 def test_files_of_anything(suffix, tmp_path, content):
     path = tmp_path / f"log.{suffix}"
     path.write_bytes(content)
-    read(path)
+    read(path, MAPPING, GOLDEN / "golden.dbc")
 
 
 def test_object_of_no_size_does_not_hang(tmp_path):
@@ -90,7 +108,7 @@ def test_object_of_no_size_does_not_hang(tmp_path):
     raw[144 + 8 : 144 + 12] = bytes(4)
     path = tmp_path / "log.blf"
     path.write_bytes(raw)
-    read(path)
+    read(path, MAPPING, GOLDEN / "golden.dbc")
 
 
 def test_container_that_claims_much_takes_no_memory(tmp_path):
@@ -99,7 +117,7 @@ def test_container_that_claims_much_takes_no_memory(tmp_path):
     raw[at + 24 : at + 28] = b"\xff" * 4
     path = tmp_path / "log.blf"
     path.write_bytes(raw)
-    read(path)
+    read(path, MAPPING, GOLDEN / "golden.dbc")
 
 
 def test_channels_outside_their_records_do_not_end_the_process(tmp_path):
