@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators.inertia import jumps
+from weighbridge.estimators.inertia import integration_std, jumps
 from weighbridge.estimators.suspension import check_suspension
 from weighbridge.io import read_drive
 from weighbridge.papers.nguyen2024 import suspension_of
@@ -372,6 +372,18 @@ def test_what_is_refused_has_no_interval_to_widen():
     told = estimate_inertia(locked(20.0).drive, CAR)
     assert told.status == "inconsistent"
     assert not any("interval" in text for text in (told.reason, *told.warnings))
+
+
+def test_slow_sampling_integrates_a_hop_to_less_and_the_interval_knows_it(found):
+    for hz in (100.0, 200.0):
+        time = np.arange(0.0, 2.0, 1.0 / hz)
+        force = np.exp(2j * np.pi * 12.0 * time)
+        steps = (5.0 * force[2:] + 8.0 * force[1:-1] - force[:-2]) / (12.0 * hz)
+        exact = np.diff(force[1:]) / (2j * np.pi * 12.0)
+        lost = 1.0 - np.abs(steps).mean() / np.abs(exact).mean()
+        assert integration_std(1.0 / hz) == pytest.approx(lost, rel=1e-6)
+        assert lost > 0.0
+    assert np.all(found.model_std >= integration_std(1.0 / SENSORS.rate))
 
 
 def test_report_opens_offline(found, tmp_path):

@@ -34,6 +34,9 @@ _LONGEST: Final = 0.012
 """Longest step over which the suspension force is integrated [s]: an axle hops at some 12 Hz,
 and a seventh of its period is still a smooth piece."""
 
+_HOP: Final = 12.0
+"""Frequency at which an axle hops [Hz], as above."""
+
 _FORMS: Final = {
     "printed": kalman_bucy.PRINTED,
     "extended": kalman_bucy.EXTENDED,
@@ -241,6 +244,19 @@ def _accelerations(ride: Ride) -> tuple[Floats, Floats]:
 def longest_step(period: float) -> float:
     """Step above which velocities count as unknown [s]."""
     return max(_LONGEST, 1.5 * period)
+
+
+def integration_std(period: float) -> float:
+    """Part by which a ride of that period may draw the inverse parameters [-].
+
+    The parabola through three samples (weights 5, 8, -1 of 12) integrates a sine of the axles'
+    hop to less than its amplitude; on a rough road most of what is known comes from there. It
+    is 0.5 % at 100 Hz and 0.03 % at 200 Hz, the same at all times, so no noise of the filter.
+    """
+    turn = np.exp(-2j * math.pi * _HOP * period)
+    parabola = (5.0 + 8.0 * turn - turn**2) / 12.0
+    exact = (1.0 - turn) / (2j * math.pi * _HOP * period)
+    return abs(1.0 - float(abs(parabola / exact)))
 
 
 def jump_params(
