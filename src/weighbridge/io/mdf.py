@@ -25,6 +25,7 @@ from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.mdf_bus import bus_frames, check_places
+from weighbridge.io.mdf_check import check_links, guard, settle
 from weighbridge.io.mdf_salvage import Salvaged, salvage
 from weighbridge.io.table import column_list
 from weighbridge.signals import DriveInfo, Floats, Problem
@@ -33,6 +34,9 @@ from weighbridge.signals.units import to_si
 
 # Channel groups of bus logging (ASAM MDF 4, bus logging), not of measurements.
 _BUS_PREFIXES: Final = ("CAN_", "LIN_", "FLX_", "ETH_", "MOST_")
+
+# Calendars of Python end with the year 9999 [s since 1970].
+_LAST_START: Final = 253_402_214_400.0
 
 _Place = tuple[int, int]
 
@@ -91,9 +95,15 @@ def _open(opener: Any, path: Path, saved: Salvaged | None, folder: str) -> Any:
     sys.unraisablehook = lambda _: None
     reason = ""
     try:
+        exact = check_links(path if saved is None else saved.raw)
+        guard()
+        if saved is not None:
+            source: Path | io.BytesIO = io.BytesIO(saved.raw)
+        else:
+            source = path if exact else io.BytesIO(path.read_bytes())
         with redirect_stdout(io.StringIO()):
             return opener(
-                path if saved is None else io.BytesIO(saved.raw),
+                source,
                 temporary_folder=folder,
                 # Frames are sorted by identifier there, which takes long and is not used here.
                 process_bus_logging=False,
@@ -160,12 +170,12 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
 
 
 def _start(file: Any) -> float | None:
-    """When the file's clock began [s since 1970]; None where it was not set."""
+    """When the file's clock began [s since 1970]; None where it was not set, or to no date."""
     try:
         start = float(file.header.start_time.timestamp())
     except (AttributeError, OverflowError, OSError, ValueError):
         return None
-    return start if start > 0.0 else None
+    return start if 0.0 < start < _LAST_START else None
 
 
 def _info(file: Any, path: Path) -> DriveInfo | None:
@@ -268,8 +278,12 @@ def _unit_text(file: Any, place: _Place) -> str:
 
 def _samples(file: Any, path: Path, place: _Place) -> tuple[Floats, Floats | None]:
     """Time and physical values of one channel, samples marked invalid left out as NaN."""
+    group = file.groups[place[0]]
     try:
-        check_places(file.groups[place[0]])
+        # asammdf does not come back from packed data of which no record is to be read.
+        if not settle(group):
+            return np.empty(0), np.empty(0)
+        check_places(group)
         found = file.get(group=place[0], index=place[1], ignore_invalidation_bits=True)
     except Exception as e:
         raise DriveError(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
+from weighbridge.io.mdf_check import settle
 
 _DATA_FRAME: Final = "CAN_DataFrame"
 # Bytes that a data length code stands for (ISO 11898-1).
@@ -21,8 +22,8 @@ _VIRTUAL: Final = (3, 6)
 def check_places(group: Any) -> None:
     """Refuse a group whose channels stand outside its records.
 
-    asammdf takes bytes from where a damaged description says, beyond the end of the data, and the
-    process would end there.
+    asammdf takes other bytes for such a channel. Of MDF 3, the check of the bytes asked for in
+    `weighbridge.io.mdf_check.guard` is the only one.
 
     Raises
     ------
@@ -31,6 +32,8 @@ def check_places(group: Any) -> None:
     """
     size = int(group.channel_group.samples_byte_nr)
     for channel in group.channels:
+        if not hasattr(channel, "bit_offset"):
+            return
         if channel.channel_type not in _VIRTUAL:
             bits = int(channel.bit_offset) + int(channel.bit_count)
             if int(channel.byte_offset) + (bits + 7) // 8 > size:
@@ -51,7 +54,7 @@ def bus_frames(file: Any) -> Frames:
     """
     parts = []
     for g, group in enumerate(file.groups):
-        if not group.channel_group.cycles_nr:
+        if not settle(group):
             continue
         for c, channel in enumerate(group.channels):
             # A frame is a structure of its fields; each of them is a channel, too.
