@@ -141,6 +141,16 @@ def test_records_beyond_the_data_take_no_memory(tmp_path):
     assert peak < 1 << 25
 
 
+def test_identifier_that_is_no_number(tmp_path):
+    raw = bytearray(log("sorted"))
+    # The third channel; its data type becomes bytes.
+    raw[body(raw, b"##CN", 2) + 2] = 10
+    path = tmp_path / "log.mf4"
+    path.write_bytes(raw)
+    with pytest.raises(DriveError, match="field ID of the frames is no number"):
+        read_drive(path)
+
+
 @pytest.mark.parametrize("cycles", [1, 1 << 20])
 def test_record_longer_than_the_data_takes_no_memory(tmp_path, cycles):
     path = written(tmp_path, compression=1)

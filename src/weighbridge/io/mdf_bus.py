@@ -11,6 +11,7 @@ from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.mdf_check import settle
 
 _DATA_FRAME: Final = "CAN_DataFrame"
+_NUMBERS: Final = frozenset({"ID", "IDE", "DataLength", "DLC", "BusChannel"})
 # Bytes that a data length code stands for (ISO 11898-1).
 _DLC: Final = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64], np.uint8)
 
@@ -72,6 +73,9 @@ def bus_frames(file: Any) -> Frames:
 def _frames(time: NDArray[np.float64], samples: Any) -> Frames:
     fields = {name.rpartition(".")[2]: samples[name] for name in samples.dtype.names}
     count = time.size
+    for name in _NUMBERS & fields.keys():
+        if fields[name].shape != (count,) or fields[name].dtype.kind not in "biuf":
+            raise ValueError(f"field {name} of the frames is no number")
     identifier = np.asarray(fields.get("ID", np.zeros(count)), np.uint32)
     extended = fields["IDE"] != 0 if "IDE" in fields else identifier > 0x7FF
     data = np.asarray(fields.get("DataBytes", np.zeros((count, 8))), np.uint8)
