@@ -233,7 +233,7 @@ def j1939_truck() -> str:
     torque = signals["engine_torque_fraction"].values
     speed = 3.6 * signals["vehicle_speed"].values
     car = wb.Vehicle.load(HERE.parent / "examples" / "j1939-truck" / "vehicle.toml")
-    w = wb.weigh(wb.read_drive(path), car, method="rls")
+    w = wb.weigh(wb.read_drive(path), car)
     view = w.result.balance.merged
     rows = view.usable
     force = (view.traction_force - view.drag_force - view.rotating_mass * view.accel)[rows]

@@ -113,8 +113,9 @@ def judge(
         )
     if not np.isfinite(std) or std > 0.15 * abs(mass):
         return Status.NOT_EXCITED, (
-            f"the drive says {mass:.0f} kg give or take {std:.0f} kg, which is no weighing; "
-            "more starts and hills are needed"
+            f"the drive says {mass:.0f} kg, {max(mass - 1.96 * std, 0.0):.0f} to "
+            f"{mass + 1.96 * std:.0f} kg with 95 % probability, which is no weighing; more starts "
+            "and hills are needed"
         )
     low, high = MASS_RANGE[vehicle.kind]
     if not low < mass < high:
