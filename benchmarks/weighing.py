@@ -1,8 +1,8 @@
 """From Parquet to mass, calibration, grid and start-up: time and memory.
 
 Run with an installed package, whose compiled code is cached: ``pip install . && python
-benchmarks/weighing.py``. Peers in the same run: the grid of Jensen 2022 by one regression per
-point, as printed, and SciPy's general least squares for the bounded fit.
+benchmarks/weighing.py``. Peers in the same run: `rls` for `joint`, the grid of Jensen 2022 by one
+regression per point, as printed, and SciPy's general least squares for the bounded fit.
 """
 
 from __future__ import annotations
@@ -105,10 +105,31 @@ def calibration() -> None:
     print(f"{'  scipy.optimize.least_squares':<44}{peer:8.3f} s, {peer / ours:.1f} x")
 
 
+def methods() -> None:
+    """Compare the joint estimator with recursive least squares, from drive to mass."""
+    import weighbridge as wb
+    from weighbridge.simulation import make_scenario, simulate_car
+
+    made = simulate_car(make_scenario("car", seed=3))
+    car = wb.calibrate(made.drive, made.scenario.mass)
+    spent: dict[str, list[float]] = {"rls": [], "joint": []}
+    for round_ in range(5):
+        for method, times in spent.items():
+            begin = time.process_time()
+            wb.weigh(made.drive, car, method)
+            # The first round compiles.
+            if round_:
+                times.append(time.process_time() - begin)
+    ours, peer = min(spent["joint"]), min(spent["rls"])
+    print(f"{'weigh by joint':<44}{ours:8.2f} s")
+    print(f"{'  by rls':<44}{peer:8.2f} s, joint {100 * (ours / peer - 1):+.0f} %")
+
+
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         commands(Path(folder))
     calibration()
+    methods()
 
 
 if __name__ == "__main__":
