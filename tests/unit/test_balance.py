@@ -168,6 +168,34 @@ def test_noise_of_the_torque_does_not_choose_its_rows():
     assert abs(np.mean(noise[used])) < 3.0 * 10.0 / np.sqrt(np.count_nonzero(used))
 
 
+def test_a_foot_on_the_accelerator_is_not_on_the_brake():
+    electric = replace(CAR, driveline=Driveline(gearings=(10.0,)))
+    wave = 40.0 * np.sin(2.0 * np.pi * STAMPS / 60.0)
+    dragging = wave < -20.0
+    pedal = np.where(STAMPS < 200.0, 0.2, 0.0)
+    told = {"engine_torque": signal("engine_torque", wave), "throttle": signal("throttle", pedal)}
+    found = force_balance(Drive("d", told), electric, motion()).merged.reason
+    assert_array_equal(found[dragging & (STAMPS < 199.0)], Reason.USED)
+    assert_array_equal(found[dragging & (STAMPS > 201.0)], Reason.OVERRUN)
+    # With an engine the throttle may be the valve of the intake, open at idle.
+    geared = force_balance(drive(signal("throttle", pedal), torque=wave), CAR, motion()).merged
+    assert_array_equal(geared.reason[dragging], Reason.OVERRUN)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.05])
+def test_a_torque_that_runs_straight_for_long_was_filled_in(slope):
+    fast = np.arange(1.0, END - 2.0, 0.1)
+    torque = 50.0 + np.cumsum(np.random.default_rng(4).normal(0.0, 1.0, fast.size)) * 0.3
+    gap = (fast > 100.0) & (fast < 130.0)
+    torque[gap] = torque[gap][0] + slope * np.arange(np.count_nonzero(gap))
+    car = replace(CAR, driveline=Driveline(gearings=(10.0,)))
+    recorded = Drive("d", {"engine_torque": Signal("engine_torque", fast, torque)})
+    found = force_balance(recorded, car, motion()).merged.reason
+    inside = (fast > 101.0) & (fast < 129.0)
+    assert_array_equal(found[inside], Reason.NO_TORQUE)
+    assert not np.any(found[~gap] == Reason.NO_TORQUE)
+
+
 def test_driveline_loses_power_both_ways():
     pulling = force_balance(drive(torque=50.0), CAR, motion()).merged
     assert_allclose(pulling.traction_force, 0.9 * 50.0 * 10.0)
