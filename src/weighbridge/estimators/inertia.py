@@ -340,8 +340,8 @@ def estimate(
 ) -> InertiaTrack:
     """Estimate the parameters over a ride.
 
-    With ``kalman-bucy`` the noise of the suspension signals is raised as long as the
-    innovations become likelier: by powers of two, then by the root of two either way.
+    With ``kalman-bucy`` the noise of the suspension signals is raised, by powers of two,
+    as long as the innovations become likelier.
 
     Raises
     ------
@@ -359,13 +359,6 @@ def estimate(
         if louder.log_likelihood < best.log_likelihood + _GAIN:
             break
         best = louder
-    middle = best.noise_factor
-    factors = (math.sqrt(2.0) * middle, middle / math.sqrt(2.0))
-    for factor in factors if middle > 1.0 else factors[:1]:
-        between = run_filter(samples, ride, chosen, noise_factor=factor)
-        gain = _GAIN if middle == 1.0 else 0.0
-        if between.log_likelihood > best.log_likelihood + gain:
-            best = between
     return best
 
 
