@@ -442,10 +442,6 @@ def _masses(
     return [float(kg) for kg in known if kg is not None]
 
 
-def _level(balance: ForceBalance, x: Floats) -> Floats:
-    return averaged(x, float(np.median(np.diff(balance.force.time))), DRAGGED_TIME)
-
-
 def _load_floor(drive: Drive, source: TorqueSource) -> float:
     if source not in ("load", "air_flow"):
         return -np.inf
@@ -454,9 +450,10 @@ def _load_floor(drive: Drive, source: TorqueSource) -> float:
 
 def _finite(balance: ForceBalance, x: Floats, floor: float) -> Bools:
     view = balance.merged
+    period = float(np.median(np.diff(view.time)))
     return np.asarray(
         view.usable
-        & (_level(balance, x) >= floor)
+        & (averaged(x, period, DRAGGED_TIME) >= floor)
         & np.isfinite(view.specific_force)
         & np.isfinite(view.gearing)
         & np.isfinite(x)
