@@ -56,6 +56,7 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
         air_speed=speed,
         drag_force=drag,
         air_density=np.full(n, 1.2),
+        fuel_burnt=np.zeros(n),
         reason=reason,
     )
     return ForceBalance(force=None, motion=SimpleNamespace(source="inertial"), merged=view)

@@ -64,6 +64,7 @@ def value(rows, name):
         (0x0CF00203, "DD FF FF FF FF FF FF FF", "clutch_switch", 1.0),  # shift in process
         (0x0CF00203, "CD FF FF FF FF FF FF FF", "clutch_switch", 0.0),
         (0x18FEF500, "C8 FF FF A0 24 FF FF FF", "barometric_pressure", 100e3),
+        (0x18FEF200, "64 00 FF FF FF FF FF FF", "fuel_rate", 5e-3 / 3600.0),  # 5 L/h
         (0x18FEF500, "FF FF FF A0 24 FF FF FF", "ambient_temperature", 293.15),  # 9376 / 32 - 273
     ],
 )

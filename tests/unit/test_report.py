@@ -121,6 +121,7 @@ def make_weighing(
         air_speed=speed,
         drag_force=drag,
         air_density=np.full(n, 1.2),
+        fuel_burnt=np.zeros(n),
         reason=reason,
     )
     force = ForceSide(

@@ -105,6 +105,7 @@ def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0
         air_speed=against(reported),
         drag_force=drag(reported),
         air_density=np.full(n, 1.2),
+        fuel_burnt=np.zeros(n),
         reason=reason,
     )
     force = ForceSide(

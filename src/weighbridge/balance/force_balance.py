@@ -14,6 +14,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.vehicle.air import air_density
+from weighbridge.vehicle.fuel import fuel_burnt
 from weighbridge.vehicle.gear import (
     effective_gearing,
     number_told_gears,
@@ -147,6 +148,7 @@ class MergedView:
     air_speed : (n,) against the air, with the reported wind [m/s]
     drag_force : (n,) in still air, or in the wind that ``drive.toml`` reports [N]
     air_density : (n,) [kg/m^3]
+    fuel_burnt : (n,) since the first row, as far as the drive tells [kg]
     reason : (n,) `Reason`
     """
 
@@ -164,6 +166,7 @@ class MergedView:
     air_speed: Floats
     drag_force: Floats
     air_density: Floats
+    fuel_burnt: Floats
     reason: NDArray[np.uint8]
 
     @property
@@ -286,6 +289,7 @@ def force_balance(
             air_speed=air_speed,
             drag_force=drag,
             air_density=density,
+            fuel_burnt=fuel_burnt(drive, vehicle, recorded, torque.torque, engine_speed),
             reason=reason,
         ),
     )

@@ -185,6 +185,7 @@ def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
             air_speed=speed,
             drag_force=drag,
             air_density=nowhere,
+            fuel_burnt=np.zeros(speed.size),
             reason=reason,
         ),
     )

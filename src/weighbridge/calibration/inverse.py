@@ -46,7 +46,7 @@ class DriveRows:
     regressor : load [-] or torque [N m]
     engine_speed : [rad/s]
     usable : rows to take
-    mass : known [kg]
+    mass : known, as the drive begins [kg]
     by_speed : the motion has no accelerometer, so that the grade is a disturbance
     """
 
@@ -161,10 +161,11 @@ def _columns(
     # The reading itself stands on the left; the other torque terms stand here.
     offset, _, *terms = torque_rows(reading, d.engine_speed, order, curved=curved).T
     one = np.ones_like(gearing)
+    mass = d.mass - view.fuel_burnt
     columns = [
-        d.mass * (view.accel if d.by_speed else view.specific_force),
+        mass * (view.accel if d.by_speed else view.specific_force),
         0.5 * view.air_density * view.air_speed * np.abs(view.air_speed),
-        d.mass * GRAVITY * np.cos(view.grade),
+        mass * GRAVITY * np.cos(view.grade),
         gearing**2 * view.accel,
         view.accel / wheel_radius**2,
         *(-gearing * term for term in (offset, *terms)),

@@ -33,8 +33,8 @@ def calibrate(
         Optional[list[float]],  # noqa: UP045
         typer.Option(
             "--mass",
-            help="Known mass in kg; repeat it, one for each drive, where they differ. "
-            "Without it, mass_kg of each drive.toml.",
+            help="Known mass in kg as the drive begins; repeat it, one for each drive, where they "
+            "differ. Without it, mass_kg of each drive.toml.",
         ),
     ] = None,
     vehicle: Annotated[

@@ -31,6 +31,7 @@ from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.navigation.motion import BY_SPEED, MotionSource
 from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.fuel import FUEL_STD
 from weighbridge.vehicle.model import Vehicle
 
 GATE: Final = 5.0
@@ -149,8 +150,9 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     levels of fast noise and of the disturbance are those of highest
     likelihood. After every stop a second filter tries whether the load has
     changed; the running mass is the mean of both. The final answer is that of
-    the whole drive smoothed, at its end: where the load has changed, the mass
-    after the last change, and the segments tell those before.
+    the whole drive smoothed, at its end: the fuel burnt by then is taken off,
+    and where the load has changed, it is the mass after the last change; the
+    segments tell those before.
 
     Parameters
     ----------
@@ -192,11 +194,12 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     left_out[cut.index] = ~taken[cut.window]
     reason[left_out] = Reason.BAD_FIT
     used = reason == Reason.USED
-    mass, bound = float(x[-1, 0]), float(np.sqrt(var[-1, 0]))
+    burnt = view.fuel_burnt
+    mass, bound = float(x[-1, 0] - burnt[-1]), float(np.sqrt(var[-1, 0]))
     left = _left_open(balance, vehicle, mass)
     std = float(np.hypot(UNMODELLED * bound, mass * left))
     last = np.searchsorted(time, view.time, side="right") - 1
-    track = np.where(last >= 0, running[np.maximum(last, 0)], np.nan)
+    track = np.where(last >= 0, running[np.maximum(last, 0)] - burnt, np.nan)
     track_std = UNMODELLED * np.sqrt(running_var)[np.maximum(last, 0)]
     status, why = judge(view, vehicle, used, mass, std, cut.count.size)
     spread = float(np.std(problem.rows[taken, 0]))
@@ -244,6 +247,10 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     made = vehicle.provenance
     if made.method == "rls":
         left = float(np.hypot(left, OTHER_METHOD_STD))
+    if mass > 0.0:
+        # When the rows weigh, half of the fuel is gone, in the mean.
+        fuel = 0.5 * float(balance.merged.fuel_burnt[-1]) / mass
+        left = float(np.hypot(left, FUEL_STD * fuel))
     if made.masses and mass > 0.0:
         above, below = np.log(mass / max(made.masses)), np.log(min(made.masses) / mass)
         left = float(np.hypot(left, BEYOND_STD * max(above, below, 0.0)))
@@ -305,7 +312,7 @@ def stopped(view: MergedView, time: Floats) -> Bools:
 def _segments(
     view: MergedView, time: Floats, begins: Bools, mass: Floats, bound: Floats, left: float
 ) -> tuple[Segment, ...]:
-    """Stretches of one load: the mass of each, smoothed over the whole drive."""
+    """Stretches of one load: the mass at the end of each, smoothed over the whole drive."""
     first = np.concatenate(([0], np.flatnonzero(begins)))
     last = np.concatenate((first[1:], [time.size])) - 1
     edges = [float(view.time[0])]
@@ -316,11 +323,12 @@ def _segments(
         rests = np.flatnonzero(between & ~moving)
         edges.append(float(view.time[rests[-1]]) if rests.size else float(time[k]))
     edges.append(float(view.time[-1]))
+    burnt = np.interp(edges[1:], view.time, view.fuel_burnt)
     return tuple(
         Segment(
             start=edges[j],
             end=edges[j + 1],
-            mass=float(mass[k]),
+            mass=float(mass[k] - burnt[j]),
             std=float(np.hypot(UNMODELLED * bound[k], mass[k] * left)),
         )
         for j, k in enumerate(last)

@@ -107,8 +107,9 @@ def design(view: MergedView, vehicle: Vehicle, *, by_speed: bool = False) -> tup
 
     Returns
     -------
-    rows : (n, 7) for `NAMES`
-    y : (n,) traction less drag and rotating inertia [N]
+    rows : (n, 7) for `NAMES`; the mass is that of the first row
+    y : (n,) traction less drag and rotating inertia, and what the fuel that is burnt by then
+        would have weighed [N]
     """
     phi, y = regression(view, vehicle)
     if by_speed:
@@ -118,7 +119,8 @@ def design(view: MergedView, vehicle: Vehicle, *, by_speed: bool = False) -> tup
     one = np.ones_like(phi)
     cold = coldness(view) * np.nan_to_num(view.gearing)
     pressure = 0.5 * view.air_density * view.air_speed * np.abs(view.air_speed)
-    return np.column_stack([phi, one, one, slope * north, slope * east, cold, pressure]), y
+    columns = [phi, one, one, slope * north, slope * east, cold, pressure]
+    return np.column_stack(columns), y + phi * view.fuel_burnt
 
 
 def usable_rows(view: MergedView, rows: Floats, y: Floats) -> Bools:

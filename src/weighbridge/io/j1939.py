@@ -23,14 +23,14 @@ from weighbridge.signals.words import counted
 EEC1, EEC2, EEC3 = 0xF004, 0xF003, 0xFEDF
 ETC1, ETC2 = 0xF002, 0xF005
 CCVS1, EBC1, ERC1 = 0xFEF1, 0xF001, 0xF000
-VDHR, AMB, VW, CVW = 0xFEC1, 0xFEF5, 0xFEEA, 0xFE70
+VDHR, AMB, LFE, VW, CVW = 0xFEC1, 0xFEF5, 0xFEF2, 0xFEEA, 0xFE70
 EC1 = 0xFEE3
 _TP_CM, _TP_DT = 0xEC00, 0xEB00
 
 NAMES: Final[dict[int, str]] = {
     EEC1: "EEC1", EEC2: "EEC2", EEC3: "EEC3", ETC1: "ETC1", ETC2: "ETC2", CCVS1: "CCVS1",
-    EBC1: "EBC1", ERC1: "ERC1", VDHR: "VDHR", AMB: "AMB", VW: "VW", CVW: "CVW", EC1: "EC1",
-    _TP_CM: "TP.CM", _TP_DT: "TP.DT",
+    EBC1: "EBC1", ERC1: "ERC1", VDHR: "VDHR", AMB: "AMB", LFE: "LFE", VW: "VW", CVW: "CVW",
+    EC1: "EC1", _TP_CM: "TP.CM", _TP_DT: "TP.DT",
 }  # fmt: skip
 """Parameter groups by number, with the acronyms of J1939-71."""
 
@@ -85,6 +85,7 @@ SPNS: Final[tuple[Spn, ...]] = (
     Spn(917, "distance", VDHR, 1, 1, 32, 5.0, 0.0, "m"),
     Spn(108, "barometric_pressure", AMB, 1, 1, 8, 0.5, 0.0, "kpa"),
     Spn(171, "ambient_temperature", AMB, 4, 1, 16, 0.03125, -273.0, "degc"),
+    Spn(183, "fuel_rate", LFE, 1, 1, 16, 0.05, 0.0, "lph"),
     Spn(928, "axle", VW, 1, 1, 8),
     Spn(582, "axle_weight", VW, 2, 1, 16, 0.5, 0.0, "kg"),
     Spn(1760, "combination_weight", CVW, 3, 1, 16, 10.0, 0.0, "kg"),
@@ -202,7 +203,7 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
         reader.best(q)
         for q in (
             "engine_speed", "vehicle_speed", "gear", "reference_torque", "throttle", "engine_load",
-            "retarder_torque", "barometric_pressure", "ambient_temperature",
+            "retarder_torque", "barometric_pressure", "ambient_temperature", "fuel_rate",
         )
     ]  # fmt: skip
     signals += [

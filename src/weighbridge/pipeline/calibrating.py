@@ -128,7 +128,7 @@ def calibrate(
     Parameters
     ----------
     drives : recorded drives of one vehicle
-    mass : of all, or one for each [kg]; from ``drive.toml`` when None
+    mass : of all, or one for each, as the drive begins [kg]; from ``drive.toml`` when None
     vehicle : what is known already (class, wheel radius, gearings, tare)
     settings : see `CalibrationSettings`
 

@@ -47,7 +47,7 @@ class JointProblem:
     Attributes
     ----------
     balance_at : rows of each drive at a delay and lag
-    masses : known mass of each drive [kg]
+    masses : known mass of each drive as it begins [kg]
     order, curved : of the torque regression
     torque_noise : of one reading [N m]
     known : driveline of the vehicle file given to the calibration
@@ -222,8 +222,9 @@ def _self_weighed(
         for balance, mass in zip(rebalance(tried), problem.masses, strict=True):
             track = joint.estimate(balance, tried)
             if np.isfinite(track.mass):
-                ratios.append(track.mass / mass)
-                stds.append(track.bound_std / mass)
+                left = mass - float(balance.merged.fuel_burnt[-1])
+                ratios.append(track.mass / left)
+                stds.append(track.bound_std / left)
         if not ratios:
             raise DriveError(
                 "the drives of the calibration cannot be weighed: drive longer, with more starts"

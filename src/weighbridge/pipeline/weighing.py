@@ -222,8 +222,7 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     ----------
     drive : as of `read_drive`
     vehicle : as of `calibrate` or `Vehicle.load`
-    method : name of an estimator in `weighbridge.estimators.ESTIMATORS`; where "joint"
-        is asked for and there is no accelerometer, rls weighs, and a warning says so
+    method : name of an estimator in `weighbridge.estimators.ESTIMATORS`
 
     Returns
     -------

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 _LOAD_STEP = 1.0 / 255.0
 
+# Of fuel [kg/m^3]: middle of EN 228 and of EN 590.
+_DENSITY = {"petrol": 748.0, "diesel": 833.0, "electric": 833.0}
+
 
 def body_motion(pose: Pose) -> tuple[Floats, Floats]:
     """Find what an ideal inertial sensor at the rear axle reads.
@@ -326,6 +329,9 @@ def _values(scenario: Scenario, drive: Trajectory, name: str, pose: Pose) -> tup
             4.0e-5 * drive.engine_speed * peak / 320.0,
         )
         return _smooth(air * (1.0 + 0.02 * effects.load_nonlinearity), 0.1), 1.0e-5
+    if name == "fuel_rate":
+        density = _DENSITY[scenario.car.engine]
+        return drive.fuel_flow / density, scalar_to_si(0.05, "lph")
     if name == "throttle":
         return 0.13 + 0.75 * np.clip(drive.pedal, 0.0, 1.0) ** 0.8, _LOAD_STEP
     if name == "ambient_temperature":
@@ -355,6 +361,7 @@ POLLABLE = (
     "vehicle_speed", "engine_speed", "engine_load", "engine_torque", "engine_torque_fraction",
     "reference_torque", "mass_air_flow", "lambda_1", "throttle", "ambient_temperature",
     "barometric_pressure", "gear", "brake_switch", "clutch_switch", "retarder_torque",
+    "fuel_rate",
 )  # fmt: skip
 """Quantities the simulated control units can be asked for."""
 

@@ -1,0 +1,77 @@
+"""The fuel that a drive burns, which the vehicle no longer carries."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.constants import PETROL_STOICHIOMETRIC_RATIO
+from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.vehicle.model import Vehicle
+
+DENSITY: Final = 790.0
+"""Of fuel [kg/m^3]: the middle of petrol, 720 to 775 (EN 228), and diesel, 820 to 845 (EN 590)."""
+
+HEATING_VALUE: Final = 43.0e6
+"""Lower heating value of petrol and diesel [J/kg] (Heywood, Internal Combustion Engine
+Fundamentals, 1988, app. D)."""
+
+INDICATED_EFFICIENCY: Final = 0.38
+"""Work on the pistons over the energy of the fuel [-] (Heywood 1988, ch. 5 and 15)."""
+
+FRICTION: Final = 0.1
+"""Friction torque of a warm engine over its torque at full load [-] (Heywood 1988, ch. 13)."""
+
+FUEL_STD: Final = 0.3
+"""Relative standard deviation of the fuel burnt, the way by work included [-]."""
+
+SEEN: Final = 10.0
+"""Of a longer gap between two rows no more is counted [s]: the engine may have stood."""
+
+
+def fuel_burnt(
+    drive: Drive, vehicle: Vehicle, time: Floats, torque: Floats, engine_speed: Floats
+) -> Floats:
+    """Mass of the fuel burnt since the first row (n,) [kg].
+
+    From the fuel rate, else from air flow and air-fuel ratio, else from the
+    work of the engine and its friction. A vehicle with one fixed gear is
+    electric and burns none.
+
+    Parameters
+    ----------
+    drive, vehicle
+    time : (n,) stamps as recorded, not falling [s]
+    torque : (n,) at the engine's shaft [N m]; NaN where unknown
+    engine_speed : (n,) [rad/s]; NaN where unknown
+    """
+    if vehicle.driveline.single_speed or time.size < 2:
+        return np.zeros(time.size)
+    flow = np.full(time.size, np.nan)
+    rate, air, ratio = drive.get("fuel_rate"), drive.get("mass_air_flow"), drive.get("lambda_1")
+    if rate is not None and len(rate):
+        flow = DENSITY * _near(rate, time)
+    elif air is not None and len(air) and ratio is not None and len(ratio):
+        lean = np.maximum(_near(ratio, time), 0.5)
+        flow = _near(air, time) / (PETROL_STOICHIOMETRIC_RATIO * lean)
+    flow = np.where(np.isfinite(flow), flow, _by_work(torque, engine_speed))
+    span = np.clip(np.diff(time), 0.0, SEEN)
+    middle = 0.5 * (flow[1:] + flow[:-1])
+    return np.concatenate(([0.0], np.cumsum(span * np.maximum(middle, 0.0))))
+
+
+def _near(signal: Signal, time: Floats) -> Floats:
+    """Values at ``time``; NaN where no sample is near."""
+    return np.where(signal.age(time) <= SEEN, signal.at(time), np.nan)
+
+
+def _by_work(torque: Floats, engine_speed: Floats) -> Floats:
+    """Fuel flow of an engine by its work and its friction (n,) [kg/s]."""
+    known = torque[np.isfinite(torque)]
+    if not known.size:
+        return np.zeros(torque.size)
+    full = max(float(np.percentile(known, 98.0)), 0.0)
+    indicated = np.nan_to_num(torque) + FRICTION * full
+    power = np.maximum(indicated, 0.0) * np.maximum(np.nan_to_num(engine_speed), 0.0)
+    return np.asarray(power / (INDICATED_EFFICIENCY * HEATING_VALUE))
