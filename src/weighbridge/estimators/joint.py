@@ -27,6 +27,7 @@ from weighbridge.estimators.slow_errors import (
     prior_std,
     usable_rows,
 )
+from weighbridge.estimators.squat import lean
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.navigation.motion import BY_SPEED, MotionSource
@@ -167,7 +168,8 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     """
     view = balance.merged
     by_speed = balance.motion.source in BY_SPEED
-    rows, y = design(view, vehicle, by_speed=by_speed)
+    body = lean(balance, vehicle)
+    rows, y = design(view, vehicle, by_speed=by_speed, leaned=body.leaned(view.accel))
     usable = usable_rows(view, rows, y)
     cut = windows(view.time, usable)
     reason = view.reason.copy()
@@ -196,7 +198,12 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     used = reason == Reason.USED
     burnt = view.fuel_burnt
     mass, bound = float(x[-1, 0] - burnt[-1]), float(np.sqrt(var[-1, 0]))
-    left = _left_open(balance, vehicle, mass)
+    left = float(
+        np.hypot(
+            _left_open(balance, vehicle, mass),
+            body.relative_std(view.accel, rows[:, 0], used),
+        )
+    )
     std = float(np.hypot(UNMODELLED * bound, mass * left))
     last = np.searchsorted(time, view.time, side="right") - 1
     track = np.where(last >= 0, running[np.maximum(last, 0)] - burnt, np.nan)

@@ -93,7 +93,9 @@ def coldness(view: MergedView) -> Floats:
     return np.asarray(np.exp(-np.maximum(view.time - start, 0.0) / WARM_UP))
 
 
-def design(view: MergedView, vehicle: Vehicle, *, by_speed: bool = False) -> tuple[Floats, Floats]:
+def design(
+    view: MergedView, vehicle: Vehicle, *, by_speed: bool = False, leaned: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Rows of the model ``y = phi m + d + c + wind + cold torque + drag``.
 
     The drag of a wind small against the speed is linear in it:
@@ -104,6 +106,7 @@ def design(view: MergedView, vehicle: Vehicle, *, by_speed: bool = False) -> tup
     view, vehicle
     by_speed : no accelerometer saw the grade, so that it is a disturbance: heights are too
         rough to multiply the mass
+    leaned : (n,) what the lean of the accelerometer adds to the specific force [m/s^2]
 
     Returns
     -------
@@ -114,6 +117,8 @@ def design(view: MergedView, vehicle: Vehicle, *, by_speed: bool = False) -> tup
     phi, y = regression(view, vehicle)
     if by_speed:
         phi = phi - view.specific_force + view.accel
+    if leaned is not None:
+        phi = phi - leaned
     slope = view.air_density * vehicle.road_load.drag_area * view.speed
     north, east = view.direction
     one = np.ones_like(phi)

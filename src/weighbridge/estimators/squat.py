@@ -1,0 +1,73 @@
+"""What an accelerometer that leans with the body leaves in the mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance import ForceBalance
+from weighbridge.constants import GRAVITY
+from weighbridge.navigation.motion import BY_SPEED
+from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.model import Vehicle
+
+SQUAT: Final = (0.0035, 0.0025)
+"""Pitch of the body per acceleration of a vehicle of which nothing is known, and its standard
+deviation [rad per m/s^2]: four recorded cars had 0.0024 to 0.0051, and stiff trucks lean less."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lean:
+    """Squat that is still in the specific force.
+
+    Attributes
+    ----------
+    squat : pitch per acceleration to take out; negative to put back [rad per m/s^2]
+    std : what stays unknown of it
+    """
+
+    squat: float
+    std: float
+
+    def leaned(self, accel: Floats) -> Floats:
+        """Specific force that the lean adds to an acceleration (n,) [m/s^2]."""
+        return GRAVITY * self.squat * accel
+
+    def relative_std(self, accel: Floats, phi: Floats, used: Bools) -> float:
+        """Relative standard deviation of the mass [-]; hills, which do not lean, weigh without.
+
+        Parameters
+        ----------
+        accel, phi : (n,) acceleration and regressor of the mass [m/s^2]
+        used : (n,)
+        """
+        if self.std <= 0.0 or np.count_nonzero(used) < 2:
+            return 0.0
+        weight = phi[used] - phi[used].mean()
+        share = float(weight @ accel[used]) / max(float(weight @ weight), 1e-9)
+        return GRAVITY * self.std * float(np.clip(share, 0.0, 1.0))
+
+
+def lean(balance: ForceBalance, vehicle: Vehicle) -> Lean:
+    """Find what squat the rows and the torque of the vehicle do not have in common.
+
+    An accelerometer that leans by k per acceleration reads it 1 + g k times too
+    large. The navigation takes that out where the drive shows k. A torque that
+    was calibrated against such readings has the factor in it, and must meet it
+    again; one of a data sheet must not.
+    """
+    motion = balance.motion
+    if motion.source in BY_SPEED:
+        return Lean(0.0, 0.0)
+    found, found_std = motion.squat, motion.squat_std or 0.0
+    if vehicle.provenance.mass_scale_std is None:
+        return Lean(*SQUAT) if found is None else Lean(0.0, found_std)
+    mounting = vehicle.mounting
+    given = mounting.squat if mounting is not None else None
+    if found is None and mounting is not None and given is not None:
+        return Lean(given, mounting.squat_std or 0.0)
+    if found is not None and given is None:
+        return Lean(-found, found_std)
+    return Lean(0.0, found_std)

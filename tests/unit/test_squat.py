@@ -1,0 +1,92 @@
+"""An accelerometer that leans with the body, and a vehicle file that knows of it or not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import weighbridge as wb
+from weighbridge.constants import GRAVITY
+from weighbridge.estimators import joint
+from weighbridge.estimators.squat import SQUAT, Lean, lean
+from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+
+K = 0.004
+"""Pitch per acceleration [rad per m/s^2]."""
+
+
+@pytest.fixture(scope="module")
+def weighed():
+    made = simulate_car(Scenario(name="squat", car=MIDSIZE, route=short_route(), seed=72))
+    car = wb.calibrate([made.drive], mass=made.scenario.mass)
+    return car, wb.weigh(made.drive, car)
+
+
+def seen(balance, squat, *, factor):
+    """The balance with ``factor`` of a lean in its readings, and the squat the drive shows."""
+    leaned = factor * GRAVITY * K * balance.merged.accel
+    view = replace(balance.merged, specific_force=balance.merged.specific_force + leaned)
+    std = None if squat is None else 2e-4
+    return replace(balance, merged=view, motion=replace(balance.motion, squat=squat, squat_std=std))
+
+
+def calibrated(car, squat):
+    mounting = replace(car.mounting, squat=squat, squat_std=None if squat is None else 2e-4)
+    return replace(car, mounting=mounting)
+
+
+def uncalibrated(car):
+    return replace(car, provenance=replace(car.provenance, mass_scale_std=None, masses=()))
+
+
+def test_what_the_calibration_took_out_is_taken_out(weighed):
+    car, weighing = weighed
+    balance = weighing.result.balance
+    knows = calibrated(car, K)
+    right = joint.estimate(seen(balance, K, factor=0.0), knows)
+    leaning = joint.estimate(seen(balance, None, factor=1.0), knows)
+    assert_allclose(leaning.mass, right.mass, rtol=1e-6)
+
+
+def test_what_the_calibration_left_in_is_put_back(weighed):
+    car, weighing = weighed
+    balance = weighing.result.balance
+    without = calibrated(car, None)
+    as_calibrated = joint.estimate(seen(balance, None, factor=1.0), without)
+    shown = joint.estimate(seen(balance, K, factor=0.0), without)
+    assert_allclose(shown.mass, as_calibrated.mass, rtol=1e-6)
+    # Left as it is, the reading would be too small by 1 + g k wherever the car accelerates.
+    assert joint.estimate(seen(balance, None, factor=0.0), without).mass > 1.01 * shown.mass
+
+
+def test_without_a_calibration_an_unknown_squat_widens_the_interval(weighed):
+    car, weighing = weighed
+    balance = weighing.result.balance
+    sheet = uncalibrated(car)
+    shown = joint.estimate(seen(balance, K, factor=0.0), sheet)
+    hidden = joint.estimate(seen(balance, None, factor=1.0), sheet)
+    added = np.sqrt(hidden.std**2 - shown.std**2) / hidden.mass
+    assert 0.3 * GRAVITY * SQUAT[1] < added <= 1.05 * GRAVITY * SQUAT[1]
+    # The middle of what cars do is taken out: what is left is the difference.
+    off = GRAVITY * abs(K - SQUAT[0])
+    assert abs(hidden.mass / shown.mass - 1.0) < 1.2 * off
+
+
+def test_a_speed_does_not_lean(weighed):
+    car, weighing = weighed
+    balance = weighing.result.balance
+    by_speed = replace(balance, motion=replace(balance.motion, source="speed"))
+    assert lean(by_speed, uncalibrated(car)) == Lean(0.0, 0.0)
+
+
+def test_hills_weigh_without_a_lean():
+    rng = np.random.default_rng(0)
+    accel, hill = rng.normal(0.0, 0.3, (2, 4000))
+    every = np.ones(4000, dtype=bool)
+    body = Lean(0.0, 0.0025)
+    full = GRAVITY * 0.0025
+    assert_allclose(body.relative_std(accel, accel, every), full)
+    assert_allclose(body.relative_std(accel, accel + hill, every), 0.5 * full, rtol=0.05)
+    assert body.relative_std(np.zeros(4000), hill, every) == 0.0
+    assert body.relative_std(accel, accel, ~every) == 0.0
