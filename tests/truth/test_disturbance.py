@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from weighbridge.kernels import disturbance as kernel
 
-NO_JUMPS = np.zeros(300)
+NO_JUMPS = np.zeros((300, 3))
 
 
 def problem(n=300, seed=1):
@@ -85,14 +85,15 @@ def test_a_start_three_times_too_heavy_or_too_light_ends_alike():
 
 def test_smoothing_equals_the_conditional_mean_of_the_dense_covariance():
     time, rows, y, noise, params, start, _ = problem()
-    added = np.zeros(y.size)
-    added[120] = 300.0**2
+    added = np.zeros(rows.shape)
+    added[120, :2] = 300.0**2, 40.0**2
     x, var, _ = kernel.smooth(start, time, rows, y, noise, added, params)
     jumped = (np.arange(y.size) >= 120).astype(float)
+    left = jumped * np.exp(-np.maximum(time - time[119], 0.0) / 30.0)
     span = np.abs(time[:, None] - time)
     states = [
         500.0**2 + 300.0**2 * np.outer(jumped, jumped),
-        60.0**2 * np.exp(-span / 30.0),
+        60.0**2 * np.exp(-span / 30.0) + 40.0**2 * np.outer(left, left),
         25.0**2 * np.exp(-span / 200.0),
     ]
     whole = sum(c * np.outer(rows[:, i], rows[:, i]) for i, c in enumerate(states))

@@ -1,8 +1,11 @@
 """Two hypotheses of the load after every stop."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from weighbridge.estimators.joint import change_odds
 from weighbridge.kernels import disturbance
 from weighbridge.kernels import load_change as kernel
 
@@ -19,25 +22,24 @@ def drive(jump, seed=3, n=300, at=150):
         slow[k] = keep * slow[k - 1] + 50.0 * np.sqrt(1.0 - keep**2) * rng.normal()
     noise = np.full(n, 40.0**2)
     y = mass * rows[:, 0] + slow + 40.0 * rng.normal(size=n)
-    stopped = np.zeros(n, dtype=bool)
-    stopped[[40, 90, at, 220]] = True
+    odds = np.full(n, np.nan)
+    odds[[40, 90, at, 220]] = -2.2
     params = kernel.LoadParams(
         filter=disturbance.DisturbanceParams(
             time_constant=np.array([np.inf, 30.0]), std=np.array([0.0, 50.0]), gate=5.0, settle=40
         ),
-        jump_var=400.0**2,
-        prior=-2.2,
+        jump_var=np.array([400.0**2, 0.0]),
         temper=0.4,
         fewest=8,
     )
     start = disturbance.initial_state([0.0, 0.0], np.diag([1500.0**2, 50.0**2]), time[0])
-    return kernel.initial_state(start), time, rows, y, noise, stopped, params
+    return kernel.initial_state(start), time, rows, y, noise, odds, params
 
 
 @pytest.mark.parametrize("jump", [-300.0, 240.0, 800.0])
 def test_a_change_of_load_is_found_at_its_stop_and_nowhere_else(jump):
-    state, time, rows, y, noise, stopped, params = drive(jump)
-    last, first, _, begins = kernel.run(state, time, rows, y, noise, stopped, params)
+    state, time, rows, y, noise, odds, params = drive(jump)
+    last, first, _, begins = kernel.run(state, time, rows, y, noise, odds, params)
     assert np.flatnonzero(begins).tolist() == [150]
     assert last.same.x[0] == pytest.approx(1500.0 + jump, rel=0.02)
     soon = np.searchsorted(time, time[150] + 90.0)
@@ -48,9 +50,9 @@ def test_a_change_of_load_is_found_at_its_stop_and_nowhere_else(jump):
 def test_stops_without_a_change_cost_nothing():
     found = []
     for seed in range(20):
-        state, time, rows, y, noise, stopped, params = drive(0.0, seed=seed)
-        _, first, _, begins = kernel.run(state, time, rows, y, noise, stopped, params)
-        never = np.zeros(time.size, dtype=bool)
+        state, time, rows, y, noise, odds, params = drive(0.0, seed=seed)
+        _, first, _, begins = kernel.run(state, time, rows, y, noise, odds, params)
+        never = np.full(time.size, np.nan)
         _, alone, _, _ = kernel.run(state, time, rows, y, noise, never, params)
         assert not begins.any()
         found.append(first[-1] / alone[-1] - 1.0)
@@ -59,10 +61,10 @@ def test_stops_without_a_change_cost_nothing():
 
 def test_without_stops_it_is_the_plain_filter():
     state, time, rows, y, noise, _, params = drive(0.0)
-    none = np.zeros(time.size, dtype=bool)
+    none = np.full(time.size, np.nan)
     last, first, first_var, _ = kernel.run(state, time, rows, y, noise, none, params)
     plain, mass, var, _, _ = disturbance.run(
-        state.same, time, rows, y, noise, np.zeros(y.size), params.filter
+        state.same, time, rows, y, noise, np.zeros(rows.shape), params.filter
     )
     np.testing.assert_array_equal(first, mass)
     np.testing.assert_array_equal(first_var, var)
@@ -70,14 +72,42 @@ def test_without_stops_it_is_the_plain_filter():
 
 
 def test_batch_equals_sample_by_sample_to_the_last_bit():
-    state, time, rows, y, noise, stopped, params = drive(240.0)
-    _, first, first_var, begins = kernel.run(state, time, rows, y, noise, stopped, params)
+    state, time, rows, y, noise, odds, params = drive(240.0)
+    _, first, first_var, begins = kernel.run(state, time, rows, y, noise, odds, params)
     seen = []
     for k in range(y.size):
         state, mass, var, begun = kernel.step(
-            state, time[k], rows[k], y[k], noise[k], stopped[k], params
+            state, time[k], rows[k], y[k], noise[k], odds[k], params
         )
         assert mass == first[k]
         assert var == first_var[k]
         seen.append(begun)
     assert {b for b in seen if b >= 0} == set(np.flatnonzero(begins))
+
+
+def test_a_launch_on_a_slipping_clutch_moves_the_running_mass_little():
+    state, time, rows, y, noise, odds, params = drive(0.0)
+    slipping = y.copy()
+    slipping[150:152] += 400.0 * rows[150:152, 0]
+    _, first, _, begins = kernel.run(state, time, rows, slipping, noise, odds, params)
+    assert not begins.any()
+    _, hasty, _, _ = kernel.run(state, time, rows, slipping, noise, odds, params._replace(fewest=1))
+    moved, moved_at_once = (np.max(np.abs(m[150:170] / 1500.0 - 1.0)) for m in (first, hasty))
+    assert moved_at_once > 0.15
+    assert moved < 0.6 * moved_at_once
+
+
+def test_longer_stops_change_the_load_more_often():
+    time = np.arange(0.0, 1000.0, 0.25)
+    speed = np.full(time.size, 10.0)
+    for begin, duration in ((100.0, 10.0), (300.0, 25.0), (600.0, 240.0)):
+        speed[(time >= begin) & (time < begin + duration)] = 0.0
+    kept = (time < 900.0) | (time > 960.0)  # a gap in the log
+    view = SimpleNamespace(time=time[kept], speed=speed[kept])
+    windows = np.array([50.0, 120.0, 290.0, 330.0, 590.0, 850.0, 890.0, 970.0])
+    odds = change_odds(view, windows)
+    assert np.isfinite(odds).tolist() == [False, False, False, True, False, True, False, True]
+    light, long, gap = odds[[3, 5, 7]]
+    assert light < np.log(0.1)
+    assert light < gap < long
+    assert long > np.log(1.0)

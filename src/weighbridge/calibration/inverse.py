@@ -233,7 +233,7 @@ def _solve(
     start = kernel.initial_state(x0, np.diag(prior), 0.0)  # type: ignore[no-untyped-call]
     state, _, _, _, _ = kernel.run(
         start, np.concatenate(times), stacked, reached,
-        np.concatenate(variances), np.zeros(reached.size), params,
+        np.concatenate(variances), np.zeros(stacked.shape), params,
     )  # fmt: skip
     fitted = []
     for d, columns in zip(drives, parts, strict=True):

@@ -120,8 +120,8 @@ def run(state, time, rows, y, noise_var, added, params):
         Not falling [s].
     rows : (m, n) float64
     y, noise_var : (m,) float64
-    added : (m,) float64
-        Variance added to the first state before the row, where it may jump.
+    added : (m, n) float64
+        Variance added to each state before the row, where it may jump.
     params : DisturbanceParams
 
     Returns
@@ -139,7 +139,7 @@ def run(state, time, rows, y, noise_var, added, params):
     innovation = np.empty(y.size)
     taken = np.empty(y.size, dtype=np.bool_)
     for k in range(y.size):
-        if added[k] > 0.0:
+        if np.any(added[k] > 0.0):
             state = loosened(state, added[k])
         state, innovation[k], taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         first[k] = state.x[0]
@@ -149,9 +149,8 @@ def run(state, time, rows, y, noise_var, added, params):
 
 @kernel
 def loosened(state, variance):
-    """Return the state with ``variance`` added to that of the first one."""
-    cov = state.cov.copy()
-    cov[0, 0] += variance
+    """Return the state with ``variance`` (n,) added to those of the estimates."""
+    cov = state.cov + np.diag(variance)
     return DisturbanceState(state.x, cov, state.time, state.rows, state.log_likelihood)
 
 
@@ -185,7 +184,7 @@ def smooth(state, time, rows, y, noise_var, added, params):
     inverse = np.zeros(m)
     error = np.zeros(m)
     for k in range(m):
-        if added[k] > 0.0:
+        if np.any(added[k] > 0.0):
             state = loosened(state, added[k])
         x, cov, keep[k] = _faded(state, time[k], params)
         x_pred[k] = x

@@ -14,16 +14,15 @@ class LoadParams(NamedTuple):
     Attributes
     ----------
     filter : disturbance.DisturbanceParams
-    jump_var : variance of a jump of the first state
-    prior : logarithm of the odds of a jump at a stop
+    jump_var : (n,) variance of the jump of each state
     temper : part of the log-likelihood that counts, below one where the model is
         not the whole truth
-    fewest : rows after a stop without which no jump is believed
+    fewest : rows after a stop without which no jump is believed; until then its share in
+        the mean grows with them
     """
 
     filter: disturbance.DisturbanceParams
-    jump_var: float
-    prior: float
+    jump_var: np.ndarray
     temper: float
     fewest: int
 
@@ -36,6 +35,7 @@ class LoadState(NamedTuple):
     same : disturbance.DisturbanceState as if nothing had changed at the last stop
     changed : the same with a jump there
     open : whether ``changed`` is still tried
+    prior : logarithm of its odds before any row told
     begun : row at which it began
     rows : rows seen
     """
@@ -43,20 +43,21 @@ class LoadState(NamedTuple):
     same: disturbance.DisturbanceState
     changed: disturbance.DisturbanceState
     open: bool
+    prior: float
     begun: int
     rows: int
 
 
 def initial_state(same):
     """Start from one `disturbance.DisturbanceState`."""
-    return LoadState(same, same, False, 0, 0)
+    return LoadState(same, same, False, 0.0, 0, 0)
 
 
 @kernel
 def log_odds(state, params):
     """Logarithm of the odds of a jump at the last stop against none."""
     gain = state.changed.log_likelihood - state.same.log_likelihood
-    return params.prior + params.temper * gain
+    return state.prior + params.temper * gain
 
 
 @kernel
@@ -71,12 +72,13 @@ def decided(state, params):
     """
     seen = state.rows - state.begun
     if state.open and seen >= params.fewest and log_odds(state, params) > 0.0:
-        return LoadState(state.changed, state.changed, False, state.begun, state.rows), state.begun
-    return LoadState(state.same, state.same, False, state.begun, state.rows), -1
+        kept = LoadState(state.changed, state.changed, False, 0.0, state.begun, state.rows)
+        return kept, state.begun
+    return LoadState(state.same, state.same, False, 0.0, state.begun, state.rows), -1
 
 
 @kernel
-def step(state, time, row, y, noise_var, stopped, params):
+def step(state, time, row, y, noise_var, odds, params):
     """Fold in one row; see `disturbance.step`.
 
     Parameters
@@ -85,8 +87,9 @@ def step(state, time, row, y, noise_var, stopped, params):
     time : float
     row : (n,) float64
     y, noise_var : float
-    stopped : bool
-        The vehicle stood since the last row, so that the load may have changed.
+    odds : float
+        Logarithm of the odds that the load changed since the last row; NaN where the
+        vehicle did not stand.
     params : LoadParams
 
     Returns
@@ -103,17 +106,19 @@ def step(state, time, row, y, noise_var, stopped, params):
     Applications to Tracking and Navigation, 2001, ch. 11.6.
     """
     begun = -1
-    if stopped:
+    if not np.isnan(odds):
         state, begun = decided(state, params)
         loose = disturbance.loosened(state.same, params.jump_var)
-        state = LoadState(state.same, loose, True, state.rows, state.rows)
+        state = LoadState(state.same, loose, True, odds, state.rows, state.rows)
     same, _, _ = disturbance.step(state.same, time, row, y, noise_var, params.filter)
     if state.open:
         changed, _, _ = disturbance.step(state.changed, time, row, y, noise_var, params.filter)
-        state = LoadState(same, changed, True, state.begun, state.rows + 1)
+        state = LoadState(same, changed, True, state.prior, state.begun, state.rows + 1)
         share = 1.0 / (1.0 + np.exp(-log_odds(state, params)))
+        # Few rows after a stop are a launch, on a slipping clutch perhaps.
+        share *= min(1.0, (state.rows - state.begun) / params.fewest)
     else:
-        state = LoadState(same, same, False, state.begun, state.rows + 1)
+        state = LoadState(same, same, False, 0.0, state.begun, state.rows + 1)
         share = 0.0
     first = (1.0 - share) * state.same.x[0] + share * state.changed.x[0]
     first_var = (
@@ -125,7 +130,7 @@ def step(state, time, row, y, noise_var, stopped, params):
 
 
 @kernel
-def run(state, time, rows, y, noise_var, stopped, params):
+def run(state, time, rows, y, noise_var, odds, params):
     """Apply ``step`` to each row and decide at the end.
 
     Parameters
@@ -135,7 +140,8 @@ def run(state, time, rows, y, noise_var, stopped, params):
         Not falling [s].
     rows : (m, n) float64
     y, noise_var : (m,) float64
-    stopped : (m,) bool
+    odds : (m,) float64
+        As of ``step``.
     params : LoadParams
 
     Returns
@@ -152,7 +158,7 @@ def run(state, time, rows, y, noise_var, stopped, params):
     begins = np.zeros(y.size, dtype=np.bool_)
     for k in range(y.size):
         state, first[k], first_var[k], begun = step(
-            state, time[k], rows[k], y[k], noise_var[k], stopped[k], params
+            state, time[k], rows[k], y[k], noise_var[k], odds[k], params
         )
         if begun >= 0:
             begins[begun] = True
