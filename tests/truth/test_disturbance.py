@@ -87,7 +87,7 @@ def test_smoothing_equals_the_conditional_mean_of_the_dense_covariance():
     time, rows, y, noise, params, start, _ = problem()
     added = np.zeros(rows.shape)
     added[120, :2] = 300.0**2, 40.0**2
-    x, var, _ = kernel.smooth(start, time, rows, y, noise, added, params)
+    x, var, _, weight = kernel.smooth(start, time, rows, y, noise, added, params)
     jumped = (np.arange(y.size) >= 120).astype(float)
     left = jumped * np.exp(-np.maximum(time - time[119], 0.0) / 30.0)
     span = np.abs(time[:, None] - time)
@@ -105,11 +105,12 @@ def test_smoothing_equals_the_conditional_mean_of_the_dense_covariance():
         spread = np.diag(cov) - np.sum(cross * np.linalg.solve(whole, cross.T).T, axis=1)
         assert_allclose(x[:, i], expected, rtol=1e-6, atol=1e-6)
         assert_allclose(var[:, i], spread, rtol=1e-5, atol=1e-6)
+    assert_allclose(weight, np.diag(np.linalg.inv(whole)), rtol=1e-6)
 
 
 def test_smoothing_ends_where_the_filter_ends():
     time, rows, y, noise, params, start, _ = problem()
     state, *_ = kernel.run(start, time, rows, y, noise, NO_JUMPS, params)
-    x, var, _ = kernel.smooth(start, time, rows, y, noise, NO_JUMPS, params)
+    x, var, *_ = kernel.smooth(start, time, rows, y, noise, NO_JUMPS, params)
     assert_allclose(x[-1], state.x, rtol=1e-12)
     assert_allclose(var[-1], np.diag(state.cov), rtol=1e-9)

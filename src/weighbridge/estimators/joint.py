@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,10 +20,12 @@ from weighbridge.estimators.judging import (
     judge,
     nothing,
 )
+from weighbridge.estimators.noisy_motion import LEVEL_STD, drawn
 from weighbridge.estimators.slow_errors import (
     SlowErrors,
     design,
     filter_params,
+    motion_variance,
     noise_variance,
     prior_std,
     usable_rows,
@@ -206,19 +209,22 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     start, noise, params = problem.kernel_input(fast, slow)
     added = np.where(begins[:, None], problem.jump_var, 0.0)
     time = problem.time
-    x, var, taken = disturbance.smooth(start, time, problem.rows, problem.y, noise, added, params)
+    x, var, taken, weight = disturbance.smooth(
+        start, time, problem.rows, problem.y, noise, added, params
+    )
+    low = drawn(weight, fast**2 * motion_variance(cut), var[:, 0], begins)
 
     left_out = np.zeros(view.time.size, dtype=bool)
     left_out[cut.index] = ~taken[cut.window]
     reason[left_out] = Reason.BAD_FIT
     used = reason == Reason.USED
     burnt = view.fuel_burnt
-    mass, bound = float(x[-1, 0] - burnt[-1]), float(np.sqrt(var[-1, 0]))
-    left = float(
-        np.hypot(
-            _left_open(balance, vehicle, mass),
-            body.relative_std(view.accel, rows[:, 0], used),
-        )
+    smoothed, running = x[:, 0] * (1.0 + low), running * (1.0 + low)
+    mass, bound = float(smoothed[-1] - burnt[-1]), float(np.sqrt(var[-1, 0]))
+    left = math.hypot(
+        _left_open(balance, vehicle, mass),
+        body.relative_std(view.accel, rows[:, 0], used),
+        LEVEL_STD * float(low[-1]),
     )
     std = float(np.hypot(UNMODELLED * bound, mass * left))
     last = np.searchsorted(time, view.time, side="right") - 1
@@ -247,7 +253,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
         converged_at=converged_at(view.time, track, mass, used),
         status=status,
         why=why,
-        segments=_segments(view, time, begins, x[:, 0], np.sqrt(var[:, 0]), left),
+        segments=_segments(view, time, begins, smoothed, np.sqrt(var[:, 0]), left),
         slow_errors=SlowErrors(
             time=time,
             mass_bound=np.sqrt(running_var),

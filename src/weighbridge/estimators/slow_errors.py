@@ -51,6 +51,9 @@ WARM_UP: Final = 500.0
 MOTION_STD: Final = 0.03
 """Fast error of the specific force before the drive has told [m/s^2]."""
 
+MOTION_WINDOW_STD: Final = 0.008
+"""What of it the mean of a window keeps however many rows it has [m/s^2]."""
+
 NAMES: Final = ("mass", "disturbance", "resistance", "wind_north", "wind_east", "cold_torque",
                 "drag_area")  # fmt: skip
 """The states, in order."""
@@ -136,7 +139,12 @@ def usable_rows(view: MergedView, rows: Floats, y: Floats) -> Bools:
 def noise_variance(view: MergedView, cut: Windows, torque_noise: float, mass: float) -> Floats:
     """Variance of the fast noise of each window's mean force [N^2], both sides."""
     torque = cut.mean((torque_noise * np.nan_to_num(view.gearing)) ** 2)
-    return np.asarray((torque + (mass * MOTION_STD) ** 2) / cut.count + (mass * 0.008) ** 2)
+    return np.asarray(torque / cut.count + mass**2 * motion_variance(cut))
+
+
+def motion_variance(cut: Windows) -> Floats:
+    """Variance of the fast noise of each window's mean specific force [m^2/s^4]."""
+    return np.asarray(MOTION_STD**2 / cut.count + MOTION_WINDOW_STD**2)
 
 
 def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = False) -> Floats:

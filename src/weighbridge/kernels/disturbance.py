@@ -169,11 +169,15 @@ def smooth(state, time, rows, y, noise_var, added, params):
         States and their variances.
     taken : (m,) bool
         As of ``run``.
+    weight : (m,) float64
+        Inverse variance of each ``y`` given all others; 0 where it was left out. They are the
+        diagonal of the inverse covariance of ``y``.
 
     References
     ----------
     Fixed-interval smoother without inverses: Bierman, Automatica 9, 1973
     (modified Bryson-Frazier). It stays exact where a state has no variance.
+    Weights: de Jong, Biometrika 75, 1988.
     """
     m, n = rows.shape
     x_pred = np.empty((m, n))
@@ -183,6 +187,7 @@ def smooth(state, time, rows, y, noise_var, added, params):
     gain = np.zeros((m, n))
     inverse = np.zeros(m)
     error = np.zeros(m)
+    weight = np.zeros(m)
     for k in range(m):
         if np.any(added[k] > 0.0):
             state = loosened(state, added[k])
@@ -201,6 +206,7 @@ def smooth(state, time, rows, y, noise_var, added, params):
     var_out = np.empty((m, n))
     for k in range(m - 1, -1, -1):
         row = rows[k]
+        weight[k] = inverse[k] + gain[k] @ information @ gain[k]
         back = np.eye(n) - np.outer(gain[k], row)
         information = back.T @ information @ back + inverse[k] * np.outer(row, row)
         adjoint = back.T @ adjoint - inverse[k] * error[k] * row
@@ -212,4 +218,4 @@ def smooth(state, time, rows, y, noise_var, added, params):
             adjoint[i] *= keep[k, i]
             information[i, :] *= keep[k, i]
             information[:, i] *= keep[k, i]
-    return x_out, var_out, taken
+    return x_out, var_out, taken, weight

@@ -1,0 +1,50 @@
+"""Noise of the motion draws the mass down by as much as is reckoned."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from weighbridge.estimators.noisy_motion import drawn
+from weighbridge.kernels import disturbance as kernel
+
+MASS = 1500.0
+NOISE = 0.06
+"""Of the motion [m/s^2], beside a true specific force of 0.25 m/s^2."""
+
+
+def weighed(seed, n=400):
+    """Mass of one drive as the filter has it, and with what the noise takes put back."""
+    rng = np.random.default_rng(seed)
+    time = 2.5 * np.arange(n)
+    true = rng.normal(0.0, 0.25, n)
+    keep = np.exp(-2.5 / 30.0)
+    wander = np.zeros(n)
+    for k in range(1, n):
+        wander[k] = keep * wander[k - 1] + rng.normal(0.0, 60.0 * np.sqrt(1.0 - keep**2))
+    motion = true + rng.normal(0.0, NOISE, n)
+    y = MASS * true + wander + rng.normal(0.0, 30.0, n)
+    noise = np.full(n, 30.0**2 + (MASS * NOISE) ** 2)
+    params = kernel.DisturbanceParams(
+        time_constant=np.array([np.inf, 30.0]), std=np.array([0.0, 60.0]), gate=np.inf, settle=0
+    )
+    start = kernel.initial_state([MASS, 0.0], np.diag([MASS**2, 60.0**2]), 0.0)
+    rows = np.column_stack([motion, np.ones(n)])
+    none = np.zeros(rows.shape)
+    x, var, _, weight = kernel.smooth(start, time, rows, y, noise, none, params)
+    low = drawn(weight, np.full(n, NOISE**2), var[:, 0], np.zeros(n, dtype=bool))
+    return x[-1, 0], x[-1, 0] * (1.0 + low[-1])
+
+
+def test_the_mean_over_many_drives_is_right_once_the_noise_is_put_back():
+    as_it_is, put_back = np.mean([weighed(seed) for seed in range(60)], axis=0) / MASS - 1.0
+    assert -0.07 < as_it_is < -0.03
+    # To first order: what is left is the square of what was taken.
+    assert put_back == pytest.approx(0.0, abs=0.006)
+
+
+def test_each_load_counts_its_own_windows():
+    begins = np.array([False, False, True, False, True])
+    weight = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    mass_var = np.array([1.0, 1.0, 0.5, 0.5, 2.0])
+    low = drawn(weight, np.full(5, 2.0), mass_var, begins)
+    assert_allclose(low, [6.0, 6.0, 7.0, 7.0, 20.0])
