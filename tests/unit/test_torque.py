@@ -7,7 +7,13 @@ from numpy.testing import assert_allclose
 from weighbridge.errors import DriveError
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import TorqueModel, Vehicle
-from weighbridge.vehicle.torque import air_flow_torque, engine_torque, lowest_load, torque_rows
+from weighbridge.vehicle.torque import (
+    air_flow_torque,
+    engine_torque,
+    lowest_load,
+    reading_of,
+    torque_rows,
+)
 
 TIME = np.arange(5.0)
 SPEED = np.array([100.0, 150.0, 200.0, 250.0, 700.0])
@@ -55,6 +61,18 @@ def test_load_by_the_regression_of_eq_49():
     assert found.extrapolated.tolist() == [True, False, False, False, True]
     bent = torque(recorded, coefficients=(-20.0, 300.0), curvature=(0.1, 50.0), **model)
     assert_allclose(bent.torque, -20.0 + 300.0 * load + 0.1 * load * SPEED + 50.0 * load**2)
+
+
+@pytest.mark.parametrize("curvature", [(), (0.1, 50.0), (0.1, -60.0)])
+def test_the_reading_of_a_torque_gives_that_torque(curvature):
+    load = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
+    recorded = drive(engine_load=load, engine_speed=SPEED)
+    model = TorqueModel(
+        source="load", coefficients=(-20.0, 300.0, 0.05, -1e-4), curvature=curvature
+    )
+    found = engine_torque(recorded, Vehicle(torque=model), SPEED, TIME)
+    assert_allclose(reading_of(found.torque, SPEED, model), load)
+    assert_allclose(reading_of(load, SPEED, TorqueModel()), load)
 
 
 def test_air_flow_torque_by_hand():

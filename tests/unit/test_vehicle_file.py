@@ -104,6 +104,7 @@ vehicles = st.builds(
         residual_std=maybe(positive),
         samples=maybe(st.integers(0, 10**9)),
         mass_scale_std=maybe(positive),
+        fit_cov=st.sampled_from(((), (2.0,), (1.5, -0.25, 3e-7))),
         notes=maybe(text),
     ),
 )

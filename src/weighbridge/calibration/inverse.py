@@ -67,6 +67,7 @@ class InverseFit:
     coefficients : (p,) w0, w1, w2 ... of Jensen 2022, eq. 49, then the curvature
     road : (4,) C_d A, C_r, I_e, I_w
     stds : (p + 4,) standard deviations of both
+    cov : (p + 4, p + 4) covariance of both
     log_likelihood : of the innovations
     windows : number of windows
     """
@@ -74,6 +75,7 @@ class InverseFit:
     coefficients: Floats
     road: Floats
     stds: Floats
+    cov: Floats
     log_likelihood: float
     windows: int
 
@@ -251,14 +253,19 @@ def _unpack(
     extra = 1 + order + 2 * curved
     x, cov = state.x[: 5 + extra], state.cov[: 5 + extra, : 5 + extra]
     ratio = x[1:] / x[0]
-    var = (np.diag(cov)[1:] - 2.0 * ratio * cov[1:, 0] + ratio**2 * cov[0, 0]) / x[0] ** 2
-    slope = scale / x[0]
-    slope_std = slope * float(np.sqrt(cov[0, 0])) / x[0]
-    stds = np.sqrt(np.maximum(var, 0.0))
+    # Rows: w0, w1, w2 ... with the curvature, then the road. d(a / x0) = (da - a / x0 dx0) / x0.
+    slopes = np.zeros((5 + extra, 5 + extra))
+    slopes[0, 5], slopes[0, 0] = 1.0, -ratio[4]
+    slopes[1, 0] = -scale / x[0]
+    for row, column in enumerate([*range(6, 5 + extra), *range(1, 5)], start=2):
+        slopes[row, column], slopes[row, 0] = 1.0, -ratio[column - 1]
+    slopes /= x[0]
+    cov = slopes @ cov @ slopes.T
     return InverseFit(
-        coefficients=np.concatenate(([ratio[4]], [slope], ratio[5:])),
+        coefficients=np.concatenate(([ratio[4]], [scale / x[0]], ratio[5:])),
         road=ratio[:4],
-        stds=np.concatenate(([stds[4]], [slope_std], stds[5:], stds[:4])),
+        stds=np.sqrt(np.maximum(np.diag(cov), 0.0)),
+        cov=cov,
         log_likelihood=float(state.log_likelihood),
         windows=total,
     )

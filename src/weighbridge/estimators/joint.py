@@ -12,6 +12,7 @@ from scipy.optimize import minimize
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import MergedView
+from weighbridge.estimators.considered import force_columns, open_std, sensitivity
 from weighbridge.estimators.judging import (
     OTHER_METHOD_STD,
     STOP,
@@ -221,9 +222,12 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     burnt = view.fuel_burnt
     smoothed, running = x[:, 0] * (1.0 + low), running * (1.0 + low)
     mass, bound = float(smoothed[-1] - burnt[-1]), float(np.sqrt(var[-1, 0]))
+    columns = cut.mean(force_columns(balance, vehicle, mass))
+    moved = sensitivity(columns, time, problem.rows, noise, added, taken, start, params)
     left = math.hypot(
         _left_open(balance, vehicle, mass),
         body.relative_std(view.accel, rows[:, 0], used),
+        UNMODELLED * open_std(vehicle, moved, mass),
         LEVEL_STD * float(low[-1]),
     )
     std = float(np.hypot(UNMODELLED * bound, mass * left))
@@ -250,6 +254,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
         std=std,
         degrees_of_freedom=float("inf"),
         bound_std=bound,
+        sensitivity=moved,
         converged_at=converged_at(view.time, track, mass, used),
         status=status,
         why=why,

@@ -60,6 +60,8 @@ class MassTrack:
         for good [s]; NaN if never
     status : and ``why`` in a sentence where it is not converged
     segments : mass between stops
+    sensitivity : (k,) how far one unit of each parameter of the calibration moves the mass
+        [kg per unit]; None where a method does not say
     slow_errors : what was estimated beside the mass; None where a method does not
     """
 
@@ -77,6 +79,7 @@ class MassTrack:
     status: Status
     why: str
     segments: tuple[Segment, ...]
+    sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
 
     @property

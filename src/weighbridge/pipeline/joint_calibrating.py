@@ -13,6 +13,7 @@ from weighbridge.balance.force_balance import ForceBalance
 from weighbridge.calibration.inverse import DriveRows, FitSettings, InverseFit, TooShort, fit
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
+from weighbridge.estimators.considered import pinned, triangle
 from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.class_values import road_prior
@@ -126,8 +127,8 @@ def refine(
         delay, lag = _timing(misfits)
         found = fit(rows_at(delay, lag), settings)
     except TooShort as short:
-        return _self_weighed(_as_it_is(vehicle, str(short)), problem, rebalance)
-    return _self_weighed(_with(vehicle, found, delay, lag, problem), problem, rebalance)
+        return _self_weighed(_as_it_is(vehicle, str(short)), problem, rebalance, None)
+    return _self_weighed(_with(vehicle, found, delay, lag, problem), problem, rebalance, found.cov)
 
 
 def _as_it_is(vehicle: Vehicle, why: str) -> Vehicle:
@@ -213,36 +214,53 @@ def _self_weighed(
     vehicle: Vehicle,
     problem: JointProblem,
     rebalance: Callable[[Vehicle], Sequence[ForceBalance]],
+    cov: Floats | None,
 ) -> Vehicle:
-    """Scale the torque so that the drives weigh what they are known to."""
+    """Scale the torque so that the drives weigh what they are known to.
 
-    def found(scale: float) -> tuple[float, float]:
+    ``cov`` is that of the fit, if there was one. The scale pins what the drives weigh in the
+    mean; what is left open moves drives that use the torque otherwise.
+    """
+
+    def found(scale: float) -> tuple[float, float, Floats]:
         tried = replace(vehicle, torque=vehicle.torque.scaled(scale))
         ratios, stds = [], []
+        moved: list[Floats] = []
         for balance, mass in zip(rebalance(tried), problem.masses, strict=True):
             track = joint.estimate(balance, tried)
-            if np.isfinite(track.mass):
+            if np.isfinite(track.mass) and track.sensitivity is not None:
                 left = mass - float(balance.merged.fuel_burnt[-1])
                 ratios.append(track.mass / left)
                 stds.append(track.bound_std / left)
+                moved.append(track.sensitivity / left)
         if not ratios:
             raise DriveError(
                 "the drives of the calibration cannot be weighed: drive longer, with more starts"
             )
         weight = 1.0 / np.square(stds)
-        return float(np.average(ratios, weights=weight)), float(1.0 / np.sqrt(np.mean(weight)))
+        return (
+            float(np.average(ratios, weights=weight)),
+            float(1.0 / np.sqrt(np.mean(weight))),
+            np.average(np.array(moved), axis=0, weights=weight),
+        )
 
-    ratio, bound = found(1.0)
+    ratio, bound, direction = found(1.0)
     each = float(np.hypot(TRANSFER_STD[1], joint.UNMODELLED * bound))
     # Where the torque could not be fitted anew, what its own fit left open stays.
     known = float(np.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0))
     slope = (found(1.02)[0] - ratio) / 0.02
     scale = 1.0 + (1.0 - ratio) / slope if slope > 0.2 else 1.0 / ratio
+    open_cov: tuple[float, ...] = ()
+    if cov is not None:
+        # The torque coefficients are scaled, and their errors with them.
+        units = np.concatenate((np.full(len(cov) - 4, scale), np.ones(4)))
+        open_cov = triangle(pinned(cov, direction) * np.outer(units, units))
     return replace(
         vehicle,
         torque=vehicle.torque.scaled(scale),
         provenance=replace(
             vehicle.provenance,
+            fit_cov=open_cov,
             mass_scale_std=float(np.hypot(known, each / np.sqrt(len(problem.masses)))),
         ),
     )

@@ -262,6 +262,13 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 "mass_scale_std",
                 "part of any mass weighed with this file, as standard deviation",
             ),
+            _Key(
+                "fit_cov",
+                "fit_cov",
+                "what the fit leaves open beside that part, lower triangle in SI: coefficients, "
+                "curvature, drag area, rolling coefficient, engine and wheel inertia",
+                "numbers",
+            ),
             _Key("notes", "notes", "free text", "text"),
         ),
     ),

@@ -384,6 +384,9 @@ class Provenance:
         model of "speed-ekf" alone; None where nothing was
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
+    fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
+        triangle, row by row, of torque coefficients, curvature, drag area, rolling
+        coefficient, engine and wheel inertia; empty where it is not known
     notes : free text
     """
 
@@ -395,10 +398,17 @@ class Provenance:
     samples: int | None = None
     method: str | None = None
     mass_scale_std: float | None = None
+    fit_cov: tuple[float, ...] = ()
     notes: str | None = None
 
     def __post_init__(self) -> None:
         _not_negative("mass_scale_std", self.mass_scale_std)
+        size = math.isqrt(2 * len(self.fit_cov))
+        if size * (size + 1) != 2 * len(self.fit_cov):
+            raise ConfigError(
+                "fit_cov must be the lower triangle of a square, 1, 3, 6, 10 ... numbers, "
+                f"got {len(self.fit_cov)}"
+            )
         if self.method not in (None, "joint", "rls", "speed-ekf"):
             raise ConfigError(f"method must be joint, rls or speed-ekf, got {self.method!r}")
 

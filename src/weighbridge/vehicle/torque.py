@@ -179,6 +179,27 @@ def torque_rows(
     return np.column_stack(columns)
 
 
+def reading_of(torque: Floats, engine_speed: Floats, model: TorqueModel) -> Floats:
+    """Return the reading that gives a torque: `torque_rows` solved for it (n,).
+
+    Parameters
+    ----------
+    torque : (n,) [N m]
+    engine_speed : (n,) [rad/s]
+    model
+    """
+    offset, scale, *powers = model.coefficients or (0.0, 1.0)
+    lean, bend = model.curvature or (0.0, 0.0)
+    rest = offset - torque
+    for k, w in enumerate(powers, start=1):
+        rest = rest + w * engine_speed**k
+    slope = scale + lean * engine_speed
+    # The root that stays finite where the map is straight; where it bends so far that
+    # there is none, its turning point.
+    root = np.sqrt(np.maximum(slope**2 - 4.0 * bend * rest, 0.0))
+    return np.asarray(-2.0 * rest / (slope + root))
+
+
 def averaged(values: Floats, period: float, span: float) -> Floats:
     """Mean over ``span`` around each sample.
 

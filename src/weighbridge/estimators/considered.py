@@ -1,0 +1,128 @@
+"""What the calibration's fit leaves open on this drive: another mix of gears, loads, slopes."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance import ForceBalance
+from weighbridge.constants import GRAVITY
+from weighbridge.kernels import disturbance
+from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import reading_of, torque_rows
+
+UNSEEN: Final = 1e12
+"""Factor on the noise of a row that the filter had left out [-]."""
+
+
+def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Floats:
+    """Force that one unit of each fitted parameter adds to what is left for the mass.
+
+    Parameters
+    ----------
+    balance, vehicle
+    mass : rough; what rolls with C_r [kg]
+
+    Returns
+    -------
+    (n, p + 4) for the torque coefficients, their curvature, C_d A, C_r, I_e, I_w, as
+    `weighbridge.vehicle.model.Provenance.fit_cov` has them
+    """
+    view, model, line = balance.merged, vehicle.torque, vehicle.driveline
+    gearing = np.nan_to_num(view.gearing)
+    torque, speed = np.nan_to_num(balance.force.torque), np.nan_to_num(balance.force.engine_speed)
+    gain = np.where(torque >= 0.0, line.efficiency, 1.0 / line.efficiency) * gearing
+    terms = torque_rows(
+        reading_of(torque, speed, model),
+        speed,
+        max(len(model.coefficients) - 2, 0),
+        curved=bool(model.curvature),
+    )
+    pressure = 0.5 * view.air_density * view.air_speed * np.abs(view.air_speed)
+    road = (
+        -pressure,
+        -mass * GRAVITY * np.cos(view.grade),
+        -(gearing**2) * view.accel,
+        -view.accel / line.wheel_radius**2,
+    )
+    return np.asarray(np.nan_to_num(np.column_stack([terms * gain[:, None], *road])))
+
+
+def sensitivity(
+    columns: Floats,
+    time: Floats,
+    rows: Floats,
+    noise: Floats,
+    added: Floats,
+    taken: Bools,
+    start: disturbance.DisturbanceState,
+    params: disturbance.DisturbanceParams,
+) -> Floats:
+    """How far one unit of each parameter moves the mass at the end (k,) [kg per unit].
+
+    With its gains as they are the filter is linear, so that it weighs the column
+    of a parameter as it weighs a force.
+
+    Parameters
+    ----------
+    columns : (m, k) means over the windows of `force_columns`
+    time, rows, noise, added, start, params : as of `weighbridge.kernels.disturbance.smooth`
+    taken : (m,) windows that its gate let through
+
+    References
+    ----------
+    Consider analysis: Schmidt, Application of State-Space Methods to Navigation Problems,
+    1966; Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, ch. 8.
+    """
+    noise = np.where(taken, noise, UNSEEN * noise)
+    start = start._replace(x=np.zeros_like(start.x))
+    params = params._replace(gate=np.inf)
+    moved = []
+    for column in columns.T:
+        y = np.ascontiguousarray(column)
+        state, *_ = disturbance.run(start, time, rows, y, noise, added, params)
+        moved.append(float(state.x[0]))
+    return np.array(moved)
+
+
+def from_triangle(values: tuple[float, ...]) -> Floats:
+    """Symmetric matrix (k, k) from its lower triangle, row by row."""
+    size = int(np.sqrt(2 * len(values)))
+    matrix = np.zeros((size, size))
+    matrix[np.tril_indices(size)] = values
+    return np.asarray(matrix + np.tril(matrix, -1).T)
+
+
+def triangle(matrix: Floats) -> tuple[float, ...]:
+    """Lower triangle of a symmetric matrix (k, k), row by row."""
+    return tuple(float(v) for v in matrix[np.tril_indices(len(matrix))])
+
+
+def pinned(cov: Floats, direction: Floats) -> Floats:
+    """Covariance (k, k) once ``direction @ parameters`` is known exactly.
+
+    Parameters
+    ----------
+    cov : (k, k) before
+    direction : (k,)
+    """
+    gain = cov @ direction
+    power = float(direction @ gain)
+    return np.asarray(cov - np.outer(gain, gain) / power) if power > 0.0 else cov
+
+
+def open_std(vehicle: Vehicle, moved: Floats, mass: float) -> float:
+    """Relative standard deviation of a mass by what the fit left open [-].
+
+    Parameters
+    ----------
+    vehicle : 0 where its file does not say
+    moved : (k,) of `sensitivity`
+    mass : [kg]
+    """
+    cov = from_triangle(vehicle.provenance.fit_cov)
+    if len(cov) != moved.size or not mass > 0.0:
+        return 0.0
+    return float(np.sqrt(max(float(moved @ cov @ moved), 0.0)) / mass)
