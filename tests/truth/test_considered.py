@@ -86,7 +86,7 @@ def test_sensitivity_equals_generalised_least_squares_of_the_rows_taken():
     time, rows, noise, params, start, columns = problem()
     taken = np.ones(time.size, dtype=bool)
     taken[::7] = False
-    found = sensitivity(columns, time, rows, noise, np.zeros(time.size), taken, start, params)
+    found = sensitivity(columns, time, rows, noise, np.zeros(rows.shape), taken, start, params)
     cov = 60.0**2 * np.exp(-np.abs(time[:, None] - time) / 30.0) + np.diag(noise)
     weight = np.linalg.inv(cov[np.ix_(taken, taken)])
     phi = rows[taken, 0]

@@ -14,6 +14,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.vehicle.air import air_density
+from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.fuel import fuel_burnt
 from weighbridge.vehicle.gear import (
     effective_gearing,
@@ -226,7 +227,8 @@ def force_balance(
     engine_speed = _engine_speed(drive, vehicle, time + motion.speed_delay, rows["speed"])
     gear, gearing, slipping = _gears(drive, vehicle, recorded, engine_speed, rows["speed"])
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
-    efficiency = np.where(torque.torque >= 0.0, driveline.efficiency, 1.0 / driveline.efficiency)
+    driving = wheel_efficiency(vehicle)
+    efficiency = np.where(torque.torque >= 0.0, driving, 1.0 / driving)
     traction = efficiency * torque.torque * gearing
     density = air_density(drive, time, rows["altitude"])
     rotating = (

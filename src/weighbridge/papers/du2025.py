@@ -25,6 +25,7 @@ from weighbridge.report.table import Table
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
+from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import (
     Driveline,
     Mounting,
@@ -421,13 +422,13 @@ def _settings_table(done: Reproduction) -> Table:
 
 def _vehicle_table(done: Reproduction) -> Table:
     sheet, car = data_sheet(), done.vehicle
-    offset, scale = car.torque.coefficients
+    offset, scale, *_ = car.torque.coefficients
     return Table(
         "Vehicle",
         ("parameter", "data sheet", "calibrated"),
         (
             ("torque offset N m", "0", f"{offset:.1f}"),
-            ("torque scale, efficiency in it", f"{sheet.driveline.efficiency:.3f}", f"{scale:.3f}"),
+            ("torque scale, efficiency in it", f"{wheel_efficiency(sheet):.3f}", f"{scale:.3f}"),
             ("engine inertia kg m²", f"{sheet.driveline.engine_inertia:.2f}",
              f"{car.driveline.engine_inertia:.2f}"),
             ("drag area m²", f"{sheet.road_load.drag_area:.2f}", f"{car.road_load.drag_area:.2f}"),

@@ -21,6 +21,7 @@ from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signa
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.units import UNITS, scalar_from_si
 from weighbridge.signals.words import counted
+from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE, friction_coefficients
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque import SIGNALS
 
@@ -389,10 +390,7 @@ def _check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     if vehicle is not None and vehicle.torque.coefficients and vehicle.torque.coefficients[0] < 0.0:
         return
     idle = _idle_torque(drive, torque)
-    remedy = (
-        "state it as coefficients = [-F, 1.0], F the friction in N m, under [torque] of the "
-        "vehicle file"
-    )
+    remedy = _friction_remedy(drive, vehicle, idle)
     if drive.has("indicated_torque_fraction"):
         seen = f" (at most {100.0 * idle:.0f} %, its reading at idle)" if idle is not None else ""
         yield Problem(
@@ -407,6 +405,31 @@ def _check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             f"warm at idle and standing the torque reads {100.0 * idle:.0f} %: friction seems to "
             f"be in it, as PID 62 may have it, beside what alternator and pumps take; {remedy}",
         )
+
+
+def _friction_remedy(drive: Drive, vehicle: Vehicle | None, idle: float | None) -> str:
+    """Say what to write of the friction into a vehicle file."""
+    reference = drive.get("reference_torque")
+    if reference is not None and len(reference):
+        full = float(np.median(reference.values))
+    else:
+        full = (vehicle.torque.reference_torque if vehicle is not None else None) or 0.0
+    engine = drive.get("engine_speed")
+    if idle is None or not full or engine is None or not len(engine):
+        return (
+            "state it as coefficients = [-F, 1.0], F the friction in N m, under [torque] of the "
+            "vehicle file"
+        )
+    turning = engine.values[(engine.values > _IDLE[0]) & (engine.values < _IDLE[1])]
+    told = []
+    for fuel in FRICTION_PRESSURE:
+        w0, w2, w3 = friction_coefficients(idle * full, float(np.median(turning)), fuel)
+        told.append(f"[{-w0:.3g}, 1.0, {-w2:.3g}, {-w3:.3g}] for {fuel}")
+    return (
+        f"state it under [torque] of the vehicle file as coefficients = {' or '.join(told)}, which "
+        "grows with engine speed; with an automatic stand in neutral for it: in gear the reading "
+        "holds the drag of the converter as well"
+    )
 
 
 def _idle_torque(drive: Drive, torque: Signal) -> float | None:

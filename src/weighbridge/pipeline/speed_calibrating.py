@@ -77,7 +77,7 @@ def nominal_of(vehicle: Vehicle) -> Nominal:
     line = vehicle.driveline
     gearing = float(np.median(line.gearings)) if line.gearings else GEARING
     return Nominal(
-        force_gain=line.efficiency * gearing,
+        force_gain=(line.efficiency or 1.0) * gearing,
         drag=AIR_DENSITY * vehicle.road_load.drag_area,
         rolling_coefficient=vehicle.road_load.rolling_coefficient,
         rotating_mass=line.wheel_inertia / line.wheel_radius**2 + line.engine_inertia * gearing**2,

@@ -92,6 +92,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 suffix="kgm2",
             ),
             _Key("wheel_radius", "wheel_radius", "effective rolling radius", suffix="m"),
+            _Key("layout", "layout", "of a car or van: transverse or longitudinal", "text"),
             _Key(
                 "efficiency",
                 "efficiency",
@@ -109,7 +110,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 "coefficients",
                 "coefficients",
                 "in SI; load: w0, w1 per load, w2, w3 ... per power of engine speed; "
-                "measured and percent: offset, scale",
+                "measured and percent: offset, scale, then powers of engine speed",
                 "numbers",
             ),
             _Key("coefficient_stds", "coefficient_stds", "their standard deviations", "numbers"),

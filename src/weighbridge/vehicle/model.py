@@ -14,6 +14,7 @@ FORMAT_VERSION: Final = 1
 
 TorqueSource = Literal["load", "measured", "percent", "air_flow"]
 VehicleClass = Literal["car", "van", "bus", "truck"]
+Layout = Literal["transverse", "longitudinal"]
 
 
 MASS_RANGE: Final[dict[VehicleClass, tuple[float, float]]] = {
@@ -49,8 +50,11 @@ class Driveline:
         and its standard deviation [kg m^2]; None where it was not fitted
     wheel_inertia, wheel_inertia_std : all wheels and what turns with them [kg m^2]
     wheel_radius : effective rolling radius [m]
+    layout : how the engine of a car or van lies, "transverse" or "longitudinal"; None where
+        it is not known
     efficiency : wheel over engine power when driving, in (0, 1] [-]; 1 where the
-        torque was calibrated at the wheels
+        torque was calibrated at the wheels; None for that of such drivelines, see
+        `weighbridge.vehicle.data_sheet.wheel_efficiency`
     speed_scale : indicated over true vehicle speed [-]
     idle_speed : engine idle speed [rad/s]; 0 where it is unknown or the motor stands
     """
@@ -62,7 +66,8 @@ class Driveline:
     wheel_inertia: float = 6.0
     wheel_inertia_std: float | None = None
     wheel_radius: float = 0.31
-    efficiency: float = 1.0
+    layout: Layout | None = None
+    efficiency: float | None = None
     speed_scale: float = 1.0
     idle_speed: float = 0.0
 
@@ -77,7 +82,9 @@ class Driveline:
         _not_negative("wheel_inertia", self.wheel_inertia)
         _positive("wheel_radius", self.wheel_radius)
         _not_negative("idle_speed", self.idle_speed)
-        if not 0.0 < self.efficiency <= 1.0:
+        if self.layout not in (None, "transverse", "longitudinal"):
+            raise ConfigError(f"layout must be transverse or longitudinal, got {self.layout!r}")
+        if self.efficiency is not None and not 0.0 < self.efficiency <= 1.0:
             raise ConfigError(f"efficiency must be in (0, 1], got {self.efficiency}")
         if not 0.8 <= self.speed_scale <= 1.2:
             raise ConfigError(f"speed_scale must be in [0.8, 1.2], got {self.speed_scale}")
@@ -98,7 +105,8 @@ class TorqueModel:
         "percent" (percent of the reference torque) or "air_flow" (eq. 51)
     coefficients : w0, w1 (per unit of load or of air flow torque), then w2, w3 ...
         of rising powers of engine speed in rad/s; for measured and percent
-        torque (offset [N m], scale [-]), empty meaning (0, 1)
+        torque (offset [N m], scale [-]), empty meaning (0, 1), then as well powers of
+        engine speed, such as friction that is still in the reading
     coefficient_stds : their standard deviations, same length or empty
     curvature : of load times engine speed [N m s/rad] and of load squared [N m];
         empty for the regression of eq. 49 as printed
@@ -130,10 +138,10 @@ class TorqueModel:
             raise ConfigError(
                 "torque source 'load' needs at least two coefficients: run weighbridge calibrate"
             )
-        if self.source in ("measured", "percent") and len(self.coefficients) not in (0, 2):
+        if self.source in ("measured", "percent") and len(self.coefficients) == 1:
             raise ConfigError(
-                f"torque source {self.source!r} takes two coefficients, offset and scale, or none, "
-                f"got {len(self.coefficients)}"
+                f"torque source {self.source!r} takes two coefficients, offset and scale, and "
+                "powers of engine speed behind them, or none, got 1"
             )
         if self.coefficient_stds and len(self.coefficient_stds) != len(self.coefficients):
             raise ConfigError("coefficient_stds must be as many as coefficients")

@@ -247,8 +247,10 @@ def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Fl
     x = regressor(drive, model.source, time, model)
     nowhere = np.zeros(time.size, dtype=bool)
     if model.source in ("measured", "percent"):
-        offset, scale = model.coefficients or (0.0, 1.0)
+        offset, scale, *powers = model.coefficients or (0.0, 1.0)
         torque = offset + scale * x
+        for k, w in enumerate(powers, start=1):
+            torque = torque + w * engine_speed**k
         return Torque(time, torque, nowhere, nowhere, averaged(torque, period, BRAKED_TIME))
     dragged = averaged(x, period, DRAGGED_TIME)
     if not model.coefficients:
