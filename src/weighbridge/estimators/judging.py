@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.estimators.track import MassTrack, Segment, Status
-from weighbridge.navigation.motion import MotionSource
+from weighbridge.navigation.motion import BY_SPEED, MotionSource
 from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.model import MASS_RANGE, TorqueSource, Vehicle
 
 STOP: Final = 20.0
@@ -37,10 +38,9 @@ OTHER_METHOD_STD: Final = 0.06
 was fitted for rls [-]: that fit is drawn by the noise of the reading, the joint
 estimator is not; simulated vehicles came out 4 to 8 % light."""
 
-UNCALIBRATED_STD: Final = 0.06
-"""Relative standard deviation of masses by a vehicle file that was never calibrated and
-does not say how sure it is [-]: torque and efficiency 4 %, rolling radius 2 %, lean of the
-accelerometer 3 %."""
+LEAN_STD: Final = 0.03
+"""Relative standard deviation of masses by an accelerometer that leans with the body, where
+no calibration took that up [-]: recorded cars leaned by 2 to 5 % of the mass."""
 
 LIGHTEST: Final = 0.85
 """Below this part of the tare no error of the calibration explains the mass [-]."""
@@ -79,11 +79,20 @@ def calibration_std(
     vehicle: Vehicle,
     motion_std: Mapping[MotionSource, float] = MOTION_STD,
 ) -> float:
-    """Relative standard deviation by what the calibration left open and by the motion [-]."""
+    """Relative standard deviation by what the calibration left open and by the motion [-].
+
+    A vehicle file that was never calibrated leaves open what a data sheet does not say.
+    """
+    motion = balance.motion.source
     scale = vehicle.provenance.mass_scale_std
     if scale is None:
-        scale = UNCALIBRATED_STD
-    return float(np.hypot(scale, motion_std[balance.motion.source]))
+        scale = uncalibrated_std(vehicle, motion)
+    return float(np.hypot(scale, motion_std[motion]))
+
+
+def uncalibrated_std(vehicle: Vehicle, motion: MotionSource) -> float:
+    """Relative standard deviation by what a data sheet leaves open [-]."""
+    return float(np.hypot(scale_std(vehicle), 0.0 if motion in BY_SPEED else LEAN_STD))
 
 
 def cold_share(time: Floats, phi: Floats, used: Bools, start: float | None = None) -> float:

@@ -14,6 +14,12 @@ from weighbridge.estimators.rls import regression
 from weighbridge.kernels.disturbance import DisturbanceParams
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.data_sheet import (
+    USUAL_SPEED,
+    by_data_sheet,
+    inertia_std,
+    offset_std,
+)
 from weighbridge.vehicle.model import TorqueSource, Vehicle
 
 TIME_CONSTANTS: Final = (30.0, 900.0, 600.0, 600.0, 2e4)
@@ -57,6 +63,12 @@ MOTION_WINDOW_STD: Final = 0.008
 NAMES: Final = ("mass", "disturbance", "resistance", "wind_north", "wind_east", "cold_torque",
                 "drag_area")  # fmt: skip
 """The states, in order."""
+
+DATA_SHEET_NAMES: Final = ("torque_offset", "torque_growth", "engine_inertia", "wheel_inertia")
+"""Further states, constant, of a vehicle file from a data sheet alone, in order: what a
+calibration finds once is found from each drive. An offset of the torque works through the
+gear, and low gears go with strong acceleration: taken for none it makes mass. So does
+friction that grows with engine speed, which is high where torque is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +125,8 @@ def design(
 
     Returns
     -------
-    rows : (n, 7) for `NAMES`; the mass is that of the first row
+    rows : (n, 7) for `NAMES`, or (n, 11) with `DATA_SHEET_NAMES`; the mass is that of the
+        first row
     y : (n,) traction less drag and rotating inertia, and what the fuel that is burnt by then
         would have weighed [N]
     """
@@ -128,6 +141,11 @@ def design(
     cold = coldness(view) * np.nan_to_num(view.gearing)
     pressure = 0.5 * view.air_density * view.air_speed * np.abs(view.air_speed)
     columns = [phi, one, one, slope * north, slope * east, cold, pressure]
+    if by_data_sheet(vehicle):
+        gearing = np.nan_to_num(view.gearing)
+        wheels = view.accel / vehicle.driveline.wheel_radius**2
+        turning = gearing * view.speed / USUAL_SPEED
+        columns += [gearing, gearing * turning, gearing**2 * view.accel, wheels]
     return np.column_stack(columns), y + phi * view.fuel_burnt
 
 
@@ -148,7 +166,7 @@ def motion_variance(cut: Windows) -> Floats:
 
 
 def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = False) -> Floats:
-    """Standard deviations (7,) of the states before the drive has told.
+    """Standard deviations (7,) or (11,) of the states before the drive has told.
 
     Parameters
     ----------
@@ -166,22 +184,24 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = 
         rolling = float(std[1]) if rolling is None else rolling
     grade = GRAVITY * GRADE_STD if by_speed else 0.0
     resistance = float(np.hypot(RESISTANCE_STD, GRAVITY * (rolling or 0.0)))
-    return np.array(
-        [
-            mass,
-            mass * float(np.hypot(DISTURBANCE_STD, grade)),
-            mass * resistance,
-            WIND_STD,
-            WIND_STD,
-            COLD_TORQUE_STD[vehicle.torque.source] * torque,
-            drag or 0.0,
-        ]
-    )
+    states = [
+        mass,
+        mass * float(np.hypot(DISTURBANCE_STD, grade)),
+        mass * resistance,
+        WIND_STD,
+        WIND_STD,
+        COLD_TORQUE_STD[vehicle.torque.source] * torque,
+        drag or 0.0,
+    ]
+    if by_data_sheet(vehicle):
+        states += [*offset_std(vehicle, torque), *inertia_std(vehicle)]
+    return np.array(states)
 
 
 def filter_params(std: Floats, gate: float, settle: int) -> DisturbanceParams:
     """Make the kernel's parameters from the standard deviations of the states."""
-    lasting = np.array([np.inf, *TIME_CONSTANTS, np.inf])
+    lasting = np.full(std.size, np.inf)
+    lasting[1 : 1 + len(TIME_CONSTANTS)] = TIME_CONSTANTS
     return DisturbanceParams(
         time_constant=lasting,
         std=np.where(np.isfinite(lasting), std, 0.0),

@@ -17,10 +17,11 @@ from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
-from weighbridge.estimators.judging import UNCALIBRATED_STD
+from weighbridge.estimators.judging import uncalibrated_std
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
+from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import SIGNALS
 
@@ -331,9 +332,10 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
         by_speed = vehicle.provenance.method == "speed-ekf"
         made = "calibrated for speed-ekf alone" if by_speed else "not made by a calibration"
         notes += (
-            f"the vehicle file of {vehicle.name} was {made}: for errors of its torque, efficiency "
-            f"and road load {100.0 * UNCALIBRATED_STD:.0f} % of the mass, as standard deviation, "
-            "are in the interval",
+            f"the vehicle file of {vehicle.name} was {made}: for errors of its torque, rolling "
+            f"radius and efficiency (taken as {wheel_efficiency(vehicle):.2f}) and the lean of the "
+            f"body {100.0 * uncalibrated_std(vehicle, motion.source):.1f} % of the mass, "
+            "as standard deviation, are in the interval",
         )
     return force_balance(drive, vehicle, motion, delay=delay), notes
 

@@ -1,0 +1,147 @@
+"""What a data sheet leaves open: usual values of drivelines, and what the joint estimator finds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from weighbridge.balance import Reason
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.errors import ConfigError
+from weighbridge.estimators.judging import LEAN_STD, uncalibrated_std
+from weighbridge.estimators.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.data_sheet import (
+    ACCESSORY_POWER,
+    by_data_sheet,
+    friction_coefficients,
+    scale_std,
+    wheel_efficiency,
+)
+from weighbridge.vehicle.file import load_vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel, Vehicle
+from weighbridge.vehicle.torque import engine_torque
+
+GEARS = (12.0, 7.0, 4.5, 3.2)
+
+
+def sheet(**changes):
+    line = {"gearings": GEARS, **changes.pop("line", {})}
+    return Vehicle(driveline=Driveline(**line), torque=TorqueModel(source="percent"), **changes)
+
+
+def test_a_file_that_does_not_state_the_efficiency_gets_that_of_its_kind(tmp_path):
+    across = sheet(line={"layout": "transverse"})
+    lengthwise = sheet(line={"layout": "longitudinal"})
+    electric = Vehicle(driveline=Driveline(gearings=(30.0,)))
+    assert wheel_efficiency(electric) > wheel_efficiency(across) > wheel_efficiency(lengthwise)
+    assert wheel_efficiency(lengthwise) < wheel_efficiency(sheet()) < wheel_efficiency(across)
+    assert wheel_efficiency(sheet(line={"efficiency": 0.88})) == 0.88
+    # A truck's layout is always the same.
+    truck = sheet(kind="truck", line={"layout": "longitudinal"})
+    assert wheel_efficiency(truck) == wheel_efficiency(sheet(kind="truck"))
+
+    file = tmp_path / "car.toml"
+    file.write_text('[driveline]\ngearings_per_m = [12.0, 7.0]\nlayout = "transverse"\n')
+    loaded = load_vehicle(file)
+    assert loaded.driveline.efficiency is None
+    assert wheel_efficiency(loaded) == wheel_efficiency(across)
+    loaded.save(tmp_path / "again.toml")
+    assert load_vehicle(tmp_path / "again.toml") == loaded
+    with pytest.raises(ConfigError, match="transverse or longitudinal"):
+        Driveline(layout="sideways")
+
+
+@pytest.mark.parametrize(
+    "vehicle",
+    [
+        sheet(provenance=Provenance(mass_scale_std=0.01)),
+        sheet(provenance=Provenance(method="joint")),
+        Vehicle(torque=TorqueModel(source="load", coefficients=(-20.0, 300.0))),
+    ],
+)
+def test_what_was_fitted_at_the_wheels_is_left_alone(vehicle):
+    assert not by_data_sheet(vehicle)
+    assert wheel_efficiency(vehicle) == 1.0
+    assert prior_std(vehicle, 1500.0, 200.0).size == len(NAMES)
+
+
+def test_the_interval_holds_torque_efficiency_radius_and_lean():
+    electric = Vehicle(driveline=Driveline(gearings=(30.0,)))
+    assert_allclose(scale_std(electric), np.sqrt(0.03**2 + 0.01**2 + 0.015**2))
+    assert_allclose(uncalibrated_std(electric, "speed"), scale_std(electric))
+    assert_allclose(uncalibrated_std(electric, "inertial"), np.hypot(scale_std(electric), LEAN_STD))
+    assert scale_std(sheet()) > scale_std(electric)
+
+
+def test_friction_is_the_reading_at_idle_and_grows_as_printed():
+    idle = 80.0
+    for fuel, growth in (("petrol", 1.47 / 1.113), ("diesel", 1.854 / 1.138)):
+        c = friction_coefficients(40.0, idle, fuel)
+
+        # Accessories take a power: 12.5 N m of the 40 at idle, 5 at 200 rad/s.
+        def friction(speed, c=c):
+            return c[0] + c[1] * speed + c[2] * speed**2 - ACCESSORY_POWER / 200.0
+
+        assert_allclose(friction(idle), 40.0 - ACCESSORY_POWER / idle)
+        fast = 2000.0 * np.pi / 30.0
+        assert_allclose(friction(fast) / friction(idle), growth, rtol=0.01)
+    # No more than half of a small reading is taken for accessories.
+    c = friction_coefficients(10.0, idle, "petrol")
+    assert_allclose(c[0] + c[1] * idle + c[2] * idle**2, 5.0 + 5.0 * idle / 200.0)
+
+
+def test_friction_in_percent_torque_may_grow_with_engine_speed():
+    time, speed = np.arange(3.0), np.array([100.0, 200.0, 300.0])
+    drive = Drive(
+        "d", {"engine_torque_fraction": Signal("engine_torque_fraction", time, np.full(3, 0.5))}
+    )
+    model = TorqueModel(
+        source="percent", reference_torque=200.0, coefficients=(-10.0, 1.0, -0.02, -1e-4)
+    )
+    found = engine_torque(drive, Vehicle(torque=model), speed, time)
+    assert_allclose(found.torque, [100 - 10 - 2 - 1, 100 - 10 - 4 - 4, 100 - 10 - 6 - 9])
+    with pytest.raises(ConfigError, match="two coefficients"):
+        replace(model, coefficients=(1.0,))
+
+
+def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
+    """Errors put into force and inertia by hand are multiples of the rows of their states."""
+    rng = np.random.default_rng(5)
+    n = 50
+    vehicle = sheet(line={"wheel_radius": 0.3, "engine_inertia": 0.15, "wheel_inertia": 4.0})
+    line = vehicle.driveline
+    gearing, accel, speed = rng.choice(GEARS, n), rng.normal(0, 1, n), rng.uniform(5, 20, n)
+
+    def view(offset, growth, engine, wheels):
+        torque = 100.0 - offset - growth * gearing * speed / 200.0
+        rotating = (line.wheel_inertia - wheels) / 0.3**2 + (
+            line.engine_inertia - engine
+        ) * gearing**2
+        return MergedView(
+            time=np.arange(float(n)),
+            traction_force=torque * gearing,
+            speed=speed,
+            accel=accel,
+            specific_force=accel,
+            grade=np.zeros(n),
+            pitch=np.zeros(n),
+            heading=np.zeros(n),
+            gear=np.ones(n, dtype=np.int64),
+            gearing=gearing,
+            rotating_mass=rotating,
+            air_speed=speed,
+            drag_force=np.zeros(n),
+            air_density=np.full(n, 1.2),
+            reason=np.full(n, Reason.USED, dtype=np.uint8),
+        )
+
+    rows, right = design(view(0.0, 0.0, 0.0, 0.0), vehicle)
+    assert rows.shape[1] == len(NAMES) + len(DATA_SHEET_NAMES)
+    assert prior_std(vehicle, 1500.0, 200.0).size == rows.shape[1]
+    errors = np.array([3.0, 2.0, 0.05, 0.5])
+    _, wrong = design(view(*errors), vehicle)
+    k = len(NAMES)
+    made = rows[:, k : k + 2] @ -errors[:2] + rows[:, k + 2 :] @ errors[2:]
+    assert_allclose(wrong - right, made, atol=1e-9)
