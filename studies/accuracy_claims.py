@@ -43,7 +43,15 @@ from weighbridge.simulation import (
     simulate_car,
 )
 from weighbridge.vehicle.class_values import road_prior
-from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel, TorqueSource, Vehicle
+from weighbridge.vehicle.data_sheet import friction_coefficients
+from weighbridge.vehicle.model import (
+    Driveline,
+    Layout,
+    RoadLoad,
+    TorqueModel,
+    TorqueSource,
+    Vehicle,
+)
 
 FIRST: Final = 107_000
 """First seed: above those that the table of methods uses."""
@@ -434,16 +442,30 @@ def data_sheet(car: SimulatedCar, rng: np.random.Generator, idle: float | None) 
 
     Ratios are exact. The rolling radius, from the size of the tyres, is 1 % off. C_d A is
     a car's by its maker, from a wind tunnel, 7 % off; a van's or truck's that of its
-    class. C_r, inertias and efficiency are those of the class.
+    class. C_r and inertias are those of the class. Of the driveline the file says how a
+    car's engine lies, lengthwise with the automatic (its gears are those of a gearbox for
+    such cars), else across, and not how efficient it is.
+
+    Parameters
+    ----------
+    car, rng
+    idle : reading of the torque at idle, where friction is in it [-]
     """
     single = car.transmission == "single"
     mean, _ = road_prior(car.kind, single_speed=single)
     radius = car.wheel_radius * float(rng.normal(1.0, 0.01))
     known = car.drag_area * float(rng.normal(1.0, 0.07)), 0.07 * car.drag_area
     drag, drag_std = known if car.kind == "car" else (float(mean[0]), None)
-    lengthwise = car.transmission in ("automatic", "automated")
     source: TorqueSource = "measured" if car.electric else "percent"
-    friction = () if idle is None else (-idle * round(max(car.curve_torque)), 1.0)
+    friction: tuple[float, ...] = ()
+    if idle is not None:
+        w0, w2, w3 = friction_coefficients(
+            idle * round(max(car.curve_torque)),
+            car.idle_speed,
+            "diesel" if car.engine == "diesel" else "petrol",
+        )
+        friction = (-w0, 1.0, -w2, -w3)
+    layout: Layout = "longitudinal" if car.transmission == "automatic" else "transverse"
     return Vehicle(
         name="data sheet",
         kind=car.kind,
@@ -453,7 +475,7 @@ def data_sheet(car: SimulatedCar, rng: np.random.Generator, idle: float | None) 
             engine_inertia=float(mean[2]),
             wheel_inertia=float(mean[3]),
             wheel_radius=radius,
-            efficiency=0.97 if single else 0.90 if lengthwise else 0.93,
+            layout=layout if car.kind == "car" and not single else None,
         ),
         torque=TorqueModel(source=source, coefficients=friction),
         road_load=RoadLoad(
@@ -495,9 +517,12 @@ def data_sheet_job(number: int) -> list[Uncalibrated]:
             # PID 62 has friction in it; its reading at idle is taken off for every drive.
             vehicle = data_sheet(car, rng, idle_reading(drive) if polling is OBD_TORQUE else None)
         right = weigh(drive, vehicle)
-        off, on = vehicle.torque.coefficients or (0.0, 1.0)
+        off, on, *friction = vehicle.torque.coefficients or (0.0, 1.0)
         wrong = weigh(
-            drive, replace(vehicle, torque=replace(vehicle.torque, coefficients=(off, on * scale)))
+            drive,
+            replace(
+                vehicle, torque=replace(vehicle.torque, coefficients=(off, on * scale, *friction))
+            ),
         )
         found.append(
             Uncalibrated(
