@@ -31,9 +31,8 @@ LAYOUT_EFFICIENCY: Final[dict[Layout, tuple[float, float]]] = {
 gears; gearboxes of cars have 92 to 97 % and automatic and dual clutch ones 90 to 95 %
 with drag and pumps (Joachim et al. 2012), a gear without drag 96 % (standard loss of
 Regulation (EU) 2017/2400, Annex VI, App. 8, which is meant to be on the safe side). Lengthwise:
-0.97 in the gearbox, in which some gears are direct, times 0.96 in the hypoid axle: 95 to
-97 % (Fernandes et al., Tribology International, on axle oils), 95.5 % (40 CFR 1036.545), at
-least 6 % lost with a van's (Transport and Road Research Laboratory, RR 10)."""
+0.97 in the gearbox, in which some gears are direct, times 0.96 in the hypoid axle: 95.5 %
+(40 CFR 1036.545); a van's lost at least 6 % (Transport Research Laboratory, report RR 10)."""
 
 CLASS_EFFICIENCY: Final[dict[VehicleClass, tuple[float, float]]] = {
     "car": (0.95, 0.020),
@@ -43,7 +42,8 @@ CLASS_EFFICIENCY: Final[dict[VehicleClass, tuple[float, float]]] = {
 }
 """Of a class, where the layout is not told, or is always lengthwise [-]. Cars and vans stand
 between both layouts. Trucks: 0.99 in a direct and 0.96 in other gears (Annex VI, as above),
-times 0.98 in a single reduction axle without its drag; buses have automatic gearboxes."""
+times 0.98 in a single reduction axle without its drag (Annex VII); buses have automatic
+gearboxes."""
 
 TORQUE_STD: Final[dict[TorqueSource, float]] = {
     "measured": 0.04,
