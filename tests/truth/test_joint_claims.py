@@ -7,8 +7,20 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
+from weighbridge.balance import force_balance
 from weighbridge.estimators import Status, joint
-from weighbridge.simulation import MIDSIZE, Scenario, flat_route, mixed_route, simulate_car
+from weighbridge.navigation.select import find_motion
+from weighbridge.signals import Signal
+from weighbridge.simulation import (
+    ELECTRIC,
+    MIDSIZE,
+    Polling,
+    Scenario,
+    flat_route,
+    mixed_route,
+    simulate_car,
+)
+from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel, Vehicle
 
 DRIVES = 4
 MOST_MOVED = 0.003
@@ -84,6 +96,50 @@ def test_another_logger_does_not_move_the_mean(car, usual, logger):
     # Ten minutes at 2 Hz scatter by one percent; an estimator that does worse proves nothing.
     assert chance < 0.02
     assert abs(moved.mean()) < MOST_MOVED + chance
+
+
+def test_noise_of_a_measured_torque_does_not_move_the_mean():
+    """One file, the same drives, torque four times as noisy: drawn again and again."""
+    full = max(ELECTRIC.curve_torque)
+    electric = Vehicle(
+        tare=ELECTRIC.mass,
+        driveline=Driveline(
+            gearings=(ELECTRIC.final_drive / ELECTRIC.wheel_radius,),
+            engine_inertia=ELECTRIC.engine_inertia,
+            wheel_inertia=ELECTRIC.wheel_inertia,
+            wheel_radius=ELECTRIC.wheel_radius,
+            efficiency=1.0,
+        ),
+        road_load=RoadLoad(
+            drag_area=ELECTRIC.drag_area, rolling_coefficient=ELECTRIC.rolling_coefficient
+        ),
+        torque=TorqueModel(source="measured", noise=0.02 * full),
+        timing=Timing(torque_delay=0.1),
+    )
+    polling = Polling(fast=("vehicle_speed", "engine_speed", "engine_torque"))
+    rng = np.random.default_rng(3400)
+    moved = []
+    for k in range(2):
+        made = simulate_car(
+            replace(town(3400 + k, 100.0 * k, length=1.5), car=ELECTRIC, polling=polling)
+        )
+        motion, torque = find_motion(made.drive), made.drive.signals["engine_torque"]
+        for _ in range(6):
+            drawn = full * rng.standard_normal(torque.values.size)
+            little, much = (
+                made.drive.with_signals(
+                    Signal(torque.name, torque.time, torque.values + noise * drawn)
+                )
+                for noise in (0.01, 0.04)
+            )
+            a, b = (
+                joint.estimate(force_balance(d, electric, motion), electric).mass
+                for d in (little, much)
+            )
+            moved.append(b / a - 1.0)
+    chance = 2.0 * np.std(moved, ddof=1) / np.sqrt(len(moved))
+    assert chance < 0.006
+    assert abs(np.mean(moved)) < MOST_MOVED + chance
 
 
 @pytest.mark.parametrize("factor", [1.0 / 3.0, 3.0])

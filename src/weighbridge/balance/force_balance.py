@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from weighbridge.constants import GRAVITY
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.vehicle.air import air_density
 from weighbridge.vehicle.data_sheet import wheel_efficiency
@@ -23,7 +23,7 @@ from weighbridge.vehicle.gear import (
     shifting,
 )
 from weighbridge.vehicle.model import Vehicle, VehicleClass
-from weighbridge.vehicle.torque import engine_torque, source_signal
+from weighbridge.vehicle.torque import averaged, engine_torque, source_signal
 
 
 class Reason(IntEnum):
@@ -85,6 +85,14 @@ TYPICAL_MASS: Final[dict[VehicleClass, float]] = {
 
 BRAKING_FORCE: Final = 0.06
 """Braking force over weight that marks unseen braking [-]."""
+
+SLOWING_FORCE: Final = 0.02
+"""Force over weight by which a measured torque may slow the vehicle before a foot may be on the
+brake [-]: a part of what a dragged engine or recuperation do, and little beside the hills and
+starts that weigh."""
+
+PUSHED_TIME: Final = 1.0
+"""Time over which the motion tells whether the engine pushes the vehicle [s]."""
 
 PRESSED: Final = 0.01
 """Position of the accelerator from which a foot is on it [-]."""
@@ -199,6 +207,7 @@ def force_balance(
     *,
     delay: float | None = None,
     lag: float | None = None,
+    signed: bool = True,
 ) -> ForceBalance:
     """Bring the force and the motion of a drive together.
 
@@ -210,6 +219,8 @@ def force_balance(
     drive, vehicle, motion
     delay : lateness of the torque; the vehicle's when None, 0 if that is unknown [s]
     lag : time constant of its first-order smoothing; the vehicle's when None [s]
+    signed : whether the torque falls below zero; a load that stands for it does not, and
+        tells by its lowest value alone that the foot is off the pedal
 
     Raises
     ------
@@ -239,8 +250,16 @@ def force_balance(
 
     switch = drive.get("brake_switch")
     # Where no switch tells, a driver who is off the pedal may brake a little as well.
-    unknown = switch is None or not len(switch)
-    brakes_unknown = unknown & ~_foot_on_pedal(drive, vehicle, recorded)
+    unknown = signed and (switch is None or not len(switch))
+    may_brake = unknown & ~_foot_on_pedal(drive, vehicle, recorded)
+    needed, weight = _needed_force(vehicle, rows, drag, rotating)
+    # Of rows near the limit a noisy torque would keep its high readings, and the mass would
+    # come out low. The motion chooses by what stands on the other side. Where it has not
+    # measured the grade, it cannot tell a push downhill from the engine's.
+    by_speed = motion.source in BY_SPEED
+    # A load says little of an engine that is dragged; a torque may go below zero.
+    loose = SLOWING_FORCE * weight if vehicle.torque.source in ("measured", "percent") else 0.0
+    pushed = torque.level if by_speed else averaged(needed + loose, source.period, PUSHED_TIME)
 
     # The first reason that applies is the one told, so the order matters.
     reason = np.zeros(time.size, dtype=np.uint8)
@@ -248,7 +267,7 @@ def force_balance(
     changing = shifting(time, gear, margin=SHIFT_MARGIN)
     if driveline.single_speed:
         changing[:] = False
-    braking = _braking(drive, vehicle, recorded, rows, traction, drag, rotating)
+    braking = _braking(drive, recorded, traction, needed, weight)
     for flag, why in (
         (~(rows["valid"] > 0.99) | ~np.isfinite(rows["speed"]), Reason.NO_MOTION),
         (rows["speed"] < SLOWEST, Reason.STANDING),
@@ -256,7 +275,7 @@ def force_balance(
         (changing, Reason.SHIFTING),
         (slipping, Reason.CLUTCH_SLIPPING),
         (~np.isfinite(traction) | ~near | filled(source, recorded), Reason.NO_TORQUE),
-        (torque.overrun | (brakes_unknown & (torque.level <= 0.0)), Reason.OVERRUN),
+        (torque.overrun | (may_brake & (pushed <= 0.0)), Reason.OVERRUN),
         (torque.extrapolated, Reason.EXTRAPOLATED),
     ):
         reason[(reason == 0) & flag] = why
@@ -444,14 +463,22 @@ def _gears(
     return gear, gearing, slipping
 
 
+def _needed_force(
+    vehicle: Vehicle, rows: dict[str, Floats], drag: Floats, rotating: Floats
+) -> tuple[Floats, float]:
+    """Force at the wheels (n,) that the motion takes, and the weight it is told for [N].
+
+    Its sign hangs on the mass through the drag alone. The largest mass known is the
+    cautious one: drag explains least of how a heavy vehicle slows down.
+    """
+    mass = max(vehicle.provenance.masses, default=vehicle.tare or TYPICAL_MASS[vehicle.kind])
+    rolling = vehicle.road_load.rolling_coefficient * GRAVITY
+    needed = (mass + np.nan_to_num(rotating)) * rows["specific_force"] + mass * rolling + drag
+    return needed, mass * GRAVITY
+
+
 def _braking(
-    drive: Drive,
-    vehicle: Vehicle,
-    recorded: Floats,
-    rows: dict[str, Floats],
-    traction: Floats,
-    drag: Floats,
-    rotating: Floats,
+    drive: Drive, recorded: Floats, traction: Floats, needed: Floats, weight: float
 ) -> Bools:
     """Where brake or retarder work, or the vehicle slows more than its torque explains."""
     retarder = drive.get("retarder_torque")
@@ -463,9 +490,6 @@ def _braking(
         return np.asarray(retarding | (switch.held(recorded) > 0.5))
     # Unseen braking: what slows the vehicle is far more than engine, drag and
     # rolling can, whatever the mass within reason.
-    mass = vehicle.tare or TYPICAL_MASS[vehicle.kind]
     force = np.where(np.isfinite(traction), traction, 0.0)
-    rolling = vehicle.road_load.rolling_coefficient * GRAVITY
-    needed = (mass + np.nan_to_num(rotating)) * rows["specific_force"] + mass * rolling + drag
-    unseen = needed - np.minimum(force, 0.0) < -BRAKING_FORCE * mass * GRAVITY
+    unseen = needed - np.minimum(force, 0.0) < -BRAKING_FORCE * weight
     return np.asarray(retarding | unseen)

@@ -503,7 +503,8 @@ def _draft_balance(
     if source == "load":
         load = drive.signals["engine_load"]
         stand_in = drive.with_signals(replace(load, name="engine_torque"))
-    return force_balance(stand_in, draft, motion, delay=delay, lag=0.0), x
+    signed = source in ("measured", "percent")
+    return force_balance(stand_in, draft, motion, delay=delay, lag=0.0, signed=signed), x
 
 
 def _ranges(

@@ -259,5 +259,5 @@ def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Fl
     torque = rows @ np.array([*model.coefficients, *model.curvature])
     low, high = model.load_range or (-math.inf, math.inf)
     slow, fast = model.speed_range or (-math.inf, math.inf)
-    extrapolated = (x > high) | (engine_speed < slow) | (engine_speed > fast)
+    extrapolated = (dragged > high) | (engine_speed < slow) | (engine_speed > fast)
     return Torque(time, torque, extrapolated, dragged < low, averaged(torque, period, BRAKED_TIME))
