@@ -1,6 +1,7 @@
 """What a data sheet leaves open: usual values of drivelines, and what the joint estimator finds."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -70,8 +71,15 @@ def test_what_was_fitted_at_the_wheels_is_left_alone(vehicle):
 def test_the_interval_holds_torque_efficiency_radius_and_lean():
     electric = Vehicle(driveline=Driveline(gearings=(30.0,)))
     assert_allclose(scale_std(electric), np.sqrt(0.03**2 + 0.01**2 + 0.015**2))
-    assert_allclose(uncalibrated_std(electric, "speed"), scale_std(electric))
-    assert_allclose(uncalibrated_std(electric, "inertial"), np.hypot(scale_std(electric), LEAN_STD))
+    leaning = np.hypot(scale_std(electric), LEAN_STD)
+    for source, squat, expected in (
+        ("speed", None, scale_std(electric)),
+        ("inertial", None, leaning),
+        ("longitudinal_accel", None, leaning),
+        ("inertial", 0.003, scale_std(electric)),
+    ):
+        motion = SimpleNamespace(source=source, squat=squat)
+        assert_allclose(uncalibrated_std(electric, motion), expected)
     assert scale_std(sheet()) > scale_std(electric)
 
 
@@ -134,6 +142,7 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
             air_speed=speed,
             drag_force=np.zeros(n),
             air_density=np.full(n, 1.2),
+            fuel_burnt=np.zeros(n),
             reason=np.full(n, Reason.USED, dtype=np.uint8),
         )
 

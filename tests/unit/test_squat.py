@@ -37,7 +37,9 @@ def calibrated(car, squat):
 
 
 def uncalibrated(car):
-    return replace(car, provenance=replace(car.provenance, mass_scale_std=None, masses=()))
+    return replace(
+        car, provenance=replace(car.provenance, method=None, mass_scale_std=None, masses=())
+    )
 
 
 def test_what_the_calibration_took_out_is_taken_out(weighed):

@@ -98,7 +98,7 @@ def test_uncertainty_of_the_calibration_is_in_the_mass(good):
     exact = known[0.0]
     assert known[0.02].std == pytest.approx(math.hypot(exact.std, 0.02 * exact.mass), rel=1e-6)
     # A file that was never calibrated leaves open torque, efficiency, radius and lean: 5 to 6 %.
-    left = uncalibrated_std(CAR, good.result.balance.motion.source)
+    left = uncalibrated_std(CAR, good.result.balance.motion)
     assert 0.05 < left < 0.06
     assert good.std == pytest.approx(math.hypot(exact.std, left * exact.mass), rel=1e-6)
 

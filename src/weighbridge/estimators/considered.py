@@ -10,6 +10,7 @@ from weighbridge.balance import ForceBalance
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import disturbance
 from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import reading_of, torque_rows
 
@@ -23,7 +24,7 @@ def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Float
     Parameters
     ----------
     balance, vehicle
-    mass : rough; what rolls with C_r [kg]
+    mass : of the first row, rough; what rolls with C_r [kg]
 
     Returns
     -------
@@ -33,7 +34,8 @@ def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Float
     view, model, line = balance.merged, vehicle.torque, vehicle.driveline
     gearing = np.nan_to_num(view.gearing)
     torque, speed = np.nan_to_num(balance.force.torque), np.nan_to_num(balance.force.engine_speed)
-    gain = np.where(torque >= 0.0, line.efficiency, 1.0 / line.efficiency) * gearing
+    efficiency = wheel_efficiency(vehicle)
+    gain = np.where(torque >= 0.0, efficiency, 1.0 / efficiency) * gearing
     terms = torque_rows(
         reading_of(torque, speed, model),
         speed,
@@ -43,7 +45,7 @@ def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Float
     pressure = 0.5 * view.air_density * view.air_speed * np.abs(view.air_speed)
     road = (
         -pressure,
-        -mass * GRAVITY * np.cos(view.grade),
+        -(mass - view.fuel_burnt) * GRAVITY * np.cos(view.grade),
         -(gearing**2) * view.accel,
         -view.accel / line.wheel_radius**2,
     )

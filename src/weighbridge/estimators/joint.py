@@ -16,7 +16,6 @@ from weighbridge.estimators.considered import force_columns, open_std, sensitivi
 from weighbridge.estimators.judging import (
     OTHER_METHOD_STD,
     STOP,
-    calibration_std,
     converged_at,
     judge,
     nothing,
@@ -36,6 +35,7 @@ from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.navigation.motion import BY_SPEED, MotionSource
 from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.fuel import FUEL_STD
 from weighbridge.vehicle.model import Vehicle
 
@@ -63,7 +63,7 @@ most are at traffic lights."""
 CHANGE_RISE: Final = 1.6
 """Growth of that logarithm with the logarithm of the standstill: at two minutes it is even."""
 
-LEAN_STD: Final = 0.03
+LOAD_LEAN_STD: Final = 0.03
 """Standard deviation of what a change of load adds to the slow resistance, over mass [m/s^2]:
 the body leans with its load, and the accelerometer with it; 240 kg in the boot of a simulated car
 make 0.27 deg, 0.046 m/s^2."""
@@ -132,7 +132,7 @@ class _Problem:
         """Variance (n,) by which each state may jump where the load changes."""
         std = np.zeros(self.std.size)
         std[0] = CHANGE_STD * self.guess
-        std[2] = LEAN_STD * self.guess
+        std[2] = LOAD_LEAN_STD * self.guess
         return std**2
 
     def filtered(self) -> float:
@@ -213,7 +213,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     x, var, taken, weight = disturbance.smooth(
         start, time, problem.rows, problem.y, noise, added, params
     )
-    low = drawn(weight, fast**2 * motion_variance(cut), var[:, 0], begins)
+    low = drawn(weight, motion_variance(cut), var[:, 0], begins)
 
     left_out = np.zeros(view.time.size, dtype=bool)
     left_out[cut.index] = ~taken[cut.window]
@@ -222,7 +222,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     burnt = view.fuel_burnt
     smoothed, running = x[:, 0] * (1.0 + low), running * (1.0 + low)
     mass, bound = float(smoothed[-1] - burnt[-1]), float(np.sqrt(var[-1, 0]))
-    columns = cut.mean(force_columns(balance, vehicle, mass))
+    columns = cut.mean(force_columns(balance, vehicle, float(smoothed[-1])))
     moved = sensitivity(columns, time, problem.rows, noise, added, taken, start, params)
     left = math.hypot(
         _left_open(balance, vehicle, mass),
@@ -277,8 +277,9 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
 
 def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     """Relative standard deviation that no row of this drive can take away [-]."""
-    left = calibration_std(balance, vehicle, MOTION_STD)
     made = vehicle.provenance
+    scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(vehicle)
+    left = float(np.hypot(scale, MOTION_STD[balance.motion.source]))
     if made.method == "rls":
         left = float(np.hypot(left, OTHER_METHOD_STD))
     if mass > 0.0:

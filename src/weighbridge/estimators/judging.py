@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.estimators.track import MassTrack, Segment, Status
-from weighbridge.navigation.motion import BY_SPEED, MotionSource
+from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.model import MASS_RANGE, TorqueSource, Vehicle
@@ -74,25 +74,21 @@ def consider_std(balance: ForceBalance, phi: Floats, used: Bools, vehicle: Vehic
     return float(np.hypot(calibration_std(balance, vehicle), cold))
 
 
-def calibration_std(
-    balance: ForceBalance,
-    vehicle: Vehicle,
-    motion_std: Mapping[MotionSource, float] = MOTION_STD,
-) -> float:
+def calibration_std(balance: ForceBalance, vehicle: Vehicle) -> float:
     """Relative standard deviation by what the calibration left open and by the motion [-].
 
     A vehicle file that was never calibrated leaves open what a data sheet does not say.
     """
-    motion = balance.motion.source
     scale = vehicle.provenance.mass_scale_std
     if scale is None:
-        scale = uncalibrated_std(vehicle, motion)
-    return float(np.hypot(scale, motion_std[motion]))
+        scale = uncalibrated_std(vehicle, balance.motion)
+    return float(np.hypot(scale, MOTION_STD[balance.motion.source]))
 
 
-def uncalibrated_std(vehicle: Vehicle, motion: MotionSource) -> float:
+def uncalibrated_std(vehicle: Vehicle, motion: Motion) -> float:
     """Relative standard deviation by what a data sheet leaves open [-]."""
-    return float(np.hypot(scale_std(vehicle), 0.0 if motion in BY_SPEED else LEAN_STD))
+    leans = motion.source not in BY_SPEED and motion.squat is None
+    return float(np.hypot(scale_std(vehicle), LEAN_STD if leans else 0.0))
 
 
 def cold_share(time: Floats, phi: Floats, used: Bools, start: float | None = None) -> float:

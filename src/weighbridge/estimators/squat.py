@@ -62,7 +62,8 @@ def lean(balance: ForceBalance, vehicle: Vehicle) -> Lean:
     if motion.source in BY_SPEED:
         return Lean(0.0, 0.0)
     found, found_std = motion.squat, motion.squat_std or 0.0
-    if vehicle.provenance.mass_scale_std is None:
+    made = vehicle.provenance
+    if made.mass_scale_std is None and made.method is None:
         return Lean(*SQUAT) if found is None else Lean(0.0, found_std)
     mounting = vehicle.mounting
     given = mounting.squat if mounting is not None else None
