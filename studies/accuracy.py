@@ -7,7 +7,7 @@ Run from the checkout: ``python studies/accuracy.py``, which writes ``accuracy.m
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,21 +16,23 @@ from accuracy_drives import (
     FULL,
     KINDS,
     calibrated,
+    final_mass,
     known_drives,
+    mean_mass,
     scenario,
-    true_mass,
 )
 
-from weighbridge.balance import ForceBalance, force_balance
+from weighbridge.balance import force_balance
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.navigation.select import find_motion
 from weighbridge.papers.jensen2022 import without_weather
-from weighbridge.simulation import random_vehicle, simulate_car
+from weighbridge.signals import Drive
+from weighbridge.simulation import SimulatedDrive, random_vehicle, simulate_car
 
 HERE = Path(__file__).parent
 DRIVES = 10
 CALIBRATIONS = 3
-FIRST_SEED = 101_000
+FIRST_SEED = 131_000
 EARLY = 300.0
 METHODS = ("rls", "robust-rls", "ekf", "hybrid", "joint, one calibration drive", "joint")
 
@@ -47,21 +49,11 @@ class Outcome:
     early_std: float
 
 
-def first_minutes(balance: ForceBalance) -> ForceBalance:
-    """Keep what was known after `EARLY` seconds of moving; the motion stays as it was found."""
-    view = balance.merged
-    moving = np.cumsum(np.nan_to_num(view.speed) > 0.5) * float(np.median(np.diff(view.time)))
-    end = int(np.searchsorted(moving, EARLY))
-
-    def cut(rows):
-        parts = {
-            name: getattr(rows, name)[:end]
-            for name in rows.__dataclass_fields__
-            if np.shape(getattr(rows, name))[:1] == view.time.shape
-        }
-        return replace(rows, **parts)
-
-    return replace(balance, merged=cut(view), force=cut(balance.force))
+def first_minutes(made: SimulatedDrive, drive: Drive) -> Drive:
+    """Cut the drive off after `EARLY` seconds of moving: nothing later is known to anything."""
+    truth = made.truth
+    moving = np.cumsum((truth.speed > 0.5) * np.gradient(truth.time))
+    return drive.between(drive.start, float(truth.time[np.searchsorted(moving, EARLY)]))
 
 
 def weigh_all(job: tuple[int, int]) -> list[Outcome]:
@@ -81,14 +73,15 @@ def weigh_all(job: tuple[int, int]) -> list[Outcome]:
     for k in range(DRIVES):
         load = float(rng.uniform(0.0, FULL[car.kind] * car.mass))
         made = simulate_car(scenario(car, rng, load=load, seed=seed + 1000 * number + 100 + k))
-        mass = true_mass(made)
         drive = without_weather(made.drive)
-        motion = find_motion(drive, vehicles["joint"])
+        begun = first_minutes(made, drive)
+        motion, begun_motion = (find_motion(d, vehicles["joint"]) for d in (drive, begun))
         for method, vehicle in vehicles.items():
-            balance = force_balance(drive, vehicle, motion)
-            estimator = ESTIMATORS[method.split(",")[0]]
-            track = estimator(balance, vehicle)
-            early = estimator(first_minutes(balance), vehicle)
+            name = method.split(",")[0]
+            estimator = ESTIMATORS[name]
+            mass = final_mass(made) if name == "joint" else mean_mass(made)
+            track = estimator(force_balance(drive, vehicle, motion), vehicle)
+            early = estimator(force_balance(begun, vehicle, begun_motion), vehicle)
             outcomes.append(
                 Outcome(
                     kind,

@@ -72,18 +72,27 @@ def bare(car: SimulatedCar) -> Vehicle:
     return Vehicle(kind=car.kind, driveline=Driveline(wheel_radius=car.wheel_radius))
 
 
-def true_mass(made: SimulatedDrive) -> float:
-    """Return the mean mass over the drive [kg]: fuel burns."""
+def mean_mass(made: SimulatedDrive) -> float:
+    """Return the mean mass over the drive [kg], for methods that know one mass alone."""
     return float(np.mean(made.truth.mass))
+
+
+def final_mass(made: SimulatedDrive) -> float:
+    """Return the mass at the end of the drive [kg]: fuel has burnt."""
+    return float(made.truth.mass[-1])
 
 
 def calibrated(
     car: SimulatedCar, known: Sequence[SimulatedDrive], *, method: str = "joint"
 ) -> Vehicle:
-    """Return the vehicle file that drives of known mass make."""
+    """Return the vehicle file that drives of known mass make.
+
+    ``joint`` takes the mass with which a drive begins and reckons with the fuel; the others
+    know one mass, and are given the mean.
+    """
     return run_calibration(
         [without_weather(made.drive) for made in known],
-        [true_mass(made) for made in known],
+        [float(made.truth.mass[0]) if method == "joint" else mean_mass(made) for made in known],
         vehicle=bare(car),
         settings=CalibrationSettings(method=method),
     ).vehicle

@@ -1,7 +1,7 @@
 """Tables of studies/recorded.md: recorded drives weighed with data-sheet vehicles.
 
-Run from the checkout: ``python studies/recorded.py``; it needs openpyxl. The recordings
-lie in ``../shared/data`` and are not part of the project.
+Run from the checkout: ``python studies/recorded.py``; it needs the extra ``studies``. The
+recordings lie in ``../shared/data`` and are not part of the project.
 """
 
 from __future__ import annotations

@@ -89,6 +89,8 @@ def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0
         valid=np.ones(n, dtype=bool),
         specific_force_std=0.03,
         grade_std=np.full(n, 0.002),
+        squat=0.0,
+        squat_std=0.0,
     )
     merged = MergedView(
         time=time,

@@ -213,7 +213,9 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     x, var, taken, weight = disturbance.smooth(
         start, time, problem.rows, problem.y, noise, added, params
     )
-    low = drawn(weight, motion_variance(cut), var[:, 0], begins)
+    # More noise than usual is more likely the torque's; less is less on both sides.
+    shown = min(fast, 1.0) ** 2 * motion_variance(cut)
+    low = drawn(weight, shown, var[:, 0], begins)
 
     left_out = np.zeros(view.time.size, dtype=bool)
     left_out[cut.index] = ~taken[cut.window]
