@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -106,8 +106,8 @@ class _Problem:
     time: Floats
     rows: Floats
     y: Floats
-    variance: Floats
     odds: Floats
+    variance: Floats
     std: Floats
 
     @property
@@ -134,6 +134,21 @@ class _Problem:
         std[0] = CHANGE_STD * self.guess
         std[2] = LOAD_LEAN_STD * self.guess
         return std**2
+
+    def likeliest(self) -> tuple[float, float]:
+        """Levels of fast noise and of the disturbance, over their usual sizes [-].
+
+        A weak prior keeps them within a factor of about three.
+        """
+
+        def misfit(level: Floats) -> float:
+            fast, slow = np.exp(level)
+            state, *_ = self.changes(float(fast), float(slow))
+            return float(-state.same.log_likelihood + 0.5 * np.sum(level**2))
+
+        found = minimize(misfit, np.zeros(2), method="Nelder-Mead", options={"maxiter": 40})
+        fast, slow = np.exp(found.x)
+        return float(fast), float(slow)
 
     def filtered(self) -> float:
         """Mass after all windows, as if the load had never changed [kg]."""
@@ -198,18 +213,21 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     if cut.count.size < FEWEST_WINDOWS:
         return nothing("joint", balance, vehicle, reason, int(cut.count.size))
 
-    guess = first_guess(cut.mean(rows)[:, 0], cut.mean(y))
-    problem = _problem(balance, vehicle, cut, rows, y, guess)
+    time, mean_rows, mean_y = cut.mean(view.time), cut.mean(rows), cut.mean(y)
+    guess = first_guess(mean_rows[:, 0], mean_y)
+    problem = _Problem(
+        time=time,
+        rows=np.ascontiguousarray(mean_rows),
+        y=mean_y,
+        odds=change_odds(view, time),
+        **_sizes(balance, vehicle, cut, guess),
+    )
     # The levels of noise are told in terms of the mass: they should not hang on the guess.
-    problem = _problem(balance, vehicle, cut, rows, y, _sensible(problem.filtered()))
-    level = minimize(
-        _misfit, np.zeros(2), args=(problem,), method="Nelder-Mead", options={"maxiter": 40}
-    ).x
-    fast, slow = (float(v) for v in np.exp(level))
+    problem = replace(problem, **_sizes(balance, vehicle, cut, _sensible(problem.filtered())))
+    fast, slow = problem.likeliest()
     _, running, running_var, begins = problem.changes(fast, slow)
     start, noise, params = problem.kernel_input(fast, slow)
     added = np.where(begins[:, None], problem.jump_var, 0.0)
-    time = problem.time
     x, var, taken, weight = disturbance.smooth(
         start, time, problem.rows, problem.y, noise, added, params
     )
@@ -237,14 +255,8 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     track = np.where(last >= 0, running[np.maximum(last, 0)] - burnt, np.nan)
     track_std = UNMODELLED * np.sqrt(running_var)[np.maximum(last, 0)]
     status, why = judge(view, vehicle, used, mass, std, cut.count.size)
-    spread = float(np.std(problem.rows[taken, 0]))
-    if status is Status.CONVERGED and spread < LEAST_SPREAD:
-        status = Status.NOT_EXCITED
-        why = (
-            f"acceleration and hills vary the specific force by only {spread:.2f} m/s^2, as a "
-            f"cruise on the flat does, and the mass needs {LEAST_SPREAD:.2f}; more starts and "
-            "hills are needed"
-        )
+    if status is Status.CONVERGED:
+        status, why = _excited(float(np.std(problem.rows[taken, 0])))
     return MassTrack(
         method="joint",
         balance=balance,
@@ -261,19 +273,17 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
         status=status,
         why=why,
         segments=_segments(view, time, begins, smoothed, np.sqrt(var[:, 0]), left),
-        slow_errors=SlowErrors(
-            time=time,
-            mass_bound=np.sqrt(running_var),
-            disturbance=x[:, 1],
-            disturbance_std=np.sqrt(var[:, 1]),
-            resistance=x[:, 2],
-            resistance_std=np.sqrt(var[:, 2]),
-            wind_north=x[:, 3],
-            wind_east=x[:, 4],
-            wind_std=np.sqrt(var[:, 3:5]),
-            cold_torque=float(x[0, 5]),
-            cold_torque_std=float(np.sqrt(var[0, 5])),
-        ),
+        slow_errors=SlowErrors.from_states(time, x, var, running_var),
+    )
+
+
+def _excited(spread: float) -> tuple[Status, str]:
+    """Say whether the specific force varies enough, by its standard deviation [m/s^2]."""
+    if spread >= LEAST_SPREAD:
+        return Status.CONVERGED, ""
+    return Status.NOT_EXCITED, (
+        f"acceleration and hills vary the specific force by only {spread:.2f} m/s^2, as a cruise "
+        f"on the flat does, and the mass needs {LEAST_SPREAD:.2f}; more starts and hills are needed"
     )
 
 
@@ -294,30 +304,16 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     return left
 
 
-def _problem(
-    balance: ForceBalance, vehicle: Vehicle, cut: Windows, rows: Floats, y: Floats, guess: float
-) -> _Problem:
-    view = balance.merged
-    time, mean_rows, mean_y = cut.mean(view.time), cut.mean(rows), cut.mean(y)
+def _sizes(
+    balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float
+) -> dict[str, Floats]:
+    """What of a problem is told in terms of a rough mass [kg]: noise and states."""
     torque = float(np.percentile(np.abs(balance.force.torque[cut.index]), 98.0))
-    return _Problem(
-        time=time,
-        rows=np.ascontiguousarray(mean_rows),
-        y=mean_y,
-        variance=noise_variance(view, cut, vehicle.torque.noise or 0.03 * torque, guess),
-        odds=change_odds(view, time),
-        std=prior_std(vehicle, guess, torque, by_speed=balance.motion.source in BY_SPEED),
-    )
-
-
-def _misfit(level: Floats, problem: _Problem) -> float:
-    """Negative log-likelihood of noise levels, in logarithms.
-
-    A weak prior keeps them within a factor of about three.
-    """
-    fast, slow = np.exp(level)
-    state, *_ = problem.changes(float(fast), float(slow))
-    return float(-state.same.log_likelihood + 0.5 * np.sum(level**2))
+    noise = vehicle.torque.noise or 0.03 * torque
+    return {
+        "variance": noise_variance(balance.merged, cut, noise, guess),
+        "std": prior_std(vehicle, guess, torque, by_speed=balance.motion.source in BY_SPEED),
+    }
 
 
 def change_odds(view: MergedView, time: Floats) -> Floats:

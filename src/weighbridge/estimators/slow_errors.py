@@ -100,6 +100,30 @@ class SlowErrors:
     cold_torque: float
     cold_torque_std: float
 
+    @classmethod
+    def from_states(cls, time: Floats, x: Floats, var: Floats, mass_var: Floats) -> SlowErrors:
+        """Name the states of the filter.
+
+        Parameters
+        ----------
+        time : (m,) of the windows [s]
+        x, var : (m, k) smoothed states in the order of `NAMES`, and their variances
+        mass_var : (m,) variance of the mass as known at each window [kg^2]
+        """
+        return cls(
+            time=time,
+            mass_bound=np.sqrt(mass_var),
+            disturbance=x[:, 1],
+            disturbance_std=np.sqrt(var[:, 1]),
+            resistance=x[:, 2],
+            resistance_std=np.sqrt(var[:, 2]),
+            wind_north=x[:, 3],
+            wind_east=x[:, 4],
+            wind_std=np.sqrt(var[:, 3:5]),
+            cold_torque=float(x[0, 5]),
+            cold_torque_std=float(np.sqrt(var[0, 5])),
+        )
+
 
 def coldness(view: MergedView) -> Floats:
     """How much of the cold of the start is left at each row (n,) [-]."""
