@@ -37,9 +37,8 @@ def calibrated(car, squat):
 
 
 def uncalibrated(car):
-    return replace(
-        car, provenance=replace(car.provenance, method=None, mass_scale_std=None, masses=())
-    )
+    made = replace(car.provenance, method=None, motion=None, mass_scale_std=None, masses=())
+    return replace(car, mounting=None, provenance=made)
 
 
 def test_what_the_calibration_took_out_is_taken_out(weighed):
@@ -75,9 +74,34 @@ def test_without_a_calibration_an_unknown_squat_widens_the_interval(weighed):
     assert abs(hidden.mass / shown.mass - 1.0) < 1.2 * off
 
 
+@pytest.mark.parametrize(
+    ("calibrated_by", "given", "weighed_by", "shown", "expected"),
+    [
+        ("inertial", K, "inertial", K, Lean(0.0, 2e-4)),
+        ("inertial", K, "speed", None, Lean(0.0, 0.0)),
+        ("inertial", None, "longitudinal_accel", None, Lean(0.0, 0.0)),
+        ("inertial", None, "speed", None, Lean(-SQUAT[0], SQUAT[1])),
+        ("speed", None, "speed_grade", None, Lean(0.0, 0.0)),
+        ("speed", None, "inertial", K, Lean(0.0, 2e-4)),
+        ("speed", None, "inertial", None, Lean(*SQUAT)),
+        # A vehicle file that does not say how its drives moved.
+        (None, None, "inertial", K, Lean(0.0, 2e-4)),
+    ],
+)
+def test_torque_meets_what_it_was_calibrated_with(
+    weighed, calibrated_by, given, weighed_by, shown, expected
+):
+    car, weighing = weighed
+    made = replace(car.provenance, motion=calibrated_by)
+    car = replace(calibrated(car, given), provenance=made)
+    balance = seen(weighing.result.balance, shown, factor=0.0)
+    balance = replace(balance, motion=replace(balance.motion, source=weighed_by))
+    assert lean(balance, car) == expected
+
+
 def test_a_speed_does_not_lean(weighed):
     car, weighing = weighed
-    balance = weighing.result.balance
+    balance = seen(weighing.result.balance, None, factor=0.0)
     by_speed = replace(balance, motion=replace(balance.motion, source="speed"))
     assert lean(by_speed, uncalibrated(car)) == Lean(0.0, 0.0)
 

@@ -178,7 +178,7 @@ class _Problem:
         )
 
 
-def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
+def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = True) -> MassTrack:
     """Weigh by a Kalman filter of the mass and the slow errors of `slow_errors`.
 
     Usable rows, braking and overrun aside, are averaged over windows of
@@ -193,6 +193,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     Parameters
     ----------
     balance, vehicle
+    load_changes : the load may change at stops; not where the mass is known
 
     References
     ----------
@@ -208,6 +209,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
     usable = usable_rows(view, rows, y)
     cut = windows(view.time, usable)
     reason = view.reason.copy()
+    reason[view.usable] = Reason.NO_MOTION
     reason[usable] = Reason.TOO_SHORT
     reason[cut.index] = Reason.USED
     if cut.count.size < FEWEST_WINDOWS:
@@ -219,7 +221,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
         time=time,
         rows=np.ascontiguousarray(mean_rows),
         y=mean_y,
-        odds=change_odds(view, time),
+        odds=change_odds(view, time) if load_changes else np.full(time.size, np.nan),
         **_sizes(balance, vehicle, cut, guess),
     )
     # The levels of noise are told in terms of the mass: they should not hang on the guess.

@@ -56,19 +56,21 @@ def lean(balance: ForceBalance, vehicle: Vehicle) -> Lean:
     An accelerometer that leans by k per acceleration reads it 1 + g k times too
     large. The navigation takes that out where the drive shows k. A torque that
     was calibrated against such readings has the factor in it, and must meet it
-    again; one of a data sheet must not.
+    again; one of a data sheet, or calibrated by speed, must not.
     """
-    motion = balance.motion
-    if motion.source in BY_SPEED:
-        return Lean(0.0, 0.0)
-    found, found_std = motion.squat, motion.squat_std or 0.0
-    made = vehicle.provenance
-    if made.mass_scale_std is None and made.method is None:
-        return Lean(*SQUAT) if found is None else Lean(0.0, found_std)
-    mounting = vehicle.mounting
+    motion, made, mounting = balance.motion, vehicle.provenance, vehicle.mounting
     given = mounting.squat if mounting is not None else None
-    if found is None and mounting is not None and given is not None:
-        return Lean(given, mounting.squat_std or 0.0)
-    if found is not None and given is None:
-        return Lean(-found, found_std)
-    return Lean(0.0, found_std)
+    given_std = (mounting.squat_std or 0.0) if mounting is not None else 0.0
+    found_std = motion.squat_std or 0.0
+    if made.torque_fitted and given is None and made.motion is None:
+        # The file does not say what its torque has met: most likely the same.
+        return Lean(0.0, found_std)
+    rows_lean = motion.source not in BY_SPEED and motion.squat is None
+    torque_leans = made.torque_fitted and given is None and made.motion not in BY_SPEED
+    if rows_lean == torque_leans:
+        return Lean(0.0, found_std)
+    if rows_lean:
+        return Lean(given, given_std) if given is not None else Lean(*SQUAT)
+    if motion.squat is not None:
+        return Lean(-motion.squat, found_std)
+    return Lean(-SQUAT[0], SQUAT[1])

@@ -106,7 +106,9 @@ def step(state, time, row, y, noise_var, odds, params):
     Applications to Tracking and Navigation, 2001, ch. 11.6.
     """
     begun = -1
-    if not np.isnan(odds):
+    young = state.open and state.rows - state.begun < params.fewest
+    # Where stops come fast, the one at which a change is likeliest is tried until it can tell.
+    if not np.isnan(odds) and not (young and odds <= state.prior):
         state, begun = decided(state, params)
         loose = disturbance.loosened(state.same, params.jump_var)
         state = LoadState(state.same, loose, True, odds, state.rows, state.rows)

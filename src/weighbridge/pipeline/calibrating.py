@@ -262,6 +262,7 @@ def run_calibration(
             residual_std=fitted.residual_std,
             samples=int(rows.target.size),
             method="rls",
+            motion=motions[0].source if len({m.source for m in motions}) == 1 else None,
             notes=_notes(fitted, low < high, rows.target.size, found),
         ),
     )

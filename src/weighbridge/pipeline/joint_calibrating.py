@@ -37,6 +37,10 @@ drive of the calibration anew. Simulated, sixteen vehicles, calibrated by one or
 ordinary drives, six others weighed with each; sensors whose scale is 0.3 % off from drive
 to drive are most of it."""
 
+FARTHEST: Final = 5.0
+"""Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
+seen without an accelerometer, where hills and torque noise pass for drag."""
+
 BalanceAt = Callable[[int, float, float], tuple[ForceBalance, Floats, Bools]]
 """Balance, reading and usable rows of drive k at a delay and a lag [s]."""
 
@@ -128,6 +132,13 @@ def refine(
         found = fit(rows_at(delay, lag), settings)
     except TooShort as short:
         return _self_weighed(_as_it_is(vehicle, str(short)), problem, rebalance, None)
+    mean, std = settings.prior
+    if np.any(np.abs(found.road - mean)[:2] > FARTHEST * std[:2]):
+        why = (
+            f"the drives make its drag area {found.road[0]:.1f} m^2 and its rolling coefficient "
+            f"{found.road[1]:.3f}, which no {vehicle.kind} has"
+        )
+        return _self_weighed(_as_it_is(vehicle, why), problem, rebalance, None)
     return _self_weighed(_with(vehicle, found, delay, lag, problem), problem, rebalance, found.cov)
 
 
@@ -222,12 +233,12 @@ def _self_weighed(
     mean; what is left open moves drives that use the torque otherwise.
     """
 
-    def found(scale: float) -> tuple[float, float, Floats]:
+    def found(scale: float) -> tuple[float, float, Floats, int]:
         tried = replace(vehicle, torque=vehicle.torque.scaled(scale))
         ratios, stds = [], []
         moved: list[Floats] = []
         for balance, mass in zip(rebalance(tried), problem.masses, strict=True):
-            track = joint.estimate(balance, tried)
+            track = joint.estimate(balance, tried, load_changes=False)
             if np.isfinite(track.mass) and track.sensitivity is not None:
                 left = mass - float(balance.merged.fuel_burnt[-1])
                 ratios.append(track.mass / left)
@@ -242,9 +253,10 @@ def _self_weighed(
             float(np.average(ratios, weights=weight)),
             float(1.0 / np.sqrt(np.mean(weight))),
             np.average(np.array(moved), axis=0, weights=weight),
+            len(ratios),
         )
 
-    ratio, bound, direction = found(1.0)
+    ratio, bound, direction, count = found(1.0)
     each = float(np.hypot(TRANSFER_STD[1], joint.UNMODELLED * bound))
     # Where the torque could not be fitted anew, what its own fit left open stays.
     known = float(np.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0))
@@ -261,6 +273,6 @@ def _self_weighed(
         provenance=replace(
             vehicle.provenance,
             fit_cov=open_cov,
-            mass_scale_std=float(np.hypot(known, each / np.sqrt(len(problem.masses)))),
+            mass_scale_std=float(np.hypot(known, each / np.sqrt(count))),
         ),
     )

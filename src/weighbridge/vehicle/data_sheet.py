@@ -104,9 +104,8 @@ MOST_ACCESSORIES: Final = 0.5
 
 def by_data_sheet(vehicle: Vehicle) -> bool:
     """Whether torque is told by the vehicle, and nothing has calibrated it."""
-    made = vehicle.provenance
     told = vehicle.torque.source in ("measured", "percent")
-    return told and made.mass_scale_std is None and made.method is None
+    return told and not vehicle.provenance.torque_fitted
 
 
 def usual_efficiency(vehicle: Vehicle) -> tuple[float, float]:

@@ -258,6 +258,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             _Key("residual_std", "residual_std", "of the torque fit", suffix="nm"),
             _Key("samples", "samples", "used by the fit", "count"),
             _Key("method", "method", "what was fitted: joint, rls or speed-ekf", "text"),
+            _Key("motion", "motion", "how the motion of the drives was found", "text"),
             _Key(
                 "mass_scale_std",
                 "mass_scale_std",

@@ -390,6 +390,7 @@ class Provenance:
     samples : samples used
     method : what the drives were fitted for: the torque of "joint" or "rls", or the speed
         model of "speed-ekf" alone; None where nothing was
+    motion : how the motion of the drives was found, as `weighbridge.navigation.Motion.source`
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
     fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
@@ -405,6 +406,7 @@ class Provenance:
     residual_std: float | None = None
     samples: int | None = None
     method: str | None = None
+    motion: str | None = None
     mass_scale_std: float | None = None
     fit_cov: tuple[float, ...] = ()
     notes: str | None = None
@@ -419,6 +421,11 @@ class Provenance:
             )
         if self.method not in (None, "joint", "rls", "speed-ekf"):
             raise ConfigError(f"method must be joint, rls or speed-ekf, got {self.method!r}")
+
+    @property
+    def torque_fitted(self) -> bool:
+        """Whether the torque was fitted to known masses, or its scale is said to be known."""
+        return self.mass_scale_std is not None or self.method in ("joint", "rls")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
