@@ -22,6 +22,7 @@ from weighbridge.estimators.judging import (
 )
 from weighbridge.estimators.noisy_motion import LEVEL_STD, drawn
 from weighbridge.estimators.slow_errors import (
+    LASTING,
     SlowErrors,
     design,
     filter_params,
@@ -264,7 +265,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
         balance=balance,
         running_mass=track,
         running_std=np.where(last >= 0, np.hypot(track_std, track * left), np.nan),
-        residual=np.where(used, y - rows[:, 0] * x[np.maximum(last, 0), 0], np.nan),
+        residual=np.where(used, y - _explained(rows, x[np.maximum(last, 0)]), np.nan),
         reason=reason,
         mass=mass,
         std=std,
@@ -277,6 +278,14 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
         segments=_segments(view, time, begins, smoothed, np.sqrt(var[:, 0]), left),
         slow_errors=SlowErrors.from_states(time, x, var, running_var),
     )
+
+
+def _explained(rows: Floats, x: Floats) -> Floats:
+    """Force of the mass and of what lasts as long as the drive (n,) [N].
+
+    Disturbance, slow resistance and wind stay in the residual.
+    """
+    return np.asarray(rows[:, 0] * x[:, 0] + np.sum(rows[:, LASTING:] * x[:, LASTING:], axis=1))
 
 
 def _excited(spread: float) -> tuple[Status, str]:

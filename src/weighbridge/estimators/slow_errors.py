@@ -64,6 +64,9 @@ NAMES: Final = ("mass", "disturbance", "resistance", "wind_north", "wind_east", 
                 "drag_area")  # fmt: skip
 """The states, in order."""
 
+LASTING: Final = NAMES.index("cold_torque")
+"""From this state on they last as long as the drive."""
+
 DATA_SHEET_NAMES: Final = ("torque_offset", "torque_growth", "engine_inertia", "wheel_inertia")
 """Further states, constant, of a vehicle file from a data sheet alone, in order: what a
 calibration finds once is found from each drive. An offset of the torque works through the
@@ -85,7 +88,11 @@ class SlowErrors:
     wind_north, wind_east : (m,) what the wind blows towards the south and west at the
         vehicle, which is a head wind for one who drives north or east [m/s]
     wind_std : (m, 2) their standard deviations [m/s]
-    cold_torque, cold_torque_std : friction torque of the start in the reading [N m]
+    constants : the states that last as long as the drive, by name, each with its standard
+        deviation: ``cold_torque``, friction of the start in the reading [N m]; ``drag_area``, C_d A
+        above that of the vehicle file [m^2]; and those of `DATA_SHEET_NAMES`: by how much the
+        file's model of the torque tells too much [N m], the part of it that grows with engine
+        speed, at `USUAL_SPEED` [N m], and inertias above those of the file [kg m^2]
     """
 
     time: Floats
@@ -97,8 +104,7 @@ class SlowErrors:
     wind_north: Floats
     wind_east: Floats
     wind_std: Floats
-    cold_torque: float
-    cold_torque_std: float
+    constants: dict[str, tuple[float, float]]
 
     @classmethod
     def from_states(cls, time: Floats, x: Floats, var: Floats, mass_var: Floats) -> SlowErrors:
@@ -120,8 +126,11 @@ class SlowErrors:
             wind_north=x[:, 3],
             wind_east=x[:, 4],
             wind_std=np.sqrt(var[:, 3:5]),
-            cold_torque=float(x[0, 5]),
-            cold_torque_std=float(np.sqrt(var[0, 5])),
+            constants={
+                name: (float(x[-1, k]), float(np.sqrt(var[-1, k])))
+                for k, name in enumerate((*NAMES, *DATA_SHEET_NAMES)[: x.shape[1]])
+                if k >= LASTING
+            },
         )
 
 

@@ -49,7 +49,8 @@ class MassTrack:
     ----------
     method : name of the estimator
     balance : what it was made from; the rows are those of its merged view
-    running_mass, running_std : (n,) as known at each row, not later [kg]
+    running_mass, running_std : (n,) as the rows until then have it; motion and levels of noise
+        are those of the whole drive [kg]
     residual : (n,) measured force minus the model's at the final mass [N];
         NaN where a row was not used
     reason : (n,) `Reason` why a row was not used

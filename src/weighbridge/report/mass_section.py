@@ -98,8 +98,8 @@ def mass_panel(weighing: Weighing, truth: float | None) -> Panel:
     if converged:
         title = f"The final mass, {weighing.mass:.0f} kg, and what was known on the way"
         caption = (
-            "The running mass is what was known at each moment; the final mass is made from the "
-            "whole drive."
+            "The running mass is what the data until each moment make of it, with motion and noise "
+            "as the whole drive shows them; the final mass is made from the whole drive."
         )
     else:
         title = "The running mass, which ended in no result"

@@ -146,6 +146,7 @@ def tracks_panel(comparison: Sequence[Weighing], truth: float | None) -> Panel:
         figure.update_layout(yaxis_range=[min(late) - margin, max(late) + margin])
     return Panel(
         title="How each method came to its mass",
-        caption="What each knew at each moment; the masses above are made from the whole drive.",
+        caption="What each made of the data until then; the masses above are made from the whole "
+        "drive.",
         figure=figure,
     )

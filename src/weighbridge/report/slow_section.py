@@ -24,6 +24,7 @@ from weighbridge.report.style import (
     line,
     minutes,
 )
+from weighbridge.report.table import Table
 from weighbridge.report.thinning import SCATTER_POINTS, single, thin_line
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.signals.units import from_si, scalar_from_si
@@ -114,6 +115,7 @@ def slow_section(weighing: Weighing) -> Section:
         title=title,
         lead="These forces look like mass; where a line leaves zero by more than its band, they "
         "were there, and the mass was freed of them.",
+        table=constants_table(slow),
         panels=(
             force_panel(
                 weighing,
@@ -134,6 +136,31 @@ def slow_section(weighing: Weighing) -> Section:
             wind_map(weighing, wind, blind),
         ),
     )
+
+
+CONSTANTS: Final = {
+    "cold_torque": ("friction of the cold start in the torque", "N m"),
+    "drag_area": ("drag area above the vehicle file's", "m²"),
+    "torque_offset": ("torque the file's model has too much", "N m"),
+    "torque_growth": ("the same, grown with engine speed, at 200 rad/s", "N m"),
+    "engine_inertia": ("engine inertia above the file's", "kg m²"),
+    "wheel_inertia": ("wheel inertia above the file's", "kg m²"),
+}
+"""What the states that last as long as the drive are, and their units."""
+
+
+def constants_table(slow: SlowErrors) -> Table | None:
+    """List what was found beside the mass that does not change over the drive."""
+    rows = tuple(
+        (text, f"{value:+.3g}", f"{std:.2g}", unit)
+        for name, (text, unit) in CONSTANTS.items()
+        if name in slow.constants
+        for value, std in [slow.constants[name]]
+        if std > 0.0
+    )
+    if not rows:
+        return None
+    return Table("", ("The same all along", "found", "± standard deviation", "unit"), rows)
 
 
 def force_panel(weighing: Weighing, what: str, causes: str, force: Floats, std: Floats) -> Panel:

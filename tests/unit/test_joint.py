@@ -1,0 +1,166 @@
+"""What the joint estimator makes of its parts: load changes, fuel, noise, considered errors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import weighbridge as wb
+from weighbridge.balance import Reason
+from weighbridge.balance.averaging import windows
+from weighbridge.estimators import joint
+from weighbridge.estimators.slow_errors import DATA_SHEET_NAMES, design, usable_rows
+from weighbridge.report.slow_section import constants_table
+from weighbridge.signals import Signal
+from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+from weighbridge.vehicle.model import TorqueModel
+
+LOADED = 400.0
+
+
+@pytest.fixture(scope="module")
+def made():
+    return simulate_car(Scenario(name="joint", car=MIDSIZE, route=short_route(), seed=73))
+
+
+@pytest.fixture(scope="module")
+def car(made):
+    return wb.calibrate([made.drive], mass=made.scenario.mass)
+
+
+@pytest.fixture(scope="module")
+def balance(made, car):
+    return wb.weigh(made.drive, car).result.balance
+
+
+def with_stops(balance, car, *, load, every=None, lean=0.0):
+    """The drive with 300 s of loading at half of it, and then 25 s of rest every so many windows.
+
+    ``lean`` is what the load adds to the accelerometer's reading [m/s^2].
+    """
+    view = balance.merged
+    rows, y = design(view, car)
+    cut = windows(view.time, usable_rows(view, rows, y))
+    count = cut.count.size
+    first = np.array([cut.index[cut.window == k][0] for k in range(count)])
+    middle = count // 2
+    rest = np.zeros(view.time.size)
+    rest[first[middle] :] += 300.0
+    for k in range(middle + every, count, every) if every else ():
+        rest[first[k] :] += 25.0
+    after = np.arange(view.time.size) >= first[middle]
+    return replace(
+        balance,
+        merged=replace(
+            view,
+            time=view.time + rest,
+            traction_force=view.traction_force + after * load * rows[:, 0],
+            specific_force=view.specific_force + lean * after,
+        ),
+    )
+
+
+@pytest.mark.parametrize("every", [None, 3, 6, 7, 20])
+def test_a_load_is_found_however_often_the_vehicle_rests_afterwards(balance, car, every):
+    before = joint.estimate(balance, car).mass
+    found = joint.estimate(with_stops(balance, car, load=LOADED, every=every), car)
+    assert found.mass == pytest.approx(before + LOADED, rel=0.02)
+    assert found.segments[0].mass == pytest.approx(before, rel=0.02)
+
+
+def test_a_known_mass_does_not_change(balance, car):
+    held = joint.estimate(with_stops(balance, car, load=LOADED), car, load_changes=False)
+    assert len(held.segments) == 1
+
+
+def test_a_body_that_leans_with_its_load_costs_little(balance, car, monkeypatch):
+    leaning = with_stops(balance, car, load=LOADED, lean=0.1)
+    upright = joint.estimate(with_stops(balance, car, load=LOADED), car).mass
+
+    def off():
+        return abs(joint.estimate(leaning, car).mass / upright - 1.0)
+
+    allowed = off()
+    monkeypatch.setattr(joint, "LOAD_LEAN_STD", 0.0)
+    assert allowed < 0.7 * off()
+
+
+def test_each_segment_has_burnt_its_own_fuel(balance, car):
+    loaded = with_stops(balance, car, load=LOADED)
+    view = loaded.merged
+    burnt = 50.0 * (view.time - view.time[0]) / (view.time[-1] - view.time[0])
+    dry = joint.estimate(loaded, car)
+    wet = joint.estimate(
+        replace(
+            loaded,
+            merged=replace(
+                view,
+                traction_force=view.traction_force - burnt * design(view, car)[0][:, 0],
+                fuel_burnt=view.fuel_burnt + burnt,
+            ),
+        ),
+        car,
+    )
+    for a, b in zip(dry.segments, wet.segments, strict=True):
+        lost = np.interp(a.end, view.time, burnt)
+        assert_allclose(b.mass, a.mass - lost, atol=0.5)
+
+
+def test_fuel_counts_in_a_calibration(made, car):
+    """A fuel rate that is far too high: 200 kg are said to burn in the drive."""
+    time = made.drive.signals["vehicle_speed"].time
+    rate = np.full(time.size, 200.0 / 790.0 / (time[-1] - time[0]))
+    thirsty = made.drive.with_signals(Signal("fuel_rate", time, rate))
+    lighter = wb.calibrate([thirsty], mass=made.scenario.mass)
+    told = wb.weigh(made.drive, lighter).mass
+    assert told == pytest.approx(wb.weigh(made.drive, car).mass - 100.0, abs=40.0)
+
+
+def test_what_noise_of_the_motion_takes_reaches_mass_and_interval(balance, car, monkeypatch):
+    real = joint.estimate(balance, car)
+    monkeypatch.setattr(joint, "drawn", lambda weight, *_: np.full(weight.size, 0.0))
+    bare = joint.estimate(balance, car)
+    monkeypatch.setattr(joint, "drawn", lambda weight, *_: np.full(weight.size, 0.1))
+    much = joint.estimate(balance, car)
+    assert bare.mass < real.mass < 1.02 * bare.mass
+    assert much.mass + balance.merged.fuel_burnt[-1] == pytest.approx(
+        1.1 * (bare.mass + balance.merged.fuel_burnt[-1])
+    )
+    assert much.std > 0.045 * much.mass
+
+
+def test_what_the_fit_left_open_reaches_the_interval(balance, car, monkeypatch):
+    real = joint.estimate(balance, car)
+    monkeypatch.setattr(joint, "open_std", lambda *_: 0.05)
+    wide = joint.estimate(balance, car)
+    assert wide.mass == real.mass
+    assert wide.std > joint.UNMODELLED * 0.05 * wide.mass
+
+
+def test_rows_that_are_no_numbers_are_left_out(balance, car):
+    view = balance.merged
+    rows = np.flatnonzero(view.usable)[10:13]
+    broken = view.specific_force.copy()
+    broken[rows] = np.nan
+    found = joint.estimate(replace(balance, merged=replace(view, specific_force=broken)), car)
+    assert np.isfinite(found.std)
+    assert (found.reason[rows] == Reason.NO_MOTION).all()
+
+
+def test_a_speed_model_leaves_the_torque_of_a_data_sheet_alone(made, car):
+    torque = Signal("engine_torque", made.truth.time[::5], made.truth.engine_torque[::5])
+    drive = made.drive.with_signals(torque)
+    sheet = replace(
+        car,
+        torque=TorqueModel(source="measured"),
+        mounting=None,
+        provenance=wb.Vehicle().provenance,
+    )
+    weighing = wb.weigh(drive, sheet)
+    by_speed = replace(sheet, provenance=replace(sheet.provenance, method="speed-ekf"))
+    assert_allclose(wb.weigh(drive, by_speed).mass, weighing.mass, rtol=1e-9)
+    slow = weighing.result.slow_errors
+    assert set(DATA_SHEET_NAMES) < set(slow.constants)
+    table = constants_table(slow)
+    assert len(table.rows) == len(slow.constants)
