@@ -57,7 +57,7 @@ def test_a_file_that_does_not_state_the_efficiency_gets_that_of_its_kind(tmp_pat
 @pytest.mark.parametrize(
     "vehicle",
     [
-        sheet(provenance=Provenance(mass_scale_std=0.01)),
+        sheet(provenance=Provenance(masses=(1500.0,), mass_scale_std=0.01)),
         sheet(provenance=Provenance(method="joint")),
         Vehicle(torque=TorqueModel(source="load", coefficients=(-20.0, 300.0))),
     ],

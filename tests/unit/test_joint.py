@@ -164,3 +164,14 @@ def test_a_speed_model_leaves_the_torque_of_a_data_sheet_alone(made, car):
     assert set(DATA_SHEET_NAMES) < set(slow.constants)
     table = constants_table(slow)
     assert len(table.rows) == len(slow.constants)
+
+
+@pytest.mark.parametrize(("factor", "status"), [(1.3, "converged"), (3.5, "inconsistent")])
+def test_a_mass_that_no_load_explains_is_refused(balance, car, factor, status):
+    view = balance.merged
+    rows, _ = design(view, car)
+    more = view.traction_force + (factor - 1.0) * 1580.0 * rows[:, 0]
+    found = joint.estimate(replace(balance, merged=replace(view, traction_force=more)), car)
+    assert found.status == status
+    if status == "inconsistent":
+        assert "times the" in found.why

@@ -175,7 +175,21 @@ def test_data_sheet_values_are_accepted(tmp_path):
 
 
 def test_empty_file_is_a_vehicle_of_defaults(tmp_path):
-    assert load(tmp_path, "") == Vehicle()
+    assert load(tmp_path, "") == Vehicle(driveline=Driveline(wheel_inertia=5.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "engine", "wheels"),
+    [
+        ("[driveline]\ngearings_per_m = [30.0]\n", 0.045, 5.0),
+        ('[vehicle]\nclass = "truck"\n', 2.5, 110.0),
+        ('[vehicle]\nclass = "truck"\n[driveline]\nengine_inertia_kgm2 = 1.5\n', 1.5, 110.0),
+        ("[driveline]\nengine_inertia_kgm2 = 0.15\nwheel_inertia_kgm2 = 6.0\n", 0.15, 6.0),
+    ],
+)
+def test_inertias_left_out_are_those_of_the_class(tmp_path, text, engine, wheels):
+    line = load(tmp_path, text).driveline
+    assert (line.engine_inertia, line.wheel_inertia) == (engine, wheels)
 
 
 SPEED_MODEL = """[speed_model]

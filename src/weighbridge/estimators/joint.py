@@ -293,8 +293,8 @@ def _excited(spread: float) -> tuple[Status, str]:
     if spread >= LEAST_SPREAD:
         return Status.CONVERGED, ""
     return Status.NOT_EXCITED, (
-        f"acceleration and hills vary the specific force by only {spread:.2f} m/s^2, as a cruise "
-        f"on the flat does, and the mass needs {LEAST_SPREAD:.2f}; more starts and hills are needed"
+        f"acceleration and hills vary the specific force by only {spread:.3f} m/s^2, as a cruise "
+        f"on the flat does, and the mass needs {LEAST_SPREAD:.3f}; more starts and hills are needed"
     )
 
 

@@ -14,7 +14,7 @@ from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
-from weighbridge.vehicle.model import MASS_RANGE, TorqueSource, Vehicle
+from weighbridge.vehicle.model import MASS_RANGE, TorqueSource, Vehicle, VehicleClass
 
 STOP: Final = 20.0
 """A standstill this long may change the load [s]."""
@@ -45,6 +45,9 @@ no calibration took that up [-]: recorded cars leaned by 2 to 5 % of the mass.""
 LIGHTEST: Final = 0.85
 """Below this part of the tare no error of the calibration explains the mass [-]."""
 
+HEAVIEST: Final[dict[VehicleClass, float]] = {"car": 2.6, "van": 3.2, "bus": 2.6, "truck": 8.0}
+"""Above this multiple of the empty mass neither load nor a trailer explains the mass [-]: cars of
+1.4 t may draw as much again and carry 0.5 t, tractors of 6 t make 40 t and more."""
 
 MOTION_STD: Final[dict[MotionSource, float]] = {
     "inertial": 0.0,
@@ -128,6 +131,13 @@ def judge(
             f"the estimate is {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "
             f"{high:.0f} kg; check the vehicle file's class and gearings and the torque's sign "
             "and scale"
+        )
+    lightest = vehicle.tare or min(vehicle.provenance.masses, default=None)
+    if lightest is not None and mass - 3.0 * std > HEAVIEST[vehicle.kind] * lightest:
+        return Status.INCONSISTENT, (
+            f"the estimate is {mass:.0f} kg, more than {HEAVIEST[vehicle.kind]:g} times the "
+            f"{lightest:.0f} kg of the empty {vehicle.kind}; check that the vehicle file is this "
+            "vehicle's, and the unit and scale of the torque or load"
         )
     if vehicle.tare is not None and mass + 3.0 * std < LIGHTEST * vehicle.tare:
         return Status.INCONSISTENT, (

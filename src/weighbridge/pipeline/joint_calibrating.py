@@ -155,7 +155,7 @@ def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
     usual = Driveline()
     for k, name in ((2, "engine_inertia"), (3, "wheel_inertia")):
         given, given_std = getattr(known, name), getattr(known, f"{name}_std")
-        if given_std is not None or given != getattr(usual, name):
+        if given_std is not None or given not in (getattr(usual, name), float(mean[k])):
             mean[k] = given
             std[k] = given_std if given_std is not None else 0.15 * given
     return mean, std

@@ -333,8 +333,9 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
         made = "calibrated for speed-ekf alone" if by_speed else "not made by a calibration"
         notes += (
             f"the vehicle file of {vehicle.name} was {made}: for errors of its torque, rolling "
-            f"radius and efficiency (taken as {wheel_efficiency(vehicle):.2f}) and the lean of the "
-            f"body {100.0 * uncalibrated_std(vehicle, motion):.1f} % of the mass, "
+            f"radius and efficiency (taken as {wheel_efficiency(vehicle):.2f}) and, where the "
+            "drive does not show it, the lean of the body "
+            f"{100.0 * uncalibrated_std(vehicle, motion):.1f} % of the mass, "
             "as standard deviation, are in the interval",
         )
     return force_balance(drive, vehicle, motion, delay=delay), notes

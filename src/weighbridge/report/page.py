@@ -214,9 +214,15 @@ def _title(weighings: Sequence[Weighing]) -> str:
 
 
 def _truth(weighing: Weighing, truth: Mapping[str, float]) -> float | None:
-    """True mass at the end of the drive [kg]; that of ``drive.toml`` is of its start."""
-    at_start = None if load_changed(weighing) else weighing.drive.info.mass
-    return truth.get(weighing.drive.name, at_start)
+    """True mass at the end of the drive [kg].
+
+    That of ``drive.toml`` is of its start: the fuel that `joint` reckons with is taken off.
+    """
+    mass = None if load_changed(weighing) else weighing.drive.info.mass
+    result = weighing.result
+    if mass is not None and result is not None and result.slow_errors is not None:
+        mass -= float(result.balance.merged.fuel_burnt[-1])
+    return truth.get(weighing.drive.name, mass)
 
 
 def load_changed(weighing: Weighing) -> bool:

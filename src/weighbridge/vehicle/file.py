@@ -7,8 +7,8 @@ it fills; loading, saving and the comments all follow it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from collections.abc import Collection, Mapping
+from dataclasses import MISSING, dataclass, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -18,6 +18,7 @@ from tomlkit.items import Table
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals.tomlfile import Section, exact_text, read_toml
+from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import (
     FORMAT_VERSION,
     Driveline,
@@ -298,6 +299,7 @@ def load_vehicle(path: str | Path) -> Vehicle:
     root = read_toml(path)
     _check_version(root)
     sections: dict[str, Any] = {}
+    stated: Collection[str] = ()
     for name, (build, keys) in _SECTIONS.items():
         section = root.section(name)
         if section is None:
@@ -305,6 +307,7 @@ def load_vehicle(path: str | Path) -> Vehicle:
         values = {key.field: value for key in keys if (value := _value(section, key)) is not None}
         if name == "driveline":
             _alternative_gearings(section, values)
+            stated = set(values)
         elif name == "road_load":
             _alternative_drag(section, values)
         elif name == "provenance":
@@ -316,7 +319,17 @@ def load_vehicle(path: str | Path) -> Vehicle:
     values = {key.field: value for key in _VEHICLE if (value := _value(section, key)) is not None}
     section.done()
     root.done()
-    return _built(Vehicle, section, {**values, **sections})  # type: ignore[no-any-return]
+    vehicle: Vehicle = _built(Vehicle, section, {**values, **sections})
+    return _with_usual_inertias(vehicle, stated)
+
+
+def _with_usual_inertias(vehicle: Vehicle, stated: Collection[str]) -> Vehicle:
+    """Give the inertias that a file leaves out those of its class."""
+    line = vehicle.driveline
+    mean, _ = road_prior(vehicle.kind, single_speed=line.single_speed)
+    engine = line.engine_inertia if "engine_inertia" in stated else float(mean[2])
+    wheels = line.wheel_inertia if "wheel_inertia" in stated else float(mean[3])
+    return replace(vehicle, driveline=replace(line, engine_inertia=engine, wheel_inertia=wheels))
 
 
 def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:

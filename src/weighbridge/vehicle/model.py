@@ -424,8 +424,8 @@ class Provenance:
 
     @property
     def torque_fitted(self) -> bool:
-        """Whether the torque was fitted to known masses, or its scale is said to be known."""
-        return self.mass_scale_std is not None or self.method in ("joint", "rls")
+        """Whether a calibration has fitted the torque to drives of known mass."""
+        return self.method in ("joint", "rls") or (self.method is None and bool(self.masses))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
