@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 import weighbridge as wb
 from weighbridge.balance import Reason
 from weighbridge.balance.averaging import windows
+from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.slow_errors import DATA_SHEET_NAMES, design, usable_rows
 from weighbridge.report.slow_section import constants_table
@@ -175,3 +176,14 @@ def test_a_mass_that_no_load_explains_is_refused(balance, car, factor, status):
     assert found.status == status
     if status == "inconsistent":
         assert "times the" in found.why
+
+
+@pytest.mark.parametrize("late", [-1.0, 1.0, 2.0])
+def test_torque_on_another_clock_is_refused(made, car, late):
+    recorded = {
+        name: Signal(name, s.time + late, s.values)
+        for name, s in made.drive.signals.items()
+        if name in ("engine_load", "engine_speed", "vehicle_speed", "mass_air_flow")
+    }
+    with pytest.raises(DriveError, match=r"[0-2]\.[0-9] s (later|earlier) .*offset_s"):
+        wb.weigh(made.drive.with_signals(*recorded.values()), car)

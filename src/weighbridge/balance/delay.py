@@ -83,9 +83,40 @@ def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> flo
     DriveError
         The drive lacks what the torque source needs.
     """
+    return best_delay(_misfit(drive, vehicle, motion, np.arange(EARLIEST, 0.41, 0.1)))
+
+
+def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, known: float) -> float:
+    """Find by how much the torque is later than ``known`` [s]; 0 where it is not, or untold.
+
+    Another delay is believed where it leaves half of the misfit or less.
+
+    Raises
+    ------
+    DriveError
+        The drive lacks what the torque source needs.
+    """
+    shifts = np.array([-0.8, 0.0, 0.8])
+    misfit = _misfit(drive, vehicle, motion, known + shifts)
+    scores = np.array([misfit(known + shift) for shift in shifts])
+    if not np.isfinite(scores).all() or scores[1] <= scores.min():
+        return 0.0
+    shifts = np.asarray(0.2 * np.arange(-10, 21), dtype=np.float64)
+    scores = np.array([misfit(known + shift) for shift in shifts])
+    best = int(np.argmin(np.where(np.isfinite(scores), scores, np.inf)))
+    if best in (0, shifts.size - 1) or scores[best] > 0.5 * misfit(known):
+        return 0.0
+    near = slice(best - 1, best + 2)
+    return vertex(shifts[near], scores[near])
+
+
+def _misfit(
+    drive: Drive, vehicle: Vehicle, motion: Motion, delays: Floats
+) -> Callable[[float], float]:
+    """One less the correlation of force and specific force, over rows usable at all ``delays``."""
     # Rows that come and go with the delay would make its misfit rough.
     common: Bools | None = None
-    for delay in np.arange(EARLIEST, 0.41, 0.1):
+    for delay in delays:
         view = force_balance(drive, vehicle, motion, delay=float(delay)).merged
         rows = view.usable & np.isfinite(view.traction_force)
         common = rows if common is None else common & rows
@@ -98,7 +129,7 @@ def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> flo
         force = view.traction_force - view.drag_force - view.rotating_mass * view.accel
         return 1.0 - _correlation(force[rows], view.specific_force[rows])
 
-    return best_delay(misfit)
+    return misfit
 
 
 def vertex(x: Floats, y: Floats) -> float:
