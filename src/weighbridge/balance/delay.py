@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import force_balance
+from weighbridge.balance.force_balance import MergedView, force_balance
 from weighbridge.navigation.motion import Motion
-from weighbridge.signals import Bools, Drive, Floats
+from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Vehicle
 
 EARLIEST: Final = -0.4
@@ -98,13 +98,14 @@ def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, known: float) ->
     """
     shifts = np.array([-0.8, 0.0, 0.8])
     misfit = _misfit(drive, vehicle, motion, known + shifts)
-    scores = np.array([misfit(known + shift) for shift in shifts])
+    scores = np.array([misfit(float(known + shift)) for shift in shifts])
     if not np.isfinite(scores).all() or scores[1] <= scores.min():
         return 0.0
+    as_known = scores[1]
     shifts = np.asarray(0.2 * np.arange(-10, 21), dtype=np.float64)
-    scores = np.array([misfit(known + shift) for shift in shifts])
+    scores = np.array([misfit(float(known + shift)) for shift in shifts])
     best = int(np.argmin(np.where(np.isfinite(scores), scores, np.inf)))
-    if best in (0, shifts.size - 1) or scores[best] > 0.5 * misfit(known):
+    if best in (0, shifts.size - 1) or scores[best] > 0.5 * as_known:
         return 0.0
     near = slice(best - 1, best + 2)
     return vertex(shifts[near], scores[near])
@@ -114,15 +115,18 @@ def _misfit(
     drive: Drive, vehicle: Vehicle, motion: Motion, delays: Floats
 ) -> Callable[[float], float]:
     """One less the correlation of force and specific force, over rows usable at all ``delays``."""
+
+    def at(delay: float) -> MergedView:
+        return force_balance(drive, vehicle, motion, delay=delay).merged
+
+    views = {float(delay): at(float(delay)) for delay in delays}
     # Rows that come and go with the delay would make its misfit rough.
-    common: Bools | None = None
-    for delay in delays:
-        view = force_balance(drive, vehicle, motion, delay=float(delay)).merged
-        rows = view.usable & np.isfinite(view.traction_force)
-        common = rows if common is None else common & rows
+    common = np.logical_and.reduce(
+        [view.usable & np.isfinite(view.traction_force) for view in views.values()]
+    )
 
     def misfit(delay: float) -> float:
-        view = force_balance(drive, vehicle, motion, delay=delay).merged
+        view = views[delay] if delay in views else at(delay)
         rows = common & np.isfinite(view.traction_force) & np.isfinite(view.specific_force)
         if np.count_nonzero(rows) < 100:
             return float("nan")

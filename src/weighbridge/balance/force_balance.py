@@ -14,7 +14,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.vehicle.air import air_density
-from weighbridge.vehicle.data_sheet import wheel_efficiency
+from weighbridge.vehicle.data_sheet import wheel_share
 from weighbridge.vehicle.fuel import fuel_burnt
 from weighbridge.vehicle.gear import (
     effective_gearing,
@@ -184,6 +184,11 @@ class MergedView:
         return np.asarray(self.reason == Reason.USED)
 
     @property
+    def dynamic_pressure(self) -> Floats:
+        """Of the air against the vehicle (n,), which times C_d A is the drag [Pa]."""
+        return 0.5 * self.air_density * self.air_speed * np.abs(self.air_speed)
+
+    @property
     def direction(self) -> tuple[Floats, Floats]:
         """North and east part of the direction driven (n,) [-]; zero where it is unknown."""
         known = np.isfinite(self.heading)
@@ -238,9 +243,7 @@ def force_balance(
     engine_speed = _engine_speed(drive, vehicle, time + motion.speed_delay, rows["speed"])
     gear, gearing, slipping = _gears(drive, vehicle, recorded, engine_speed, rows["speed"])
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
-    driving = wheel_efficiency(vehicle)
-    efficiency = np.where(torque.torque >= 0.0, driving, 1.0 / driving)
-    traction = efficiency * torque.torque * gearing
+    traction = wheel_share(vehicle, torque.torque) * torque.torque * gearing
     density = air_density(drive, time, rows["altitude"])
     rotating = (
         driveline.wheel_inertia / driveline.wheel_radius**2 + driveline.engine_inertia * gearing**2

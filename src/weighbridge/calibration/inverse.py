@@ -166,7 +166,7 @@ def _columns(
     mass = d.mass - view.fuel_burnt
     columns = [
         mass * (view.accel if d.by_speed else view.specific_force),
-        0.5 * view.air_density * view.air_speed * np.abs(view.air_speed),
+        view.dynamic_pressure,
         mass * GRAVITY * np.cos(view.grade),
         gearing**2 * view.accel,
         view.accel / wheel_radius**2,

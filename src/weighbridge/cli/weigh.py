@@ -153,7 +153,7 @@ def _show_one(w: Weighing) -> None:
         typer.echo(f"{w.drive.name}: {w.mass:.0f} kg, 95 % between {low:.0f} and {high:.0f} kg")
         if w.vehicle.tare is not None:
             typer.echo(f"payload {w.payload:.0f} kg over a tare of {w.vehicle.tare:.0f} kg")
-        if w.method == "joint" and len(w.segments) > 1:
+        if w.load_changed:
             loads = ", then ".join(f"{s.mass:.0f} ± {1.96 * s.std:.0f} kg" for s in w.segments)
             typer.echo(f"the load changed: {loads}")
         minutes = w.used_time / 60.0

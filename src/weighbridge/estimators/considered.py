@@ -10,7 +10,7 @@ from weighbridge.balance import ForceBalance
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import disturbance
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.data_sheet import wheel_efficiency
+from weighbridge.vehicle.data_sheet import wheel_share
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import reading_of, torque_rows
 
@@ -34,17 +34,15 @@ def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Float
     view, model, line = balance.merged, vehicle.torque, vehicle.driveline
     gearing = np.nan_to_num(view.gearing)
     torque, speed = np.nan_to_num(balance.force.torque), np.nan_to_num(balance.force.engine_speed)
-    efficiency = wheel_efficiency(vehicle)
-    gain = np.where(torque >= 0.0, efficiency, 1.0 / efficiency) * gearing
+    gain = wheel_share(vehicle, torque) * gearing
     terms = torque_rows(
         reading_of(torque, speed, model),
         speed,
         max(len(model.coefficients) - 2, 0),
         curved=bool(model.curvature),
     )
-    pressure = 0.5 * view.air_density * view.air_speed * np.abs(view.air_speed)
     road = (
-        -pressure,
+        -view.dynamic_pressure,
         -(mass - view.fuel_burnt) * GRAVITY * np.cos(view.grade),
         -(gearing**2) * view.accel,
         -view.accel / line.wheel_radius**2,

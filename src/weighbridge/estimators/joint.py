@@ -305,11 +305,12 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     left = float(np.hypot(scale, MOTION_STD[balance.motion.source]))
     if made.method == "rls":
         left = float(np.hypot(left, OTHER_METHOD_STD))
-    if mass > 0.0:
-        # When the rows weigh, half of the fuel is gone, in the mean.
-        fuel = 0.5 * float(balance.merged.fuel_burnt[-1]) / mass
-        left = float(np.hypot(left, FUEL_STD * fuel))
-    if made.masses and mass > 0.0:
+    if not mass > 0.0:
+        return left
+    # When the rows weigh, half of the fuel is gone, in the mean.
+    fuel = 0.5 * float(balance.merged.fuel_burnt[-1]) / mass
+    left = float(np.hypot(left, FUEL_STD * fuel))
+    if made.masses:
         above, below = np.log(mass / max(made.masses)), np.log(min(made.masses) / mass)
         left = float(np.hypot(left, BEYOND_STD * max(above, below, 0.0)))
     return left

@@ -172,8 +172,7 @@ def design(
     north, east = view.direction
     one = np.ones_like(phi)
     cold = coldness(view) * np.nan_to_num(view.gearing)
-    pressure = 0.5 * view.air_density * view.air_speed * np.abs(view.air_speed)
-    columns = [phi, one, one, slope * north, slope * east, cold, pressure]
+    columns = [phi, one, one, slope * north, slope * east, cold, view.dynamic_pressure]
     if by_data_sheet(vehicle):
         gearing = np.nan_to_num(view.gearing)
         wheels = view.accel / vehicle.driveline.wheel_radius**2

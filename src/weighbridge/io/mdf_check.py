@@ -18,9 +18,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-_ID_BLOCK: Final = 64
-_HEAD: Final = struct.Struct("<4s4xQQ")
-_ZIPPED: Final = struct.Struct("<2sBxIQQ")
+from weighbridge.io.mdf_blocks import HEAD, ID_BLOCK, VLSD_CHANNEL, ZIPPED
+
 # Cycles, bytes of a record and of its invalidation bits.
 _GROUP: Final = struct.Struct("<8xQ8xII")
 # Of MDF 3: the first data group; next, channel group, data, count of groups, bytes of an id; next,
@@ -34,7 +33,6 @@ _ARRAY: Final = struct.Struct("<2xH")
 # So many elements are taken however short the records are: of a group may be none.
 _FEW: Final = 4096
 _BYTE: Final = struct.Struct("<B")
-_VLSD_CHANNEL: Final = 1
 # Room that values of variable length may take when all are as long as the longest, as a multiple
 # of their data.
 _ROOM: Final = 64
@@ -74,9 +72,9 @@ class _Links:
         self.seen: set[int] = set()
 
     def block(self, at: int, kinds: tuple[bytes, ...]) -> _Block:
-        if at < _ID_BLOCK or at + 24 > self.size:
+        if at < ID_BLOCK or at + 24 > self.size:
             raise ValueError(f"a link leads to byte {at} of {self.size}")
-        kind, length, count = _HEAD.unpack_from(self.raw, at)
+        kind, length, count = HEAD.unpack_from(self.raw, at)
         if kind not in kinds:
             raise ValueError(f"there is no {kinds[0].decode()[2:]} block at byte {at}")
         end = at + (length if self.finished or kind not in _DATA else 24 + 8 * count)
@@ -118,7 +116,7 @@ class _Links:
             (kind,) = self.unpack(block, _BYTE)
             at = block.link(5)
             # Values of variable length may also be records of a group in the same data.
-            if kind == _VLSD_CHANNEL and at and self.raw[at : at + 4] != b"##CG":
+            if kind == VLSD_CHANNEL and at and self.raw[at : at + 4] != b"##CG":
                 self.data(at)
 
     def elements(self, array: _Block) -> int:
@@ -150,8 +148,8 @@ class _Links:
         """As `data`, of one block."""
         if block.kind != b"##DZ":
             return block.length - 24, True
-        _, method, columns, size, packed = self.unpack(block, _ZIPPED)
-        if self.finished and block.body + _ZIPPED.size + packed > block.at + block.length:
+        _, method, columns, size, packed = self.unpack(block, ZIPPED)
+        if self.finished and block.body + ZIPPED.size + packed > block.at + block.length:
             raise ValueError(f"the length of the packed data at byte {block.at} is wrong")
         if method % 2 and not 0 < columns <= size:
             raise ValueError(f"the packed data at byte {block.at} have rows of {columns} bytes")
@@ -182,7 +180,7 @@ def check_links(source: Path | bytes) -> bool:
     """
     if isinstance(source, bytes):
         return _check(source)
-    if source.stat().st_size <= _ID_BLOCK:
+    if source.stat().st_size <= ID_BLOCK:
         return True
     with (
         source.open("rb") as stream,
@@ -198,7 +196,7 @@ def _check(raw: bytes | mmap.mmap) -> bool:
         _check_three(raw)
         return True
     file = _Links(raw, finished=not struct.unpack_from("<H", raw, 60)[0])
-    header = file.block(_ID_BLOCK, (b"##HD",))
+    header = file.block(ID_BLOCK, (b"##HD",))
     for number, kind in _CHAINS:
         for _ in file.chain(header.link(number), (kind,)):
             pass
@@ -231,7 +229,7 @@ def _check_three(raw: bytes | mmap.mmap) -> None:
         seen.add(at)
         return tuple(values)
 
-    (group,) = fields(_ID_BLOCK, b"HD", _HEAD_3)
+    (group,) = fields(ID_BLOCK, b"HD", _HEAD_3)
     while group:
         group, channel_group, data, count, id_size = fields(group, b"DG", _DATA_GROUP_3)
         told = 0

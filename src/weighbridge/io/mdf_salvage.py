@@ -17,10 +17,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-_ID_BLOCK: Final = 64
+from weighbridge.io.mdf_blocks import HEAD, ID_BLOCK, VLSD_CHANNEL, ZIPPED
+
 _LINK: Final = struct.Struct("<Q")
-_HEAD: Final = struct.Struct("<4s4xQQ")
-_ZIPPED: Final = struct.Struct("<2sBxIQQ")
 # Record id, cycles, flags, bytes of a record and of its invalidation bits.
 _GROUP: Final = struct.Struct("<QQH6xII")
 # Type, byte offset and bits of a channel.
@@ -36,7 +35,6 @@ _SPARE: Final[dict[bytes, frozenset[int]]] = {
     b"##SI": frozenset((0, 1, 2)),
 }
 _CHANNEL_DATA: Final = 5
-_VLSD_CHANNEL: Final = 1
 _VLSD_GROUP: Final = 0x1
 _TRANSPOSED: Final = 1
 _UNZIPPED_LIMIT: Final = 1 << 28
@@ -91,9 +89,9 @@ class _File:
 
     def block(self, at: int, kinds: tuple[bytes, ...], *, whole: bool = True) -> _Block:
         """Read the header and the links of a block, and ask for all of it where ``whole``."""
-        if at < _ID_BLOCK or at + 24 > self.size:
+        if at < ID_BLOCK or at + 24 > self.size:
             raise _LostError
-        kind, length, count = _HEAD.unpack_from(self.raw, at)
+        kind, length, count = HEAD.unpack_from(self.raw, at)
         if kind not in kinds or length < 24 or count > length // 8:
             raise _LostError
         if at + (length if whole else 24 + 8 * count) > self.size:
@@ -123,7 +121,7 @@ class _File:
             raise _DamagedError
         self.raw += bytes(-len(self.raw) % 8)
         at = len(self.raw)
-        self.raw += _HEAD.pack(kind, 24 + len(content), 0) + content
+        self.raw += HEAD.pack(kind, 24 + len(content), 0) + content
         return at
 
 
@@ -143,7 +141,7 @@ def salvage(path: Path) -> Salvaged | None:
     ASAM MDF 4.1: the blocks HD, DG, CG, CN, CC, DT, SD, DZ, DL and HL.
     """
     size = path.stat().st_size
-    if size <= _ID_BLOCK:
+    if size <= ID_BLOCK:
         return None
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as raw:
         if raw[:8] not in (b"MDF     ", b"UnFinMF ") or raw[8:9] != b"4":
@@ -165,7 +163,7 @@ def _is_unfinished(file: _File) -> bool:
 
 def _mend(file: _File) -> None:
     try:
-        header = file.block(_ID_BLOCK, (b"##HD",))
+        header = file.block(ID_BLOCK, (b"##HD",))
     except _LostError:
         return
     for k, target in enumerate(header.links[1:], 1):
@@ -251,7 +249,7 @@ def _described(file: _File, cg: _Block) -> list[_Block]:
             _spare(file, owner, k, target)
             continue
         if owner.kind == b"##CN" and k == _CHANNEL_DATA:
-            if file.raw[owner.body] == _VLSD_CHANNEL:
+            if file.raw[owner.body] == VLSD_CHANNEL:
                 variable.append(owner)
             continue
         block = file.block(target, _DESCRIPTION)
@@ -315,8 +313,8 @@ def _plain(file: _File, block: _Block) -> tuple[bytes, bool]:
     end = block.at + block.length
     if block.kind != b"##DZ":
         return bytes(file.raw[block.body : min(end, file.size)]), end <= file.size
-    _, kind, columns, size, packed = _ZIPPED.unpack_from(file.raw, block.body)
-    start = block.body + _ZIPPED.size
+    _, kind, columns, size, packed = ZIPPED.unpack_from(file.raw, block.body)
+    start = block.body + ZIPPED.size
     try:
         content = zlib.decompressobj().decompress(
             file.raw[start : min(start + packed, file.size)], min(size, _UNZIPPED_LIMIT) or 1

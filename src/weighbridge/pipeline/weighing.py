@@ -112,6 +112,12 @@ class Weighing:
         return found
 
     @property
+    def load_changed(self) -> bool:
+        """Whether segments are loads told apart, as joint has them, not just legs of a drive."""
+        result = self.result
+        return result is not None and result.slow_errors is not None and len(result.segments) > 1
+
+    @property
     def track(self) -> pl.DataFrame:
         """The mass over time with what it was made from, one row per force sample."""
         import polars as pl

@@ -218,17 +218,11 @@ def _truth(weighing: Weighing, truth: Mapping[str, float]) -> float | None:
 
     That of ``drive.toml`` is of its start: the fuel that `joint` reckons with is taken off.
     """
-    mass = None if load_changed(weighing) else weighing.drive.info.mass
+    mass = None if weighing.load_changed else weighing.drive.info.mass
     result = weighing.result
     if mass is not None and result is not None and result.slow_errors is not None:
         mass -= float(result.balance.merged.fuel_burnt[-1])
     return truth.get(weighing.drive.name, mass)
-
-
-def load_changed(weighing: Weighing) -> bool:
-    """Whether segments are loads told apart, as joint has them, not just legs of a drive."""
-    result = weighing.result
-    return result is not None and result.slow_errors is not None and len(result.segments) > 1
 
 
 def _summary(weighings: Sequence[Weighing], truth: Mapping[str, float]) -> str:
@@ -355,7 +349,7 @@ def _segments(weighing: Weighing) -> str:
         for s in weighing.segments
     ]
     heads = [("from", "n"), ("to", "n"), ("mass ± standard deviation", "n")]
-    if load_changed(weighing):
+    if weighing.load_changed:
         return html_table("The load changed at a stop", heads, rows)
     caption = "Mass between longer stops, where load can change"
     table = html_table("", heads, rows)

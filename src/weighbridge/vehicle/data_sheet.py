@@ -13,6 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from weighbridge.signals import Floats
 from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import Layout, TorqueSource, Vehicle, VehicleClass
 
@@ -126,6 +127,15 @@ def wheel_efficiency(vehicle: Vehicle) -> float:
     if vehicle.driveline.efficiency is not None:
         return vehicle.driveline.efficiency
     return usual_efficiency(vehicle)[0] if by_data_sheet(vehicle) else 1.0
+
+
+def wheel_share(vehicle: Vehicle, torque: Floats) -> Floats:
+    """Torque at the wheels, geared down, over that of the engine (n,) [-].
+
+    Losses take of it when driving, and add to it when the wheels turn the engine.
+    """
+    driving = wheel_efficiency(vehicle)
+    return np.where(torque >= 0.0, driving, 1.0 / driving)
 
 
 def torque_std(vehicle: Vehicle) -> float:
