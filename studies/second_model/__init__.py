@@ -1,0 +1,7 @@
+"""An independent simulator of road vehicles, to weigh what it drives."""
+
+from .make import make_drive, simulate
+from .sensing import Logger
+from .vehicle import KINDS, Vehicle, random_vehicle
+
+__all__ = ["KINDS", "Logger", "Vehicle", "make_drive", "random_vehicle", "simulate"]
