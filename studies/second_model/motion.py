@@ -24,7 +24,7 @@ COLUMNS = (
     "drag_force", "rolling_force", "traction_force", "coupled_force", "slip", "pedal",
     "brake_pedal", "clutch_open", "fuel_rate", "engine_warmth", "oil_warmth", "tyre_warmth",
     "engine_brake_torque", "accessory_power", "rotor_warmth", "coupled_offset", "coupled_speed",
-    "traction_work", "brake_work", "rolling_work", "drag_work", "coupled_work", "crosswind",
+    "crosswind",
 )  # fmt: skip
 
 
@@ -51,6 +51,7 @@ class Engine(NamedTuple):
     brake : engine brake torque at governed speed [N m]
     accessory, cycled : power always taken, and power that is switched on and off [W]
     warm_time : time of the coolant to warm up at ordinary load [s]
+    stop_start : 1 where the engine is stopped at a standstill
     """
 
     full: np.ndarray
@@ -78,6 +79,7 @@ class Engine(NamedTuple):
     accessory: float
     cycled: float
     warm_time: float
+    stop_start: int
 
 
 class Gearbox(NamedTuple):
@@ -194,6 +196,7 @@ class Driver(NamedTuple):
     pace : wanted speed over limit [-]
     top_speed : never faster [m/s]
     headway : time behind a leader [s]
+    hardest : most deceleration ever asked for [m/s2]
     up_low, up_high : shift up at closed and full pedal, parts of the governed speed [-]
     lug : lowest engine speed under load, part of the governed speed [-]
     skip, neutral, rest, pre_brake, overlap : chances of a skipped gear, of coasting in neutral,
@@ -213,6 +216,7 @@ class Driver(NamedTuple):
     pace: float
     top_speed: float
     headway: float
+    hardest: float
     up_low: float
     up_high: float
     lug: float
@@ -310,7 +314,7 @@ class Day(NamedTuple):
     draft: float
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def at(values, x):
     """Read a uniform grid of unit step at ``x``, held at its ends."""
     if x <= 0.0:
@@ -322,13 +326,13 @@ def at(values, x):
     return values[i] * (1.0 - f) + values[i + 1] * f
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def full_torque(engine, speed):
     """Net torque at full load, warm, at sea level [N m]."""
     return at(engine.full, max(speed, 0.0) / engine.top * (engine.full.size - 1))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def friction(engine, speed):
     """Friction of the warm engine [N m], at zero speed none."""
     s = max(speed, 0.0)
@@ -336,7 +340,7 @@ def friction(engine, speed):
     return f * min(1.0, s / 20.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def regen_limit(torque, power, speed):
     """Braking torque of a motor: limited by torque, power, and fading out to a halt."""
     s = max(speed, 0.0)
@@ -344,7 +348,7 @@ def regen_limit(torque, power, speed):
     return limit * min(1.0, max(0.0, (s - 15.0) / 60.0))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def run(engine, box, body, driver, road, day, rng, steps):
     """Drive for ``steps`` steps of ``DT``; return rows of ``COLUMNS``."""
     out = np.zeros((steps // KEEP, len(COLUMNS)))
@@ -366,7 +370,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
     # Motion.
     s, v, a, height = 30.0, 0.0, 0.0, 0.0
     a_felt, a_long = 0.0, 0.0
-    x_c, v_c = 0.0, 0.0
+    first = at(road.grade, s / road.step)
+    x_c, v_c = -G * np.sin(first) / body.coupled_frequency**2, 0.0
     pitch, pitch_rate = 0.0, 0.0
     heave, heave_rate = 0.0, 0.0
     smooth_f, smooth_r = 0.0, 0.0
@@ -400,7 +405,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
     # Driver.
     mode, foot = COAST, 0.0
     pedal, pedal_goal, pedal_sum = 0.0, 0.0, 0.0
-    brake, brake_goal = 0.0, 0.0
+    brake, brake_goal, brake_sum = 0.0, 0.0, 0.0
     pads = 0.0
     wait = 3.0 + 10.0 * rng.random()
     standing = True
@@ -417,7 +422,6 @@ def run(engine, box, body, driver, road, day, rng, steps):
     lead_on, lead_big = False, 0.0
     a_des = 0.0
 
-    w_trac, w_brake, w_roll, w_drag, w_coupled = 0.0, 0.0, 0.0, 0.0, 0.0
     s_pitch_rate, s_pitch_acc, s_heave = 0.0, 0.0, 0.0
     v_kept = 0.0
     fuel_rate = 0.0
@@ -425,6 +429,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
     t_drag = 0.0
     t_net = 0.0
     t_limit = 1.0
+    off = False
     every = 20
     tick = DT * every
 
@@ -543,28 +548,29 @@ def run(engine, box, body, driver, road, day, rng, steps):
             if stop < road.stop_at.size:
                 left = road.stop_at[stop] - s
                 if left < 250.0:
-                    need = v * v / (2.0 * max(left, 0.4))
+                    need = v * v / (2.0 * max(left + 0.5, 0.7))
                     b = road.stop_decel[stop]
-                    if road.stop_release[stop] > left and not standing:
+                    free = road.stop_release[stop]
+                    if free > 0.0 and free > left and not standing:
                         stop += 1
                         stop_stage = 0
                     else:
                         if stop_stage == 0 and need > 0.45 * b:
                             stop_stage = 1
-                        if stop_stage == 1 and need > b:
+                        if stop_stage == 1 and (need > b or left < 12.0):
                             stop_stage = 2
                         if stop_stage == 1:
                             a_stop = max(a_coast - 0.02, -need)
                         elif stop_stage == 2:
-                            a_stop = -need * 1.02
+                            a_stop = -min(need * 1.02, 1.5 * b + 0.7)
                             if left < 2.0:
                                 a_stop = min(a_stop, -0.6)
                         if v < 2.0 and stop_stage == 0 and left < 8.0:
                             stop_stage = 2
-                        if left < -3.0 and v > 3.0:
+                        if left < -6.0 or (left < -3.0 and v > 3.0):
                             stop += 1
                             stop_stage = 0
-            a_des = max(min(a_des, a_stop), -6.0)
+            a_des = max(min(a_des, a_stop), -driver.hardest)
 
             # Standing.
             if standing:
@@ -580,8 +586,9 @@ def run(engine, box, body, driver, road, day, rng, steps):
                         over_level = (0.1 + 0.5 * rng.random()) + 6.0 * max(sin_g, 0.0)
                 else:
                     a_des = -1.0
-            elif v < 0.05 and mode == BRAKE:
+            elif v < 0.05 and (mode == BRAKE or a_des < 0.01):
                 standing = True
+                stop_stage = 0
                 wait = 0.6 + 2.0 * rng.random()
                 if stop < road.stop_at.size and road.stop_at[stop] - s < 8.0:
                     wait = road.stop_time[stop]
@@ -589,6 +596,12 @@ def run(engine, box, body, driver, road, day, rng, steps):
                         mass -= road.stop_drop[stop]
                     stop += 1
                     stop_stage = 0
+
+            # The engine stops at a halt and is started before the start.
+            if engine.stop_start == 1 and standing and we < 1.3 * engine.idle:
+                off = x_e > 0.7 and wait > 0.5 and t > 15.0 and not (ac_on and wait < 15.0)
+            else:
+                off = False
 
             # Which pedal.
             foot -= tick
@@ -605,6 +618,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
                         new = BRAKE
                 elif mode == BRAKE and (a_des > a_coast + 0.05 and stop_stage != 2):
                     new = COAST
+                if stop_stage == 2 and v < 3.5 and road.stop_at[stop] - s < 10.0:
+                    new = BRAKE
                 if new != mode and foot < 0.0:
                     foot = 0.25 + 0.5 * rng.random()
                     if a_des < a_coast - 1.5:
@@ -620,6 +635,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
                     if new == BRAKE and rng.random() < driver.pre_brake:
                         pre_left = 0.4 + 1.8 * rng.random()
                         pre_level = 0.1 + 0.35 * rng.random()
+                    if new == BRAKE:
+                        brake_sum = 0.0
                     if new == DRIVE:
                         pedal_sum *= 0.5
                     mode = new
@@ -661,7 +678,9 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 if standing:
                     brake_goal = mass * (3.0 + 10.0 * abs(sin_g))
                 elif mode == BRAKE:
-                    more = felt * max(0.05, a_coast - a_des)
+                    brake_sum += 0.12 * (a_felt - a_des)
+                    brake_sum = min(2.5, max(-0.4, brake_sum))
+                    more = felt * max(0.05, a_coast - a_des + brake_sum)
                     if pre_left > 0.0 and more < 2.5 * felt:
                         more = felt * pre_level
                     brake_goal = more * (1.0 + 0.04 * rng.normal())
@@ -690,7 +709,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 goal_gear = gear
                 lug_w = driver.lug * n_max * (0.85 + 0.45 * pedal)
                 if mode != DRIVE:
-                    lug_w = max(1.15 * engine.idle, 0.72 * driver.lug * n_max)
+                    lug_w = max(1.15 * engine.idle, 0.6 * driver.lug * n_max)
                 if mode == DRIVE and not in_neutral:
                     up = n_max * (driver.up_low + (driver.up_high - driver.up_low) * pedal**1.4)
                     up *= 1.0 + 2.0 * max(0.0, sin_g)
@@ -730,13 +749,15 @@ def run(engine, box, body, driver, road, day, rng, steps):
                     in_neutral = False
                     goal_gear = gear
                     phase, phase_time = 2, 0.0
-                if box.robot == 0 and goal_gear == 1 and gear > 1 and v > 2.2 and sin_g < 0.06:
+                # Nobody goes down into the lowest gear while the vehicle rolls well.
+                rolls = v > 2.5 and sin_g < 0.06 and pedal < 0.7
+                if rolls and goal_gear == 1 and gear > 1:
                     goal_gear = 2
                 if goal_gear < gear:
                     while goal_gear > 1 and v / radius * box.ratios[goal_gear - 1] < 0.9 * lug_w:
                         if v / radius * box.ratios[goal_gear - 2] > 0.8 * n_max:
                             break
-                        if box.robot == 0 and goal_gear == 2 and v > 2.2:
+                        if rolls and goal_gear == 2:
                             break
                         goal_gear -= 1
                 if goal_gear != gear:
@@ -796,8 +817,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
                     wi = v / radius * (1.0 + slip) * ratio
                     twist = twist * old_ratio / ratio
                     locked = False
-                cut = 0.75
-                cap = (0.15 + 1.1 * abs(t_net) / full_cap + 0.4 * phase_time) * full_cap
+                cut = 0.8
+                cap = 1.05 * abs(t_net) + (0.03 + 0.25 * phase_time) * full_max
                 if locked or phase_time > 1.5 or wi < 1.12 * engine.idle:
                     phase = 0
             if in_neutral and phase == 0:
@@ -816,7 +837,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 elif not locked:
                     if pedal > 0.01 or mode == DRIVE:
                         bite = max(0.0, (we - 0.9 * box.launch_low) / box.launch_span)
-                        cap = min(1.0, max(bite**1.3, cap / full_cap + DT * 1.2)) * full_cap
+                        cap = min(1.0, max(bite**1.3, cap / full_cap + DT * 0.6)) * full_cap
                     else:
                         cap = min(full_cap, cap + full_cap * DT * 0.6)
                 else:
@@ -891,7 +912,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 demand = max(demand, hold * fade)
             else:
                 idle_sum = 0.0
-            if phase >= 2 and clutched and next_gear > 0 and not locked:
+            meet = phase >= 2 or (phase == 1 and box.kind == DUAL_CLUTCH)
+            if meet and clutched and next_gear > 0 and not locked:
                 # The engine is turned up to the speed of a lower gear, by most drivers a little.
                 target = v / radius * box.ratios[next_gear - 1]
                 match = 0.97 if box.robot == 1 else 0.85
@@ -921,6 +943,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
             fuel_rate = torque_i * we / (engine.efficiency * engine.heating)
 
         # ---- driveline ------------------------------------------------------------------
+        we_before = we
         w_wheel = v / radius * (1.0 + slip)
         if not in_gear:
             twist -= DT / 0.05 * twist
@@ -932,6 +955,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
             wi = w_wheel * box.ratios[max(gear, next_gear, 1) - 1]
             locked = False
         else:
+            wi_before = wi
             d_twist = wi / ratio - w_wheel
             t_shaft = box.stiffness * twist + box.damping * d_twist
             through = t_shaft / ratio
@@ -948,19 +972,25 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 lift = 1.0 - (box.converter_ratio - 1.0) * (nu / 0.86 - 1.0)
                 t_turb = t_pump * max(1.0, lift)
             if locked:
-                acc = (t_net - load) / (engine.inertia + box.inertia)
+                # The shafts' damping is taken at the end of the step, else stiff gears diverge.
+                both = engine.inertia + box.inertia
+                soft = 1.0 + DT * box.damping / (both * ratio * ratio)
+                acc = (t_net - load) / (both * soft)
                 carried = t_net - engine.inertia * acc
                 if not fixed and abs(carried) > cap:
                     locked = False
                 else:
                     we += DT * acc
                     wi = we
+                    t_shaft += box.damping * DT * acc / ratio
             if not locked:
                 diff = we - wi
                 side = 1.0 if diff > 0.0 else -1.0
                 t_clutch = cap * side
                 we += DT * (t_net - t_clutch - t_pump) / engine.inertia
-                wi += DT * (t_clutch + t_turb - load) / box.inertia
+                soft = 1.0 + DT * box.damping / (box.inertia * ratio * ratio)
+                wi += DT * (t_clutch + t_turb - load) / (box.inertia * soft)
+                t_shaft += box.damping * (wi - wi_before) / ratio
                 if (we - wi) * side <= 0.0 and cap > 1.0:
                     joint = engine.inertia * we + box.inertia * wi
                     we = joint / (engine.inertia + box.inertia)
@@ -968,6 +998,10 @@ def run(engine, box, body, driver, road, day, rng, steps):
                     locked = True
                 we = max(we, 0.4 * engine.idle)
             twist += DT * (wi / ratio - w_wheel)
+
+        if off:
+            we = max(0.0, we_before - 250.0 * DT)
+            torque_i, t_net, fuel_rate = 0.0, 0.0, 0.0
 
         # ---- forces ---------------------------------------------------------------------
         f_trac = t_shaft / radius
@@ -1019,12 +1053,6 @@ def run(engine, box, body, driver, road, day, rng, steps):
             acc_c -= 2.0 * body.coupled_damping * body.coupled_frequency * v_c
             v_c += DT * acc_c
             x_c += DT * v_c
-        if v_mid > 0.0:
-            w_trac += DT * f_trac * v_mid
-            w_brake += DT * f_brake * v_mid
-            w_roll += DT * f_roll * v_mid
-            w_drag += DT * f_drag * v_mid
-            w_coupled += DT * f_coupled * v_mid
         v = v_new
         s += DT * v_mid
         height += DT * v_mid * sin_g
@@ -1102,12 +1130,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
             o[35] = x_m
             o[36] = x_c
             o[37] = v_c
-            o[38] = w_trac
-            o[39] = w_brake
-            o[40] = w_roll
-            o[41] = w_drag
-            o[42] = w_coupled
-            o[43] = cross
+            o[38] = cross
             v_kept = v
             s_pitch_rate = 0.0
             s_pitch_acc = 0.0

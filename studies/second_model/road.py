@@ -165,7 +165,7 @@ def make_road(
     fine = int(length / PROFILE_STEP)
     rough = np.array([2.0, 2.6, 1.6, 1.0])[zone] * float(np.exp(rng.normal(0.0, 0.35)))
     at_fine = np.minimum((np.arange(fine) * PROFILE_STEP / STEP).astype(int), count - 1)
-    n0, gd = 0.1, 16e-6 * 0.5
+    n0, gd = 0.1, 16e-6
     white = rng.normal(size=fine) * rough[at_fine]
     slope = 2.0 * np.pi * n0 * np.sqrt(gd) * white / np.sqrt(2.0 * PROFILE_STEP)
     keep = np.exp(-2.0 * np.pi * 0.01 * PROFILE_STEP)

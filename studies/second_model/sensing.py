@@ -275,8 +275,10 @@ def obd(out: np.ndarray, vehicle: Vehicle, logger: Logger, air: float, rng) -> C
     length = n / RATE
     u = rng.uniform
     delay = dict.fromkeys(values, 0.0)
+    cycle = dict.fromkeys(values, 1.0 / RATE)
     for name in values:
         if logger.delays:
+            cycle[name] = u(0.01, 0.1)
             slow = name in ("vehicle_speed_kmh", "engine_load_pct")
             delay[name] = u(0.05, 0.3) if slow else u(0.02, 0.15)
     if logger.mode == "rows":
@@ -306,7 +308,8 @@ def obd(out: np.ndarray, vehicle: Vehicle, logger: Logger, air: float, rng) -> C
                 which[5 :: int(60 * logger.rate)] = name
         lost = rng.random(count) < 0.003
     for name, series in values.items():
-        rows = np.clip(((asked - delay[name]) * RATE).astype(int), 0, n - 1)
+        fresh = np.floor((asked - delay[name]) / cycle[name]) * cycle[name]
+        rows = np.clip((fresh * RATE).astype(int), 0, n - 1)
         column = series[rows]
         if logger.mode == "polled":
             column = np.where((which == name) & ~lost, column, np.nan)

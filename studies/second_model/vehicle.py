@@ -6,7 +6,6 @@ import numpy as np
 
 from .motion import (
     CONVERTER,
-    DT,
     DUAL_CLUTCH,
     FIXED,
     MANUAL,
@@ -261,6 +260,7 @@ def random_vehicle(kind: str, seed: int) -> Vehicle:
         accessory=u(0.4, 0.9) * kw * (4.0 if heavy else 1.0),
         cycled=(u(8.0, 18.0) if base in ("truck", "semi") else u(1.2, 3.2)) * kw,
         warm_time=u(280, 480) * (1.6 if heavy else 1.0),
+        stop_start=int(not heavy and not electric and u() < 0.5),
     )
 
     # Gearbox. Overall ratios from the speed at 1000 rpm that such vehicles have.
@@ -298,8 +298,7 @@ def random_vehicle(kind: str, seed: int) -> Vehicle:
         efficiency[direct] = 0.992 * final  # direct drive
     box_inertia = 0.012 * peak / 150.0 + 0.01
     shaft = u(6e3, 11e3) if not heavy else u(50e3, 90e3)
-    least = min(engine.inertia if electric else box_inertia, 9.0) * ratios.min() ** 2
-    damping = min(u(0.010, 0.016) * shaft, 0.8 * least / DT)
+    damping = u(0.018, 0.032) * shaft
     start = 1
     if base == "semi":
         start = 3

@@ -1,0 +1,144 @@
+"""The second model keeps the laws of physics and drives as people do."""
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numba
+import numpy as np
+import polars as pl
+import pytest
+from numpy.testing import assert_allclose
+
+from weighbridge.io import read_drive
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "studies"))
+
+from second_model import Logger, make_drive, random_vehicle, simulate
+from second_model.motion import RATE, G
+from second_model.sensing import AT, imu
+
+pytestmark = pytest.mark.skipif(
+    numba.config.DISABLE_JIT, reason="half a million steps need compiled code"
+)
+
+KINDS = ("petrol", "diesel", "semi", "electric_car")
+
+
+@cache
+def driven(kind, style="ordinary"):
+    vehicle = random_vehicle(kind, 3)
+    mass = 0.5 * (vehicle.tare + vehicle.gross)
+    return vehicle, simulate(vehicle, mass=mass, seed=5, duration=900.0, style=style, warm=1.0)
+
+
+def columns(motion, *names):
+    return [motion.out[:, AT[name]] for name in names]
+
+
+def share_that_moves(vehicle, mass):
+    return vehicle.body.coupled_share * np.maximum(0.0, mass[0] - vehicle.body.reference_mass)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_energy_closes(kind):
+    vehicle, motion = driven(kind)
+    speed, height, mass = columns(motion, "speed", "altitude", "mass")
+    names = ("traction_force", "coupled_force", "brake_force", "drag_force", "rolling_force")
+    forces = columns(motion, *names)
+    traction, coupled, *losses = (np.trapezoid(f * speed) / RATE for f in forces)
+    rigid = mass - share_that_moves(vehicle, mass)
+    kinetic = 0.5 * (rigid[-1] + vehicle.body.wheel_mass) * speed[-1] ** 2
+    potential = np.sum(0.5 * (rigid[1:] + rigid[:-1]) * G * np.diff(height))
+    spent = np.trapezoid(np.abs(forces[0]) * speed) / RATE
+    assert abs(traction + coupled - sum(losses) - kinetic - potential) < 1e-3 * spent
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_perfect_accelerometer_reads_acceleration_and_gravity(kind):
+    vehicle, motion = driven(kind)
+    table = imu(motion.out, vehicle, Logger(imu_quality=0.0), np.random.default_rng(1))
+    speed, height, distance, pitch, roll = columns(
+        motion, "speed", "altitude", "distance", "pitch", "roll"
+    )
+    left, up = table["accel_y_mps2"], table["accel_z_mps2"]
+    upright = left * np.sin(roll) + up * np.cos(roll)
+    along = table["accel_x_mps2"] * np.cos(pitch) - upright * np.sin(pitch)
+    # Gravity from the height gained per distance, not from the grade the model used.
+    climb = np.diff(height, prepend=0.0) / np.maximum(np.diff(distance, prepend=30.0), 1e-9)
+    moving = speed > 0.5
+    accel = np.diff(speed, prepend=0.0) * RATE
+    assert_allclose((along - accel - G * climb)[moving], 0.0, atol=0.02)
+    # The gyroscope follows the slope of road and body, and y points left.
+    turned = -np.cumsum(table["gyro_y_radps"]) / RATE
+    tilt = motion.out[:, AT["grade"]] + pitch
+    assert_allclose(turned - turned[0], tilt - tilt[0], atol=0.003)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_engine_and_wheels_turn_by_the_gear(kind):
+    vehicle, motion = driven(kind)
+    speed, gear, engine, slipping = columns(motion, "speed", "gear", "engine_speed", "clutch_open")
+    rows = (gear > 0) & (slipping == 0.0) & (speed > 5.0)
+    ratio = engine[rows] / speed[rows] * vehicle.body.radius
+    off = ratio / vehicle.box.ratios[gear[rows].astype(int) - 1]
+    assert np.median(off) == pytest.approx(1.0, abs=0.02)
+    assert np.quantile(np.abs(off - 1.0), 0.95) < 0.06
+    assert engine.max() < 1.1 * vehicle.engine.limit
+
+
+def test_city_traffic_looks_like_city_traffic():
+    vehicle, motion = driven("petrol", "city")
+    speed, accel, brake, gear, torque, mass = columns(
+        motion, "speed", "accel", "brake_force", "gear", "engine_torque", "mass"
+    )
+    moving = speed > 0.3
+    assert 15.0 < 3.6 * speed.mean() < 35.0
+    assert 0.05 < np.mean(~moving) < 0.45
+    assert 0.05 < np.mean(brake[moving] > 0.03 * mass[moving]) < 0.3
+    low, high = np.quantile(accel[moving], [0.01, 0.99])
+    assert -3.5 < low < -1.0
+    assert 1.0 < high < 3.5
+    assert np.abs(accel).max() < 8.0
+    assert torque.max() < 1.02 * vehicle.engine.full.max()
+    shifts = np.count_nonzero(np.diff(gear[gear > 0]))
+    assert 2.0 < shifts / 15.0 < 12.0
+    assert np.all(np.diff(mass) <= 0.0)
+    assert 0.1 < mass[0] - mass[-1] < 2.0
+
+
+def test_a_folder_reads_back(tmp_path):
+    vehicle = random_vehicle("truck", 1)
+    logger = Logger(brake_switch=True, gnss_speed=True)
+    truth = make_drive(
+        tmp_path, vehicle, mass=9000.0, seed=3, duration=120.0, logger=logger, warm=1.0
+    )
+    drive = read_drive(tmp_path)
+    assert drive.problems == ()
+    assert drive.info.mass == 9000.0
+    wanted = {"vehicle_speed", "engine_speed", "engine_torque_fraction", "reference_torque"}
+    wanted |= {"brake_switch", "accel_x", "gyro_z", "latitude", "gnss_speed"}
+    assert wanted <= drive.signals.keys()
+    speed = drive.signals["vehicle_speed"]
+    true = np.interp(speed.time, truth["time_s"], truth["speed_mps"])
+    assert np.std(speed.values - true) < 0.6
+    assert pl.read_parquet(tmp_path / "truth.parquet").equals(truth)
+
+
+def test_the_same_seed_gives_the_same_drive():
+    vehicle = random_vehicle("small_petrol", 2)
+    one, two, other = (
+        simulate(vehicle, mass=1200.0, seed=seed, duration=60.0).out for seed in (4, 4, 5)
+    )
+    np.testing.assert_array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
+def test_bad_orders_are_refused():
+    with pytest.raises(ValueError, match="kind"):
+        random_vehicle("boat", 1)
+    vehicle = random_vehicle("petrol", 1)
+    with pytest.raises(ValueError, match="style"):
+        simulate(vehicle, mass=1500.0, seed=1, style="wild")
+    with pytest.raises(ValueError, match="mass"):
+        simulate(vehicle, mass=100.0, seed=1)
