@@ -148,6 +148,7 @@ class Body(NamedTuple):
     corner_stiffness : side force over load per radian of slip angle [1/rad]
     wheelbase : [m]
     squat, dive : nose-up pitch per acceleration by traction and by brakes [rad s2/m]
+    play : pitch that the friction of the springs holds back [rad]
     pitch_frequency, pitch_damping : [rad/s, -] at the reference mass
     heave_frequency, heave_damping : [rad/s, -]
     roll_per_accel : [rad s2/m]
@@ -172,6 +173,7 @@ class Body(NamedTuple):
     wheelbase: float
     squat: float
     dive: float
+    play: float
     pitch_frequency: float
     pitch_damping: float
     heave_frequency: float
@@ -372,10 +374,12 @@ def run(engine, box, body, driver, road, day, rng, steps):
     a_felt, a_long = 0.0, 0.0
     first = at(road.grade, s / road.step)
     x_c, v_c = -G * np.sin(first) / body.coupled_frequency**2, 0.0
-    pitch, pitch_rate = 0.0, 0.0
-    heave, heave_rate = 0.0, 0.0
-    smooth_f, smooth_r = 0.0, 0.0
-    last_f, last_r = 0.0, 0.0
+    pitch, pitch_rate, held = day.seat_pitch, 0.0, 0.0
+    heave_rate = 0.0
+    smooth_f = at(road.profile, s / road.profile_step)
+    smooth_r = at(road.profile, (s - body.wheelbase) / road.profile_step)
+    last_f, last_r = smooth_f, smooth_r
+    heave = 0.5 * (smooth_f + smooth_r)
     roll = 0.0
     slip = 0.0
     f_roll, f_drag, f_brake, f_trac = 0.0, 0.0, 0.0, 0.0
@@ -594,6 +598,11 @@ def run(engine, box, body, driver, road, day, rng, steps):
                     wait = road.stop_time[stop]
                     if road.stop_drop[stop] != 0.0:
                         mass -= road.stop_drop[stop]
+                        coupled = body.coupled_share * max(0.0, mass - body.reference_mass)
+                        load_ratio = mass / body.reference_mass
+                        radius = body.radius * (1.0 - body.radius_load * (load_ratio - 1.0))
+                        pitch_w = body.pitch_frequency / np.sqrt(load_ratio)
+                        heave_w = body.heave_frequency / np.sqrt(load_ratio)
                     stop += 1
                     stop_stage = 0
 
@@ -708,6 +717,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 w_gear = v / radius * box.ratios[gear - 1]
                 goal_gear = gear
                 lug_w = driver.lug * n_max * (0.85 + 0.45 * pedal)
+                many = 0.85 if gears > 8 else 1.0
+                lowest = box.start_gear if sin_g < 0.06 else 1
                 if mode != DRIVE:
                     lug_w = max(1.15 * engine.idle, 0.6 * driver.lug * n_max)
                 if mode == DRIVE and not in_neutral:
@@ -725,21 +736,22 @@ def run(engine, box, body, driver, road, day, rng, steps):
                             goal_gear = gear + 1
                             if gear + 1 < gears and rng.random() < driver.skip:
                                 after2 = w_gear * box.ratios[gear + 1] / box.ratios[gear - 1]
-                                if after2 > 1.15 * lug_w:
+                                if after2 > (1.15 if many == 1.0 else 0.92) * lug_w:
                                     goal_gear = gear + 2
-                    elif gear > 1 and w_gear < lug_w and since_shift > 2.0:
+                    elif gear > lowest and w_gear < many * lug_w and since_shift > 2.0:
                         goal_gear = gear - 1
                     elif gear > 1 and full_time > 0.8 and a_des - a_felt > 0.15:
                         after = w_gear * box.ratios[gear - 2] / box.ratios[gear - 1]
                         if after < 0.88 * n_max and since_shift > 2.5:
                             goal_gear = gear - 1
                 elif mode in (COAST, BRAKE):
-                    if gear > 1 and w_gear < lug_w and since_shift > 1.5 and not in_neutral:
+                    slow = gear > lowest and w_gear < lug_w and not in_neutral
+                    if slow and since_shift > 1.5:
                         if box.robot == 1 or box.kind != MANUAL or v > 5.0:
                             goal_gear = gear - 1
                             if box.kind == MANUAL:
                                 # Further down in one go if braking.
-                                while goal_gear > 1 and goal_gear > gear - 3 and mode == BRAKE:
+                                while goal_gear > max(lowest, gear - 3) and mode == BRAKE:
                                     if v / radius * box.ratios[goal_gear - 1] > 1.2 * lug_w:
                                         break
                                     goal_gear -= 1
@@ -754,7 +766,9 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 if rolls and goal_gear == 1 and gear > 1:
                     goal_gear = 2
                 if goal_gear < gear:
-                    while goal_gear > 1 and v / radius * box.ratios[goal_gear - 1] < 0.9 * lug_w:
+                    while (
+                        goal_gear > lowest and v / radius * box.ratios[goal_gear - 1] < 0.9 * lug_w
+                    ):
                         if v / radius * box.ratios[goal_gear - 2] > 0.8 * n_max:
                             break
                         if rolls and goal_gear == 2:
@@ -844,6 +858,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
                     cap = full_cap
                 if locked and (we < 0.95 * engine.idle or (we < low * 0.98 and pedal < 0.02)):
                     cap = 0.0
+            if we < 0.9 * engine.idle:
+                cap = 0.0  # the clutch opens before the engine stalls
         elif box.kind == CONVERTER:
             if phase == 1:
                 cut = 0.7
@@ -1078,7 +1094,9 @@ def run(engine, box, body, driver, road, day, rng, steps):
         heave_rate += DT * heave_acc
         heave += DT * heave_rate
         lean = squat_gain * f_trac - dive_gain * (f_brake if v > 0.0 else 0.0)
-        lean += day.seat_pitch + (smooth_f - smooth_r) / body.wheelbase
+        # Friction of the springs: they move once the force exceeds it.
+        held = min(max(held, lean - body.play), lean + body.play)
+        lean = held + day.seat_pitch + (smooth_f - smooth_r) / body.wheelbase
         lean_rate = (rate_f - rate_r) / body.wheelbase
         pitch_acc = pitch_w**2 * (lean - pitch)
         pitch_acc += 2.0 * body.pitch_damping * pitch_w * (lean_rate - pitch_rate)

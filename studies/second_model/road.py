@@ -147,7 +147,7 @@ def make_road(
         square[k] = min(square[k], square[k + 1] + 2.0 * slow[k] * STEP)
     plan = np.sqrt(square)
 
-    crossfall = np.clip(0.02 + curvature * 25.0 * -1.0, -0.06, 0.06) * -1.0
+    crossfall = np.clip(0.02 - curvature * 25.0, -0.06, 0.06)
     crossfall = gaussian_filter1d(crossfall + _wander(rng, count, 80.0, 0.006), 8.0)
     heading = (
         rng.uniform(0.0, 2.0 * np.pi) - np.concatenate([[0.0], np.cumsum(curvature)[:-1]]) * STEP

@@ -184,7 +184,7 @@ def _believed(out: np.ndarray, ecu: Ecu, vehicle: Vehicle) -> np.ndarray:
     ) * np.sin(6.0 * share + p[3])
     relative = ecu.scale * (1.0 + ecu.map_error * wave)
     relative += ecu.part_load * np.maximum(1.0 - np.abs(share) / 0.6, 0.0)
-    relative -= ecu.rotor_fade * (1.0 - out[:, AT["rotor_warmth"]]) * -1.0
+    relative -= ecu.rotor_fade * (1.0 - out[:, AT["rotor_warmth"]])
     return out[:, AT["indicated_torque"]] * relative
 
 
@@ -207,7 +207,18 @@ def _ecu_values(
     rpm = rpm + (4.0 * rng.normal(size=rpm.size) if vehicle.cylinders else 0.0)
     values["engine_speed_rpm"] = np.maximum(np.round(rpm / ecu.rpm_step) * ecu.rpm_step, 0.0)
 
-    believed = _low_pass(_believed(out, ecu, vehicle), ecu.smoothing)
+    believed = _believed(out, ecu, vehicle)
+    if vehicle.kind in ("diesel", "van", "truck", "semi") and rng.random() < 0.12:
+        # The particle filter burns itself clean: later injection, other fuel per torque.
+        begin, span = rng.uniform(0.0, 0.7), rng.uniform(400.0, 800.0)
+        burning = (
+            np.abs(np.arange(speed.size) / RATE - begin * speed.size / RATE - span / 2) < span / 2
+        )
+        believed = believed * (1.0 + rng.uniform(0.02, 0.07) * burning)
+    believed = believed + 0.004 * engine.full.max() * _wander(rng, speed.size, 1.0 / RATE, 0.15) * (
+        believed > 1.0
+    )
+    believed = _low_pass(believed, ecu.smoothing)
     limit = np.maximum(out[:, AT["indicated_limit"]], 1.0)
     # Friction as the control unit has it: warm, and what it knows of the cold.
     cold = 1.0 + ecu.cold_known * engine.cold * (1.0 - out[:, AT["engine_warmth"]]) ** 1.5
@@ -346,7 +357,7 @@ def gnss(
     )
     tall = u(1.8, 4.0)
     height = height + tall * worse * (
-        _wander(rng, count, 1.0, 200.0) + 0.25 * _wander(rng, count, 1.0, 10.0)
+        _wander(rng, count, 1.0, 200.0) + 0.12 * _wander(rng, count, 1.0, 10.0)
     )
     height = height + rng.normal(0.0, 0.15, count) + u(-20.0, 45.0)
     seen = around.covered[np.minimum(place.astype(int), around.covered.size - 1)] == 0.0

@@ -347,8 +347,10 @@ def random_vehicle(kind: str, seed: int) -> Vehicle:
         ),
         corner_stiffness=u(9.0, 13.0),
         wheelbase=u(2.4, 2.8) if not heavy else u(3.7, 6.0),
-        squat=(u(0.10, 0.32) if not heavy else u(0.05, 0.15)) * degree,
-        dive=(u(0.08, 0.25) if not heavy else u(0.05, 0.13)) * degree,
+        squat=(u(0.10, 0.32) if not heavy else u(0.07, 0.25)) * degree,
+        dive=(u(0.08, 0.25) if not heavy else u(0.07, 0.22)) * degree,
+        # Leaf springs rub, coil springs hardly.
+        play=(u(0.02, 0.15) if heavy or base == "van" else u(0.0, 0.03)) * degree,
         pitch_frequency=2.0 * np.pi * u(1.2, 1.9),
         pitch_damping=u(0.22, 0.4),
         heave_frequency=2.0 * np.pi * u(1.1, 1.6),
