@@ -878,6 +878,9 @@ def run(engine, box, body, driver, road, day, rng, steps):
             else:
                 lock_up = max(0.0, lock_up - DT / (0.15 if phase == 0 else 0.4))
             cap = box.capacity * lock_up
+            if phase == 1:
+                # Lock-up slips in the shift, so that the engine's inertia does not jolt.
+                cap = min(cap, 1.1 * abs(t_net) + 0.05 * full_max)
         in_gear = gear > 0 and not in_neutral
 
         # ---- engine ---------------------------------------------------------------------
@@ -913,6 +916,9 @@ def run(engine, box, body, driver, road, day, rng, steps):
             demand = ask * t_limit
             if in_gear and ratio > 0.0:
                 grip = 0.85 * day.grip * body.driven_share * mass * G * radius / ratio
+                if box.kind == CONVERTER and not locked:
+                    low = 1.0 - (box.converter_ratio - 1.0) * (wi / max(we, 10.0) / 0.86 - 1.0)
+                    grip /= max(1.0, low)
                 demand = min(demand, grip + fric)
             if we > engine.limit:
                 demand *= max(0.0, 1.0 - (we - engine.limit) / (0.03 * engine.limit))
