@@ -10,8 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from weighbridge.constants import GRAVITY
-from weighbridge.navigation.motion import BY_SPEED, Motion
+from weighbridge.balance.foot import foot_off, near
+from weighbridge.constants import (
+    GAS_CONSTANT_DRY_AIR,
+    GRAVITY,
+    STANDARD_PRESSURE,
+    STANDARD_TEMPERATURE,
+)
+from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.vehicle.air import air_density
 from weighbridge.vehicle.data_sheet import wheel_share
@@ -23,7 +29,7 @@ from weighbridge.vehicle.gear import (
     shifting,
 )
 from weighbridge.vehicle.model import Vehicle, VehicleClass
-from weighbridge.vehicle.torque import averaged, engine_torque, source_signal
+from weighbridge.vehicle.torque import engine_torque, source_signal
 
 
 class Reason(IntEnum):
@@ -86,19 +92,11 @@ TYPICAL_MASS: Final[dict[VehicleClass, float]] = {
 BRAKING_FORCE: Final = 0.06
 """Braking force over weight that marks unseen braking [-]."""
 
-SLOWING_FORCE: Final = 0.02
-"""Force over weight by which a measured torque may slow the vehicle before a foot may be on the
-brake [-]: a part of what a dragged engine or recuperation do, and little beside the hills and
-starts that weigh."""
+SWITCH_MARGIN: Final = 0.3
+"""Samples nearer than this to a pressed brake switch may be braked [s]."""
 
-PUSHED_TIME: Final = 1.0
-"""Time over which the motion tells whether the engine pushes the vehicle [s]."""
-
-PRESSED: Final = 0.01
-"""Position of the accelerator from which a foot is on it [-]."""
-
-PEDAL_MARGIN: Final = 0.3
-"""Samples nearer than this to the foot leaving the pedal may see the brake [s]."""
+TRAIL: Final = 0.0015
+"""Braking force over weight that smoothing may still hold of a brake let go [-]."""
 
 FILLED_TIME: Final = 10.0
 """A fast reading that runs straight for so long was filled in, not measured [s]."""
@@ -224,8 +222,8 @@ def force_balance(
     drive, vehicle, motion
     delay : lateness of the torque; the vehicle's when None, 0 if that is unknown [s]
     lag : time constant of its first-order smoothing; the vehicle's when None [s]
-    signed : whether the torque falls below zero; a load that stands for it does not, and
-        tells by its lowest value alone that the foot is off the pedal
+    signed : whether the torque tells what a dragged engine takes; a load that stands for it
+        does not
 
     Raises
     ------
@@ -237,7 +235,8 @@ def force_balance(
         delay = vehicle.timing.torque_delay or 0.0
     recorded = source.time
     time = recorded - delay
-    rows = _motion_at(smoothed(motion, vehicle.timing.torque_lag if lag is None else lag), time)
+    lag = vehicle.timing.torque_lag if lag is None else lag
+    rows = _motion_at(smoothed(motion, lag), time)
     driveline = vehicle.driveline
 
     engine_speed = _engine_speed(drive, vehicle, time + motion.speed_delay, rows["speed"])
@@ -251,18 +250,14 @@ def force_balance(
     air_speed = rows["speed"] + headwind(drive, rows["heading"])
     drag = 0.5 * density * vehicle.road_load.drag_area * air_speed * np.abs(air_speed)
 
-    switch = drive.get("brake_switch")
-    # Where no switch tells, a driver who is off the pedal may brake a little as well.
-    unknown = signed and (switch is None or not len(switch))
-    may_brake = unknown & ~_foot_on_pedal(drive, vehicle, recorded)
+    signed = signed and vehicle.torque.source in ("measured", "percent")
     needed, weight = _needed_force(vehicle, rows, drag, rotating)
-    # Of rows near the limit a noisy torque would keep its high readings, and the mass would
-    # come out low. The motion chooses by what stands on the other side. Where it has not
-    # measured the grade, it cannot tell a push downhill from the engine's.
-    by_speed = motion.source in BY_SPEED
-    # A load says little of an engine that is dragged; a torque may go below zero.
-    loose = SLOWING_FORCE * weight if vehicle.torque.source in ("measured", "percent") else 0.0
-    pushed = torque.level if by_speed else averaged(needed + loose, source.period, PUSHED_TIME)
+    pressed = brake_pressed(drive, recorded)
+    off = foot_off(drive, vehicle, source, recorded)
+    # What a dragged engine takes is told by a torque alone, and by none where a foot may brake.
+    overrun = np.zeros_like(off) if signed and pressed is not None else off
+    slowed = off if pressed is None else pressed
+    trailing = _trailing(vehicle, motion, time, slowed, traction if signed else None, lag)
 
     # The first reason that applies is the one told, so the order matters.
     reason = np.zeros(time.size, dtype=np.uint8)
@@ -270,7 +265,7 @@ def force_balance(
     changing = shifting(time, gear, margin=SHIFT_MARGIN)
     if driveline.single_speed:
         changing[:] = False
-    braking = _braking(drive, recorded, traction, needed, weight)
+    braking = _braking(drive, recorded, traction, needed, weight, pressed)
     for flag, why in (
         (~(rows["valid"] > 0.99) | ~np.isfinite(rows["speed"]), Reason.NO_MOTION),
         (rows["speed"] < SLOWEST, Reason.STANDING),
@@ -278,7 +273,7 @@ def force_balance(
         (changing, Reason.SHIFTING),
         (slipping, Reason.CLUTCH_SLIPPING),
         (~np.isfinite(traction) | ~near | filled(source, recorded), Reason.NO_TORQUE),
-        (torque.overrun | (may_brake & (pushed <= 0.0)), Reason.OVERRUN),
+        (torque.overrun | overrun | trailing, Reason.OVERRUN),
         (torque.extrapolated, Reason.EXTRAPOLATED),
     ):
         reason[(reason == 0) & flag] = why
@@ -317,22 +312,6 @@ def force_balance(
             reason=reason,
         ),
     )
-
-
-def _foot_on_pedal(drive: Drive, vehicle: Vehicle, recorded: Floats) -> Bools:
-    """Where the accelerator is pressed, so that the brake is not (n,).
-
-    With one pedal an electric car drives and recuperates; with an engine the throttle
-    may be the valve of the intake, which is never quite shut, and tells nothing.
-    """
-    pedal = drive.get("throttle")
-    if pedal is None or not len(pedal) or not vehicle.driveline.single_speed:
-        return np.zeros(recorded.size, dtype=bool)
-    pressed = np.ones(recorded.size, dtype=bool)
-    for side in (-PEDAL_MARGIN, 0.0, PEDAL_MARGIN):
-        near = pedal.age(recorded + side) <= 3.0 * pedal.period
-        pressed &= near & (np.nan_to_num(pedal.at(recorded + side)) > PRESSED)
-    return pressed
 
 
 def filled(signal: Signal, time: Floats) -> Bools:
@@ -393,18 +372,18 @@ def smoothed(motion: Motion, lag: float) -> Motion:
     """Pass what the force side is compared with through a first-order lag [s]."""
     if lag <= 0.0:
         return motion
-    keep = float(np.exp(-1.0 / (motion.rate * lag)))
-
-    def behind(values: Floats) -> Floats:
-        start = [keep * values[0]]
-        return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=start)[0])
-
     return replace(
         motion,
-        specific_force=behind(motion.specific_force),
-        accel=behind(motion.accel),
-        grade=behind(motion.grade),
+        specific_force=behind(motion.specific_force, motion.rate, lag),
+        accel=behind(motion.accel, motion.rate, lag),
+        grade=behind(motion.grade, motion.rate, lag),
     )
+
+
+def behind(values: Floats, rate: float, lag: float) -> Floats:
+    """Pass even samples (n,) at ``rate`` [Hz] through a first-order lag [s]."""
+    keep = float(np.exp(-1.0 / (rate * lag)))
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0])
 
 
 def _motion_at(motion: Motion, time: Floats) -> dict[str, Floats]:
@@ -466,31 +445,77 @@ def _gears(
     return gear, gearing, slipping
 
 
+def _mass_known(vehicle: Vehicle) -> float:
+    """Largest mass known [kg]: drag explains least of how a heavy vehicle slows down."""
+    return max(vehicle.provenance.masses, default=vehicle.tare or TYPICAL_MASS[vehicle.kind])
+
+
 def _needed_force(
     vehicle: Vehicle, rows: dict[str, Floats], drag: Floats, rotating: Floats
 ) -> tuple[Floats, float]:
-    """Force at the wheels (n,) that the motion takes, and the weight it is told for [N].
-
-    Its sign hangs on the mass through the drag alone. The largest mass known is the
-    cautious one: drag explains least of how a heavy vehicle slows down.
-    """
-    mass = max(vehicle.provenance.masses, default=vehicle.tare or TYPICAL_MASS[vehicle.kind])
+    """Force at the wheels (n,) that the motion takes, and the weight it is told for [N]."""
+    mass = _mass_known(vehicle)
     rolling = vehicle.road_load.rolling_coefficient * GRAVITY
     needed = (mass + np.nan_to_num(rotating)) * rows["specific_force"] + mass * rolling + drag
     return needed, mass * GRAVITY
 
 
+def _trailing(
+    vehicle: Vehicle,
+    motion: Motion,
+    time: Floats,
+    slowed: Bools,
+    traction: Floats | None,
+    lag: float,
+) -> Bools:
+    """Where the smoothed motion still holds the force of a brake that was let go (n,).
+
+    Parameters
+    ----------
+    vehicle, motion
+    time : (n,) instants of the torque [s]
+    slowed : (n,) where the brake may work
+    traction : (n,) of a torque that tells what a dragged engine takes [N]; None for none
+    lag : time constant of the smoothing [s]
+    """
+    if lag <= 0.0 or not slowed.any():
+        return np.zeros(time.size, dtype=bool)
+    mass = _mass_known(vehicle)
+    load = vehicle.road_load
+    nearest = np.clip(np.searchsorted(time, motion.time), 0, time.size - 1)
+    needed = mass * (motion.specific_force + load.rolling_coefficient * GRAVITY)
+    density = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)
+    needed = needed + 0.5 * density * load.drag_area * motion.speed**2
+    dragged = np.minimum(np.nan_to_num(traction), 0.0)[nearest] if traction is not None else 0.0
+    brake = np.where(slowed[nearest], np.maximum(dragged - np.nan_to_num(needed), 0.0), 0.0)
+    held = np.interp(time, motion.time, behind(brake, motion.rate, lag))
+    return np.asarray(held > TRAIL * mass * GRAVITY)
+
+
+def brake_pressed(drive: Drive, recorded: Floats) -> Bools | None:
+    """Where the brake switch is on, or nearly (n,); None without a switch."""
+    switch = drive.get("brake_switch")
+    if switch is None or not len(switch):
+        return None
+    on = switch.values > 0.5
+    return (switch.held(recorded) > 0.5) | near(switch.time, on, recorded, SWITCH_MARGIN)
+
+
 def _braking(
-    drive: Drive, recorded: Floats, traction: Floats, needed: Floats, weight: float
+    drive: Drive,
+    recorded: Floats,
+    traction: Floats,
+    needed: Floats,
+    weight: float,
+    pressed: Bools | None,
 ) -> Bools:
     """Where brake or retarder work, or the vehicle slows more than its torque explains."""
     retarder = drive.get("retarder_torque")
     retarding = np.zeros(recorded.size, dtype=bool)
     if retarder is not None and len(retarder):
         retarding = np.nan_to_num(retarder.held(recorded)) < RETARDING
-    switch = drive.get("brake_switch")
-    if switch is not None and len(switch):
-        return np.asarray(retarding | (switch.held(recorded) > 0.5))
+    if pressed is not None:
+        return np.asarray(retarding | pressed)
     # Unseen braking: what slows the vehicle is far more than engine, drag and
     # rolling can, whatever the mass within reason.
     force = np.where(np.isfinite(traction), traction, 0.0)

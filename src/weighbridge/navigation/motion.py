@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
+import numpy as np
+
+from weighbridge.constants import GRAVITY
 from weighbridge.signals import Bools, Floats
 
 MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
@@ -79,3 +82,24 @@ class Motion:
     def rate(self) -> float:
         """Samples per second [Hz]."""
         return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
+
+
+def with_squat(motion: Motion, squat: float, std: float) -> Motion:
+    """Take another squat out of the grade than the one found in the drive.
+
+    Parameters
+    ----------
+    motion : with a ``squat``, else it is returned as it is
+    squat : pitch of the body per acceleration [rad per m/s^2]
+    std : its standard deviation
+    """
+    if motion.squat is None:
+        return motion
+    more = (squat - motion.squat) * motion.accel
+    return replace(
+        motion,
+        grade=motion.grade - more,
+        specific_force=motion.specific_force - GRAVITY * np.cos(motion.grade) * more,
+        squat=squat,
+        squat_std=std,
+    )

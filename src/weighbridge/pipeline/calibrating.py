@@ -11,7 +11,7 @@ import numpy as np
 
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.delay import best_delay, delay_std
-from weighbridge.balance.force_balance import ForceBalance, smoothed
+from weighbridge.balance.force_balance import ForceBalance
 from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.regression import (
     BOUNDS,
@@ -26,7 +26,8 @@ from weighbridge.calibration.regression import (
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, cold_share
 from weighbridge.estimators.rls import block_jackknife, regression
-from weighbridge.navigation.motion import Motion
+from weighbridge.estimators.squat import pooled
+from weighbridge.navigation.motion import Motion, with_squat
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.joint_calibrating import BalanceAt, JointProblem, refine
@@ -193,7 +194,7 @@ def run_calibration(
             raise DriveError(
                 f"{drive.name}: no {' and no '.join(missing)}, which torque source {source!r} needs"
             )
-    motions = [find_motion(drive, base) for drive in drives]
+    motions, squat = _one_squat([find_motion(drive, base) for drive in drives])
 
     gears, draft = _draft(drives, motions, base, source)
     driveline = draft.driveline
@@ -249,7 +250,7 @@ def run_calibration(
             speed_range=speeds,
         ),
         road_load=_fitted_road_load(fitted),
-        mounting=_mounting(motions, base.mounting),
+        mounting=_mounting(motions, base.mounting, squat),
         timing=Timing(
             torque_delay=delay if found else base.timing.torque_delay,
             torque_delay_std=spread if np.isfinite(spread) else None,
@@ -345,12 +346,9 @@ def _balance_at(
     floors: Sequence[float],
 ) -> BalanceAt:
     """Return what makes the rows of drive ``k`` at a delay and a lag."""
-    lagged: dict[tuple[int, float], Motion] = {}
 
     def rows(k: int, delay: float, lag: float) -> tuple[ForceBalance, Floats, Bools]:
-        if (k, lag) not in lagged:
-            lagged[k, lag] = smoothed(motions[k], lag)
-        balance, x = _draft_balance(drives[k], lagged[k, lag], draft, source, delay)
+        balance, x = _draft_balance(drives[k], motions[k], draft, source, delay, lag)
         return balance, x, _finite(balance, x, floors[k])
 
     return rows
@@ -496,6 +494,7 @@ def _draft_balance(
     draft: Vehicle,
     source: TorqueSource,
     delay: float,
+    lag: float = 0.0,
 ) -> tuple[ForceBalance, Floats]:
     """Balance without a torque model yet, and the torque source at its stamps."""
     stamps = drive.signals[SIGNALS[source][0]].time
@@ -505,7 +504,7 @@ def _draft_balance(
         load = drive.signals["engine_load"]
         stand_in = drive.with_signals(replace(load, name="engine_torque"))
     signed = source in ("measured", "percent")
-    return force_balance(stand_in, draft, motion, delay=delay, lag=0.0, signed=signed), x
+    return force_balance(stand_in, draft, motion, delay=delay, lag=lag, signed=signed), x
 
 
 def _ranges(
@@ -543,7 +542,17 @@ def _speed_scale(motions: Sequence[Motion], base: Vehicle) -> float:
     return float(np.average([scale for scale, _ in known], weights=weight))
 
 
-def _mounting(motions: Sequence[Motion], known: Mounting | None) -> Mounting | None:
+def _one_squat(motions: list[Motion]) -> tuple[list[Motion], tuple[float, float] | None]:
+    """Take the same squat out of all drives: that of the vehicle, with its standard deviation."""
+    found = pooled(motions)
+    if found is None:
+        return motions, None
+    return [with_squat(motion, *found) for motion in motions], found
+
+
+def _mounting(
+    motions: Sequence[Motion], known: Mounting | None, squat: tuple[float, float] | None
+) -> Mounting | None:
     for motion in motions:
         if motion.mounting is not None:
             roll, pitch, yaw = motion.mounting
@@ -552,8 +561,8 @@ def _mounting(motions: Sequence[Motion], known: Mounting | None) -> Mounting | N
                 pitch=pitch,
                 yaw=yaw,
                 std=motion.mounting_std,
-                squat=motion.squat,
-                squat_std=motion.squat_std,
+                squat=squat[0] if squat else None,
+                squat_std=squat[1] if squat else None,
             )
     return known
 

@@ -18,6 +18,7 @@ from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
 from weighbridge.estimators.judging import uncalibrated_std
+from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
@@ -335,7 +336,7 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     DriveError
         Torque and motion are on clocks that differ.
     """
-    motion = find_motion(drive, vehicle)
+    motion = of_vehicle(find_motion(drive, vehicle), vehicle)
     notes = motion.notes
     delay = vehicle.timing.torque_delay
     if delay is None:

@@ -1,0 +1,243 @@
+"""Where the driver's foot is off the accelerator, so that it may be on the brake.
+
+A driver brakes with the engine dragged. The reading then lies on its floor, the lowest
+value it takes at that engine speed; how hard the brake works it does not say. So the rows on
+the floor are left out, and those just beside them, where a foot is on its way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from weighbridge.kernels import two_states
+from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.vehicle.model import Vehicle
+
+BIN: Final = 1.12
+"""Ratio of the engine speeds at the ends of a bin [-]."""
+
+SLOWEST_ENGINE: Final = 30.0
+"""Engine speed at which the first bin begins [rad/s]."""
+
+FEWEST: Final = 12
+"""Samples that a bin needs."""
+
+LOW: Final = 2.0
+"""Percentile of the readings in a bin near which its floor lies."""
+
+SPREAD: Final = 0.05
+"""Readings so near above that percentile, over the range of the reading, lie on the floor [-]."""
+
+SHARE: Final = 0.06
+"""Part of a bin's readings that lie on a floor; of an engine that was never dragged at that speed
+fewer are so near its lowest reading [-]."""
+
+SLOPE: Final = 0.02
+"""Rise of the floor from one bin to the next, over the range of the reading, at most [-]."""
+
+SCATTER: Final = (0.012, 0.03)
+"""Standard deviation of readings on the floor over the range of the reading, at least and at
+most [-]."""
+
+USUAL_LAG: Final = 0.3
+"""Time constant of the smoothing by which control units report torque and load [s]."""
+
+SHORTEST: Final = 0.2
+"""Time between readings over which the smoothing is undone, at least [s]."""
+
+STAY: Final = 1.0
+"""Mean time that a foot stays on a pedal [s]."""
+
+ODDS: Final = (-5.0, 3.0)
+"""Bounds of what one reading adds to the logarithm of the odds that the foot is off [-]."""
+
+PROBABLE: Final = 0.3
+"""Probability above which the foot counts as off the accelerator [-]."""
+
+PRESSED: Final = 0.01
+"""Position of the accelerator above its lowest from which a foot is on it [-]."""
+
+MOVING: Final = 1.0
+"""Speed above which a reading tells of a dragged engine [m/s]."""
+
+MARGIN: Final = 0.5
+"""Samples nearer than this to one with the foot off may see the brake [s]."""
+
+MARGIN_POLLS: Final = 2.0
+"""The same in periods of the reading, where it is polled slowly [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """Reading of a dragged engine over its speed.
+
+    Attributes
+    ----------
+    engine_speed : (b,) middle of each bin, rising [rad/s]
+    level : (b,) reading of the dragged engine
+    scatter : standard deviation of such readings
+    span : range of the reading from dragged to full
+    """
+
+    engine_speed: Floats
+    level: Floats
+    scatter: float
+    span: float
+
+    def at(self, engine_speed: Floats) -> Floats:
+        """Floor at engine speeds (n,); at the ends that of the last bin."""
+        return np.interp(engine_speed, self.engine_speed, self.level)
+
+
+def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
+    """Learn the floor of a reading over engine speed.
+
+    Parameters
+    ----------
+    reading, engine_speed : (n,) while driving; NaN where unknown [rad/s]
+
+    Returns
+    -------
+    Floor
+        None where there are too few samples.
+    """
+    known = np.isfinite(reading) & np.isfinite(engine_speed) & (engine_speed > SLOWEST_ENGINE)
+    if np.count_nonzero(known) < 5 * FEWEST:
+        return None
+    x, turning = reading[known], engine_speed[known]
+    low, high = np.percentile(x, [1.0, 99.5])
+    span = float(high - low)
+    if not span > 0.0:
+        return None
+    bins = (np.log(turning / SLOWEST_ENGINE) / np.log(BIN)).astype(np.int64)
+    count = int(bins.max()) + 1
+    level = np.full(count, np.nan)
+    rest = []
+    for k in range(count):
+        inside = x[bins == k]
+        if inside.size < FEWEST:
+            continue
+        near = inside[inside <= np.percentile(inside, LOW) + SPREAD * span]
+        if near.size >= max(0.5 * FEWEST, SHARE * inside.size):
+            level[k] = np.median(near)
+            rest.append(near - level[k])
+    middle = SLOWEST_ENGINE * BIN ** (np.arange(count) + 0.5)
+    shown = np.isfinite(level)
+    if not shown.any():
+        return Floor(middle, np.full(count, low), SCATTER[1] * span, span)
+    # Where an engine was never dragged its lowest readings are no floor: it does not rise
+    # faster than the floors beside it allow.
+    every = np.arange(count)
+    steps = np.abs(every[:, None] - every[shown]) * SLOPE * span
+    level = np.min(level[shown] + steps, axis=1)
+    spread = 1.4826 * float(np.median(np.abs(np.concatenate(rest))))
+    return Floor(middle, level, float(np.clip(spread, *np.multiply(SCATTER, span))), span)
+
+
+def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, recorded: Floats) -> Bools:
+    """Where the foot may be off the accelerator (n,).
+
+    Two hidden states, dragged and pushing, of which a dragged engine reads its floor and a
+    pushing one anything above: so the noise of a reading does not choose rows one by one.
+    Where the position of the accelerator is told, it decides.
+
+    Parameters
+    ----------
+    drive, vehicle
+    source : what the torque is made from
+    recorded : (n,) stamps asked about [s]
+    """
+    pedal = _pedal(drive, vehicle)
+    if pedal is not None:
+        released = pedal.values <= float(np.percentile(pedal.values, 1.0)) + PRESSED
+        off = near(pedal.time, released, recorded, MARGIN)
+        return np.asarray(off | (pedal.age(recorded) > 3.0 * pedal.period))
+    engine = drive.get("engine_speed")
+    turning = engine.at(source.time) if engine is not None else np.full(len(source), np.nan)
+    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    driven = source.values
+    if speed is not None:
+        driven = np.where(np.nan_to_num(speed.at(source.time)) > MOVING, driven, np.nan)
+    if vehicle.driveline.single_speed:
+        # A motor that recuperates may be helped by the brake, and no floor tells where it ends.
+        finite = driven[np.isfinite(driven)]
+        span = float(np.percentile(np.abs(finite), 99.5)) if finite.size else 0.0
+        floor = Floor(np.ones(1), np.zeros(1), SCATTER[0] * span, span) if span > 0.0 else None
+    else:
+        floor = find_floor(driven, turning)
+    if floor is None:
+        return np.zeros(recorded.size, dtype=bool)
+    level = floor.at(np.nan_to_num(turning))
+    sharp, gain = unsmoothed(source)
+    odds = np.maximum(
+        _log_odds(source.values - level, floor.scatter, floor.span),
+        _log_odds(sharp - level, gain * floor.scatter, floor.span),
+    )
+    off = two_states.posterior(odds, source.time, STAY) > PROBABLE
+    return near(source.time, off, recorded, max(MARGIN, MARGIN_POLLS * source.period))
+
+
+def _log_odds(above: Floats, scatter: Floats | float, span: float) -> Floats:
+    """Logarithm of the odds that a dragged engine reads so far ``above`` its floor (n,)."""
+    odds = np.log(span / (np.sqrt(2.0 * np.pi) * scatter))
+    odds = odds - 0.5 * (np.maximum(above, 0.0) / scatter) ** 2
+    return np.asarray(np.clip(np.nan_to_num(odds, nan=ODDS[0]), *ODDS))
+
+
+def unsmoothed(reading: Signal) -> tuple[Floats, Floats]:
+    """Undo the usual smoothing of a control unit: what was held since the sample before (n,).
+
+    A foot that taps the brake leaves the accelerator for less time than the reading takes to
+    fall to its floor.
+
+    Returns
+    -------
+    values : (n,) constant input of a first-order lag of `USUAL_LAG` that leads from an earlier
+        reading to this one; NaN where none is near
+    gain : (n,) its noise over that of the reading [-]
+    """
+    time, values = reading.time, reading.values
+    step = 1
+    if len(reading) > 1 and reading.period > 0.0:
+        step = max(1, round(SHORTEST / reading.period))
+    sharp, gain = np.full(len(reading), np.nan), np.ones(len(reading))
+    if len(reading) <= step:
+        return sharp, gain
+    kept = np.exp(-(time[step:] - time[:-step]) / USUAL_LAG)
+    sharp[step:] = (values[step:] - kept * values[:-step]) / (1.0 - kept)
+    gain[step:] = np.sqrt(1.0 + kept**2) / (1.0 - kept)
+    return sharp, gain
+
+
+def _pedal(drive: Drive, vehicle: Vehicle) -> Signal | None:
+    """Position of the accelerator; None where nothing tells it.
+
+    The throttle of an engine may be the valve of its intake, which is never quite shut.
+    """
+    names = ("accelerator_pedal", "relative_pedal")
+    for name in (*names, "throttle") if vehicle.driveline.single_speed else names:
+        pedal = drive.get(name)
+        if pedal is not None and len(pedal) > 1 and np.ptp(pedal.values) > 5.0 * PRESSED:
+            return pedal
+    return None
+
+
+def near(time: Floats, flag: Bools, asked: Floats, margin: float) -> Bools:
+    """Whether a flagged sample lies within ``margin`` of each instant (n,).
+
+    Parameters
+    ----------
+    time, flag : (m,) samples, rising [s]
+    asked : (n,) [s]
+    margin : [s]
+    """
+    flagged = time[flag]
+    if flagged.size == 0:
+        return np.zeros(asked.size, dtype=bool)
+    after = np.searchsorted(flagged, asked)
+    right = flagged[np.minimum(after, flagged.size - 1)]
+    left = flagged[np.maximum(after - 1, 0)]
+    return np.minimum(np.abs(right - asked), np.abs(asked - left)) <= margin
