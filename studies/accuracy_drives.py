@@ -21,6 +21,7 @@ from weighbridge.simulation import (
     SimulatedCar,
     SimulatedDrive,
     jensen_route,
+    random_habits,
     random_vehicle,
     short_route,
     simulate_car,
@@ -50,6 +51,8 @@ def scenario(
         route=jensen_route(int(rng.integers(1000, 2000))),
         payload=load,
         seed=seed,
+        # A generator of its own: wind, temperature and route stay what they are.
+        habits=random_habits(np.random.default_rng([seed, 41])),
         polling=polling or usual_polling(car),
         wind_speed=float(rng.uniform(0.0, 10.0)),
         wind_from=float(rng.uniform(0.0, 2.0 * math.pi)),

@@ -52,8 +52,8 @@ def short(*, without=(), duration=150.0, **changes):
 
 def inside(scenario):
     """Trajectory, pose and inertial signals at the full rate."""
-    random = streams(scenario.seed, "plan", "drive", "road", "imu")
-    drive = simulate_trajectory(scenario, random["plan"], random["drive"])
+    random = streams(scenario.seed, "plan", "drive", "road", "imu", "habits")
+    drive = simulate_trajectory(scenario, random["plan"], random["drive"], random["habits"])
     pose = simulate_pose(scenario, drive, random["road"])
     imu = {s.name: s for s in simulate_imu(scenario, drive, pose, random["imu"])}
     return drive, pose, imu

@@ -23,6 +23,7 @@ from weighbridge.simulation import (
     VAN,
     Braking,
     Effects,
+    Habits,
     Loading,
     Polling,
     Sensors,
@@ -31,6 +32,7 @@ from weighbridge.simulation import (
     make_scenario,
     mixed_route,
     random_car,
+    random_habits,
     random_vehicle,
     simulate_car,
     usual_polling,
@@ -613,6 +615,45 @@ def test_random_vehicles_of_every_kind_drive(kind, vehicle_class):
         assert {car.transmission for car in drawn} == {wanted}
 
 
+def test_named_vehicles_lack_what_random_ones_have():
+    for name in SCENARIOS:
+        made = make_scenario(name)
+        assert made.habits == Habits()
+        assert made.car.spin_loss == made.car.load_curve == made.car.overrun_charge == 0.0
+    rng, again = np.random.default_rng(3), np.random.default_rng(3)
+    for kind in ("petrol_manual", "diesel_automatic", "van", "truck"):
+        car = random_vehicle(rng, kind)
+        torque = np.array(car.curve_torque)
+        peak = int(np.argmax(torque))
+        assert 0.2 < car.spin_loss / car.wheel_radius**2 * (100 / 3.6) ** 2 / car.mass < 0.6
+        assert car.load_curve == 1.0
+        assert car.cut_speed > 1.15 * car.idle_speed
+        assert np.all(np.diff(torque[: peak + 1]) > 0.0)
+        assert np.all(np.diff(torque[peak:]) < 0.0)
+    drawn = [random_habits(rng) for _ in range(2)]
+    assert drawn[0] != drawn[1]
+    # The details come from a generator of their own.
+    first = random_vehicle(again, "petrol_manual")
+    same = np.random.default_rng(3)
+    plain = random_car(same)
+    while plain.transmission != "manual":
+        plain = random_car(same)
+    assert first.drag_area == plain.drag_area
+
+
+def test_brake_switch_feels_a_light_foot():
+    polling = Polling(fast=("vehicle_speed", "brake_switch"), slow=(), rate=20.0)
+    habits = Habits(touch_rate=1.0, touch_strength=0.01, touch_time=2.0)
+    quiet = Sensors(imu_rate=0.0, gnss_rate=0.0)
+    shares = []
+    for effects in (Effects(), Effects().without("light_braking")):
+        made = simulate_car(short(polling=polling, sensors=quiet, habits=habits, effects=effects))
+        switch = made.drive.signals["brake_switch"]
+        moving = np.interp(switch.time, made.truth.time, made.truth.speed) > 3.0
+        shares.append(switch.values[moving].mean())
+    assert shares[0] > 1.5 * shares[1]
+
+
 def test_every_scenario_is_described():
     assert set(ABOUT) == set(SCENARIOS)
     hints = get_type_hints(simulate, include_extras=True)
@@ -644,6 +685,8 @@ def test_scenarios_are_named_as_they_are_called():
         (lambda: Polling(speed_rounding="up"), "speed_rounding"),
         (lambda: Polling(fast=()), "at least one"),
         (lambda: Polling(speed_step=0.0), "speed_step must be positive"),
+        (lambda: Habits(foot_time=(0.5, 0.2)), "foot_time must rise"),
+        (lambda: Habits(touch_rate=-1.0), "touch_rate must be in"),
         (lambda: Braking(time=5.0, duration=0.0, decel=1.0), "a braking needs"),
         (lambda: replace(BUS, launch_gear=9), "launch_gear"),
         (lambda: random_vehicle(np.random.default_rng(1), "tank"), "unknown kind of vehicle"),

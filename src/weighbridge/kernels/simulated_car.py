@@ -17,15 +17,26 @@ from weighbridge.kernels.simulated_driveline import (
     choose_gear,
     converter_torques,
     crank_drag,
+    cut_fuel,
     foot_off,
     fuel_flow,
     transmit,
 )
-from weighbridge.kernels.simulated_driver import Intent, loaded, look_up, steer
+from weighbridge.kernels.simulated_driver import (
+    ACCELERATOR,
+    ON_BRAKE,
+    Foot,
+    Intent,
+    loaded,
+    look_up,
+    move_foot,
+    steer,
+)
 
 DISTANCE, SPEED, ACCEL, ENGINE_SPEED, GEAR, TORQUE, GROSS_TORQUE, TRACTION, BRAKE, DRAG = range(10)
 ROLLING, WIND_ALONG, MASS, FUEL_FLOW, PEDAL, PHASE, ACCESSORY, LOADED = range(10, 18)
-FIELDS = 18
+BRAKE_PEDAL, UNCUT = 18, 19
+FIELDS = 20
 
 NOISE_STRIDE = 20  # steps per row of random numbers: 10 Hz
 NOISE_CHANNELS = 6
@@ -105,7 +116,7 @@ def _resist(road, resistance, weather, where, v, mass, cold):
         -look_up(road.altitude, where) / resistance.density_height
     )
     area = resistance.drag_area * (1.0 + resistance.yaw_drag * (side / flow_total) ** 2)
-    drag = 0.5 * density * area * flow_total * flow
+    drag = 0.5 * density * area * flow_total * flow * look_up(road.shelter, where)
     lateral = v * v * curvature
     rolling = (
         mass
@@ -124,36 +135,34 @@ def _resist(road, resistance, weather, where, v, mass, cold):
 
 
 @inlined_kernel
-def _brake(brake, braking, electric, wanted, coasting, at_stop, inertia, push, resistance, dt):
-    """Brake force [N], and whether the pedal is pressed, from the acceleration wanted and
-    the one the vehicle has with the foot off the pedal; at a stop, against what pushes.
+def _brake(brake, foot, wanted, coasting, at_stop, inertia, push, resistance, dt):
+    """Brake force [N], from the acceleration wanted and the one the vehicle has with the
+    foot off the pedal, or of a touch; at a stop, against what pushes.
     """
-    if electric:
-        braking = wanted < coasting - 0.02 or at_stop
-    elif braking:
-        braking = wanted < coasting + 0.05 or at_stop
-    else:
-        braking = (wanted < coasting - 0.3) or at_stop
     asked = 0.0
-    if braking:
+    if foot.place == ON_BRAKE:
         asked = max(0.0, inertia * (coasting - wanted))
+        if foot.touch_left > 0.0:
+            asked = max(asked, inertia * foot.touch)
         if at_stop:
             asked = inertia + push
+    elif foot.both > 0.0:
+        asked = inertia * foot.touch
     lag = resistance.brake_fall if asked < brake else resistance.brake_rise
     brake += (asked - brake) * dt / lag
-    if brake < 5.0 and not braking:
+    if brake < 5.0 and asked == 0.0 and foot.place != ON_BRAKE:
         brake = 0.0
-    return brake, braking
+    return brake
 
 
 @inlined_kernel
-def _press(power, shaft, drag, torque_wanted, coast, braking, v, dt):
+def _press(power, shaft, drag, torque_wanted, coast, lifted, v, dt):
     """Torque the pedal asks for [N m], and the pedal [-]."""
     if power.electric:
         # The motor brakes as asked; a lifted foot asks for a little.
         if coast and v > 3.0:
             torque_wanted = min(torque_wanted, -0.2 * power.regeneration)
-    elif braking or (coast and v > 3.0):
+    elif lifted or (coast and v > 3.0):
         torque_wanted = drag.lowest
     torque_wanted = min(drag.full, max(drag.lowest, torque_wanted))
     pedal_torque = shaft.pedal_torque + (torque_wanted - shaft.pedal_torque) * dt / 0.25
@@ -184,7 +193,7 @@ def _shift(power, shaft, road, where, sync, braking, pedal_torque, pedal, dt):
 
 
 @kernel
-def drive(road, power, resistance, driver, noise, dt, steps):
+def drive(road, power, resistance, driver, noise, chance, dt, steps):
     """Drive the road from end to end.
 
     Parameters
@@ -193,6 +202,8 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         See the types.
     noise : (m, 6) float64
         Standard normal numbers at ``NOISE_STRIDE`` steps.
+    chance : (m, 6) float64
+        Evenly distributed numbers in [0, 1) at ``NOISE_STRIDE`` steps, for the foot.
     dt : float
         Step [s].
     steps : int
@@ -200,7 +211,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
 
     Returns
     -------
-    out : (18, steps) float64
+    out : (20, steps) float64
         One row per field, see the constants of this module; SI.
     count : int
         Steps driven.
@@ -223,7 +234,9 @@ def drive(road, power, resistance, driver, noise, dt, steps):
     intent = Intent(0.0, 0.0, 0, False, 0, True, driver.rest)
     weather = Weather(0.0, 0.0, 0.0, 0.0, noise[0, 4], 0.0)
     brake = 0.0
-    braking = False
+    foot = Foot(ON_BRAKE, 0.0, driver.least_high, 0.0, 0.0, 0.0)
+    off_pedal = 0.0
+    uncut = 1.0
     residual = 0.0
     fuel = 0.0
     load = 0.0
@@ -235,6 +248,7 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         if k % NOISE_STRIDE == 0:
             row = noise[(k // NOISE_STRIDE) % noise.shape[0]]
             weather = _wander(weather, row, v, fast, resistance.gust_length)
+            uneven = chance[(k // NOISE_STRIDE) % chance.shape[0]]
 
         # What holds the vehicle back.
         cold = np.exp(-t / resistance.warm_up_time)
@@ -247,7 +261,8 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         pull = mass * a + drag + rolling + slope
         slip = min(0.05, max(-0.05, resistance.tyre_slip * weight * pull))
         sync = gearing * v * (1.0 + slip)
-        crank_side = crank_drag(power, shaft.engine, v, t, cold, weather.electric_load)
+        crank_side = crank_drag(power, shaft.engine, v, t, cold, weather.electric_load, uncut)
+        spin = power.spin_loss * (1.0 + power.spin_cold * cold) * v
 
         # Driver.
         stood = intent.at_stop
@@ -256,9 +271,14 @@ def drive(road, power, resistance, driver, noise, dt, steps):
             load = loaded(road, intent)
         inertia = mass + power.wheel_mass
         idle_force = gearing * foot_off(power, shaft, crank_side, sync)
-        coasting = (idle_force - resist) / inertia
-        brake, braking = _brake(
-            brake, braking, power.electric, intent.wanted, coasting, intent.at_stop, inertia,
+        coasting = (idle_force - spin - resist) / inertia
+        foot = move_foot(
+            driver, foot, uneven, fast if k % NOISE_STRIDE == 0 else 0.0, power.electric,
+            intent.wanted, coasting, intent.coast, intent.at_stop, v, dt,
+        )  # fmt: skip
+        lifted = foot.place != ACCELERATOR
+        brake = _brake(
+            brake, foot, intent.wanted, coasting, intent.at_stop, inertia,
             abs(slope) + max(0.0, idle_force), resistance, dt,
         )  # fmt: skip
         turning = power.engine_inertia * gearing * gearing
@@ -266,24 +286,26 @@ def drive(road, power, resistance, driver, noise, dt, steps):
             # Behind a slipping clutch the engine need not gain speed with the vehicle.
             turning = 0.0
         torque_wanted = (
-            ((inertia + turning) * intent.wanted + resist) / gearing + crank_side.loss_constant
+            ((inertia + turning) * intent.wanted + resist + spin) / gearing
+            + crank_side.loss_constant
         ) * (1.0 + power.loss_slope)
         if power.converter > 0.0 and not shaft.locked and torque_wanted > 0.0:
             torque_wanted /= converter_torques(power, shaft.engine, sync, 1.0)[1]
         pedal_torque, pedal = _press(
-            power, shaft, crank_side, torque_wanted, intent.coast, braking, v, dt
+            power, shaft, crank_side, torque_wanted, intent.coast, lifted, v, dt
         )
 
         # Gearbox and clutch.
-        shaft = _shift(power, shaft, road, where, sync, braking, pedal_torque, pedal, dt)
+        shaft = _shift(power, shaft, road, where, sync, lifted, pedal_torque, pedal, dt)
         shaft, gearing, net, crank = transmit(
-            power, shaft, crank_side, gearing, v, slip, pedal, braking, dt
+            power, shaft, crank_side, gearing, v, slip, pedal, lifted, dt
         )
+        off_pedal, uncut = cut_fuel(power, shaft, crank_side, off_pedal, uncut, dt)
 
         # Motion.
         loss = crank_side.loss_constant * min(1.0, v / 0.5) + power.loss_slope * abs(net)
         rotating = power.engine_inertia * gearing * gearing if shaft.phase == DRIVING else 0.0
-        force = gearing * (net - loss)
+        force = gearing * (net - loss) - spin
         residual *= 1.0 - dt / resistance.brake_drag_time
         if brake > resistance.brake_drag:
             residual = resistance.brake_drag
@@ -320,10 +342,12 @@ def drive(road, power, resistance, driver, noise, dt, steps):
         out[WIND_ALONG, k] = tail
         out[MASS, k] = mass
         out[FUEL_FLOW, k] = burnt
-        out[PEDAL, k] = 0.0 if braking else pedal
+        out[PEDAL, k] = 0.0 if lifted else pedal
         out[PHASE, k] = shaft.phase
         out[ACCESSORY, k] = crank_side.accessory
         out[LOADED, k] = load
+        out[BRAKE_PEDAL, k] = 1.0 if foot.place == ON_BRAKE or foot.both > 0.0 else 0.0
+        out[UNCUT, k] = uncut
 
         s += 0.5 * (v + v_new) * dt
         v = v_new

@@ -50,6 +50,11 @@ class Powertrain(NamedTuple):
     stall_ratio: float  # turbine over pump torque at stall [-]
     lock_gear: int  # lowest gear in which the converter is locked
     lock_speed: float  # turbine speed from which it is [rad/s]
+    spin_loss: float  # drag of gearbox and axle per speed, warm [N s/m]
+    spin_cold: float  # its growth at the start [-]
+    overrun_charge: float  # charge kept in overrun before the fuel is cut, over that of idling [-]
+    cut_delay: float  # foot off the pedal until the fuel is cut [s]
+    cut_speed: float  # engine speed below which it is not [rad/s]
 
 
 class Shaft(NamedTuple):
@@ -76,6 +81,7 @@ class Drag(NamedTuple):
     friction: float  # and pumping [N m]
     accessory: float  # [N m]
     loss_constant: float  # of the driveline [N m]
+    charge: float  # torque still burnt with the foot off the pedal [N m]
 
 
 @inlined_kernel
@@ -94,7 +100,7 @@ def full_torque(power, speed):
 
 
 @inlined_kernel
-def crank_drag(power, engine, v, t, cold, electric_load):
+def crank_drag(power, engine, v, t, cold, electric_load, uncut):
     """Torques against the crank.
 
     Parameters
@@ -106,10 +112,17 @@ def crank_drag(power, engine, v, t, cold, electric_load):
         How cold engine and oil are, 1 at the start to 0 [-].
     electric_load : float
         Wandering of the alternator's load, unit standard deviation.
+    uncut : float
+        Part of the charge of overrun that still burns [-].
 
     Returns
     -------
     Drag
+
+    Notes
+    -----
+    A closed throttle passes the air that idling needs. Each cycle gets the less of it the
+    faster the engine turns.
     """
     full = full_torque(power, engine)
     warm = 1.0 + power.cold_friction * cold
@@ -126,10 +139,37 @@ def crank_drag(power, engine, v, t, cold, electric_load):
             + power.compressor_power * on
         ) / max(engine, 0.8 * power.idle_speed)
     loss_constant = power.loss_constant * (1.0 + 0.6 * power.cold_friction * cold)
-    lowest = -friction - accessory
+    charge = power.overrun_charge * uncut * (friction + accessory)
+    charge *= min(1.0, power.idle_speed / max(engine, 1.0))
+    lowest = min(0.0, -friction - accessory + charge)
     if power.electric:
         lowest = -power.regeneration * min(1.0, v / 3.0)
-    return Drag(full, lowest, friction, accessory, loss_constant)
+    return Drag(full, lowest, friction, accessory, loss_constant, charge)
+
+
+@inlined_kernel
+def cut_fuel(power, shaft, drag, lifted, uncut, dt):
+    """Let the control unit cut the fuel of overrun, late and above some engine speed.
+
+    Parameters
+    ----------
+    power, shaft, drag
+        See the types.
+    lifted : float
+        How long the foot has been off the pedal [s].
+    uncut : float
+        Part of the charge of overrun that still burns [-].
+    dt : float
+        Step [s].
+
+    Returns
+    -------
+    lifted, uncut : float
+    """
+    off = shaft.pedal_torque < drag.lowest + 0.25 * drag.friction
+    lifted = lifted + dt if off else 0.0
+    aim = 0.0 if lifted > power.cut_delay and shaft.engine > power.cut_speed else 1.0
+    return lifted, uncut + (aim - uncut) * dt / 0.3
 
 
 @inlined_kernel
@@ -360,8 +400,9 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
                 fuel_cut = shaft.pedal_torque < lowest + 0.25 * drag.friction
             else:
                 fuel_cut = shaft.pedal_torque < lowest + 0.05 * drag.friction
+            fuel_cut = fuel_cut and drag.charge <= 0.02 * drag.friction
             if gross < 0.0:
-                torque = lowest
+                torque = lowest - drag.charge
         engine = sync
         if engine > power.max_speed:
             # A limiter cuts the fuel at once.

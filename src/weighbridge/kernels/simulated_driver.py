@@ -20,6 +20,7 @@ class Road(NamedTuple):
     curvature: np.ndarray  # (n,) positive to the right [1/m]
     surface: np.ndarray  # (n,) rolling resistance factor [-]
     exposure: np.ndarray  # (n,) wind over wind in the open [-]
+    shelter: np.ndarray  # (n,) air drag over that of a vehicle alone [-]
     target_speed: np.ndarray  # (n,) what the driver wants to drive [m/s]
     accel_limit: np.ndarray  # (n,) pull-away acceleration the driver uses [m/s^2]
     revs: np.ndarray  # (n,) eagerness to rev, 0 calm to 1 to the limiter [-]
@@ -32,6 +33,18 @@ class Road(NamedTuple):
     brake_decel: np.ndarray  # (b,) how hard [m/s^2]
 
 
+ACCELERATOR, TO_BRAKE, ON_BRAKE, TO_ACCELERATOR = range(4)
+"""Where the right foot is."""
+
+CHANCES = 6
+"""Random numbers the foot needs at a time: whether it touches the brake, how hard, how long,
+from which deceleration it brakes next, how fast it moves, whether both pedals are pressed."""
+
+TOUCH_BELOW, TOUCH_UNTIL = 0.5, 0.7
+"""Acceleration wanted beyond that with the foot off the pedals up to which the brake is touched,
+and from which a touch ends [m/s^2]: nearly none, and plainly one."""
+
+
 class Driver(NamedTuple):
     """How the driver drives."""
 
@@ -40,6 +53,25 @@ class Driver(NamedTuple):
     gain: float  # acceleration per speed error [1/s]
     rest: float  # standing before the start [s]
     grip: float  # acceleration the driven tyres can hold [m/s^2]
+    least_low: float  # deceleration beyond the dragged engine's from which the driver
+    least_high: float  # brakes, drawn anew for each braking [m/s^2]
+    touch_rate: float  # how often a foot off the accelerator touches the brake [1/s]
+    touch_strength: float  # mean deceleration of a touch [m/s^2]
+    touch_time: float  # mean length of a touch [s]
+    foot_low: float  # time of the foot between the pedals, drawn anew each time [s]
+    foot_high: float
+    both_chance: float  # that the brake is still pressed when the driver accelerates [-]
+
+
+class Foot(NamedTuple):
+    """What the right foot does."""
+
+    place: int  # ACCELERATOR ... TO_ACCELERATOR
+    moving: float  # time left between the pedals [s]
+    least: float  # deceleration beyond the dragged engine's from which it brakes next [m/s^2]
+    touch: float  # deceleration of the last touch [m/s^2]
+    touch_left: float  # its time left [s]
+    both: float  # time left with both pedals pressed [s]
 
 
 class Intent(NamedTuple):
@@ -180,3 +212,71 @@ def steer(road, driver, intent, t, s, v, ripple, speed_ripple, dt):
             wanted = 0.0
             integral = 0.0
     return Intent(wanted, integral, approach, coast, stop, at_stop, waiting)
+
+
+@inlined_kernel
+def move_foot(driver, foot, row, every, electric, wanted, coasting, coast, at_stop, v, dt):
+    """Move the foot between accelerator and brake.
+
+    Parameters
+    ----------
+    driver, foot
+        See the types.
+    row : (6,) float64
+        Evenly distributed random numbers in [0, 1), see ``CHANCES``.
+    every : float
+        Seconds for which the row decides over a touch, 0 where it was asked already [s].
+    electric : bool
+        The motor brakes before the brakes do; there is no drag to help out.
+    wanted, coasting : float
+        Acceleration wanted, and that with the foot off the pedals [m/s^2].
+    coast, at_stop : bool
+        Foot lifted; held at a stop.
+    v, dt : float
+        Speed [m/s], step [s].
+
+    Returns
+    -------
+    Foot
+
+    Notes
+    -----
+    A driver brakes who wants to slow down more than the vehicle does by itself. Beside
+    that, a foot off the accelerator now and then touches the brake while the engine is
+    dragged: to be ready, or because a braking begins before it is needed.
+    """
+    place, moving, least = foot.place, foot.moving, foot.least
+    touch, touch_left = foot.touch, max(0.0, foot.touch_left - dt)
+    both = max(0.0, foot.both - dt)
+    idle = coast or wanted < coasting + TOUCH_BELOW
+    idle = idle and place != ON_BRAKE and both <= 0.0 and v > 1.0
+    if idle and touch_left <= 0.0 and row[0] < driver.touch_rate * every:
+        touch = -np.log(1.0 - row[1]) * driver.touch_strength
+        touch_left = -np.log(1.0 - row[2]) * driver.touch_time + driver.foot_high
+    if wanted > coasting + TOUCH_UNTIL or at_stop or electric:
+        touch_left = 0.0
+    if electric:
+        wants = wanted < coasting - 0.02 or at_stop
+    elif place == ON_BRAKE:
+        wants = wanted < coasting + 0.05 or at_stop
+    else:
+        wants = wanted < coasting - least or at_stop
+    wants = wants or touch_left > 0.0
+    time = driver.foot_low + (driver.foot_high - driver.foot_low) * row[4]
+    if place == ACCELERATOR and wants:
+        place, moving = TO_BRAKE, time
+    elif place == ON_BRAKE and not wants:
+        place, moving = TO_ACCELERATOR, time
+        least = driver.least_low + (driver.least_high - driver.least_low) * row[3]
+        if row[5] < driver.both_chance:
+            # The other foot, or the edge of the shoe, stays on the brake.
+            place, moving = ACCELERATOR, 0.0
+            both = 0.3 + 0.7 * row[2]
+            touch = driver.touch_strength * row[1]
+    moving = max(0.0, moving - dt)
+    if moving <= 0.0:
+        if place == TO_BRAKE:
+            place = ON_BRAKE
+        elif place == TO_ACCELERATOR:
+            place = ACCELERATOR
+    return Foot(place, moving, least, touch, touch_left, both)

@@ -16,6 +16,7 @@ from weighbridge.simulation.route import (
 from weighbridge.simulation.scenario import (
     Braking,
     Effects,
+    Habits,
     Loading,
     Polling,
     Scenario,
@@ -28,7 +29,9 @@ from weighbridge.simulation.vehicles import (
     TRUCK18,
     VAN,
     VehicleKind,
+    random_habits,
     random_vehicle,
+    with_random_details,
 )
 
 __all__ = [
@@ -43,6 +46,7 @@ __all__ = [
     "VAN",
     "Braking",
     "Effects",
+    "Habits",
     "Loading",
     "Polling",
     "Route",
@@ -60,9 +64,11 @@ __all__ = [
     "make_scenario",
     "mixed_route",
     "random_car",
+    "random_habits",
     "random_vehicle",
     "short_route",
     "simulate_car",
     "straight_route",
     "usual_polling",
+    "with_random_details",
 ]

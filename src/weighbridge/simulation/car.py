@@ -75,6 +75,16 @@ class SimulatedCar:
     roll_gain : roll to the outside per lateral acceleration [rad per m/s^2]
     pitch_frequency, roll_frequency, heave_frequency : undamped, of the body [Hz]
     wheelbase, track : [m]
+    spin_loss : drag torque of gearbox and axle at the wheels over wheel speed, warm
+        [N m s/rad]
+    overrun_charge : what still burns with the foot off the pedal before the fuel is cut,
+        over the charge of idling [-]
+    least_charge : air of a cycle that still burns, over that of full load, as the
+        calculated load counts it until the fuel is cut [-]
+    cut_delay, cut_speed : foot off the pedal until the fuel is cut [s], engine speed
+        below which it is not [rad/s]
+    load_curve : 1 where the calculated load is of all the torque there is at the engine
+        speed of the moment, friction and accessories inside; 0 as ``load_full`` says [-]
     tyre_slip : wheel slip per traction over weight [-]
     side_slip : slip angle of the rear axle per lateral acceleration [rad per m/s^2]
     cylinders : of a four-stroke engine; 0 for a motor
@@ -145,6 +155,12 @@ class SimulatedCar:
     heave_frequency: float = 1.25
     wheelbase: float = 2.75
     track: float = 1.55
+    spin_loss: float = 0.0
+    overrun_charge: float = 0.0
+    least_charge: float = 0.0
+    cut_delay: float = 0.0
+    cut_speed: float = 0.0
+    load_curve: float = 0.0
     tyre_slip: float = 0.035
     side_slip: float = 0.0035
     cylinders: int = 4

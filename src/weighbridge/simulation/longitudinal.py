@@ -6,11 +6,12 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GAS_CONSTANT_DRY_AIR, GRAVITY, PETROL_HEATING_VALUE
 from weighbridge.kernels import simulated_car as kernel
 from weighbridge.kernels.simulated_driveline import Powertrain
-from weighbridge.kernels.simulated_driver import Driver, Road, limit_target
+from weighbridge.kernels.simulated_driver import CHANCES, Driver, Road, limit_target
 from weighbridge.signals import Floats
 from weighbridge.simulation.route import STEP
 
@@ -25,6 +26,11 @@ DIESEL_HEATING_VALUE = 42.8e6
 
 ROUGHNESS_LENGTH = 0.1
 """Of open country with hedges, for the profile of the wind over height [m]."""
+
+SPIN_COLD = 1.5
+"""How much more gearbox and axle drag at the start [-]. Their oils are ten times as viscous at
+20 degC as at 80 degC; churning and bearings follow with a power of about 0.4 (Naunheimer et al.,
+Automotive Transmissions, 2nd ed., 2011, on load-independent losses)."""
 
 _REFERENCE_TEMPERATURE = 298.15  # of rolling resistance, ISO 28580 [K]
 
@@ -51,9 +57,41 @@ class Trajectory(NamedTuple):
     phase: Floats
     accessory_torque: Floats
     loaded: Floats  # since the start [kg]
+    brake_pedal: Floats  # 1 while it is pressed [-]
+    uncut: Floats  # part of the charge of overrun that still burns [-]
 
 
-def _plan(scenario: Scenario, rng: np.random.Generator) -> Road:
+def _shelter(scenario: Scenario, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Draw the stretches driven behind another vehicle.
+
+    Returns
+    -------
+    drag, speed : (n,) float64
+        Air drag over that of a vehicle alone [-], and of whom is followed [m/s].
+    """
+    route, habits = scenario.route, scenario.habits
+    drag, speed = np.ones(route.grade.size), np.full(route.grade.size, math.inf)
+    # Nobody to follow where there is no traffic.
+    size = scenario.effects.drafting * min(1.0, scenario.effects.traffic)
+    if habits.following <= 0.0 or size <= 0.0:
+        return drag, speed
+    s = np.arange(route.grade.size) * STEP
+    open_road = route.limit > 55 / 3.6
+    x = 0.0
+    while x < s[-1]:
+        length = rng.uniform(500.0, 4000.0)
+        saved = rng.uniform(*habits.shelter)
+        slower = rng.uniform(0.8, 1.0)
+        x += rng.exponential(2250.0 * (1.0 / habits.following - 1.0))
+        part = (s >= x) & (s < x + length) & open_road
+        # It takes some seconds to close up, and to be left alone.
+        drag[part] = 1.0 - size * saved
+        speed[part] = slower * route.limit[part]
+        x += length
+    return np.maximum(0.0, uniform_filter1d(drag, round(100.0 / STEP), mode="nearest")), speed
+
+
+def _plan(scenario: Scenario, rng: np.random.Generator, habit_rng: np.random.Generator) -> Road:
     """Decide what the driver will do: speeds, stops, how hard to pull away."""
     route, effects = scenario.route, scenario.effects
     n = route.grade.size
@@ -104,7 +142,9 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> Road:
         if not is_red and rng.random() < 0.3:
             k = int(at / STEP)
             target[k : k + 10] = np.minimum(target[k : k + 10], slow)
-    target = np.minimum(np.maximum(target, 2.5), scenario.car.top_speed)
+    shelter, ahead = _shelter(scenario, habit_rng)
+    target = np.minimum(np.minimum(target, ahead), scenario.car.top_speed)
+    target = np.maximum(target, 2.5)
     # Braking on purpose in town, mostly lifting the foot on the highway.
     slow_down = np.where(city, 0.95, np.where(fast, 0.5, 0.75)) * lively**0.5
     slow_down *= rng.uniform(0.85, 1.2)
@@ -119,6 +159,7 @@ def _plan(scenario: Scenario, rng: np.random.Generator) -> Road:
         curvature=curvature,
         surface=rolling,
         exposure=np.ascontiguousarray(route.exposure, dtype=np.float64),
+        shelter=shelter,
         target_speed=target,
         accel_limit=accel_limit,
         revs=np.minimum(revs, 1.0),
@@ -192,6 +233,11 @@ def _powertrain(scenario: Scenario) -> Powertrain:
         stall_ratio=car.stall_ratio,
         lock_gear=car.lock_gear,
         lock_speed=car.lock_speed,
+        spin_loss=car.spin_loss / car.wheel_radius**2 * effects.spin_loss,
+        spin_cold=SPIN_COLD * effects.warm_up,
+        overrun_charge=car.overrun_charge * effects.overrun_fuel,
+        cut_delay=car.cut_delay * effects.overrun_fuel,
+        cut_speed=car.cut_speed * effects.overrun_fuel,
     )
 
 
@@ -228,8 +274,33 @@ def _resistance(scenario: Scenario) -> kernel.Resistance:
     )
 
 
+def _driver(scenario: Scenario) -> Driver:
+    habits, effects = scenario.habits, scenario.effects
+    light, foot = effects.light_braking, effects.foot_switch
+    low, high = (max(0.0, 0.3 + light * (x - 0.3)) for x in habits.least_braking)
+    return Driver(
+        ripple=0.09 * effects.driver_ripple,
+        speed_ripple=0.018 * effects.driver_ripple,
+        gain=0.4,
+        rest=scenario.start_rest,
+        # What the driven axle of a heavy vehicle grips, or its standing passengers bear.
+        grip=4.0 * min(1.0, scenario.car.liveliness),
+        least_low=low,
+        least_high=high,
+        touch_rate=habits.touch_rate * light,
+        touch_strength=habits.touch_strength,
+        touch_time=habits.touch_time,
+        foot_low=habits.foot_time[0] * foot,
+        foot_high=habits.foot_time[1] * foot,
+        both_chance=min(1.0, habits.both_pedals * light),
+    )
+
+
 def simulate_trajectory(
-    scenario: Scenario, plan_rng: np.random.Generator, noise_rng: np.random.Generator
+    scenario: Scenario,
+    plan_rng: np.random.Generator,
+    noise_rng: np.random.Generator,
+    habit_rng: np.random.Generator,
 ) -> Trajectory:
     """Drive the scenario's car along its route.
 
@@ -238,29 +309,30 @@ def simulate_trajectory(
     scenario : Scenario
     plan_rng, noise_rng : numpy.random.Generator
         Of the driver's plan, and of foot, wind and electric load.
+    habit_rng : numpy.random.Generator
+        Of the foot between the pedals and of vehicles ahead.
 
     Returns
     -------
     Trajectory
     """
-    road = _plan(scenario, plan_rng)
+    road = _plan(scenario, plan_rng, habit_rng)
     longest = 1.7 * float(np.sum(STEP / road.target_speed)) + 1.3 * float(road.stop_time.sum())
     longest += scenario.start_rest + 30.0 * road.stop_time.size + 120.0
     if scenario.duration is not None:
         longest = min(longest, scenario.duration)
     steps = int(longest / DT)
     noise = noise_rng.standard_normal((steps // kernel.NOISE_STRIDE + 1, kernel.NOISE_CHANNELS))
-    ripple = scenario.effects.driver_ripple
-    driver = Driver(
-        ripple=0.09 * ripple,
-        speed_ripple=0.018 * ripple,
-        gain=0.4,
-        rest=scenario.start_rest,
-        # What the driven axle of a heavy vehicle grips, or its standing passengers bear.
-        grip=4.0 * min(1.0, scenario.car.liveliness),
-    )
+    chance = habit_rng.random((noise.shape[0], CHANCES))
     out, count = kernel.drive(
-        road, _powertrain(scenario), _resistance(scenario), driver, noise, DT, steps
+        road,
+        _powertrain(scenario),
+        _resistance(scenario),
+        _driver(scenario),
+        noise,
+        chance,
+        DT,
+        steps,
     )
     columns = [row[:count] for row in out]
     return Trajectory(np.arange(count) * DT, *columns)

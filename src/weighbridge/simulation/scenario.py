@@ -14,7 +14,7 @@ from weighbridge.simulation.route import Route
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effects:
-    """Size of every effect: 1 as usual on the road, 0 switched off.
+    """Size of every effect: 1 as vehicle, driver and road have it, 0 switched off.
 
     Attributes
     ----------
@@ -36,6 +36,12 @@ class Effects:
     brake_drag : released brakes still hold a little
     fuel_burn : the fuel's mass is lost
     driver_ripple : foot and speed of the driver wander
+    light_braking : the driver brakes lightly while the engine is dragged
+    foot_switch : the foot takes time between accelerator and brake
+    overrun_fuel : in overrun the fuel is cut late, and not at low engine speed
+    spin_loss : gearbox and axle drag the more the faster they turn, most when cold
+    load_curve : the load reading is of the torque there is at that engine speed
+    drafting : others ahead shelter from the air
     traffic : others slow the driver down
     squat : the body pitches with acceleration
     load_pitch : the body pitches with payload
@@ -67,6 +73,12 @@ class Effects:
     brake_drag: float = 1.0
     fuel_burn: float = 1.0
     driver_ripple: float = 1.0
+    light_braking: float = 1.0
+    foot_switch: float = 1.0
+    overrun_fuel: float = 1.0
+    spin_loss: float = 1.0
+    load_curve: float = 1.0
+    drafting: float = 1.0
     traffic: float = 1.0
     squat: float = 1.0
     load_pitch: float = 1.0
@@ -290,6 +302,49 @@ class Braking:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Habits:
+    """What one driver does with the foot, and how near others are; as it stands, nothing of it.
+
+    Attributes
+    ----------
+    least_braking : deceleration beyond that of the dragged engine from which the driver
+        brakes, drawn evenly between two values for each braking [m/s^2]
+    touch_rate : how often a foot off the accelerator touches the brake [1/s]
+    touch_strength, touch_time : of such touches, means of exponential distributions
+        [m/s^2], [s]
+    foot_time : of the foot between the pedals, drawn evenly between two values [s]
+    both_pedals : chance that the brake is still pressed when the driver accelerates [-]
+    following : part of the way outside towns driven behind another vehicle [-]
+    shelter : air drag saved there, drawn evenly between two values [-]
+    """
+
+    least_braking: tuple[float, float] = (0.3, 0.3)
+    touch_rate: float = 0.0
+    touch_strength: float = 0.0
+    touch_time: float = 0.0
+    foot_time: tuple[float, float] = (0.0, 0.0)
+    both_pedals: float = 0.0
+    following: float = 0.0
+    shelter: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name, high in (("least_braking", 2.0), ("foot_time", 2.0), ("shelter", 0.8)):
+            low, most = getattr(self, name)
+            if not 0.0 <= low <= most <= high:
+                raise ConfigError(f"{name} must rise within [0, {high:g}], got {low}, {most}")
+        for name, high in (
+            ("touch_rate", 5.0),
+            ("touch_strength", 2.0),
+            ("touch_time", 60.0),
+            ("both_pedals", 1.0),
+            ("following", 0.9),
+        ):
+            value = getattr(self, name)
+            if not 0.0 <= value <= high:
+                raise ConfigError(f"{name} must be in [0, {high:g}], got {value}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """One drive to be simulated.
 
@@ -301,6 +356,7 @@ class Scenario:
     loading : stops at which the load changes, rising in distance
     brakings : at times, beside those the road asks for
     seed : of driver, weather and sensors; the route keeps its own
+    habits : of the driver
     effects, sensors, polling : see the classes
     wind_speed : mean at 10 m height [m/s]
     wind_from : direction it blows from, clockwise from north [rad]
@@ -330,6 +386,7 @@ class Scenario:
     loading: tuple[Loading, ...] = ()
     brakings: tuple[Braking, ...] = ()
     seed: int = 0
+    habits: Habits = field(default_factory=Habits)
     effects: Effects = field(default_factory=Effects)
     sensors: Sensors = field(default_factory=Sensors)
     polling: Polling = field(default_factory=Polling)

@@ -250,12 +250,20 @@ def engine_load(scenario: Scenario, drive: Trajectory) -> Floats:
         # Of the torque there is at that engine speed (SAE J1979).
         w = drive.engine_speed
         top = np.interp(w, car.curve_speed, car.curve_torque) + c[0] + c[1] * w + c[2] * w * w
+    size = car.load_curve * effects.load_curve
+    if size > 0.0:
+        # As the control unit knows the engine: with its friction and usual accessories.
+        w = np.maximum(drive.engine_speed, 0.8 * car.idle_speed)
+        full = np.interp(w, car.curve_speed, car.curve_torque) + c[0] + c[1] * w + c[2] * w * w
+        full += car.accessory_power * effects.accessories / w
+        top = top + size * (full - top)
     part = drive.gross_torque / top
     bend = effects.load_nonlinearity * car.load_curvature * 2.0 * part * (1.0 - part)
     lean = effects.load_nonlinearity * car.load_speed_slope
     load = (part + bend) * (1.0 + lean * (drive.engine_speed / car.max_speed - 0.35))
     # Air still passes a closed throttle.
-    load = car.load_full * np.maximum(load, 0.03)
+    least = np.maximum(0.03, effects.overrun_fuel * car.least_charge * drive.uncut)
+    load = car.load_full * np.maximum(load, least)
     load = _smooth(load, car.load_smoothing * effects.load_smoothing)
     return np.asarray(np.clip(load, 0.0, 1.0))
 
@@ -351,6 +359,9 @@ def _values(scenario: Scenario, drive: Trajectory, name: str, pose: Pose) -> tup
         # Released brakes are not felt by the pedal; half of a retarder has a lever.
         by_lever = 0.5 * car.retarder_force * _retarder_fade(drive)
         touched = drive.brake_force > np.maximum(max(20.0, 1.5 * car.brake_drag), by_lever)
+        if scenario.habits.touch_rate * effects.light_braking > 0.0 and car.retarder_force == 0.0:
+            # A light foot works the switch before the brakes bite.
+            touched |= drive.brake_pedal > 0.0
         return (touched | held).astype(np.float64), 1.0
     if name == "clutch_switch":
         return (drive.phase != DRIVING).astype(np.float64), 1.0

@@ -62,6 +62,7 @@ class Truth:
     wind_along : wind at the car along its heading, positive from behind [m/s]
     fuel_flow : [kg/s]
     pedal : torque asked for over torque there is [-]
+    brake_pedal : 1 while it is pressed, however lightly
 
     Notes
     -----
@@ -95,6 +96,7 @@ class Truth:
     wind_along: Floats
     fuel_flow: Floats
     pedal: Floats
+    brake_pedal: Floats
 
 
 _TRUTH_SUFFIX = {
@@ -103,7 +105,7 @@ _TRUTH_SUFFIX = {
     "latitude": "deg", "longitude": "deg", "mass": "kg", "engine_speed": "rpm",
     "engine_torque": "nm", "load": "pct", "gear": "", "phase": "", "traction_force": "n",
     "brake_force": "n", "drag_force": "n", "rolling_force": "n", "wind_along": "mps",
-    "fuel_flow": "kgps", "pedal": "pct",
+    "fuel_flow": "kgps", "pedal": "pct", "brake_pedal": "",
 }  # fmt: skip
 
 
@@ -166,8 +168,8 @@ def simulate_car(scenario: Scenario) -> SimulatedDrive:
     for name in (*scenario.polling.fast, *scenario.polling.slow):
         if name not in POLLABLE:
             raise ConfigError(f"cannot poll {name!r}; known are {', '.join(POLLABLE)}")
-    random = streams(scenario.seed, "plan", "drive", "road", "imu", "gnss", "obd")
-    trajectory = simulate_trajectory(scenario, random["plan"], random["drive"])
+    random = streams(scenario.seed, "plan", "drive", "road", "imu", "gnss", "obd", "habits")
+    trajectory = simulate_trajectory(scenario, random["plan"], random["drive"], random["habits"])
     pose = simulate_pose(scenario, trajectory, random["road"])
     signals: list[Signal] = []
     if scenario.sensors.imu_rate > 0.0:
@@ -206,6 +208,7 @@ def simulate_car(scenario: Scenario) -> SimulatedDrive:
         wind_along=cut(trajectory.wind_along),
         fuel_flow=cut(trajectory.fuel_flow),
         pedal=cut(trajectory.pedal),
+        brake_pedal=cut(trajectory.brake_pedal),
     )
     info = DriveInfo(
         start_time=scenario.start_time,
