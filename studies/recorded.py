@@ -1,15 +1,19 @@
 """Tables of studies/recorded.md: recorded drives weighed with data-sheet vehicles.
 
-Run from the checkout: ``python studies/recorded.py``; it needs the extra ``studies``. The
+Run from the checkout: ``python studies/recorded.py``, or ``python studies/recorded.py bmw`` for the
+section of the BMW alone; it needs the extra ``studies``. The
 recordings lie in ``../shared/data`` and are not part of the project.
 """
 
 from __future__ import annotations
 
 import re
+import sys
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
+from unittest.mock import patch
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,13 +26,17 @@ from weighbridge.balance.averaging import windows
 from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.estimators import joint
 from weighbridge.estimators.rls import regression
+from weighbridge.estimators.slow_errors import design, prior_std
+from weighbridge.estimators.squat import SQUAT, Lean
 from weighbridge.io.candump import read_candump
 from weighbridge.io.j1939 import decode_j1939
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Signal
 from weighbridge.signals.alignment import align
+from weighbridge.vehicle.data_sheet import MOTOR_TORQUE_STD, inertia_std
 from weighbridge.vehicle.gear import detect_gearings
+from weighbridge.vehicle.power_balance import find_power_balance
 
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "shared" / "data"
@@ -77,40 +85,56 @@ def shortest(masses: np.ndarray, part: float) -> tuple[float, float, float]:
     return float(held[0]), float(held[-1]), float(np.median(held))
 
 
+def trips() -> dict[str, wb.Drive]:
+    """The BMW's trips without what was filled in."""
+    found = {}
+    for path in sorted((DATA / "bmw-i3").glob("Trip*.csv")):
+        drive = wb.read_drive(path, EXAMPLE / "mapping.toml")
+        gap = FILLED.get(path.stem)
+        found[path.stem] = drive if gap is None else without(drive, *gap)
+    return found
+
+
+LOADED = ("TripB33", "TripB34")
+DECEMBER = ("TripB02", "TripB03", "TripB05", "TripB06")
+JANUARY = ("TripB11", "TripB13")
+NOTED = 160.0
+"""What the overview notes of `LOADED` [kg]."""
+
+FIRST = 550.0
+"""As long as the longer trip of which a load is noted [s]."""
+
+
 def bmw_i3() -> str:
     car = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
     told = overview()
     lines = [
-        "| trip | date | noted | min | used min | mass kg | ± sd within the trip kg "
-        "| `rls` kg | offset m/s² |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| trip | date | noted | min | used min | mass kg | 95 % interval ± % | noise kg "
+        "| torque reads, by battery | `rls` kg | offset m/s² |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     rows = []
-    scale = car.provenance.mass_scale_std or 0.0
-    for path in sorted((DATA / "bmw-i3").glob("Trip*.csv")):
-        drive = wb.read_drive(path, EXAMPLE / "mapping.toml")
-        if path.stem in FILLED:
-            drive = without(drive, *FILLED[path.stem])
-        when, note = told[path.stem]
+    reach = []
+    for name, drive in trips().items():
+        when, note = told[name]
         load = " ".join(found.group(0).split()) if (found := LOAD_NOTE.search(note)) else ""
-        head = f"| {path.stem} | {when:%Y-%m-%d %H:%M} | {load} | {drive.duration / 60:.1f} |"
+        head = f"| {name} | {when:%Y-%m-%d %H:%M} | {load} | {drive.duration / 60:.1f} |"
         w = wb.weigh(drive, car, method="joint")
         if w.status != "converged":
-            lines.append(f"{head} | {w.reason} | | | |")
+            lines.append(f"{head} | {w.reason} | | | | | |")
             continue
         other = wb.weigh(drive, car, method="rls").mass
-        own = float(np.sqrt(max(w.std**2 - (scale * w.mass) ** 2, 0.0)))
+        own = joint.UNMODELLED * w.result.bound_std
+        power = find_power_balance(drive, car)
         offset = next(n.split()[2] for n in w.warnings if n.startswith("accelerometer offset"))
-        rows.append((path.stem, when, load, w.mass, own, other))
+        rows.append((name, when, load, w.mass, own, other))
+        reach.append(196.0 * w.std / w.mass)
         lines.append(
-            f"{head} {w.used_time / 60:.1f} | {w.mass:.0f} | {own:.0f} | {other:.0f} | {offset} |"
+            f"{head} {w.used_time / 60:.1f} | {w.mass:.0f} | {reach[-1]:.1f} | {own:.0f} "
+            f"| {power.scale:.3f} ± {power.noise_std:.3f} | {other:.0f} | {offset} |"
         )
     mass = np.array([row[3] for row in rows])
     low, high, middle = shortest(mass, 1.0 / 3.0)
-    bare = [row[3] for row in rows if row[1].year == 2019 and row[1].month == 12]
-    loaded = [row[3] for row in rows if row[2]]
-    gain = float(np.mean(loaded) - np.mean(bare))
-    gain_std = float(np.hypot(np.std(bare, ddof=1), np.std(loaded, ddof=1)) / np.sqrt(2.0))
     other = shortest(np.array([row[5] for row in rows]), 1.0 / 3.0)
     draw_trips(rows, low, high, middle)
     lines += [
@@ -118,62 +142,156 @@ def bmw_i3() -> str:
         f"{mass.size} of {len(told)} trips of the table are there and weighed. The shortest "
         f"interval that holds a third of them runs from {low:.0f} to {high:.0f} kg, "
         f"{100 * (high - low) / middle:.1f} % of its median "
-        f"(`rls`: {100 * (other[1] - other[0]) / other[2]:.1f} %). Median standard deviation "
-        f"within a trip {np.median([row[4] for row in rows]):.0f} kg. The {len(loaded)} trips with "
-        f"160 kg noted are {gain:.0f} ± {gain_std:.0f} kg heavier than the {len(bare)} of "
-        "December, of which nothing is noted.",
+        f"(`rls`: {100 * (other[1] - other[0]) / other[2]:.1f} %). The 95 % interval is "
+        f"± {np.median(reach):.1f} % (median; {min(reach):.1f} to {max(reach):.1f} %).",
     ]
     return "\n".join(lines)
 
 
-def bmw_power() -> str:
-    """Power of the motor beside that of the battery, and charge beside state of charge."""
-    line = wb.Vehicle.load(EXAMPLE / "vehicle.toml").driveline
-    driving, recuperating, charge = [], [], []
-    for path in sorted((DATA / "bmw-i3").glob("Trip*.csv")):
-        if path.stem in FILLED:
-            continue
-        table = pl.read_csv(path, separator=";", encoding="latin-1", infer_schema_length=None)
-        speed, torque, volts, amps, soc, air, time = (
-            table[name].cast(pl.Float64, strict=False).to_numpy()
-            for name in (
-                "Velocity [km/h]",
-                "Motor Torque [Nm]",
-                "Battery Voltage [V]",
-                "Battery Current [A]",
-                "SoC [%]",
-                "AirCon Power [kW]",
-                "Time [s]",
-            )
-        )
-        heat = table["Heating Power CAN [kW]"].cast(pl.Float64, strict=False).to_numpy()
-        motor = torque * speed / 3.6 * line.gearings[0]
-        battery = -volts * amps - 1e3 * np.nan_to_num(air) - 1e3 * np.nan_to_num(heat)
-        still = (speed < 0.4) & np.isfinite(battery)
-        if np.count_nonzero(still) >= 200:
-            battery -= float(np.median(battery[still]))
-        # Seconds, so that what is sent at other instants weighs little.
-        seconds = speed.size // 10 * 10
-        motor, battery = (x[:seconds].reshape(-1, 10).mean(axis=1) for x in (motor, battery))
-        known = np.isfinite(motor) & np.isfinite(battery)
-        much = known & (motor > 8e3) & (motor < 30e3)
-        back = known & (motor < -8e3) & (motor > -30e3)
-        driving.append(motor[much].sum() / battery[much].sum())
-        recuperating.append(battery[back].sum() / motor[back].sum())
-        used = np.nansum(-amps[:-1] * np.diff(time)) / 3600.0
-        charge.append(100.0 * used / (np.nanmax(soc) - soc[np.isfinite(soc)][-1]))
-    told = [
-        (np.median(values), *np.percentile(values, (10, 90)))
-        for values in (driving, recuperating, charge)
+def gain(masses: dict[str, float], bare: tuple[str, ...]) -> tuple[float, float]:
+    """Return what the loaded trips weigh more than others, and its standard deviation [kg].
+
+    Both kinds scatter alike; of two trips alone too little is known.
+    """
+    empty, full = (np.array([masses[n] for n in names]) for names in (bare, LOADED))
+    off = np.concatenate([empty - empty.mean(), full - full.mean()])
+    scatter = float(np.sqrt(np.sum(off**2) / (off.size - 2)))
+    return float(full.mean() - empty.mean()), scatter * float(
+        np.sqrt(1.0 / empty.size + 1.0 / full.size)
+    )
+
+
+def bmw_loads() -> str:
+    """What the noted load comes out as, and what of the model moves it."""
+    car = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
+    as_read = replace(car, torque=replace(car.torque, scale_std=MOTOR_TORQUE_STD))
+    drives = trips()
+
+    def with_inertias(view, vehicle, **options):  # type: ignore[no-untyped-def]
+        rows, y = design(view, vehicle, **options)
+        wheels = view.accel / vehicle.driveline.wheel_radius**2
+        return np.column_stack([rows, view.gearing**2 * view.accel, wheels]), y
+
+    def their_std(vehicle, *given, **options):  # type: ignore[no-untyped-def]
+        return np.append(prior_std(vehicle, *given, **options), inertia_std(vehicle))
+
+    def usual_lean(*_):  # type: ignore[no-untyped-def]
+        return Lean(*SQUAT)
+
+    lines = [
+        "| | narrowest third % | December kg | heavier than December kg | slope "
+        "| heavier than December and 3 January kg | slope |",
+        "|---|---|---|---|---|---|---|",
     ]
-    scale = float(np.sqrt(told[0][0] / told[1][0]))
+
+    def row(name: str, masses: dict[str, float]) -> str:
+        low, high, middle = shortest(np.array(list(masses.values())), 1.0 / 3.0)
+        cells = []
+        for bare in (DECEMBER, DECEMBER + JANUARY):
+            more, std = gain(masses, bare)
+            cells.append(f"{more:.0f} ± {std:.0f} | {more / NOTED:.2f} ± {std / NOTED:.2f}")
+        empty = np.mean([masses[n] for n in DECEMBER])
+        third = f"{100 * (high - low) / middle:.1f}" if len(masses) > 10 else ""
+        return f"| {name} | {third} | {empty:.0f} | {' | '.join(cells)} |"
+
+    def weighed(vehicle: wb.Vehicle) -> dict[str, float]:
+        return {n: wb.weigh(d, vehicle).mass for n, d in drives.items()}
+
+    with (
+        patch.object(joint, "design", with_inertias),
+        patch.object(joint, "prior_std", their_std),
+        patch.object(joint, "inertia_relative_std", lambda *_: 0.0),
+        patch.object(joint, "lean", usual_lean),
+    ):
+        lines.append(row("inertias estimated, usual lean, torque as read", weighed(as_read)))
+    with patch.object(joint, "lean", usual_lean):
+        lines.append(row("inertias considered", weighed(as_read)))
+    lines.append(row("and lean found against the wheels", weighed(as_read)))
+    now = weighed(car)
+    lines.append(row("and torque by battery power: `weigh`", now))
+    short = {n: now[n] for n in LOADED}
+    for name in DECEMBER + JANUARY:
+        # Nothing of the first minutes of one trip is left behind its gap.
+        most = FIRST + (FILLED[name][1] - FILLED[name][0] if name in FILLED else 0.0)
+        part = without(drives[name], drives[name].start + most, np.inf)
+        short[name] = wb.weigh(part, car).mass
+    lines.append(row("the others' first nine minutes", short))
+    return "\n".join(lines)
+
+
+def bmw_regressions() -> str:
+    """Plain regressions of force on specific force, without any state."""
+    car = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
+    kinds = ("force on specific force", "specific force on force", "instrument: rate of the speed",
+             "the same, driving", "the same, recuperating")  # fmt: skip
+    found: dict[str, dict[str, float]] = {kind: {} for kind in kinds}
+    for name, drive in trips().items():
+        balance = wb.weigh(drive, car).result.balance
+        view, motion = balance.merged, balance.motion
+        rate = np.gradient(motion.speed, motion.time)
+        rolled = np.interp(view.time, motion.time, rate)
+        force = view.traction_force - view.drag_force - view.rotating_mass * view.accel
+        known = view.usable & np.isfinite(force) & np.isfinite(view.specific_force)
+        for kind in kinds:
+            driven = np.sign(view.traction_force)
+            side = {"driving": driven > 0.0, "recuperating": driven < 0.0}.get(
+                kind.rpartition(" ")[2], True
+            )
+            cut = windows(view.time, known & side)
+            time = cut.mean(view.time)
+            y, f, a = (
+                without_slow(time, cut.mean(x)) for x in (force, view.specific_force, rolled)
+            )
+            found[kind][name] = {
+                kinds[0]: (f @ y) / (f @ f),
+                kinds[1]: (y @ y) / (f @ y),
+            }.get(kind, (a @ y) / (a @ f))
+    lines = [
+        "| regression | narrowest third % | December kg | heavier than December kg | slope |",
+        "|---|---|---|---|---|",
+    ]
+    for kind, masses in found.items():
+        low, high, middle = shortest(np.array(list(masses.values())), 1.0 / 3.0)
+        more, std = gain(masses, DECEMBER)
+        lines.append(
+            f"| {kind} | {100 * (high - low) / middle:.1f} "
+            f"| {np.mean([masses[n] for n in DECEMBER]):.0f} | {more:.0f} ± {std:.0f} "
+            f"| {more / NOTED:.2f} ± {std / NOTED:.2f} |"
+        )
+    return "\n".join(lines)
+
+
+def bmw_power() -> str:
+    """What battery power says of the torque, what the heater's meters say of the battery's."""
+    car = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
+    found = [find_power_balance(drive, car) for drive in trips().values()]
+    scale = np.array([f.scale for f in found])
+    noise = np.array([f.noise_std for f in found])
+    sure = noise < 0.01
+    both = [100.0 * np.median([getattr(f, n) for f in found]) for n in ("driving", "recuperating")]
+    heaters = []
+    for path in sorted((DATA / "bmw-i3").glob("TripB*.csv")):
+        table = pl.read_csv(path, separator=";", encoding="latin-1", infer_schema_length=None)
+
+        def column(name: str, table: pl.DataFrame = table) -> np.ndarray:
+            return table[name].cast(pl.Float64, strict=False).to_numpy()
+
+        heater = column("Heater Voltage [V]") * column("Heater Current [A]")
+        battery = -column("Battery Voltage [V]") * column("Battery Current [A]")
+        still = (column("Velocity [km/h]") < 0.4) & np.isfinite(heater + battery)
+        if np.count_nonzero(still) > 300 and np.std(heater[still]) > 1000.0:
+            cooling = 1e3 * np.nan_to_num(column("AirCon Power [kW]"))
+            terms = np.column_stack([heater, cooling, np.ones_like(heater)])[still]
+            heaters.append(np.linalg.lstsq(terms, battery[still], rcond=None)[0][0])
     return (
-        f"Motor torque times motor speed over battery power, 8 to 30 kW driving: median "
-        f"{told[0][0]:.2f} of {len(driving)} trips, the middle eight tenths {told[0][1]:.2f} to "
-        f"{told[0][2]:.2f}; battery over motor power recuperating: {told[1][0]:.2f}, "
-        f"{told[1][1]:.2f} to {told[1][2]:.2f}. With losses alike both ways the reading is "
-        f"{scale:.2f} of the torque. Charge per full state of charge: {told[2][0]:.1f}, "
-        f"{told[2][1]:.1f} to {told[2][2]:.1f} A h, of a battery of 60 A h."
+        f"Of what changes within a minute the motor gives {both[0]:.0f} % of the battery's power "
+        f"driving, and {both[1]:.0f} % comes back recuperating (medians of {len(found)} trips). "
+        f"So the torque reads {np.mean(scale[sure]):.3f} of what it is, with a standard deviation "
+        f"of {np.std(scale[sure], ddof=1):.3f} between {np.count_nonzero(sure)} trips, each known "
+        f"to ± {np.median(noise[sure]):.3f} but for what all share (± "
+        f"{np.median([f.std for f in found]):.3f}). Standing, the battery gives "
+        f"{min(heaters):.2f} to {max(heaters):.2f} W per watt of the heater, which has meters of "
+        f"its own ({len(heaters)} trips)."
     )
 
 
@@ -207,7 +325,7 @@ def draw_trips(
             axis.axvline(k - 0.5, color="0.85", lw=0.8, zorder=0)
     axis.set_xticks(at, [f"{row[0][4:]}  {row[1]:%Y-%m-%d}" for row in rows], rotation=90)
     axis.set_xlim(-0.6, len(rows) + 3.5)
-    axis.set_ylabel("mass kg, 95 % interval within the trip")
+    axis.set_ylabel("mass kg, 95 % interval of its noise")
     axis.legend(loc="upper left")
     (HERE / "figures").mkdir(exist_ok=True)
     figure.savefig(HERE / "figures" / "bmw-i3.png", dpi=110)
@@ -536,17 +654,39 @@ def seat_leon() -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    page = (HERE / "recorded.template.md").read_text(encoding="utf-8")
-    page = page.replace("<!-- bmw-i3 -->", bmw_i3())
-    page = page.replace("<!-- bmw-power -->", bmw_power())
-    page = page.replace("<!-- j1939-truck -->", j1939_truck())
-    page = page.replace("<!-- clocks -->", clocks())
-    page = page.replace("<!-- canedge -->", canedge())
-    page = page.replace("<!-- canedge-regressions -->", canedge_regressions(canedge_drives()))
-    page = page.replace("<!-- seat-leon -->", seat_leon())
-    (HERE / "recorded.md").write_text(page, encoding="utf-8")
+PARTS: Mapping[str, Callable[[], str]] = {
+    "bmw-i3": bmw_i3,
+    "bmw-loads": bmw_loads,
+    "bmw-regressions": bmw_regressions,
+    "bmw-power": bmw_power,
+    "j1939-truck": j1939_truck,
+    "clocks": clocks,
+    "canedge": canedge,
+    "canedge-regressions": lambda: canedge_regressions(canedge_drives()),
+    "seat-leon": seat_leon,
+}
+"""What stands in the template as ``<!-- name -->``."""
+
+HEADING = re.compile(r"^(?=## )", re.MULTILINE)
+
+
+def main(wanted: str = "") -> None:
+    """Write the page; sections without a part whose name begins so stay as they are."""
+    page = HERE / "recorded.md"
+    written = {
+        part.partition("\n")[0]: part
+        for part in (HEADING.split(page.read_text(encoding="utf-8")) if wanted else ())
+    }
+    parts = HEADING.split((HERE / "recorded.template.md").read_text(encoding="utf-8"))
+    for k, part in enumerate(parts):
+        names = [name for name in PARTS if f"<!-- {name} -->" in part]
+        if wanted and names and not any(name.startswith(wanted) for name in names):
+            parts[k] = written[part.partition("\n")[0]]
+            continue
+        for name in names:
+            parts[k] = parts[k].replace(f"<!-- {name} -->", PARTS[name]())
+    page.write_text("".join(parts), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:2])

@@ -57,6 +57,8 @@ def test_all_bmw_trips_are_read_without_loss(bmw):
         "engine_torque",
         "longitudinal_accel",
         "altitude",
+        "battery_current",
+        "battery_voltage",
         "throttle",
         "ambient_temperature",
     }

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from weighbridge.balance import Reason
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.errors import ConfigError
+from weighbridge.estimators.confounded import inertia_relative_std
 from weighbridge.estimators.judging import LEAN_STD, uncalibrated_std
 from weighbridge.estimators.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
 from weighbridge.signals import Drive, Signal
@@ -17,6 +18,7 @@ from weighbridge.vehicle.data_sheet import (
     ACCESSORY_POWER,
     by_data_sheet,
     friction_coefficients,
+    inertia_std,
     scale_std,
     wheel_efficiency,
 )
@@ -154,3 +156,20 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
     k = len(NAMES)
     made = rows[:, k : k + 2] @ -errors[:2] + rows[:, k + 2 :] @ errors[2:]
     assert_allclose(wrong - right, made, atol=1e-9)
+
+
+def test_with_one_gear_inertias_are_considered_not_estimated():
+    """What hills say of them is what the accelerometer errs by, so the mass must not hang on it."""
+    electric = Vehicle(driveline=Driveline(gearings=(30.0,), wheel_radius=0.33))
+    states = prior_std(electric, 1500.0, 200.0)
+    assert states.size == len(NAMES) + 2
+    accel = np.sin(np.arange(200.0))
+    used = np.ones(200, dtype=bool)
+    engine, wheels = inertia_std(electric)
+    expected = np.hypot(engine * 30.0**2, wheels / 0.33**2) / 1500.0
+    assert_allclose(inertia_relative_std(electric, 1500.0, accel, accel, used), expected)
+    # Where all that weighs is hills, the inertias do not matter.
+    hills = np.cos(np.arange(200.0))
+    assert inertia_relative_std(electric, 1500.0, accel, accel + 9.0 * hills, used) < 0.2 * expected
+    for known in (sheet(), replace(electric, provenance=Provenance(method="joint"))):
+        assert inertia_relative_std(known, 1500.0, accel, accel, used) == 0.0

@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose
 import weighbridge as wb
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators import joint
-from weighbridge.estimators.squat import SQUAT, Lean, lean
+from weighbridge.estimators.squat import SQUAT, Lean, lean, squat_by_speed
+from weighbridge.navigation.longitudinal import longitudinal_motion
+from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 
 K = 0.004
@@ -116,3 +118,40 @@ def test_hills_weigh_without_a_lean():
     assert_allclose(body.relative_std(accel, accel + hill, every), 0.5 * full, rtol=0.05)
     assert body.relative_std(np.zeros(4000), hill, every) == 0.0
     assert body.relative_std(accel, accel, ~every) == 0.0
+
+
+def along(k, *, hills=0.02, seconds=900.0, swing=1.0, seed=4):
+    """A drive with one accelerometer that leans by ``k`` per acceleration."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, seconds, 0.1)
+    noise = np.convolve(rng.normal(size=time.size + 80), np.hanning(81), "valid")
+    accel = swing * noise / noise.std()
+    speed = 15.0 + np.cumsum(accel - accel.mean()) * 0.1
+    speed = 15.0 + 8.0 * np.tanh((speed - 15.0) / 8.0)
+    accel = np.gradient(speed, 0.1)
+    grade = hills * np.sin(time / 31.0)
+    read = (1.0 + GRAVITY * k) * accel + GRAVITY * grade + rng.normal(0.0, 0.05, time.size)
+    signals = {
+        "longitudinal_accel": Signal("longitudinal_accel", time, read),
+        "vehicle_speed": Signal("vehicle_speed", time, speed),
+    }
+    return longitudinal_motion(Drive("d", signals))
+
+
+@pytest.mark.parametrize("k", [0.0, 0.005])
+def test_one_accelerometer_shows_its_lean_against_the_wheels(weighed, k):
+    motion = along(k)
+    found, std = squat_by_speed(motion)
+    assert found == pytest.approx(k, abs=7e-4)
+    # The scales of speed and accelerometer stay open.
+    assert 1.5e-3 < std < 2.5e-3
+    car, weighing = weighed
+    balance = replace(weighing.result.balance, motion=motion)
+    taken = lean(balance, uncalibrated(car))
+    assert min(k, SQUAT[0]) < taken.squat < max(k, SQUAT[0])
+    assert taken.std < 0.75 * SQUAT[1]
+
+
+def test_a_drive_that_hardly_accelerates_shows_no_lean():
+    assert squat_by_speed(along(0.0, swing=0.05)) is None
+    assert squat_by_speed(along(0.0, seconds=120.0)) is None

@@ -48,6 +48,7 @@ torques = st.builds(
     reference_torque=maybe(positive),
     engine_efficiency=st.floats(1e-3, 1.0),
     noise=maybe(positive),
+    scale_std=maybe(positive),
     load_range=maybe(pairs),
     speed_range=maybe(pairs),
 )

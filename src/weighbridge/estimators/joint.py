@@ -12,6 +12,7 @@ from scipy.optimize import minimize
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import MergedView
+from weighbridge.estimators.confounded import inertia_relative_std
 from weighbridge.estimators.considered import force_columns, open_std, sensitivity
 from weighbridge.estimators.judging import (
     OTHER_METHOD_STD,
@@ -250,6 +251,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     left = math.hypot(
         _left_open(balance, vehicle, mass),
         body.relative_std(view.accel, rows[:, 0], used),
+        inertia_relative_std(vehicle, mass, view.accel, rows[:, 0], used),
         UNMODELLED * open_std(vehicle, moved, mass),
         LEVEL_STD * float(low[-1]),
     )

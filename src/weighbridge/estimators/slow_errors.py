@@ -71,7 +71,9 @@ DATA_SHEET_NAMES: Final = ("torque_offset", "torque_growth", "engine_inertia", "
 """Further states, constant, of a vehicle file from a data sheet alone, in order: what a
 calibration finds once is found from each drive. An offset of the torque works through the
 gear, and low gears go with strong acceleration: taken for none it makes mass. So does
-friction that grows with engine speed, which is high where torque is."""
+friction that grows with engine speed, which is high where torque is. The inertias are states
+where there are several gears: with one they are like the scale and the lean of the
+accelerometer, which would be taken for them (`weighbridge.estimators.confounded`)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +160,7 @@ def design(
 
     Returns
     -------
-    rows : (n, 7) for `NAMES`, or (n, 11) with `DATA_SHEET_NAMES`; the mass is that of the
+    rows : (n, 7) for `NAMES`, or (n, 9) or (n, 11) with `DATA_SHEET_NAMES`; the mass is that of the
         first row
     y : (n,) traction less drag and rotating inertia, and what the fuel that is burnt by then
         would have weighed [N]
@@ -177,7 +179,9 @@ def design(
         gearing = np.nan_to_num(view.gearing)
         wheels = view.accel / vehicle.driveline.wheel_radius**2
         turning = gearing * view.speed / USUAL_SPEED
-        columns += [gearing, gearing * turning, gearing**2 * view.accel, wheels]
+        columns += [gearing, gearing * turning]
+        if not vehicle.driveline.single_speed:
+            columns += [gearing**2 * view.accel, wheels]
     return np.column_stack(columns), y + phi * view.fuel_burnt
 
 
@@ -198,7 +202,7 @@ def motion_variance(cut: Windows) -> Floats:
 
 
 def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = False) -> Floats:
-    """Standard deviations (7,) or (11,) of the states before the drive has told.
+    """Standard deviations (7,), (9,) or (11,) of the states before the drive has told.
 
     Parameters
     ----------
@@ -226,7 +230,9 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = 
         drag or 0.0,
     ]
     if by_data_sheet(vehicle):
-        states += [*offset_std(vehicle, torque), *inertia_std(vehicle)]
+        states += offset_std(vehicle, torque)
+        if not vehicle.driveline.single_speed:
+            states += inertia_std(vehicle)
     return np.array(states)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from weighbridge.balance import ForceBalance
 from weighbridge.constants import GRAVITY
@@ -18,7 +19,6 @@ SQUAT: Final = (0.0035, 0.0025)
 """Pitch of the body per acceleration of a vehicle of which nothing is known, and its standard
 deviation [rad per m/s^2]: four recorded cars had 0.0024 to 0.0051, and stiff trucks lean less."""
 
-
 DRIVE_STD: Final = 0.0009
 """Standard deviation of the squat that one drive shows, beside what its navigation says
 [rad per m/s^2]: heights by GNSS err together for minutes, and hills that happen to go with
@@ -27,6 +27,29 @@ long the squat found was off by 0.0009, where the navigation says 0.0003."""
 
 LOADED_STD: Final = 0.0003
 """By how much the squat of a vehicle changes with its load [rad per m/s^2]."""
+
+MOVING: Final = 1.0
+"""Slower than this wheels tell no acceleration [m/s]."""
+
+SMOOTH: Final = 1.0
+"""Accelerations are compared as means over this time [s]."""
+
+BRIEF: Final = 10.0
+"""What changes more slowly is grade and offset, and is taken off [s]."""
+
+LEAST_ACCEL: Final = 0.15
+"""Standard deviation of what is left that is needed [m/s^2]."""
+
+BLOCK: Final = 60.0
+"""Stretches of this length tell how much the slope scatters [s]."""
+
+FEWEST_BLOCKS: Final = 4
+
+SPEED_SCALE_STD: Final = 0.015
+"""Scale of the speed by the wheels, relative standard deviation [-]: that of the tyres' radius."""
+
+ACCEL_SCALE_STD: Final = 0.01
+"""Scale of an accelerometer in a vehicle, relative standard deviation [-]."""
 
 
 def pooled(motions: Sequence[Motion]) -> tuple[float, float] | None:
@@ -81,11 +104,65 @@ class Lean:
         accel, phi : (n,) acceleration and regressor of the mass [m/s^2]
         used : (n,)
         """
-        if self.std <= 0.0 or np.count_nonzero(used) < 2:
+        if self.std <= 0.0:
             return 0.0
-        weight = phi[used] - phi[used].mean()
-        share = float(weight @ accel[used]) / max(float(weight @ weight), 1e-9)
-        return GRAVITY * self.std * float(np.clip(share, 0.0, 1.0))
+        return GRAVITY * self.std * share_of_accel(accel, phi, used)
+
+
+def share_of_accel(accel: Floats, phi: Floats, used: Bools) -> float:
+    """Part of what weighs that is acceleration, not hills [-].
+
+    Parameters
+    ----------
+    accel, phi : (n,) acceleration and regressor of the mass [m/s^2]
+    used : (n,)
+    """
+    if np.count_nonzero(used) < 2:
+        return 0.0
+    weight = phi[used] - phi[used].mean()
+    share = float(weight @ accel[used]) / max(float(weight @ weight), 1e-9)
+    return float(np.clip(share, 0.0, 1.0))
+
+
+def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
+    """Find squat as what one accelerometer reads too much of the wheels' acceleration.
+
+    Over some seconds what the road's grade adds has little to do with how the driver
+    accelerates. So the slope of the specific force on the rate of the speed is 1 + g k,
+    times the scale of the accelerometer over that of the speed, which stays open.
+
+    Parameters
+    ----------
+    motion : by an accelerometer along the vehicle
+
+    Returns
+    -------
+    Pitch per acceleration and its standard deviation [rad per m/s^2]; None where too little
+    accelerates.
+    """
+    rate = motion.rate
+    moving = motion.valid & (motion.speed > MOVING)
+    around = max(round(SMOOTH * rate), 1), max(round(BRIEF * rate), 1)
+    parts = [
+        uniform_filter1d(x, around[0]) - uniform_filter1d(x, around[1])
+        for x in (motion.specific_force, np.gradient(motion.speed, 1.0 / rate))
+    ]
+    inside = uniform_filter1d(moving.astype(np.float64), around[1]) > 0.999
+    block = (motion.time[inside] // BLOCK).astype(np.int64)
+    read, rolled = (x[inside] for x in parts)
+    _, block = np.unique(block, return_inverse=True)
+    if block.size == 0 or block.max() < FEWEST_BLOCKS:
+        return None
+    cross = np.bincount(block, weights=read * rolled)
+    square = np.bincount(block, weights=rolled**2)
+    if square.sum() / read.size < LEAST_ACCEL**2:
+        return None
+    slope = float(cross.sum() / square.sum())
+    left_out = (cross.sum() - cross) / (square.sum() - square)
+    many = left_out.size
+    scatter = (many - 1) / many * float(np.sum((left_out - left_out.mean()) ** 2))
+    std = float(np.sqrt(scatter + SPEED_SCALE_STD**2 + ACCEL_SCALE_STD**2))
+    return (slope - 1.0) / GRAVITY, std / GRAVITY
 
 
 def lean(balance: ForceBalance, vehicle: Vehicle) -> Lean:
@@ -108,7 +185,16 @@ def lean(balance: ForceBalance, vehicle: Vehicle) -> Lean:
     if rows_lean == torque_leans:
         return Lean(0.0, found_std)
     if rows_lean:
-        return Lean(given, given_std) if given is not None else Lean(*SQUAT)
+        if given is not None:
+            return Lean(given, given_std)
+        seen = squat_by_speed(motion) if motion.source == "longitudinal_accel" else None
+        return Lean(*SQUAT) if seen is None else Lean(*_mean(SQUAT, seen))
     if motion.squat is not None:
         return Lean(-motion.squat, found_std)
     return Lean(-SQUAT[0], SQUAT[1])
+
+
+def _mean(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+    """Return the mean weighted by variance of two values with standard deviations, and its own."""
+    weight = b[1] ** 2 / (a[1] ** 2 + b[1] ** 2)
+    return weight * a[0] + (1.0 - weight) * b[0], float(np.sqrt(weight)) * a[1]

@@ -15,6 +15,7 @@ from weighbridge.pipeline.checks import check_drive
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import TorqueSource, Vehicle
+from weighbridge.vehicle.power_balance import find_power_balance
 from weighbridge.vehicle.torque import SIGNALS
 
 GAP_PERIODS: Final = 5.0
@@ -153,13 +154,21 @@ def inspect_drive(drive: Drive, vehicle: Vehicle | None = None) -> Inspection:
     """
     order = list(QUANTITIES)
     signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
-    problems = (*drive.problems, *check_drive(drive, vehicle))
+    problems = (*drive.problems, *check_drive(drive, vehicle), *_by_battery(drive, vehicle))
     return Inspection(
         drive=drive,
         signals=tuple(describe(s) for s in signals),
         problems=tuple(sorted(dict.fromkeys(problems), key=lambda p: not p.serious)),
         ways=_ways(drive, vehicle),
     )
+
+
+def _by_battery(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:
+    """Tell what battery power says of the torque of an electric drive with one gear."""
+    if vehicle is None or not vehicle.driveline.single_speed:
+        return ()
+    found = find_power_balance(drive, vehicle)
+    return (Problem("battery_current", found.text),) if found is not None else ()
 
 
 def describe(signal: Signal) -> SignalReport:

@@ -25,6 +25,7 @@ from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.power_balance import by_power
 from weighbridge.vehicle.torque import SIGNALS
 
 if TYPE_CHECKING:
@@ -273,8 +274,9 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str) -> Weighing:
         balance = speed_balance(drive, vehicle)
         warnings += balance.motion.notes
     else:
+        vehicle, found = by_power(drive, vehicle)
         balance, notes = torque_balance(drive, vehicle)
-        warnings += notes
+        warnings += found + notes
         warnings += fitted_for_another(vehicle, method)
     return weigh_balance(drive, vehicle, method, balance, warnings)
 

@@ -69,6 +69,7 @@ UNITS: Final[dict[str, Unit]] = {
     "kgps": Unit("kg/s", 1.0),
     "lph": Unit("m^3/s", 1e-3 / 3600.0),
     "v": Unit("V", 1.0),
+    "a": Unit("A", 1.0),
     "kg": Unit("kg", 1.0),
     "t": Unit("kg", 1e3),
     "kgm2": Unit("kg m^2", 1.0),

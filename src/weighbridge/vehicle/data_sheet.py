@@ -139,7 +139,9 @@ def wheel_share(vehicle: Vehicle, torque: Floats) -> Floats:
 
 
 def torque_std(vehicle: Vehicle) -> float:
-    """Relative standard deviation of the torque's scale."""
+    """Relative standard deviation of the torque's scale: as the file says, else as usual."""
+    if vehicle.torque.scale_std is not None:
+        return vehicle.torque.scale_std
     if vehicle.driveline.single_speed and vehicle.torque.source == "measured":
         return MOTOR_TORQUE_STD
     return TORQUE_STD[vehicle.torque.source]

@@ -125,6 +125,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             ),
             _Key("engine_efficiency", "engine_efficiency", "shaft over fuel power, for air_flow"),
             _Key("noise", "noise", "standard deviation of the torque", suffix="nm"),
+            _Key("scale_std", "scale_std", "of a torque never calibrated: how sure its scale is"),
             _Key("load_range", "load_range", "loads the fit has seen", "numbers", "pct", pair=True),
             _Key(
                 "speed_range",

@@ -114,6 +114,8 @@ class TorqueModel:
     reference_torque : for "percent" where the drive does not carry it [N m]
     engine_efficiency : for "air_flow", shaft over fuel power [-]
     noise : standard deviation of the torque from this source [N m]
+    scale_std : relative standard deviation of the scale of a torque that was never calibrated
+        [-]; None for that of a data sheet
     load_range, speed_range : what the regression has seen; outside, torque is
         extrapolated and the sample left out ([-], [rad/s])
     """
@@ -126,6 +128,7 @@ class TorqueModel:
     reference_torque: float | None = None
     engine_efficiency: float = 0.33
     noise: float | None = None
+    scale_std: float | None = None
     load_range: tuple[float, float] | None = None
     speed_range: tuple[float, float] | None = None
 
@@ -151,6 +154,7 @@ class TorqueModel:
             raise ConfigError("curvature_stds must be as many as curvature")
         _positive("reference_torque", self.reference_torque)
         _positive("noise", self.noise)
+        _not_negative("scale_std", self.scale_std)
         if not 0.0 < self.engine_efficiency <= 1.0:
             raise ConfigError(f"engine_efficiency must be in (0, 1], got {self.engine_efficiency}")
 

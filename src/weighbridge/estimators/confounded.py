@@ -1,0 +1,35 @@
+"""What a drive cannot tell from the mass, and what the mass is uncertain by for it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weighbridge.estimators.squat import share_of_accel
+from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.data_sheet import by_data_sheet, inertia_std
+from weighbridge.vehicle.model import Vehicle
+
+
+def inertia_relative_std(
+    vehicle: Vehicle, mass: float, accel: Floats, phi: Floats, used: Bools
+) -> float:
+    """Relative standard deviation of a mass by the inertias of a data sheet with one gear [-].
+
+    With one gear the rotating mass is the same all the time. Only hills, which accelerate
+    nothing, tell it from the mass, and they tell it no better than the accelerometer's
+    scale and lean are known. So it is considered (Schmidt, 1966), not estimated. With
+    several gears it is a state.
+
+    Parameters
+    ----------
+    vehicle
+    mass : [kg]
+    accel, phi : (n,) acceleration and regressor of the mass [m/s^2]
+    used : (n,)
+    """
+    line = vehicle.driveline
+    if not (by_data_sheet(vehicle) and line.single_speed) or not mass > 0.0:
+        return 0.0
+    engine, wheels = inertia_std(vehicle)
+    rotating = float(np.hypot(engine * line.gearings[0] ** 2, wheels / line.wheel_radius**2))
+    return rotating / mass * share_of_accel(accel, phi, used)
