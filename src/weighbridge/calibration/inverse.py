@@ -8,8 +8,10 @@ averaged over the same windows.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from weighbridge.balance.averaging import WINDOW, Windows, windows
 from weighbridge.balance.force_balance import MergedView
@@ -64,7 +66,8 @@ class InverseFit:
 
     Attributes
     ----------
-    coefficients : (p,) w0, w1, w2 ... of Jensen 2022, eq. 49, then the curvature
+    coefficients : (p,) w0, w1, w2 ... of Jensen 2022, eq. 49, then the curvature and the
+        slopes at the knots
     road : (4,) C_d A, C_r, I_e, I_w
     stds : (p + 4,) standard deviations of both
     cov : (p + 4, p + 4) covariance of both
@@ -81,6 +84,67 @@ class InverseFit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TorquePrior:
+    """Standard deviations of the torque terms, over the highest torque of the drives [-].
+
+    Attributes
+    ----------
+    offset : torque at no reading
+    growth : for each power of engine speed, at `TYPICAL_SPEED`
+    lean : torque at the highest reading that grows with engine speed, at `TYPICAL_SPEED`
+    bend : of the highest reading squared
+    knot : of the smooth correction at the highest reading
+    """
+
+    offset: float
+    growth: float
+    lean: float
+    bend: float
+    knot: float
+
+    def covariance(self, settings: FitSettings, torque: float, reading: float) -> Floats:
+        """Covariance of the terms beside the reading, in the order of `torque_rows`.
+
+        Parameters
+        ----------
+        settings : which terms there are
+        torque, reading : highest of the drives [N m], [unit of the reading]
+
+        References
+        ----------
+        The correction is a Gaussian process over the logarithm of engine speed: Rasmussen and
+        Williams, Gaussian Processes for Machine Learning, 2006, ch. 4.
+        """
+        stds = [self.offset]
+        stds += [self.growth / TYPICAL_SPEED**k for k in range(1, settings.order + 1)]
+        if settings.curved:
+            stds += [self.lean / (TYPICAL_SPEED * reading), self.bend / reading**2]
+        cov = np.diag(np.square(stds))
+        if settings.knots:
+            where = np.log(settings.knots)
+            apart = (where[:, None] - where) / KNOT_LENGTH
+            smooth = (self.knot / reading) ** 2 * np.exp(-0.5 * apart**2)
+            cov = block_diag(cov, smooth)
+        return np.asarray(torque**2 * cov)
+
+
+TYPICAL_SPEED: Final = 300.0
+"""Engine speed at which the growth of torque terms is told [rad/s]."""
+
+KNOT_LENGTH: Final = 0.35
+"""Length over which the full-load curve of an engine bends, in the logarithm of its speed [-]."""
+
+KNOT_RATIO: Final = 1.25
+"""Ratio of neighbouring knots [-]."""
+
+
+def knots_between(slow: float, fast: float) -> tuple[float, ...]:
+    """Return knots from ``slow`` to ``fast``, evenly apart in the logarithm [rad/s]."""
+    count = max(2, 1 + round(np.log(fast / slow) / np.log(KNOT_RATIO)))
+    return tuple(float(k) for k in np.geomspace(slow, fast, count))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FitSettings:
     """What is fitted, and what is known before.
 
@@ -89,6 +153,8 @@ class FitSettings:
     source : of the torque
     order : highest power of engine speed
     curved : let torque per load bend with engine speed and load
+    knots : engine speeds of a smooth correction of torque per reading [rad/s]
+    bounds : what is known of the terms before
     torque_noise : of one reading, as torque [N m]
     wheel_radius : [m]
     prior : mean and standard deviation (4,) of C_d A, C_r, I_e, I_w
@@ -99,6 +165,8 @@ class FitSettings:
     source: TorqueSource
     order: int
     curved: bool
+    knots: tuple[float, ...]
+    bounds: TorquePrior
     torque_noise: float
     wheel_radius: float
     prior: tuple[Floats, Floats]
@@ -137,7 +205,12 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     readings = [d.regressor for d in drives]
     for _ in range(settings.rounds):
         state, readings = _solve(drives, cuts, readings, scale, settings)
-    return _unpack(state, scale, settings.order, settings.curved, total)
+    return _unpack(state, scale, _extra(settings), total)
+
+
+def _extra(settings: FitSettings) -> int:
+    """Torque terms beside the reading."""
+    return 1 + settings.order + 2 * settings.curved + len(settings.knots)
 
 
 def _torque_per_reading(drives: list[DriveRows]) -> float:
@@ -152,16 +225,16 @@ def _torque_per_reading(drives: list[DriveRows]) -> float:
     return float(np.median(slopes))
 
 
-def _columns(
-    d: DriveRows, reading: Floats, wheel_radius: float, order: int, curved: bool
-) -> Floats:
+def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
     """Columns of one drive: motion, road load, torque terms, disturbances."""
     view = d.view
     gearing = np.nan_to_num(view.gearing)
     north, east = view.direction
     push = view.air_density * 0.5 * view.speed
     # The reading itself stands on the left; the other torque terms stand here.
-    offset, _, *terms = torque_rows(reading, d.engine_speed, order, curved=curved).T
+    offset, _, *terms = torque_rows(
+        reading, d.engine_speed, settings.order, curved=settings.curved, knots=settings.knots
+    ).T
     one = np.ones_like(gearing)
     mass = d.mass - view.fuel_burnt
     columns = [
@@ -169,7 +242,7 @@ def _columns(
         view.dynamic_pressure,
         mass * GRAVITY * np.cos(view.grade),
         gearing**2 * view.accel,
-        view.accel / wheel_radius**2,
+        view.accel / settings.wheel_radius**2,
         *(-gearing * term for term in (offset, *terms)),
         one,
         one,
@@ -188,13 +261,12 @@ def _solve(
     settings: FitSettings,
 ) -> tuple[kernel.DisturbanceState, list[Floats]]:
     """Run the filter over all drives one after another."""
-    order, curved = settings.order, settings.curved
     mean, std = settings.prior
     times, rows, targets, variances, parts = [], [], [], [], []
     clock = 0.0
     mass = float(np.mean([d.mass for d in drives]))
     for d, cut, reading in zip(drives, cuts, readings, strict=True):
-        columns = _columns(d, reading, settings.wheel_radius, order, curved)
+        columns = _columns(d, reading, settings)
         gearing = np.nan_to_num(d.view.gearing)
         time = cut.mean(d.view.time)
         times.append(time - time[0] + clock)
@@ -205,15 +277,13 @@ def _solve(
         variances.append(noise_variance(d.view, cut, settings.torque_noise, mass))
         parts.append(columns)
     stacked = np.ascontiguousarray(np.vstack(rows))
-    extra = 1 + order + 2 * curved
-    typical = np.sqrt(np.mean(stacked[:, 5 : 5 + extra] ** 2, axis=0))
+    extra = _extra(settings)
     reached = np.concatenate(targets)
-    force = float(np.sqrt(np.mean(reached**2)))
     gearing = np.concatenate(
         [cut.mean(np.nan_to_num(d.view.gearing)) for d, cut in zip(drives, cuts, strict=True)]
     )
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
-    loose = 3.0 * force / np.maximum(typical, 1e-12)
+    terms = settings.bounds.covariance(settings, torque, torque / scale)
     grade = GRAVITY * GRADE_STD if any(d.by_speed for d in drives) else 0.0
     fading = np.array(
         [
@@ -225,14 +295,14 @@ def _solve(
         ]
     )
     x0 = np.concatenate(([1.0], mean, np.zeros(extra), np.zeros(fading.size)))
-    prior = np.concatenate(([0.5], std, loose, fading)) ** 2
+    prior = block_diag(np.diag(np.square([0.5, *std])), terms, np.diag(np.square(fading)))
     params = kernel.DisturbanceParams(
         time_constant=np.concatenate((np.full(5 + extra, np.inf), TIME_CONSTANTS)),
         std=np.concatenate((np.zeros(5 + extra), fading)),
         gate=GATE,
         settle=100,
     )
-    start = kernel.initial_state(x0, np.diag(prior), 0.0)  # type: ignore[no-untyped-call]
+    start = kernel.initial_state(x0, prior, 0.0)  # type: ignore[no-untyped-call]
     state, _, _, _, _ = kernel.run(
         start, np.concatenate(times), stacked, reached,
         np.concatenate(variances), np.zeros(stacked.shape), params,
@@ -246,11 +316,8 @@ def _solve(
     return state, fitted
 
 
-def _unpack(
-    state: kernel.DisturbanceState, scale: float, order: int, curved: bool, total: int
-) -> InverseFit:
+def _unpack(state: kernel.DisturbanceState, scale: float, extra: int, total: int) -> InverseFit:
     """Divide by the first coefficient, and carry the covariance along."""
-    extra = 1 + order + 2 * curved
     x, cov = state.x[: 5 + extra], state.cov[: 5 + extra, : 5 + extra]
     ratio = x[1:] / x[0]
     # Rows: w0, w1, w2 ... with the curvature, then the road. d(a / x0) = (da - a / x0 dx0) / x0.

@@ -12,7 +12,7 @@ from weighbridge.kernels import disturbance
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import wheel_share
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import reading_of, torque_rows
+from weighbridge.vehicle.torque import reading_of, rows_of
 
 UNSEEN: Final = 1e12
 """Factor on the noise of a row that the filter had left out [-]."""
@@ -28,19 +28,14 @@ def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Float
 
     Returns
     -------
-    (n, p + 4) for the torque coefficients, their curvature, C_d A, C_r, I_e, I_w, as
+    (n, p + 4) for the torque coefficients, their curvature, slopes at the knots, C_d A, C_r, I_e, I_w, as
     `weighbridge.vehicle.model.Provenance.fit_cov` has them
     """
     view, model, line = balance.merged, vehicle.torque, vehicle.driveline
     gearing = np.nan_to_num(view.gearing)
     torque, speed = np.nan_to_num(balance.force.torque), np.nan_to_num(balance.force.engine_speed)
     gain = wheel_share(vehicle, torque) * gearing
-    terms = torque_rows(
-        reading_of(torque, speed, model),
-        speed,
-        max(len(model.coefficients) - 2, 0),
-        curved=bool(model.curvature),
-    )
+    terms = rows_of(model, reading_of(torque, speed, model), speed)
     road = (
         -view.dynamic_pressure,
         -(mass - view.fuel_burnt) * GRAVITY * np.cos(view.grade),

@@ -13,6 +13,7 @@ from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.delay import best_delay, delay_std
 from weighbridge.balance.force_balance import ForceBalance
 from weighbridge.calibration.grid import grid_search
+from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.regression import (
     BOUNDS,
     ROAD_PARAMETERS,
@@ -287,6 +288,7 @@ def run_calibration(
             masses=masses,
             order=order,
             curved=curved,
+            knots=() if driveline.single_speed else _knots(drives, motions, draft, source, delay),
             torque_noise=fitted.residual_std,
             known=base.driveline,
         )
@@ -528,6 +530,25 @@ def _ranges(
     slow, fast = np.percentile(speed, [0.1, 99.9])
     high = float(np.max(load))
     return (float(0.95 * slow), float(1.05 * fast)), (float(min(floors)), 1.02 * high)
+
+
+def _knots(
+    drives: Sequence[Drive],
+    motions: Sequence[Motion],
+    draft: Vehicle,
+    source: TorqueSource,
+    delay: float,
+) -> tuple[float, ...]:
+    """Engine speeds at which the torque per reading may differ from a straight line [rad/s]."""
+    turned = []
+    for drive, motion in zip(drives, motions, strict=True):
+        balance, x = _draft_balance(drive, motion, draft, source, delay)
+        turned.append(balance.force.engine_speed[_finite(balance, x, -np.inf)])
+    speed = np.concatenate(turned)
+    if speed.size < FEW_SAMPLES // 10:
+        return ()
+    slow, fast = np.percentile(speed, [1.0, 99.0])
+    return knots_between(float(slow), float(fast))
 
 
 def _speed_scale(motions: Sequence[Motion], base: Vehicle) -> float:

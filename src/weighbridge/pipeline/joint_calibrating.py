@@ -10,14 +10,22 @@ import numpy as np
 
 from weighbridge.balance.delay import vertex
 from weighbridge.balance.force_balance import ForceBalance
-from weighbridge.calibration.inverse import DriveRows, FitSettings, InverseFit, TooShort, fit
+from weighbridge.calibration.inverse import (
+    DriveRows,
+    FitSettings,
+    InverseFit,
+    TooShort,
+    TorquePrior,
+    fit,
+    knots_between,
+)
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.considered import pinned, triangle
 from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.class_values import road_prior
-from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.vehicle.model import Driveline, TorqueSource, Vehicle
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.45)
 """Time constants of the reading's smoothing that are tried [s]."""
@@ -37,6 +45,16 @@ drive of the calibration anew. Simulated, sixteen vehicles, calibrated by one or
 ordinary drives, six others weighed with each; sensors whose scale is 0.3 % off from drive
 to drive are most of it."""
 
+TORQUE_PRIOR: Final[dict[TorqueSource, TorquePrior]] = {
+    "load": TorquePrior(offset=0.15, growth=0.10, lean=0.30, bend=0.15, knot=0.08),
+    "air_flow": TorquePrior(offset=0.15, growth=0.10, lean=0.30, bend=0.15, knot=0.08),
+    "percent": TorquePrior(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012),
+    "measured": TorquePrior(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012),
+}
+"""What is known of the terms of a torque before any drive: friction and accessories are a tenth
+of the full-load torque and grow with speed (Heywood, 1988, ch. 13); the full-load curve is
+smooth; a torque that is told has been modelled by the maker to a few percent of it."""
+
 FARTHEST: Final = 5.0
 """Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
 seen without an accelerometer, where hills and torque noise pass for drag."""
@@ -54,6 +72,7 @@ class JointProblem:
     balance_at : rows of each drive at a delay and lag
     masses : known mass of each drive as it begins [kg]
     order, curved : of the torque regression
+    knots : engine speeds of its smooth correction [rad/s]
     torque_noise : of one reading [N m]
     known : driveline of the vehicle file given to the calibration
     """
@@ -62,6 +81,7 @@ class JointProblem:
     masses: Sequence[float]
     order: int
     curved: bool
+    knots: tuple[float, ...]
     torque_noise: float
     known: Driveline
 
@@ -89,11 +109,13 @@ def refine(
         source=vehicle.torque.source,
         order=problem.order,
         curved=problem.curved,
+        knots=problem.knots,
+        bounds=TORQUE_PRIOR[vehicle.torque.source],
         torque_noise=problem.torque_noise,
         wheel_radius=line.wheel_radius,
         prior=_prior(vehicle, problem.known),
     )
-    quick = replace(settings, window=TIMING_WINDOW, rounds=1)
+    quick = replace(settings, window=TIMING_WINDOW, rounds=1, knots=())
 
     def rows_at(delay: float, lag: float) -> list[DriveRows]:
         found = []
@@ -188,7 +210,8 @@ def _timing(misfits: Callable[[Sequence[tuple[float, float]]], Floats]) -> tuple
 def _with(
     vehicle: Vehicle, found: InverseFit, delay: float, lag: float, problem: JointProblem
 ) -> Vehicle:
-    straight = found.coefficients.size - 2 * problem.curved
+    bent = found.coefficients.size - len(problem.knots)
+    straight = bent - 2 * problem.curved
     values = [float(w) for w in found.coefficients]
     stds = [float(s) for s in found.stds]
     road = np.maximum(found.road, 0.0)
@@ -198,8 +221,10 @@ def _with(
             vehicle.torque,
             coefficients=tuple(values[:straight]),
             coefficient_stds=tuple(stds[:straight]),
-            curvature=tuple(values[straight:]),
-            curvature_stds=tuple(stds[straight : found.coefficients.size]),
+            curvature=tuple(values[straight:bent]),
+            curvature_stds=tuple(stds[straight:bent]),
+            knots=problem.knots,
+            knot_slopes=tuple(values[bent:]),
         ),
         road_load=replace(
             vehicle.road_load,

@@ -117,6 +117,8 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             _Key("coefficient_stds", "coefficient_stds", "their standard deviations", "numbers"),
             _Key("curvature", "curvature", "of load * engine speed and of load^2", "numbers"),
             _Key("curvature_stds", "curvature_stds", "their standard deviations", "numbers"),
+            _Key("knots", "knots", "engine speeds of a correction of w1", "numbers", "rpm"),
+            _Key("knot_slopes", "knot_slopes", "the correction there", "numbers"),
             _Key(
                 "reference_torque",
                 "reference_torque",
@@ -270,7 +272,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 "fit_cov",
                 "fit_cov",
                 "what the fit leaves open beside that part, lower triangle in SI: coefficients, "
-                "curvature, drag area, rolling coefficient, engine and wheel inertia",
+                "curvature, knot slopes, drag area, rolling coefficient, engine and wheel inertia",
                 "numbers",
             ),
             _Key("notes", "notes", "free text", "text"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -111,6 +112,9 @@ class TorqueModel:
     curvature : of load times engine speed [N m s/rad] and of load squared [N m];
         empty for the regression of eq. 49 as printed
     curvature_stds : their standard deviations, same length or empty
+    knots : rising engine speeds between which a correction of the torque per load or torque
+        read is interpolated; empty for none [rad/s]
+    knot_slopes : that correction at the knots, in the unit of w1
     reference_torque : for "percent" where the drive does not carry it [N m]
     engine_efficiency : for "air_flow", shaft over fuel power [-]
     noise : standard deviation of the torque from this source [N m]
@@ -125,6 +129,8 @@ class TorqueModel:
     coefficient_stds: tuple[float, ...] = ()
     curvature: tuple[float, ...] = ()
     curvature_stds: tuple[float, ...] = ()
+    knots: tuple[float, ...] = ()
+    knot_slopes: tuple[float, ...] = ()
     reference_torque: float | None = None
     engine_efficiency: float = 0.33
     noise: float | None = None
@@ -152,6 +158,13 @@ class TorqueModel:
             raise ConfigError(f"curvature must be two numbers or none, got {self.curvature}")
         if self.curvature_stds and len(self.curvature_stds) != len(self.curvature):
             raise ConfigError("curvature_stds must be as many as curvature")
+        if len(self.knot_slopes) != len(self.knots):
+            raise ConfigError(
+                f"knot_slopes must be as many as knots, {len(self.knots)}, got "
+                f"{len(self.knot_slopes)}"
+            )
+        if any(b <= a for a, b in itertools.pairwise(self.knots)):
+            raise ConfigError(f"knots must rise, got {self.knots}")
         _positive("reference_torque", self.reference_torque)
         _positive("noise", self.noise)
         _not_negative("scale_std", self.scale_std)
@@ -166,6 +179,7 @@ class TorqueModel:
             coefficient_stds=tuple(scale * s for s in self.coefficient_stds),
             curvature=tuple(scale * w for w in self.curvature),
             curvature_stds=tuple(scale * s for s in self.curvature_stds),
+            knot_slopes=tuple(scale * s for s in self.knot_slopes),
         )
 
 
@@ -398,7 +412,7 @@ class Provenance:
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
     fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
-        triangle, row by row, of torque coefficients, curvature, drag area, rolling
+        triangle, row by row, of torque coefficients, curvature, slopes at the knots, drag area, rolling
         coefficient, engine and wheel inertia; empty where it is not known
     notes : free text
     """

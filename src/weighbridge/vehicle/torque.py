@@ -25,9 +25,6 @@ SIGNALS: dict[TorqueSource, tuple[str, ...]] = {
 DRAGGED_TIME: Final = 0.5
 """Time over which a load tells whether the engine is dragged [s]."""
 
-BRAKED_TIME: Final = 2.0
-"""Time over which a torque at or below zero tells that a foot may be on the brake [s]."""
-
 
 @dataclass(frozen=True, slots=True)
 class Torque:
@@ -39,14 +36,12 @@ class Torque:
     torque : (n,) [N m]
     extrapolated : (n,) outside what the torque model has seen
     overrun : (n,) the source says nothing: load at its lowest, engine dragged
-    level : (n,) torque `averaged` over `BRAKED_TIME` [N m]
     """
 
     time: Floats
     torque: Floats
     extrapolated: Bools
     overrun: Bools
-    level: Floats
 
 
 def air_flow_torque(
@@ -153,13 +148,19 @@ def _reference(drive: Drive, time: Floats, model: TorqueModel) -> Floats:
 
 
 def torque_rows(
-    regressor: Floats, engine_speed: Floats, order: int, *, curved: bool = False
+    regressor: Floats,
+    engine_speed: Floats,
+    order: int,
+    *,
+    curved: bool = False,
+    knots: tuple[float, ...] = (),
 ) -> Floats:
     """Rows of the torque regression (Jensen 2022, eq. 49).
 
     The paper's regression is linear in load and takes the same torque per
     load at every engine speed. Load is a part of the torque that is to be had
-    at that speed, so the slope changes with it: two further columns let it.
+    at that speed, so the slope changes with it: two further columns let it, and
+    one for each knot of a smooth curve.
 
     Parameters
     ----------
@@ -167,16 +168,42 @@ def torque_rows(
     engine_speed : (n,) [rad/s]
     order : highest power of engine speed
     curved : append load times engine speed and load squared
+    knots : rising engine speeds of the curve of torque per load [rad/s]
 
     Returns
     -------
-    (n, 2 + order [+ 2]): 1, load, N, N^2 ... [, load N, load^2]
+    (n, 2 + order [+ 2] + knots): 1, load, N, N^2 ... [, load N, load^2], load times the part of
+    each knot
     """
     powers = [engine_speed**k for k in range(1, order + 1)]
     columns = [np.ones_like(regressor), regressor, *powers]
     if curved:
         columns += [regressor * engine_speed, regressor**2]
+    if knots:
+        columns += list((regressor[:, None] * knot_parts(engine_speed, knots)).T)
     return np.column_stack(columns)
+
+
+def knot_parts(engine_speed: Floats, knots: tuple[float, ...]) -> Floats:
+    """Part of each knot in linear interpolation at engine speeds (n,): (n, knots)."""
+    known = np.nan_to_num(engine_speed)
+    return np.column_stack([np.interp(known, knots, unit) for unit in np.eye(len(knots))])
+
+
+def rows_of(model: TorqueModel, reading: Floats, engine_speed: Floats) -> Floats:
+    """Rows (n, p) whose product with `parameters` is the torque of a model."""
+    return torque_rows(
+        reading,
+        engine_speed,
+        max(len(model.coefficients) - 2, 0),
+        curved=bool(model.curvature),
+        knots=model.knots,
+    )
+
+
+def parameters(model: TorqueModel) -> Floats:
+    """Coefficients of a torque model (p,) in the order of `rows_of`."""
+    return np.array([*(model.coefficients or (0.0, 1.0)), *model.curvature, *model.knot_slopes])
 
 
 def reading_of(torque: Floats, engine_speed: Floats, model: TorqueModel) -> Floats:
@@ -194,6 +221,8 @@ def reading_of(torque: Floats, engine_speed: Floats, model: TorqueModel) -> Floa
     for k, w in enumerate(powers, start=1):
         rest = rest + w * engine_speed**k
     slope = scale + lean * engine_speed
+    if model.knots:
+        slope = slope + knot_parts(engine_speed, model.knots) @ np.array(model.knot_slopes)
     # The root that stays finite where the map is straight; where it bends so far that
     # there is none, its turning point.
     root = np.sqrt(np.maximum(slope**2 - 4.0 * bend * rest, 0.0))
@@ -247,17 +276,21 @@ def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Fl
     x = regressor(drive, model.source, time, model)
     nowhere = np.zeros(time.size, dtype=bool)
     if model.source in ("measured", "percent"):
-        offset, scale, *powers = model.coefficients or (0.0, 1.0)
-        torque = offset + scale * x
-        for k, w in enumerate(powers, start=1):
-            torque = torque + w * engine_speed**k
-        return Torque(time, torque, nowhere, nowhere, averaged(torque, period, BRAKED_TIME))
+        torque = _by_map(model, x, engine_speed)
+        return Torque(time, torque, nowhere, nowhere)
     dragged = averaged(x, period, DRAGGED_TIME)
     if not model.coefficients:
-        return Torque(time, x, nowhere, dragged <= 0.0, averaged(x, period, BRAKED_TIME))
-    rows = torque_rows(x, engine_speed, len(model.coefficients) - 2, curved=bool(model.curvature))
-    torque = rows @ np.array([*model.coefficients, *model.curvature])
+        return Torque(time, x, nowhere, dragged <= 0.0)
+    torque = _by_map(model, x, engine_speed)
     low, high = model.load_range or (-math.inf, math.inf)
     slow, fast = model.speed_range or (-math.inf, math.inf)
     extrapolated = (dragged > high) | (engine_speed < slow) | (engine_speed > fast)
-    return Torque(time, torque, extrapolated, dragged < low, averaged(torque, period, BRAKED_TIME))
+    return Torque(time, torque, extrapolated, dragged < low)
+
+
+def _by_map(model: TorqueModel, reading: Floats, engine_speed: Floats) -> Floats:
+    """Torque that a reading stands for (n,) [N m]; engine speed is asked for where it tells."""
+    straight = len(model.coefficients) <= 2 and not model.curvature and not model.knots
+    known = np.zeros_like(reading) if straight else engine_speed
+    torque = rows_of(model, reading, known) @ parameters(model)
+    return np.asarray(np.where(np.isfinite(known), torque, np.nan))
