@@ -20,6 +20,7 @@ from weighbridge.calibration.regression import (
     TorqueRows,
     at_point,
     build_rows,
+    driven_slope,
     fit,
     join_rows,
 )
@@ -228,7 +229,7 @@ def run_calibration(
         delay = base.timing.torque_delay or 0.0
     rows = rows_at(delay)
     fitted = fit(rows, low, high)
-    _refuse_nonsense(drives, fitted, source)
+    _refuse_nonsense(drives, fitted, rows, source, curved)
     if settings.grid:
         if base.kind != "car" or driveline.single_speed:
             raise ConfigError(
@@ -592,14 +593,17 @@ def _self_weighing(
     return (1.0 + resisted) / (found + resisted), float(np.hypot(std / found, warming))
 
 
-def _refuse_nonsense(drives: Sequence[Drive], fitted: TorqueFit, source: TorqueSource) -> None:
+def _refuse_nonsense(
+    drives: Sequence[Drive], fitted: TorqueFit, rows: TorqueRows, source: TorqueSource, curved: bool
+) -> None:
     """Raise where torque does not rise with its source: nothing can be weighed by it."""
-    slope, std = fitted.coefficients[1], float(np.sqrt(fitted.cov[1, 1]))
+    slope, std = driven_slope(fitted, rows, curved=curved)
     if not slope > 3.0 * std:
         raise DriveError(
             f"{', '.join(drive.name for drive in drives)}: torque does not rise with its source "
-            f"{SIGNALS[source][0]} ({slope:.3g} ± {std:.2g}); check the signal, its unit and the "
-            "known mass, or calibrate with another --torque"
+            f"{SIGNALS[source][0]} ({slope:.3g} ± {std:.2g} N m per unit at the loads and engine "
+            "speeds driven); check the signal, its unit and the known mass, or calibrate with "
+            "another --torque"
         )
 
 
