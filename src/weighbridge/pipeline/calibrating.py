@@ -30,7 +30,7 @@ from weighbridge.estimators.rls import block_jackknife, regression
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
-from weighbridge.pipeline.joint_calibrating import BalanceAt, JointProblem, refine
+from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, refine
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.class_values import road_prior
@@ -627,7 +627,7 @@ def _notes(fitted: TorqueFit, free: Bools, samples: int, delay_found: bool) -> s
     if samples < FEW_SAMPLES:
         notes.append(f"made from {samples} samples only; drive longer")
     if not delay_found:
-        notes.append("the drives do not show how late the torque is")
+        notes.append(NOT_TOLD)
     return "; ".join(notes) or None
 
 

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.delay import vertex
+from weighbridge.balance.delay import FARTHEST as FARTHEST_DELAY
+from weighbridge.balance.delay import beyond, vertex
 from weighbridge.balance.force_balance import ForceBalance
 from weighbridge.calibration.inverse import DriveRows, FitSettings, InverseFit, TooShort, fit
 from weighbridge.errors import DriveError
@@ -22,8 +23,15 @@ from weighbridge.vehicle.model import Driveline, Vehicle
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.45)
 """Time constants of the reading's smoothing that are tried [s]."""
 
+LONG_LAGS: Final = (0.65, 0.9, 1.25)
+"""Further ones, where the longest of these fits best [s]."""
+
 DELAYS: Final = tuple(0.2 * k for k in range(-2, 7))
-"""Sums of delay and lag among which the search begins [s]."""
+"""Sums of delay and lag among which the search begins [s]; it goes on beyond an end that fits
+best."""
+
+NOT_TOLD: Final = "the drives do not show how late the torque is"
+"""What is noted where the search for the delay ends at its end."""
 
 USUAL_DELAY: Final = 0.3
 """Sum of delay and lag where the drives do not show it [s]."""
@@ -128,7 +136,7 @@ def refine(
         )
 
     try:
-        delay, lag = _timing(misfits)
+        delay, lag, told = _timing(misfits)
         found = fit(rows_at(delay, lag), settings)
     except TooShort as short:
         return _self_weighed(_as_it_is(vehicle, str(short)), problem, rebalance, None)
@@ -139,14 +147,25 @@ def refine(
             f"{found.road[1]:.3f}, which no {vehicle.kind} has"
         )
         return _self_weighed(_as_it_is(vehicle, why), problem, rebalance, None)
-    return _self_weighed(_with(vehicle, found, delay, lag, problem), problem, rebalance, found.cov)
+    fitted = _with(vehicle, found, delay, lag, problem)
+    if not told:
+        fitted = _noted(fitted, NOT_TOLD)
+    return _self_weighed(fitted, problem, rebalance, found.cov)
 
 
 def _as_it_is(vehicle: Vehicle, why: str) -> Vehicle:
     """Keep the torque of eq. 48, to be scaled alone."""
-    made = vehicle.provenance
-    notes = "; ".join(note for note in (made.notes, f"scaled, not fitted anew: {why}") if note)
-    return replace(vehicle, provenance=replace(made, method="joint", notes=notes))
+    made = replace(vehicle, provenance=replace(vehicle.provenance, method="joint"))
+    return _noted(made, f"scaled, not fitted anew: {why}")
+
+
+def _noted(vehicle: Vehicle, note: str) -> Vehicle:
+    """Add a note for readers of the vehicle file, once."""
+    notes = vehicle.provenance.notes
+    if notes is not None and note in notes:
+        return vehicle
+    notes = f"{notes}; {note}" if notes else note
+    return replace(vehicle, provenance=replace(vehicle.provenance, notes=notes))
 
 
 def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
@@ -161,28 +180,45 @@ def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
     return mean, std
 
 
-def _timing(misfits: Callable[[Sequence[tuple[float, float]]], Floats]) -> tuple[float, float]:
+def _timing(
+    misfits: Callable[[Sequence[tuple[float, float]]], Floats],
+) -> tuple[float, float, bool]:
     """Find delay and lag of least misfit: their sum first, then both, then the delay finely.
 
     Parameters
     ----------
     misfits : of pairs of delay and lag [s], all by the same rows
+
+    Returns
+    -------
+    delay, lag : [s]
+    told : whether the drives show them
     """
     middle = LAGS[len(LAGS) // 2]
-    pairs = [(total - middle, middle) for total in DELAYS]
-    scores = misfits(pairs)
+    totals = np.array(DELAYS)
+    scores = misfits([(float(t) - middle, middle) for t in totals])
+    while int(np.argmin(scores)) in (0, totals.size - 1):
+        more = beyond(totals, scores, DELAYS[1] - DELAYS[0], FARTHEST_DELAY)
+        if not more.size:
+            break
+        totals = np.sort(np.concatenate([totals, more]))
+        scores = misfits([(float(t) - middle, middle) for t in totals])
     # At the ends both sides have little in common, and little to disagree about.
-    lowest = [
-        k for k in range(1, len(DELAYS) - 1) if scores[k] <= min(scores[k - 1], scores[k + 1])
-    ]
-    total = DELAYS[min(lowest, key=lambda k: scores[k])] if lowest else USUAL_DELAY
-    pairs = [(total - lag + shift, lag) for lag in LAGS for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
-    delay, lag = pairs[int(np.argmin(misfits(pairs)))]
+    lowest = [k for k in range(1, totals.size - 1) if scores[k] <= min(scores[k - 1 : k + 2])]
+    total = float(totals[min(lowest, key=lambda k: scores[k])]) if lowest else USUAL_DELAY
+
+    def near(lags: Sequence[float]) -> tuple[float, float]:
+        pairs = [(total - x + shift, x) for x in lags for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
+        return pairs[int(np.argmin(misfits(pairs)))]
+
+    delay, lag = near(LAGS)
+    if lag == LAGS[-1]:
+        delay, lag = near((LAGS[-1], *LONG_LAGS))
     delays = np.asarray(delay + 0.03 * np.arange(-4, 5), dtype=np.float64)
     scores = misfits([(float(d), lag) for d in delays])
     best = int(np.clip(np.argmin(scores), 1, delays.size - 2))
-    near = slice(best - 1, best + 2)
-    return vertex(delays[near], scores[near]), lag
+    around = slice(best - 1, best + 2)
+    return vertex(delays[around], scores[around]), lag, bool(lowest)
 
 
 def _with(
