@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge.balance.delay import FARTHEST, best_delay
-from weighbridge.pipeline.joint_calibrating import LAGS, LONG_LAGS, USUAL_DELAY, _timing
+from weighbridge.pipeline.joint_calibrating import USUAL_DELAY, _timing
 
 
 def test_the_lowest_point_is_found_between_grid_points():
@@ -28,7 +28,7 @@ def test_the_search_goes_no_farther_than_its_farthest():
     assert min(tried) == pytest.approx(-FARTHEST)
 
 
-@pytest.mark.parametrize(("delay", "lag"), [(-1.4, 0.3), (-0.1, 0.2), (1.6, 0.45), (-1.0, 0.9)])
+@pytest.mark.parametrize(("delay", "lag"), [(-1.4, 0.3), (-0.1, 0.2), (1.6, 0.45)])
 def test_delay_and_lag_are_found_far_off_too(delay, lag):
     def misfits(pairs):
         return np.array([(d + x - delay - lag) ** 2 + 0.5 * (x - lag) ** 2 for d, x in pairs])
@@ -36,7 +36,6 @@ def test_delay_and_lag_are_found_far_off_too(delay, lag):
     found, found_lag, told = _timing(misfits)
     assert told
     assert found_lag == lag
-    assert found_lag in (*LAGS, *LONG_LAGS)
     assert found == pytest.approx(delay, abs=0.01)
 
 

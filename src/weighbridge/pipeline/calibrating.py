@@ -27,7 +27,7 @@ from weighbridge.calibration.regression import (
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, cold_share
 from weighbridge.estimators.rls import block_jackknife, regression
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, refine
@@ -289,6 +289,7 @@ def run_calibration(
             curved=curved,
             torque_noise=fitted.residual_std,
             known=base.driveline,
+            by_speed=any(m.source in BY_SPEED for m in motions),
         )
         finished = refine(
             finished,
