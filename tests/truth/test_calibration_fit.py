@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 from weighbridge.calibration.grid import TABLE_5, grid_search
-from weighbridge.calibration.regression import BOUNDS, TorqueRows, fit
+from weighbridge.calibration.regression import BOUNDS, TorqueRows, driven_slope, fit
 
 TORQUE = np.array([-15.0, 900.0, 0.03])
 ROAD = np.array([0.62, 0.0093, 0.17, 5.0])
@@ -103,3 +103,26 @@ def test_huber_optimum_agrees_with_a_general_minimiser():
     scale = np.maximum(np.abs(start), 1e-3)
     better = minimize(lambda z: loss(z * scale), start / scale, method="Powell")
     assert loss(start) <= better.fun * (1.0 + 1e-6)
+
+
+def test_slope_of_the_torque_is_told_where_the_engine_was_driven():
+    rng = np.random.default_rng(7)
+    made = rows(rng, noise=8.0)
+    engine = made.design[:, 2]
+    # Full load torque grows with engine speed: at zero load and zero speed the map is flat.
+    lean, bend = 0.55, 20.0
+    torque = made.target - made.design[:, 3:] @ ROAD - TORQUE[0] - TORQUE[2] * engine
+    load = 2.0 * torque / (lean * engine + np.sqrt((lean * engine) ** 2 + 4.0 * bend * torque))
+    load = load + rng.normal(0.0, 0.02, load.size)
+    columns = [np.ones_like(load), load, engine, load * engine, load**2]
+    curved = TorqueRows(
+        design=np.column_stack([*columns, made.design[:, 3:]]), target=made.target, time=made.time
+    )
+    found = fit(curved, *BOUNDS["car"])
+    alone, std_alone = found.coefficients[1], np.sqrt(found.cov[1, 1])
+    assert alone < 3.0 * std_alone
+    slope, std = driven_slope(found, curved, curved=True)
+    assert slope > 30.0 * std
+    assert slope == pytest.approx(np.mean(lean * engine + 2.0 * bend * load), rel=0.1)
+    straight = fit(made, *BOUNDS["car"])
+    assert driven_slope(straight, made, curved=False)[0] == pytest.approx(TORQUE[1], rel=0.02)

@@ -4,9 +4,15 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
-from weighbridge.signals.cleaning import clean_clock, clean_columns, clean_signal, rising
+from weighbridge.signals.cleaning import (
+    clean_clock,
+    clean_columns,
+    clean_signal,
+    rising,
+    spread_rows,
+)
 
 
 def test_clean_table_shares_its_arrays():
@@ -31,6 +37,49 @@ def test_repeated_stamp_keeps_the_first_row():
     clock = clean_clock(np.array([0.0, 1.0, 1.0, 2.0]), "obd.csv")
     assert_array_equal(clock.keep, [True, True, False, True])
     assert "1 of 4 time stamps repeat" in clock.problems[0].text
+
+
+def test_rows_of_whole_seconds_are_spread_over_the_second():
+    true = 100.5 + 0.25 * np.arange(400)
+    speed = np.sin(0.1 * true)
+    signals, problems = clean_columns(np.floor(true), [("vehicle_speed", speed)], "obd.csv")
+    assert len(signals[0]) == 400
+    assert_allclose(signals[0].time, true, atol=1e-9)
+    assert_array_equal(signals[0].values, speed)
+    assert [p.text for p in problems] == [
+        "obd.csv: time stamps come in steps of 1 s and several rows share one; "
+        "they were spread evenly over the step"
+    ]
+
+
+def test_rows_that_come_unevenly_stay_in_their_second():
+    rng = np.random.default_rng(4)
+    true = np.cumsum(rng.uniform(0.1, 0.5, 300))
+    true = true[(true < 30.0) | (true > 47.0)]
+    spread, step = spread_rows(np.floor(true))
+    assert step == 1.0
+    assert (np.diff(spread) > 0.0).all()
+    assert_array_equal(np.floor(spread), np.floor(true))
+    assert float(np.abs(spread - true).max()) < 0.5
+    assert float(np.std(spread - true)) < 0.15
+
+
+def test_a_few_repeated_rows_are_no_coarse_clock():
+    time = np.sort(np.concatenate([np.arange(100.0), np.arange(0.0, 100.0, 10.0)]))
+    assert spread_rows(time) is None
+    assert len(clean_signal("vehicle_speed", time, np.ones(110), "obd.csv")[0]) == 100
+
+
+def test_values_read_together_one_to_a_row_keep_their_stamp():
+    time = np.repeat(np.arange(0.0, 30.0), 2)
+    first, second = np.tile([1.0, np.nan], 30), np.tile([np.nan, 2.0], 30)
+    signals, problems = clean_columns(
+        time, [("vehicle_speed", first), ("engine_speed", second)], "obd.csv"
+    )
+    assert problems == []
+    assert [s.name for s in signals] == ["vehicle_speed", "engine_speed"]
+    for signal in signals:
+        assert_array_equal(signal.time, np.arange(30.0))
 
 
 def test_one_late_stamp_costs_one_row():

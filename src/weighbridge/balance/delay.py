@@ -13,40 +13,69 @@ from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Vehicle
 
 EARLIEST: Final = -0.4
-"""Torque requested before it acts is early; never by more than this [s]."""
+"""Torque requested before it acts is early; by more than this only where the motion is late [s]."""
 
 LATEST: Final = 1.2
 """Torque polled, smoothed and sent is late; hardly by more than this [s]."""
 
+FARTHEST: Final = 2.4
+"""Where the best lies at an end of the search, it goes on as far as this [s]: a speed of the
+instrument cluster, polled once a second, is behind the load by 1 to 1.5 s."""
+
+FURTHER: Final = 0.8
+"""By how much the search goes on at a time [s]."""
+
 
 def best_delay(
-    misfit: Callable[[float], float], *, start: float = EARLIEST, end: float = LATEST
+    misfit: Callable[[float], float],
+    *,
+    start: float = EARLIEST,
+    end: float = LATEST,
+    farthest: float = FARTHEST,
 ) -> float:
     """Minimise ``misfit`` over the delay: a coarse grid, a fine one, a parabola.
+
+    Where the best of the coarse grid lies at an end, the grid goes on beyond it.
 
     Parameters
     ----------
     misfit : of a delay in s; NaN where it cannot be told
-    start, end : of the search [s]
+    start, end : of the search at first [s]
+    farthest : delay on either side at which it stops [s]
 
     Returns
     -------
     float
-        Delay [s]; NaN where no delay can be told or the best lies at an end.
+        Delay [s]; NaN where no delay can be told or the best lies at the farthest.
     """
     step = 0.1
     grid = np.arange(start, end + 0.5 * step, step)
-    for _ in range(2):
-        scores = np.array([misfit(float(delay)) for delay in grid])
-        if not np.isfinite(scores).all():
+    scores = np.array([misfit(float(delay)) for delay in grid])
+    while np.isfinite(scores).all() and int(np.argmin(scores)) in (0, grid.size - 1):
+        more = beyond(grid, scores, step, farthest)
+        if not more.size:
             return float("nan")
-        best = int(np.argmin(scores))
-        if best in (0, grid.size - 1):
-            return float("nan")
-        centre = vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
-        step = 0.02
-        grid = centre + step * np.arange(-5, 6)
-    return centre
+        grid = np.concatenate([grid, more])
+        scores = np.concatenate([scores, [misfit(float(delay)) for delay in more]])
+        order = np.argsort(grid)
+        grid, scores = grid[order], scores[order]
+    if not np.isfinite(scores).all():
+        return float("nan")
+    best = int(np.argmin(scores))
+    centre = vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
+    fine = np.asarray(centre + 0.02 * np.arange(-5, 6), dtype=np.float64)
+    scores = np.array([misfit(float(delay)) for delay in fine])
+    best = int(np.argmin(scores)) if np.isfinite(scores).all() else 0
+    if best in (0, fine.size - 1):
+        return float("nan")
+    return vertex(fine[best - 1 : best + 2], scores[best - 1 : best + 2])
+
+
+def beyond(grid: Floats, scores: Floats, step: float, farthest: float) -> Floats:
+    """Return the instants to try next beyond the better end of a rising grid [s], if any."""
+    ahead = step * np.arange(1, round(FURTHER / step) + 1)
+    more = grid[-1] + ahead if scores[-1] < scores[0] else grid[0] - ahead
+    return np.asarray(more[np.abs(more) <= farthest + 1e-9])
 
 
 def delay_std(misfit: Callable[[float], float], delay: float, rows: float) -> float:

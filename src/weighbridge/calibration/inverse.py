@@ -7,6 +7,7 @@ averaged over the same windows.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -21,7 +22,6 @@ from weighbridge.estimators.joint import GATE
 from weighbridge.estimators.slow_errors import (
     COLD_TORQUE_STD,
     DISTURBANCE_STD,
-    GRADE_STD,
     RESISTANCE_STD,
     TIME_CONSTANTS,
     WIND_STD,
@@ -49,7 +49,9 @@ class DriveRows:
     engine_speed : [rad/s]
     usable : rows to take
     mass : known, as the drive begins [kg]
-    by_speed : the motion has no accelerometer, so that the grade is a disturbance
+    accel_std : of a mean acceleration over a length of time [s], where it is the slope of a
+        speed [m/s^2]
+    grade_open : what of the grade nothing has measured, a disturbance [rad]
     """
 
     view: MergedView
@@ -57,7 +59,8 @@ class DriveRows:
     engine_speed: Floats
     usable: Bools
     mass: float
-    by_speed: bool
+    grade_open: float
+    accel_std: Callable[[float], float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,7 +205,9 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
             "more starts and in all gears"
         )
     scale = _torque_per_reading(drives)
-    readings = [d.regressor for d in drives]
+    # The first round is straight: a reading on both sides would explain itself, and where the
+    # motion is noisy the motion would explain nothing.
+    readings = [np.zeros_like(d.regressor) for d in drives]
     for _ in range(settings.rounds):
         state, readings = _solve(drives, cuts, readings, scale, settings)
     return _unpack(state, scale, _extra(settings), total)
@@ -238,7 +243,7 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
     one = np.ones_like(gearing)
     mass = d.mass - view.fuel_burnt
     columns = [
-        mass * (view.accel if d.by_speed else view.specific_force),
+        mass * view.specific_force,
         view.dynamic_pressure,
         mass * GRAVITY * np.cos(view.grade),
         gearing**2 * view.accel,
@@ -274,7 +279,9 @@ def _solve(
         clock = float(times[-1][-1]) + 1e5
         rows.append(cut.mean(columns))
         targets.append(cut.mean(scale * gearing * np.nan_to_num(d.regressor)))
-        variances.append(noise_variance(d.view, cut, settings.torque_noise, mass))
+        variances.append(
+            noise_variance(d.view, cut, settings.torque_noise, mass, d.accel_std(settings.window))
+        )
         parts.append(columns)
     stacked = np.ascontiguousarray(np.vstack(rows))
     extra = _extra(settings)
@@ -284,7 +291,7 @@ def _solve(
     )
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
     terms = settings.bounds.covariance(settings, torque, torque / scale)
-    grade = GRAVITY * GRADE_STD if any(d.by_speed for d in drives) else 0.0
+    grade = GRAVITY * max(d.grade_open for d in drives)
     fading = np.array(
         [
             mass * float(np.hypot(DISTURBANCE_STD, grade)),

@@ -214,6 +214,34 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
     )
 
 
+def driven_slope(fitted: TorqueFit, rows: TorqueRows, *, curved: bool) -> tuple[float, float]:
+    """Slope of the torque over its source, mean of the loads and engine speeds driven.
+
+    The coefficient of the source alone is the slope at zero load and zero engine speed,
+    where no engine runs.
+
+    Parameters
+    ----------
+    fitted, rows
+    curved : the slope changes with engine speed and load
+
+    Returns
+    -------
+    slope : [N m per unit of the source]
+    std : its standard deviation
+    """
+    slope = np.zeros(fitted.coefficients.size)
+    slope[1] = 1.0
+    if curved:
+        source = rows.design[:, 1]
+        there = source != 0.0
+        engine_speed = rows.design[there, slope.size - 2] / source[there]
+        slope[-2] = float(np.average(engine_speed, weights=fitted.weight[there]))
+        slope[-1] = 2.0 * float(np.average(source, weights=fitted.weight))
+    cov = fitted.cov[: slope.size, : slope.size]
+    return float(slope @ fitted.coefficients), float(np.sqrt(slope @ cov @ slope))
+
+
 def at_point(rows: TorqueRows, fitted: TorqueFit, coefficients: Floats, road: Floats) -> TorqueFit:
     """Return a fit of the same rows and weights at other parameters, such as a grid's."""
     residual = rows.target - rows.design @ np.concatenate([coefficients, road])

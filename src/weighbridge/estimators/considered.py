@@ -28,8 +28,8 @@ def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Float
 
     Returns
     -------
-    (n, p + 4) for the torque coefficients, their curvature, slopes at the knots, C_d A, C_r, I_e, I_w, as
-    `weighbridge.vehicle.model.Provenance.fit_cov` has them
+    (n, p + 4) for the torque coefficients, their curvature, slopes at the knots, C_d A, C_r,
+    I_e, I_w, as `weighbridge.vehicle.model.Provenance.fit_cov` has them
     """
     view, model, line = balance.merged, vehicle.torque, vehicle.driveline
     gearing = np.nan_to_num(view.gearing)

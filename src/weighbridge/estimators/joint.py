@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.averaging import Windows, windows
+from weighbridge.balance.averaging import WINDOW, Windows, windows
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.estimators.confounded import inertia_relative_std
 from weighbridge.estimators.considered import force_columns, open_std, sensitivity
@@ -35,7 +35,7 @@ from weighbridge.estimators.slow_errors import (
 from weighbridge.estimators.squat import lean
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.kernels import disturbance, load_change
-from weighbridge.navigation.motion import BY_SPEED, MotionSource
+from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.fuel import FUEL_STD
@@ -205,9 +205,8 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     drive can improve are considered, not estimated: Schmidt, 1966.
     """
     view = balance.merged
-    by_speed = balance.motion.source in BY_SPEED
     body = lean(balance, vehicle)
-    rows, y = design(view, vehicle, by_speed=by_speed, leaned=body.leaned(view.accel))
+    rows, y = design(view, vehicle, leaned=body.leaned(view.accel))
     usable = usable_rows(view, rows, y)
     cut = windows(view.time, usable)
     reason = view.reason.copy()
@@ -325,8 +324,10 @@ def _sizes(
     torque = float(np.percentile(np.abs(balance.force.torque[cut.index]), 98.0))
     noise = vehicle.torque.noise or 0.03 * torque
     return {
-        "variance": noise_variance(balance.merged, cut, noise, guess),
-        "std": prior_std(vehicle, guess, torque, by_speed=balance.motion.source in BY_SPEED),
+        "variance": noise_variance(
+            balance.merged, cut, noise, guess, balance.motion.mean_accel_std(WINDOW)
+        ),
+        "std": prior_std(vehicle, guess, torque, grade_open=balance.motion.grade_open),
     }
 
 

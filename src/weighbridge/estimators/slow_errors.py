@@ -30,9 +30,6 @@ hour, mean wind ten minutes; how cold a drive began stays the same all along."""
 DISTURBANCE_STD: Final = 0.04
 """Standard deviation of the disturbance before the drive has told, over mass [m/s^2]."""
 
-GRADE_STD: Final = 0.02
-"""Standard deviation of the grade of roads, where nothing measures it [-]."""
-
 RESISTANCE_STD: Final = 0.017
 """Of the slow resistance, over mass [m/s^2]: a fifth of the rolling resistance of a car."""
 
@@ -144,7 +141,7 @@ def coldness(view: MergedView) -> Floats:
 
 
 def design(
-    view: MergedView, vehicle: Vehicle, *, by_speed: bool = False, leaned: Floats | None = None
+    view: MergedView, vehicle: Vehicle, *, leaned: Floats | None = None
 ) -> tuple[Floats, Floats]:
     """Rows of the model ``y = phi m + d + c + wind + cold torque + drag``.
 
@@ -154,8 +151,6 @@ def design(
     Parameters
     ----------
     view, vehicle
-    by_speed : no accelerometer saw the grade, so that it is a disturbance: heights are too
-        rough to multiply the mass
     leaned : (n,) what the lean of the accelerometer adds to the specific force [m/s^2]
 
     Returns
@@ -166,8 +161,6 @@ def design(
         would have weighed [N]
     """
     phi, y = regression(view, vehicle)
-    if by_speed:
-        phi = phi - view.specific_force + view.accel
     if leaned is not None:
         phi = phi - leaned
     slope = view.air_density * vehicle.road_load.drag_area * view.speed
@@ -190,10 +183,15 @@ def usable_rows(view: MergedView, rows: Floats, y: Floats) -> Bools:
     return np.asarray(view.usable & np.isfinite(y) & np.isfinite(rows).all(axis=1))
 
 
-def noise_variance(view: MergedView, cut: Windows, torque_noise: float, mass: float) -> Floats:
-    """Variance of the fast noise of each window's mean force [N^2], both sides."""
+def noise_variance(
+    view: MergedView, cut: Windows, torque_noise: float, mass: float, accel_std: float = 0.0
+) -> Floats:
+    """Variance of the fast noise of each window's mean force [N^2], both sides.
+
+    ``accel_std`` is that of a window's mean acceleration where it is the slope of a speed [m/s^2].
+    """
     torque = cut.mean((torque_noise * np.nan_to_num(view.gearing)) ** 2)
-    return np.asarray(torque / cut.count + mass**2 * motion_variance(cut))
+    return np.asarray(torque / cut.count + mass**2 * (motion_variance(cut) + accel_std**2))
 
 
 def motion_variance(cut: Windows) -> Floats:
@@ -201,7 +199,7 @@ def motion_variance(cut: Windows) -> Floats:
     return np.asarray(MOTION_STD**2 / cut.count + MOTION_WINDOW_STD**2)
 
 
-def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = False) -> Floats:
+def prior_std(vehicle: Vehicle, mass: float, torque: float, *, grade_open: float = 0.0) -> Floats:
     """Standard deviations (7,), (9,) or (11,) of the states before the drive has told.
 
     Parameters
@@ -210,7 +208,7 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = 
         deviations say; where there are none and it was not calibrated, as those of its class
     mass : rough [kg]; its own standard deviation is as large
     torque : highest of the drive [N m]
-    by_speed : the disturbance has to take the grade as well
+    grade_open : what of the grade nothing has measured; the disturbance takes it [rad]
     """
     load = vehicle.road_load
     drag, rolling = load.drag_area_std, load.rolling_coefficient_std
@@ -218,7 +216,7 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, by_speed: bool = 
         _, std = road_prior(vehicle.kind, single_speed=vehicle.driveline.single_speed)
         drag = float(std[0]) if drag is None else drag
         rolling = float(std[1]) if rolling is None else rolling
-    grade = GRAVITY * GRADE_STD if by_speed else 0.0
+    grade = GRAVITY * grade_open
     resistance = float(np.hypot(RESISTANCE_STD, GRAVITY * (rolling or 0.0)))
     states = [
         mass,

@@ -14,7 +14,7 @@ MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
 
 BY_SPEED: Final = frozenset({"speed_grade", "speed"})
 """Motion without an accelerometer: its acceleration is the slope of speed, its grade that of
-heights, or none."""
+heights, or none; both are conditional means."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +50,8 @@ class Motion:
     squat_std : its standard deviation
     mounting : (roll, pitch, yaw) of the sensor found or used [rad]
     mounting_std : their standard deviations [rad]
+    speed_std : of ``speed`` where ``accel`` is its slope, as a smoother knows it; 0 where an
+        accelerometer gave ``accel`` [m/s]
     notes : sentences on what was found and what was doubtful
     """
 
@@ -76,12 +78,24 @@ class Motion:
     squat_std: float | None = None
     mounting: tuple[float, float, float] | None = None
     mounting_std: tuple[float, float, float] | None = None
+    speed_std: float = 0.0
     notes: tuple[str, ...] = ()
 
     @property
     def rate(self) -> float:
         """Samples per second [Hz]."""
         return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
+
+    @property
+    def grade_open(self) -> float:
+        """What of the grade nothing has measured, as a standard deviation [rad]."""
+        if self.source not in BY_SPEED or not self.valid.any():
+            return 0.0
+        return float(np.sqrt(np.mean(self.grade_std[self.valid] ** 2)))
+
+    def mean_accel_std(self, length: float) -> float:
+        """Standard deviation of the mean acceleration over ``length`` [s] by its ends [m/s^2]."""
+        return float(min(np.sqrt(2.0) * self.speed_std / length, self.specific_force_std or 0.0))
 
 
 def with_squat(motion: Motion, squat: float, std: float) -> Motion:

@@ -5,26 +5,27 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
-from weighbridge.navigation.longitudinal import LONGEST_GAP, lowpass, resample
+from weighbridge.navigation.longitudinal import LONGEST_GAP, resample
 from weighbridge.navigation.motion import Motion, MotionSource
+from weighbridge.navigation.smoothing import GRADE_STD, smooth_grade, smooth_height, smooth_speed
 from weighbridge.signals import Drive, Floats
 
 SHORTEST: Final = 20.0
 """A shorter drive is not worth a look [s]."""
 
-GRADE_DISTANCE: Final = 60.0
-"""Distance over which height is smoothed into grade [m]."""
+SHORTEST_WAY: Final = 120.0
+"""A shorter way shows no grade by its heights [m]."""
 
 
 def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
-    """Find the motion from speed: acceleration by differentiation.
+    """Find the motion from speed: acceleration as its smoothed rate of change.
 
     Grade comes from a grade signal, else from height over distance, else the
-    road is taken as level and the notes say so.
+    road is taken as level and the notes say so. Acceleration and grade are
+    conditional means, see `weighbridge.navigation.smoothing`.
 
     Parameters
     ----------
@@ -50,17 +51,10 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
             f"{drive.name}: only {end - start:.0f} s of speed; at least {SHORTEST:.0f} s are needed"
         )
     valid = speed.age(time) < max(LONGEST_GAP, 2.5 * speed.period)
-    # A quadratic over two seconds, or three samples where they are rarer,
-    # rides over the steps of a speed in whole km/h.
-    window = 2 * int(max(1.0, 1.5 * speed.period) * rate) + 1
-    raw = resample(speed, time)
-    v = np.asarray(savgol_filter(raw, window, 2))
-    accel = np.asarray(savgol_filter(raw, window, 2, deriv=1, delta=1.0 / rate))
+    v, accel, speed_std, accel_std = smooth_speed(speed, time)
     distance = np.cumsum(np.where(valid, v, 0.0)) / rate
-    grade, height, source, notes = _grade(drive, time, v, distance, rate)
+    grade, grade_std, height, source, notes = _grade(drive, time, distance)
     nowhere = np.full(time.size, np.nan)
-    step = np.diff(np.unique(speed.values))
-    quantum = float(step.min()) if step.size else 0.0
     return Motion(
         source=source,
         time=time,
@@ -76,24 +70,26 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
         latitude=nowhere,
         longitude=nowhere,
         valid=valid,
-        specific_force_std=max(0.29 * quantum, 0.02) * rate / window,
-        grade_std=np.full(time.size, 0.02),
+        specific_force_std=float(np.median(accel_std)),
+        grade_std=grade_std,
+        speed_std=float(np.median(speed_std)),
         notes=notes,
     )  # fmt: skip
 
 
 def _grade(
-    drive: Drive, time: Floats, speed: Floats, distance: Floats, rate: float
-) -> tuple[Floats, Floats | None, MotionSource, tuple[str, ...]]:
+    drive: Drive, time: Floats, distance: Floats
+) -> tuple[Floats, Floats, Floats | None, MotionSource, tuple[str, ...]]:
+    """Find grade, its standard deviation, and height where there is one."""
     measured, altitude = drive.get("grade"), drive.get("altitude")
-    height = resample(altitude, time) if altitude is not None and len(altitude) > 1 else None
+    known = altitude is not None and np.count_nonzero(altitude.age(time[::10]) < 5.0) > 1
+    height = resample(altitude, time) if altitude is not None and known else None
     if measured is not None and len(measured) > 1:
-        return resample(measured, time), height, "speed_grade", ()
-    if height is None or distance[-1] < 2.0 * GRADE_DISTANCE:
+        grade, std = smooth_grade(measured, time, distance)
+        return grade, std, height, "speed_grade", ()
+    if altitude is None or height is None or distance[-1] < SHORTEST_WAY:
         note = "no grade and no altitude: the road is taken as level"
-        return np.zeros(time.size), height, "speed", (note,)
-    even = np.arange(0.0, distance[-1], 5.0)
-    profile = lowpass(np.interp(even, distance, height), 1.0 / 5.0, 0.5 / GRADE_DISTANCE)
-    slope = np.gradient(profile, 5.0)
-    grade = np.arctan(np.clip(np.interp(distance, even, slope), -0.3, 0.3))
-    return grade, height, "speed_grade", ("grade from altitude over distance",)
+        return np.zeros(time.size), np.full(time.size, GRADE_STD), height, "speed", (note,)
+    height, slope, std = smooth_height(altitude, time, distance)
+    grade = np.arcsin(np.clip(slope, -0.3, 0.3))
+    return grade, std, height, "speed_grade", ("grade from altitude over distance",)

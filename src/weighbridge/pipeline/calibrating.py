@@ -21,6 +21,7 @@ from weighbridge.calibration.regression import (
     TorqueRows,
     at_point,
     build_rows,
+    driven_slope,
     fit,
     join_rows,
 )
@@ -28,10 +29,10 @@ from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, cold_share
 from weighbridge.estimators.rls import block_jackknife, regression
 from weighbridge.estimators.squat import pooled
-from weighbridge.navigation.motion import Motion, with_squat
+from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
-from weighbridge.pipeline.joint_calibrating import BalanceAt, JointProblem, refine
+from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, refine
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.class_values import road_prior
@@ -230,7 +231,7 @@ def run_calibration(
         delay = base.timing.torque_delay or 0.0
     rows = rows_at(delay)
     fitted = fit(rows, low, high)
-    _refuse_nonsense(drives, fitted, source)
+    _refuse_nonsense(drives, fitted, rows, source, curved)
     if settings.grid:
         if base.kind != "car" or driveline.single_speed:
             raise ConfigError(
@@ -291,6 +292,7 @@ def run_calibration(
             knots=() if driveline.single_speed else _knots(drives, motions, draft, source, delay),
             torque_noise=fitted.residual_std,
             known=base.driveline,
+            by_speed=any(m.source in BY_SPEED for m in motions),
         )
         finished = refine(
             finished,
@@ -622,14 +624,17 @@ def _self_weighing(
     return (1.0 + resisted) / (found + resisted), float(np.hypot(std / found, warming))
 
 
-def _refuse_nonsense(drives: Sequence[Drive], fitted: TorqueFit, source: TorqueSource) -> None:
+def _refuse_nonsense(
+    drives: Sequence[Drive], fitted: TorqueFit, rows: TorqueRows, source: TorqueSource, curved: bool
+) -> None:
     """Raise where torque does not rise with its source: nothing can be weighed by it."""
-    slope, std = fitted.coefficients[1], float(np.sqrt(fitted.cov[1, 1]))
+    slope, std = driven_slope(fitted, rows, curved=curved)
     if not slope > 3.0 * std:
         raise DriveError(
             f"{', '.join(drive.name for drive in drives)}: torque does not rise with its source "
-            f"{SIGNALS[source][0]} ({slope:.3g} ± {std:.2g}); check the signal, its unit and the "
-            "known mass, or calibrate with another --torque"
+            f"{SIGNALS[source][0]} ({slope:.3g} ± {std:.2g} N m per unit at the loads and engine "
+            "speeds driven); check the signal, its unit and the known mass, or calibrate with "
+            "another --torque"
         )
 
 
@@ -653,7 +658,7 @@ def _notes(fitted: TorqueFit, free: Bools, samples: int, delay_found: bool) -> s
     if samples < FEW_SAMPLES:
         notes.append(f"made from {samples} samples only; drive longer")
     if not delay_found:
-        notes.append("the drives do not show how late the torque is")
+        notes.append(NOT_TOLD)
     return "; ".join(notes) or None
 
 

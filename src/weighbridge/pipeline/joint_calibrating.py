@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.delay import vertex
+from weighbridge.balance.delay import FARTHEST as FARTHEST_DELAY
+from weighbridge.balance.delay import beyond, vertex
 from weighbridge.balance.force_balance import ForceBalance
 from weighbridge.calibration.inverse import (
     DriveRows,
@@ -17,21 +18,25 @@ from weighbridge.calibration.inverse import (
     TooShort,
     TorquePrior,
     fit,
-    knots_between,
 )
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.considered import pinned, triangle
-from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import Driveline, TorqueSource, Vehicle
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.45)
-"""Time constants of the reading's smoothing that are tried [s]."""
+"""Time constants of the reading's smoothing that are tried [s]. Longer ones pass for the
+smoothness of a polled speed: with up to 1.25 s, 2 Hz without an accelerometer went from 3 to
+13 % RMS."""
 
 DELAYS: Final = tuple(0.2 * k for k in range(-2, 7))
-"""Sums of delay and lag among which the search begins [s]."""
+"""Sums of delay and lag among which the search begins [s]; it goes on beyond an end that fits
+best."""
+
+NOT_TOLD: Final = "the drives do not show how late the torque is"
+"""What is noted where the search for the delay ends at its end."""
 
 USUAL_DELAY: Final = 0.3
 """Sum of delay and lag where the drives do not show it [s]."""
@@ -75,6 +80,7 @@ class JointProblem:
     knots : engine speeds of its smooth correction [rad/s]
     torque_noise : of one reading [N m]
     known : driveline of the vehicle file given to the calibration
+    by_speed : a drive has no accelerometer
     """
 
     balance_at: BalanceAt
@@ -84,6 +90,7 @@ class JointProblem:
     knots: tuple[float, ...]
     torque_noise: float
     known: Driveline
+    by_speed: bool = False
 
 
 def refine(
@@ -128,7 +135,8 @@ def refine(
                     engine_speed=balance.force.engine_speed,
                     usable=usable,
                     mass=mass,
-                    by_speed=balance.motion.source in BY_SPEED,
+                    grade_open=balance.motion.grade_open,
+                    accel_std=balance.motion.mean_accel_std,
                 )
             )
         return found
@@ -150,7 +158,7 @@ def refine(
         )
 
     try:
-        delay, lag = _timing(misfits)
+        delay, lag, told = _timing(misfits)
         found = fit(rows_at(delay, lag), settings)
     except TooShort as short:
         return _self_weighed(_as_it_is(vehicle, str(short)), problem, rebalance, None)
@@ -160,15 +168,33 @@ def refine(
             f"the drives make its drag area {found.road[0]:.1f} m^2 and its rolling coefficient "
             f"{found.road[1]:.3f}, which no {vehicle.kind} has"
         )
+        if problem.by_speed:
+            # The torque of eq. 48 is worse still: noise of the motion and hills draw it.
+            raise DriveError(
+                f"without an accelerometer {why}: hills and braking pass for resistance; calibrate "
+                "with an inertial sensor or GNSS heights, on more or longer drives, or with a "
+                "brake switch"
+            )
         return _self_weighed(_as_it_is(vehicle, why), problem, rebalance, None)
-    return _self_weighed(_with(vehicle, found, delay, lag, problem), problem, rebalance, found.cov)
+    fitted = _with(vehicle, found, delay, lag, problem)
+    if not told:
+        fitted = _noted(fitted, NOT_TOLD)
+    return _self_weighed(fitted, problem, rebalance, found.cov)
 
 
 def _as_it_is(vehicle: Vehicle, why: str) -> Vehicle:
     """Keep the torque of eq. 48, to be scaled alone."""
-    made = vehicle.provenance
-    notes = "; ".join(note for note in (made.notes, f"scaled, not fitted anew: {why}") if note)
-    return replace(vehicle, provenance=replace(made, method="joint", notes=notes))
+    made = replace(vehicle, provenance=replace(vehicle.provenance, method="joint"))
+    return _noted(made, f"scaled, not fitted anew: {why}")
+
+
+def _noted(vehicle: Vehicle, note: str) -> Vehicle:
+    """Add a note for readers of the vehicle file, once."""
+    notes = vehicle.provenance.notes
+    if notes is not None and note in notes:
+        return vehicle
+    notes = f"{notes}; {note}" if notes else note
+    return replace(vehicle, provenance=replace(vehicle.provenance, notes=notes))
 
 
 def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
@@ -183,28 +209,40 @@ def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
     return mean, std
 
 
-def _timing(misfits: Callable[[Sequence[tuple[float, float]]], Floats]) -> tuple[float, float]:
+def _timing(
+    misfits: Callable[[Sequence[tuple[float, float]]], Floats],
+) -> tuple[float, float, bool]:
     """Find delay and lag of least misfit: their sum first, then both, then the delay finely.
 
     Parameters
     ----------
     misfits : of pairs of delay and lag [s], all by the same rows
+
+    Returns
+    -------
+    delay, lag : [s]
+    told : whether the drives show them
     """
     middle = LAGS[len(LAGS) // 2]
-    pairs = [(total - middle, middle) for total in DELAYS]
-    scores = misfits(pairs)
+    totals = np.array(DELAYS)
+    scores = misfits([(float(t) - middle, middle) for t in totals])
+    while int(np.argmin(scores)) in (0, totals.size - 1):
+        more = beyond(totals, scores, DELAYS[1] - DELAYS[0], FARTHEST_DELAY)
+        if not more.size:
+            break
+        totals = np.sort(np.concatenate([totals, more]))
+        scores = misfits([(float(t) - middle, middle) for t in totals])
     # At the ends both sides have little in common, and little to disagree about.
-    lowest = [
-        k for k in range(1, len(DELAYS) - 1) if scores[k] <= min(scores[k - 1], scores[k + 1])
-    ]
-    total = DELAYS[min(lowest, key=lambda k: scores[k])] if lowest else USUAL_DELAY
-    pairs = [(total - lag + shift, lag) for lag in LAGS for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
+    lowest = [k for k in range(1, totals.size - 1) if scores[k] <= min(scores[k - 1 : k + 2])]
+    total = float(totals[min(lowest, key=lambda k: scores[k])]) if lowest else USUAL_DELAY
+
+    pairs = [(total - x + shift, x) for x in LAGS for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
     delay, lag = pairs[int(np.argmin(misfits(pairs)))]
     delays = np.asarray(delay + 0.03 * np.arange(-4, 5), dtype=np.float64)
     scores = misfits([(float(d), lag) for d in delays])
     best = int(np.clip(np.argmin(scores), 1, delays.size - 2))
-    near = slice(best - 1, best + 2)
-    return vertex(delays[near], scores[near]), lag
+    around = slice(best - 1, best + 2)
+    return vertex(delays[around], scores[around]), lag, bool(lowest)
 
 
 def _with(

@@ -7,11 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from weighbridge.signals.drive import Problem
 from weighbridge.signals.signal import Bools, Floats, Signal
+
+COARSE: Final = 0.05
+"""Stamps in steps below this are as fine as a drive needs [s]."""
+
+SHARED: Final = 0.25
+"""Part of the rows with the stamp of the row before, from which the clock is coarse and the
+stamps are no mistake [-]."""
+
+FEWEST_ROWS: Final = 20
+"""Fewer rows do not tell a coarse clock from repeated rows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +119,59 @@ def clean_clock(time: Floats, source: str) -> Clock:
     return Clock(time[keep], keep, tuple(problems))
 
 
+def spread_rows(time: Floats) -> tuple[Floats, float] | None:
+    """Spread rows that share the stamp of a coarse clock evenly over its step.
+
+    A logger that writes several rows a second and stamps them in whole seconds gives each
+    row the second it was written in. The rows of the first stamp are the last of their
+    step, where they are fewer than usual.
+
+    Parameters
+    ----------
+    time : (n,) as recorded; NaN where missing [s]
+
+    Returns
+    -------
+    time : (n,) [s]
+    step : of the clock [s]
+
+    None where the clock is not coarse.
+    """
+    places = np.flatnonzero(np.isfinite(time))
+    present = time[places]
+    steps = np.diff(present)
+    ahead = steps[steps > 0.0]
+    if present.size < FEWEST_ROWS or ahead.size < 2:
+        return None
+    step = float(ahead.min())
+    uneven = np.abs(ahead / step - np.rint(ahead / step)) > 1e-3
+    shared = np.count_nonzero(steps == 0.0)
+    if step < COARSE or uneven.any() or shared < SHARED * present.size:
+        return None
+    starts = np.flatnonzero(np.concatenate(([True], steps != 0.0)))
+    count = np.diff(np.append(starts, present.size))
+    usual = int(np.median(count))
+    rank = np.arange(present.size) - np.repeat(starts, count)
+    rank[: count[0]] += max(usual - int(count[0]), 0)
+    size = np.maximum(
+        count, np.where(np.isin(np.arange(count.size), (0, count.size - 1)), usual, 1)
+    )
+    spread = time.copy()
+    spread[places] = present + step * rank / np.repeat(size, count)
+    return spread, step
+
+
+def _one_to_a_row(time: Floats, columns: Sequence[tuple[str, Floats]]) -> bool:
+    """Whether stamps repeat only because values read together lie one to a row."""
+    if len(columns) < 2 or not np.any(np.diff(time) == 0.0):
+        return False
+    for _, values in columns:
+        stamps = time[np.isfinite(values)]
+        if stamps.size < 2 or not (np.diff(stamps) > 0.0).all():
+            return False
+    return True
+
+
 def clean_columns(
     time: Floats, columns: Sequence[tuple[str, Floats]], source: str
 ) -> tuple[list[Signal], list[Problem]]:
@@ -126,9 +190,25 @@ def clean_columns(
     signals : those with at least one sample
     problems : what was left out
     """
-    clock = clean_clock(time, source)
-    problems = list(clock.problems)
     signals: list[Signal] = []
+    if _one_to_a_row(time, columns):
+        for name, raw in columns:
+            there = np.isfinite(raw)
+            signals.append(Signal(name, time[there], raw[there]))
+        return signals, []
+    problems: list[Problem] = []
+    coarse = spread_rows(time)
+    if coarse is not None:
+        time, step = coarse
+        problems.append(
+            Problem(
+                "",
+                f"{source}: time stamps come in steps of {step:g} s and several rows share one; "
+                "they were spread evenly over the step",
+            )
+        )
+    clock = clean_clock(time, source)
+    problems += clock.problems
     mask: Bools | None = None
     masked_time = clock.time
     for name, raw in columns:

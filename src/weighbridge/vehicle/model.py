@@ -412,8 +412,8 @@ class Provenance:
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
     fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
-        triangle, row by row, of torque coefficients, curvature, slopes at the knots, drag area, rolling
-        coefficient, engine and wheel inertia; empty where it is not known
+        triangle, row by row, of torque coefficients, curvature, slopes at the knots, drag area,
+        rolling coefficient, engine and wheel inertia; empty where it is not known
     notes : free text
     """
 

@@ -1,0 +1,156 @@
+"""Kalman filter and fixed-interval smoother of a linear model with scalar measurements."""
+
+import numpy as np
+
+from weighbridge.kernels._jit import kernel
+
+
+@kernel
+def _product(a, b, out):
+    """Matrix product of small matrices, without a call of a library."""
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            total = 0.0
+            for m in range(a.shape[1]):
+                total += a[i, m] * b[m, j]
+            out[i, j] = total
+
+
+@kernel
+def _predict(transition, process_cov, x, cov, work):
+    """Take state and covariance one row further, in place."""
+    k = x.size
+    moved = work[2, 0]
+    for i in range(k):
+        total = 0.0
+        for m in range(k):
+            total += transition[i, m] * x[m]
+        moved[i] = total
+    x[:] = moved
+    _product(transition, cov, work[0])
+    _product(work[0], transition.T, work[1])
+    for i in range(k):
+        for j in range(k):
+            cov[i, j] = 0.5 * (work[1, i, j] + work[1, j, i]) + process_cov[i, j]
+
+
+@kernel
+def _spread(cov, row, variance, gain):
+    """Variance of the innovation; ``gain`` becomes the covariance with the measurement."""
+    total = variance
+    for i in range(row.size):
+        gain[i] = 0.0
+        for m in range(row.size):
+            gain[i] += cov[i, m] * row[m]
+        total += row[i] * gain[i]
+    return total
+
+
+@kernel
+def _error(row, x, z):
+    total = z
+    for i in range(row.size):
+        total -= row[i] * x[i]
+    return total
+
+
+@kernel
+def _update(x, cov, gain, error, spread):
+    for i in range(x.size):
+        x[i] += gain[i] * (error / spread)
+        for j in range(x.size):
+            cov[i, j] -= gain[i] * gain[j] / spread
+
+
+@kernel
+def log_likelihood(transition, process_cov, row, z, variance, x0, cov0):
+    """Log-likelihood of the innovations, constant left out.
+
+    Parameters
+    ----------
+    transition, process_cov : (n, k, k) from the row before to each; those of row 0 are not used
+    row : (k,) what is measured of the state
+    z : (n,) measurements; NaN where there is none
+    variance : (n,) of their noise
+    x0, cov0 : (k,), (k, k) state before row 0 is measured
+
+    Returns
+    -------
+    float
+    """
+    k = x0.size
+    x, cov, gain, work = x0.copy(), cov0.copy(), np.empty(k), np.empty((3, k, k))
+    total = 0.0
+    for i in range(z.size):
+        if i > 0:
+            _predict(transition[i], process_cov[i], x, cov, work)
+        if np.isfinite(z[i]):
+            spread = _spread(cov, row, variance[i], gain)
+            error = _error(row, x, z[i])
+            total -= 0.5 * (np.log(spread) + error**2 / spread)
+            _update(x, cov, gain, error, spread)
+    return total
+
+
+@kernel
+def smooth(transition, process_cov, row, z, variance, x0, cov0):
+    """Smooth the state over all rows; parameters as of `log_likelihood`.
+
+    Returns
+    -------
+    x : (n, k) mean given all measurements
+    var : (n, k) its variances
+
+    References
+    ----------
+    Bierman, Automatica 9(5), 1973, 633-639: the form of Bryson and Frazier, which inverts no
+    covariance.
+    """
+    n, k = z.size, x0.size
+    mean, covs = np.empty((n, k)), np.empty((n, k, k))
+    gains, spreads, errors = np.empty((n, k)), np.empty(n), np.empty(n)
+    x, cov, work = x0.copy(), cov0.copy(), np.empty((3, k, k))
+    for i in range(n):
+        if i > 0:
+            _predict(transition[i], process_cov[i], x, cov, work)
+        # What is kept is from before the row is measured.
+        mean[i], covs[i] = x, cov
+        if np.isfinite(z[i]):
+            spreads[i] = _spread(cov, row, variance[i], gains[i])
+            errors[i] = _error(row, x, z[i])
+            _update(x, cov, gains[i], errors[i], spreads[i])
+    var = np.empty((n, k))
+    adjoint, information = np.zeros(k), np.zeros((k, k))
+    keep = np.empty((k, k))
+    for i in range(n - 1, -1, -1):
+        if np.isfinite(z[i]):
+            for a in range(k):
+                for b in range(k):
+                    keep[a, b] = (1.0 if a == b else 0.0) - gains[i, a] * row[b] / spreads[i]
+            moved = work[2, 0]
+            for a in range(k):
+                moved[a] = -row[a] * errors[i] / spreads[i]
+                for b in range(k):
+                    moved[a] += keep[b, a] * adjoint[b]
+            adjoint[:] = moved
+            _product(keep.T, information, work[0])
+            _product(work[0], keep, information)
+            for a in range(k):
+                for b in range(k):
+                    information[a, b] += row[a] * row[b] / spreads[i]
+        _product(covs[i], information, work[0])
+        _product(work[0], covs[i], work[1])
+        for a in range(k):
+            var[i, a] = covs[i, a, a] - work[1, a, a]
+            for b in range(k):
+                mean[i, a] -= covs[i, a, b] * adjoint[b]
+        # Back to just after the row before.
+        moved = work[2, 0]
+        for a in range(k):
+            moved[a] = 0.0
+            for b in range(k):
+                moved[a] += transition[i, b, a] * adjoint[b]
+        adjoint[:] = moved
+        _product(transition[i].T, information, work[0])
+        _product(work[0], transition[i], information)
+    return mean, var

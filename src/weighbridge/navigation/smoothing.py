@@ -1,0 +1,240 @@
+"""Acceleration from polled speeds and grade from heights, as conditional means."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from scipy.optimize import minimize
+
+from weighbridge.kernels import rts
+from weighbridge.signals import Floats, Ints, Signal
+
+ACCEL_TIME: Final = 3.0
+"""How long a driver keeps an acceleration before the drive has told [s]."""
+
+ACCEL_STD: Final = 0.5
+"""Standard deviation of the acceleration of a drive before it has told [m/s^2]."""
+
+SPEED_NOISE: Final = 0.03
+"""Noise of a vehicle speed beside its resolution, before the drive has told [m/s]."""
+
+GRADE_STD: Final = 0.02
+"""Standard deviation of the grade of roads before the drive has told [-]."""
+
+GRADE_LENGTH: Final = 300.0
+"""Length over which a grade lasts, before the drive has told [m]."""
+
+GRADE_NOISE: Final = 0.01
+"""Noise of a measured grade beside its resolution, before the drive has told [rad]."""
+
+HEIGHT_NOISE: Final = 1.0
+"""Noise of heights from fix to fix before the drive has told [m]."""
+
+HEIGHT_WALK: Final = 4.0
+"""Slow error of GNSS heights before the drive has told [m]."""
+
+HEIGHT_TIME: Final = 100.0
+"""How long the slow error of heights lasts, before the drive has told [s]."""
+
+THINNED: Final = 0.1
+"""The sizes are found from samples at least so far apart [s]."""
+
+LEVEL_STD: Final = 1.0
+"""Standard deviation of the logarithms of these values before the drive has told [-]."""
+
+
+def resolution(values: Floats) -> float:
+    """Step in which values come, 0 where they are one value."""
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > 1e-9]
+    return float(steps.min()) if steps.size else 0.0
+
+
+def _stride(time: Floats) -> int:
+    """Take every how-many-th sample, so that they are `THINNED` apart."""
+    return max(1, round(THINNED * (time.size - 1) / max(float(time[-1] - time[0]), THINNED)))
+
+
+def _gauss_markov(step: Floats, length: float, std: float) -> tuple[Floats, Floats, Floats]:
+    """Integrate a first-order Gauss-Markov process over steps.
+
+    Returns
+    -------
+    transition, process_cov : (n, 2, 2) of the integral and the process
+    keep : (n,) what is left of the process
+    """
+    n = step.size
+    x = step / length
+    keep = np.exp(-x)
+    transition = np.zeros((n, 2, 2))
+    transition[:, 0, 0] = 1.0
+    transition[:, 0, 1] = length * (1.0 - keep)
+    transition[:, 1, 1] = keep
+    cov = np.zeros((n, 2, 2))
+    # The first one loses its digits in short steps: there it is its series.
+    integral = np.where(
+        x < 1e-2, 2.0 / 3.0 * x**3 * (1.0 - 0.75 * x), 2.0 * x - 3.0 + 4.0 * keep - keep**2
+    )
+    cov[:, 0, 0] = std**2 * length**2 * integral
+    cov[:, 0, 1] = cov[:, 1, 0] = std**2 * length * (1.0 - keep) ** 2
+    cov[:, 1, 1] = std**2 * (1.0 - keep**2)
+    return transition, cov, keep
+
+
+def _merged(stamps: Floats, values: Floats, time: Floats) -> tuple[Floats, Floats, Ints]:
+    """Join measurements and instants asked for: clock, measurements on it, places of the latter."""
+    clock = np.unique(np.concatenate([stamps, time]))
+    z = np.full(clock.size, np.nan)
+    z[np.searchsorted(clock, stamps)] = values
+    return clock, z, np.searchsorted(clock, time).astype(np.int64)
+
+
+def smooth_speed(speed: Signal, time: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Smooth a polled speed into speed and acceleration.
+
+    The acceleration is a first-order Gauss-Markov process; its size, how long
+    it lasts and the noise of the speed are those of highest likelihood. What
+    comes out is the mean given all samples: regressing on it is not drawn by
+    its error, as that is independent of it (Berkson errors).
+
+    Parameters
+    ----------
+    speed : the samples
+    time : (n,) instants asked for, rising [s]
+
+    Returns
+    -------
+    speed, accel : (n,) [m/s], [m/s^2]
+    speed_std, accel_std : (n,) their standard deviations [m/s], [m/s^2]
+
+    References
+    ----------
+    Singer, IEEE Trans. Aerospace and Electronic Systems 6(4), 1970, 473-483.
+    Carroll et al., Measurement Error in Nonlinear Models, 2nd ed., 2006, ch. 1.
+    """
+    quantum = resolution(speed.values)
+    stride = _stride(speed.time)
+    thin = speed.time[::stride]
+    usual = np.log([ACCEL_STD, ACCEL_TIME, np.hypot(SPEED_NOISE, quantum / np.sqrt(12.0))])
+    row = np.array([1.0, 0.0])
+
+    def model(clock: Floats, level: Floats) -> tuple[Floats, Floats, float, Floats, Floats]:
+        std, length, noise = np.exp(usual + level)
+        transition, cov, _ = _gauss_markov(np.diff(clock, prepend=clock[0]), length, std)
+        start = np.array([speed.values[0], 0.0])
+        return transition, cov, noise**2, start, np.diag([noise**2, std**2])
+
+    def misfit(level: Floats) -> float:
+        transition, cov, noise, start, spread = model(thin, level)
+        var = np.full(thin.size, noise)
+        told = rts.log_likelihood(transition, cov, row, speed.values[::stride], var, start, spread)
+        return float(-told + 0.5 * np.sum((level / LEVEL_STD) ** 2))
+
+    found = minimize(misfit, np.zeros(3), method="Nelder-Mead", options={"xatol": 0.02}).x
+    clock, z, at = _merged(speed.time, speed.values, time)
+    transition, cov, noise, start, spread = model(clock, found)
+    x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
+    std = np.sqrt(np.maximum(var[at], 0.0))
+    return x[at, 0], x[at, 1], std[:, 0], std[:, 1]
+
+
+def smooth_height(
+    altitude: Signal, time: Floats, distance: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Smooth heights into height and grade along the way.
+
+    The grade is a first-order Gauss-Markov process over the distance. Heights
+    have noise from fix to fix and an error that lasts; the sizes of all are
+    those of highest likelihood.
+
+    Parameters
+    ----------
+    altitude : heights on their own clock
+    time : (n,) instants asked for, rising [s]
+    distance : (n,) travelled [m]
+
+    Returns
+    -------
+    height : (n,) [m]
+    slope : (n,) rise over the distance [-]
+    slope_std : (n,) its standard deviation [-]
+    """
+    inside = (altitude.time >= time[0]) & (altitude.time <= time[-1])
+    stamps, values = altitude.time[inside], altitude.values[inside]
+    quantum = resolution(values)
+    stride = _stride(stamps)
+    thin = stamps[::stride]
+    usual = np.log(
+        [
+            GRADE_STD, GRADE_LENGTH, np.hypot(HEIGHT_NOISE, quantum / np.sqrt(12.0)),
+            HEIGHT_WALK, HEIGHT_TIME,
+        ]
+    )  # fmt: skip
+    row = np.array([1.0, 0.0, 1.0])
+
+    def model(clock: Floats, level: Floats) -> tuple[Floats, Floats, float, Floats, Floats]:
+        std, length, noise, walk, lasting = np.exp(usual + level)
+        way = np.interp(clock, time, distance)
+        road, road_cov, _ = _gauss_markov(np.diff(way, prepend=way[0]), length, std)
+        keep = np.exp(-np.diff(clock, prepend=clock[0]) / lasting)
+        transition, cov = np.zeros((clock.size, 3, 3)), np.zeros((clock.size, 3, 3))
+        transition[:, :2, :2], cov[:, :2, :2] = road, road_cov
+        transition[:, 2, 2], cov[:, 2, 2] = keep, walk**2 * (1.0 - keep**2)
+        start = np.array([values[0], 0.0, 0.0])
+        return transition, cov, noise**2, start, np.diag([1e4, std**2, walk**2])
+
+    def misfit(level: Floats) -> float:
+        transition, cov, noise, start, spread = model(thin, level)
+        var = np.full(thin.size, noise)
+        told = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
+        return float(-told + 0.5 * np.sum((level / LEVEL_STD) ** 2))
+
+    found = minimize(
+        misfit, np.zeros(5), method="Nelder-Mead", options={"xatol": 0.05, "maxiter": 300}
+    ).x
+    clock, z, at = _merged(stamps, values, time)
+    transition, cov, noise, start, spread = model(clock, found)
+    x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
+    return x[at, 0], x[at, 1], np.sqrt(np.maximum(var[at, 1], 0.0))
+
+
+def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floats, Floats]:
+    """Smooth a measured grade along the way.
+
+    Parameters
+    ----------
+    measured : grades on their own clock [rad]
+    time : (n,) instants asked for, rising [s]
+    distance : (n,) travelled [m]
+
+    Returns
+    -------
+    grade : (n,) [rad]
+    grade_std : (n,) its standard deviation [rad]
+    """
+    quantum = resolution(measured.values)
+    stride = _stride(measured.time)
+    thin = measured.time[::stride]
+    usual = np.log([GRADE_STD, GRADE_LENGTH, np.hypot(GRADE_NOISE, quantum / np.sqrt(12.0))])
+    row = np.array([0.0, 1.0])
+
+    def model(clock: Floats, level: Floats) -> tuple[Floats, Floats, float, Floats, Floats]:
+        std, length, noise = np.exp(usual + level)
+        way = np.interp(clock, time, distance)
+        transition, cov, _ = _gauss_markov(np.diff(way, prepend=way[0]), length, std)
+        return transition, cov, noise**2, np.zeros(2), np.diag([0.0, std**2])
+
+    def misfit(level: Floats) -> float:
+        transition, cov, noise, start, spread = model(thin, level)
+        var = np.full(thin.size, noise)
+        told = rts.log_likelihood(
+            transition, cov, row, measured.values[::stride], var, start, spread
+        )
+        return float(-told + 0.5 * np.sum((level / LEVEL_STD) ** 2))
+
+    found = minimize(misfit, np.zeros(3), method="Nelder-Mead", options={"xatol": 0.05}).x
+    clock, z, at = _merged(measured.time, measured.values, time)
+    transition, cov, noise, start, spread = model(clock, found)
+    x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
+    return x[at, 1], np.sqrt(np.maximum(var[at, 1], 0.0))

@@ -1,0 +1,55 @@
+"""Drives of another simulator, thinned to what makers have: OBD at a few Hz, GNSS, no IMU."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numba import config
+
+import weighbridge as wb
+from weighbridge.signals import Signal
+
+pytestmark = pytest.mark.skipif(
+    bool(config.DISABLE_JIT), reason="whole drives take minutes without the compiler"
+)
+
+POLLED = ("vehicle_speed", "engine_speed", "engine_load", "engine_torque")
+GNSS = ("latitude", "longitude", "altitude")
+
+
+def thinned(drive, rate):
+    """Keep OBD at ``rate`` [Hz] and GNSS."""
+    signals = {}
+    for name in (n for n in (*POLLED, *GNSS) if n in drive.signals):
+        s = drive.signals[name]
+        if name in POLLED and s.period < 0.95 / rate:
+            wanted = np.arange(s.time[0], s.time[-1], 1.0 / rate)
+            at = np.unique(np.minimum(np.searchsorted(s.time, wanted), s.time.size - 1))
+            s = Signal(name, s.time[at], s.values[at])
+        signals[name] = s
+    return replace(drive, signals=signals)
+
+
+@pytest.fixture(scope="module")
+def folder(shared_data):
+    path = shared_data / "foreign-simulator"
+    if not path.is_dir():
+        pytest.skip("the drives of another simulator are not here")
+    return path
+
+
+@pytest.mark.parametrize(("vehicle", "rate"), [("hatchback", 1.0), ("wagon", 4.0)])
+def test_obd_and_gnss_without_an_inertial_sensor(folder, vehicle, rate):
+    def drive(name):
+        return thinned(wb.read_drive(folder / vehicle / name), rate)
+
+    car = wb.calibrate([drive("calibration-1"), drive("calibration-2")])
+    assert "not fitted anew" not in (car.provenance.notes or "")
+    errors = []
+    for name in ("drive-1", "drive-3"):
+        w = wb.weigh(drive(name), car)
+        truth = drive(name).info.mass
+        assert abs(w.mass - truth) < 2.0 * w.std
+        assert w.std < 0.06 * w.mass
+        errors.append(w.mass / truth - 1.0)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.04
