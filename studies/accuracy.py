@@ -24,6 +24,7 @@ from accuracy_drives import (
 
 from weighbridge.balance import force_balance
 from weighbridge.estimators import ESTIMATORS
+from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.select import find_motion
 from weighbridge.papers.jensen2022 import without_weather
 from weighbridge.signals import Drive
@@ -75,7 +76,8 @@ def weigh_all(job: tuple[int, int]) -> list[Outcome]:
         made = simulate_car(scenario(car, rng, load=load, seed=seed + 1000 * number + 100 + k))
         drive = without_weather(made.drive)
         begun = first_minutes(made, drive)
-        motion, begun_motion = (find_motion(d, vehicles["joint"]) for d in (drive, begun))
+        found = (find_motion(d, vehicles["joint"]) for d in (drive, begun))
+        motion, begun_motion = (of_vehicle(m, vehicles["joint"]) for m in found)
         for method, vehicle in vehicles.items():
             name = method.split(",")[0]
             estimator = ESTIMATORS[name]

@@ -7,7 +7,7 @@ the floor are left out, and those just beside them, where a foot is on its way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -48,6 +48,13 @@ USUAL_LAG: Final = 0.3
 SHORTEST: Final = 0.2
 """Time between readings over which the smoothing is undone, at least [s]."""
 
+SETTLED: Final = 0.7
+"""The motion has to slow for so long around a reading that is surely one of a dragged engine [s]."""
+
+WIDEST: Final = 0.06
+"""Scatter of such readings over the range of the reading at most [-]: of a recorded car a quarter
+of the braked readings lay within 0.04 of the floor and three quarters within 0.1."""
+
 STAY: Final = 1.0
 """Mean time that a foot stays on a pedal [s]."""
 
@@ -65,6 +72,9 @@ MOVING: Final = 1.0
 
 MARGIN: Final = 0.5
 """Samples nearer than this to one with the foot off may see the brake [s]."""
+
+MOST_MARGIN: Final = 1.0
+"""The same at most: slowly polled logs would have no rows left [s]."""
 
 MARGIN_POLLS: Final = 2.0
 """The same in periods of the reading, where it is polled slowly [-]."""
@@ -124,7 +134,7 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
         if near.size >= max(0.5 * FEWEST, SHARE * inside.size):
             level[k] = np.median(near)
             rest.append(near - level[k])
-    middle = SLOWEST_ENGINE * BIN ** (np.arange(count) + 0.5)
+    middle = np.asarray(SLOWEST_ENGINE * BIN ** (np.arange(count) + 0.5), dtype=np.float64)
     shown = np.isfinite(level)
     if not shown.any():
         return Floor(middle, np.full(count, low), SCATTER[1] * span, span)
@@ -137,7 +147,9 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
     return Floor(middle, level, float(np.clip(spread, *np.multiply(SCATTER, span))), span)
 
 
-def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, recorded: Floats) -> Bools:
+def foot_off(
+    drive: Drive, vehicle: Vehicle, source: Signal, recorded: Floats, slowing: Bools
+) -> Bools:
     """Where the foot may be off the accelerator (n,).
 
     Two hidden states, dragged and pushing, of which a dragged engine reads its floor and a
@@ -149,6 +161,7 @@ def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, recorded: Floats) -
     drive, vehicle
     source : what the torque is made from
     recorded : (n,) stamps asked about [s]
+    slowing : (n,) where the motion shows that no foot is on the accelerator
     """
     pedal = _pedal(drive, vehicle)
     if pedal is not None:
@@ -172,12 +185,35 @@ def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, recorded: Floats) -
         return np.zeros(recorded.size, dtype=bool)
     level = floor.at(np.nan_to_num(turning))
     sharp, gain = unsmoothed(source)
+    if not vehicle.driveline.single_speed:
+        lasting = near(recorded, slowing, source.time, SETTLED) & ~near(
+            recorded, ~slowing, source.time, SETTLED
+        )
+        floor = _reach(floor, (source.values - level)[lasting])
     odds = np.maximum(
         _log_odds(source.values - level, floor.scatter, floor.span),
         _log_odds(sharp - level, gain * floor.scatter, floor.span),
     )
     off = two_states.posterior(odds, source.time, STAY) > PROBABLE
-    return near(source.time, off, recorded, max(MARGIN, MARGIN_POLLS * source.period))
+    return near(source.time, off, recorded, float(np.clip(MARGIN_POLLS * source.period, MARGIN, MOST_MARGIN)))
+
+
+def _reach(floor: Floor, above: Floats) -> Floor:
+    """Widen the scatter of a floor to what the reading shows where the motion slows.
+
+    An engine without fuel cut burns its idle charge in overrun, and so reads above its floor.
+
+    Parameters
+    ----------
+    floor
+    above : (k,) readings over the floor where the engine is surely dragged
+    """
+    known = above[np.isfinite(above)]
+    if known.size < FEWEST:
+        return floor
+    shown = float(np.percentile(known, 90.0)) / 1.645
+    widest = max(floor.scatter, min(shown, WIDEST * floor.span))
+    return replace(floor, scatter=widest)
 
 
 def _log_odds(above: Floats, scatter: Floats | float, span: float) -> Floats:
