@@ -21,7 +21,7 @@ from weighbridge.balance import force_balance
 from weighbridge.balance.averaging import windows
 from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.estimators import joint
-from weighbridge.estimators.rls import regression
+from weighbridge.estimators.regression import regression
 from weighbridge.io.candump import read_candump
 from weighbridge.io.j1939 import decode_j1939
 from weighbridge.kernels.rotation import euler_to_matrix

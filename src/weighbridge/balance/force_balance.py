@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from weighbridge.balance.cornering import cornering
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
@@ -41,6 +42,7 @@ class Reason(IntEnum):
     NOT_ACCELERATING = 9
     BAD_FIT = 10
     TOO_SHORT = 11
+    CORNERING = 12
 
     @property
     def text(self) -> str:
@@ -61,6 +63,7 @@ REASON_TEXT: Final[dict[Reason, str]] = {
     Reason.NOT_ACCELERATING: "not accelerating",
     Reason.BAD_FIT: "bad fit",
     Reason.TOO_SHORT: "too short a stretch",
+    Reason.CORNERING: "cornering hard",
 }
 """Every reason as tables and reports print it."""
 
@@ -280,6 +283,7 @@ def force_balance(
         (~np.isfinite(traction) | ~near | filled(source, recorded), Reason.NO_TORQUE),
         (torque.overrun | (may_brake & (pushed <= 0.0)), Reason.OVERRUN),
         (torque.extrapolated, Reason.EXTRAPOLATED),
+        (cornering(motion, time), Reason.CORNERING),
     ):
         reason[(reason == 0) & flag] = why
 

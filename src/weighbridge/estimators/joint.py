@@ -16,6 +16,7 @@ from weighbridge.estimators.considered import force_columns, open_std, sensitivi
 from weighbridge.estimators.judging import (
     OTHER_METHOD_STD,
     STOP,
+    Evidence,
     converged_at,
     judge,
     nothing,
@@ -32,7 +33,7 @@ from weighbridge.estimators.slow_errors import (
     usable_rows,
 )
 from weighbridge.estimators.squat import lean
-from weighbridge.estimators.track import MassTrack, Segment, Status
+from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.navigation.motion import BY_SPEED, MotionSource
 from weighbridge.signals import Bools, Floats
@@ -45,11 +46,6 @@ GATE: Final = 5.0
 
 FEWEST_WINDOWS: Final = 8
 """Fewer usable windows carry no mass, after a stop no change of it."""
-
-LEAST_SPREAD: Final = 0.12
-"""Standard deviation of the specific force below which no mass is given [m/s^2]. What the mass
-rests on then is the local slope of the torque's map, 15 % off in a simulated cruise; cruises
-had 0.07 to 0.11, parts of highway drives 0.14 and more, ordinary drives 0.25 to 0.4."""
 
 SETTLE: Final = 40
 """Windows before the gate closes."""
@@ -257,9 +253,18 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     last = np.searchsorted(time, view.time, side="right") - 1
     track = np.where(last >= 0, running[np.maximum(last, 0)] - burnt, np.nan)
     track_std = UNMODELLED * np.sqrt(running_var)[np.maximum(last, 0)]
-    status, why = judge(view, vehicle, used, mass, std, cut.count.size)
-    if status is Status.CONVERGED:
-        status, why = _excited(float(np.std(problem.rows[taken, 0])))
+    status, why = judge(
+        Evidence(
+            view=view,
+            used=used,
+            phi=rows[:, 0],
+            mass=mass,
+            std=std,
+            blocks=cut.count.size,
+            left=mass * left,
+        ),
+        vehicle,
+    )
     return MassTrack(
         method="joint",
         balance=balance,
@@ -286,16 +291,6 @@ def _explained(rows: Floats, x: Floats) -> Floats:
     Disturbance, slow resistance and wind stay in the residual.
     """
     return np.asarray(rows[:, 0] * x[:, 0] + np.sum(rows[:, LASTING:] * x[:, LASTING:], axis=1))
-
-
-def _excited(spread: float) -> tuple[Status, str]:
-    """Say whether the specific force varies enough, by its standard deviation [m/s^2]."""
-    if spread >= LEAST_SPREAD:
-        return Status.CONVERGED, ""
-    return Status.NOT_EXCITED, (
-        f"acceleration and hills vary the specific force by only {spread:.3f} m/s^2, as a cruise "
-        f"on the flat does, and the mass needs {LEAST_SPREAD:.3f}; more starts and hills are needed"
-    )
 
 
 def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:

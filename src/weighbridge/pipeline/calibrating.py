@@ -25,7 +25,8 @@ from weighbridge.calibration.regression import (
 )
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, cold_share
-from weighbridge.estimators.rls import block_jackknife, regression
+from weighbridge.estimators.regression import regression
+from weighbridge.estimators.rls import block_jackknife
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
