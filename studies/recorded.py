@@ -25,7 +25,7 @@ from weighbridge.balance import force_balance
 from weighbridge.balance.averaging import windows
 from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.estimators import joint
-from weighbridge.estimators.rls import regression
+from weighbridge.estimators.regression import regression
 from weighbridge.estimators.slow_errors import design, prior_std
 from weighbridge.estimators.squat import SQUAT, Lean
 from weighbridge.io.candump import read_candump

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import weighbridge as wb
 from weighbridge.estimators import joint
-from weighbridge.estimators.rls import regression
+from weighbridge.estimators.regression import regression
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import MIDSIZE, Polling, Scenario, short_route, simulate_car
 from weighbridge.vehicle.fuel import DENSITY, SEEN, fuel_burnt

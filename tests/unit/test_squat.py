@@ -98,14 +98,14 @@ def test_torque_meets_what_it_was_calibrated_with(
     car = replace(calibrated(car, given), provenance=made)
     balance = seen(weighing.result.balance, shown, factor=0.0)
     balance = replace(balance, motion=replace(balance.motion, source=weighed_by))
-    assert lean(balance, car) == expected
+    assert lean(balance, car, 1500.0) == expected
 
 
 def test_a_speed_does_not_lean(weighed):
     car, weighing = weighed
     balance = seen(weighing.result.balance, None, factor=0.0)
     by_speed = replace(balance, motion=replace(balance.motion, source="speed"))
-    assert lean(by_speed, uncalibrated(car)) == Lean(0.0, 0.0)
+    assert lean(by_speed, uncalibrated(car), 1500.0) == Lean(0.0, 0.0)
 
 
 def test_hills_weigh_without_a_lean():
@@ -147,7 +147,7 @@ def test_one_accelerometer_shows_its_lean_against_the_wheels(weighed, k):
     assert 1.5e-3 < std < 2.5e-3
     car, weighing = weighed
     balance = replace(weighing.result.balance, motion=motion)
-    taken = lean(balance, uncalibrated(car))
+    taken = lean(balance, uncalibrated(car), 1500.0)
     assert min(k, SQUAT[0]) < taken.squat < max(k, SQUAT[0])
     assert taken.std < 0.75 * SQUAT[1]
 

@@ -100,7 +100,9 @@ def test_uncertainty_of_the_calibration_is_in_the_mass(good):
     # A file that was never calibrated leaves open torque, efficiency, radius and lean: 5 to 6 %.
     left = uncalibrated_std(CAR, good.result.balance.motion)
     assert 0.05 < left < 0.06
-    assert good.std == pytest.approx(math.hypot(exact.std, left * exact.mass), rel=1e-6)
+    # Drag and rolling resistance are less sure then as well.
+    least = math.hypot(exact.std, left * exact.mass)
+    assert least < good.std < 1.2 * least
 
 
 def test_payload_needs_a_tare(good):

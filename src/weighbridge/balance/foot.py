@@ -49,7 +49,7 @@ SHORTEST: Final = 0.2
 """Time between readings over which the smoothing is undone, at least [s]."""
 
 SETTLED: Final = 0.7
-"""The motion has to slow for so long around a reading that is surely one of a dragged engine [s]."""
+"""The motion has to slow for so long around a reading that is one of a dragged engine [s]."""
 
 WIDEST: Final = 0.06
 """Scatter of such readings over the range of the reading at most [-]: of a recorded car a quarter
@@ -195,7 +195,8 @@ def foot_off(
         _log_odds(sharp - level, gain * floor.scatter, floor.span),
     )
     off = two_states.posterior(odds, source.time, STAY) > PROBABLE
-    return near(source.time, off, recorded, float(np.clip(MARGIN_POLLS * source.period, MARGIN, MOST_MARGIN)))
+    margin = float(np.clip(MARGIN_POLLS * source.period, MARGIN, MOST_MARGIN))
+    return near(source.time, off, recorded, margin)
 
 
 def _reach(floor: Floor, above: Floats) -> Floor:

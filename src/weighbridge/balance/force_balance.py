@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from weighbridge.balance.cornering import cornering
 from weighbridge.balance.foot import foot_off, near
 from weighbridge.constants import (
     GAS_CONSTANT_DRY_AIR,
@@ -47,6 +48,7 @@ class Reason(IntEnum):
     NOT_ACCELERATING = 9
     BAD_FIT = 10
     TOO_SHORT = 11
+    CORNERING = 12
 
     @property
     def text(self) -> str:
@@ -67,6 +69,7 @@ REASON_TEXT: Final[dict[Reason, str]] = {
     Reason.NOT_ACCELERATING: "not accelerating",
     Reason.BAD_FIT: "bad fit",
     Reason.TOO_SHORT: "too short a stretch",
+    Reason.CORNERING: "cornering hard",
 }
 """Every reason as tables and reports print it."""
 
@@ -264,7 +267,7 @@ def force_balance(
 
     # The first reason that applies is the one told, so the order matters.
     reason = np.zeros(time.size, dtype=np.uint8)
-    near = source.age(recorded) <= 3.0 * source.period
+    fresh = source.age(recorded) <= 3.0 * source.period
     changing = shifting(time, gear, margin=SHIFT_MARGIN)
     if driveline.single_speed:
         changing[:] = False
@@ -275,9 +278,10 @@ def force_balance(
         (braking, Reason.BRAKING),
         (changing, Reason.SHIFTING),
         (slipping, Reason.CLUTCH_SLIPPING),
-        (~np.isfinite(traction) | ~near | filled(source, recorded), Reason.NO_TORQUE),
+        (~np.isfinite(traction) | ~fresh | filled(source, recorded), Reason.NO_TORQUE),
         (torque.overrun | overrun | trailing, Reason.OVERRUN),
         (torque.extrapolated, Reason.EXTRAPOLATED),
+        (cornering(motion, time), Reason.CORNERING),
     ):
         reason[(reason == 0) & flag] = why
 

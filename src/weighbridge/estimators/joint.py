@@ -17,6 +17,7 @@ from weighbridge.estimators.considered import force_columns, open_std, sensitivi
 from weighbridge.estimators.judging import (
     OTHER_METHOD_STD,
     STOP,
+    Evidence,
     converged_at,
     judge,
     nothing,
@@ -33,7 +34,7 @@ from weighbridge.estimators.slow_errors import (
     usable_rows,
 )
 from weighbridge.estimators.squat import lean
-from weighbridge.estimators.track import MassTrack, Segment, Status
+from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import Bools, Floats
@@ -46,11 +47,6 @@ GATE: Final = 5.0
 
 FEWEST_WINDOWS: Final = 8
 """Fewer usable windows carry no mass, after a stop no change of it."""
-
-LEAST_SPREAD: Final = 0.12
-"""Standard deviation of the specific force below which no mass is given [m/s^2]. What the mass
-rests on then is the local slope of the torque's map, 15 % off in a simulated cruise; cruises
-had 0.07 to 0.11, parts of highway drives 0.14 and more, ordinary drives 0.25 to 0.4."""
 
 SETTLE: Final = 40
 """Windows before the gate closes."""
@@ -205,8 +201,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     drive can improve are considered, not estimated: Schmidt, 1966.
     """
     view = balance.merged
-    body = lean(balance, vehicle)
-    rows, y = design(view, vehicle, leaned=body.leaned(view.accel))
+    rows, y = design(view, vehicle)
     usable = usable_rows(view, rows, y)
     cut = windows(view.time, usable)
     reason = view.reason.copy()
@@ -216,17 +211,22 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     if cut.count.size < FEWEST_WINDOWS:
         return nothing("joint", balance, vehicle, reason, int(cut.count.size))
 
-    time, mean_rows, mean_y = cut.mean(view.time), cut.mean(rows), cut.mean(y)
-    guess = first_guess(mean_rows[:, 0], mean_y)
-    problem = _Problem(
-        time=time,
-        rows=np.ascontiguousarray(mean_rows),
-        y=mean_y,
-        odds=change_odds(view, time) if load_changes else np.full(time.size, np.nan),
-        **_sizes(balance, vehicle, cut, guess),
-    )
-    # The levels of noise are told in terms of the mass: they should not hang on the guess.
-    problem = replace(problem, **_sizes(balance, vehicle, cut, _sensible(problem.filtered())))
+    time = cut.mean(view.time)
+    odds = change_odds(view, time) if load_changes else np.full(time.size, np.nan)
+    guess = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
+    # The levels of noise and the squat are told in terms of the mass: they should not hang on
+    # the guess.
+    for _ in range(2):
+        body = lean(balance, vehicle, guess)
+        rows, y = design(view, vehicle, leaned=body.leaned(view.accel))
+        problem = _Problem(
+            time=time,
+            rows=np.ascontiguousarray(cut.mean(rows)),
+            y=cut.mean(y),
+            odds=odds,
+            **_sizes(balance, vehicle, cut, guess),
+        )
+        guess = _sensible(problem.filtered())
     fast, slow = problem.likeliest()
     _, running, running_var, begins = problem.changes(fast, slow)
     start, noise, params = problem.kernel_input(fast, slow)
@@ -258,9 +258,18 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     last = np.searchsorted(time, view.time, side="right") - 1
     track = np.where(last >= 0, running[np.maximum(last, 0)] - burnt, np.nan)
     track_std = UNMODELLED * np.sqrt(running_var)[np.maximum(last, 0)]
-    status, why = judge(view, vehicle, used, mass, std, cut.count.size)
-    if status is Status.CONVERGED:
-        status, why = _excited(float(np.std(problem.rows[taken, 0])))
+    status, why = judge(
+        Evidence(
+            view=view,
+            used=used,
+            phi=rows[:, 0],
+            mass=mass,
+            std=std,
+            blocks=cut.count.size,
+            left=mass * left,
+        ),
+        vehicle,
+    )
     return MassTrack(
         method="joint",
         balance=balance,
@@ -287,16 +296,6 @@ def _explained(rows: Floats, x: Floats) -> Floats:
     Disturbance, slow resistance and wind stay in the residual.
     """
     return np.asarray(rows[:, 0] * x[:, 0] + np.sum(rows[:, LASTING:] * x[:, LASTING:], axis=1))
-
-
-def _excited(spread: float) -> tuple[Status, str]:
-    """Say whether the specific force varies enough, by its standard deviation [m/s^2]."""
-    if spread >= LEAST_SPREAD:
-        return Status.CONVERGED, ""
-    return Status.NOT_EXCITED, (
-        f"acceleration and hills vary the specific force by only {spread:.3f} m/s^2, as a cruise "
-        f"on the flat does, and the mass needs {LEAST_SPREAD:.3f}; more starts and hills are needed"
-    )
 
 
 def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:

@@ -8,10 +8,16 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.force_balance import MergedView
-from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.judging import consider_std, converged_at, judge, segments
+from weighbridge.estimators.fit_std import honest_std, slow_std
+from weighbridge.estimators.judging import (
+    Evidence,
+    consider_std,
+    converged_at,
+    judge,
+    segments,
+)
+from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import rls as kernel
 from weighbridge.signals import Bools, Floats
@@ -50,24 +56,6 @@ class RlsSettings:
 
 PAPER_RATE: Final = 4.0
 """Rate at which the forgetting factor of the paper applies [Hz] (sec. 7.1)."""
-
-
-def regression(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
-    """Regressor and right-hand side of the mass (Jensen 2022, eqs. 5, 6).
-
-    The two terms ``v' + g sin(grade)`` of eq. 5 are the specific force along
-    the road.
-
-    Returns
-    -------
-    phi : (n,) [m/s^2]
-    y : (n,) [N]
-    """
-    load = vehicle.road_load
-    rolling = load.rolling_coefficient + load.rolling_speed_coefficient * view.speed
-    phi = view.specific_force + GRAVITY * rolling * np.cos(view.grade)
-    y = view.traction_force - view.drag_force - view.rotating_mass * view.accel
-    return phi, y
 
 
 def parameters(settings: RlsSettings, period: float) -> kernel.RlsParams:
@@ -122,11 +110,26 @@ def estimate(
 
     mass, spread, blocks = block_jackknife(view.time, phi, y, used)
     slow = consider_std(balance, phi, used, vehicle)
-    std = float(np.hypot(spread, mass * slow))
+    influence = phi[used] / np.sum(phi[used] ** 2)
+    passing, lasting = slow_std(balance, vehicle, np.flatnonzero(used), influence, mass)
+    left = float(np.hypot(mass * slow, lasting))
+    std, freedom = honest_std(spread, blocks, passing, left)
     residual = np.where(used, y - phi * mass, np.nan)
     # Before the first row there is a start value, but no measurement.
     running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)
-    status, why = judge(view, vehicle, used, mass, std, blocks)
+    status, why = judge(
+        Evidence(
+            view=view,
+            used=used,
+            phi=phi,
+            mass=mass,
+            std=std,
+            blocks=blocks,
+            left=left,
+            degrees_of_freedom=freedom,
+        ),
+        vehicle,
+    )
 
     def part(rows: slice) -> tuple[float, float]:
         return block_jackknife(view.time[rows], phi[rows], y[rows], used[rows], 20.0)[:2]
@@ -140,7 +143,7 @@ def estimate(
         reason=reason,
         mass=mass,
         std=std,
-        degrees_of_freedom=float(max(blocks - 1, 1)),
+        degrees_of_freedom=freedom,
         bound_std=_bound(phi, residual, used),
         converged_at=converged_at(view.time, running, mass, used),
         status=status,

@@ -14,15 +14,17 @@ from weighbridge.balance.averaging import PAUSE
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
+from weighbridge.estimators.fit_std import honest_std, slow_std
 from weighbridge.estimators.judging import (
     UNMODELLED_STD,
+    Evidence,
     consider_std,
     converged_at,
     judge,
     nothing,
     segments,
 )
-from weighbridge.estimators.rls import regression
+from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
 from weighbridge.signals import Bools, Floats, Ints
@@ -178,18 +180,7 @@ class WindowFit:
         phi, y = self.phi[chosen], self.y[chosen]
         if not np.any(phi):
             return float("nan"), float("inf"), 0
-        mass, offset, ridge = float(np.sum(phi * y) / np.sum(phi**2)), 0.0, np.inf
-        weight, noise = np.ones_like(phi), 0.0
-        for _ in range(50):
-            before = mass
-            size = np.abs(y - phi * mass - offset)
-            noise = max(1.4826 * float(np.median(size)), self.params.noise_floor * abs(mass))
-            weight = np.minimum(1.0, self.params.threshold * noise / np.maximum(size, 1e-9))
-            if self.params.offset_std > 0.0:
-                ridge = self.params.dependence * (noise / (self.params.offset_std * mass)) ** 2
-            mass, offset = (float(x[0]) for x in _solve(_sums(phi, y, weight)[:, None], ridge))
-            if abs(mass - before) <= 1e-7 * abs(mass):
-                break
+        mass, noise, weight, ridge = self._huber(phi, y)
         block = self.block if np.isinf(begin) else BLOCKS[0]
         number = ((self.time[chosen] - self.time[chosen][0]) // block).astype(np.int64)
         parts = _sums(phi, y, weight, number)
@@ -203,6 +194,32 @@ class WindowFit:
         without = _solve(parts.sum(axis=1, keepdims=True) - parts, ridge)[0]
         std = float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
         return mass, max(std, least), n
+
+    def _huber(self, phi: Floats, y: Floats) -> tuple[float, float, Floats, float]:
+        """Mass and noise [kg], [N], weights (k,) of the windows and what holds the offset."""
+        mass, offset, ridge = float(np.sum(phi * y) / np.sum(phi**2)), 0.0, np.inf
+        weight, noise = np.ones_like(phi), 0.0
+        for _ in range(50):
+            before = mass
+            size = np.abs(y - phi * mass - offset)
+            noise = max(1.4826 * float(np.median(size)), self.params.noise_floor * abs(mass))
+            weight = np.minimum(1.0, self.params.threshold * noise / np.maximum(size, 1e-9))
+            if self.params.offset_std > 0.0:
+                ridge = self.params.dependence * (noise / (self.params.offset_std * mass)) ** 2
+            mass, offset = (float(x[0]) for x in _solve(_sums(phi, y, weight)[:, None], ridge))
+            if abs(mass - before) <= 1e-7 * abs(mass):
+                break
+        return mass, noise, weight, ridge
+
+    @property
+    def influence(self) -> Floats:
+        """What a newton in each window adds to the mass (m,) [kg/N], its weight as it is."""
+        _, _, weight, ridge = self._huber(self.phi, self.y)
+        power, first, count, _, _ = _sums(self.phi, self.y, weight)
+        if np.isinf(ridge):
+            return np.asarray(weight * self.phi / power)
+        determinant = power * (count + ridge) - first**2
+        return np.asarray(weight * ((count + ridge) * self.phi - first) / determinant)
 
     @property
     def bound(self) -> float:
@@ -310,8 +327,25 @@ def finish(
     fitted, scatter, blocks = fit.mass()
     mass = fitted if final is None else final(slice(0, view.time.size))
     slow = consider_std(balance, phi, used, vehicle)
-    std = float(np.hypot(scatter, mass * slow))
-    status, why = judge(view, vehicle, used, mass, std, blocks)
+    index = np.maximum(np.searchsorted(view.time, fit.time, side="right") - 1, 0)
+    # What holds an offset of the force knows it; a filter without one takes it for mass.
+    influence = fit.influence if final is None else fit.phi / np.sum(fit.phi**2)
+    passing, lasting = slow_std(balance, vehicle, index, influence, mass)
+    left = float(np.hypot(mass * slow, lasting))
+    std, freedom = honest_std(scatter, blocks, passing, left)
+    status, why = judge(
+        Evidence(
+            view=view,
+            used=used,
+            phi=phi,
+            mass=mass,
+            std=std,
+            blocks=blocks,
+            left=left,
+            degrees_of_freedom=freedom,
+        ),
+        vehicle,
+    )
     # A running mass that forgets is that of a stretch of time.
     passing = np.hypot(slow, UNMODELLED_STD)
 
@@ -329,7 +363,7 @@ def finish(
         reason=reason,
         mass=mass,
         std=std,
-        degrees_of_freedom=float(max(blocks - 1, 1)),
+        degrees_of_freedom=freedom,
         bound_std=fit.bound,
         converged_at=converged_at(view.time, running, mass, used),
         status=status,

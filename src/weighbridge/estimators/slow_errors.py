@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.balance.averaging import Windows
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators.rls import regression
+from weighbridge.estimators.regression import regression
 from weighbridge.kernels.disturbance import DisturbanceParams
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.class_values import road_prior

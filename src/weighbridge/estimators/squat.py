@@ -13,7 +13,7 @@ from weighbridge.balance import ForceBalance
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.model import Vehicle, VehicleClass
 
 SQUAT: Final = (0.0035, 0.0025)
 """Pitch of the body per acceleration of a vehicle of which nothing is known, and its standard
@@ -52,11 +52,39 @@ ACCEL_SCALE_STD: Final = 0.01
 """Scale of an accelerometer in a vehicle, relative standard deviation [-]."""
 
 
-def pooled(motions: Sequence[Motion]) -> tuple[float, float] | None:
-    """Squat of a vehicle from several drives and its standard deviation; None where none shows."""
+GROWTH: Final[dict[VehicleClass, float]] = {"car": 0.0, "van": 1.0, "bus": 1.0, "truck": 1.0}
+"""Power of the mass with which the squat grows [-]: of springs that stay as stiff, 1; those of cars
+are level or progressive."""
+
+
+def squat_at(squat: float, mass: float, masses: Sequence[float], kind: VehicleClass) -> float:
+    """Squat at a mass [rad per m/s^2], of a vehicle whose ``squat`` is that of its calibration.
+
+    Parameters
+    ----------
+    squat : at the mean of ``masses`` [rad per m/s^2]
+    mass : [kg]
+    masses : of the calibration [kg]; where there are none the squat is taken as it is
+    kind : class of the vehicle
+    """
+    if not masses or not mass > 0.0:
+        return squat
+    return float(squat * (mass / np.mean(masses)) ** GROWTH[kind])
+
+
+def pooled(
+    motions: Sequence[Motion], masses: Sequence[float], kind: VehicleClass
+) -> tuple[float, float] | None:
+    """Squat of a vehicle from several drives and its standard deviation; None where none shows.
+
+    It is that at the mean of the drives' masses [rad per m/s^2].
+    """
     found = [
-        (m.squat, float(np.hypot(m.squat_std or 0.0, DRIVE_STD)))
-        for m in motions
+        (
+            m.squat / squat_at(1.0, mass, masses, kind),
+            float(np.hypot(m.squat_std or 0.0, DRIVE_STD)),
+        )
+        for m, mass in zip(motions, masses, strict=True)
         if m.squat is not None and m.source not in BY_SPEED
     ]
     if not found:
@@ -165,8 +193,13 @@ def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
     return (slope - 1.0) / GRAVITY, std / GRAVITY
 
 
-def lean(balance: ForceBalance, vehicle: Vehicle) -> Lean:
+def lean(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Lean:
     """Find what squat the rows and the torque of the vehicle do not have in common.
+
+    Parameters
+    ----------
+    balance, vehicle
+    mass : rough, for squat that grows with it [kg]
 
     An accelerometer that leans by k per acceleration reads it 1 + g k times too
     large. The navigation takes that out where the drive shows k. A torque that
@@ -183,7 +216,9 @@ def lean(balance: ForceBalance, vehicle: Vehicle) -> Lean:
     rows_lean = motion.source not in BY_SPEED and motion.squat is None
     torque_leans = made.torque_fitted and given is None and made.motion not in BY_SPEED
     if rows_lean == torque_leans:
-        return Lean(0.0, found_std)
+        if rows_lean or given is None or not made.torque_fitted:
+            return Lean(0.0, found_std)
+        return Lean(squat_at(given, mass, made.masses, vehicle.kind) - motion.squat, found_std)
     if rows_lean:
         if given is not None:
             return Lean(given, given_std)

@@ -27,8 +27,9 @@ from weighbridge.calibration.regression import (
 )
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, cold_share
-from weighbridge.estimators.rls import block_jackknife, regression
-from weighbridge.estimators.squat import pooled
+from weighbridge.estimators.regression import regression
+from weighbridge.estimators.rls import block_jackknife
+from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
@@ -196,7 +197,8 @@ def run_calibration(
             raise DriveError(
                 f"{drive.name}: no {' and no '.join(missing)}, which torque source {source!r} needs"
             )
-    motions, squat = _one_squat([find_motion(drive, base) for drive in drives])
+    found = [find_motion(drive, base) for drive in drives]
+    motions, squat = _one_squat(found, masses, base.kind)
 
     gears, draft = _draft(drives, motions, base, source)
     driveline = draft.driveline
@@ -565,12 +567,19 @@ def _speed_scale(motions: Sequence[Motion], base: Vehicle) -> float:
     return float(np.average([scale for scale, _ in known], weights=weight))
 
 
-def _one_squat(motions: list[Motion]) -> tuple[list[Motion], tuple[float, float] | None]:
+def _one_squat(
+    motions: list[Motion], masses: Sequence[float], kind: VehicleClass
+) -> tuple[list[Motion], tuple[float, float] | None]:
     """Take the same squat out of all drives: that of the vehicle, with its standard deviation."""
-    found = pooled(motions)
+    found = pooled(motions, masses, kind)
     if found is None:
         return motions, None
-    return [with_squat(motion, *found) for motion in motions], found
+    squat, std = found
+    held = [
+        with_squat(motion, squat_at(squat, mass, masses, kind), std)
+        for motion, mass in zip(motions, masses, strict=True)
+    ]
+    return held, found
 
 
 def _mounting(

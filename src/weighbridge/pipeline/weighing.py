@@ -17,6 +17,7 @@ from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
+from weighbridge.estimators.foreign import of_another
 from weighbridge.estimators.judging import uncalibrated_std
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
@@ -299,6 +300,10 @@ def weigh_balance(
             f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
             "are wrong; calibrate this vehicle"
         )
+    if status is Status.CONVERGED and method not in SPEED_ALONE:
+        another = of_another(balance, vehicle, result)
+        if another:
+            status, reason = Status.INCONSISTENT, another
     return Weighing(
         drive=drive,
         vehicle=vehicle,

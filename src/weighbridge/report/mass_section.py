@@ -8,7 +8,7 @@ import numpy as np
 
 from weighbridge.balance import Reason
 from weighbridge.estimators import SPEED_ALONE, MassTrack, Status
-from weighbridge.estimators.rls import regression
+from weighbridge.estimators.regression import regression
 from weighbridge.report.style import (
     BLUE,
     GREEN,

@@ -48,6 +48,7 @@ REASON_STYLE: Final[dict[Reason, tuple[str, str]]] = {
     Reason.NOT_ACCELERATING: ("#b3a24d", "circle-open"),
     Reason.BAD_FIT: ("#c0392b", "x-thin-open"),
     Reason.TOO_SHORT: ("#c8c8c8", "diamond-open"),
+    Reason.CORNERING: ("#7a5c3e", "triangle-right"),
 }
 """Colour and marker of used and excluded samples."""
 

@@ -1,0 +1,49 @@
+"""Where a vehicle corners so hard that its tyres slow it down."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.navigation.motion import Motion
+from weighbridge.signals import Bools, Floats
+
+HARD_CORNERING: Final = 3.0
+"""Lateral acceleration above which a row is left out [m/s^2]. A tyre runs at a slip angle and
+its side force points backwards by as much: the resistance over the mass is
+a_y^2 / (g c), with a cornering stiffness c of 10 to 20 per rad over the load (Gillespie,
+Fundamentals of Vehicle Dynamics, 1992, ch. 6), 0.05 to 0.09 m/s^2 at this limit. That is more
+than the disturbance that the joint estimator expects (0.04 m/s^2), and it lasts through a
+bend and has one sign. Ordinary drives spend a thousandth of their time beyond 2.5 m/s^2."""
+
+TURN_TIME: Final = 1.0
+"""Time over which the yaw rate is taken, as the difference of headings [s]."""
+
+
+def lateral_acceleration(motion: Motion) -> Floats:
+    """Return yaw rate times speed (n,) [m/s^2]; NaN where the heading is unknown."""
+    half = max(1, round(0.5 * TURN_TIME * motion.rate))
+    index = np.arange(motion.time.size)
+    before, after = np.maximum(index - half, 0), np.minimum(index + half, index.size - 1)
+    turn = motion.heading[after] - motion.heading[before]
+    turn = np.mod(turn + np.pi, 2.0 * np.pi) - np.pi
+    span = motion.time[after] - motion.time[before]
+    return np.asarray(motion.speed * turn / np.where(span > 0.0, span, np.inf))
+
+
+def cornering(motion: Motion, time: Floats) -> Bools:
+    """Where the lateral acceleration exceeds `HARD_CORNERING`; nowhere if headings are unknown.
+
+    Parameters
+    ----------
+    motion
+    time : (n,) instants asked about [s]
+
+    Returns
+    -------
+    (n,)
+    """
+    hard = np.abs(np.nan_to_num(lateral_acceleration(motion))) > HARD_CORNERING
+    nearest = np.rint((time - motion.time[0]) * motion.rate)
+    return np.asarray(hard[np.clip(nearest, 0, hard.size - 1).astype(np.int64)])

@@ -1,0 +1,127 @@
+"""How far slow errors move a mass that is a weighted sum of forces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from scipy.signal import lfilter
+
+from weighbridge.balance import ForceBalance
+from weighbridge.estimators.considered import force_columns, open_std
+from weighbridge.estimators.slow_errors import (
+    LASTING,
+    NAMES,
+    TIME_CONSTANTS,
+    design,
+    prior_std,
+)
+from weighbridge.signals import Floats, Ints
+from weighbridge.vehicle.model import Vehicle
+
+BIN: Final = 2.5
+"""Time over which a slow error counts as one [s]: it is short beside the shortest of
+`weighbridge.estimators.slow_errors.TIME_CONSTANTS`."""
+
+
+COLD: Final = NAMES.index("cold_torque")
+
+
+def slow_std(
+    balance: ForceBalance, vehicle: Vehicle, index: Ints, influence: Floats, mass: float
+) -> tuple[float, float]:
+    """Standard deviations of a mass ``sum(influence * force)`` by slow errors of the force [kg].
+
+    The errors are those that the joint estimator has as states, as large as it takes them before
+    a drive, and what the fit of the calibration leaves open. A fit that does not estimate them
+    beside the mass has their whole effect; for the rows it uses, its mass cannot be surer than
+    this, which is not below their Cramér-Rao bound.
+
+    Parameters
+    ----------
+    balance, vehicle
+    index : (m,) rows of the merged view, rising
+    influence : (m,) what a newton at each row adds to the mass [kg/N]
+    mass : rough [kg]
+
+    Returns
+    -------
+    passing : by what differs from drive to drive
+    lasting : by what a file without the covariance of its fit leaves open, which stays with
+        the vehicle
+
+    References
+    ----------
+    Variance of a linear estimate under coloured noise: Gelb, Applied Optimal Estimation, 1974,
+    ch. 4; Gauss-Markov covariance, ch. 3.8.
+    """
+    view = balance.merged
+    if not (index.size and np.isfinite(mass) and mass > 0.0):
+        return float("inf"), 0.0
+    rows, _ = design(view, vehicle)
+    highest = _highest_torque(balance, index)
+    std = prior_std(_known_road_load(vehicle), mass, highest)
+    # The methods that ask have `weighbridge.estimators.judging.consider_std` for the cold.
+    std[COLD] = 0.0
+    effect = influence[:, None] * np.nan_to_num(rows[index])
+    whole = effect.sum(axis=0)
+    time = view.time[index]
+    number = ((time - time[0]) // BIN).astype(np.int64)
+    passing = 0.0
+    for k in range(1, LASTING):
+        binned = np.bincount(number, effect[:, k]).astype(np.float64)
+        keep = float(np.exp(-BIN / TIME_CONSTANTS[k - 1]))
+        passing += std[k] ** 2 * _correlated(binned, keep)
+    if vehicle.provenance.fit_cov:
+        moved = influence @ force_columns(balance, vehicle, mass)[index]
+        passing += (mass * open_std(vehicle, moved, mass)) ** 2
+        return float(np.sqrt(passing)), 0.0
+    # What a file says of its own road load is in the resistance and the last states.
+    open_ = prior_std(vehicle, mass, highest)
+    open_[COLD] = 0.0
+    stays = np.sqrt(np.maximum(open_**2 - std**2, 0.0)) * whole
+    stays[len(NAMES) :] = open_[len(NAMES) :] * whole[len(NAMES) :]
+    return float(np.sqrt(passing)), float(np.linalg.norm(stays[1:]))
+
+
+def _highest_torque(balance: ForceBalance, index: Ints) -> float:
+    view = balance.merged
+    with np.errstate(invalid="ignore", divide="ignore"):
+        torque = np.abs(view.traction_force / view.gearing)[index]
+    known = torque[np.isfinite(torque)]
+    return float(np.percentile(known, 98.0)) if known.size else 0.0
+
+
+def honest_std(scatter: float, blocks: int, slow: float, left: float) -> tuple[float, float]:
+    """Standard deviation of a mass [kg] and the degrees of freedom behind it.
+
+    Parameters
+    ----------
+    scatter : between blocks of time, which does not see what all of them share [kg]
+    blocks : how many
+    slow : `slow_std`, below which the scatter is not believed [kg]
+    left : what no row can take away [kg]
+
+    References
+    ----------
+    Degrees of freedom of a sum of variances: Welch, Biometrika 34, 1947; Satterthwaite,
+    Biometrics Bulletin 2, 1946.
+    """
+    freedom = float(max(blocks - 1, 1))
+    std = float(np.hypot(max(scatter, slow), left))
+    if not (np.isfinite(std) and scatter > 0.0):
+        return std, freedom
+    return std, freedom * (std / scatter) ** 4
+
+
+def _known_road_load(vehicle: Vehicle) -> Vehicle:
+    """Return the vehicle as if its drag area and rolling resistance were known exactly."""
+    load = replace(vehicle.road_load, drag_area_std=0.0, rolling_coefficient_std=0.0)
+    return replace(vehicle, road_load=load)
+
+
+def _correlated(effect: Floats, keep: float) -> float:
+    """Sum of ``effect_i effect_j keep^|i - j|`` over all pairs."""
+    before = lfilter([0.0, keep], [1.0, -keep], effect)
+    return float(effect @ effect + 2.0 * (effect @ before))

@@ -1,0 +1,63 @@
+"""Is the vehicle file another vehicle's? What its road load has to be stretched by tells."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance import ForceBalance
+from weighbridge.estimators import joint
+from weighbridge.estimators.slow_errors import NAMES, prior_std
+from weighbridge.estimators.track import MassTrack
+from weighbridge.vehicle.model import Vehicle
+
+FARTHEST: Final = 2.5
+"""Root of the summed squares of slow resistance and drag area, each over its standard deviation
+before the drive, above which the file is another vehicle's [-]: with their own files, drives of
+simulated and foreign vehicles had 0.6 in the middle and 2.2 at most; with those of others, torque
+from load and gearings alike, 0.9 to 7, half of them above 2.6."""
+
+
+def stretched(track: MassTrack, vehicle: Vehicle) -> float:
+    """How far the drive takes slow resistance and drag area from the vehicle file [-].
+
+    Parameters
+    ----------
+    track : of the joint estimator
+    vehicle
+    """
+    slow = track.slow_errors
+    if slow is None or not (np.isfinite(track.mass) and track.mass > 0.0):
+        return 0.0
+    # The torque is only the size of the cold start's.
+    prior = dict(zip(NAMES, prior_std(vehicle, track.mass, 1.0), strict=False))
+    resistance = float(np.sqrt(np.mean(slow.resistance**2))) / prior["resistance"]
+    area, _ = slow.constants["drag_area"]
+    drag = area / prior["drag_area"] if prior["drag_area"] > 0.0 else 0.0
+    return float(np.hypot(resistance, drag))
+
+
+def of_another(balance: ForceBalance, vehicle: Vehicle, track: MassTrack) -> str:
+    """Say why the vehicle file is another vehicle's, in a sentence; nothing if it may be its own.
+
+    Only files of a calibration for ``joint`` can tell: a data sheet leaves more open, and fits
+    for others put their road load elsewhere.
+
+    Parameters
+    ----------
+    balance, vehicle
+    track : of any method; the joint estimator is run where it is of another
+    """
+    if vehicle.provenance.method != "joint" or not vehicle.provenance.torque_fitted:
+        return ""
+    if track.method != "joint":
+        track = joint.estimate(balance, vehicle)
+    far = stretched(track, vehicle)
+    if far <= FARTHEST:
+        return ""
+    return (
+        f"the drive takes resistance and air drag {far:.1f} standard deviations from those of "
+        f"{vehicle.name}: the vehicle file is another vehicle's, or much has changed since it was "
+        "calibrated; calibrate this vehicle"
+    )

@@ -1,0 +1,227 @@
+"""The gate that every method passes: rows, width, excitation, time, size, cornering, vehicle."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.balance import ForceBalance, Reason, force_balance
+from weighbridge.balance.cornering import HARD_CORNERING, cornering, lateral_acceleration
+from weighbridge.balance.force_balance import MergedView
+from weighbridge.estimators import ESTIMATORS, Status, fit_std, foreign, judging
+from weighbridge.estimators.fit_std import honest_std, slow_std
+from weighbridge.pipeline.weighing import weigh_balance
+from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
+
+METHODS = ("joint", "rls", "robust-rls", "ekf", "hybrid")
+MASS = 10_000.0
+BUS = Vehicle(
+    kind="bus",
+    tare=8000.0,
+    driveline=Driveline(gearings=(10.0,)),
+    torque=TorqueModel(source="measured"),
+    road_load=RoadLoad(drag_area=5.4, rolling_coefficient=0.0075),
+    provenance=Provenance(mass_scale_std=0.01),
+)
+
+
+def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
+    """Rows of a bus that speeds up and slows down by ``swing`` [m/s^2], every 60 s.
+
+    ``offset`` is the standard deviation of a force that lasts, over the mass [m/s^2].
+    """
+    rng = np.random.default_rng(seed)
+    n = int(60.0 * minutes * rate)
+    time = np.arange(n) / rate
+    accel = swing * np.sin(2.0 * np.pi * time / 60.0)
+    speed = 18.0 - swing * 60.0 / (2.0 * np.pi) * np.cos(2.0 * np.pi * time / 60.0)
+    rotating, drag = np.full(n, 300.0), 0.5 * 1.2 * 5.4 * speed**2
+    force = (MASS + rotating) * accel + drag + MASS * (9.81 * 0.0075 + offset * rng.normal())
+    view = MergedView(
+        time=time,
+        traction_force=force + rng.normal(0.0, 100.0, n),
+        speed=speed,
+        accel=accel,
+        specific_force=accel + rng.normal(0.0, 0.02, n),
+        grade=np.zeros(n),
+        pitch=np.zeros(n),
+        heading=np.zeros(n),
+        gear=np.ones(n, dtype=np.int64),
+        gearing=np.full(n, 10.0),
+        rotating_mass=rotating,
+        air_speed=speed,
+        drag_force=drag,
+        air_density=np.full(n, 1.2),
+        fuel_burnt=np.zeros(n),
+        reason=np.zeros(n, dtype=np.uint8),
+    )
+    side = SimpleNamespace(torque=force / 10.0, engine_speed=10.0 * speed)
+    motion = SimpleNamespace(source="inertial", squat=0.003, squat_std=0.0)
+    return ForceBalance(force=side, motion=motion, merged=view)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return simulate_car(Scenario(name="gate", car=MIDSIZE, route=short_route(), seed=73))
+
+
+@pytest.fixture(scope="module")
+def car(made):
+    return wb.calibrate([made.drive], mass=made.scenario.mass)
+
+
+@pytest.fixture(scope="module")
+def own(made, car):
+    return wb.weigh(made.drive, car)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_good_drive_passes(method):
+    track = ESTIMATORS[method](balance(), BUS)
+    assert track.status is Status.CONVERGED
+    assert track.mass == pytest.approx(MASS, rel=0.03)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_specific_force_that_hardly_varies_carries_no_mass(method, monkeypatch):
+    cruise = balance(swing=0.14, minutes=30.0)
+    monkeypatch.setattr(judging, "WIDEST", np.inf)
+    monkeypatch.setattr(judging, "WIDEST_OF_DRIVE", np.inf)
+    track = ESTIMATORS[method](cruise, BUS)
+    assert track.status is Status.NOT_EXCITED
+    assert "vary the specific force by only" in track.why
+    monkeypatch.setattr(judging, "LEAST_SPREAD", 0.0)
+    assert ESTIMATORS[method](cruise, BUS).status is Status.CONVERGED
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_short_stretch_carries_no_mass(method, monkeypatch):
+    # The least squares of jensen2022 take rising speed alone: half of the time.
+    short = balance(minutes=1.4 if method == "rls" else 0.9)
+    monkeypatch.setattr(judging, "WIDEST", np.inf)
+    monkeypatch.setattr(judging, "WIDEST_OF_DRIVE", np.inf)
+    monkeypatch.setattr(judging, "FEWEST_BLOCKS", 0)
+    monkeypatch.setattr(judging.Evidence, "reach", 0.0)
+    track = ESTIMATORS[method](short, BUS)
+    assert track.status is Status.NOT_EXCITED
+    assert "s of the drive could be used" in track.why
+    monkeypatch.setattr(judging, "LEAST_TIME", 0.0)
+    assert ESTIMATORS[method](short, BUS).status is Status.CONVERGED
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_mass_below_the_tare_is_none(method):
+    heavy = replace(BUS, tare=MASS / 0.8)
+    track = ESTIMATORS[method](balance(), heavy)
+    assert track.status is Status.INCONSISTENT
+    assert "less than the tare" in track.why
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_mass_above_what_loads_explain_is_none(method):
+    light = replace(BUS, tare=MASS / (1.15 * judging.HEAVIEST["bus"]))
+    track = ESTIMATORS[method](balance(), light)
+    assert track.status is Status.INCONSISTENT
+    assert "more than 2.6 times" in track.why
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_the_drive_leaves_open_is_bounded_whatever_the_file_does(method, monkeypatch):
+    wide = replace(BUS, provenance=Provenance(mass_scale_std=0.12))
+    assert ESTIMATORS[method](balance(), wide).status is Status.CONVERGED
+    monkeypatch.setattr(judging, "WIDEST_OF_DRIVE", 1e-3)
+    track = ESTIMATORS[method](balance(), wide)
+    assert track.status is Status.NOT_EXCITED
+    assert "which is no weighing" in track.why
+
+
+def test_the_interval_of_least_squares_holds_under_errors_that_last(monkeypatch):
+    """Resistance that stays off by as much as `slow_errors` expects."""
+
+    def held():
+        inside = []
+        for seed in range(20):
+            track = ESTIMATORS["rls"](balance(swing=0.5, offset=0.025, seed=seed), BUS)
+            inside.append(abs(track.mass - MASS) < 1.96 * track.std)
+        return np.mean(inside)
+
+    assert held() >= 0.9
+    # The scatter of blocks does not see it.
+    monkeypatch.setattr("weighbridge.estimators.rls.slow_std", lambda *_: (0.0, 0.0))
+    assert held() < 0.9
+
+
+@pytest.mark.parametrize("method", ["robust-rls", "ekf", "hybrid"])
+def test_no_method_is_surer_than_slow_errors_allow(method, monkeypatch):
+    honest = ESTIMATORS[method](balance(swing=0.5), BUS).std
+    monkeypatch.setattr("weighbridge.estimators.robust_rls.slow_std", lambda *_: (0.0, 0.0))
+    assert honest > 1.05 * ESTIMATORS[method](balance(swing=0.5), BUS).std
+
+
+def test_slow_errors_add_up_as_their_covariance_says(monkeypatch):
+    made = balance(minutes=3.0)
+    view = made.merged
+    phi = view.specific_force
+    index = np.arange(0, phi.size, 25)
+    influence = phi[index] / np.sum(phi[index] ** 2)
+    std = np.zeros(11)
+    std[1] = 400.0
+    monkeypatch.setattr(fit_std, "prior_std", lambda *_: std)
+    passing, lasting = slow_std(made, BUS, index, influence, MASS)
+    apart = np.abs(np.subtract.outer(view.time[index], view.time[index]))
+    expected = influence @ (400.0**2 * np.exp(-apart / 30.0)) @ influence
+    assert passing == pytest.approx(np.sqrt(expected), rel=1e-6)
+    assert lasting == 0.0
+
+
+def test_degrees_of_freedom_grow_with_what_is_not_scatter():
+    assert honest_std(100.0, 5, 0.0, 0.0) == (100.0, 4.0)
+    std, freedom = honest_std(100.0, 5, 200.0, 0.0)
+    assert std == 200.0
+    assert freedom == pytest.approx(64.0)
+
+
+def turning(motion, lateral):
+    """The motion in a bend of that lateral acceleration [m/s^2]."""
+    rate = lateral / np.maximum(motion.speed, 1.0)
+    return replace(motion, heading=np.mod(np.cumsum(rate) / motion.rate, 2.0 * np.pi))
+
+
+def test_lateral_acceleration_is_yaw_rate_times_speed(own):
+    motion = own.result.balance.motion
+    fast = motion.speed > 5.0
+    found = lateral_acceleration(turning(motion, 3.0))[fast]
+    assert np.median(found) == pytest.approx(3.0, rel=0.02)
+    unknown = replace(motion, heading=np.full(motion.time.size, np.nan))
+    assert not cornering(unknown, motion.time).any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rows_of_hard_cornering_are_left_out(made, car, own, method):
+    motion = own.result.balance.motion
+    hard = force_balance(made.drive, car, turning(motion, HARD_CORNERING + 0.5))
+    soft = force_balance(made.drive, car, turning(motion, HARD_CORNERING - 0.5))
+    fast = soft.merged.usable & (soft.merged.speed > 5.0)
+    assert np.mean(hard.merged.reason[fast] == Reason.CORNERING) > 0.95
+    track = ESTIMATORS[method](hard, car)
+    assert not track.used[fast & (hard.merged.reason == Reason.CORNERING)].any()
+    assert track.status is Status.NOT_EXCITED
+    assert "cornering hard" in track.why
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_file_whose_resistance_is_another_vehicles_is_refused(made, car, own, method):
+    balance = own.result.balance
+    sure = replace(car.road_load, drag_area_std=0.03, rolling_coefficient_std=0.001)
+    car = replace(car, road_load=sure)
+    assert foreign.of_another(balance, car, own.result) == ""
+    view = balance.merged
+    more = 0.1 * made.scenario.mass
+    slower = replace(balance, merged=replace(view, traction_force=view.traction_force + more))
+    found = weigh_balance(made.drive, car, method, slower)
+    assert found.status is Status.INCONSISTENT
+    assert "another vehicle's" in found.reason
+    assert np.isnan(found.mass)
