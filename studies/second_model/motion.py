@@ -24,7 +24,7 @@ COLUMNS = (
     "drag_force", "rolling_force", "traction_force", "coupled_force", "slip", "pedal",
     "brake_pedal", "clutch_open", "fuel_rate", "engine_warmth", "oil_warmth", "tyre_warmth",
     "engine_brake_torque", "accessory_power", "rotor_warmth", "coupled_offset", "coupled_speed",
-    "crosswind",
+    "crosswind", "input_speed", "clutch_torque", "pump_torque", "turbine_torque", "gearbox_loss",
 )  # fmt: skip
 
 
@@ -427,6 +427,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
     a_des = 0.0
 
     s_pitch_rate, s_pitch_acc, s_heave = 0.0, 0.0, 0.0
+    s_clutch, s_pump, s_turb, s_loss = 0.0, 0.0, 0.0, 0.0
     v_kept = 0.0
     fuel_rate = 0.0
     eb = 0.0
@@ -534,7 +535,11 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 near += v * (v - v_lead) / (2.0 * np.sqrt(max(want, 0.5) * 1.5))
                 near = max(near, 2.0)
                 free = want * (1.0 - (v / max(v_goal, 1.0)) ** 4)
-                a_des = min(a_des, max(free, -0.3) - want * (near / max(gap, 0.5)) ** 2)
+                # Who is close but not faster falls back gently.
+                room = max(gap - 2.0, 1.0)
+                needed = 0.5 * max(v - v_lead, 0.0) ** 2 / room
+                yielding = max(free, -0.3) - want * (near / max(gap, 0.5)) ** 2
+                a_des = min(a_des, max(yielding, -1.2 - 1.4 * needed))
 
             # Force with the pedal released, as felt.
             if fixed:
@@ -852,6 +857,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
                     if pedal > 0.01 or mode == DRIVE:
                         bite = max(0.0, (we - 0.9 * box.launch_low) / box.launch_span)
                         cap = min(1.0, max(bite**1.3, cap / full_cap + DT * 0.6)) * full_cap
+                        # The foot feels the speeds meet.
+                        cap = min(cap, 1.1 * max(t_net, 0.0) + 0.08 * full_max)
                     else:
                         cap = min(full_cap, cap + full_cap * DT * 0.6)
                 else:
@@ -862,10 +869,13 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 cap = 0.0  # the clutch opens before the engine stalls
         elif box.kind == CONVERTER:
             if phase == 1:
-                cut = 0.7
-                f = min(1.0, phase_time / box.sync_time)
-                f = f * f * (3.0 - 2.0 * f)
                 gear = next_gear
+                # A wide step takes longer. Upwards the engine's inertia pushes as it slows down:
+                # its torque is taken back for as long.
+                wide = abs(np.log(old_ratio / box.ratios[gear - 1])) / 0.35
+                f = min(1.0, phase_time / (box.sync_time * max(1.0, wide)))
+                cut = 0.7 - (2.0 * f * (1.0 - f) if old_ratio > box.ratios[gear - 1] else 0.0)
+                f = f * f * (3.0 - 2.0 * f)
                 ratio = old_ratio * (1.0 - f) + box.ratios[gear - 1] * f
                 if f >= 1.0:
                     phase = 0
@@ -966,6 +976,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
 
         # ---- driveline ------------------------------------------------------------------
         we_before = we
+        t_clutch, t_pump, t_turb, loss = 0.0, 0.0, 0.0, 0.0
         w_wheel = v / radius * (1.0 + slip)
         if not in_gear:
             twist -= DT / 0.05 * twist
@@ -986,44 +997,38 @@ def run(engine, box, body, driver, road, day, rng, steps):
             spin = (box.spin_0 + box.spin_1 * abs(wi)) * (1.0 + box.cold * (1.0 - x_o))
             loss = (loss + spin) * wi / (abs(wi) + 1.0)
             load = through + loss
-            t_pump, t_turb = 0.0, 0.0
             if box.kind == CONVERTER and not locked:
                 nu = min(wi / max(we, 20.0), 1.35)
                 ease = max(-0.8, 1.0 - nu**5)
                 t_pump = box.converter_k * we * we * ease
                 lift = 1.0 - (box.converter_ratio - 1.0) * (nu / 0.86 - 1.0)
                 t_turb = t_pump * max(1.0, lift)
+            # The clutch carries what keeps both sides together, at most its capacity. It is solved
+            # with the shafts' damping at the end of the step, else stiff gears diverge; whoever
+            # lets it break and joins the sides afterwards hides torque from the shafts.
+            slow = box.inertia + DT * box.damping / (ratio * ratio)
+            drive, drag = t_net - t_pump, load - t_turb
+            joint = engine.inertia * we + slow * wi + DT * (drive - drag)
+            joint /= engine.inertia + slow
+            t_clutch = drive - engine.inertia * (joint - we) / DT
+            locked = fixed or (cap > 1.0 and abs(t_clutch) <= cap)
             if locked:
-                # The shafts' damping is taken at the end of the step, else stiff gears diverge.
-                both = engine.inertia + box.inertia
-                soft = 1.0 + DT * box.damping / (both * ratio * ratio)
-                acc = (t_net - load) / (both * soft)
-                carried = t_net - engine.inertia * acc
-                if not fixed and abs(carried) > cap:
-                    locked = False
-                else:
-                    we += DT * acc
-                    wi = we
-                    t_shaft += box.damping * DT * acc / ratio
-            if not locked:
-                diff = we - wi
-                side = 1.0 if diff > 0.0 else -1.0
-                t_clutch = cap * side
-                we += DT * (t_net - t_clutch - t_pump) / engine.inertia
-                soft = 1.0 + DT * box.damping / (box.inertia * ratio * ratio)
-                wi += DT * (t_clutch + t_turb - load) / (box.inertia * soft)
-                t_shaft += box.damping * (wi - wi_before) / ratio
-                if (we - wi) * side <= 0.0 and cap > 1.0:
-                    joint = engine.inertia * we + box.inertia * wi
-                    we = joint / (engine.inertia + box.inertia)
-                    wi = we
-                    locked = True
+                we, wi = joint, joint
+            else:
+                t_clutch = min(max(t_clutch, -cap), cap)
+                we += DT * (drive - t_clutch) / engine.inertia
+                wi += DT * (t_clutch - drag) / slow
                 we = max(we, 0.4 * engine.idle)
+            t_shaft += box.damping * (wi - wi_before) / ratio
             twist += DT * (wi / ratio - w_wheel)
 
         if off:
             we = max(0.0, we_before - 250.0 * DT)
             torque_i, t_net, fuel_rate = 0.0, 0.0, 0.0
+        s_clutch += t_clutch
+        s_pump += t_pump
+        s_turb += t_turb
+        s_loss += loss
 
         # ---- forces ---------------------------------------------------------------------
         f_trac = t_shaft / radius
@@ -1155,8 +1160,15 @@ def run(engine, box, body, driver, road, day, rng, steps):
             o[36] = x_c
             o[37] = v_c
             o[38] = cross
+            o[39] = wi
+            # Means over the row, so that momentum can be counted.
+            o[40] = s_clutch / KEEP
+            o[41] = s_pump / KEEP
+            o[42] = s_turb / KEEP
+            o[43] = s_loss / KEEP
             v_kept = v
             s_pitch_rate = 0.0
             s_pitch_acc = 0.0
             s_heave = 0.0
+            s_clutch, s_pump, s_turb, s_loss = 0.0, 0.0, 0.0, 0.0
     return out
