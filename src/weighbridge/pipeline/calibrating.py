@@ -197,8 +197,8 @@ def run_calibration(
             raise DriveError(
                 f"{drive.name}: no {' and no '.join(missing)}, which torque source {source!r} needs"
             )
-    found = [find_motion(drive, base) for drive in drives]
-    motions, squat = _one_squat(found, masses, base.kind)
+    found_motions = [find_motion(drive, base) for drive in drives]
+    motions, squat = _one_squat(found_motions, masses, base.kind)
 
     gears, draft = _draft(drives, motions, base, source)
     driveline = draft.driveline
