@@ -7,7 +7,7 @@ the floor are left out, and those just beside them, where a foot is on its way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from weighbridge.kernels import two_states
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import averaged
 
 BIN: Final = 1.12
 """Ratio of the engine speeds at the ends of a bin [-]."""
@@ -48,12 +49,21 @@ USUAL_LAG: Final = 0.3
 SHORTEST: Final = 0.2
 """Time between readings over which the smoothing is undone, at least [s]."""
 
+SLOWING: Final = 0.03
+"""Force over weight that slows a vehicle so much that no foot is on the accelerator [-]."""
+
 SETTLED: Final = 0.7
 """The motion has to slow for so long around a reading that is one of a dragged engine [s]."""
 
-WIDEST: Final = 0.06
-"""Scatter of such readings over the range of the reading at most [-]: of a recorded car a quarter
-of the braked readings lay within 0.04 of the floor and three quarters within 0.1."""
+FARTHEST: Final = 0.15
+"""Such readings over their floor, over the range of the reading, at most [-]: of a recorded car a
+quarter of the braked readings lay within 0.04 of the floor and three quarters within 0.1."""
+
+BEYOND: Final = 3.0
+"""Standard deviations of the floor within which a reading lies on it [-]."""
+
+PUSHED_TIME: Final = 1.0
+"""Time over which the motion tells whether the engine pushes the vehicle [s]."""
 
 STAY: Final = 1.0
 """Mean time that a foot stays on a pedal [s]."""
@@ -147,9 +157,7 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
     return Floor(middle, level, float(np.clip(spread, *np.multiply(SCATTER, span))), span)
 
 
-def foot_off(
-    drive: Drive, vehicle: Vehicle, source: Signal, recorded: Floats, slowing: Bools
-) -> Bools:
+def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torque: Floats) -> Bools:
     """Where the foot may be off the accelerator (n,).
 
     Two hidden states, dragged and pushing, of which a dragged engine reads its floor and a
@@ -160,9 +168,10 @@ def foot_off(
     ----------
     drive, vehicle
     source : what the torque is made from
-    recorded : (n,) stamps asked about [s]
-    slowing : (n,) where the motion shows that no foot is on the accelerator
+    need : (n,) force that the motion takes over weight, at the stamps of the source [-]
+    torque : (n,) torque of the engine that the motion takes [N m]; NaN without a gear
     """
+    recorded = source.time
     pedal = _pedal(drive, vehicle)
     if pedal is not None:
         released = pedal.values <= float(np.percentile(pedal.values, 1.0)) + PRESSED
@@ -185,24 +194,44 @@ def foot_off(
         return np.zeros(recorded.size, dtype=bool)
     level = floor.at(np.nan_to_num(turning))
     sharp, gain = unsmoothed(source)
-    if not vehicle.driveline.single_speed:
-        lasting = near(recorded, slowing, source.time, SETTLED) & ~near(
-            recorded, ~slowing, source.time, SETTLED
-        )
-        floor = _reach(floor, (source.values - level)[lasting])
     odds = np.maximum(
         _log_odds(source.values - level, floor.scatter, floor.span),
         _log_odds(sharp - level, gain * floor.scatter, floor.span),
     )
     off = two_states.posterior(odds, source.time, STAY) > PROBABLE
     margin = float(np.clip(MARGIN_POLLS * source.period, MARGIN, MOST_MARGIN))
-    return near(source.time, off, recorded, margin)
+    off = near(source.time, off, recorded, margin)
+    if vehicle.driveline.single_speed:
+        return off
+    lasting = ~near(recorded, ~(need < -SLOWING), recorded, SETTLED)
+    reach = _reach(floor, (source.values - level)[lasting])
+    return off | _untold(source, level, reach, torque)
 
 
-def _reach(floor: Floor, above: Floats) -> Floor:
-    """Widen the scatter of a floor to what the reading shows where the motion slows.
+def _untold(source: Signal, level: Floats, reach: float, torque: Floats) -> Bools:
+    """Where so little torque is taken that a reading off its floor may be a dragged engine's (n,).
 
-    An engine without fuel cut burns its idle charge in overrun, and so reads above its floor.
+    An engine without fuel cut burns its idle charge in overrun, and so reads above its floor what
+    it also reads when it pushes a little. The motion tells these rows, not the reading.
+
+    Parameters
+    ----------
+    source, level : reading and its floor (n,)
+    reach : how far above it the reading of a dragged engine goes
+    torque : (n,) that the motion takes [N m]
+    """
+    above = source.values - level
+    clear = (above > 2.0 * reach) & np.isfinite(torque)
+    if reach <= 0.0 or np.count_nonzero(clear) < 5 * FEWEST:
+        return np.zeros(len(source), dtype=bool)
+    slope, offset = np.polyfit(source.values[clear], torque[clear], 1)
+    least = offset + slope * (float(np.median(level)) + reach)
+    taken = averaged(torque, source.period, PUSHED_TIME)
+    return np.asarray(taken < least)
+
+
+def _reach(floor: Floor, above: Floats) -> float:
+    """How far above its floor the reading goes where the motion slows; 0 within its scatter.
 
     Parameters
     ----------
@@ -211,10 +240,9 @@ def _reach(floor: Floor, above: Floats) -> Floor:
     """
     known = above[np.isfinite(above)]
     if known.size < FEWEST:
-        return floor
-    shown = float(np.percentile(known, 90.0)) / 1.645
-    widest = max(floor.scatter, min(shown, WIDEST * floor.span))
-    return replace(floor, scatter=widest)
+        return 0.0
+    shown = min(float(np.percentile(known, 90.0)), FARTHEST * floor.span)
+    return shown if shown > BEYOND * floor.scatter else 0.0
 
 
 def _log_odds(above: Floats, scatter: Floats | float, span: float) -> Floats:

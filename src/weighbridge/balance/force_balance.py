@@ -98,9 +98,6 @@ BRAKING_FORCE: Final = 0.06
 SWITCH_MARGIN: Final = 0.3
 """Samples nearer than this to a pressed brake switch may be braked [s]."""
 
-SLOWING: Final = 0.03
-"""Force over weight that slows a vehicle so much that no foot is on the accelerator [-]."""
-
 TRAIL: Final = 0.0015
 """Braking force over weight that smoothing may still hold of a brake let go [-]."""
 
@@ -259,7 +256,7 @@ def force_balance(
     signed = signed and vehicle.torque.source in ("measured", "percent")
     needed, weight = _needed_force(vehicle, rows, drag, rotating)
     pressed = brake_pressed(drive, recorded)
-    off = foot_off(drive, vehicle, source, recorded, needed < -SLOWING * weight)
+    off = foot_off(drive, vehicle, source, needed / weight, needed / gearing)
     # What a dragged engine takes is told by a torque alone, and by none where a foot may brake.
     overrun = np.zeros_like(off) if signed and pressed is not None else off
     slowed = off if pressed is None else pressed

@@ -12,7 +12,7 @@ from weighbridge.estimators.slow_errors import NAMES, prior_std
 from weighbridge.estimators.track import MassTrack
 from weighbridge.vehicle.model import Vehicle
 
-FARTHEST: Final = 2.5
+FARTHEST: Final = 4.0
 """Root of the summed squares of slow resistance and drag area, each over its standard deviation
 before the drive, above which the file is another vehicle's [-]: with their own files, drives of
 simulated and foreign vehicles had 0.6 in the middle and 2.2 at most; with those of others, torque
