@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge.balance.force_balance import MergedView
-from weighbridge.calibration.inverse import DriveRows, FitSettings, fit
+from weighbridge.calibration.inverse import DriveRows, FitSettings, TorquePrior, fit
 from weighbridge.vehicle.class_values import road_prior
 
 MASS, DRAG_AREA, ROLLING, ENGINE_INERTIA, WHEEL_INERTIA, RADIUS = 1400.0, 0.62, 0.01, 0.15, 5.0, 0.3
@@ -42,8 +42,9 @@ def made(rng, motion_noise, n=4800):
 def test_the_map_is_found_where_the_motion_is_noisy(motion_noise):
     drive = made(np.random.default_rng(1), motion_noise)
     settings = FitSettings(
-        source="load", order=2, curved=True, torque_noise=5.0, wheel_radius=RADIUS,
-        prior=road_prior("car", single_speed=False),
+        source="load", order=2, curved=True, knots=(), torque_noise=5.0,
+        bounds=TorquePrior(offset=0.5, growth=0.5, lean=1.0, bend=0.5, knot=0.0),
+        wheel_radius=RADIUS, prior=road_prior("car", single_speed=False),
     )  # fmt: skip
     found = fit([drive], settings)
     _, scale, _, _, lean, bend = found.coefficients

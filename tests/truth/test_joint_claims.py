@@ -124,7 +124,7 @@ def test_noise_of_a_measured_torque_does_not_move_the_mean():
             replace(town(3400 + k, 100.0 * k, length=1.5), car=ELECTRIC, polling=polling)
         )
         motion, torque = find_motion(made.drive), made.drive.signals["engine_torque"]
-        for _ in range(6):
+        for _ in range(9):
             drawn = full * rng.standard_normal(torque.values.size)
             little, much = (
                 made.drive.with_signals(

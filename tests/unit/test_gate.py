@@ -59,7 +59,13 @@ def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
         reason=np.zeros(n, dtype=np.uint8),
     )
     side = SimpleNamespace(torque=force / 10.0, engine_speed=10.0 * speed)
-    motion = SimpleNamespace(source="inertial", squat=0.003, squat_std=0.0)
+    motion = SimpleNamespace(
+        source="inertial",
+        squat=0.003,
+        squat_std=0.0,
+        grade_open=0.0,
+        mean_accel_std=lambda _: 0.0,
+    )
     return ForceBalance(force=side, motion=motion, merged=view)
 
 
@@ -167,7 +173,7 @@ def test_slow_errors_add_up_as_their_covariance_says(monkeypatch):
     phi = view.specific_force
     index = np.arange(0, phi.size, 25)
     influence = phi[index] / np.sum(phi[index] ** 2)
-    std = np.zeros(11)
+    std = np.zeros(9)
     std[1] = 400.0
     monkeypatch.setattr(fit_std, "prior_std", lambda *_: std)
     passing, lasting = slow_std(made, BUS, index, influence, MASS)
@@ -217,9 +223,9 @@ def test_a_file_whose_resistance_is_another_vehicles_is_refused(made, car, own, 
     balance = own.result.balance
     sure = replace(car.road_load, drag_area_std=0.03, rolling_coefficient_std=0.001)
     car = replace(car, road_load=sure)
-    assert foreign.of_another(balance, car, own.result) == ""
+    assert foreign.of_another(balance, car, own.result) == (False, "")
     view = balance.merged
-    more = 0.1 * made.scenario.mass
+    more = 0.4 * made.scenario.mass
     slower = replace(balance, merged=replace(view, traction_force=view.traction_force + more))
     found = weigh_balance(made.drive, car, method, slower)
     assert found.status is Status.INCONSISTENT

@@ -73,7 +73,7 @@ def test_without_a_calibration_an_unknown_squat_widens_the_interval(weighed):
     assert 0.3 * GRAVITY * SQUAT[1] < added <= 1.05 * GRAVITY * SQUAT[1]
     # The middle of what cars do is taken out: what is left is the difference.
     off = GRAVITY * abs(K - SQUAT[0])
-    assert abs(hidden.mass / shown.mass - 1.0) < 1.2 * off
+    assert abs(hidden.mass / shown.mass - 1.0) < 2.0 * off
 
 
 @pytest.mark.parametrize(

@@ -116,7 +116,7 @@ def test_track(good, tmp_path):
     assert track.height == STAMPS.size
     assert track["used"].sum() == np.count_nonzero(good.result.used)
     reasons = set(track["reason"])
-    assert reasons == {"", "not accelerating"}
+    assert reasons == {"", "not accelerating", "overrun"}
     for suffix, read in ((".csv", pl.read_csv), (".parquet", pl.read_parquet)):
         path = tmp_path / f"track{suffix}"
         good.write_track(path)

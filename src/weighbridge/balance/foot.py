@@ -36,6 +36,9 @@ SHARE: Final = 0.06
 """Part of a bin's readings that lie on a floor; of an engine that was never dragged at that speed
 fewer are so near its lowest reading [-]."""
 
+HIGHEST: Final = 0.25
+"""Floor over the highest reading, at most [-]: idling and dragged engines read a tenth or less."""
+
 SLOPE: Final = 0.02
 """Rise of the floor from one bin to the next, over the range of the reading, at most [-]."""
 
@@ -122,7 +125,7 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
     Returns
     -------
     Floor
-        None where there are too few samples.
+        None where there are too few samples, or the engine was never dragged.
     """
     known = np.isfinite(reading) & np.isfinite(engine_speed) & (engine_speed > SLOWEST_ENGINE)
     if np.count_nonzero(known) < 5 * FEWEST:
@@ -141,13 +144,15 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
         if inside.size < FEWEST:
             continue
         near = inside[inside <= np.percentile(inside, LOW) + SPREAD * span]
+        if np.median(near) > HIGHEST * high:
+            continue
         if near.size >= max(0.5 * FEWEST, SHARE * inside.size):
             level[k] = np.median(near)
             rest.append(near - level[k])
     middle = np.asarray(SLOWEST_ENGINE * BIN ** (np.arange(count) + 0.5), dtype=np.float64)
     shown = np.isfinite(level)
     if not shown.any():
-        return Floor(middle, np.full(count, low), SCATTER[1] * span, span)
+        return None
     # Where an engine was never dragged its lowest readings are no floor: it does not rise
     # faster than the floors beside it allow.
     every = np.arange(count)
@@ -168,7 +173,8 @@ def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torqu
     ----------
     drive, vehicle
     source : what the torque is made from
-    need : (n,) force that the motion takes over weight, at the stamps of the source [-]
+    need : (n,) force that the motion takes over weight, at the stamps of the source [-]; NaN
+        where nothing measures the grade
     torque : (n,) torque of the engine that the motion takes [N m]; NaN without a gear
     """
     recorded = source.time
@@ -185,6 +191,8 @@ def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torqu
         driven = np.where(np.nan_to_num(speed.at(source.time)) > MOVING, driven, np.nan)
     if vehicle.driveline.single_speed:
         # A motor that recuperates may be helped by the brake, and no floor tells where it ends.
+        if np.isfinite(need).any():
+            return np.asarray(~(averaged(need, source.period, PUSHED_TIME) > 0.0))
         finite = driven[np.isfinite(driven)]
         span = float(np.percentile(np.abs(finite), 99.5)) if finite.size else 0.0
         floor = Floor(np.ones(1), np.zeros(1), SCATTER[0] * span, span) if span > 0.0 else None
@@ -193,6 +201,8 @@ def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torqu
     if floor is None:
         return np.zeros(recorded.size, dtype=bool)
     level = floor.at(np.nan_to_num(turning))
+    # An engine brake reads far less than an engine that is dragged, and neither pushes.
+    level = np.where(level < -HIGHEST * floor.span, 0.0, level)
     sharp, gain = unsmoothed(source)
     odds = np.maximum(
         _log_odds(source.values - level, floor.scatter, floor.span),

@@ -18,7 +18,7 @@ from weighbridge.constants import (
     STANDARD_PRESSURE,
     STANDARD_TEMPERATURE,
 )
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.vehicle.air import air_density
 from weighbridge.vehicle.data_sheet import wheel_share
@@ -256,7 +256,8 @@ def force_balance(
     signed = signed and vehicle.torque.source in ("measured", "percent")
     needed, weight = _needed_force(vehicle, rows, drag, rotating)
     pressed = brake_pressed(drive, recorded)
-    off = foot_off(drive, vehicle, source, needed / weight, needed / gearing)
+    told = np.nan if motion.source in BY_SPEED else 1.0
+    off = foot_off(drive, vehicle, source, told * needed / weight, told * needed / gearing)
     # What a dragged engine takes is told by a torque alone, and by none where a foot may brake.
     overrun = np.zeros_like(off) if signed and pressed is not None else off
     slowed = off if pressed is None else pressed

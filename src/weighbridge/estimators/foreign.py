@@ -12,11 +12,15 @@ from weighbridge.estimators.slow_errors import NAMES, prior_std
 from weighbridge.estimators.track import MassTrack
 from weighbridge.vehicle.model import Vehicle
 
-FARTHEST: Final = 4.0
+FARTHEST: Final = 8.0
 """Root of the summed squares of slow resistance and drag area, each over its standard deviation
 before the drive, above which the file is another vehicle's [-]: with their own files, drives of
 simulated and foreign vehicles had 0.6 in the middle and 2.2 at most; with those of others, torque
-from load and gearings alike, 0.9 to 7, half of them above 2.6."""
+from load and gearings alike, 0.9 to 7, half of them above 2.6; with a file from one drive in
+another wind, up to 7.4."""
+
+DOUBTFUL: Final = 4.0
+"""The same, above which a warning says so [-]."""
 
 
 def stretched(track: MassTrack, vehicle: Vehicle) -> float:
@@ -38,7 +42,7 @@ def stretched(track: MassTrack, vehicle: Vehicle) -> float:
     return float(np.hypot(resistance, drag))
 
 
-def of_another(balance: ForceBalance, vehicle: Vehicle, track: MassTrack) -> str:
+def of_another(balance: ForceBalance, vehicle: Vehicle, track: MassTrack) -> tuple[bool, str]:
     """Say why the vehicle file is another vehicle's, in a sentence; nothing if it may be its own.
 
     Only files of a calibration for ``joint`` can tell: a data sheet leaves more open, and fits
@@ -48,15 +52,20 @@ def of_another(balance: ForceBalance, vehicle: Vehicle, track: MassTrack) -> str
     ----------
     balance, vehicle
     track : of any method; the joint estimator is run where it is of another
+
+    Returns
+    -------
+    refused : whether there is no mass for it
+    doubt : one sentence; empty where nothing is doubted
     """
     if vehicle.provenance.method != "joint" or not vehicle.provenance.torque_fitted:
-        return ""
+        return False, ""
     if track.method != "joint":
         track = joint.estimate(balance, vehicle)
     far = stretched(track, vehicle)
-    if far <= FARTHEST:
-        return ""
-    return (
+    if far <= DOUBTFUL:
+        return False, ""
+    return far > FARTHEST, (
         f"the drive takes resistance and air drag {far:.1f} standard deviations from those of "
         f"{vehicle.name}: the vehicle file is another vehicle's, or much has changed since it was "
         "calibrated; calibrate this vehicle"

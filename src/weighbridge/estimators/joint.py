@@ -33,7 +33,7 @@ from weighbridge.estimators.slow_errors import (
     prior_std,
     usable_rows,
 )
-from weighbridge.estimators.squat import lean
+from weighbridge.estimators.squat import Lean, lean
 from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.navigation.motion import MotionSource
@@ -213,20 +213,19 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
 
     time = cut.mean(view.time)
     odds = change_odds(view, time) if load_changes else np.full(time.size, np.nan)
-    guess = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
-    # The levels of noise and the squat are told in terms of the mass: they should not hang on
-    # the guess.
-    for _ in range(2):
-        body = lean(balance, vehicle, guess)
+    rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
+
+    def problem_of(mass: float | None) -> tuple[_Problem, Lean, Floats, Floats]:
+        """State the problem; squat and levels of noise are told in terms of a mass [kg]."""
+        body = lean(balance, vehicle, mass or rough)
         rows, y = design(view, vehicle, leaned=body.leaned(view.accel))
-        problem = _Problem(
-            time=time,
-            rows=np.ascontiguousarray(cut.mean(rows)),
-            y=cut.mean(y),
-            odds=odds,
-            **_sizes(balance, vehicle, cut, guess),
-        )
-        guess = _sensible(problem.filtered())
+        means, sums = np.ascontiguousarray(cut.mean(rows)), cut.mean(y)
+        sizes = _sizes(balance, vehicle, cut, mass or first_guess(means[:, 0], sums))
+        return _Problem(time=time, rows=means, y=sums, odds=odds, **sizes), body, rows, y
+
+    # They should not hang on the guess.
+    problem, body, rows, y = problem_of(None)
+    problem, body, rows, y = problem_of(_sensible(problem.filtered()))
     fast, slow = problem.likeliest()
     _, running, running_var, begins = problem.changes(fast, slow)
     start, noise, params = problem.kernel_input(fast, slow)

@@ -216,7 +216,7 @@ def lean(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Lean:
     rows_lean = motion.source not in BY_SPEED and motion.squat is None
     torque_leans = made.torque_fitted and given is None and made.motion not in BY_SPEED
     if rows_lean == torque_leans:
-        if rows_lean or given is None or not made.torque_fitted:
+        if rows_lean or given is None or motion.squat is None or not made.torque_fitted:
             return Lean(0.0, found_std)
         return Lean(squat_at(given, mass, made.masses, vehicle.kind) - motion.squat, found_std)
     if rows_lean:

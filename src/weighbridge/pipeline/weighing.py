@@ -301,9 +301,11 @@ def weigh_balance(
             "are wrong; calibrate this vehicle"
         )
     if status is Status.CONVERGED and method not in SPEED_ALONE:
-        another = of_another(balance, vehicle, result)
-        if another:
-            status, reason = Status.INCONSISTENT, another
+        refused, doubt = of_another(balance, vehicle, result)
+        if refused:
+            status, reason = Status.INCONSISTENT, doubt
+        elif doubt:
+            warnings += (doubt,)
     return Weighing(
         drive=drive,
         vehicle=vehicle,
