@@ -9,8 +9,18 @@ from numpy.testing import assert_allclose
 import weighbridge as wb
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators import joint
-from weighbridge.estimators.squat import SQUAT, Lean, lean, squat_by_speed
+from weighbridge.estimators.squat import (
+    DRIVE_STD,
+    SQUAT,
+    Lean,
+    lean,
+    of_vehicle,
+    pooled,
+    squat_at,
+    squat_by_speed,
+)
 from weighbridge.navigation.longitudinal import longitudinal_motion
+from weighbridge.navigation.motion import with_squat
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 
@@ -155,3 +165,44 @@ def test_one_accelerometer_shows_its_lean_against_the_wheels(weighed, k):
 def test_a_drive_that_hardly_accelerates_shows_no_lean():
     assert squat_by_speed(along(0.0, swing=0.05)) is None
     assert squat_by_speed(along(0.0, seconds=120.0)) is None
+
+
+def moved(squat, *, std=2e-4):
+    """Motion of a drive that shows a squat."""
+    return replace(along(0.0, seconds=200.0), source="inertial", squat=squat, squat_std=std)
+
+
+def test_drives_of_a_calibration_share_one_squat():
+    squat, std = pooled([moved(0.003), moved(0.005), moved(0.004)], (1500.0,) * 3, "car")
+    # Three drives and the usual squat, by their variances.
+    drives, usual = 3.0 / (2e-4**2 + DRIVE_STD**2), 1.0 / SQUAT[1] ** 2
+    assert squat == pytest.approx((0.004 * drives + SQUAT[0] * usual) / (drives + usual))
+    assert std == pytest.approx((drives + usual) ** -0.5)
+    assert pooled([replace(moved(0.003), squat=None)], (1500.0,), "car") is None
+
+
+def test_squat_of_a_truck_grows_with_its_mass():
+    masses = (8000.0, 16_000.0)
+    squat, _ = pooled([moved(0.001), moved(0.002)], masses, "truck")
+    assert squat == pytest.approx(0.0015, rel=0.2)
+    assert squat_at(squat, 16_000.0, masses, "truck") == pytest.approx(squat * 4.0 / 3.0)
+    assert squat_at(squat, 16_000.0, masses, "car") == squat
+
+
+def test_another_squat_is_taken_out_of_grade_and_specific_force():
+    motion = moved(0.003)
+    other = with_squat(motion, 0.005, 1e-4)
+    assert_allclose(other.grade, motion.grade - 0.002 * motion.accel)
+    assert_allclose(
+        other.specific_force - other.accel,
+        motion.specific_force
+        - motion.accel
+        - GRAVITY * np.cos(motion.grade) * 0.002 * motion.accel,
+    )
+
+
+def test_weighing_holds_the_squat_of_the_calibration(weighed):
+    car, _ = weighed
+    held = of_vehicle(moved(0.009), calibrated(car, K))
+    assert held.squat == K
+    assert of_vehicle(moved(0.009), uncalibrated(car)).squat == 0.009

@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.errors import DriveError
+from weighbridge.errors import ConfigError, DriveError
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque import (
     air_flow_torque,
     engine_torque,
+    knot_parts,
     lowest_load,
+    parameters,
     reading_of,
+    rows_of,
     torque_rows,
 )
 
@@ -100,3 +103,36 @@ def test_what_is_missing_is_named(source):
     coefficients = (0.0, 1.0) if source == "load" else ()
     with pytest.raises(DriveError, match=f"torque source '{source}'"):
         torque(drive(throttle=[0.5] * 5), source=source, coefficients=coefficients)
+
+
+KNOTS = (120.0, 180.0, 260.0)
+
+
+def test_parts_of_the_knots_add_up_to_one_and_end_flat():
+    parts = knot_parts(np.array([50.0, 120.0, 150.0, 200.0, 900.0]), KNOTS)
+    assert_allclose(parts.sum(axis=1), 1.0)
+    assert_allclose(parts[0], [1.0, 0.0, 0.0])
+    assert_allclose(parts[2], [0.5, 0.5, 0.0])
+    assert_allclose(parts[4], [0.0, 0.0, 1.0])
+
+
+def test_a_map_with_knots_is_undone_by_its_reading():
+    model = TorqueModel(
+        source="load", coefficients=(-12.0, 160.0, -0.03), curvature=(0.05, -20.0),
+        knots=KNOTS, knot_slopes=(8.0, -5.0, 12.0),
+    )  # fmt: skip
+    load = np.array([0.1, 0.3, 0.5, 0.8, 0.95])
+    made = rows_of(model, load, SPEED) @ parameters(model)
+    assert_allclose(reading_of(made, SPEED, model), load, rtol=1e-9)
+    assert_allclose(
+        rows_of(model.scaled(1.1), load, SPEED) @ parameters(model.scaled(1.1)), 1.1 * made
+    )
+
+
+@pytest.mark.parametrize(
+    ("knots", "slopes", "said"),
+    [((120.0, 180.0), (1.0,), "as many as knots"), ((180.0, 120.0), (1.0, 2.0), "must rise")],
+)
+def test_knots_that_cannot_be_are_refused(knots, slopes, said):
+    with pytest.raises(ConfigError, match=said):
+        TorqueModel(knots=knots, knot_slopes=slopes)

@@ -1,0 +1,200 @@
+"""Rows on which the foot may be on the brake, on made-up drives whose braking is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from weighbridge.balance import Reason, force_balance
+from weighbridge.balance.foot import find_floor, foot_off, near, unsmoothed
+from weighbridge.constants import GRAVITY
+from weighbridge.kernels import two_states
+from weighbridge.navigation.motion import Motion
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel, Vehicle
+
+END = 1200.0
+CLOCK = np.arange(0.0, END, 0.05)
+STAMPS = np.arange(1.0, END - 2.0, 0.25)
+MASS, GEARING, FULL = 1500.0, 10.0, 150.0
+DRAGGED, FLOOR = -25.0, 0.08
+
+
+def foot(time):
+    """1 where the accelerator is pressed: 16 of every 20 s."""
+    return ((time % 20.0) < 16.0).astype(float)
+
+
+def braked(time):
+    """Force of the brake [N]: light, in the middle of every other dragged stretch."""
+    phase = time % 40.0
+    return np.where((phase > 16.8) & (phase < 19.5), 300.0, 0.0)
+
+
+def torque_of(time, part=None):
+    pushing = 20.0 + 60.0 * (0.5 + 0.5 * np.sin(0.31 * time)) if part is None else part
+    return np.where(foot(time) > 0.5, pushing, DRAGGED)
+
+
+def load_of(time):
+    """PID 04 of `torque_of`, with the floor of a dragged engine."""
+    return np.where(foot(time) > 0.5, FLOOR + torque_of(time) / FULL, FLOOR)
+
+
+CAR = Vehicle(
+    tare=MASS,
+    driveline=Driveline(
+        gearings=(2.0 * GEARING, GEARING), engine_inertia=0.0, wheel_inertia=0.0, efficiency=1.0
+    ),
+    road_load=RoadLoad(drag_area=0.0, rolling_coefficient=0.01),
+    timing=Timing(torque_delay=0.0),
+)
+
+
+def motion(braking=True, lag=0.0):
+    """What torque and brake make of the vehicle on the flat."""
+    force = GEARING * torque_of(CLOCK) - MASS * GRAVITY * 0.01
+    accel = (force - (braked(CLOCK) if braking else 0.0)) / MASS
+    zeros, nothing = np.zeros(CLOCK.size), np.full(CLOCK.size, np.nan)
+    return Motion(
+        source="inertial", time=CLOCK, speed=np.full(CLOCK.size, 15.0), accel=accel,
+        specific_force=accel, grade=zeros, pitch=zeros, roll=zeros, heading=nothing,
+        distance=15.0 * CLOCK, altitude=zeros, latitude=nothing, longitude=nothing,
+        valid=np.ones(CLOCK.size, dtype=bool), specific_force_std=0.05, grade_std=zeros + 0.01,
+    )  # fmt: skip
+
+
+def recorded(**values):
+    signals = {"engine_speed": np.full(STAMPS.size, 150.0), "vehicle_speed": 15.0 + 0.0 * STAMPS}
+    signals |= values
+    return Drive(
+        "d", {n: Signal(n, STAMPS, np.asarray(v, dtype=float)) for n, v in signals.items()}
+    )
+
+
+def reasons(drive, car=CAR, **balance):
+    return force_balance(drive, car, motion(), **balance).merged.reason
+
+
+LOADED = replace(CAR, torque=TorqueModel(source="load", coefficients=(-FULL * FLOOR, FULL)))
+
+
+@pytest.mark.parametrize("source", ["measured", "load"])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_no_row_is_braked_and_most_that_push_are_used(source, noise):
+    random = np.random.default_rng(5)
+    read = torque_of(STAMPS) if source == "measured" else load_of(STAMPS)
+    read = read + noise * np.ptp(read) * random.standard_normal(read.size)
+    name = "engine_torque" if source == "measured" else "engine_load"
+    used = reasons(recorded(**{name: read}), CAR if source == "measured" else LOADED) == Reason.USED
+    assert not np.any(used & (braked(STAMPS) > 0.0))
+    pushing = foot(STAMPS) > 0.5
+    assert np.count_nonzero(used & pushing) > 0.85 * np.count_nonzero(pushing)
+
+
+def test_a_brake_switch_leaves_the_dragged_rows_of_a_torque():
+    switch = (braked(STAMPS) > 0.0).astype(float)
+    found = reasons(recorded(engine_torque=torque_of(STAMPS), brake_switch=switch))
+    away = ~near(STAMPS, switch > 0.5, STAMPS, 0.35)
+    assert np.all(found[switch > 0.5] == Reason.BRAKING)
+    assert np.all(found[away & (foot(STAMPS) < 0.5)] == Reason.USED)
+
+
+def test_the_pedal_tells_where_it_is_recorded():
+    pedal = 0.15 + 0.3 * foot(STAMPS)
+    steady = np.full(STAMPS.size, 50.0)
+    found = reasons(recorded(engine_torque=steady, accelerator_pedal=pedal))
+    off = foot(STAMPS) < 0.5
+    assert np.all(found[off] == Reason.OVERRUN)
+    assert np.mean(found[~off] == Reason.USED) > 0.9
+
+
+def test_smoothing_holds_a_brake_that_was_let_go():
+    hard = np.where((STAMPS % 20.0 > 17.0) & (STAMPS % 20.0 < 17.5), 1.0, 0.0)
+    drive = recorded(engine_torque=np.full(STAMPS.size, 30.0), brake_switch=hard)
+    slowed = np.where((CLOCK % 20.0 > 17.0) & (CLOCK % 20.0 < 17.5), -3.0, 0.1)
+    moved = replace(motion(), specific_force=slowed, accel=slowed)
+    after = (STAMPS % 20.0 > 18.0) & (STAMPS % 20.0 < 18.6)
+    assert np.all(force_balance(drive, CAR, moved, lag=0.4).merged.reason[after] != Reason.USED)
+    assert np.all(force_balance(drive, CAR, moved, lag=0.0).merged.reason[after] == Reason.USED)
+
+
+def test_a_foot_that_taps_the_brake_is_found_through_the_smoothing():
+    lag, fine = 0.3, np.arange(0.0, END, 0.01)
+    tapped = (fine % 30.0 > 10.0) & (fine % 30.0 < 10.4)
+    dragged = tapped | ((fine % 30.0 > 20.0) & (fine % 30.0 < 23.0))
+    held = np.where(dragged, FLOOR, 0.45)
+    read = np.empty_like(held)
+    read[0] = held[0]
+    keep = np.exp(-0.01 / lag)
+    for k in range(1, held.size):
+        read[k] = keep * read[k - 1] + (1.0 - keep) * held[k]
+    drive = recorded(engine_load=np.interp(STAMPS, fine, read))
+    source = drive.signals["engine_load"]
+    # The smoothed reading stays far off its floor.
+    assert np.min(source.values[(STAMPS % 30.0 > 9.0) & (STAMPS % 30.0 < 12.0)]) > FLOOR + 0.08
+    unknown = np.full(STAMPS.size, np.nan)
+    off = foot_off(drive, LOADED, source, unknown, unknown)
+    assert np.all(off[(STAMPS % 30.0 > 10.0) & (STAMPS % 30.0 < 10.4)])
+    assert not np.any(off[(STAMPS % 30.0 > 3.0) & (STAMPS % 30.0 < 8.0)])
+
+
+def test_idle_charge_in_overrun_reads_above_the_floor():
+    """Half of the dragged stretches read 0.09 above the floor, as light pushing does."""
+    high = (STAMPS % 40.0) < 20.0
+    read = load_of(STAMPS) + 0.09 * (high & (foot(STAMPS) < 0.5))
+    drive = recorded(engine_load=read)
+    source = drive.signals["engine_load"]
+    made = motion(braking=False)
+    torque = np.interp(STAMPS, CLOCK, MASS * (made.accel + 0.01 * GRAVITY) / GEARING)
+    need = torque * GEARING / MASS / GRAVITY - 0.02 * (foot(STAMPS) < 0.5)
+    off = foot_off(drive, LOADED, source, need, torque)
+    dragged = ~near(STAMPS, foot(STAMPS) > 0.5, STAMPS, 0.6)
+    assert np.all(off[dragged & high])
+    blind = np.full(STAMPS.size, np.nan)
+    assert not np.all(foot_off(drive, LOADED, source, blind, blind)[dragged & high])
+
+
+def test_the_floor_is_that_of_engine_speeds_at_which_it_was_dragged():
+    random = np.random.default_rng(2)
+    turning = random.uniform(100.0, 400.0, 8000)
+    dragged = (random.random(8000) < 0.2) & (turning < 250.0)
+    read = np.where(dragged, 0.05 + 1e-4 * turning, random.uniform(0.25, 1.0, 8000))
+    floor = find_floor(read + 0.004 * random.standard_normal(8000), turning)
+    assert_allclose(floor.at(np.array([120.0, 200.0])), [0.062, 0.07], atol=0.012)
+    # Never dragged at 380 rad/s: lowest readings there are no floor.
+    assert floor.at(np.array([380.0]))[0] < 0.2
+    assert find_floor(random.uniform(0.4, 1.0, 8000), turning) is None
+
+
+def test_an_engine_brake_does_not_hide_a_dragged_engine():
+    braking = (STAMPS % 20.0) > 18.0
+    read = np.where(braking, -120.0, torque_of(STAMPS))
+    found = reasons(recorded(engine_torque=read))
+    assert not np.any((found == Reason.USED) & (foot(STAMPS) < 0.5))
+
+
+def test_unsmoothed_undoes_a_first_order_lag():
+    time = np.arange(0.0, 3.0, 0.25)
+    read = 0.4 * np.exp(-time / 0.3)
+    sharp, gain = unsmoothed(Signal("engine_load", time, read))
+    assert_allclose(sharp[1:], 0.0, atol=1e-12)
+    assert np.all(gain[1:] > 1.0)
+    assert np.isnan(sharp[0])
+
+
+def test_two_states_equal_the_sum_over_all_paths():
+    random = np.random.default_rng(7)
+    time = np.cumsum(random.uniform(0.1, 0.6, 8))
+    ratio = random.normal(0.0, 1.5, 8)
+    stay = 1.3
+    total, first = 0.0, np.zeros(8)
+    for path in range(2**8):
+        bits = np.array([(path >> k) & 1 for k in range(8)])
+        change = 0.5 * (1.0 - np.exp(-2.0 * np.diff(time) / stay))
+        moves = np.where(bits[1:] != bits[:-1], change, 1.0 - change)
+        weight = 0.5 * np.prod(moves) * np.exp(np.sum(ratio[bits == 1]))
+        total += weight
+        first += weight * bits
+    assert_allclose(two_states.posterior(ratio, time, stay), first / total, rtol=1e-9)
