@@ -101,13 +101,18 @@ def test_a_brake_switch_leaves_the_dragged_rows_of_a_torque():
     assert np.all(found[away & (foot(STAMPS) < 0.5)] == Reason.USED)
 
 
-def test_the_pedal_tells_where_it_is_recorded():
-    pedal = 0.15 + 0.3 * foot(STAMPS)
-    steady = np.full(STAMPS.size, 50.0)
-    found = reasons(recorded(engine_torque=steady, accelerator_pedal=pedal))
+def test_a_pressed_accelerator_is_no_brake_and_a_pedal_that_is_up_may_be_cruise_control():
+    pressed = np.where(STAMPS < 0.5 * END, 0.45, 0.15)
+    read = torque_of(STAMPS)
+    found = reasons(recorded(engine_torque=read, accelerator_pedal=pressed))
+    first = STAMPS < 0.5 * END - 2.0
+    assert np.all(found[first] != Reason.OVERRUN)
     off = foot(STAMPS) < 0.5
-    assert np.all(found[off] == Reason.OVERRUN)
-    assert np.mean(found[~off] == Reason.USED) > 0.9
+    assert np.all(found[~first & off] != Reason.USED)
+    up = 0.15 + 0.0 * STAMPS
+    up[::200] = 0.6
+    steering = reasons(recorded(engine_torque=read, accelerator_pedal=up))
+    assert np.mean(steering[~off] == Reason.USED) > 0.85
 
 
 def test_smoothing_holds_a_brake_that_was_let_go():

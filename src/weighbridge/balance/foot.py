@@ -167,7 +167,7 @@ def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torqu
 
     Two hidden states, dragged and pushing, of which a dragged engine reads its floor and a
     pushing one anything above: so the noise of a reading does not choose rows one by one.
-    Where the position of the accelerator is told, it decides.
+    Where the position of the accelerator is told and it is pressed, no foot is on the brake.
 
     Parameters
     ----------
@@ -177,12 +177,25 @@ def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torqu
         where nothing measures the grade
     torque : (n,) torque of the engine that the motion takes [N m]; NaN without a gear
     """
-    recorded = source.time
+    return _dragged(drive, vehicle, source, need, torque) & ~_pressed(drive, vehicle, source.time)
+
+
+def _pressed(drive: Drive, vehicle: Vehicle, recorded: Floats) -> Bools:
+    """Where the accelerator is surely pressed, so that the brake is not (n,).
+
+    A pedal that is up tells less: cruise control pushes without a foot.
+    """
     pedal = _pedal(drive, vehicle)
-    if pedal is not None:
-        released = pedal.values <= float(np.percentile(pedal.values, 1.0)) + PRESSED
-        off = near(pedal.time, released, recorded, MARGIN)
-        return np.asarray(off | (pedal.age(recorded) > 3.0 * pedal.period))
+    if pedal is None:
+        return np.zeros(recorded.size, dtype=bool)
+    up = pedal.values <= float(np.percentile(pedal.values, 1.0)) + PRESSED
+    known = pedal.age(recorded) <= 3.0 * pedal.period
+    return np.asarray(known & ~near(pedal.time, up, recorded, MARGIN))
+
+
+def _dragged(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torque: Floats) -> Bools:
+    """Where engine or motor may be dragged, by reading and motion; parameters of `foot_off`."""
+    recorded = source.time
     engine = drive.get("engine_speed")
     turning = engine.at(source.time) if engine is not None else np.full(len(source), np.nan)
     speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
