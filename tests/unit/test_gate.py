@@ -156,14 +156,14 @@ def test_the_interval_of_least_squares_holds_under_errors_that_last(monkeypatch)
 
     assert held() >= 0.9
     # The scatter of blocks does not see it.
-    monkeypatch.setattr("weighbridge.estimators.rls.slow_std", lambda *_: (0.0, 0.0))
+    monkeypatch.setattr("weighbridge.estimators.fit_std.slow_std", lambda *_: (0.0, 0.0))
     assert held() < 0.9
 
 
 @pytest.mark.parametrize("method", ["robust-rls", "ekf", "hybrid"])
 def test_no_method_is_surer_than_slow_errors_allow(method, monkeypatch):
     honest = ESTIMATORS[method](balance(swing=0.5), BUS).std
-    monkeypatch.setattr("weighbridge.estimators.robust_rls.slow_std", lambda *_: (0.0, 0.0))
+    monkeypatch.setattr("weighbridge.estimators.fit_std.slow_std", lambda *_: (0.0, 0.0))
     assert honest > 1.05 * ESTIMATORS[method](balance(swing=0.5), BUS).std
 
 

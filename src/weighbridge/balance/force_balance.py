@@ -254,7 +254,7 @@ def force_balance(
     drag = 0.5 * density * vehicle.road_load.drag_area * air_speed * np.abs(air_speed)
 
     signed = signed and vehicle.torque.source in ("measured", "percent")
-    needed, weight = _needed_force(vehicle, rows, drag, rotating)
+    needed, weight = _needed_force(vehicle, rows["specific_force"], drag, rotating)
     pressed = brake_pressed(drive, recorded)
     told = np.nan if motion.source in BY_SPEED else 1.0
     off = foot_off(drive, vehicle, source, told * needed / weight, told * needed / gearing)
@@ -450,19 +450,18 @@ def _gears(
     return gear, gearing, slipping
 
 
-def _mass_known(vehicle: Vehicle) -> float:
-    """Largest mass known [kg]: drag explains least of how a heavy vehicle slows down."""
-    return max(vehicle.provenance.masses, default=vehicle.tare or TYPICAL_MASS[vehicle.kind])
-
-
 def _needed_force(
-    vehicle: Vehicle, rows: dict[str, Floats], drag: Floats, rotating: Floats
+    vehicle: Vehicle, specific_force: Floats, drag: Floats, rotating: Floats | float = 0.0
 ) -> tuple[Floats, float]:
-    """Force at the wheels (n,) that the motion takes, and the weight it is told for [N]."""
-    mass = _mass_known(vehicle)
+    """Force at the wheels (n,) that the motion takes, and the weight it is told for [N].
+
+    Its sign hangs on the mass through the drag alone. The largest mass known is the
+    cautious one: drag explains least of how a heavy vehicle slows down.
+    """
+    mass = max(vehicle.provenance.masses, default=vehicle.tare or TYPICAL_MASS[vehicle.kind])
     rolling = vehicle.road_load.rolling_coefficient * GRAVITY
-    needed = (mass + np.nan_to_num(rotating)) * rows["specific_force"] + mass * rolling + drag
-    return needed, mass * GRAVITY
+    needed = (mass + np.nan_to_num(rotating)) * specific_force + mass * rolling + drag
+    return np.asarray(needed), mass * GRAVITY
 
 
 def _trailing(
@@ -485,16 +484,14 @@ def _trailing(
     """
     if lag <= 0.0 or not slowed.any():
         return np.zeros(time.size, dtype=bool)
-    mass = _mass_known(vehicle)
-    load = vehicle.road_load
     nearest = np.clip(np.searchsorted(time, motion.time), 0, time.size - 1)
-    needed = mass * (motion.specific_force + load.rolling_coefficient * GRAVITY)
     density = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)
-    needed = needed + 0.5 * density * load.drag_area * motion.speed**2
+    drag = 0.5 * density * vehicle.road_load.drag_area * motion.speed**2
+    needed, weight = _needed_force(vehicle, motion.specific_force, drag)
     dragged = np.minimum(np.nan_to_num(traction), 0.0)[nearest] if traction is not None else 0.0
     brake = np.where(slowed[nearest], np.maximum(dragged - np.nan_to_num(needed), 0.0), 0.0)
     held = np.interp(time, motion.time, behind(brake, motion.rate, lag))
-    return np.asarray(held > TRAIL * mass * GRAVITY)
+    return np.asarray(held > TRAIL * weight)
 
 
 def brake_pressed(drive: Drive, recorded: Floats) -> Bools | None:

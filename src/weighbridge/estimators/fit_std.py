@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from weighbridge.balance import ForceBalance
 from weighbridge.estimators.considered import force_columns, open_std
+from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.estimators.slow_errors import (
     LASTING,
     NAMES,
@@ -17,7 +18,8 @@ from weighbridge.estimators.slow_errors import (
     design,
     prior_std,
 )
-from weighbridge.signals import Floats, Ints
+from weighbridge.estimators.track import Status
+from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.model import Vehicle
 
 BIN: Final = 2.5
@@ -26,6 +28,26 @@ BIN: Final = 2.5
 
 
 COLD: Final = NAMES.index("cold_torque")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fitted:
+    """A mass that is a weighted sum of forces.
+
+    Attributes
+    ----------
+    mass : [kg]
+    scatter : its standard deviation by blocks of time [kg]
+    blocks : how many
+    index : (m,) rows of the merged view, rising
+    influence : (m,) what a newton at each row adds to the mass [kg/N]
+    """
+
+    mass: float
+    scatter: float
+    blocks: int
+    index: Ints
+    influence: Floats
 
 
 def slow_std(
@@ -113,6 +135,45 @@ def honest_std(scatter: float, blocks: int, slow: float, left: float) -> tuple[f
     if not (np.isfinite(std) and scatter > 0.0):
         return std, freedom
     return std, freedom * (std / scatter) ** 4
+
+
+def judged(
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    used: Bools,
+    phi: Floats,
+    fitted: Fitted,
+    slow: float,
+) -> tuple[float, float, Status, str]:
+    """Find how sure a fit of a published method is, and whether it carries a mass.
+
+    Parameters
+    ----------
+    balance, vehicle
+    used : (n,)
+    phi : (n,) regressor of the mass [m/s^2]
+    fitted
+    slow : `weighbridge.estimators.judging.consider_std` [-]
+
+    Returns
+    -------
+    std, degrees_of_freedom : as of `honest_std`
+    status, why : as of `weighbridge.estimators.judging.judge`
+    """
+    passing, lasting = slow_std(balance, vehicle, fitted.index, fitted.influence, fitted.mass)
+    left = float(np.hypot(fitted.mass * slow, lasting))
+    std, freedom = honest_std(fitted.scatter, fitted.blocks, passing, left)
+    evidence = Evidence(
+        view=balance.merged,
+        used=used,
+        phi=phi,
+        mass=fitted.mass,
+        std=std,
+        blocks=fitted.blocks,
+        left=left,
+        degrees_of_freedom=freedom,
+    )
+    return std, freedom, *judge(evidence, vehicle)
 
 
 def _known_road_load(vehicle: Vehicle) -> Vehicle:

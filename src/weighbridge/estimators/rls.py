@@ -9,12 +9,10 @@ import numpy as np
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.fit_std import honest_std, slow_std
+from weighbridge.estimators.fit_std import Fitted, judged
 from weighbridge.estimators.judging import (
-    Evidence,
     consider_std,
     converged_at,
-    judge,
     segments,
 )
 from weighbridge.estimators.regression import regression
@@ -110,26 +108,17 @@ def estimate(
 
     mass, spread, blocks = block_jackknife(view.time, phi, y, used)
     slow = consider_std(balance, phi, used, vehicle)
-    influence = phi[used] / np.sum(phi[used] ** 2)
-    passing, lasting = slow_std(balance, vehicle, np.flatnonzero(used), influence, mass)
-    left = float(np.hypot(mass * slow, lasting))
-    std, freedom = honest_std(spread, blocks, passing, left)
+    fitted = Fitted(
+        mass=mass,
+        scatter=spread,
+        blocks=blocks,
+        index=np.flatnonzero(used),
+        influence=phi[used] / np.sum(phi[used] ** 2),
+    )
+    std, freedom, status, why = judged(balance, vehicle, used, phi, fitted, slow)
     residual = np.where(used, y - phi * mass, np.nan)
     # Before the first row there is a start value, but no measurement.
     running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)
-    status, why = judge(
-        Evidence(
-            view=view,
-            used=used,
-            phi=phi,
-            mass=mass,
-            std=std,
-            blocks=blocks,
-            left=left,
-            degrees_of_freedom=freedom,
-        ),
-        vehicle,
-    )
 
     def part(rows: slice) -> tuple[float, float]:
         return block_jackknife(view.time[rows], phi[rows], y[rows], used[rows], 20.0)[:2]

@@ -14,13 +14,11 @@ from weighbridge.balance.averaging import PAUSE
 from weighbridge.balance.force_balance import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.fit_std import honest_std, slow_std
+from weighbridge.estimators.fit_std import Fitted, judged
 from weighbridge.estimators.judging import (
     UNMODELLED_STD,
-    Evidence,
     consider_std,
     converged_at,
-    judge,
     nothing,
     segments,
 )
@@ -330,22 +328,8 @@ def finish(
     index = np.maximum(np.searchsorted(view.time, fit.time, side="right") - 1, 0)
     # What holds an offset of the force knows it; a filter without one takes it for mass.
     influence = fit.influence if final is None else fit.phi / np.sum(fit.phi**2)
-    passing, lasting = slow_std(balance, vehicle, index, influence, mass)
-    left = float(np.hypot(mass * slow, lasting))
-    std, freedom = honest_std(scatter, blocks, passing, left)
-    status, why = judge(
-        Evidence(
-            view=view,
-            used=used,
-            phi=phi,
-            mass=mass,
-            std=std,
-            blocks=blocks,
-            left=left,
-            degrees_of_freedom=freedom,
-        ),
-        vehicle,
-    )
+    weighed = Fitted(mass=mass, scatter=scatter, blocks=blocks, index=index, influence=influence)
+    std, freedom, status, why = judged(balance, vehicle, used, phi, weighed, slow)
     # A running mass that forgets is that of a stretch of time.
     passing = np.hypot(slow, UNMODELLED_STD)
 
