@@ -1,5 +1,7 @@
 """The fit of the reading on the motion, against a map that is known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -31,10 +33,13 @@ def made(rng, motion_noise, n=4800):
         rotating_mass=rotating, air_speed=speed, drag_force=0.6 * DRAG_AREA * speed**2,
         air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
     )  # fmt: skip
+    motion = SimpleNamespace(
+        source="speed", specific_force_std=motion_noise, grade_open=0.008,
+        mean_accel_std=lambda length: motion_noise / np.sqrt(2.0 * length),
+    )  # fmt: skip
     return DriveRows(
         view=view, regressor=load, engine_speed=engine,
-        usable=np.append(np.diff(stretch) == 0, True),
-        mass=MASS, grade_open=0.008, accel_std=lambda length: motion_noise / np.sqrt(2.0 * length),
+        usable=np.append(np.diff(stretch) == 0, True), mass=MASS, motion=motion,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.balance import Reason, force_balance
-from weighbridge.balance.foot import find_floor, foot_off, near, unsmoothed
+from weighbridge.balance.foot import find_floor, find_foot, near, unsmoothed
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import two_states
 from weighbridge.navigation.motion import Motion
@@ -140,7 +140,7 @@ def test_a_foot_that_taps_the_brake_is_found_through_the_smoothing():
     # The smoothed reading stays far off its floor.
     assert np.min(source.values[(STAMPS % 30.0 > 9.0) & (STAMPS % 30.0 < 12.0)]) > FLOOR + 0.08
     unknown = np.full(STAMPS.size, np.nan)
-    off = foot_off(drive, LOADED, source, unknown, unknown)
+    off = find_foot(drive, LOADED, source, unknown, unknown).off
     assert np.all(off[(STAMPS % 30.0 > 10.0) & (STAMPS % 30.0 < 10.4)])
     assert not np.any(off[(STAMPS % 30.0 > 3.0) & (STAMPS % 30.0 < 8.0)])
 
@@ -154,11 +154,11 @@ def test_idle_charge_in_overrun_reads_above_the_floor():
     made = motion(braking=False)
     torque = np.interp(STAMPS, CLOCK, MASS * (made.accel + 0.01 * GRAVITY) / GEARING)
     need = torque * GEARING / MASS / GRAVITY - 0.02 * (foot(STAMPS) < 0.5)
-    off = foot_off(drive, LOADED, source, need, torque)
+    off = find_foot(drive, LOADED, source, need, torque).off
     dragged = ~near(STAMPS, foot(STAMPS) > 0.5, STAMPS, 0.6)
     assert np.all(off[dragged & high])
     blind = np.full(STAMPS.size, np.nan)
-    assert not np.all(foot_off(drive, LOADED, source, blind, blind)[dragged & high])
+    assert not np.all(find_foot(drive, LOADED, source, blind, blind).off[dragged & high])
 
 
 def test_the_floor_is_that_of_engine_speeds_at_which_it_was_dragged():
@@ -171,6 +171,28 @@ def test_the_floor_is_that_of_engine_speeds_at_which_it_was_dragged():
     # Never dragged at 380 rad/s: lowest readings there are no floor.
     assert floor.at(np.array([380.0]))[0] < 0.2
     assert find_floor(random.uniform(0.4, 1.0, 8000), turning) is None
+
+
+def test_where_nothing_tells_of_the_brake_that_is_said():
+    random = np.random.default_rng(4)
+    no_floor = random.uniform(0.4, 1.0, STAMPS.size)
+    up = np.where(foot(STAMPS) > 0.5, 0.5, 0.1)
+    slowed = np.where(foot(CLOCK) > 0.5, 0.5, -0.6)
+    moved = replace(motion(), specific_force=slowed, accel=slowed)
+
+    def balance(**values):
+        return force_balance(recorded(engine_load=no_floor, **values), LOADED, moved)
+
+    assert balance().brake_hidden
+    assert not balance(brake_switch=1.0 - foot(STAMPS)).brake_hidden
+    by_pedal = balance(accelerator_pedal=up)
+    assert not by_pedal.brake_hidden
+    assert not np.any(by_pedal.merged.usable & (foot(STAMPS) < 0.5))
+    # A vehicle that never slows is not braked.
+    even = force_balance(recorded(engine_load=no_floor), LOADED, replace(
+        motion(), specific_force=0.2 + 0.0 * CLOCK, accel=0.2 + 0.0 * CLOCK))  # fmt: skip
+    assert not even.brake_hidden
+    assert not force_balance(recorded(engine_load=load_of(STAMPS)), LOADED, moved).brake_hidden
 
 
 def test_an_engine_brake_does_not_hide_a_dragged_engine():

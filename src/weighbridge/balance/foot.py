@@ -162,8 +162,22 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
     return Floor(middle, level, float(np.clip(spread, *np.multiply(SCATTER, span))), span)
 
 
-def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torque: Floats) -> Bools:
-    """Where the foot may be off the accelerator (n,).
+@dataclass(frozen=True, slots=True)
+class Foot:
+    """Where the foot may be off the accelerator.
+
+    Attributes
+    ----------
+    off : (n,)
+    told : whether reading, pedal or motion tell it at all
+    """
+
+    off: Bools
+    told: bool
+
+
+def find_foot(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torque: Floats) -> Foot:
+    """Find where the foot may be off the accelerator.
 
     Two hidden states, dragged and pushing, of which a dragged engine reads its floor and a
     pushing one anything above: so the noise of a reading does not choose rows one by one.
@@ -177,24 +191,35 @@ def foot_off(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torqu
         where nothing measures the grade
     torque : (n,) torque of the engine that the motion takes [N m]; NaN without a gear
     """
-    return _dragged(drive, vehicle, source, need, torque) & ~_pressed(drive, vehicle, source.time)
+    dragged = _dragged(drive, vehicle, source, need, torque)
+    pedal = _pedal(drive, vehicle)
+    if dragged is None:
+        if pedal is None:
+            return Foot(np.zeros(len(source), dtype=bool), told=False)
+        # A pedal may be up because cruise control pushes.
+        pushed = averaged(need, source.period, PUSHED_TIME) > 0.0
+        return Foot(~_pressed(pedal, source.time) & ~pushed, told=True)
+    pressed = np.zeros(len(source), bool) if pedal is None else _pressed(pedal, source.time)
+    return Foot(dragged & ~pressed, told=True)
 
 
-def _pressed(drive: Drive, vehicle: Vehicle, recorded: Floats) -> Bools:
+def _pressed(pedal: Signal, recorded: Floats) -> Bools:
     """Where the accelerator is surely pressed, so that the brake is not (n,).
 
     A pedal that is up tells less: cruise control pushes without a foot.
     """
-    pedal = _pedal(drive, vehicle)
-    if pedal is None:
-        return np.zeros(recorded.size, dtype=bool)
     up = pedal.values <= float(np.percentile(pedal.values, 1.0)) + PRESSED
     known = pedal.age(recorded) <= 3.0 * pedal.period
     return np.asarray(known & ~near(pedal.time, up, recorded, MARGIN))
 
 
-def _dragged(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torque: Floats) -> Bools:
-    """Where engine or motor may be dragged, by reading and motion; parameters of `foot_off`."""
+def _dragged(
+    drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torque: Floats
+) -> Bools | None:
+    """Where engine or motor may be dragged, by reading and motion; None where neither tells.
+
+    Parameters are those of `find_foot`.
+    """
     recorded = source.time
     engine = drive.get("engine_speed")
     turning = engine.at(source.time) if engine is not None else np.full(len(source), np.nan)
@@ -212,7 +237,7 @@ def _dragged(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torqu
     else:
         floor = find_floor(driven, turning)
     if floor is None:
-        return np.zeros(recorded.size, dtype=bool)
+        return None
     level = floor.at(np.nan_to_num(turning))
     # An engine brake reads far less than an engine that is dragged, and neither pushes.
     level = np.where(level < -HIGHEST * floor.span, 0.0, level)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from weighbridge.balance.cornering import cornering
-from weighbridge.balance.foot import foot_off, near
+from weighbridge.balance.foot import SLOWING, find_foot, near
 from weighbridge.constants import (
     GAS_CONSTANT_DRY_AIR,
     GRAVITY,
@@ -100,6 +100,16 @@ SWITCH_MARGIN: Final = 0.3
 
 TRAIL: Final = 0.0015
 """Braking force over weight that smoothing may still hold of a brake let go [-]."""
+
+SLOWS: Final = 0.02
+"""Part of the moving rows in which a vehicle slows that is braked now and then [-]."""
+
+BRAKE_HIDDEN: Final = (
+    "nothing tells when the brake is on: there is no brake switch and no accelerator position, "
+    "and the torque source never rests on the lowest reading of a dragged engine; light "
+    "braking then counts as load, and the mass may be some percent off; record brake switch or "
+    "accelerator position"
+)
 
 FILLED_TIME: Final = 10.0
 """A fast reading that runs straight for so long was filled in, not measured [s]."""
@@ -199,11 +209,24 @@ class MergedView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceBalance:
-    """Both sides of Newton's law along the road, and their merged view."""
+    """Both sides of Newton's law along the road, and their merged view.
+
+    Attributes
+    ----------
+    force, motion, merged
+    brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading tells
+        where it is braked
+    """
 
     force: ForceSide
     motion: Motion
     merged: MergedView
+    brake_hidden: bool = False
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is doubted, one sentence each."""
+        return (BRAKE_HIDDEN,) if self.brake_hidden else ()
 
 
 def force_balance(
@@ -257,10 +280,10 @@ def force_balance(
     needed, weight = _needed_force(vehicle, rows["specific_force"], drag, rotating)
     pressed = brake_pressed(drive, recorded)
     told = np.nan if motion.source in BY_SPEED else 1.0
-    off = foot_off(drive, vehicle, source, told * needed / weight, told * needed / gearing)
+    foot = find_foot(drive, vehicle, source, told * needed / weight, told * needed / gearing)
     # What a dragged engine takes is told by a torque alone, and by none where a foot may brake.
-    overrun = np.zeros_like(off) if signed and pressed is not None else off
-    slowed = off if pressed is None else pressed
+    overrun = np.zeros_like(foot.off) if signed and pressed is not None else foot.off
+    slowed = foot.off if pressed is None else pressed
     trailing = _trailing(vehicle, motion, time, slowed, traction if signed else None, lag)
 
     # The first reason that applies is the one told, so the order matters.
@@ -283,6 +306,8 @@ def force_balance(
     ):
         reason[(reason == 0) & flag] = why
 
+    slows = (needed < -SLOWING * weight)[rows["speed"] > SLOWEST]
+    hidden = pressed is None and not foot.told and slows.size and slows.mean() > SLOWS
     noise = vehicle.torque.noise
     middle = np.nanmedian(gearing) if np.isfinite(gearing).any() else np.nan
     return ForceBalance(
@@ -316,6 +341,7 @@ def force_balance(
             fuel_burnt=fuel_burnt(drive, vehicle, recorded, torque.torque, engine_speed),
             reason=reason,
         ),
+        brake_hidden=bool(hidden),
     )
 
 

@@ -7,8 +7,7 @@ averaged over the same windows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -26,9 +25,11 @@ from weighbridge.estimators.slow_errors import (
     TIME_CONSTANTS,
     WIND_STD,
     coldness,
+    gustiness,
     noise_variance,
 )
 from weighbridge.kernels import disturbance as kernel
+from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import TorqueSource
 from weighbridge.vehicle.torque import torque_rows
@@ -49,9 +50,7 @@ class DriveRows:
     engine_speed : [rad/s]
     usable : rows to take
     mass : known, as the drive begins [kg]
-    accel_std : of a mean acceleration over a length of time [s], where it is the slope of a
-        speed [m/s^2]
-    grade_open : what of the grade nothing has measured, a disturbance [rad]
+    motion : of the drive
     """
 
     view: MergedView
@@ -59,8 +58,7 @@ class DriveRows:
     engine_speed: Floats
     usable: Bools
     mass: float
-    grade_open: float
-    accel_std: Callable[[float], float]
+    motion: Motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,6 +129,9 @@ class TorquePrior:
         return np.asarray(torque**2 * cov)
 
 
+AROUND: Final = 60.0
+"""Pressures are averaged over so long before and after [s]."""
+
 TYPICAL_SPEED: Final = 300.0
 """Engine speed at which the growth of torque terms is told [rad/s]."""
 
@@ -161,6 +162,8 @@ class FitSettings:
     torque_noise : of one reading, as torque [N m]
     wheel_radius : [m]
     prior : mean and standard deviation (4,) of C_d A, C_r, I_e, I_w
+    lasting_drag : learn the drag area from the lasting part of the pressure alone; what comes and
+        goes within `AROUND` is taken with that of the class
     window : length of the windows [s]
     rounds : of refining the fitted reading
     """
@@ -173,8 +176,39 @@ class FitSettings:
     torque_noise: float
     wheel_radius: float
     prior: tuple[Floats, Floats]
+    lasting_drag: bool = False
     window: float = WINDOW
     rounds: int = 3
+
+
+def lasting_pressure(view: MergedView) -> Floats:
+    """Mean dynamic pressure within `AROUND` of each row (n,) [Pa]."""
+    pressure = np.nan_to_num(view.dynamic_pressure)
+    total = np.concatenate(([0.0], np.cumsum(pressure)))
+    first = np.searchsorted(view.time, view.time - AROUND)
+    last = np.searchsorted(view.time, view.time + AROUND, side="right")
+    return np.asarray((total[last] - total[first]) / (last - first))
+
+
+def fit_with_gusts(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
+    """Fit as `fit` does, and keep open what gusts leave confounded.
+
+    A vehicle that meets a gust slows down. So where drag is high speed is low, the more the less
+    power there is in hand: the drag area comes out small, and offset and rolling resistance
+    large for it. How fast a road is driven at all hangs on no gust, but says less. Where both
+    ways to learn the drag area differ, the covariance holds their difference.
+
+    Parameters and errors are those of `fit`.
+
+    References
+    ----------
+    Regressors that answer to the disturbance: Greene, Econometric Analysis, 2018, ch. 8.
+    """
+    plain = fit(drives, settings)
+    other = fit(drives, replace(settings, lasting_drag=True))
+    apart = np.concatenate((other.coefficients - plain.coefficients, other.road - plain.road))
+    cov = plain.cov + np.outer(apart, apart)
+    return replace(plain, cov=cov, stds=np.sqrt(np.maximum(np.diag(cov), 0.0)))
 
 
 def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
@@ -242,14 +276,18 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
     ).T
     one = np.ones_like(gearing)
     mass = d.mass - view.fuel_burnt
+    pushed, pressure = mass * view.specific_force, view.dynamic_pressure
+    if settings.lasting_drag:
+        lasting = lasting_pressure(view)
+        pushed, pressure = pushed + settings.prior[0][0] * (pressure - lasting), lasting
     columns = [
-        mass * view.specific_force,
-        view.dynamic_pressure,
+        pushed,
+        pressure,
         mass * GRAVITY * np.cos(view.grade),
         gearing**2 * view.accel,
         view.accel / settings.wheel_radius**2,
         *(-gearing * term for term in (offset, *terms)),
-        one,
+        gustiness(view),
         one,
         push * north,
         push * east,
@@ -280,7 +318,7 @@ def _solve(
         rows.append(cut.mean(columns))
         targets.append(cut.mean(scale * gearing * np.nan_to_num(d.regressor)))
         variances.append(
-            noise_variance(d.view, cut, settings.torque_noise, mass, d.accel_std(settings.window))
+            noise_variance(d.view, cut, settings.torque_noise, mass, d.motion, settings.window)
         )
         parts.append(columns)
     stacked = np.ascontiguousarray(np.vstack(rows))
@@ -291,7 +329,7 @@ def _solve(
     )
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
     terms = settings.bounds.covariance(settings, torque, torque / scale)
-    grade = GRAVITY * max(d.grade_open for d in drives)
+    grade = GRAVITY * max(d.motion.grade_open for d in drives)
     fading = np.array(
         [
             mass * float(np.hypot(DISTURBANCE_STD, grade)),

@@ -50,7 +50,7 @@ from weighbridge.navigation.aiding import (
     speed_from_fixes,
     still_state,
 )
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.motion import Motion, noise_level
 from weighbridge.navigation.mounting import TooLittleMotionError, coarse_mounting
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.navigation.timing import estimate_speed_delay
@@ -580,7 +580,7 @@ def _motion(
         latitude=latitude,
         longitude=longitude,
         valid=valid,
-        specific_force_std=_noise_level(specific_force[valid]),
+        specific_force_std=noise_level(specific_force[valid]),
         grade_std=np.hypot(on_grid(stds), floor),
         speed_scale=float(end[SCALE]) if found_scale else None,
         speed_scale_std=float(end_std[18]) if found_scale else None,
@@ -593,11 +593,3 @@ def _motion(
         ),
         notes=tuple(dict.fromkeys(notes)),
     )  # fmt: skip
-
-
-def _noise_level(y: Floats) -> float:
-    """Return the noise of a smooth signal from its second differences, robustly."""
-    if y.size < 10:
-        return 0.1
-    second = y[2:] - 2.0 * y[1:-1] + y[:-2]
-    return max(0.005, float(1.4826 * np.median(np.abs(second)) / math.sqrt(6.0)))

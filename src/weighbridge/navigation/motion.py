@@ -40,7 +40,7 @@ class Motion:
     altitude : (n,) [m]; NaN where unknown
     latitude, longitude : (n,) [rad]; NaN where unknown
     valid : (n,) the sources were there; False in their gaps
-    specific_force_std : noise level of ``specific_force`` [m/s^2]
+    specific_force_std : noise level of ``specific_force``, of one sample [m/s^2]
     grade_std : (n,) standard deviation of ``grade`` as the filter sees it [rad]
     speed_scale : indicated over true vehicle speed [-]; None where not found
     speed_scale_std : its standard deviation
@@ -96,6 +96,14 @@ class Motion:
     def mean_accel_std(self, length: float) -> float:
         """Standard deviation of the mean acceleration over ``length`` [s] by its ends [m/s^2]."""
         return float(min(np.sqrt(2.0) * self.speed_std / length, self.specific_force_std or 0.0))
+
+
+def noise_level(y: Floats) -> float:
+    """Noise of a smooth signal (n,) from its second differences, robustly; in its unit."""
+    if y.size < 10:
+        return 0.1
+    second = y[2:] - 2.0 * y[1:-1] + y[:-2]
+    return max(0.005, float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)))
 
 
 def with_squat(motion: Motion, squat: float, std: float) -> Motion:

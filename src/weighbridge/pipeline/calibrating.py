@@ -33,7 +33,7 @@ from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.checks import check_drive
-from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, refine
+from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, noted, refine
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.class_values import road_prior
@@ -302,6 +302,8 @@ def run_calibration(
             lambda car: [force_balance(d, car, m) for d, m in zip(drives, motions, strict=True)],
         )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
+    for note in dict.fromkeys(n for balance in balances for n in balance.notes):
+        finished = noted(finished, note)
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
 
 

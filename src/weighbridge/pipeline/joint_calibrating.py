@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -18,6 +19,7 @@ from weighbridge.calibration.inverse import (
     TooShort,
     TorquePrior,
     fit,
+    fit_with_gusts,
 )
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
@@ -63,6 +65,18 @@ smooth; a torque that is told has been modelled by the maker to a few percent of
 FARTHEST: Final = 5.0
 """Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
 seen without an accelerometer, where hills and torque noise pass for drag."""
+
+USUAL_SLOPE: Final = 1.2
+"""Relative change of a mass per relative change of its torque [-]: what road loads take is not
+scaled."""
+
+SLOPES: Final = (0.8, 2.5)
+"""The same at least and at most [-]."""
+
+SELF_CLOSE: Final = 5e-4
+"""The calibration's own drives are weighed so near to their masses, in the mean [-]."""
+
+SELF_ROUNDS: Final = 4
 
 BalanceAt = Callable[[int, float, float], tuple[ForceBalance, Floats, Bools]]
 """Balance, reading and usable rows of drive k at a delay and a lag [s]."""
@@ -135,8 +149,7 @@ def refine(
                     engine_speed=balance.force.engine_speed,
                     usable=usable,
                     mass=mass,
-                    grade_open=balance.motion.grade_open,
-                    accel_std=balance.motion.mean_accel_std,
+                    motion=balance.motion,
                 )
             )
         return found
@@ -159,7 +172,7 @@ def refine(
 
     try:
         delay, lag, told = _timing(misfits)
-        found = fit(rows_at(delay, lag), settings)
+        found = fit_with_gusts(rows_at(delay, lag), settings)
     except TooShort as short:
         return _self_weighed(_as_it_is(vehicle, str(short)), problem, rebalance, None)
     mean, std = settings.prior
@@ -178,17 +191,17 @@ def refine(
         return _self_weighed(_as_it_is(vehicle, why), problem, rebalance, None)
     fitted = _with(vehicle, found, delay, lag, problem)
     if not told:
-        fitted = _noted(fitted, NOT_TOLD)
+        fitted = noted(fitted, NOT_TOLD)
     return _self_weighed(fitted, problem, rebalance, found.cov)
 
 
 def _as_it_is(vehicle: Vehicle, why: str) -> Vehicle:
     """Keep the torque of eq. 48, to be scaled alone."""
     made = replace(vehicle, provenance=replace(vehicle.provenance, method="joint"))
-    return _noted(made, f"scaled, not fitted anew: {why}")
+    return noted(made, f"scaled, not fitted anew: {why}")
 
 
-def _noted(vehicle: Vehicle, note: str) -> Vehicle:
+def noted(vehicle: Vehicle, note: str) -> Vehicle:
     """Add a note for readers of the vehicle file, once."""
     notes = vehicle.provenance.notes
     if notes is not None and note in notes:
@@ -319,17 +332,24 @@ def _self_weighed(
             len(ratios),
         )
 
-    ratio, bound, direction, count = found(1.0)
+    scale, slope = 1.0, USUAL_SLOPE
+    ratio, bound, direction, count = found(scale)
+    for _ in range(SELF_ROUNDS):
+        if abs(ratio - 1.0) < SELF_CLOSE:
+            break
+        before, at = ratio, scale
+        scale += (1.0 - ratio) / slope
+        ratio, bound, direction, count = found(scale)
+        # Levels of noise may fall into another optimum, and the mass jump with them.
+        slope = float(np.clip((ratio - before) / (scale - at), *SLOPES))
     each = float(np.hypot(TRANSFER_STD[1], joint.UNMODELLED * bound))
     # Where the torque could not be fitted anew, what its own fit left open stays.
-    known = float(np.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0))
-    slope = (found(1.02)[0] - ratio) / 0.02
-    scale = 1.0 + (1.0 - ratio) / slope if slope > 0.2 else 1.0 / ratio
+    known = math.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0, ratio - 1.0)
     open_cov: tuple[float, ...] = ()
     if cov is not None:
         # The torque coefficients are scaled, and their errors with them.
         units = np.concatenate((np.full(len(cov) - 4, scale), np.ones(4)))
-        open_cov = triangle(pinned(cov, direction) * np.outer(units, units))
+        open_cov = triangle(pinned(cov * np.outer(units, units), direction))
     return replace(
         vehicle,
         torque=vehicle.torque.scaled(scale),

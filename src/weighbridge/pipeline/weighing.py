@@ -367,7 +367,8 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
             f"{100.0 * uncalibrated_std(vehicle, motion):.1f} % of the mass, "
             "as standard deviation, are in the interval",
         )
-    return force_balance(drive, vehicle, motion, delay=delay), notes
+    balance = force_balance(drive, vehicle, motion, delay=delay)
+    return balance, notes + balance.notes
 
 
 def _refuse_other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, delay: float) -> None:
