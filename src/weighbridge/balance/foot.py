@@ -7,14 +7,15 @@ the floor are left out, and those just beside them, where a foot is on its way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from weighbridge.kernels import two_states
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.model import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import averaged
 
 BIN: Final = 1.12
@@ -61,6 +62,10 @@ SETTLED: Final = 0.7
 FARTHEST: Final = 0.15
 """Such readings over their floor, over the range of the reading, at most [-]: of a recorded car a
 quarter of the braked readings lay within 0.04 of the floor and three quarters within 0.1."""
+
+DRIFT: Final = 0.03
+"""A reading may drift by so much between drives, over its range [-]: by air, heat and what the
+alternator takes."""
 
 BEYOND: Final = 3.0
 """Standard deviations of the floor within which a reading lies on it [-]."""
@@ -113,6 +118,20 @@ class Floor:
     def at(self, engine_speed: Floats) -> Floats:
         """Floor at engine speeds (n,); at the ends that of the last bin."""
         return np.interp(engine_speed, self.engine_speed, self.level)
+
+    @classmethod
+    def of_vehicle(cls, known: DraggedReading) -> Floor:
+        """Return the floor that a calibration has learnt."""
+        return cls(np.array(known.engine_speed), np.array(known.level), known.scatter, known.span)
+
+    def lifted(self, other: Floor) -> Floor:
+        """Follow another floor where it lies a little higher: a reading may drift.
+
+        Where it lies far above, its drive did not drag the engine at that speed.
+        """
+        higher = other.at(self.engine_speed) - self.level
+        near = (higher > 0.0) & (higher < DRIFT * self.span)
+        return replace(self, level=self.level + np.where(near, higher, 0.0))
 
 
 def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
@@ -221,12 +240,9 @@ def _dragged(
     Parameters are those of `find_foot`.
     """
     recorded = source.time
-    engine = drive.get("engine_speed")
-    turning = engine.at(source.time) if engine is not None else np.full(len(source), np.nan)
-    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
-    driven = source.values
-    if speed is not None:
-        driven = np.where(np.nan_to_num(speed.at(source.time)) > MOVING, driven, np.nan)
+    known = vehicle.dragged
+    turning = _turning(drive, source)
+    driven = _driven(drive, source)
     if vehicle.driveline.single_speed:
         # A motor that recuperates may be helped by the brake, and no floor tells where it ends.
         if np.isfinite(need).any():
@@ -236,6 +252,9 @@ def _dragged(
         floor = Floor(np.ones(1), np.zeros(1), SCATTER[0] * span, span) if span > 0.0 else None
     else:
         floor = find_floor(driven, turning)
+        if known is not None:
+            learnt = Floor.of_vehicle(known)
+            floor = learnt if floor is None else learnt.lifted(floor)
     if floor is None:
         return None
     level = floor.at(np.nan_to_num(turning))
@@ -251,9 +270,67 @@ def _dragged(
     off = near(source.time, off, recorded, margin)
     if vehicle.driveline.single_speed:
         return off
-    lasting = ~near(recorded, ~(need < -SLOWING), recorded, SETTLED)
-    reach = _reach(floor, (source.values - level)[lasting])
+    reach = _reach(floor, (source.values - level)[_slowing(recorded, need)])
+    if known is not None:
+        reach = max(reach, known.reach)
     return off | _untold(source, level, reach, torque)
+
+
+def learn_dragged(
+    drives: Sequence[Drive], sources: Sequence[Signal], needs: Sequence[Floats]
+) -> DraggedReading | None:
+    """Learn from several drives what the torque source reads while the engine is dragged.
+
+    Parameters
+    ----------
+    drives
+    sources : what the torque of each is made from
+    needs : (n,) of each, force that the motion takes over weight, at the stamps of its source
+        [-]; NaN where nothing measures the grade
+
+    Returns
+    -------
+    DraggedReading
+        None where the drives do not show it.
+    """
+    pairs = list(zip(drives, sources, strict=True))
+    turning = [_turning(drive, source) for drive, source in pairs]
+    floor = find_floor(
+        np.concatenate([_driven(drive, source) for drive, source in pairs]),
+        np.concatenate(turning),
+    )
+    if floor is None:
+        return None
+    above = [
+        (source.values - floor.at(np.nan_to_num(speed)))[_slowing(source.time, need)]
+        for source, speed, need in zip(sources, turning, needs, strict=True)
+    ]
+    return DraggedReading(
+        engine_speed=tuple(map(float, floor.engine_speed)),
+        level=tuple(map(float, floor.level)),
+        scatter=floor.scatter,
+        span=floor.span,
+        reach=_reach(floor, np.concatenate(above)),
+    )
+
+
+def _turning(drive: Drive, source: Signal) -> Floats:
+    """Engine speed at the stamps of the source (n,) [rad/s]; NaN where it is not told."""
+    engine = drive.get("engine_speed")
+    return engine.at(source.time) if engine is not None else np.full(len(source), np.nan)
+
+
+def _driven(drive: Drive, source: Signal) -> Floats:
+    """Readings of the source while the vehicle moves (n,), else NaN."""
+    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    if speed is None:
+        return source.values
+    return np.where(np.nan_to_num(speed.at(source.time)) > MOVING, source.values, np.nan)
+
+
+def _slowing(recorded: Floats, need: Floats) -> Bools:
+    """Where the motion slows so long that no foot is on the accelerator (n,)."""
+    return ~near(recorded, ~(need < -SLOWING), recorded, SETTLED)
 
 
 def _untold(source: Signal, level: Floats, reach: float, torque: Floats) -> Bools:

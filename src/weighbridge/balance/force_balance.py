@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from weighbridge.balance.cornering import cornering
-from weighbridge.balance.foot import SLOWING, find_foot, near
+from weighbridge.balance.foot import SLOWING, find_foot, learn_dragged, near
 from weighbridge.constants import (
     GAS_CONSTANT_DRY_AIR,
     GRAVITY,
@@ -29,7 +30,7 @@ from weighbridge.vehicle.gear import (
     predict_gear,
     shifting,
 )
-from weighbridge.vehicle.model import Vehicle, VehicleClass
+from weighbridge.vehicle.model import DraggedReading, Vehicle, VehicleClass
 from weighbridge.vehicle.torque import engine_torque, source_signal
 
 
@@ -343,6 +344,36 @@ def force_balance(
         ),
         brake_hidden=bool(hidden),
     )
+
+
+def dragged_reading(
+    drives: Sequence[Drive], motions: Sequence[Motion], vehicle: Vehicle
+) -> DraggedReading | None:
+    """Learn what the torque source reads while the engine is dragged.
+
+    Parameters
+    ----------
+    drives, motions : of the calibration
+    vehicle : with the delay of its torque
+
+    Returns
+    -------
+    DraggedReading
+        None for a motor with one gear, and where the drives do not show it.
+    """
+    if vehicle.driveline.single_speed:
+        return None
+    sources, needs = [], []
+    for drive, motion in zip(drives, motions, strict=True):
+        source = source_signal(drive, vehicle)
+        time = source.time - (vehicle.timing.torque_delay or 0.0)
+        rows = _motion_at(smoothed(motion, vehicle.timing.torque_lag), time)
+        density = air_density(drive, time, rows["altitude"])
+        drag = 0.5 * density * vehicle.road_load.drag_area * rows["speed"] ** 2
+        needed, weight = _needed_force(vehicle, rows["specific_force"], drag)
+        sources.append(source)
+        needs.append(np.full_like(needed, np.nan) if motion.source in BY_SPEED else needed / weight)
+    return learn_dragged(drives, sources, needs)
 
 
 def filled(signal: Signal, time: Floats) -> Bools:

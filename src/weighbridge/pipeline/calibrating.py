@@ -11,7 +11,7 @@ import numpy as np
 
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.delay import best_delay, delay_std
-from weighbridge.balance.force_balance import ForceBalance
+from weighbridge.balance.force_balance import ForceBalance, dragged_reading
 from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.regression import (
@@ -271,6 +271,7 @@ def run_calibration(
             notes=_notes(fitted, low < high, rows.target.size, found),
         ),
     )
+    finished = replace(finished, dragged=dragged_reading(drives, motions, finished))
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
     scale, scale_std = _self_weighing(balances, finished, masses)
     finished = replace(
@@ -287,7 +288,9 @@ def run_calibration(
     )
     if settings.method == "joint":
         asked = JointProblem(
-            balance_at=_balance_at(drives, motions, draft, source, floors),
+            balance_at=_balance_at(
+                drives, motions, replace(draft, dragged=finished.dragged), source, floors
+            ),
             masses=masses,
             order=order,
             curved=curved,

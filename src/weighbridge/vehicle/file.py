@@ -21,6 +21,7 @@ from weighbridge.signals.tomlfile import Section, exact_text, read_toml
 from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import (
     FORMAT_VERSION,
+    DraggedReading,
     Driveline,
     Mounting,
     Provenance,
@@ -181,6 +182,22 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
             _Key("torque_delay", "torque_delay", "how late torque or load is stamped", suffix="s"),
             _Key("torque_delay_std", "torque_delay_std", "its standard deviation", suffix="s"),
             _Key("torque_lag", "torque_lag", "time constant of its smoothing", suffix="s"),
+        ),
+    ),
+    "dragged": (
+        DraggedReading,
+        (
+            _Key(
+                "engine_speed",
+                "engine_speed",
+                "engine dragged, no foot on the accelerator: at these speeds",
+                "numbers",
+                "rpm",
+            ),
+            _Key("level", "level", "load or torque reads so little", "numbers"),
+            _Key("scatter", "scatter", "standard deviation of such readings"),
+            _Key("span", "span", "range of the reading up to the highest"),
+            _Key("reach", "reach", "how far above the level idle charge may lift it"),
         ),
     ),
     "speed_model": (

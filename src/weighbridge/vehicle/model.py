@@ -262,6 +262,38 @@ class Timing:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DraggedReading:
+    """What the torque source reads while the engine is dragged, its floor over engine speed.
+
+    Attributes
+    ----------
+    engine_speed : rising [rad/s]
+    level : the floor there, in the unit of the reading
+    scatter : standard deviation of readings on the floor
+    span : range of the reading from dragged to full
+    reach : how far above the floor a dragged engine may read, because it burns idle charge
+    """
+
+    engine_speed: tuple[float, ...]
+    level: tuple[float, ...]
+    scatter: float
+    span: float
+    reach: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.level) != len(self.engine_speed) or not self.level:
+            raise ConfigError(
+                f"level must be as many as engine_speed, {len(self.engine_speed)} and at least "
+                f"one, got {len(self.level)}"
+            )
+        if any(b <= a for a, b in itertools.pairwise(self.engine_speed)):
+            raise ConfigError(f"engine_speed must rise, got {self.engine_speed}")
+        _positive("scatter", self.scatter)
+        _positive("span", self.span)
+        _not_negative("reach", self.reach)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedModel:
     """Model of ``--method speed-ekf``, in which torque is proportional to speed.
 
@@ -457,6 +489,8 @@ class Vehicle:
     tare : mass without payload [kg]
     gross : permitted mass [kg]
     mapping : path of a mapping TOML for its logs
+    dragged : what the torque source reads without a foot on the accelerator; None where it was
+        not calibrated, or its drives did not show it
     speed_model : for ``--method speed-ekf``; None where it was not calibrated
     """
 
@@ -470,6 +504,7 @@ class Vehicle:
     road_load: RoadLoad = field(default_factory=RoadLoad)
     mounting: Mounting | None = None
     timing: Timing = field(default_factory=Timing)
+    dragged: DraggedReading | None = None
     speed_model: SpeedModel | None = None
     ride: Ride | None = None
     provenance: Provenance = field(default_factory=Provenance)
