@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from weighbridge.balance.force_balance import MergedView
-from weighbridge.calibration.inverse import DriveRows, FitSettings, TorquePrior, fit
+from weighbridge.calibration.inverse import (
+    DriveRows,
+    FitSettings,
+    TorquePrior,
+    fit,
+    fit_with_gusts,
+)
 from weighbridge.vehicle.class_values import road_prior
 
+TRUCK_AREA, TRUCK_ROLLING = 8.0, 0.008
 MASS, DRAG_AREA, ROLLING, ENGINE_INERTIA, WHEEL_INERTIA, RADIUS = 1400.0, 0.62, 0.01, 0.15, 5.0, 0.3
 OFFSET, SCALE, LEAN = -20.0, 150.0, 0.12
 
@@ -58,3 +65,56 @@ def test_the_map_is_found_where_the_motion_is_noisy(motion_noise):
     # A reading that stands on both sides explains itself and leaves nothing to the motion.
     assert slope == pytest.approx(SCALE + LEAN * engine, rel=0.05)
     assert found.road[0] == pytest.approx(DRAG_AREA, abs=0.2)
+
+
+def gusty(rng, mass):
+    """A truck on the flat at the end of its power: a gust slows it down, for most of a minute."""
+    step, n, gearing = 0.25, 14_400, 6.0
+    gust = np.zeros(n)
+    keep = np.exp(-step / 15.0)
+    for k in range(1, n):
+        gust[k] = keep * gust[k - 1] + 2.0 * np.sqrt(1.0 - keep**2) * rng.standard_normal()
+    time = step * np.arange(n)
+    # Full power, which is another every hundred seconds [W].
+    power = mass * rng.uniform(6.0, 23.0, n // 400)[np.arange(n) // 400]
+    speed, accel = np.zeros(n), np.zeros(n)
+    now = 18.0
+    for k in range(n):
+        force = power[k] / now
+        drag = 0.6 * TRUCK_AREA * (now + gust[k]) ** 2
+        accel[k] = (force - drag - mass * 9.80665 * TRUCK_ROLLING) / mass
+        speed[k] = now
+        now += step * accel[k]
+    force = power / speed
+    zero, one = np.zeros(n), np.ones(n)
+    view = MergedView(
+        time=time, traction_force=force, speed=speed, accel=accel, specific_force=accel, grade=zero,
+        pitch=zero, heading=zero, gear=np.ones(n, dtype=np.int64), gearing=gearing * one,
+        rotating_mass=zero, air_speed=speed, drag_force=0.6 * TRUCK_AREA * speed**2, air_density=1.2 * one,
+        fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
+    )  # fmt: skip
+    motion = SimpleNamespace(
+        source="inertial", specific_force_std=0.01, grade_open=0.0, mean_accel_std=lambda _: 0.0
+    )
+    return DriveRows(
+        view=view, regressor=force / gearing, engine_speed=gearing * speed,
+        usable=np.ones(n, dtype=bool), mass=mass, motion=motion,
+    )  # fmt: skip
+
+
+def test_what_gusts_confound_stays_open():
+    settings = FitSettings(
+        source="percent", order=0, curved=False, knots=(), torque_noise=5.0,
+        bounds=TorquePrior(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012),
+        wheel_radius=0.5, prior=road_prior("truck", single_speed=False),
+    )  # fmt: skip
+    told = {fit: [], fit_with_gusts: []}
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        drives = [gusty(rng, mass) for mass in (8000.0, 12000.0, 15000.0)]
+        for how, errors in told.items():
+            found = how(drives, settings)
+            errors.append((found.road[1] - TRUCK_ROLLING) / found.stds[-3])
+    # Speed answers to the gusts, and the drag that is missing passes for rolling resistance.
+    assert min(told[fit]) > 2.0
+    assert max(told[fit_with_gusts]) < 1.8

@@ -1,6 +1,7 @@
 """Calibration on simulated drives: what it finds, what it refuses."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from numba import config
 
 from weighbridge import calibrate, weigh
 from weighbridge.errors import ConfigError, DriveError
+from weighbridge.pipeline import joint_calibrating
 from weighbridge.pipeline.calibrating import CalibrationSettings
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
@@ -242,3 +244,29 @@ def test_joint_finds_a_load_in_unknown_wind(empty, loaded):
     low, high = w.interval(0.95)
     assert low < truth < high
     assert w.mass == pytest.approx(truth, rel=0.03)
+
+
+def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monkeypatch):
+    """Levels of noise fall into another optimum at some scales, and the mass jumps."""
+    base = Vehicle(torque=TorqueModel(source="measured", coefficients=(0.0, 1.0)))
+
+    def estimate(_, car, load_changes):
+        scale = car.torque.coefficients[1]
+        jump = 60.0 if 1.1 < scale < 1.2 else 0.0
+        mass = 6800.0 + 1.3 * 6800.0 * (scale - 1.0) - jump
+        return SimpleNamespace(mass=mass, bound_std=30.0, sensitivity=np.zeros(1))
+
+    monkeypatch.setattr(joint_calibrating.joint, "estimate", estimate)
+    burnt = SimpleNamespace(merged=SimpleNamespace(fuel_burnt=np.zeros(2)))
+    problem = SimpleNamespace(masses=[8400.0])
+    scaled = joint_calibrating._self_weighed(base, problem, lambda car: [burnt], None)
+    assert estimate(None, scaled, False).mass == pytest.approx(8400.0, rel=1e-3)
+    assert scaled.provenance.mass_scale_std < 0.015
+
+    def stuck(_, car, load_changes):
+        return SimpleNamespace(mass=6800.0, bound_std=30.0, sensitivity=np.zeros(1))
+
+    monkeypatch.setattr(joint_calibrating.joint, "estimate", stuck)
+    lost = joint_calibrating._self_weighed(base, problem, lambda car: [burnt], None)
+    # What the scale cannot mend is in the interval.
+    assert lost.provenance.mass_scale_std > 0.15

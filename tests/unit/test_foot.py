@@ -7,7 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.balance import Reason, force_balance
-from weighbridge.balance.foot import find_floor, find_foot, near, unsmoothed
+from weighbridge.balance.foot import (
+    Floor,
+    find_floor,
+    find_foot,
+    learn_dragged,
+    near,
+    unsmoothed,
+)
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import two_states
 from weighbridge.navigation.motion import Motion
@@ -193,6 +200,36 @@ def test_where_nothing_tells_of_the_brake_that_is_said():
         motion(), specific_force=0.2 + 0.0 * CLOCK, accel=0.2 + 0.0 * CLOCK))  # fmt: skip
     assert not even.brake_hidden
     assert not force_balance(recorded(engine_load=load_of(STAMPS)), LOADED, moved).brake_hidden
+
+
+def test_a_drive_that_shows_no_floor_has_that_of_the_vehicle_file():
+    """A cruise on which the engine is dragged for a twentieth of the time, and braked."""
+    dragged = (STAMPS % 40.0) > 38.0
+    read = np.where(dragged, FLOOR + 0.01, 0.3 + 0.05 * np.sin(0.7 * STAMPS))
+    turning = np.full(STAMPS.size, 150.0)
+    assert find_floor(read[::4], turning[::4]) is None
+    rare = Drive("rare", {
+        "engine_load": Signal("engine_load", STAMPS[::4], read[::4]),
+        "engine_speed": Signal("engine_speed", STAMPS[::4], turning[::4]),
+    })  # fmt: skip
+    source = rare.signals["engine_load"]
+    unknown = np.full(len(source), np.nan)
+    alone = find_foot(rare, LOADED, source, unknown, unknown)
+    assert not alone.told
+
+    town = recorded(engine_load=load_of(STAMPS))
+    learnt = learn_dragged([town], [town.signals["engine_load"]], [np.full(STAMPS.size, np.nan)])
+    assert np.interp(150.0, learnt.engine_speed, learnt.level) == pytest.approx(FLOOR, abs=0.01)
+    known = find_foot(rare, replace(LOADED, dragged=learnt), source, unknown, unknown)
+    assert known.told
+    assert np.all(known.off[dragged[::4]])
+    assert np.mean(known.off[~dragged[::4]]) < 0.15
+
+
+def test_the_floor_of_the_file_follows_a_small_drift_alone():
+    file = Floor(np.array([100.0, 200.0, 300.0]), np.array([0.05, 0.05, 0.05]), 0.01, 0.8)
+    drive = Floor(np.array([100.0, 200.0, 300.0]), np.array([0.06, 0.04, 0.2]), 0.01, 0.8)
+    assert_allclose(file.lifted(drive).level, [0.06, 0.05, 0.05])
 
 
 def test_an_engine_brake_does_not_hide_a_dragged_engine():

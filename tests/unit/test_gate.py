@@ -179,7 +179,9 @@ def test_slow_errors_add_up_as_their_covariance_says(monkeypatch):
     monkeypatch.setattr(fit_std, "prior_std", lambda *_: std)
     passing, lasting = slow_std(made, BUS, index, influence, MASS)
     apart = np.abs(np.subtract.outer(view.time[index], view.time[index]))
-    expected = influence @ (400.0**2 * np.exp(-apart / 30.0)) @ influence
+    # Half of the disturbance is gusts, which push in proportion to the speed.
+    moved = influence * np.sqrt(0.5 + 0.5 * (view.speed[index] / 15.0) ** 2)
+    expected = moved @ (400.0**2 * np.exp(-apart / 30.0)) @ moved
     assert passing == pytest.approx(np.sqrt(expected), rel=1e-6)
     assert lasting == 0.0
 

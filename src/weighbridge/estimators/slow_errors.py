@@ -59,12 +59,12 @@ WARM_UP: Final = 500.0
 MOTION_STD: Final = 0.03
 """Noise of one sample of a specific force that no accelerometer measured [m/s^2]."""
 
-MOTION_SHARE: Final = 0.23
+MOTION_SHARE: Final = 0.25
 """What of that noise the mean of a window keeps [-]: in 58 drives of three simulators, vibration,
 rough roads and vehicles of all classes, noise of one sample from 0.010 to 0.113 m/s^2,
 `motion_variance` meets the true error of the mean of a window within a quarter."""
 
-MOTION_WINDOW_STD: Final = 0.009
+MOTION_WINDOW_STD: Final = 0.007
 """Fast error of the mean of a window without such noise [m/s^2]."""
 
 NAMES: Final = ("mass", "disturbance", "resistance", "wind_north", "wind_east", "cold_torque",
