@@ -90,8 +90,8 @@ def gusty(rng, mass):
     view = MergedView(
         time=time, traction_force=force, speed=speed, accel=accel, specific_force=accel, grade=zero,
         pitch=zero, heading=zero, gear=np.ones(n, dtype=np.int64), gearing=gearing * one,
-        rotating_mass=zero, air_speed=speed, drag_force=0.6 * TRUCK_AREA * speed**2, air_density=1.2 * one,
-        fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
+        rotating_mass=zero, air_speed=speed, drag_force=0.6 * TRUCK_AREA * speed**2,
+        air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
     )  # fmt: skip
     motion = SimpleNamespace(
         source="inertial", specific_force_std=0.01, grade_open=0.0, mean_accel_std=lambda _: 0.0
