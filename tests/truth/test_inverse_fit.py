@@ -117,4 +117,4 @@ def test_what_gusts_confound_stays_open():
             errors.append((found.road[1] - TRUCK_ROLLING) / found.stds[-3])
     # Speed answers to the gusts, and the drag that is missing passes for rolling resistance.
     assert min(told[fit]) > 2.0
-    assert max(told[fit_with_gusts]) < 1.8
+    assert max(np.abs(told[fit_with_gusts])) < 1.8

@@ -246,6 +246,23 @@ def test_joint_finds_a_load_in_unknown_wind(empty, loaded):
     assert w.mass == pytest.approx(truth, rel=0.03)
 
 
+def test_a_calibration_with_which_nothing_could_be_weighed_is_refused(empty, monkeypatch):
+    monkeypatch.setattr(joint_calibrating, "TRANSFER_STD", (0.3, 0.003))
+    with pytest.raises(DriveError, match="would leave 30 % in every mass"):
+        calibrate(empty.drive)
+
+
+def test_a_drive_without_the_accelerometer_of_its_calibration_says_so(empty, car):
+    blind = empty.drive.with_signals()
+    blind = replace(
+        blind, signals={n: s for n, s in blind.signals.items() if n[:5] not in ("accel", "gyro_")}
+    )
+    found = weigh(blind, car)
+    assert any("made with an accelerometer" in text for text in found.warnings)
+    assert found.result.std > 0.04 * found.result.mass
+    assert not any("made with an accelerometer" in t for t in weigh(empty.drive, car).warnings)
+
+
 def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monkeypatch):
     """Levels of noise fall into another optimum at some scales, and the mass jumps."""
     base = Vehicle(torque=TorqueModel(source="measured", coefficients=(0.0, 1.0)))

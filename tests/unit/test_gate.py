@@ -168,6 +168,13 @@ def test_no_method_is_surer_than_slow_errors_allow(method, monkeypatch):
     assert honest > 1.05 * ESTIMATORS[method](balance(swing=0.5), BUS).std
 
 
+@pytest.mark.parametrize("method", ["rls", "robust-rls", "ekf", "hybrid", "joint"])
+def test_where_nothing_tells_of_the_brake_no_method_is_as_sure(method):
+    told = balance(swing=0.5)
+    hidden = ESTIMATORS[method](replace(told, brake_hidden=True), BUS)
+    assert hidden.std**2 > ESTIMATORS[method](told, BUS).std ** 2 + (0.02 * hidden.mass) ** 2
+
+
 def test_slow_errors_add_up_as_their_covariance_says(monkeypatch):
     made = balance(minutes=3.0)
     view = made.merged

@@ -125,13 +125,18 @@ class Floor:
         return cls(np.array(known.engine_speed), np.array(known.level), known.scatter, known.span)
 
     def lifted(self, other: Floor) -> Floor:
-        """Follow another floor where it lies a little higher: a reading may drift.
+        """Follow another floor where it lies a little higher, and its scatter where it is larger.
 
-        Where it lies far above, its drive did not drag the engine at that speed.
+        A reading may drift, and another logger be noisier. Where the other floor lies far above,
+        its drive did not drag the engine at that speed.
         """
         higher = other.at(self.engine_speed) - self.level
         near = (higher > 0.0) & (higher < DRIFT * self.span)
-        return replace(self, level=self.level + np.where(near, higher, 0.0))
+        return replace(
+            self,
+            level=self.level + np.where(near, higher, 0.0),
+            scatter=max(self.scatter, other.scatter),
+        )
 
 
 def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
@@ -228,8 +233,9 @@ def _pressed(pedal: Signal, recorded: Floats) -> Bools:
     A pedal that is up tells less: cruise control pushes without a foot.
     """
     up = pedal.values <= float(np.percentile(pedal.values, 1.0)) + PRESSED
-    known = pedal.age(recorded) <= 3.0 * pedal.period
-    return np.asarray(known & ~near(pedal.time, up, recorded, MARGIN))
+    margin = max(MARGIN, pedal.period)
+    known = pedal.age(recorded) <= margin
+    return np.asarray(known & ~near(pedal.time, up, recorded, margin))
 
 
 def _dragged(
@@ -350,6 +356,8 @@ def _untold(source: Signal, level: Floats, reach: float, torque: Floats) -> Bool
     if reach <= 0.0 or np.count_nonzero(clear) < 5 * FEWEST:
         return np.zeros(len(source), dtype=bool)
     slope, offset = np.polyfit(source.values[clear], torque[clear], 1)
+    if slope <= 0.0:
+        return np.zeros(len(source), dtype=bool)
     least = offset + slope * (float(np.median(level)) + reach)
     taken = averaged(torque, source.period, PUSHED_TIME)
     return np.asarray(taken < least)

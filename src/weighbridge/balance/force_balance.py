@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from weighbridge.balance.cornering import cornering
-from weighbridge.balance.foot import SLOWING, find_foot, learn_dragged, near
+from weighbridge.balance.foot import find_foot, learn_dragged, near
 from weighbridge.constants import (
     GAS_CONSTANT_DRY_AIR,
     GRAVITY,
@@ -101,6 +101,9 @@ SWITCH_MARGIN: Final = 0.3
 
 TRAIL: Final = 0.0015
 """Braking force over weight that smoothing may still hold of a brake let go [-]."""
+
+SLOWED: Final = 0.005
+"""Force over weight that slows a vehicle as a dragged engine does, or a light brake [-]."""
 
 SLOWS: Final = 0.02
 """Part of the moving rows in which a vehicle slows that is braked now and then [-]."""
@@ -307,7 +310,7 @@ def force_balance(
     ):
         reason[(reason == 0) & flag] = why
 
-    slows = (needed < -SLOWING * weight)[rows["speed"] > SLOWEST]
+    slows = (needed < -SLOWED * weight)[rows["speed"] > SLOWEST]
     hidden = pressed is None and not foot.told and slows.size and slows.mean() > SLOWS
     noise = vehicle.torque.noise
     middle = np.nanmedian(gearing) if np.isfinite(gearing).any() else np.nan

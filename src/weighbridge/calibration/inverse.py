@@ -183,11 +183,12 @@ class FitSettings:
 
 def lasting_pressure(view: MergedView) -> Floats:
     """Mean dynamic pressure within `AROUND` of each row (n,) [Pa]."""
-    pressure = np.nan_to_num(view.dynamic_pressure)
-    total = np.concatenate(([0.0], np.cumsum(pressure)))
+    known = np.isfinite(view.dynamic_pressure)
+    total = np.concatenate(([0.0], np.cumsum(np.where(known, view.dynamic_pressure, 0.0))))
+    count = np.concatenate(([0], np.cumsum(known)))
     first = np.searchsorted(view.time, view.time - AROUND)
     last = np.searchsorted(view.time, view.time + AROUND, side="right")
-    return np.asarray((total[last] - total[first]) / (last - first))
+    return np.asarray((total[last] - total[first]) / np.maximum(count[last] - count[first], 1))
 
 
 def fit_with_gusts(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
@@ -287,7 +288,7 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
         gearing**2 * view.accel,
         view.accel / settings.wheel_radius**2,
         *(-gearing * term for term in (offset, *terms)),
-        gustiness(view),
+        gustiness(view, d.motion.grade_open),
         one,
         push * north,
         push * east,

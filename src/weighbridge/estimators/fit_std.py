@@ -81,7 +81,7 @@ def slow_std(
     view = balance.merged
     if not (index.size and np.isfinite(mass) and mass > 0.0):
         return float("inf"), 0.0
-    rows, _ = design(view, vehicle)
+    rows, _ = design(view, vehicle, grade_open=balance.motion.grade_open)
     highest = _highest_torque(balance, index)
     std = prior_std(_known_road_load(vehicle), mass, highest)
     # The methods that ask have `weighbridge.estimators.judging.consider_std` for the cold.

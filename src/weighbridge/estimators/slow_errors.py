@@ -62,7 +62,9 @@ MOTION_STD: Final = 0.03
 MOTION_SHARE: Final = 0.25
 """What of that noise the mean of a window keeps [-]: in 58 drives of three simulators, vibration,
 rough roads and vehicles of all classes, noise of one sample from 0.010 to 0.113 m/s^2,
-`motion_variance` meets the true error of the mean of a window within a quarter."""
+`motion_variance` meets the true error of the mean of a window within a quarter (RMS); how much a
+window keeps hangs on how fast the noise is, and on rough roads of one simulator it was twice as
+much."""
 
 MOTION_WINDOW_STD: Final = 0.007
 """Fast error of the mean of a window without such noise [m/s^2]."""
@@ -116,7 +118,9 @@ class SlowErrors:
     constants: dict[str, tuple[float, float]]
 
     @classmethod
-    def from_states(cls, time: Floats, x: Floats, var: Floats, mass_var: Floats) -> SlowErrors:
+    def from_states(
+        cls, time: Floats, x: Floats, var: Floats, mass_var: Floats, gusts: Floats
+    ) -> SlowErrors:
         """Name the states of the filter.
 
         Parameters
@@ -124,12 +128,13 @@ class SlowErrors:
         time : (m,) of the windows [s]
         x, var : (m, k) smoothed states in the order of `NAMES`, and their variances
         mass_var : (m,) variance of the mass as known at each window [kg^2]
+        gusts : (m,) `gustiness` of each window, by which the disturbance is a force
         """
         return cls(
             time=time,
             mass_bound=np.sqrt(mass_var),
-            disturbance=x[:, 1],
-            disturbance_std=np.sqrt(var[:, 1]),
+            disturbance=gusts * x[:, 1],
+            disturbance_std=gusts * np.sqrt(var[:, 1]),
             resistance=x[:, 2],
             resistance_std=np.sqrt(var[:, 2]),
             wind_north=x[:, 3],
@@ -150,16 +155,28 @@ def coldness(view: MergedView) -> Floats:
     return np.asarray(np.exp(-np.maximum(view.time - start, 0.0) / WARM_UP))
 
 
-def gustiness(view: MergedView) -> Floats:
+def gustiness(view: MergedView, grade_open: float = 0.0) -> Floats:
     """How large the fast disturbance is at each row over its usual size (n,) [-].
 
-    Half of it are grade and torque, the other half gusts, whose force grows with the speed.
+    Half of it are errors of grade and torque, the other half gusts, whose force grows with the
+    speed. A grade that nothing has measured comes beside them.
+
+    Parameters
+    ----------
+    view
+    grade_open : what of the grade nothing has measured [rad]
     """
-    return np.asarray(np.hypot(1.0, np.nan_to_num(view.speed) / GUST_SPEED) / np.sqrt(2.0))
+    gusts = 0.5 * (1.0 + (np.nan_to_num(view.speed) / GUST_SPEED) ** 2)
+    grade = (GRAVITY * grade_open / DISTURBANCE_STD) ** 2
+    return np.asarray(np.sqrt((gusts + grade) / (1.0 + grade)))
 
 
 def design(
-    view: MergedView, vehicle: Vehicle, *, leaned: Floats | None = None
+    view: MergedView,
+    vehicle: Vehicle,
+    *,
+    leaned: Floats | None = None,
+    grade_open: float = 0.0,
 ) -> tuple[Floats, Floats]:
     """Rows of the model ``y = phi m + d + c + wind + cold torque + drag``.
 
@@ -170,6 +187,7 @@ def design(
     ----------
     view, vehicle
     leaned : (n,) what the lean of the accelerometer adds to the specific force [m/s^2]
+    grade_open : what of the grade nothing has measured [rad]
 
     Returns
     -------
@@ -185,7 +203,7 @@ def design(
     north, east = view.direction
     one = np.ones_like(phi)
     cold = coldness(view) * np.nan_to_num(view.gearing)
-    gusts = gustiness(view)
+    gusts = gustiness(view, grade_open)
     columns = [phi, gusts, one, slope * north, slope * east, cold, view.dynamic_pressure]
     if by_data_sheet(vehicle):
         gearing = np.nan_to_num(view.gearing)

@@ -221,7 +221,7 @@ def lean(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Lean:
         return Lean(squat_at(given, mass, made.masses, vehicle.kind) - motion.squat, found_std)
     if rows_lean:
         if given is not None:
-            return Lean(given, given_std)
+            return Lean(squat_at(given, mass, made.masses, vehicle.kind), given_std)
         seen = squat_by_speed(motion) if motion.source == "longitudinal_accel" else None
         return Lean(*SQUAT) if seen is None else Lean(*_mean(SQUAT, seen))
     if motion.squat is not None:

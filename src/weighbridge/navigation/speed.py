@@ -82,7 +82,11 @@ def _grade(
 ) -> tuple[Floats, Floats, Floats | None, MotionSource, tuple[str, ...]]:
     """Find grade, its standard deviation, and height where there is one."""
     measured, altitude = drive.get("grade"), drive.get("altitude")
-    known = altitude is not None and np.count_nonzero(altitude.age(time[::10]) < 5.0) > 1
+    known = (
+        altitude is not None
+        and np.count_nonzero(altitude.age(time[::10]) < 5.0) > 1
+        and np.count_nonzero((altitude.time >= time[0]) & (altitude.time <= time[-1])) > 1
+    )
     height = resample(altitude, time) if altitude is not None and known else None
     if measured is not None and len(measured) > 1:
         grade, std = smooth_grade(measured, time, distance)

@@ -26,7 +26,7 @@ from weighbridge.calibration.regression import (
     join_rows,
 )
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators.judging import COLD_STD, cold_share
+from weighbridge.estimators.judging import COLD_STD, HIDDEN_BRAKE_STD, WIDEST, cold_share
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.rls import block_jackknife
 from weighbridge.estimators.squat import pooled, squat_at
@@ -271,7 +271,8 @@ def run_calibration(
             notes=_notes(fitted, low < high, rows.target.size, found),
         ),
     )
-    finished = replace(finished, dragged=dragged_reading(drives, motions, finished))
+    learnt = dragged_reading(drives, motions, finished)
+    finished = replace(finished, dragged=learnt or finished.dragged)
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
     scale, scale_std = _self_weighing(balances, finished, masses)
     finished = replace(
@@ -307,7 +308,29 @@ def run_calibration(
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
     for note in dict.fromkeys(n for balance in balances for n in balance.notes):
         finished = noted(finished, note)
+    if any(balance.brake_hidden for balance in balances):
+        made = finished.provenance
+        std = float(np.hypot(made.mass_scale_std or 0.0, HIDDEN_BRAKE_STD))
+        finished = replace(finished, provenance=replace(made, mass_scale_std=std))
+    _refuse_useless(finished)
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
+
+
+def _refuse_useless(vehicle: Vehicle) -> None:
+    """Refuse a calibration with which no drive could be weighed.
+
+    Raises
+    ------
+    DriveError
+        It leaves more than `WIDEST` in every mass.
+    """
+    made = vehicle.provenance
+    if made.mass_scale_std is not None and made.mass_scale_std > WIDEST:
+        raise DriveError(
+            f"the calibration would leave {100.0 * made.mass_scale_std:.0f} % in every mass, as "
+            f"standard deviation, with which no drive can be weighed ({made.notes or 'no notes'}); "
+            "check that every sample was recorded, and calibrate on other or longer drives"
+        )
 
 
 def _draft(
@@ -331,7 +354,9 @@ def _draft(
         reference_torque=base.torque.reference_torque,
         engine_efficiency=base.torque.engine_efficiency,
     )
-    return gears, replace(base, driveline=driveline, torque=model)
+    # A floor is told in the unit of its reading.
+    dragged = base.dragged if base.torque.source == source else None
+    return gears, replace(base, driveline=driveline, torque=model, dragged=dragged)
 
 
 def _bounds(base: Vehicle, driveline: Driveline) -> tuple[Floats, Floats]:
@@ -670,7 +695,7 @@ def _notes(fitted: TorqueFit, free: Bools, samples: int, delay_found: bool) -> s
     ]
     notes = ["held by a bound: " + ", ".join(held)] if held else []
     if samples < FEW_SAMPLES:
-        notes.append(f"made from {samples} samples only; drive longer")
+        notes.append(f"made from {samples} samples only; poll faster, or drive longer")
     if not delay_found:
         notes.append(NOT_TOLD)
     return "; ".join(notes) or None

@@ -73,6 +73,9 @@ scaled."""
 SLOPES: Final = (0.8, 2.5)
 """The same at least and at most [-]."""
 
+SCALES: Final = (0.5, 2.0)
+"""A torque that was fitted is scaled by so much at least and at most [-]."""
+
 SELF_CLOSE: Final = 5e-4
 """The calibration's own drives are weighed so near to their masses, in the mean [-]."""
 
@@ -333,15 +336,18 @@ def _self_weighed(
         )
 
     scale, slope = 1.0, USUAL_SLOPE
-    ratio, bound, direction, count = found(scale)
+    tried = [(scale, *found(scale))]
     for _ in range(SELF_ROUNDS):
+        before, ratio = scale, tried[-1][1]
         if abs(ratio - 1.0) < SELF_CLOSE:
             break
-        before, at = ratio, scale
-        scale += (1.0 - ratio) / slope
-        ratio, bound, direction, count = found(scale)
+        scale = float(np.clip(scale + (1.0 - ratio) / slope, *SCALES))
+        if scale == before:
+            break
+        tried.append((scale, *found(scale)))
         # Levels of noise may fall into another optimum, and the mass jump with them.
-        slope = float(np.clip((ratio - before) / (scale - at), *SLOPES))
+        slope = float(np.clip((tried[-1][1] - ratio) / (scale - before), *SLOPES))
+    scale, ratio, bound, direction, count = min(tried, key=lambda t: abs(t[1] - 1.0))
     each = float(np.hypot(TRANSFER_STD[1], joint.UNMODELLED * bound))
     # Where the torque could not be fitted anew, what its own fit left open stays.
     known = math.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0, ratio - 1.0)

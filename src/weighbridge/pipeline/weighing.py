@@ -20,7 +20,7 @@ from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, 
 from weighbridge.estimators.foreign import of_another
 from weighbridge.estimators.judging import uncalibrated_std
 from weighbridge.estimators.squat import of_vehicle
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
@@ -368,7 +368,18 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
             "as standard deviation, are in the interval",
         )
     balance = force_balance(drive, vehicle, motion, delay=delay)
-    return balance, notes + balance.notes
+    return balance, notes + other_equipment(vehicle, motion) + balance.notes
+
+
+def other_equipment(vehicle: Vehicle, motion: Motion) -> tuple[str, ...]:
+    """Say where the calibration had an accelerometer and the drive has none; nothing if not."""
+    made = vehicle.provenance
+    if not made.torque_fitted or made.motion in (None, *BY_SPEED) or motion.source not in BY_SPEED:
+        return ()
+    return (
+        f"the vehicle file of {vehicle.name} was made with an accelerometer, and this drive has "
+        "none that can be used: masses come out 3 to 14 % light; calibrate on drives without it",
+    )
 
 
 def _refuse_other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, delay: float) -> None:

@@ -194,7 +194,12 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 "numbers",
                 "rpm",
             ),
-            _Key("level", "level", "load or torque reads so little", "numbers"),
+            _Key(
+                "level",
+                "level",
+                "it reads so little: a share for load and percent, else N m, kg/s",
+                "numbers",
+            ),
             _Key("scatter", "scatter", "standard deviation of such readings"),
             _Key("span", "span", "range of the reading up to the highest"),
             _Key("reach", "reach", "how far above the level idle charge may lift it"),
