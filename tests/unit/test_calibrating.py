@@ -252,6 +252,13 @@ def test_a_calibration_with_which_nothing_could_be_weighed_is_refused(empty, mon
         calibrate(empty.drive)
 
 
+def test_a_mass_given_against_the_one_a_drive_states_is_noted(empty, car):
+    stated = empty.drive.info.mass
+    assert "states a mass of" not in (car.provenance.notes or "")
+    heavier = calibrate(empty.drive, mass=1.1 * stated)
+    assert f"states a mass of {stated:.0f} kg" in heavier.provenance.notes
+
+
 def test_a_drive_without_the_accelerometer_of_its_calibration_says_so(empty, car):
     blind = empty.drive.with_signals()
     blind = replace(

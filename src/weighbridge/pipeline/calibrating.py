@@ -55,6 +55,9 @@ from weighbridge.vehicle.torque import DRAGGED_TIME, SIGNALS, averaged, lowest_l
 FEW_SAMPLES: Final = 2000
 """Fewer usable samples, some twenty minutes of driving, make a poor calibration."""
 
+MASSES_APART: Final = 0.01
+"""A mass given and one that a drive states differ by more, and a note says so [-]."""
+
 TRANSFER_STD: Final[dict[TorqueSource, float]] = {
     "measured": 0.005,
     "percent": 0.005,
@@ -306,7 +309,8 @@ def run_calibration(
             lambda car: [force_balance(d, car, m) for d, m in zip(drives, motions, strict=True)],
         )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
-    for note in dict.fromkeys(n for balance in balances for n in balance.notes):
+    notes = [n for balance in balances for n in balance.notes] + _other_masses(drives, masses)
+    for note in dict.fromkeys(notes):
         finished = noted(finished, note)
     if any(balance.brake_hidden for balance in balances):
         made = finished.provenance
@@ -475,6 +479,16 @@ def _masses(
                 f"{high:g} kg; give the mass in kg, and the class under [vehicle] of --vehicle"
             )
     return [float(kg) for kg in known if kg is not None]
+
+
+def _other_masses(drives: Sequence[Drive], masses: Sequence[float]) -> list[str]:
+    """Say where a mass that was given differs from the one its drive states."""
+    return [
+        f"{drive.name} states a mass of {drive.info.mass:.0f} kg and was calibrated with the "
+        f"{kg:.0f} kg given"
+        for drive, kg in zip(drives, masses, strict=True)
+        if drive.info.mass is not None and abs(kg / drive.info.mass - 1.0) > MASSES_APART
+    ]
 
 
 def _load_floor(drive: Drive, source: TorqueSource) -> float:
