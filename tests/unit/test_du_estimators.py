@@ -59,7 +59,8 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
         fuel_burnt=np.zeros(n),
         reason=reason,
     )
-    return ForceBalance(force=None, motion=SimpleNamespace(source="inertial"), merged=view)
+    motion = SimpleNamespace(source="inertial", grade_open=0.0)
+    return ForceBalance(force=None, motion=motion, merged=view)
 
 
 @pytest.mark.parametrize("method", METHODS)
