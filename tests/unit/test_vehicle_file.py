@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.file import load_vehicle, save_vehicle
 from weighbridge.vehicle.model import (
+    DraggedReading,
     Driveline,
     Mounting,
     Provenance,
@@ -40,6 +42,18 @@ drivelines = st.builds(
     speed_scale=st.floats(0.8, 1.2),
     idle_speed=st.floats(0.0, 200.0),
 )
+rising = st.lists(st.floats(1.0, 900.0), min_size=1, max_size=5, unique=True).map(
+    lambda x: tuple(sorted(x))
+)
+
+
+def curve(x_name, y_name):
+    """Fields of a curve: as many of both, and the first rises."""
+    return rising.flatmap(
+        lambda x: st.tuples(*[finite] * len(x)).map(lambda y: {x_name: x, y_name: y})
+    )
+
+
 pairs = st.tuples(st.floats(0.0, 500.0), st.floats(0.0, 500.0)).map(lambda p: tuple(sorted(p)))
 torques = st.builds(
     TorqueModel,
@@ -51,6 +65,10 @@ torques = st.builds(
     scale_std=maybe(positive),
     load_range=maybe(pairs),
     speed_range=maybe(pairs),
+)
+bent = st.tuples(torques, curve("knots", "knot_slopes")).map(lambda t: replace(t[0], **t[1]))
+dragged = st.tuples(curve("engine_speed", "level"), positive, positive, st.floats(0.0, 1e6)).map(
+    lambda d: DraggedReading(**d[0], scatter=d[1], span=d[2], reach=d[3])
 )
 speed_models = st.builds(
     SpeedModel,
@@ -73,7 +91,7 @@ vehicles = st.builds(
     gross=maybe(positive),
     mapping=maybe(text),
     driveline=drivelines,
-    torque=torques,
+    torque=torques | bent,
     road_load=st.builds(
         RoadLoad,
         drag_area=st.floats(0.0, 19.0),
@@ -96,6 +114,7 @@ vehicles = st.builds(
         torque_delay=maybe(st.floats(-1.0, 3.0)),
         torque_delay_std=maybe(positive),
     ),
+    dragged=maybe(dragged),
     speed_model=maybe(speed_models),
     provenance=st.builds(
         Provenance,
@@ -201,6 +220,9 @@ rotating_mass_kg = 71
 scale_std = 0.2"""
 
 
+DRAGGED = "[dragged]\nengine_speed_rpm = [900, 2000]\nscatter = 0.01\nspan = 0.8"
+
+
 @pytest.mark.parametrize(
     ("content", "line", "words"),
     [
@@ -228,6 +250,10 @@ scale_std = 0.2"""
         ("[road_load]\nrolling_speed_coefficient_s_per_m = 0.9", 2, "must be in [0, 0.002) s/m"),
         ("[mounting]\nstd_deg = [1, 2]", 2, "must be three numbers"),
         ("[timing]\ntorque_delay_s = 120", 2, "must be in [-1, 3] s"),
+        (DRAGGED + "\nlevel = [0.1]", 2, "level must be as many as engine_speed, 2, got 1"),
+        (DRAGGED + "\nlevel = []", 5, "one number at least"),
+        (DRAGGED.replace("2000", "700") + "\nlevel = [1, 2]", 2, "engine_speed must rise"),
+        ("[dragged]\nspan = 1.0", 1, "lacks"),
         ("[provenance]\nformat_version = 99", 2, "reads version 1"),
         ("[provenance]\nsamples = 1.5", 2, "a whole number"),
         ("[speed_model]\nmass_kg = 1092", 1, "lacks force_gain_per_m, drag_kg_per_m, rotating_"),
