@@ -21,6 +21,15 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
+def foreign_simulator(shared_data: Path) -> Path:
+    """Folder of another simulator's drives, by vehicle; skips where they are not."""
+    path = shared_data / "foreign-simulator"
+    if not path.is_dir():
+        pytest.skip("the drives of another simulator are not here")
+    return path
+
+
+@pytest.fixture(scope="session")
 def assert_salvaged() -> Callable[[Path], None]:
     """Check that a damaged log leaves sound signals or one sentence."""
 

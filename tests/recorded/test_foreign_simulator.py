@@ -19,23 +19,15 @@ THREE = ("calibration-1", "calibration-2", "calibration-3")
 DRIVES = ("drive-1", "drive-2", "drive-3", "drive-4")
 
 
-@pytest.fixture(scope="module")
-def folder(shared_data):
-    path = shared_data / "foreign-simulator"
-    if not path.is_dir():
-        pytest.skip("the drives of another simulator are not here")
-    return path
-
-
-def truth(folder, vehicle, name):
-    return pl.read_parquet(folder / vehicle / name / "truth.parquet")
+def truth(foreign_simulator, vehicle, name):
+    return pl.read_parquet(foreign_simulator / vehicle / name / "truth.parquet")
 
 
 @pytest.fixture(scope="module")
-def calibrated(folder):
+def calibrated(foreign_simulator):
     @functools.cache
     def make(vehicle, names):
-        return wb.calibrate([wb.read_drive(folder / vehicle / n) for n in names])
+        return wb.calibrate([wb.read_drive(foreign_simulator / vehicle / n) for n in names])
 
     return make
 
@@ -45,12 +37,14 @@ def calibrated(folder):
     [(THREE, 0.9), (("calibration-1",), 1.1), (("brisk-calibration",), 1.1)],
     ids=["three", "one", "brisk"],
 )
-def test_masses_of_vehicles_of_another_simulator(folder, calibrated, names, most):
+def test_masses_of_vehicles_of_another_simulator(foreign_simulator, calibrated, names, most):
     errors, scaled = [], []
     for vehicle in VEHICLES:
         for name in DRIVES:
-            found = wb.weigh(wb.read_drive(folder / vehicle / name), calibrated(vehicle, names))
-            mass = truth(folder, vehicle, name)["mass_kg"][-1]
+            found = wb.weigh(
+                wb.read_drive(foreign_simulator / vehicle / name), calibrated(vehicle, names)
+            )
+            mass = truth(foreign_simulator, vehicle, name)["mass_kg"][-1]
             errors.append(100.0 * (found.mass / mass - 1.0))
             scaled.append((found.mass - mass) / found.std)
     assert np.sqrt(np.mean(np.square(errors))) < most
@@ -58,21 +52,23 @@ def test_masses_of_vehicles_of_another_simulator(folder, calibrated, names, most
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
-def test_differences_of_load_are_what_they_are(folder, calibrated, vehicle):
+def test_differences_of_load_are_what_they_are(foreign_simulator, calibrated, vehicle):
     found, true = [], []
     for name in DRIVES:
-        weighing = wb.weigh(wb.read_drive(folder / vehicle / name), calibrated(vehicle, THREE))
+        weighing = wb.weigh(
+            wb.read_drive(foreign_simulator / vehicle / name), calibrated(vehicle, THREE)
+        )
         found.append(weighing.mass)
-        true.append(truth(folder, vehicle, name)["mass_kg"][-1])
+        true.append(truth(foreign_simulator, vehicle, name)["mass_kg"][-1])
     assert np.polyfit(true, found, 1)[0] == pytest.approx(1.0, abs=0.05)
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
-def test_next_to_no_row_that_weighs_is_braked(folder, calibrated, vehicle):
+def test_next_to_no_row_that_weighs_is_braked(foreign_simulator, calibrated, vehicle):
     balance, _ = torque_balance(
-        wb.read_drive(folder / vehicle / "drive-3"), calibrated(vehicle, THREE)
+        wb.read_drive(foreign_simulator / vehicle / "drive-3"), calibrated(vehicle, THREE)
     )
-    known = truth(folder, vehicle, "drive-3")
+    known = truth(foreign_simulator, vehicle, "drive-3")
     view = balance.merged
     brake = np.interp(view.time, known["time_s"], known["brake_n"])
     assert np.mean(brake[view.speed > 1.5] > 5.0) > 0.05

@@ -11,11 +11,8 @@ METHODS = ("joint", "rls", "robust-rls", "ekf", "hybrid")
 
 
 @pytest.fixture(scope="module")
-def wagon(shared_data):
-    folder = shared_data / "foreign-simulator" / "wagon"
-    if not folder.is_dir():
-        pytest.skip("no foreign-simulator/wagon in the shared data")
-    return folder
+def wagon(foreign_simulator):
+    return foreign_simulator / "wagon"
 
 
 @pytest.fixture(scope="module")

@@ -30,18 +30,10 @@ def thinned(drive, rate):
     return replace(drive, signals=signals)
 
 
-@pytest.fixture(scope="module")
-def folder(shared_data):
-    path = shared_data / "foreign-simulator"
-    if not path.is_dir():
-        pytest.skip("the drives of another simulator are not here")
-    return path
-
-
 @pytest.mark.parametrize(("vehicle", "rate"), [("hatchback", 1.0), ("wagon", 4.0)])
-def test_obd_and_gnss_without_an_inertial_sensor(folder, vehicle, rate):
+def test_obd_and_gnss_without_an_inertial_sensor(foreign_simulator, vehicle, rate):
     def drive(name):
-        return thinned(wb.read_drive(folder / vehicle / name), rate)
+        return thinned(wb.read_drive(foreign_simulator / vehicle / name), rate)
 
     car = wb.calibrate([drive("calibration-1"), drive("calibration-2")])
     assert "not fitted anew" not in (car.provenance.notes or "")

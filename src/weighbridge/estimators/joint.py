@@ -21,6 +21,7 @@ from weighbridge.estimators.judging import (
     Evidence,
     converged_at,
     judge,
+    lacks_accelerometer,
     nothing,
 )
 from weighbridge.estimators.noisy_motion import LEVEL_STD, drawn
@@ -37,7 +38,7 @@ from weighbridge.estimators.slow_errors import (
 from weighbridge.estimators.squat import Lean, lean
 from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance, load_change
-from weighbridge.navigation.motion import BY_SPEED, MotionSource
+from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.fuel import FUEL_STD
@@ -310,8 +311,8 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     left = float(np.hypot(scale, MOTION_STD[balance.motion.source]))
     if balance.brake_hidden:
         left = float(np.hypot(left, HIDDEN_BRAKE_STD))
-    if made.torque_fitted and made.motion not in (None, *BY_SPEED):
-        left = float(np.hypot(left, OTHER_MOTION_STD.get(balance.motion.source, 0.0)))
+    if lacks_accelerometer(vehicle, balance.motion):
+        left = float(np.hypot(left, OTHER_MOTION_STD[balance.motion.source]))
     if made.method == "rls":
         left = float(np.hypot(left, OTHER_METHOD_STD))
     if not mass > 0.0:

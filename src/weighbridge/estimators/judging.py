@@ -123,6 +123,13 @@ def calibration_std(balance: ForceBalance, vehicle: Vehicle) -> float:
     return math.hypot(scale, MOTION_STD[balance.motion.source], hidden)
 
 
+def lacks_accelerometer(vehicle: Vehicle, motion: Motion) -> bool:
+    """Whether the vehicle file was made with an accelerometer and the drive has none."""
+    made = vehicle.provenance
+    with_one = made.torque_fitted and made.motion not in (None, *BY_SPEED)
+    return with_one and motion.source in BY_SPEED
+
+
 def uncalibrated_std(vehicle: Vehicle, motion: Motion) -> float:
     """Relative standard deviation by what a data sheet leaves open [-]."""
     leans = motion.source not in BY_SPEED and motion.squat is None

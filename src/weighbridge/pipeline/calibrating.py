@@ -309,15 +309,22 @@ def run_calibration(
             lambda car: [force_balance(d, car, m) for d, m in zip(drives, motions, strict=True)],
         )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
-    notes = [n for balance in balances for n in balance.notes] + _other_masses(drives, masses)
-    for note in dict.fromkeys(notes):
-        finished = noted(finished, note)
-    if any(balance.brake_hidden for balance in balances):
-        made = finished.provenance
-        std = float(np.hypot(made.mass_scale_std or 0.0, HIDDEN_BRAKE_STD))
-        finished = replace(finished, provenance=replace(made, mass_scale_std=std))
+    finished = _with_doubts(finished, balances, _other_masses(drives, masses))
     _refuse_useless(finished)
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
+
+
+def _with_doubts(
+    vehicle: Vehicle, balances: Sequence[ForceBalance], notes: Sequence[str]
+) -> Vehicle:
+    """Note what is doubted of a calibration's drives, and count what is hidden in them."""
+    for note in dict.fromkeys([*(n for balance in balances for n in balance.notes), *notes]):
+        vehicle = noted(vehicle, note)
+    if not any(balance.brake_hidden for balance in balances):
+        return vehicle
+    made = vehicle.provenance
+    std = float(np.hypot(made.mass_scale_std or 0.0, HIDDEN_BRAKE_STD))
+    return replace(vehicle, provenance=replace(made, mass_scale_std=std))
 
 
 def _refuse_useless(vehicle: Vehicle) -> None:

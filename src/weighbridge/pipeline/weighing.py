@@ -18,9 +18,9 @@ from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
 from weighbridge.estimators.foreign import of_another
-from weighbridge.estimators.judging import uncalibrated_std
+from weighbridge.estimators.judging import lacks_accelerometer, uncalibrated_std
 from weighbridge.estimators.squat import of_vehicle
-from weighbridge.navigation.motion import BY_SPEED, Motion
+from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
@@ -373,8 +373,7 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
 
 def other_equipment(vehicle: Vehicle, motion: Motion) -> tuple[str, ...]:
     """Say where the calibration had an accelerometer and the drive has none; nothing if not."""
-    made = vehicle.provenance
-    if not made.torque_fitted or made.motion in (None, *BY_SPEED) or motion.source not in BY_SPEED:
+    if not lacks_accelerometer(vehicle, motion):
         return ()
     return (
         f"the vehicle file of {vehicle.name} was made with an accelerometer, and this drive has "

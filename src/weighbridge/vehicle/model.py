@@ -28,6 +28,14 @@ MASS_RANGE: Final[dict[VehicleClass, tuple[float, float]]] = {
 with a trailer [kg]: outside, data or vehicle file are wrong."""
 
 
+def _curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, ...]) -> None:
+    """Refuse a curve with other counts of ``x`` and ``y``, or whose ``x`` does not rise."""
+    if len(y) != len(x):
+        raise ConfigError(f"{y_name} must be as many as {x_name}, {len(x)}, got {len(y)}")
+    if any(b <= a for a, b in itertools.pairwise(x)):
+        raise ConfigError(f"{x_name} must rise, got {x}")
+
+
 def _positive(name: str, value: float | None) -> None:
     if value is not None and not (math.isfinite(value) and value > 0.0):
         raise ConfigError(f"{name} must be a positive number, got {value}")
@@ -158,13 +166,7 @@ class TorqueModel:
             raise ConfigError(f"curvature must be two numbers or none, got {self.curvature}")
         if self.curvature_stds and len(self.curvature_stds) != len(self.curvature):
             raise ConfigError("curvature_stds must be as many as curvature")
-        if len(self.knot_slopes) != len(self.knots):
-            raise ConfigError(
-                f"knot_slopes must be as many as knots, {len(self.knots)}, got "
-                f"{len(self.knot_slopes)}"
-            )
-        if any(b <= a for a, b in itertools.pairwise(self.knots)):
-            raise ConfigError(f"knots must rise, got {self.knots}")
+        _curve("knots", self.knots, "knot_slopes", self.knot_slopes)
         _positive("reference_torque", self.reference_torque)
         _positive("noise", self.noise)
         _not_negative("scale_std", self.scale_std)
@@ -281,13 +283,9 @@ class DraggedReading:
     reach: float = 0.0
 
     def __post_init__(self) -> None:
-        if len(self.level) != len(self.engine_speed) or not self.level:
-            raise ConfigError(
-                f"level must be as many as engine_speed, {len(self.engine_speed)} and at least "
-                f"one, got {len(self.level)}"
-            )
-        if any(b <= a for a, b in itertools.pairwise(self.engine_speed)):
-            raise ConfigError(f"engine_speed must rise, got {self.engine_speed}")
+        if not self.level:
+            raise ConfigError("level must be one number at least, got none")
+        _curve("engine_speed", self.engine_speed, "level", self.level)
         _positive("scatter", self.scatter)
         _positive("span", self.span)
         _not_negative("reach", self.reach)
