@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
+from weighbridge.checks import check_drive
 from weighbridge.errors import DriveError
 from weighbridge.kernels.rotation import euler_to_matrix
-from weighbridge.pipeline.checks import check_drive
 from weighbridge.vehicle.gear import detect_gearings
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

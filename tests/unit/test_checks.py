@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from weighbridge.checks import check_drive
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
-from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.inspection import describe, inspect_drive, quantisation
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.signals import Drive, DriveInfo, Signal

@@ -25,6 +25,7 @@ from weighbridge.calibration.regression import (
     fit,
     join_rows,
 )
+from weighbridge.checks import check_drive
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, HIDDEN_BRAKE_STD, WIDEST, cold_share
 from weighbridge.estimators.regression import regression
@@ -32,7 +33,6 @@ from weighbridge.estimators.rls import block_jackknife
 from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion
-from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, noted, refine
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from weighbridge.checks import check_drive
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.inertia import (
@@ -38,7 +39,6 @@ from weighbridge.estimators.suspension import (
     static_mass,
 )
 from weighbridge.estimators.track import Status
-from weighbridge.pipeline.checks import check_drive
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.pipeline.ride_checks import (
     LEAST,

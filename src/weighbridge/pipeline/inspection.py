@@ -9,9 +9,9 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.balance.speed_balance import SPEEDS
+from weighbridge.checks import check_drive
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.navigation.select import IMU_SIGNALS
-from weighbridge.pipeline.checks import check_drive
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import TorqueSource, Vehicle

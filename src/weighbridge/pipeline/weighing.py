@@ -255,7 +255,7 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     if method not in ESTIMATORS:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
 
-    from weighbridge.pipeline.checks import check_drive
+    from weighbridge.checks import check_drive
 
     drive = drive.with_problems(*check_drive(drive, vehicle))
     for problem in drive.problems:

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
-from weighbridge.pipeline import windows
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
 

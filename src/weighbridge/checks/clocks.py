@@ -1,0 +1,135 @@
+"""Do the clocks of a drive run as a recording's do, and together?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from weighbridge.signals import QUANTITIES, Drive, Floats, Problem
+from weighbridge.signals.catalogue import TABLES
+from weighbridge.vehicle.model import Vehicle
+
+# A pause in which nothing was recorded is told [s]; no drive has one so long [s].
+_PAUSE: Final = 60.0
+_NO_DRIVE: Final = 6 * 3600.0
+
+
+def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find time columns in another unit than their name says."""
+    for table in TABLES:
+        signals = [s for s in drive.signals.values() if QUANTITIES[s.name].table == table]
+        signals = [s for s in signals if len(s) >= 10]
+        if not signals:
+            continue
+        s = max(signals, key=len)
+        period, name = s.period, f"{table} ({s.name})"
+        slow, fast = (0.5, 5e-5) if table in ("imu", "ride") else (30.0, 5e-4)
+        if period > slow or (period > 2.0 and s.duration > 2 * 86_400.0):
+            yield Problem(
+                "",
+                f"{name} has one sample every {period:.4g} s; if its time is in milliseconds, "
+                "name the column time_ms or set the unit in [time] of the mapping",
+                serious=True,
+            )
+        elif period < fast:
+            yield Problem(
+                "",
+                f"{name} has {1.0 / period:.4g} samples per second; if its time is in seconds, "
+                "name the column time_s or set the unit in [time] of the mapping",
+                serious=True,
+            )
+
+
+def check_overlap(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find tables that were not recorded at the same time."""
+    spans = {}
+    for table in TABLES:
+        signals = [
+            s for s in drive.signals.values() if QUANTITIES[s.name].table == table and len(s)
+        ]
+        if signals:
+            start = min(float(s.time[0]) for s in signals)
+            spans[table] = (start, max(float(s.time[-1]) for s in signals))
+    for (a, (a0, a1)), (b, (b0, b1)) in combinations(spans.items(), 2):
+        shared = min(a1, b1) - max(a0, b0)
+        shorter = min(a1 - a0, b1 - b0)
+        if shared <= 0.1 * shorter:
+            yield Problem(
+                "",
+                f"{a} runs from {a0:.6g} to {a1:.6g} s and {b} from {b0:.6g} to {b1:.6g} s: "
+                "write both on one clock (a constant goes into offset_s in [time] of a mapping)",
+                serious=True,
+            )
+        elif shared < 0.5 * max(a1 - a0, b1 - b0):
+            yield Problem("", f"{a} and {b} were recorded together for {shared:.0f} s only")
+
+
+def check_long_gaps(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find jumps of the clock that no recording makes."""
+    seen: set[int] = set()
+    for s in drive.signals.values():
+        if id(s.time) in seen or len(s) < 2:
+            continue
+        seen.add(id(s.time))
+        step = np.diff(s.time)
+        k = int(np.argmax(step))
+        if step[k] > _NO_DRIVE:
+            yield Problem(
+                s.name,
+                f"the clock of {s.name} jumps by {step[k]:.6g} s after {s.time[k]:.6g} s; "
+                "cut the recording there, or correct that time stamp",
+                serious=True,
+            )
+
+
+def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Tell of times in which nothing was recorded, which a clock set forward looks like, too."""
+    clocks: dict[str, dict[int, Floats]] = {}
+    for s in drive.signals.values():
+        clocks.setdefault(QUANTITIES[s.name].table, {})[id(s.time)] = s.time
+    tables = {t: np.unique(np.concatenate(list(c.values()))) for t, c in clocks.items()}
+    if not tables:
+        return
+    whole = _pauses(np.unique(np.concatenate(list(tables.values()))))
+    if whole:
+        start, length = max(whole, key=lambda p: p[1])
+        speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+        ends = np.array([start, start + length])
+        moving = (
+            speed is not None
+            and bool(np.all(speed.age(ends) < 5.0))
+            and float(np.min(np.abs(speed.at(ends)))) > 3.0
+        )
+        several = f"{len(whole)} times, the longest time " if len(whole) > 1 else ""
+        why = (
+            "while the vehicle moves: the clock was set forward, or a piece of the recording is "
+            "missing"
+            if moving
+            else "as if the recording paused or its clock was set forward"
+        )
+        yield Problem(
+            "",
+            f"nothing was recorded {several}for {length:.0f} s from {start:.6g} s, {why}",
+        )
+    for table, time in tables.items():
+        own = [p for p in _pauses(time) if not any(abs(p[0] - w[0]) < _PAUSE for w in whole)]
+        if own:
+            start, length = max(own, key=lambda p: p[1])
+            several = f"{len(own)} times, the longest time " if len(own) > 1 else ""
+            yield Problem(
+                "",
+                f"{table} pauses {several}for {length:.0f} s from {start:.6g} s while the rest "
+                "goes on; if its clock was set there, cut the recording",
+            )
+
+
+def _pauses(time: Floats) -> list[tuple[float, float]]:
+    """Start and length of the pauses of a clock [s]."""
+    if time.size < 10:
+        return []
+    step = np.diff(time)
+    pause = (step > max(_PAUSE, 10.0 * float(np.median(step)))) & (step <= _NO_DRIVE)
+    return [(float(time[k]), float(step[k])) for k in np.flatnonzero(pause)]

@@ -1,0 +1,124 @@
+"""Are torque and speed of the engine what their names say?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from weighbridge.checks.needed import show
+from weighbridge.signals import Drive, Problem, Signal
+from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE, friction_coefficients
+from weighbridge.vehicle.model import Vehicle
+
+# Engine speeds of an idle [rad/s], and coolant of an engine that is warm [K].
+_IDLE: Final = (45.0, 135.0)
+_WARM: Final = 343.0
+# Torque at idle that alternator and pumps do not take [part of the reference torque].
+_IDLE_TORQUE: Final = 0.03
+
+
+def check_whole_torque(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Doubt a torque in N m that looks like one in percent."""
+    s = drive.get("engine_torque")
+    if s is None or len(s) < 200:
+        return
+    low, high = float(np.min(s.values)), float(np.max(s.values))
+    whole = bool(np.all(np.abs(s.values - np.round(s.values)) < 1e-6))
+    if whole and low >= -40.0 and 60.0 <= high <= 100.0 and np.unique(s.values).size > 20:
+        yield Problem(
+            s.name,
+            f"engine_torque runs from {low:.0f} to {high:.0f} in whole N m; if that is percent of "
+            "a reference torque, name the column engine_torque_pct",
+        )
+
+
+def check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find friction of the engine in a torque that is taken for the one at its shaft."""
+    torque = drive.get("engine_torque_fraction")
+    if torque is None or (vehicle is not None and vehicle.torque.source != "percent"):
+        return
+    if vehicle is not None and vehicle.torque.coefficients and vehicle.torque.coefficients[0] < 0.0:
+        return
+    idle = _idle_torque(drive, torque)
+    remedy = _friction_remedy(drive, vehicle, idle)
+    if drive.has("indicated_torque_fraction"):
+        seen = f" (at most {100.0 * idle:.0f} %, its reading at idle)" if idle is not None else ""
+        yield Problem(
+            "engine_torque_fraction",
+            f"the torque is the engine's indicated one, friction included{seen}: log its nominal "
+            f"friction (EEC3), or {remedy}",
+            serious=vehicle is not None,
+        )
+    elif idle is not None and idle > _IDLE_TORQUE:
+        yield Problem(
+            "engine_torque_fraction",
+            f"warm at idle and standing the torque reads {100.0 * idle:.0f} %: friction seems to "
+            f"be in it, as PID 62 may have it, beside what alternator and pumps take; {remedy}",
+        )
+
+
+def _friction_remedy(drive: Drive, vehicle: Vehicle | None, idle: float | None) -> str:
+    """Say what to write of the friction into a vehicle file."""
+    reference = drive.get("reference_torque")
+    if reference is not None and len(reference):
+        full = float(np.median(reference.values))
+    else:
+        full = (vehicle.torque.reference_torque if vehicle is not None else None) or 0.0
+    engine = drive.get("engine_speed")
+    if idle is None or not full or engine is None or not len(engine):
+        return (
+            "state it as coefficients = [-F, 1.0], F the friction in N m, under [torque] of the "
+            "vehicle file"
+        )
+    turning = engine.values[(engine.values > _IDLE[0]) & (engine.values < _IDLE[1])]
+    told = []
+    for fuel in FRICTION_PRESSURE:
+        w0, w2, w3 = friction_coefficients(idle * full, float(np.median(turning)), fuel)
+        told.append(f"[{-w0:.3g}, 1.0, {-w2:.3g}, {-w3:.3g}] for {fuel}")
+    return (
+        f"state it under [torque] of the vehicle file as coefficients = {' or '.join(told)}, which "
+        "grows with engine speed; with an automatic stand in neutral for it: in gear the reading "
+        "holds the drag of the converter as well"
+    )
+
+
+def _idle_torque(drive: Drive, torque: Signal) -> float | None:
+    """Least torque of an engine that idles warm and standing; None where that was not seen."""
+    engine, speed = drive.get("engine_speed"), drive.get("vehicle_speed")
+    if engine is None or speed is None or not len(speed) or not len(engine):
+        return None
+    at = torque.time
+    turning = engine.at(at)
+    with np.errstate(invalid="ignore"):
+        idle = (turning > _IDLE[0]) & (turning < _IDLE[1]) & (np.abs(speed.at(at)) < 0.3)
+        # No pull-away just before or after.
+        for side in (-2.0, 2.0):
+            idle &= np.abs(speed.at(at + side)) < 0.3
+        coolant = drive.get("coolant_temperature")
+        if coolant is not None and len(coolant):
+            idle &= coolant.at(at) > _WARM
+    if np.count_nonzero(idle) < 20:
+        return None
+    # Fans, air conditioning and a gearbox in gear come and go.
+    return float(np.percentile(torque.values[idle], 10.0))
+
+
+def check_engine_speed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find an engine that would turn too slowly for the road speed."""
+    engine, speed = drive.get("engine_speed"), drive.get("vehicle_speed")
+    if engine is None or speed is None or not len(speed):
+        return
+    fast = speed.at(engine.time) > 10.0
+    if np.count_nonzero(fast) < 20:
+        return
+    # Slower than any idle, but turning: rad/s or revolutions per second.
+    highest = float(np.max(engine.values[fast]))
+    if 1.0 < highest < 62.0:
+        yield Problem(
+            "engine_speed",
+            f"engine_speed never exceeds {show('engine_speed', highest)} while driving faster "
+            "than 36 km/h; if it is in rad/s, name the column engine_speed_radps",
+            serious=True,
+        )

@@ -1,0 +1,62 @@
+"""What a mass is made from: what is wrong with it is serious."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.signals import QUANTITIES, Drive
+from weighbridge.signals.units import scalar_from_si
+from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.torque import SIGNALS
+
+IMU: Final = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
+MOTION: Final = frozenset(
+    (
+        *IMU,
+        "longitudinal_accel",
+        "vehicle_speed",
+        "engine_speed",
+        "latitude",
+        "longitude",
+        "gnss_speed",
+        "grade",
+    )
+)
+"""Signals a mass is made from beside the torque's: what is wrong with them is serious."""
+TORQUE: Final = frozenset(name for names in SIGNALS.values() for name in names) - MOTION
+"""Signals of torque: only what is wrong with those of the source in use is serious."""
+
+
+def needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
+    """Signals a mass would be made from.
+
+    The torque is that of the vehicle file; without one, of the source that a calibration takes.
+    """
+    sources = [source for source, names in SIGNALS.items() if drive.has(*names)]
+    if vehicle is not None and replace(vehicle.torque, reference_torque=None) != TorqueModel():
+        sources = [vehicle.torque.source]
+    elif "percent" in sources[:1] and len(sources) > 1 and not drive.has("reference_torque"):
+        # A vehicle file may yet give the reference torque.
+        return MOTION.union(SIGNALS["percent"], SIGNALS[sources[1]])
+    return MOTION.union(*(SIGNALS[source] for source in sources[:1]))
+
+
+def show(name: str, value: float) -> str:
+    """Write an SI value in the quantity's own unit."""
+    suffix = QUANTITIES[name].suffix
+    return f"{scalar_from_si(value, suffix):.4g} {suffix}" if suffix else f"{value:.4g}"
+
+
+def moves(drive: Drive) -> bool:
+    """Tell whether any source saw the vehicle move."""
+    for name in ("vehicle_speed", "gnss_speed"):
+        s = drive.get(name)
+        if s is not None and len(s) and float(np.max(np.abs(s.values))) > 1.0:
+            return True
+    lat, lon = drive.get("latitude"), drive.get("longitude")
+    if lat is None or lon is None or not len(lat) or not len(lon):
+        return False
+    return float(np.ptp(lat.values)) > 3e-5 or float(np.ptp(lon.values)) > 3e-5

@@ -1,0 +1,72 @@
+"""Does the speed go forward, without jumps and long standstills?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from weighbridge.checks.needed import show
+from weighbridge.signals import Bools, Drive, Problem, Signal
+from weighbridge.signals.words import counted
+from weighbridge.vehicle.model import Vehicle
+
+
+def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Tell of long standstills and cuts; neither spoils a mass."""
+    s = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    if s is None or len(s) < 2:
+        return
+    standing = np.abs(s.values) < 0.3
+    if float(np.max(np.abs(s.values))) < 1.0:
+        yield Problem(
+            s.name,
+            f"the vehicle stands all the time ({s.duration:.0f} s): there is nothing to weigh by",
+        )
+        return
+    length, start = _longest_time(s, standing)
+    if length > 600.0:
+        yield Problem(
+            s.name,
+            f"the vehicle stands for {length / 60.0:.0f} min from {start:.6g} s; "
+            "if it was loaded there, look at the mass of each segment",
+        )
+    # No car brakes or accelerates at 1.5 g: a piece of the recording is missing there.
+    step, jump = np.diff(s.time), np.abs(np.diff(s.values))
+    cut = (jump > 15.0 * step + 1.5) & (step < 1.0)
+    if count := int(np.count_nonzero(cut)):
+        k = int(np.argmax(np.where(cut, jump, 0.0)))
+        yield Problem(
+            s.name,
+            f"{s.name} jumps {counted(count, 'time')}, as from "
+            f"{show(s.name, float(s.values[k]))} to {show(s.name, float(s.values[k + 1]))} "
+            f"within {step[k]:.2g} s at {s.time[k]:.6g} s; "
+            "a piece may be cut out of the recording there",
+        )
+
+
+def _longest_time(s: Signal, mask: Bools) -> tuple[float, float]:
+    """Duration and start of the longest run of True [s]."""
+    edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    if starts.size == 0:
+        return 0.0, 0.0
+    lengths = s.time[ends] - s.time[starts]
+    k = int(np.argmax(lengths))
+    return float(lengths[k]), float(s.time[starts[k]])
+
+
+def check_sign(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find a speed counted backwards."""
+    s = drive.get("vehicle_speed")
+    if s is None:
+        return
+    moving = np.abs(s.values) > 1.0
+    backwards = int(np.count_nonzero(s.values[moving] < 0.0))
+    if backwards > 0.5 * np.count_nonzero(moving):
+        yield Problem(
+            s.name,
+            f"vehicle_speed is negative in {backwards} of {np.count_nonzero(moving)} samples in "
+            "motion; if forward is negative there, set factor = -1 in the mapping",
+            serious=True,
+        )

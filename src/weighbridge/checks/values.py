@@ -1,0 +1,154 @@
+"""Are values possible, alive and in the unit their name says?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations
+from typing import Final
+
+import numpy as np
+
+from weighbridge.checks.needed import IMU, MOTION, TORQUE, moves, needed, show
+from weighbridge.checks.speed import SETTLED
+from weighbridge.signals import QUANTITIES, Drive, Floats, Problem
+from weighbridge.signals.units import UNITS
+from weighbridge.vehicle.model import Vehicle
+
+_PERCENT: Final = (
+    "engine_load",
+    "engine_torque_fraction",
+    "indicated_torque_fraction",
+    "demanded_torque",
+    "absolute_load",
+    "throttle",
+    "accelerator_pedal",
+    "relative_pedal",
+)
+"""Signals in percent that a drive takes far beyond `_LEAST_PERCENT`."""
+
+# No drive that gets anywhere stays below: 0 to 1 under a percent name ends near 1 %, of a torque
+# with its boost below 2 %.
+_LEAST_PERCENT: Final = 0.02
+# Samples that a noisy sensor does not repeat by chance.
+_FROZEN: Final = 200
+
+
+def check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find values no road vehicle can have."""
+    made_of = needed(drive, vehicle)
+    for s in drive.signals.values():
+        q = QUANTITIES[s.name]
+        outside = (s.values < q.low) | (s.values > q.high)
+        count = int(np.count_nonzero(outside))
+        if count == 0:
+            continue
+        k = int(np.argmax(np.where(outside, np.abs(s.values), -1.0)))
+        yield Problem(
+            s.name,
+            f"{count} of {len(s)} values of {s.name} are outside {show(s.name, q.low)} to "
+            f"{show(s.name, q.high)}, such as {show(s.name, float(s.values[k]))} at "
+            f"{s.time[k]:.6g} s; check its unit",
+            serious=s.name in made_of and count > 0.01 * len(s),
+        )
+
+
+def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find signals that never change, and sensors that froze on the way."""
+    moving = moves(drive)
+    made_of = needed(drive, vehicle)
+    for s in drive.signals.values():
+        if s.name not in MOTION | TORQUE or s.name == "grade" or len(s) < 50 or s.duration < 20.0:
+            continue
+        value = float(s.values[0])
+        if bool(np.all(s.values == value)):
+            standing = s.name in ("vehicle_speed", "gnss_speed", "latitude", "longitude")
+            if (standing or s.name not in IMU) and not moving:
+                continue
+            if _along_an_axis(drive, s.name):
+                continue
+            yield Problem(
+                s.name,
+                f"{s.name} is {show(s.name, value)} all the time; its source is stuck: "
+                "leave the column out or record it again",
+                serious=s.name in made_of,
+            )
+        elif s.name in IMU:
+            run, at = _longest_run(s.values)
+            length = float(s.time[at + run - 1] - s.time[at])
+            if run > _FROZEN and length > 5.0:
+                yield Problem(
+                    s.name,
+                    f"{s.name} repeats one value for {length:.1f} s from {s.time[at]:.6g} s",
+                    serious=length > 0.2 * s.duration,
+                )
+
+
+def _along_an_axis(drive: Drive, name: str) -> bool:
+    """Tell whether the course lets a latitude or longitude stay, as on a road due east."""
+    part = {"latitude": np.cos, "longitude": np.sin}.get(name)
+    course = drive.get("gnss_course")
+    if part is None or course is None or not len(course):
+        return False
+    return bool(np.percentile(np.abs(part(course.values)), 90) < 0.02)
+
+
+def _longest_run(values: Floats) -> tuple[int, int]:
+    """Length and start of the longest run of one value; (1, 0) where none is long."""
+    same = values[1:] == values[:-1]
+    if np.count_nonzero(same) < _FROZEN:
+        return 1, 0
+    ends = np.flatnonzero(np.concatenate((~same, [True])))
+    lengths = np.diff(np.concatenate(([-1], ends)))
+    k = int(np.argmax(lengths))
+    return int(lengths[k]), int(ends[k] - lengths[k] + 1)
+
+
+def check_load(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find parts of one under a percent name."""
+    if not moves(drive):
+        return
+    made_of = needed(drive, vehicle)
+    for name in _PERCENT:
+        s = drive.get(name)
+        if s is None or len(s) < 50:
+            continue
+        highest = float(np.max(np.abs(s.values)))
+        if 0.0 < highest <= _LEAST_PERCENT and np.unique(s.values).size > 5:
+            column = QUANTITIES[name].stem
+            yield Problem(
+                name,
+                f"{name} never exceeds {100 * highest:.3g} % though the vehicle drives; it seems "
+                f"to run from 0 to {'1' if highest <= 0.0102 else f'{100 * highest:.2f}'}: name "
+                f"the column {column}_ratio or set the unit ratio in the mapping{SETTLED}",
+                serious=name in made_of,
+            )
+
+
+def check_pressure(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find a barometer in another unit: drag goes with the air's density."""
+    s = drive.get("barometric_pressure")
+    if s is None or not len(s):
+        return
+    usual = float(np.median(s.values))
+    q = QUANTITIES[s.name]
+    if q.low <= usual <= q.high:
+        return
+    swapped = next(
+        (
+            (said, meant)
+            for said, meant in permutations(("pa", "hpa", "kpa"), 2)
+            if q.low <= usual * UNITS[meant].factor / UNITS[said].factor <= q.high
+        ),
+        None,
+    )
+    remedy = (
+        f"it seems to be in {swapped[1]} under {swapped[0]}: name the column {q.stem}_{swapped[1]}"
+        if swapped
+        else "check its unit, or leave the column out"
+    )
+    yield Problem(
+        s.name,
+        f"barometric_pressure is {show(s.name, usual)} in the median, which is no air pressure; "
+        f"{remedy}",
+        serious=True,
+    )
