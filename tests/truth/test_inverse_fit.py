@@ -14,14 +14,25 @@ from weighbridge.calibration.inverse import (
     fit_with_gusts,
 )
 from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.torque import torque_rows
 
 TRUCK_AREA, TRUCK_ROLLING = 8.0, 0.008
 MASS, DRAG_AREA, ROLLING, ENGINE_INERTIA, WHEEL_INERTIA, RADIUS = 1400.0, 0.62, 0.01, 0.15, 5.0, 0.3
 OFFSET, SCALE, LEAN = -20.0, 150.0, 0.12
 
 
-def made(rng, motion_noise, n=4800):
-    """One drive at 2 Hz whose reading is the share of a full-load torque that grows with speed."""
+def growing(engine):
+    """Full-load torque that grows with engine speed [N m]."""
+    return SCALE + LEAN * engine
+
+
+def sagging(engine):
+    """The same, which sags in the middle as that of a small engine does [N m]."""
+    return growing(engine) * (1.0 - 0.12 * np.exp(-(((engine - 150.0) / 35.0) ** 2)))
+
+
+def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, grade_open=0.008):
+    """One drive at 2 Hz whose reading is the share of a full-load torque."""
     time = 0.5 * np.arange(n)
     stretch = (time // 12.0).astype(int)
     found = np.maximum(rng.normal(0.3, 0.25, stretch[-1] + 1), 0.0)[stretch]
@@ -32,8 +43,8 @@ def made(rng, motion_noise, n=4800):
     engine = gearing * speed
     zero, one = np.zeros(n), np.ones(n)
     rotating = WHEEL_INERTIA / RADIUS**2 + ENGINE_INERTIA * gearing**2
-    force = (MASS + rotating) * accel + MASS * 9.80665 * ROLLING + 0.6 * DRAG_AREA * speed**2
-    load = (force / gearing - OFFSET) / (SCALE + LEAN * engine) + rng.normal(0.0, 0.03, n)
+    force = (mass + rotating) * accel + mass * 9.80665 * ROLLING + 0.6 * DRAG_AREA * speed**2
+    load = (force / gearing - OFFSET) / full(engine) + rng.normal(0.0, 0.03, n)
     view = MergedView(
         time=time, traction_force=force, speed=speed, accel=found, specific_force=found, grade=zero,
         pitch=zero, heading=zero, gear=np.ones(n, dtype=np.int64), gearing=gearing,
@@ -41,30 +52,66 @@ def made(rng, motion_noise, n=4800):
         air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
     )  # fmt: skip
     motion = SimpleNamespace(
-        source="speed", specific_force_std=motion_noise, grade_open=0.008,
+        source="speed", specific_force_std=motion_noise, grade_open=grade_open,
         mean_accel_std=lambda length: motion_noise / np.sqrt(2.0 * length),
     )  # fmt: skip
     return DriveRows(
         view=view, regressor=load, engine_speed=engine,
-        usable=np.append(np.diff(stretch) == 0, True), mass=MASS, motion=motion,
+        usable=np.append(np.diff(stretch) == 0, True), mass=mass, motion=motion,
+    )  # fmt: skip
+
+
+def settings_of_load(*, knots=(), knot=0.0):
+    return FitSettings(
+        source="load", order=2, curved=True, knots=knots, torque_noise=5.0,
+        bounds=TorquePrior(offset=0.5, growth=0.5, lean=1.0, bend=0.5, knot=knot),
+        wheel_radius=RADIUS, prior=road_prior("car", single_speed=False),
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("motion_noise", [0.02, 0.2])
 def test_the_map_is_found_where_the_motion_is_noisy(motion_noise):
     drive = made(np.random.default_rng(1), motion_noise)
-    settings = FitSettings(
-        source="load", order=2, curved=True, knots=(), torque_noise=5.0,
-        bounds=TorquePrior(offset=0.5, growth=0.5, lean=1.0, bend=0.5, knot=0.0),
-        wheel_radius=RADIUS, prior=road_prior("car", single_speed=False),
-    )  # fmt: skip
-    found = fit([drive], settings)
+    found = fit([drive], settings_of_load())
     _, scale, _, _, lean, bend = found.coefficients
     load, engine = 0.6, 120.0
     slope = scale + lean * engine + 2.0 * bend * load
     # A reading that stands on both sides explains itself and leaves nothing to the motion.
     assert slope == pytest.approx(SCALE + LEAN * engine, rel=0.05)
     assert found.road[0] == pytest.approx(DRAG_AREA, abs=0.2)
+
+
+def test_masses_far_apart_pin_the_rolling_resistance():
+    truth = np.array([DRAG_AREA, ROLLING, ENGINE_INERTIA, WHEEL_INERTIA])
+    stds = []
+    for masses in ((MASS,) * 3, (MASS, 2.0 * MASS, 3.0 * MASS)):
+        rng = np.random.default_rng(4)
+        drives = [made(rng, 0.05, mass=mass, grade_open=0.0) for mass in masses]
+        found = fit(drives, settings_of_load())
+        road = np.array(found.road)
+        stds.append(found.stds[-4:])
+        assert np.all(np.abs(road - truth) < 3.0 * stds[-1])
+    one, three = stds
+    # Loads of a car, a third of its mass, leave it as open as one mass does.
+    assert three[1] < 0.7 * one[1]
+
+
+def test_knots_follow_a_torque_that_sags_at_some_engine_speeds():
+    knots = (60.0, 95.0, 130.0, 165.0, 200.0, 240.0)
+    drives = [made(np.random.default_rng(k), 0.05, full=sagging) for k in range(2)]
+    low, high, engine = 0.1, 0.6, np.linspace(80.0, 220.0, 30)
+    errors = []
+    for settings in (settings_of_load(), settings_of_load(knots=knots, knot=0.1)):
+        found = fit(drives, settings)
+        at_high, at_low = (
+            torque_rows(np.full(30, x), engine, 2, curved=True, knots=settings.knots)
+            for x in (high, low)
+        )
+        rise = (at_high - at_low) @ found.coefficients
+        errors.append(rise / ((high - low) * sagging(engine)) - 1.0)
+    without, with_knots = np.sqrt(np.mean(np.square(errors), axis=1))
+    assert with_knots < 0.015
+    assert with_knots < 0.35 * without
 
 
 def gusty(rng, mass):

@@ -232,6 +232,38 @@ def test_the_floor_of_the_file_follows_a_small_drift_alone():
     assert_allclose(file.lifted(drive).level, [0.06, 0.05, 0.05])
 
 
+def test_a_reading_that_has_risen_far_is_found_by_the_motion():
+    town = recorded(engine_load=load_of(STAMPS))
+    unknown = np.full(STAMPS.size, np.nan)
+    learnt = learn_dragged([town], [town.signals["engine_load"]], [unknown])
+    car = replace(LOADED, dragged=learnt)
+    risen = recorded(engine_load=load_of(STAMPS) + 0.12)
+    source = risen.signals["engine_load"]
+    off = foot(STAMPS) < 0.5
+    need = np.where(off, -0.05, 0.05)
+    by_motion = find_foot(risen, car, source, need, unknown)
+    assert by_motion.told
+    assert np.mean(by_motion.off[off]) > 0.8
+    # Without a grade nothing shows it: a vehicle that stops has been dragged somewhere.
+    held = np.where(off, 0.4, source.values)
+    speed = np.where((STAMPS % 200.0) > 196.0, 0.0, 15.0)
+    stops = recorded(engine_load=held, vehicle_speed=speed)
+    assert not find_foot(stops, car, stops.signals["engine_load"], unknown, unknown).told
+    cruise = recorded(engine_load=held)
+    assert find_foot(cruise, car, cruise.signals["engine_load"], unknown, unknown).told
+
+
+def test_a_noisy_reading_chooses_no_rows_where_the_engine_surely_pushes():
+    asked = 0.3 + 0.1 * np.sin(0.31 * STAMPS)
+    noise = 0.08 * np.random.default_rng(6).standard_normal(STAMPS.size)
+    read = np.where(foot(STAMPS) > 0.5, asked + noise, FLOOR)
+    drive = recorded(engine_load=read)
+    beside = near(STAMPS, foot(STAMPS) < 0.5, STAMPS, 2.5)
+    torque = np.where(foot(STAMPS) > 0.5, (asked - FLOOR) * FULL, DRAGGED)
+    found = find_foot(drive, LOADED, drive.signals["engine_load"], torque / 1e4, torque)
+    assert np.mean(found.off[~beside]) < 0.02
+
+
 def test_an_engine_brake_does_not_hide_a_dragged_engine():
     braking = (STAMPS % 20.0) > 18.0
     read = np.where(braking, -120.0, torque_of(STAMPS))

@@ -67,6 +67,9 @@ DRIFT: Final = 0.03
 """A reading may drift by so much between drives, over its range [-]: by air, heat and what the
 alternator takes."""
 
+LEAST_DRAGGED: Final = 10.0
+"""Percentile of the readings of a surely dragged engine on which its floor lies."""
+
 BEYOND: Final = 3.0
 """Standard deviations of the floor within which a reading lies on it [-]."""
 
@@ -82,11 +85,24 @@ ODDS: Final = (-5.0, 3.0)
 PROBABLE: Final = 0.3
 """Probability above which the foot counts as off the accelerator [-]."""
 
+PUSHED: Final = 0.1
+"""Reading that the motion asks for over its floor, over the range of the reading, above which a
+low reading may be noise [-]."""
+
+NOISE_REACH: Final = 3.0
+"""Standard deviations of its noise by which a reading falls below what the motion asks for [-]."""
+
 PRESSED: Final = 0.01
 """Position of the accelerator above its lowest from which a foot is on it [-]."""
 
 MOVING: Final = 1.0
 """Speed above which a reading tells of a dragged engine [m/s]."""
+
+WALKING: Final = 3.0
+"""Speed from which a vehicle that stops has been driven [m/s]."""
+
+STANDING: Final = 0.3
+"""Speed below which it stands [m/s]."""
 
 MARGIN: Final = 0.5
 """Samples nearer than this to one with the foot off may see the brake [s]."""
@@ -137,6 +153,19 @@ class Floor:
             level=self.level + np.where(near, higher, 0.0),
             scatter=max(self.scatter, other.scatter),
         )
+
+    def raised(self, above: Floats) -> Floor:
+        """Rise to what the engine reads where the motion shows that it is dragged.
+
+        Parameters
+        ----------
+        above : (k,) readings over this floor there; NaN where unknown
+        """
+        known = above[np.isfinite(above)]
+        if known.size < FEWEST:
+            return self
+        least = float(np.percentile(known, LEAST_DRAGGED))
+        return replace(self, level=self.level + least) if least > DRIFT * self.span else self
 
 
 def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
@@ -224,7 +253,19 @@ def find_foot(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torq
         pushed = averaged(need, source.period, PUSHED_TIME) > 0.0
         return Foot(~_pressed(pedal, source.time) & ~pushed, told=True)
     pressed = np.zeros(len(source), bool) if pedal is None else _pressed(pedal, source.time)
-    return Foot(dragged & ~pressed, told=True)
+    # The foot leaves the accelerator before a vehicle stops: a floor that shows it nowhere is none.
+    told = pedal is not None or bool(dragged.any()) or not _stops(drive)
+    return Foot(dragged & ~pressed, told=told)
+
+
+def _stops(drive: Drive) -> bool:
+    """Whether the vehicle comes to a stop from more than walking pace."""
+    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    if speed is None:
+        return False
+    size = np.abs(speed.values)
+    fast = size[(size > WALKING) | (size < STANDING)] > WALKING
+    return bool(np.any(fast[:-1] & ~fast[1:]))
 
 
 def _pressed(pedal: Signal, recorded: Floats) -> Bools:
@@ -249,6 +290,7 @@ def _dragged(
     known = vehicle.dragged
     turning = _turning(drive, source)
     driven = _driven(drive, source)
+    slowing = _slowing(recorded, need)
     if vehicle.driveline.single_speed:
         # A motor that recuperates may be helped by the brake, and no floor tells where it ends.
         if np.isfinite(need).any():
@@ -261,6 +303,7 @@ def _dragged(
         if known is not None:
             learnt = Floor.of_vehicle(known)
             floor = learnt if floor is None else learnt.lifted(floor)
+            floor = floor.raised((driven - floor.at(np.nan_to_num(turning)))[slowing])
     if floor is None:
         return None
     level = floor.at(np.nan_to_num(turning))
@@ -271,12 +314,13 @@ def _dragged(
         _log_odds(source.values - level, floor.scatter, floor.span),
         _log_odds(sharp - level, gain * floor.scatter, floor.span),
     )
+    odds = np.where(_noisy(source, level, floor.span, torque), ODDS[0], odds)
     off = two_states.posterior(odds, source.time, STAY) > PROBABLE
     margin = float(np.clip(MARGIN_POLLS * source.period, MARGIN, MOST_MARGIN))
     off = near(source.time, off, recorded, margin)
     if vehicle.driveline.single_speed:
         return off
-    reach = _reach(floor, (source.values - level)[_slowing(recorded, need)])
+    reach = _reach(floor, (source.values - level)[slowing])
     if known is not None:
         reach = max(reach, known.reach)
     return off | _untold(source, level, reach, torque)
@@ -351,16 +395,49 @@ def _untold(source: Signal, level: Floats, reach: float, torque: Floats) -> Bool
     reach : how far above it the reading of a dragged engine goes
     torque : (n,) that the motion takes [N m]
     """
-    above = source.values - level
-    clear = (above > 2.0 * reach) & np.isfinite(torque)
-    if reach <= 0.0 or np.count_nonzero(clear) < 5 * FEWEST:
+    line = _torque_of(source, level, reach, torque) if reach > 0.0 else None
+    if line is None:
         return np.zeros(len(source), dtype=bool)
-    slope, offset = np.polyfit(source.values[clear], torque[clear], 1)
-    if slope <= 0.0:
-        return np.zeros(len(source), dtype=bool)
+    slope, offset = line
     least = offset + slope * (float(np.median(level)) + reach)
     taken = averaged(torque, source.period, PUSHED_TIME)
     return np.asarray(taken < least)
+
+
+def _noisy(source: Signal, level: Floats, span: float, torque: Floats) -> Bools:
+    """Where a reading may be as low as it is by noise alone, for the motion shows a push (n,).
+
+    Without this the noise of a reading chooses rows: low ones pass for a dragged engine, high
+    ones stay, and masses come out light.
+
+    Parameters are those of `_untold`; ``span`` is the range of the reading.
+    """
+    taken = averaged(torque, source.period, PUSHED_TIME)
+    clear = (source.values > level + PUSHED * span) & np.isfinite(taken)
+    if np.count_nonzero(clear) < 5 * FEWEST or not np.ptp(taken[clear]) > 0.0:
+        return np.zeros(len(source), dtype=bool)
+    asked = np.polyval(np.polyfit(taken[clear], source.values[clear], 1), taken)
+    pushes = ~near(source.time, ~(asked > level + PUSHED * span), source.time, SETTLED)
+    return np.asarray(
+        pushes & (asked - source.values < NOISE_REACH * _white_noise(source.values, clear))
+    )
+
+
+def _white_noise(values: Floats, clear: Bools) -> float:
+    """Standard deviation of what clear samples have for themselves, beside their neighbours."""
+    alone = (values[1:-1] - 0.5 * (values[:-2] + values[2:]))[clear[1:-1]]
+    return 1.4826 * float(np.median(np.abs(alone))) / np.sqrt(1.5) if alone.size else 0.0
+
+
+def _torque_of(
+    source: Signal, level: Floats, reach: float, torque: Floats
+) -> tuple[float, float] | None:
+    """Slope and offset of the torque that the motion takes over a reading clear of its floor."""
+    clear = (source.values - level > 2.0 * reach) & np.isfinite(torque)
+    if np.count_nonzero(clear) < 5 * FEWEST:
+        return None
+    slope, offset = np.polyfit(source.values[clear], torque[clear], 1)
+    return (float(slope), float(offset)) if slope > 0.0 else None
 
 
 def _reach(floor: Floor, above: Floats) -> float:
