@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from weighbridge import __version__
-from weighbridge.cli import calibrate, convert, demo, inertia, inspect, reproduce, simulate, weigh
+from weighbridge.cli import (
+    calibrate,
+    convert,
+    demo,
+    inertia,
+    inspect,
+    reproduce,
+    simulate,
+    vehicle,
+    weigh,
+)
 from weighbridge.errors import WeighbridgeError
 
 app = typer.Typer(
@@ -26,6 +36,7 @@ app.command()(inertia.inertia)
 app.command()(simulate.simulate)
 app.command()(convert.convert)
 app.command()(reproduce.reproduce)
+app.add_typer(vehicle.app, name="vehicle")
 
 
 def _print_version(wanted: bool) -> None:

@@ -357,10 +357,19 @@ def _with_usual_inertias(vehicle: Vehicle, stated: Collection[str]) -> Vehicle:
     return replace(vehicle, driveline=replace(line, engine_inertia=engine, wheel_inertia=wheels))
 
 
-def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:
+def save_vehicle(
+    vehicle: Vehicle, path: str | Path, origins: Mapping[tuple[str, str], str] | None = None
+) -> None:
     """Write a vehicle file, with a comment to every key.
 
     `load_vehicle` gives the same vehicle back to the last bit.
+
+    Parameters
+    ----------
+    vehicle
+    path : the file
+    origins : by section and field, where a number is from, for its comment; what has none and is
+        as without a file is left out
 
     Raises
     ------
@@ -375,7 +384,10 @@ def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:
         part = getattr(vehicle, name)
         if part is None:
             continue
-        table = _table(keys, part)
+        origin = None
+        if origins is not None:
+            origin = {field: text for (of, field), text in origins.items() if of == name}
+        table = _table(keys, part, origin)
         if name == "provenance":
             version = tomlkit.item(FORMAT_VERSION)
             version.comment("of this file")
@@ -499,17 +511,24 @@ def _built(build: type[Any], section: Section, values: Mapping[str, Any]) -> Any
         ) from None
 
 
-def _table(keys: tuple[_Key, ...], part: Any) -> Table:
+def _table(keys: tuple[_Key, ...], part: Any, origins: Mapping[str, str] | None = None) -> Table:
     table = tomlkit.table()
+    usual = {f.name: f.default for f in fields(part)}
     for key in keys:
         value = getattr(part, key.field)
+        origin = (origins or {}).get(key.field)
         if value is None or (isinstance(value, tuple) and not value):
+            if origin is not None:
+                table.add(tomlkit.comment(f"{key.name}: {origin}"))
+            continue
+        if origins is not None and origin is None and value == usual[key.field]:
             continue
         item = _item(key, value)
-        if len(item.as_string()) + len(key.name) + len(key.comment) < _LINE:
-            item.comment(key.comment)
+        comment = "; ".join(filter(None, (key.comment, origin)))
+        if len(item.as_string()) + len(key.name) + len(comment) < _LINE:
+            item.comment(comment)
         else:
-            table.add(tomlkit.comment(key.comment))
+            table.add(tomlkit.comment(comment))
         table.add(key.name, item)
     return table
 

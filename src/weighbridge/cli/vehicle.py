@@ -1,0 +1,154 @@
+"""``weighbridge vehicle``: a vehicle file from what an owner knows, and what a file says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Optional
+
+import typer
+
+from weighbridge.cli.options import refuse_missing_folder, refuse_overwriting
+
+if TYPE_CHECKING:
+    from weighbridge.vehicle.model import Vehicle
+
+app = typer.Typer(no_args_is_help=True, help="Write a vehicle file, or tell what one says.")
+
+_Text = Optional[str]  # noqa: UP045  (typer reads the annotation at run time)
+_Number = Optional[float]  # noqa: UP045
+
+
+@app.command()
+def new(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
+    ],
+    kind: Annotated[str, typer.Option("--class", help="car, van, bus or truck.")] = "car",
+    name: Annotated[str, typer.Option("--name", help="For people.")] = "vehicle",
+    engine: Annotated[
+        _Text, typer.Option("--engine", help="petrol, diesel or electric.", show_default=False)
+    ] = None,
+    tare: Annotated[
+        _Number,
+        typer.Option(
+            "--tare",
+            help="Empty mass in kg; field G of an EU registration document.",
+            show_default=False,
+        ),
+    ] = None,
+    gross: Annotated[
+        _Number,
+        typer.Option("--gross", help="Permitted mass in kg, field F.1 or F.2.", show_default=False),
+    ] = None,
+    tyre: Annotated[
+        _Text, typer.Option("--tyre", help="Size, such as '205/55 R16'.", show_default=False)
+    ] = None,
+    gear_ratios: Annotated[
+        _Text,
+        typer.Option("--gear-ratios", help="Such as 3.77,2.09,1.32,0.98,0.78.", show_default=False),
+    ] = None,
+    final_drive: Annotated[
+        _Number, typer.Option("--final-drive", help="Ratio of the axle.", show_default=False)
+    ] = None,
+    torque: Annotated[
+        _Text,
+        typer.Option(
+            "--torque",
+            help="What the drives tell: measured (N m), percent, load or air_flow.",
+            show_default=False,
+        ),
+    ] = None,
+    reference_torque: Annotated[
+        _Number,
+        typer.Option("--reference-torque", help="100 % torque in N m.", show_default=False),
+    ] = None,
+    drag_coefficient: Annotated[
+        _Number, typer.Option("--drag-coefficient", help="C_d.", show_default=False)
+    ] = None,
+    frontal_area: Annotated[
+        _Number, typer.Option("--frontal-area", help="In m².", show_default=False)
+    ] = None,
+    layout: Annotated[
+        _Text,
+        typer.Option(
+            "--layout",
+            help="Engine transverse or longitudinal, of a car or van.",
+            show_default=False,
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Write a vehicle file from what an owner knows; the rest is usual for the class.
+
+    Example: weighbridge vehicle new --class van --tare 2150 --gross 3500 --tyre "235/65 R16"
+    -o van.toml
+    """
+    from weighbridge.vehicle.file import save_vehicle
+    from weighbridge.vehicle.known import Known, describe
+
+    refuse_missing_folder(output)
+    refuse_overwriting(output, force, "vehicle file")
+    made = describe(
+        Known(
+            name=name,
+            kind=kind,  # type: ignore[arg-type]
+            engine=engine,  # type: ignore[arg-type]
+            tare=tare,
+            gross=gross,
+            tyre=tyre,
+            gear_ratios=_ratios(gear_ratios),
+            final_drive=final_drive,
+            torque=torque,  # type: ignore[arg-type]
+            reference_torque=reference_torque,
+            drag_coefficient=drag_coefficient,
+            frontal_area=frontal_area,
+            layout=layout,  # type: ignore[arg-type]
+        )
+    )
+    save_vehicle(made.vehicle, output, made.origins)
+    _print(output, made.vehicle)
+    typer.echo(f"written: {output}")
+
+
+@app.command()
+def show(
+    path: Annotated[Path, typer.Argument(help="Vehicle file.", show_default=False)],
+) -> None:
+    """Tell in words what a vehicle file says, and how good it is.
+
+    Example: weighbridge vehicle show car.toml
+    """
+    from weighbridge.vehicle.model import Vehicle
+
+    _print(path, Vehicle.load(path))
+
+
+def _ratios(text: str | None) -> tuple[float, ...]:
+    from weighbridge.errors import ConfigError
+
+    if text is None:
+        return ()
+    try:
+        return tuple(float(part) for part in text.replace(",", " ").split())
+    except ValueError:
+        raise ConfigError(
+            f"--gear-ratios {text}: must be numbers, such as 3.77,2.09,1.32,0.98,0.78"
+        ) from None
+
+
+def _print(path: Path, vehicle: Vehicle) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from weighbridge.vehicle.telling import can_weigh, tell
+
+    shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for heading, sentence in tell(vehicle):
+        shown.add_row(Text(heading), Text(sentence))
+    Console().print(shown)
+    typer.echo(
+        f"next: weighbridge weigh DRIVE --vehicle {path}"
+        if can_weigh(vehicle)
+        else f"next: weighbridge calibrate DRIVE --mass KG --vehicle {path} -o calibrated.toml"
+    )

@@ -1,0 +1,198 @@
+"""A vehicle from what its owner knows: papers, tyres, data sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, Literal, get_args
+
+from weighbridge.errors import ConfigError
+from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.data_sheet import RADIUS_STD, usual_efficiency
+from weighbridge.vehicle.model import (
+    MASS_RANGE,
+    Driveline,
+    Layout,
+    Provenance,
+    RoadLoad,
+    TorqueModel,
+    TorqueSource,
+    Vehicle,
+    VehicleClass,
+)
+from weighbridge.vehicle.tyre import rolling_radius
+
+EngineKind = Literal["petrol", "diesel", "electric"]
+
+CLASS_TYRE: Final[dict[VehicleClass, str]] = {
+    "car": "205/55 R16",
+    "van": "235/65 R16",
+    "bus": "275/70 R22.5",
+    "truck": "315/80 R22.5",
+}
+"""Usual tyre of a class. Those of cars lie within 6 % of its radius, of trucks within 8 %."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Known:
+    """What an owner may know; None where it is not known.
+
+    Attributes
+    ----------
+    name : for people
+    kind : "car", "van", "bus" or "truck"
+    engine : "petrol", "diesel" or "electric"
+    tare : mass of the empty vehicle; of an EU registration document field G, driver of 75 kg and
+        fuel included [kg]
+    gross : permitted mass, field F.1 or F.2 [kg]
+    tyre : size as on its side, such as ``205/55 R16``
+    gear_ratios : of the gears, falling; of an electric car 1 alone where ``final_drive`` has all
+    final_drive : ratio behind the gearbox; 1 when None
+    torque : how the drives tell torque: "measured" in N m, "percent", "load" or "air_flow"
+    reference_torque : 100 % of a torque in percent [N m]
+    drag_coefficient, frontal_area : [-], [m^2]
+    layout : how the engine lies, "transverse" or "longitudinal"
+    """
+
+    name: str = "vehicle"
+    kind: VehicleClass = "car"
+    engine: EngineKind | None = None
+    tare: float | None = None
+    gross: float | None = None
+    tyre: str | None = None
+    gear_ratios: Sequence[float] = ()
+    final_drive: float | None = None
+    torque: TorqueSource | None = None
+    reference_torque: float | None = None
+    drag_coefficient: float | None = None
+    frontal_area: float | None = None
+    layout: Layout | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Described:
+    """A vehicle and where its numbers come from.
+
+    Attributes
+    ----------
+    vehicle
+    origins : by section and field of the vehicle file, where a number is from and how sure it is
+    """
+
+    vehicle: Vehicle
+    origins: dict[tuple[str, str], str]
+
+
+def describe(known: Known) -> Described:
+    """Make a vehicle of what is known, and of its class for the rest.
+
+    Parameters
+    ----------
+    known
+
+    Returns
+    -------
+    Described
+        Its torque is that of the vehicle's control unit, or missing where only a calibration
+        can find it.
+
+    Raises
+    ------
+    ConfigError
+        A value is impossible, or one is missing that another needs.
+    """
+    _refuse(known)
+    origins: dict[tuple[str, str], str] = {}
+    driveline = _driveline(known, origins)
+    torque = TorqueModel()
+    if known.torque in ("measured", "percent"):
+        torque = TorqueModel(source=known.torque, reference_torque=known.reference_torque)
+        origins["torque", "source"] = "given"
+    vehicle = Vehicle(
+        name=known.name,
+        kind=known.kind,
+        tare=known.tare,
+        gross=known.gross,
+        driveline=driveline,
+        torque=torque,
+        road_load=_road_load(known, origins),
+        provenance=Provenance(notes="written by weighbridge vehicle new; nothing is calibrated"),
+    )
+    if driveline.efficiency is None:
+        mean, std = usual_efficiency(vehicle)
+        origins["driveline", "efficiency"] = f"not given; taken as {mean:.3f} ± {std:.3f}"
+    return Described(vehicle=vehicle, origins=origins)
+
+
+def _refuse(known: Known) -> None:
+    if known.kind not in MASS_RANGE:
+        raise ConfigError(f"class must be {', '.join(MASS_RANGE)}, got {known.kind!r}")
+    for name, value, choice in (
+        ("engine", known.engine, get_args(EngineKind)),
+        ("torque", known.torque, get_args(TorqueSource)),
+    ):
+        if value is not None and value not in choice:
+            raise ConfigError(f"{name} must be {', '.join(choice)}, got {value!r}")
+    low, high = MASS_RANGE[known.kind]
+    for name, mass in (("tare", known.tare), ("gross", known.gross)):
+        if mass is not None and not low <= mass <= high:
+            raise ConfigError(
+                f"{name} of {mass:g} kg: a {known.kind} has {low:.0f} to {high:.0f} kg; "
+                "check the unit (1 lb is 0.4536 kg) and the class"
+            )
+    if known.tare is not None and known.gross is not None and known.gross <= known.tare:
+        raise ConfigError(
+            f"gross of {known.gross:g} kg is not above the tare of {known.tare:g} kg; "
+            "gross is the permitted mass, tare the empty one"
+        )
+    if any(b >= a for a, b in pairwise(known.gear_ratios)):
+        raise ConfigError(
+            f"gear ratios must fall from first to last gear, got {list(known.gear_ratios)}"
+        )
+    if any(ratio <= 0.0 for ratio in (*known.gear_ratios, known.final_drive or 1.0)):
+        raise ConfigError("gear ratios and final drive must be positive")
+    if known.final_drive is not None and not known.gear_ratios and known.engine != "electric":
+        raise ConfigError("a final drive needs gear ratios, such as 3.8,2.1,1.4,1.0")
+    if (known.drag_coefficient is None) != (known.frontal_area is None):
+        raise ConfigError("drag coefficient and frontal area belong together; give both or none")
+    if known.reference_torque is not None and known.torque != "percent":
+        raise ConfigError("a reference torque is that of a torque in percent; name percent as well")
+
+
+def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
+    tyre = known.tyre or CLASS_TYRE[known.kind]
+    radius = round(rolling_radius(tyre), 4)
+    origins["driveline", "wheel_radius"] = (
+        f"of {tyre}, ± {100.0 * RADIUS_STD:.1f} %"
+        if known.tyre
+        else f"of {tyre}, usual for a {known.kind}, ± 6 %"
+    )
+    ratios = tuple(known.gear_ratios)
+    if not ratios and known.engine == "electric" and known.final_drive is not None:
+        ratios = (1.0,)
+    factor = (known.final_drive or 1.0) / radius
+    if ratios:
+        origins["driveline", "gearings"] = "of ratios and tyre"
+    single = known.engine == "electric" or len(ratios) == 1
+    mean, std = road_prior(known.kind, single_speed=single)
+    for name, k in (("engine_inertia", 2), ("wheel_inertia", 3)):
+        origins["driveline", name] = f"usual for a {known.kind}, ± {std[k]:.2g}"
+    return Driveline(
+        gearings=tuple(round(ratio * factor, 3) for ratio in ratios),
+        engine_inertia=float(mean[2]),
+        wheel_inertia=float(mean[3]),
+        wheel_radius=radius,
+        layout=known.layout,
+    )
+
+
+def _road_load(known: Known, origins: dict[tuple[str, str], str]) -> RoadLoad:
+    mean, std = road_prior(known.kind, single_speed=False)
+    area = float(mean[0])
+    origins["road_load", "drag_area"] = f"usual for a {known.kind}, ± {std[0]:.2g}"
+    if known.drag_coefficient is not None and known.frontal_area is not None:
+        area = round(known.drag_coefficient * known.frontal_area, 4)
+        origins["road_load", "drag_area"] = "of drag coefficient and frontal area, given"
+    origins["road_load", "rolling_coefficient"] = f"usual for a {known.kind}, ± {std[1]:.2g}"
+    return RoadLoad(drag_area=area, rolling_coefficient=float(mean[1]))

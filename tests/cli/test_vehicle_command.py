@@ -1,0 +1,40 @@
+"""``weighbridge vehicle``: written from papers, told in words."""
+
+from weighbridge.vehicle.model import Vehicle
+
+
+def test_a_file_from_papers_is_told_and_names_the_next_command(weighbridge, tmp_path):
+    path = tmp_path / "van.toml"
+    ran = weighbridge(
+        "vehicle", "new", "--class", "van", "--tare", 2150, "--gross", 3500, "--tyre", "235/65 R16",
+        "-o", path,
+    )  # fmt: skip
+    assert ran.code == 0
+    assert f"next: weighbridge calibrate DRIVE --mass KG --vehicle {path}" in ran.out
+    assert Vehicle.load(path).tare == 2150.0
+    again = weighbridge("vehicle", "new", "-o", path)
+    assert again.code == 2
+    assert "--force" in again.err
+    assert weighbridge("vehicle", "new", "-o", path, "--force").code == 0
+
+
+def test_what_a_calibration_made_is_told_in_words(weighbridge, car):
+    ran = weighbridge("vehicle", "show", car)
+    assert ran.code == 0
+    text = " ".join(ran.out.split())
+    for words in (
+        "gears",
+        "from engine load (PID 04)",
+        "the highest the calibration saw",
+        "is left by the",
+        "kW",
+    ):
+        assert words in text
+    assert f"next: weighbridge weigh DRIVE --vehicle {car}" in text
+
+
+def test_a_mistake_is_one_line(weighbridge, tmp_path):
+    ran = weighbridge("vehicle", "new", "--gear-ratios", "3.8;2.1", "-o", tmp_path / "v.toml")
+    assert ran.code == 2
+    assert ran.err.count("\n") == 1
+    assert "--gear-ratios" in ran.err

@@ -1,0 +1,94 @@
+"""A vehicle from papers, tyres and data sheet."""
+
+import pytest
+
+from weighbridge.errors import ConfigError
+from weighbridge.vehicle.file import load_vehicle, save_vehicle
+from weighbridge.vehicle.known import CLASS_TYRE, Known, describe
+from weighbridge.vehicle.model import MASS_RANGE
+from weighbridge.vehicle.telling import can_weigh, tell
+from weighbridge.vehicle.tyre import rolling_radius
+
+
+@pytest.mark.parametrize(
+    ("size", "circumference"),
+    # Rolling circumferences of the ETRTO manual, as makers print them [m].
+    [
+        ("205/55 R16", 1.928),
+        ("205/55R16 91V", 1.928),
+        ("P205/55 ZR16", 1.928),
+        ("315/80 R 22.5", 3.280),
+        ("315/80 R22,5 156/150L", 3.280),
+        ("195 R14 C", 2.058),
+        ("195R14C", 2.058),
+    ],
+)
+def test_radius_of_a_tyre_size(size, circumference):
+    assert 2.0 * 3.14159265 * rolling_radius(size) == pytest.approx(circumference, rel=0.005)
+
+
+@pytest.mark.parametrize(
+    "size", ["", "16", "205/55", "205/555 R16", "205/55 R99", "R16 205/55", "²"]
+)
+def test_what_is_no_tyre_size_is_told(size):
+    with pytest.raises(ConfigError, match="tyre size"):
+        rolling_radius(size)
+
+
+@pytest.mark.parametrize("kind", MASS_RANGE)
+def test_a_class_alone_makes_a_file_that_can_be_calibrated(kind, tmp_path):
+    made = describe(Known(kind=kind))
+    path = tmp_path / "v.toml"
+    save_vehicle(made.vehicle, path, made.origins)
+    assert load_vehicle(path) == made.vehicle
+    assert not can_weigh(made.vehicle)
+    text = path.read_text()
+    assert f"of {CLASS_TYRE[kind]}, usual for a {kind}" in text
+    assert f"usual for a {kind}, ±" in text
+    # What nothing is known of is not written as if it were.
+    assert "[torque]" not in text
+    assert "speed_scale" not in text
+
+
+def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
+    made = describe(
+        Known(
+            kind="van", tare=2150.0, gross=3500.0, tyre="235/65 R16", torque="measured",
+            gear_ratios=(4.0, 2.2, 1.4, 1.0), final_drive=3.9, drag_coefficient=0.34,
+            frontal_area=3.8, layout="longitudinal",
+        )
+    )  # fmt: skip
+    path = tmp_path / "v.toml"
+    save_vehicle(made.vehicle, path, made.origins)
+    loaded = load_vehicle(path)
+    assert loaded == made.vehicle
+    assert can_weigh(loaded)
+    assert loaded.driveline.gearings[0] == pytest.approx(
+        4.0 * 3.9 / loaded.driveline.wheel_radius, rel=1e-3
+    )
+    assert loaded.road_load.drag_area == pytest.approx(0.34 * 3.8)
+    assert "# efficiency: not given; taken as 0.930 ± 0.020" in path.read_text()
+    told = dict(tell(loaded))
+    assert told["gears"].startswith("4 gears")
+    assert "never calibrated" in told["worth"]
+
+
+@pytest.mark.parametrize(
+    ("known", "words"),
+    [
+        ({"tare": 3483.0, "gross": 2000.0}, "gross of 2000 kg is not above the tare"),
+        ({"tare": 50.0}, "tare of 50 kg: a car has 250 to 8000 kg"),
+        ({"kind": "lorry"}, "class must be car, van, bus, truck"),
+        ({"gear_ratios": (1.0, 2.0)}, "must fall"),
+        ({"gear_ratios": (2.0, -1.0)}, "must be positive"),
+        ({"final_drive": 3.9}, "needs gear ratios"),
+        ({"drag_coefficient": 0.3}, "belong together"),
+        ({"reference_torque": 320.0}, "name percent"),
+        ({"tyre": "winter"}, "tyre size"),
+        ({"engine": "steam"}, "engine must be petrol, diesel, electric"),
+        ({"torque": "guess"}, "torque must be"),
+    ],
+)
+def test_what_cannot_be_is_refused(known, words):
+    with pytest.raises(ConfigError, match=words):
+        describe(Known(**known))
