@@ -11,15 +11,17 @@ from weighbridge.signals.catalogue import TIME_COLUMN
 from weighbridge.signals.units import UNITS
 
 UNIT_TEXTS: Final[dict[str, str]] = {
-    "km/h": "kmh", "kph": "kmh", "km/hr": "kmh", "mi/h": "mph", "m/s": "mps", "knots": "kn",
+    "km/h": "kmh", "kph": "kmh", "km/hr": "kmh", "kmph": "kmh", "mi/h": "mph", "m/s": "mps",
+    "meters/second": "mps", "knots": "kn",
     "m/s^2": "mps2", "m/s²": "mps2", "m/s2": "mps2", "m/s/s": "mps2", "gn": "g",
-    "1/min": "rpm", "r/min": "rpm", "u/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
+    "1/min": "rpm", "r/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
     "rad/s": "radps", "deg/s": "degps", "°/s": "degps", "dps": "degps",
     "°": "deg", "degrees": "deg", "radians": "rad",
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
     "%": "pct", "percent": "pct", "-": "ratio", "1": "ratio",
-    "°c": "degc", "c": "degc", "deg c": "degc", "celsius": "degc", "°f": "degf", "f": "degf",
-    "g/s": "gps", "kg/s": "kgps", "l/h": "lph", "volt": "v", "volts": "v",
+    "°c": "degc", "℃": "degc", "c": "degc", "deg c": "degc", "celsius": "degc",
+    "°f": "degf", "℉": "degf", "f": "degf", "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
+    "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""

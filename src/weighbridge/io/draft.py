@@ -1,0 +1,438 @@
+"""A mapping drafted from a log: how its text is written, its time, what its columns are.
+
+Nothing is asked and nothing is guessed silently: what is doubtful is told with the draft.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import polars as pl
+
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import DriveError
+from weighbridge.io.columns import dimension_of, suffixes_of, unit_suffix
+from weighbridge.io.naming import Named, is_time, recognise_all, unit_of
+from weighbridge.io.table import (
+    SEPARATORS,
+    RawTable,
+    TextFormat,
+    column_list,
+    read_parquet,
+    read_text,
+    time_seconds,
+)
+from weighbridge.signals import QUANTITIES, Floats
+from weighbridge.signals.units import UNITS, to_si
+
+HEAD_LINES: Final = 60
+"""Lines at the beginning that tell how a text is written."""
+
+EVEN: Final = 0.7
+"""Part of the lines that a separator cuts alike [-]."""
+
+DATE_FORMATS: Final = (
+    "%d.%m.%Y %H:%M:%S%.f",
+    "%d/%m/%Y %H:%M:%S%.f",
+    "%m/%d/%Y %H:%M:%S%.f",
+    "%m/%d/%Y %I:%M:%S%.f %p",
+    "%d-%b-%Y %H:%M:%S%.f",
+    "%Y/%m/%d %H:%M:%S%.f",
+    "%Y-%m-%d %H-%M-%S%.f",
+    "%Y%m%d %H%M%S%.f",
+)
+"""Dates that loggers write beside ISO 8601; day before month where both would fit."""
+
+_EPOCHS: Final = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
+"""Least number of a clock that counts from 1970, and its unit."""
+
+_NUMBER: Final = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?$")
+_COMMA: Final = re.compile(r"[-+]?\d+,\d+$")
+_CLOCK: Final = re.compile(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?$")
+_ISO: Final = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
+
+_USUAL_STEP: Final = (1e-3, 20.0)
+"""Time between rows of loggers [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class DraftColumn:
+    """One column of a log and what it is taken for.
+
+    Attributes
+    ----------
+    name : as it stands in the log
+    quantity : canonical name; empty where it is not known or not needed
+    unit : suffix; empty for a quantity without one
+    stated : whether the log itself states that unit
+    low, usual, high : lowest, median and highest value in that unit; NaN where there is none
+    count : cells with a number
+    doubt : what is not sure, one sentence; empty where it is
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    stated: bool
+    low: float
+    usual: float
+    high: float
+    count: int
+    doubt: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draft:
+    """What one file seems to be.
+
+    Attributes
+    ----------
+    path : the file
+    text : how it is written
+    time : name of the time column
+    time_unit : suffix of a time in numbers; empty for a text
+    time_format : "clock", "iso" or a `strptime` format; empty for numbers
+    rate : rows per second in the median; NaN where it is not known
+    duration : from the first to the last row [s]
+    columns : all but the time
+    doubts : of the file and its time, one sentence each
+    """
+
+    path: Path
+    text: TextFormat
+    time: str
+    time_unit: str
+    time_format: str
+    rate: float
+    duration: float
+    columns: tuple[DraftColumn, ...]
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def known(self) -> tuple[DraftColumn, ...]:
+        """Columns that are some quantity."""
+        return tuple(c for c in self.columns if c.quantity)
+
+    @property
+    def all_doubts(self) -> tuple[str, ...]:
+        """Doubts of the file and of its columns."""
+        return (*self.doubts, *(f"{c.name!r}: {c.doubt}" for c in self.known if c.doubt))
+
+
+@dataclass(slots=True)
+class _Time:
+    column: str
+    index: int
+    unit: str
+    format: str
+    seconds: Floats
+    doubts: list[str] = field(default_factory=list)
+
+
+def draft(path: Path) -> Draft:
+    """Look at a table and draft how it is to be read.
+
+    Parameters
+    ----------
+    path : CSV or other separated text, or Parquet
+
+    Raises
+    ------
+    DriveError
+        It is no table, has no time, or none of its columns is known.
+    """
+    units: dict[str, str] = {}
+    if path.suffix.lower() == ".parquet":
+        text, raw = TextFormat(), read_parquet(path)
+    else:
+        text, units = _text_format(path)
+        raw = read_text(path, text)
+    if raw.rows == 0:
+        raise DriveError(f"{path} has a header and no rows; nothing can be told of its columns")
+    time = _find_time(raw)
+    names = [n for k, n in enumerate(raw.names) if k != time.index]
+    named = recognise_all(names, [units.get(n) for n in names])
+    columns = tuple(
+        _column(raw, name, found, stated=units.get(name))
+        for name, found in zip(names, named, strict=True)
+    )
+    columns = _accelerometer_unit(columns)
+    if not any(c.quantity for c in columns):
+        raise DriveError(
+            f"{path}: none of its columns is known by its name; it has {column_list(raw.names)}: "
+            "write [signals] of a mapping by hand"
+        )
+    step = np.diff(time.seconds[np.isfinite(time.seconds)])
+    rising = step[step > 0.0]
+    doubts = list(time.doubts)
+    if step.size and np.mean(step == 0.0) > 0.2:
+        doubts.append("several rows share one time stamp; they are spread over the step in reading")
+    if step.size and np.any(step < 0.0):
+        doubts.append("the time goes back in places; rows there are left out in reading")
+    return Draft(
+        path=path,
+        text=text,
+        time=time.column,
+        time_unit=time.unit,
+        time_format=time.format,
+        rate=float(1.0 / np.median(rising)) if rising.size else float("nan"),
+        duration=float(np.nanmax(time.seconds) - np.nanmin(time.seconds)),
+        columns=columns,
+        doubts=tuple(doubts),
+    )
+
+
+def _head(path: Path) -> list[str]:
+    with path.open("rb") as file:
+        data = file.read(1 << 18)
+    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig",):
+        try:
+            return data.decode(encoding, errors="strict").splitlines()[:HEAD_LINES]
+        except UnicodeDecodeError:
+            # The piece may end within a character.
+            return data.decode("latin-1").splitlines()[:HEAD_LINES]
+    return []
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return [c.strip() for c in next(csv.reader([line], delimiter=separator), [])]
+
+
+def _is_number(cell: str) -> bool:
+    return _NUMBER.match(cell) is not None
+
+
+def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
+    """Find separator, header, unit row and decimal mark of a text.
+
+    Returns
+    -------
+    text
+    units : suffixes that a row below the header states, by column
+    """
+    lines = [line for line in _head(path) if line.strip("\r\n")]
+    if not lines:
+        raise DriveError(f"{path} is empty; record it again")
+    separator = _separator(lines)
+    rows = [_cells(line, separator) for line in lines]
+    width = int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
+    first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
+    if first is None:
+        raise DriveError(f"{path} is no table: its lines have no common separator")
+    if sum(map(_is_number, rows[first])) > 0.5 * len(rows[first]):
+        raise DriveError(
+            f"{path} has no header line: its first row is {lines[first][:60]!r}; write the names "
+            "of its columns as columns in [csv] of a mapping"
+        )
+    header, units, after = rows[first], {}, 0
+    if first + 1 < len(rows) and not any(map(_is_number, rows[first + 1])):
+        below = rows[first + 1]
+        stated = {n: unit_suffix(c.strip("[]()")) for n, c in zip(header, below, strict=False)}
+        units = {n: u for n, u in stated.items() if u is not None}
+        after = 1 if len(units) >= 0.3 * len(header) else 0
+        units = units if after else {}
+    body = [c for r in rows[first + 1 + after :] for c in r]
+    commas = sum(_COMMA.match(c) is not None for c in body)
+    decimal = "," if separator != "," and commas > 0.2 * max(len(body), 1) else "."
+    skipped = _head(path).index(lines[first])
+    text = TextFormat(
+        separator=separator, decimal=decimal, skip_rows=skipped, skip_after_header=after
+    )
+    return text, units
+
+
+def _separator(lines: Sequence[str]) -> str:
+    """Separator that cuts most lines into equally many cells.
+
+    A comma comes last: between semicolons or tabs it is a decimal mark.
+    """
+    for separator in sorted(SEPARATORS, key=lambda s: s == ","):
+        counts = np.array([line.count(separator) for line in lines])
+        usual = int(np.median(counts))
+        if usual > 0 and np.mean(counts == usual) >= EVEN:
+            return separator
+    return max(SEPARATORS, key=lambda s: sum(line.count(s) for line in lines))
+
+
+def _find_time(raw: RawTable) -> _Time:
+    places = [k for k, name in enumerate(raw.names) if is_time(name)]
+    places += [
+        k for k in range(len(raw.names)) if raw.column(k).dtype.is_temporal() and k not in places
+    ]
+    found = [t for k in places if (t := _as_time(raw, k)) is not None]
+    if not found:
+        raise DriveError(
+            f"{raw.path} has no column that can be its time; it has {column_list(raw.names)}: name "
+            "it as column in [time] of a mapping"
+        )
+    # The finer of several clocks; where they are alike, the first.
+    best = max(found, key=lambda t: (round(_resolution(t.seconds), 3), -t.index))
+    others = [t.column for t in found if t is not best]
+    if others:
+        best.doubts.append(f"{best.column!r} is taken for the time, not {column_list(others)}")
+    return best
+
+
+def _resolution(seconds: Floats) -> float:
+    """Part of the rows that have a stamp of their own."""
+    known = seconds[np.isfinite(seconds)]
+    return np.unique(known).size / max(seconds.size, 1)
+
+
+def _as_time(raw: RawTable, index: int) -> _Time | None:
+    """Read a column as a time; None where it cannot be one."""
+    series, name = raw.column(index), raw.names[index]
+    if series.dtype.is_temporal():
+        seconds, _, _ = time_seconds(raw, index, 1.0, None)
+        return _Time(name, index, "", "", seconds)
+    if series.dtype == pl.String:
+        texts = [t.strip() for t in series.drop_nulls().head(200).to_list() if t.strip()]
+        numbers = sum(map(_is_number, texts))
+        if texts and numbers < 0.5 * len(texts):
+            return _text_time(raw, index, texts)
+    try:
+        values, _ = raw.numbers(index)
+    except DriveError:
+        return None
+    known = values[np.isfinite(values)]
+    if known.size < 2 or known[-1] <= known[0]:
+        return None
+    doubts = []
+    stated, _ = unit_of(name)
+    if stated is not None and UNITS[stated].dimension == "s":
+        unit = stated
+    else:
+        unit, doubt = _time_unit(name, known)
+        doubts += [doubt] if doubt else []
+    return _Time(name, index, unit, "", values * UNITS[unit].factor, doubts)
+
+
+def _time_unit(name: str, values: Floats) -> tuple[str, str]:
+    """Unit of a time in numbers, by its size and its steps, and a doubt."""
+    usual = float(np.median(np.abs(values)))
+    for least, unit in _EPOCHS:
+        if usual >= least:
+            return unit, ""
+    step = np.diff(values)
+    step = step[step > 0.0]
+    usual_step = float(np.median(step)) if step.size else 1.0
+    whole = bool(np.all(values == np.round(values)))
+    if whole and usual_step >= 5.0:
+        for unit in ("ms", "us", "ns"):
+            low, high = _USUAL_STEP
+            if low <= usual_step * UNITS[unit].factor <= high:
+                return unit, (
+                    f"time {name!r} states no unit; its steps of {usual_step:g} are taken as {unit}"
+                )
+    if whole and usual_step == 1.0 and name.strip().lower() in ("index", "row", "sample", "n"):
+        return "s", f"{name!r} counts rows; it is taken as seconds"
+    return "s", f"time {name!r} states no unit; taken as seconds, {usual_step:g} s from row to row"
+
+
+def _text_time(raw: RawTable, index: int, texts: Sequence[str]) -> _Time | None:
+    name = raw.names[index]
+    doubts = []
+    if all(_CLOCK.match(t) for t in texts):
+        form = "clock"
+    elif all(_ISO.match(t) for t in texts):
+        form = "iso"
+    else:
+        fits = [f for f in DATE_FORMATS if _fits(texts, f)]
+        if not fits:
+            return None
+        form = fits[0]
+        if len(fits) > 1 and {f[:5] for f in fits} >= {"%d/%m", "%m/%d"}:
+            doubts.append(f"{texts[0]!r} is read with the day before the month")
+    try:
+        seconds, _, _ = time_seconds(raw, index, 1.0, form)
+    except DriveError:
+        return None
+    return _Time(name, index, "", form, seconds, doubts)
+
+
+def _fits(texts: Sequence[str], form: str) -> bool:
+    parsed = pl.Series(texts).str.to_datetime(form, strict=False, time_unit="us")
+    return int(parsed.null_count()) <= 0.02 * len(texts)
+
+
+def _column(raw: RawTable, name: str, found: Named, *, stated: str | None) -> DraftColumn:
+    nothing = DraftColumn(name, "", "", False, float("nan"), float("nan"), float("nan"), 0)
+    if not found.quantity:
+        return nothing
+    try:
+        values, _ = raw.numbers(raw.names.index(name))
+    except DriveError:
+        return replace(nothing, doubt="its cells are no numbers")
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return nothing
+    quantity = QUANTITIES[found.quantity]
+    unit, doubt, by_log = stated or found.unit, "", True
+    if not quantity.suffix:
+        unit = ""
+    elif unit is not None and UNITS[unit].dimension == dimension_of(quantity):
+        doubt = _beyond(found.quantity, unit, known)
+    else:
+        by_log = False
+        unit, doubt = _plausible_unit(found.quantity, known)
+    low, usual, high = map(float, np.quantile(known, [0.0, 0.5, 1.0]))
+    return DraftColumn(name, found.quantity, unit, by_log, low, usual, high, known.size, doubt)
+
+
+def _beyond(quantity: str, unit: str, values: Floats) -> str:
+    q = QUANTITIES[quantity]
+    si = to_si(values, unit)
+    outside = np.mean((si < q.low) | (si > q.high))
+    if outside <= 0.01:
+        return ""
+    return f"{100.0 * outside:.0f} % of its values are impossible in {unit}; check its unit"
+
+
+def _plausible_unit(quantity: str, values: Floats) -> tuple[str, str]:
+    """Unit in which values are those of a drive: the usual one first, and a doubt."""
+    q = QUANTITIES[quantity]
+    high = float(np.percentile(np.abs(values), 99.5))
+    if quantity in ("vehicle_speed", "gnss_speed"):
+        # Few drives stay below 60 km/h, and none is faster than 60 m/s.
+        unit = "kmh" if high > 45.0 or (quantity == "vehicle_speed" and high > 28.0) else "mps"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    if quantity.startswith("gyro_"):
+        unit = "degps" if high > 3.0 else "radps"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    if q.suffix == "pct":
+        unit = "ratio" if high <= 1.02 else "pct"
+        return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
+    usual = [q.suffix, *(s for s in suffixes_of(q) if s != q.suffix)]
+    for unit in usual:
+        si = to_si(values, unit)
+        if np.mean((si < q.low) | (si > q.high)) <= 0.01:
+            sure = q.suffix in ("deg", "rpm", "v", "a") and unit == q.suffix
+            return unit, "" if sure else f"states no unit; taken as {unit}"
+    return q.suffix, f"states no unit, and its values fit none; taken as {q.suffix}"
+
+
+def _accelerometer_unit(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Tell m/s^2 from g by gravity where the log states no unit, and gravity that is missing."""
+    axes = [c for c in columns if c.quantity.startswith("accel_")]
+    if len(axes) < 3:
+        return columns
+    size = float(np.linalg.norm([c.usual * UNITS[c.unit].factor for c in axes if c.stated]))
+    doubt = ""
+    unit = axes[0].unit
+    if not axes[0].stated:
+        read = float(np.linalg.norm([c.usual for c in axes]))
+        unit = "g" if 0.7 < read < 1.4 else "mps2"
+        size = read * UNITS[unit].factor
+        doubt = f"states no unit; taken as {unit}, for it reads {read:.2g} in the median"
+    if size < 0.5 * GRAVITY:
+        doubt = (
+            f"reads {size:.2g} m/s^2 in the median: gravity was taken out of it; record the raw "
+            "accelerometer"
+        )
+    return tuple(replace(c, unit=unit, doubt=doubt or c.doubt) if c in axes else c for c in columns)

@@ -1,0 +1,86 @@
+"""A drafted mapping as the text of a TOML file, with what is doubtful in its comments."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Sequence
+
+import tomlkit
+from tomlkit.items import Table
+
+from weighbridge.io.draft import Draft, DraftColumn
+from weighbridge.io.table import TextFormat
+from weighbridge.signals import QUANTITIES
+
+
+def mapping_text(drafts: Sequence[Draft]) -> str:
+    """Write a mapping: at the top level for one file, else one table for each.
+
+    Parameters
+    ----------
+    drafts : of the files of one drive
+    """
+    document = tomlkit.document()
+    document.add(tomlkit.comment("How to read this log: a mapping for weighbridge."))
+    if len(drafts) == 1:
+        for name, part in _sections(drafts[0]).items():
+            document.add(name, part)
+        return tomlkit.dumps(document)
+    tables = tomlkit.table(is_super_table=True)
+    for k, one in enumerate(drafts, 1):
+        table = tomlkit.table()
+        table.add("files", glob.escape(one.path.name))
+        for name, part in _sections(one).items():
+            table.add(name, part)
+        tables.add(f"table_{k}", table)
+    document.add("tables", tables)
+    return tomlkit.dumps(document)
+
+
+def _sections(one: Draft) -> dict[str, Table]:
+    found = {"csv": _csv(one.text), "time": _time(one), "signals": _signals(one)}
+    return {name: table for name, table in found.items() if len(table)}
+
+
+def _csv(text: TextFormat) -> Table:
+    table = tomlkit.table()
+    usual = TextFormat()
+    if text.separator is not None:
+        table.add("separator", text.separator)
+    for key in ("decimal", "skip_rows", "skip_after_header"):
+        value = getattr(text, key)
+        if value != getattr(usual, key):
+            table.add(key, value)
+    return table
+
+
+def _time(one: Draft) -> Table:
+    table = tomlkit.table()
+    for doubt in one.doubts:
+        table.add(tomlkit.comment(doubt))
+    table.add("column", one.time)
+    if one.time_unit:
+        table.add("unit", one.time_unit)
+    if one.time_format:
+        table.add("format", one.time_format)
+    return table
+
+
+def _signals(one: Draft) -> Table:
+    table = tomlkit.table(is_super_table=True)
+    for column in one.known:
+        table.add(column.quantity, _signal(column))
+    return table
+
+
+def _signal(column: DraftColumn) -> Table:
+    table = tomlkit.table()
+    quantity = QUANTITIES[column.quantity]
+    seen = f"{quantity.meaning}; {column.low:.4g} to {column.high:.4g}"
+    table.add(tomlkit.comment(f"{seen} {column.unit}".rstrip()))
+    if column.doubt:
+        table.add(tomlkit.comment(f"doubtful: {column.doubt}"))
+    table.add("column", column.name)
+    if column.unit:
+        table.add("unit", column.unit)
+    return table

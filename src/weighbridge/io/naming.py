@@ -1,0 +1,384 @@
+"""What a foreign log's column is, told from its name.
+
+A name is taken apart into words, in any spelling (``EngineSpeed``, ``engine_speed``, ``Engine
+speed [rpm]``), and held against what loggers call each quantity in several languages.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from weighbridge.io.columns import dimension_of, unit_suffix
+from weighbridge.signals import QUANTITIES
+from weighbridge.signals.units import UNITS
+
+PHRASES: Final[dict[str, tuple[str, ...]]] = {
+    "vehicle_speed": ("obd 2 speed", "kmph meas", "kmph", "kph",
+        "vehicle speed", "speed", "obd speed", "speed obd", "car speed", "wheel speed", "wheel based vehicle speed",
+        "ground speed can", "velocity", "geschwindigkeit", "fahrgeschwindigkeit", "fahrzeuggeschwindigkeit",
+        "vitesse", "vitesse vehicule", "velocidad", "velocidad vehiculo", "velocita", "velocita veicolo",
+        "velocidade", "velocidade veiculo", "snelheid", "vss", "vspeed", "speedometer", "speed sensor",
+        "vehicle speed sensor", "v ego", "vego", "esp speed",
+    ),
+    "engine_speed": ("nmot", "n mot",
+        "engine speed", "engine rpm", "rpm", "rpms", "engine rpms", "revs", "motor speed", "motor rpm", "motordrehzahl",
+        "drehzahl", "regime moteur", "regime", "regimen motor", "revoluciones", "revoluciones motor",
+        "giri motore", "giri", "regime motore", "rotacao", "rotacao motor", "toerental", "engine revolutions",
+        "crankshaft speed", "n engine", "eng speed", "engine speed rpm",
+    ),
+    "engine_load": (
+        "engine load", "calculated engine load", "calculated load value", "calculated load", "load", "motorlast",
+        "berechneter lastwert", "last", "charge moteur", "charge calculee", "carga motor", "carga calculada",
+        "carico motore", "carga do motor", "calc load", "engine load calculated", "calculated engine load value",
+        "eng load",
+    ),
+    "absolute_load": ("absolute engine load", "absolute load", "absolute load value", "absolute throttle load"),
+    "engine_torque": (
+        "engine torque", "torque", "motor torque", "drehmoment", "motordrehmoment", "couple", "couple moteur",
+        "par motor", "coppia", "coppia motore", "torque motor", "actual engine torque", "net torque",
+        "emotor torque", "electric motor torque", "brake torque", "flywheel torque",
+    ),
+    "engine_torque_fraction": (
+        "actual engine percent torque", "actual engine torque", "percent torque", "engine percent torque",
+        "actual engine torque percent", "engine torque", "motor torque percent", "actual torque", "torque",
+        "drehmoment", "engine torque mode percent",
+    ),
+    "demanded_torque": (
+        "driver s demand engine percent torque", "drivers demand engine percent torque", "demanded torque",
+        "driver demand torque", "demand engine torque", "driver s demand engine torque",
+    ),
+    "reference_torque": (
+        "engine reference torque", "reference torque", "referenzmoment", "reference engine torque",
+    ),
+    "mass_air_flow": (
+        "mass air flow", "mass air flow rate", "maf", "air flow", "maf rate", "maf air flow rate", "air flow rate",
+        "luftmassenstrom", "luftmasse", "debit air", "debit massique air", "flujo masa aire", "flujo aire",
+        "portata aria", "massa aria", "fluxo de ar", "air flow rate maf", "intake air flow", "maf sensor",
+        "air flow rate from mass flow sensor",
+    ),
+    "intake_pressure": ("presion absoluta colector admision", "pression absolue collecteur admission",
+        "intake manifold pressure", "intake manifold absolute pressure", "manifold absolute pressure", "map",
+        "manifold pressure", "saugrohrdruck", "ladedruck", "pression admission", "presion admision",
+        "presion multiple admision", "pressione collettore", "intake pressure", "boost pressure absolute",
+        "inlet manifold pressure",
+    ),
+    "throttle": (
+        "throttle", "throttle position", "absolute throttle position", "tps", "throttle pos", "drosselklappe",
+        "drosselklappenstellung", "position papillon", "posicion acelerador", "posicion mariposa",
+        "posizione farfalla", "posicao borboleta", "throttle position manifold", "abs throttle position",
+        "throttle position sensor",
+    ),
+    "relative_throttle": ("relative throttle position", "relative throttle"),
+    "commanded_throttle": ("commanded throttle actuator", "commanded throttle", "commanded throttle actuator control"),
+    "throttle_b": ("absolute throttle position b", "throttle position b", "absolute throttle b"),
+    "accelerator_pedal": ("aps", "accel pedal pos",
+        "accelerator pedal position", "accelerator pedal position d", "accelerator pedal", "accelerator",
+        "pedal position", "gas pedal", "gaspedal", "gaspedalstellung", "fahrpedal", "fahrpedalstellung",
+        "position pedale accelerateur", "pedal acelerador", "pedale acceleratore", "pedal accelerator",
+        "accelerator position", "accel pedal", "accelerator pedal position 1", "app", "pedal",
+        "accelerator pedalposition d", "posicion pedal acelerador", "gas",
+    ),
+    "relative_pedal": ("relative accelerator pedal position", "relative accelerator pedal"),
+    "coolant_temperature": (
+        "engine coolant temperature", "coolant temperature", "coolant temp", "engine coolant temp", "ect",
+        "kuhlmitteltemperatur", "motorkuhlmitteltemperatur", "kuhlwassertemperatur", "temperature liquide refroidissement",
+        "temperatura refrigerante", "temperatura liquido refrigerante", "temperatura acqua", "water temperature",
+        "water temp", "coolant", "temperatura refrigerante motor",
+    ),
+    "intake_temperature": (
+        "intake air temperature", "intake temperature", "intake air temp", "iat", "ansauglufttemperatur",
+        "temperature air admission", "temperatura aire admision", "temperatura aria aspirata", "intake temp",
+        "inlet air temperature",
+    ),
+    "ambient_temperature": (
+        "ambient air temperature", "ambient temperature", "ambient air temp", "ambient temp", "outside temperature",
+        "oat", "aussentemperatur", "umgebungstemperatur", "temperature exterieure", "temperatura ambiente",
+        "temperatura exterior", "temperatura esterna", "outside air temperature",
+    ),
+    "oil_temperature": (
+        "engine oil temperature", "oil temperature", "oil temp", "engine oil temp", "oltemperatur", "motoroltemperatur",
+        "temperature huile", "temperatura aceite", "temperatura olio",
+    ),
+    "barometric_pressure": (
+        "barometric pressure", "atmospheric pressure", "baro", "ambient pressure", "absolute barometric pressure",
+        "luftdruck", "pression atmospherique", "pression barometrique", "presion barometrica", "presion atmosferica",
+        "pressione barometrica", "barometer", "barometric pressure from vehicle",
+    ),
+    "fuel_rate": (
+        "engine fuel rate", "fuel rate", "fuel flow", "fuel flow rate", "fuel consumption rate", "kraftstoffverbrauch",
+        "momentanverbrauch", "debit carburant", "consumo instantaneo", "calculated instant fuel rate",
+        "fuel rate direct from ecu",
+    ),
+    "lambda_1": ("lambda", "equivalence ratio", "air fuel equivalence ratio", "lambda 1", "o2 sensor1 equivalence ratio"),
+    "commanded_lambda": ("fuel air commanded equiv ratio",
+        "commanded equivalence ratio", "commanded air fuel equivalence ratio", "commanded lambda",
+        "fuel air commanded equivalence ratio", "fuel air equivalence ratio commanded",
+    ),
+    "gear": (
+        "gear", "current gear", "selected gear", "gang", "aktueller gang", "rapport", "rapport engage", "marcha",
+        "marcia", "transmission gear", "gear position", "actual gear", "transmission current gear",
+    ),
+    "gear_ratio": ("transmission actual gear ratio", "actual gear ratio", "gear ratio"),
+    "brake_switch": (
+        "brake switch", "brake pressed", "brake", "brake pedal", "brake pedal pressed", "brake status", "bremse", "bremspedal",
+        "bremslicht", "frein", "freno", "brake light", "brake pedal status", "brakes", "brake lights",
+    ),
+    "clutch_switch": ("clutch switch", "clutch", "clutch pedal", "kupplung", "embrayage", "embrague", "frizione", "clutch pressed"),
+    "battery_voltage": (
+        "battery voltage hv", "hv battery voltage", "traction battery voltage", "battery pack voltage", "pack voltage",
+        "high voltage battery voltage", "hv voltage", "batteriespannung", "battery voltage",
+    ),
+    "battery_current": (
+        "battery current", "hv battery current", "traction battery current", "battery pack current", "pack current",
+        "high voltage battery current", "hv current", "batteriestrom",
+    ),
+    "module_voltage": (
+        "control module voltage", "module voltage", "ecu voltage", "obd module voltage", "supply voltage",
+        "voltage control module", "adapter voltage", "obd adapter voltage", "control module voltage ecu",
+    ),
+    "fuel_level": ("fuel level", "fuel tank level", "fuel level input", "tankfullstand", "niveau carburant", "nivel combustible", "fuel remaining", "livello carburante"),
+    "run_time": ("run time since engine start", "time since engine start", "engine run time", "engine runtime", "runtime since engine start", "tiempo desde arranque motor"),
+    "odometer": ("odometer", "mileage", "kilometerstand", "total distance", "kilometrage", "vehicle odometer"),
+    "latitude": ("latitude", "lat", "breitengrad", "breite", "latitud", "latitudine", "gps latitude", "latitude deg", "gps lat", "position latitude"),
+    "longitude": ("longitude", "lon", "lng", "long", "langengrad", "lange", "longitud", "longitudine", "gps longitude", "gps lon", "gps long", "gps lng"),
+    "altitude": ("altitude", "alt", "height", "elevation", "ele", "hohe", "altitud", "altitudine", "gps altitude", "gps alt", "gps height", "hauteur", "altura", "msl altitude", "height above msl", "location altitude"),
+    "gnss_speed": ("gpsspeed", "gps speed", "speed gps", "gnss speed", "speed over ground", "gps geschwindigkeit", "vitesse gps", "velocidad gps", "location speed", "gps velocity", "sog", "velocita gps", "geschwindigkeit gps"),
+    "gnss_course": ("course", "heading", "bearing", "gps course", "gps bearing", "gps heading", "course over ground", "cog", "kurs", "cap", "rumbo", "track angle", "location course", "direction", "gps direction", "location bearing"),
+    "hdop": ("hdop", "horizontal dilution of precision", "dop", "gps hdop"),
+    "gnss_accuracy": ("horizontal accu", "accuracy", "gps accuracy", "horizontal accuracy", "genauigkeit", "precision", "location accuracy", "location horizontal accuracy", "position accuracy", "h accuracy", "gps horizontal accuracy"),
+    "longitudinal_accel": ("longitudinal acceleration", "longitudinal accel", "long accel", "langsbeschleunigung", "acceleration longitudinale", "ax vehicle", "long acceleration", "lon acceleration", "longitudinal acc", "inline acc", "inline acceleration"),
+    "grade": ("grade", "road grade", "slope", "steigung", "road slope", "pente", "gradient", "pendiente", "pendenza", "inclination road"),
+    **{
+        f"accel_{a}": (
+            f"accel {a}", f"acc {a}", f"acceleration {a}", f"accelerometer {a}", f"a {a}", f"{a} accel",
+            f"{a} acceleration", f"beschleunigung {a}", f"accelerometer acceleration {a}", f"g force {a}", f"g f{a}", f"f{a}",
+            f"acceleration in {a}", f"acceleration {a} with gravity", f"total acceleration {a}",
+            f"aceleracion {a}", f"accelerazione {a}", f"imu accel {a}", f"linear accelerometer {a}", f"a{a}",
+            f"{a} axis acceleration", f"gf {a}", f"gf{a}", f"acc{a}", f"accel{a}", f"acceleration {a} axis",
+        )
+        for a in "xyz"
+    },
+    **{
+        f"gyro_{a}": (
+            f"gyro {a}", f"gyroscope {a}", f"angular rate {a}", f"rotation rate {a}", f"rotation {a}", f"w {a}",
+            f"{a} gyro", f"angular velocity {a}", f"drehrate {a}", f"gyr {a}", f"omega {a}", f"{a} gyroscope",
+            f"gyroscope rotation {a}", f"giroscopio {a}", f"gyro rotation {a}", f"imu gyro {a}", f"w{a}",
+            f"{a} rate of rotation", f"rate of rotation {a}", f"gyro{a}", f"gyr{a}", f"angular speed {a}",
+            f"gyroscope {a} axis", f"{a} angular rate",
+        )
+        for a in "xyz"
+    },
+}  # fmt: skip
+"""What loggers call each quantity: English, German, French, Spanish, Italian, Portuguese, Dutch;
+without accents, in small letters."""
+
+TIME_PHRASES: Final = frozenset(
+    (
+        "time", "t", "timestamp", "time stamp", "zeit", "zeitstempel", "uhrzeit", "date", "datetime", "date time",
+        "device time", "gps time", "temps", "horodatage", "tiempo", "fecha hora", "hora", "tempo", "ora", "data ora", "datum",
+        "elapsed", "elapsed time", "seconds elapsed", "seconds", "millis", "milliseconds", "utc", "utc time", "epoch",
+        "time since start", "time utc", "unix time", "log time", "timestamps", "created at", "measured at", "sec", "ms",
+        "session time", "meta time", "relative time", "recording time", "logging time", "time since start in ms", "running time",
+        "ts", "local time", "elapsed seconds", "offset", "trip time", "time elapsed", "tijd", "timestamp ms", "unix timestamp",
+    )
+)  # fmt: skip
+"""What loggers call their time, likewise."""
+
+_NOISE: Final = frozenset(
+    ("obd", "ii", "obd2", "obdii", "pid", "sensor", "value", "avg", "raw", "data", "signal", "bank", "of", "the", "in",
+     "can", "ecu", "location", "txt", "wgs", "der", "des", "du", "de", "la", "le", "el", "del", "della", "di", "do", "da", "from", "as")
+)  # fmt: skip
+"""Words that say nothing of the quantity."""
+
+_AGAINST: Final[dict[str, frozenset[str]]] = {
+    "vehicle_speed": frozenset(("gps", "gnss", "engine", "motor", "wind", "fan", "limit", "cruise", "max", "min", "average", "avg",
+                      "target", "accuracy", "set", "shaft", "output", "input", "turbine", "angular", "idle", "course")),
+    "engine_speed": frozenset(("idle", "max", "min", "target", "wheel", "shaft", "turbo", "vehicle", "fan", "limit", "desired", "average")),
+    "engine_load": frozenset(("absolute", "sensor", "cpu", "axle", "torque")),
+    "engine_torque": frozenset(("reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder")),
+    "engine_torque_fraction": frozenset(("reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "nominal", "converter")),
+    "throttle": frozenset(("relative", "commanded", "b", "c", "pedal", "accelerator", "volts", "voltage")),
+    "accelerator_pedal": frozenset(("relative", "e", "f", "brake", "clutch", "x", "y", "z")),
+    "fuel_rate": frozenset(("level", "trim", "pressure", "rail", "average")),
+    "gear": frozenset(("ratio", "shift", "recommended", "target", "steering", "input", "desired")),
+    "brake_switch": frozenset(("pressure", "torque", "force", "parking", "temperature", "retarder", "fluid", "percent", "calculated", "regenerative", "regen")),
+    "altitude": frozenset(("accuracy", "ellipsoid", "ellipsoidal", "barometric", "relative")),
+    "latitude": frozenset(("accuracy", "start", "end", "std")),
+    "longitude": frozenset(("accuracy", "start", "end", "std")),
+    "gnss_speed": frozenset(("accuracy", "max", "average", "difference", "vs", "obd")),
+    "gnss_course": frozenset(("accuracy", "magnetic", "rate", "north")),
+    "gnss_accuracy": frozenset(("vertical", "speed", "bearing", "course", "heading", "altitude")),
+    "intake_pressure": frozenset(("fuel", "delta", "temperature")),
+    "coolant_temperature": frozenset(("oil", "intake", "gearbox", "transmission", "2", "inverter", "battery", "heater")),
+    "battery_voltage": frozenset(("12v", "12", "cell", "min", "max", "module", "sensor", "phone", "adapter", "starter")),
+    "battery_current": frozenset(("12v", "12", "max", "min", "limit", "phone", "starter", "charger")),
+    "mass_air_flow": frozenset(("temperature", "voltage", "volts", "pressure", "2")),
+    "lambda_1": frozenset(("commanded", "voltage", "2", "current", "target", "desired")),
+    "odometer": frozenset(("trip",)),
+    "oil_temperature": frozenset(("transmission", "gearbox", "axle", "differential", "atf")),
+    **{f"accel_{a}": frozenset(("linear", "user", "gravity", "free", "without", "angular")) for a in "xyz"},
+    **{f"gyro_{a}": frozenset(("accel", "acceleration", "uncalibrated", "vector", "bias", "drift")) for a in "xyz"},
+}  # fmt: skip
+"""Words with which a name means something else."""
+
+_ENGINE: Final = frozenset(("engine_speed", "engine_load", "engine_torque", "mass_air_flow"))
+"""Quantities of a table that an engine's control unit fills."""
+
+LEAST: Final = 0.66
+"""Part of the words of a name that have to be those of a quantity [-]."""
+
+_MARKS: Final = frozenset(("txt", "wgs84", "gear", "bool", "int", "float", "on/off", "0/1", "none"))
+"""What stands in brackets as a unit does, and is none."""
+
+_UNIT: Final = re.compile(r"[\[({<]\s*([^\])}>]{0,20}?)\s*[\])}>]")
+_WORD: Final = re.compile(r"[a-z]+|\d+")
+_CAMEL: Final = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """What a name says.
+
+    Attributes
+    ----------
+    quantity : canonical name; empty where none is recognised
+    unit : suffix of the unit that the name states; None where it states none
+    score : part of the name's words that speak for it [-]
+    """
+
+    quantity: str
+    unit: str | None
+    score: float
+
+
+def words_of(name: str) -> tuple[str, ...]:
+    """Words of a name in small letters, without accents and without units in brackets."""
+    plain = _UNIT.sub(lambda found: _kept(found.group(1)), name)
+    plain = _CAMEL.sub(" ", plain)
+    plain = unicodedata.normalize("NFKD", plain.replace("ß", "ss"))
+    plain = "".join(c for c in plain if not unicodedata.combining(c)).lower()
+    return tuple(_WORD.findall(plain))
+
+
+def _kept(bracketed: str) -> str:
+    """What stands in brackets, where it is a word and no unit."""
+    word = bracketed.strip()
+    plain = len(_WORD.findall(word.lower())) and word.lower() not in _MARKS
+    return f" {word} " if plain and len(word) > 2 and unit_suffix(word) is None else " "
+
+
+def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
+    """Unit that a name states in brackets or as its last word, and the words without it."""
+    words = words_of(name)
+    for found in reversed(_UNIT.findall(name)):
+        suffix = unit_suffix(found)
+        if suffix is not None:
+            return suffix, words
+    tail = name.rsplit("_", 1)
+    if len(tail) == 2 and (suffix := unit_suffix(tail[1])) is not None and len(words) > 1:
+        gone = len(words_of(tail[1]))
+        return suffix, words[: len(words) - gone]
+    last = name.split()
+    if len(last) > 1 and (suffix := unit_suffix(last[-1].strip("()[],;"))) is not None:
+        gone = len(words_of(last[-1]))
+        return suffix, words[: len(words) - gone] if gone else words
+    return None, words
+
+
+def recognise(name: str, unit: str | None = None) -> Named:
+    """Recognise a column by its name.
+
+    Parameters
+    ----------
+    name : as it stands in the log
+    unit : suffix of its unit, where the log states it elsewhere
+
+    Returns
+    -------
+    Named
+        With an empty quantity where nothing fits well enough.
+    """
+    stated, words = unit_of(name)
+    stated = stated or unit
+    whole = words_of(name)
+    best = Named("", stated, 0.0)
+    for quantity, phrases in PHRASES.items():
+        if _AGAINST.get(quantity, frozenset()) & set(whole):
+            continue
+        if stated is not None and not _can_be(quantity, stated):
+            continue
+        # A last word may be a unit or part of the name, as in ENGINE_RPM.
+        score = max(_score(said, phrase.split()) for said in {words, whole} for phrase in phrases)
+        if score > best.score:
+            best = Named(quantity, stated, score)
+    return best if best.score >= LEAST else Named("", stated, best.score)
+
+
+def is_time(name: str) -> bool:
+    """Whether a column's name is that of a time."""
+    _, words = unit_of(name)
+    plain = " ".join(words_of(name))
+    return plain in TIME_PHRASES or " ".join(words) in TIME_PHRASES
+
+
+def _can_be(quantity: str, unit: str) -> bool:
+    q = QUANTITIES[quantity]
+    if not q.suffix:
+        return unit == "ratio"
+    return UNITS[unit].dimension == dimension_of(q)
+
+
+def _score(words: tuple[str, ...], phrase: list[str]) -> float:
+    """Part of the words of a name that a phrase has; 0 where the name lacks one of the phrase's."""
+    said = {w for w in words if w not in _NOISE} or set(words)
+    wanted = {w for w in phrase if w not in _NOISE} or set(phrase)
+    return len(wanted) / len(said) if said and wanted <= said else 0.0
+
+
+def recognise_all(names: Sequence[str], units: Sequence[str | None] | None = None) -> list[Named]:
+    """Recognise the columns of one table together.
+
+    A quantity is given once, to the name that fits best. A speed without more words is that of
+    satellites where it stands beside a position and another column has the wheels' speed, or the
+    table has no value of an engine.
+
+    Parameters
+    ----------
+    names : of the columns
+    units : suffixes of their units, where the log states them elsewhere
+
+    Returns
+    -------
+    One for each name.
+    """
+    found = [
+        recognise(name, unit)
+        for name, unit in zip(names, units or [None] * len(names), strict=True)
+    ]
+    found = _speed_of_satellites(list(names), found)
+    best: dict[str, int] = {}
+    for k, named in enumerate(found):
+        other = best.get(named.quantity)
+        if other is None or named.score > found[other].score:
+            best[named.quantity] = k
+    return [
+        named if best[named.quantity] == k else Named("", named.unit, named.score)
+        for k, named in enumerate(found)
+    ]
+
+
+def _speed_of_satellites(names: list[str], found: list[Named]) -> list[Named]:
+    quantities = {n.quantity for n in found}
+    if "latitude" not in quantities or "gnss_speed" in quantities:
+        return found
+    speeds = [k for k, n in enumerate(found) if n.quantity == "vehicle_speed"]
+    plain = [k for k in speeds if not {"obd", "vehicle", "car", "wheel"} & set(words_of(names[k]))]
+    if len(plain) != 1 or (len(speeds) == 1 and quantities & _ENGINE):
+        return found
+    changed = list(found)
+    changed[plain[0]] = Named("gnss_speed", found[plain[0]].unit, found[plain[0]].score)
+    return changed

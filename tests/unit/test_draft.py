@@ -1,0 +1,151 @@
+"""Mappings drafted from logs as loggers write them, read back with what was drafted."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from weighbridge.errors import DriveError
+from weighbridge.io import read_drive
+from weighbridge.io.draft import draft
+from weighbridge.io.mapping import load_mapping
+from weighbridge.io.mapping_text import mapping_text
+
+ROWS = 400
+T = 0.25 * np.arange(ROWS)
+SPEED = 60.0 + 25.0 * np.sin(0.1 * T)
+RPM = np.round(1800.0 + 700.0 * np.sin(0.13 * T))
+LOAD = np.round(40.0 + 30.0 * np.sin(0.3 * T), 1)
+
+
+def german(value):
+    return f"{value:.2f}".replace(".", ",")
+
+
+def written(path, lines, encoding="utf-8"):
+    path.write_bytes("\n".join(lines).encode(encoding) + b"\n")
+    return path
+
+
+def car_scanner(folder):
+    head = (
+        "time,Vehicle speed (km/h),Engine RPM (rpm),Calculated engine load value (%),"
+        "Average speed (km/h),"
+    )
+    rows = [
+        f"10:{int(t // 60):02d}:{t % 60:06.3f},{v:.0f},{n:.0f},{x:.1f},33,"
+        for t, v, n, x in zip(T, SPEED, RPM, LOAD, strict=True)
+    ]
+    return written(folder / "car.csv", [head, *rows])
+
+
+def german_sheet(folder):
+    head = (
+        "Messung vom Montag\n\n"
+        "Zeit [s];Geschwindigkeit [km/h];Motordrehzahl [1/min];Berechneter Lastwert [%]"
+    )
+    rows = [";".join(map(german, row)) for row in zip(T, SPEED, RPM, LOAD, strict=True)]
+    return written(folder / "blatt.csv", [head, *rows], "cp1252")
+
+
+def unit_row(folder):
+    head = ["Timestamp\tVehicle Speed\tEngine Speed\tEngine Load", "ms\tmph\trpm\t%"]
+    rows = [
+        f"{1000 * t:.0f}\t{v / 1.609344:.3f}\t{n:.0f}\t{x:.1f}"
+        for t, v, n, x in zip(T, SPEED, RPM, LOAD, strict=True)
+    ]
+    return written(folder / "units.txt", [*head, *rows])
+
+
+def no_units(folder):
+    head = "Date,VEHICLE_SPEED,ENGINE_RPM,ENGINE_LOAD,comment"
+    rows = [
+        f"05/13/2024 11:{int(t) // 60:02d}:{t % 60:06.3f} PM,{v:.0f},{n:.0f},{x / 100.0:.3f},ok"
+        for t, v, n, x in zip(T, SPEED, RPM, LOAD, strict=True)
+    ]
+    return written(folder / "plain.csv", [head, *rows])
+
+
+def epoch(folder):
+    frame = pl.DataFrame(
+        {
+            "ts": (1.7e12 + 1000.0 * T).astype(np.int64),
+            "v_ego": SPEED / 3.6,
+            "rpm": RPM,
+            "load": LOAD,
+        }
+    )
+    frame.write_parquet(folder / "fleet.parquet")
+    return folder / "fleet.parquet"
+
+
+@pytest.mark.parametrize("make", [car_scanner, german_sheet, unit_row, no_units, epoch])
+def test_what_was_drafted_reads_the_log(make, tmp_path):
+    path = make(tmp_path)
+    found = draft(path)
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(mapping_text([found]), encoding="utf-8")
+    drive = read_drive(path, mapping)
+    assert not any(p.serious for p in drive.problems)
+    for name, true in (("vehicle_speed", SPEED / 3.6), ("engine_speed", RPM * np.pi / 30.0)):
+        signal = drive.signals[name]
+        assert len(signal) == ROWS
+        assert np.abs(signal.values - true).max() < 0.02 * true.max()
+        assert signal.duration == pytest.approx(T[-1], abs=0.01)
+    assert np.abs(drive.signals["engine_load"].values - 0.01 * LOAD).max() < 0.002
+
+
+def test_units_that_the_log_states_are_not_doubted_and_others_are(tmp_path):
+    assert draft(car_scanner(tmp_path)).all_doubts == ()
+    doubts = " ".join(draft(no_units(tmp_path)).all_doubts)
+    assert "'VEHICLE_SPEED': states no unit; its highest is" in doubts
+    assert "taken as ratio" in doubts
+
+
+def test_columns_that_nobody_needs_are_left_out(tmp_path):
+    found = draft(no_units(tmp_path))
+    assert {c.quantity for c in found.known} == {"vehicle_speed", "engine_speed", "engine_load"}
+    assert "comment" not in mapping_text([found])
+
+
+def phone(folder, gravity, name, unit=""):
+    rng = np.random.default_rng(1)
+    axes = rng.normal(0.0, 0.03, (ROWS, 3)) * gravity + [0.0, 0.1 * gravity, gravity]
+    head = f"Time (s),ax{unit},ay{unit},az{unit}"
+    rows = [f"{t:.2f},{x:.4f},{y:.4f},{z:.4f}" for t, (x, y, z) in zip(T, axes, strict=True)]
+    return written(folder / name, [head, *rows])
+
+
+def test_gravity_tells_the_unit_of_an_accelerometer(tmp_path):
+    units = [{c.unit for c in draft(phone(tmp_path, g, "a.csv")).known} for g in (9.81, 1.0)]
+    assert units == [{"mps2"}, {"g"}]
+    gone = draft(phone(tmp_path, 1e-3, "b.csv", " (m/s^2)"))
+    assert "gravity was taken out of it" in " ".join(gone.all_doubts)
+
+
+def test_several_files_of_a_drive_get_a_table_each(tmp_path):
+    obd, imu = car_scanner(tmp_path), phone(tmp_path, 9.81, "imu [1].csv")
+    text = mapping_text([draft(obd), draft(imu)])
+    (tmp_path / "map.toml").write_text(text, encoding="utf-8")
+    tables = load_mapping(tmp_path / "map.toml")
+    assert len(tables) == 2
+    drive = read_drive([obd, imu], tmp_path / "map.toml")
+    assert {"vehicle_speed", "accel_z"} <= set(drive.signals)
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ([""], "is empty"),
+        (["hello world"], "no common separator"),
+        (["a,b", "1,2", "3,4"], "no column that can be its time"),
+        (["time,b", "1,2", "3,4"], "none of its columns is known"),
+        (["1,2,3", "2,3,4"], "no header line"),
+        (["time,Speed (km/h)"], "no rows"),
+    ],
+)
+def test_what_cannot_be_drafted_is_one_sentence(lines, words, tmp_path):
+    path = written(tmp_path / "x.csv", lines)
+    with pytest.raises(DriveError, match=words) as told:
+        draft(path)
+    assert str(told.value).startswith(str(path))
+    assert "\n" not in str(told.value)
