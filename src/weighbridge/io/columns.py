@@ -20,7 +20,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
     "%": "pct", "percent": "pct", "-": "ratio", "1": "ratio",
     "°c": "degc", "℃": "degc", "c": "degc", "deg c": "degc", "celsius": "degc",
-    "°f": "degf", "℉": "degf", "f": "degf", "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
+    "°f": "degf", "℉": "degf", "â°c": "degc", "â°": "deg", "f": "degf", "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
     "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip

@@ -213,7 +213,7 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
     "gnss_course": frozenset(("accuracy", "magnetic", "rate", "north")),
     "gnss_accuracy": frozenset(("vertical", "speed", "bearing", "course", "heading", "altitude")),
     "intake_pressure": frozenset(("fuel", "delta", "temperature")),
-    "coolant_temperature": frozenset(("oil", "intake", "gearbox", "transmission", "2", "inverter", "battery", "heater")),
+    "coolant_temperature": frozenset(("oil", "intake", "gearbox", "transmission", "2", "inverter", "battery", "heater", "heatercore")),
     "battery_voltage": frozenset(("12v", "12", "cell", "min", "max", "module", "sensor", "phone", "adapter", "starter")),
     "battery_current": frozenset(("12v", "12", "max", "min", "limit", "phone", "starter", "charger")),
     "mass_air_flow": frozenset(("temperature", "voltage", "volts", "pressure", "2")),
