@@ -24,6 +24,9 @@ UNIT_TEXTS: Final[dict[str, str]] = {
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""
 
+# Letters of a name that may resemble a canonical one; comparing takes their square.
+_LONGEST_NAME: Final = 200
+
 _BRACKETED: Final = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
 # Stems too general to be taken at their word outside their own table.
@@ -129,6 +132,8 @@ def near_column(column: str) -> str | None:
     """Canonical column that an unknown name resembles, or None."""
     known = [q.column for q in QUANTITIES.values() if q.stem not in _GENERAL] + [TIME_COLUMN]
     name = column.strip().lower()
+    if len(name) > _LONGEST_NAME:
+        return None
     whole = [k for k in known if k.endswith(f"_{name}")]
     near = whole[:1] or difflib.get_close_matches(name, known, n=1, cutoff=0.75)
     return near[0] if near else None
