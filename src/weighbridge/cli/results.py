@@ -186,7 +186,7 @@ def refuse_missing_folder(*outputs: Path | None) -> None:
 
 
 def _is_input(path: Path, known: Path, read: Inputs) -> str:
-    if any(known.parent == drive for drive in read.drives):
+    if _place(path.parent) in {_place(drive) for drive in read.drives}:
         return (
             f"{path}: is there already, in the folder of a drive that is read; results must "
             "go to another file"
