@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import logging
 import warnings
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -87,9 +90,11 @@ def write_mdf(drive: Drive, path: str | Path) -> None:
     clocks: dict[int, list[Signal]] = {}
     for s in drive.signals.values():
         clocks.setdefault(id(s.time), []).append(s)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), whole_file(path, DriveError) as part:
         warnings.simplefilter("ignore")
-        with MDF(version="4.10") as file:
+        # The library tells of a full disk with a traceback of its own, beside raising.
+        logging.getLogger("asammdf").setLevel(logging.CRITICAL)
+        with contextlib.redirect_stdout(io.StringIO()), MDF(version="4.10") as file:
             # The clock of a drive counts from its own zero.
             file.header.start_time = datetime.fromtimestamp(0.0, UTC)
             if drive.info != DriveInfo():
@@ -102,10 +107,9 @@ def write_mdf(drive: Drive, path: str | Path) -> None:
                     name = f"{s.name}_{suffix}" if suffix else s.name
                     channels.append(Channel(values, s.time, name=name, unit=suffix))
                 file.append(channels)
-            with whole_file(path, DriveError) as part:
-                saved = Path(file.save(part, overwrite=True, compression=2))
-                if saved != part:
-                    saved.replace(part)
+            saved = Path(file.save(part, overwrite=True, compression=2))
+        if saved != part:
+            saved.replace(part)
 
 
 def write_table(columns: Mapping[str, Floats], path: str | Path) -> None:

@@ -119,7 +119,10 @@ def whole_folder(
             raise NotADirectoryError(errno.ENOTDIR, "is a file; name a folder")
         fresh = not target.exists()
         if fresh:
-            target.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                target.parent.mkdir(parents=True, exist_ok=True)
+            except FileExistsError:
+                raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR)) from None
             part = target.parent / _part_name(target)
             part.mkdir()
         else:
