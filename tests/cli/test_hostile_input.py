@@ -261,20 +261,31 @@ def test_names_of_three_hundred_bytes(refused, tmp_path, monkeypatch, words):
     refused(*words, said="File name too long")
 
 
-@pytest.mark.parametrize(
-    ("option", "said"),
-    [("--vehicle", "Is a directory"), ("--mapping", "Is a directory"), ("--dbc", "Is a directory")],
-)
-def test_folders_in_place_of_files(refused, tmp_path, option, said):
+@pytest.mark.parametrize("option", ["--vehicle", "--mapping", "--dbc"])
+def test_folders_and_devices_in_place_of_files(refused, tmp_path, option):
+    said = "is a folder" if option == "--dbc" else "Is a directory"
     refused("inspect", GOLDEN / "csv", option, tmp_path, said=said)
+    said = "is a device" if option == "--dbc" else "longer than 4 MB"
+    refused("inspect", GOLDEN / "csv", option, "/dev/zero", said=said)
 
 
-def test_folders_in_place_of_tables(refused, tmp_path):
-    for name, said in (("drive.toml", "Is a directory"), ("gnss.csv", "is a folder: a table")):
-        folder = Path(shutil.copytree(GOLDEN / "csv", tmp_path / name.split(".")[0]))
-        (folder / name).unlink()
+@pytest.mark.parametrize("name", ["drive.toml", "gnss.csv"])
+@pytest.mark.parametrize("what", ["folder", "dangling", "pipe", "device"])
+def test_what_is_no_file_in_place_of_a_table(refused, tmp_path, name, what):
+    folder = Path(shutil.copytree(GOLDEN / "csv", tmp_path / "d"))
+    (folder / name).unlink()
+    if what == "folder":
         (folder / name).mkdir()
-        refused("inspect", folder, said=said)
+    elif what == "pipe":
+        os.mkfifo(folder / name)
+    else:
+        (folder / name).symlink_to("/dev/zero" if what == "device" else "nowhere")
+    refused("inspect", folder, said="is no file" if name == "drive.toml" else "a table is one file")
+
+
+def test_a_mark_of_the_byte_order_is_no_fault(tmp_path):
+    (tmp_path / "car.toml").write_bytes(b"\xef\xbb\xbf[vehicle]\r\nname = 'x'\r\n")
+    assert Vehicle.load(tmp_path / "car.toml").name == "x"
 
 
 def test_loops_devices_and_what_is_no_file(refused, tmp_path):

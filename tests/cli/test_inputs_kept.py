@@ -205,6 +205,22 @@ def test_devices_and_new_files_are_free(drive, car, tmp_path):
         refuse_folder(read, drive)
 
 
+def test_results_that_would_be_tables(weighbridge, drive, car, tmp_path):
+    before = contents(drive)
+    words = ("weigh", drive, "--vehicle", car, "--track")
+    (tmp_path / "link.csv").symlink_to(drive / "ride.csv")
+    for out in (drive / "ride.csv", drive / "imu.parquet", tmp_path / "link.csv"):
+        refused(weighbridge(*words, out), "would be read as a table")
+    assert contents(drive) == before
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    shutil.copy(GOLDEN / "can.blf", logs)
+    refused(
+        weighbridge("weigh", logs, "--vehicle", car, "--track", logs / "track.csv"),
+        "would be read as a table",
+    )
+
+
 def test_times_beside_an_array_are_inputs(tmp_path):
     for name in ("value.npy", "t.npy"):
         (tmp_path / name).write_bytes(b"")

@@ -125,6 +125,7 @@ def refuse_results(read: Inputs, results: Sequence[Result]) -> None:
         if place is not None and place in known:
             raise ConfigError(_is_input(path, known[place], read))
         target = os.path.realpath(path)
+        _refuse_new_table(read, path, Path(target))
         other = asked.get(target) or asked.get(place)
         if other is not None:
             raise ConfigError(
@@ -183,6 +184,24 @@ def refuse_missing_folder(*outputs: Path | None) -> None:
             raise ConfigError(f"{path}: there is no folder {path.parent}; make it first")
         if path is not None and path.is_dir():
             raise ConfigError(f"{path}: is a folder; name a file in it")
+
+
+def _refuse_new_table(read: Inputs, path: Path, target: Path) -> None:
+    """Raise where a result would be read as a table of a drive from then on."""
+    from weighbridge.io import READERS
+    from weighbridge.signals.catalogue import TABLES
+
+    if target.suffix.lower() not in READERS:
+        return
+    home = _place(target.parent)
+    for drive in read.drives:
+        if drive.is_dir() and _place(drive) == home:
+            tables = any(f.stem.lower() in TABLES and _may_be_read(f) for f in drive.iterdir())
+            if target.stem.lower() in TABLES or not tables:
+                raise ConfigError(
+                    f"{path}: would be read as a table of the drive {drive.name}; results must go "
+                    "to another folder"
+                )
 
 
 def _is_input(path: Path, known: Path, read: Inputs) -> str:

@@ -84,6 +84,9 @@ def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
         channel = int(found.group(1)) if found else None
         path = Path(found.group(2) if found else source)
         try:
+            if not path.is_file() and path.exists():
+                kind = "folder" if path.is_dir() else "device or a pipe"
+                raise ConfigError(f"--dbc {path} is a {kind}; name a DBC file")
             text = path.read_bytes().decode("cp1252", "replace")
         except FileNotFoundError:
             raise ConfigError(f"--dbc {path}: no such file") from None

@@ -197,12 +197,15 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
         )
     logs_there = [f for f in inside if f.suffix.lower() in READERS]
     for f in logs_there:
-        if f.is_dir() and f.stem.lower() in TABLES:
-            raise DriveError(f"{f} is a folder: a table is one file; join its parts, or remove it")
+        if f.stem.lower() in TABLES and not f.is_file():
+            kind = "a folder" if f.is_dir() else "a link that leads nowhere, or a device"
+            raise DriveError(f"{f} is {kind}: a table is one file; put it there, or remove this")
     files = [f for f in logs_there if f.is_file()]
     files = [f for f in files if f.stem.lower() != TRUTH_NAME]
     info_path = folder / INFO_NAME
-    info = read_info(info_path) if info_path.exists() else DriveInfo()
+    if info_path in inside and not info_path.is_file():
+        raise DriveError(f"{info_path} is no file: put the file there, or remove this")
+    info = read_info(info_path) if info_path in inside else DriveInfo()
     tables: dict[str, Path] = {}
     for f in files:
         table = f.stem.lower()

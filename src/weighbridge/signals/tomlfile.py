@@ -324,7 +324,7 @@ def read_toml(path: Path, error: type[WeighbridgeError] = ConfigError) -> Sectio
             "wrote; name another one"
         )
     try:
-        text = content.decode("utf-8").replace("\r\n", "\n")
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as e:
         line = e.object[: e.start].count(b"\n") + 1
         raise error(f"{path} is not UTF-8 (line {line}): save it as UTF-8") from None
