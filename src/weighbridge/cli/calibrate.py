@@ -13,9 +13,10 @@ from weighbridge.cli.options import (
     MappingPath,
     load,
     mapping_for,
-    refuse_missing_folder,
-    refuse_overwriting,
 )
+from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
+from weighbridge.cli.terminal import console, say
+from weighbridge.cli.terminal import shown as _shown
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -73,8 +74,6 @@ def calibrate(
     """
     from dataclasses import replace
 
-    from rich.console import Console
-
     from weighbridge.errors import ConfigError
     from weighbridge.pipeline.calibrating import (
         CalibrationSettings,
@@ -83,12 +82,14 @@ def calibrate(
     )
     from weighbridge.vehicle.model import Vehicle
 
-    refuse_missing_folder(output)
     refuse_overwriting(output, force, "vehicle file")
     if torque not in (None, "measured", "percent", "load", "air_flow"):
         raise ConfigError(f"--torque {torque}: must be measured, percent, load or air_flow")
     base = Vehicle.load(vehicle) if vehicle is not None else None
-    recorded = [load(path, mapping_for(mapping, base, vehicle), dbc) for path in drives]
+    chosen = mapping_for(mapping, base, vehicle)
+    read = inputs(drives, vehicle, chosen, dbc)
+    refuse_results(read, [Result("--output", output, "vehicle file")])
+    recorded = [load(path, chosen, dbc) for path in drives]
     settings = CalibrationSettings(
         order=order,
         source=torque,  # type: ignore[arg-type]
@@ -100,12 +101,12 @@ def calibrate(
     if settings.method == "speed-ekf":
         _refuse_torque_options(torque, order, grid, straight)
         by_speed = run_speed_calibration(recorded, masses, vehicle=base)
-        car, shown = by_speed.vehicle, speed_table(by_speed)
+        car, found = by_speed.vehicle, speed_table(by_speed)
         doubts = by_speed.warnings
         lightest = min(rows.mass for rows in by_speed.rows)
     else:
         done = run_calibration(recorded, masses, vehicle=base, settings=settings)
-        car, shown, doubts = done.vehicle, table(done), ()
+        car, found, doubts = done.vehicle, table(done), ()
         lightest = min(car.provenance.masses)
     if tare is not None and not 0.3 * lightest <= tare <= 1.02 * lightest:
         raise ConfigError(
@@ -115,10 +116,10 @@ def calibrate(
     if tare is not None:
         car = replace(car, tare=tare)
     car.save(output)
-    Console().print(shown)
+    console().print(found)
     for doubt in doubts:
-        typer.echo(f"  note: {doubt}")
-    typer.echo(f"written: {output}")
+        say(f"  note: {doubt}")
+    say(f"written: {output}")
 
 
 def _refuse_torque_options(
@@ -138,7 +139,7 @@ def speed_table(done: SpeedCalibration) -> Table:
 
     model = done.vehicle.speed_model
     assert model is not None
-    shown = Table(title=f"speed model of {done.vehicle.name}", title_justify="left")
+    shown = Table(title=f"speed model of {_shown(done.vehicle.name)}", title_justify="left")
     shown.add_column("parameter")
     shown.add_column("value", justify="right")
     shown.add_row("known mass (kg)", ", ".join(f"{rows.mass:.0f}" for rows in done.rows))
@@ -161,7 +162,7 @@ def table(done: Calibration) -> Table:
     from weighbridge.signals.units import scalar_from_si
 
     vehicle, p = done.vehicle, done.vehicle.provenance
-    shown = Table(title=f"calibration of {vehicle.name}", title_justify="left")
+    shown = Table(title=f"calibration of {_shown(vehicle.name)}", title_justify="left")
     shown.add_column("parameter")
     shown.add_column("value", justify="right")
     shown.add_column("std", justify="right")
@@ -211,5 +212,5 @@ def table(done: Calibration) -> Table:
     if p.mass_scale_std is not None:
         row("left in every mass (%)", 100.0 * p.mass_scale_std, None, 2)
     if p.notes:
-        shown.caption = p.notes
+        shown.caption = _shown(p.notes)
     return shown

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,13 +11,16 @@ from weighbridge.cli.options import (
     DbcPaths,
     MappingPath,
     load,
-    refuse_missing_folder,
-    refuse_overwriting,
 )
+from weighbridge.cli.results import (
+    Result,
+    inputs,
+    refuse_folder,
+    refuse_overwriting,
+    refuse_results,
+)
+from weighbridge.cli.terminal import say
 from weighbridge.errors import ConfigError, DriveError
-
-if TYPE_CHECKING:
-    from weighbridge.signals import Drive
 
 
 def convert(
@@ -44,40 +47,32 @@ def convert(
     """
     if table_format not in ("parquet", "csv"):
         raise ConfigError(f"--format {table_format}: must be parquet or csv")
-    if out.resolve() == drive.resolve():
+    if out.exists() and drive.exists() and out.samefile(drive):
         raise ConfigError(f"{out}: is the drive itself; name another folder or file")
+    read = inputs([drive], None, mapping, dbc)
+    whole = out.suffix.lower() == ".mf4"
+    if out.suffix and not whole and not out.is_dir():
+        raise ConfigError(f"{out}: drives are written as a folder or as .mf4, not {out.suffix!r}")
+    if not whole:
+        refuse_folder(read, out)
     refuse_overwriting(out, force, "folder or file")
+    if whole:
+        refuse_results(read, [Result("OUT", out, "MF4")])
     recorded = load(drive, mapping, dbc)
     serious = next((p for p in recorded.problems if p.serious), None)
     if serious is not None:
         # A canonical drive carries no doubts: a mass would be made of it without a word.
         raise DriveError(f"{drive}: not converted, {serious.text}")
-    if out.suffix.lower() == ".mf4":
+    if whole:
         from weighbridge.io import write_mdf
 
-        refuse_missing_folder(out)
         write_mdf(recorded, out)
-    elif out.suffix and not out.is_dir():
-        raise ConfigError(f"{out}: drives are written as a folder or as .mf4, not {out.suffix!r}")
     else:
-        _write_folder(recorded, out, table_format)
+        from weighbridge.io import write_drive
+
+        write_drive(recorded, out, table_format)  # type: ignore[arg-type]
     for line in recorded.contents:
-        typer.echo(f"  {line}")
+        say(f"  {line}")
     for problem in recorded.problems:
-        typer.echo(f"  note: {problem.text}")
-    typer.echo(f"written: {out}, {len(recorded.signals)} signals")
-
-
-def _write_folder(drive: Drive, folder: Path, table_format: str) -> None:
-    from weighbridge.io import write_drive
-    from weighbridge.io.info import FILE_NAME
-    from weighbridge.signals.catalogue import TABLES
-
-    if folder.is_file():
-        raise ConfigError(f"{folder}: is a file; name a folder, or a file that ends in .mf4")
-    # A table that is left of another drive would be read with this one.
-    for table in TABLES:
-        for suffix in ("csv", "parquet", "pq"):
-            (folder / f"{table}.{suffix}").unlink(missing_ok=True)
-    (folder / FILE_NAME).unlink(missing_ok=True)
-    write_drive(drive, folder, table_format)  # type: ignore[arg-type]
+        say(f"  note: {problem.text}")
+    say(f"written: {out}, {len(recorded.signals)} signals")

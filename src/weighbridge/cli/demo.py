@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from weighbridge.cli.options import refuse_missing_folder
+from weighbridge.cli.results import Result, inputs, refuse_results
+from weighbridge.cli.terminal import complain, console, say
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.weighing import Weighing
@@ -37,15 +38,15 @@ def demo(
     from weighbridge.report import write_report
     from weighbridge.simulation import make_scenario, simulate_car
 
-    refuse_missing_folder(output)
-    say = _say if sys.stderr.isatty() else _keep_quiet
-    say("simulating and calibrating: one drive of known mass")
+    refuse_results(inputs(), [Result("--output", output, "report")])
+    tell = complain if sys.stderr.isatty() else _keep_quiet
+    tell("simulating and calibrating: one drive of known mass")
     known = simulate_car(make_scenario("car-calibration", seed=seed))
     calibration = run_calibration(known.drive, float(known.truth.mass.mean()))
     car = replace(calibration.vehicle, name="simulated midsize car", tare=known.scenario.car.mass)
     weighed: list[tuple[Weighing, float]] = []
     for k, load in enumerate(LOADS, 1):
-        say(f"simulating and weighing: {load:+.0f} kg")
+        tell(f"simulating and weighing: {load:+.0f} kg")
         chosen = replace(make_scenario("car", payload=load, seed=seed + k), name=f"{load:+.0f} kg")
         made = simulate_car(chosen)
         weighed.append((weigh(made.drive, car), float(made.truth.mass.mean())))
@@ -58,8 +59,8 @@ def demo(
         title="weighbridge demo: a simulated car, weighed three times",
         comparisons=[w.compare() for w, _ in weighed],
     )
-    typer.echo("told beside the recordings: the wind of the weather report")
-    typer.echo(f"report: {output}")
+    say("told beside the recordings: the wind of the weather report")
+    say(f"report: {output}")
     if open_report and sys.stdout.isatty():
         import webbrowser
 
@@ -67,7 +68,6 @@ def demo(
 
 
 def _show(weighed: list[tuple[Weighing, float]]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table()
@@ -78,11 +78,7 @@ def _show(weighed: list[tuple[Weighing, float]]) -> None:
         error = 100.0 * (w.mass / truth - 1.0)
         numbers = (f"{truth:.0f}", f"{w.mass:.0f}", f"{low:.0f}", f"{high:.0f}", f"{error:+.2f}")
         table.add_row(w.drive.name, *numbers)
-    Console().print(table)
-
-
-def _say(text: str) -> None:
-    typer.echo(text, err=True)
+    console().print(table)
 
 
 def _keep_quiet(text: str) -> None:

@@ -13,8 +13,9 @@ from weighbridge.cli.options import (
     ReportPath,
     load,
     mapping_for,
-    refuse_results,
 )
+from weighbridge.cli.results import asked_for, inputs, refuse_results
+from weighbridge.cli.terminal import say, say_json
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.inertia import Inertia
@@ -55,20 +56,24 @@ def inertia(
     Example: weighbridge inertia ride/ --vehicle truck.toml --report ride.html
     """
     from weighbridge.pipeline.inertia import estimate_inertia
+    from weighbridge.signals.whole import write_whole
     from weighbridge.vehicle.model import Vehicle
 
-    refuse_results([drive, vehicle], track=track, report=report, json_path=json_path)
     car = Vehicle.load(vehicle)
-    found = estimate_inertia(load(drive, mapping_for(mapping, car, vehicle), dbc), car, method)
+    chosen = mapping_for(mapping, car, vehicle)
+    refuse_results(
+        inputs([drive], vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
+    )
+    found = estimate_inertia(load(drive, chosen, dbc), car, method)
     if track is not None:
         found.write_track(track)
     if report is not None:
         found.report(report)
     if json_path == "-":
-        typer.echo(found.to_json())
+        say_json(found.to_json())
     else:
         if json_path is not None:
-            Path(json_path).write_text(found.to_json() + "\n", encoding="utf-8")
+            write_whole(json_path, found.to_json() + "\n")
         _show(found)
     if found.status != "converged":
         raise typer.Exit(1)
@@ -82,23 +87,23 @@ def _show(found: Inertia) -> None:
             (("sprung mass", "kg"), ("roll inertia", "kg m²"), ("pitch inertia", "kg m²"))
         ):
             if found.values[k] == found.values[k]:
-                typer.echo(
+                say(
                     f"{name}: {what} {found.values[k]:.0f} {unit}, "
                     f"95 % between {low[k]:.0f} and {high[k]:.0f} {unit}"
                 )
         front, rear = found.axle_loads
         lightest, heaviest = found.mass_interval()
-        typer.echo(
+        say(
             f"mass {found.mass:.0f} kg, 95 % between {lightest:.0f} and {heaviest:.0f} kg: "
             f"front axle {front:.0f} kg, rear axle {rear:.0f} kg"
         )
         if found.vehicle.tare is not None:
-            typer.echo(f"payload {found.payload:.0f} kg over a tare of {found.vehicle.tare:.0f} kg")
+            say(f"payload {found.payload:.0f} kg over a tare of {found.vehicle.tare:.0f} kg")
         if len(found.segments) > 1:
-            typer.echo("the load changed:")
+            say("the load changed:")
             for s in found.segments:
-                typer.echo(f"  {s.start:.1f} to {s.end:.1f} s: sprung mass {s.values[0]:.0f} kg")
+                say(f"  {s.start:.1f} to {s.end:.1f} s: sprung mass {s.values[0]:.0f} kg")
     else:
-        typer.echo(f"{name}: no mass ({found.status}): {found.reason}")
+        say(f"{name}: no mass ({found.status}): {found.reason}")
     for warning in found.warnings:
-        typer.echo(f"  note: {warning}")
+        say(f"  note: {warning}")

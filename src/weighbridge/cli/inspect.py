@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 import typer
 
 from weighbridge.cli.options import DbcPaths, DrivePaths, MappingPath, load, mapping_for
+from weighbridge.cli.terminal import console, shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,47 +37,43 @@ def inspect(
 
     Example: weighbridge inspect drive/ --vehicle car.toml
     """
-    from rich.console import Console
-
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.vehicle.model import Vehicle
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = mapping_for(mapping, car, vehicle)
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = _WIDTH
+    screen = console(highlight=False)
+    if not screen.is_terminal:
+        screen.width = _WIDTH
     for path in drives:
-        _show(console, inspect_drive(load(path, chosen, dbc), car), every_way)
+        _show(screen, inspect_drive(load(path, chosen, dbc), car), every_way)
 
 
-def _show(console: Console, found: Inspection, every_way: bool) -> None:
-    from rich.markup import escape
-
+def _show(screen: Console, found: Inspection, every_way: bool) -> None:
     from weighbridge.pipeline.ride_checks import NEEDED as RIDE
 
     drive = found.drive
-    console.print(f"[bold]{escape(drive.name)}[/]: {drive.duration / 60.0:.1f} min")
+    screen.print(f"[bold]{shown(drive.name)}[/]: {drive.duration / 60.0:.1f} min")
     for line in drive.contents:
-        console.print(f"  {escape(line)}", soft_wrap=True)
-    console.print(_signal_table(found))
+        screen.print(f"  {shown(line)}", soft_wrap=True)
+    screen.print(_signal_table(found))
     if found.problems:
-        console.print("Problems")
+        screen.print("Problems")
         for p in found.problems:
             mark = "[bold red]serious[/]" if p.serious else "note"
-            console.print(f"  {mark}: {escape(p.text)}", soft_wrap=True)
+            screen.print(f"  {mark}: {shown(p.text)}", soft_wrap=True)
     else:
-        console.print("No problems found")
+        screen.print("No problems found")
     weighable = any(w.possible and w.torque != "speed" for w in found.ways)
     if drive.has(*RIDE):
-        console.print("The ride is there: weighbridge inertia finds sprung mass and inertias")
+        screen.print("The ride is there: weighbridge inertia finds sprung mass and inertias")
         if not weighable:
-            console.print()
+            screen.print()
             return
     if not weighable:
-        console.print("No way to weigh by this drive; the nearest one:")
-    console.print(_way_table(found, every_way))
-    console.print()
+        screen.print("No way to weigh by this drive; the nearest one:")
+    screen.print(_way_table(found, every_way))
+    screen.print()
 
 
 def _signal_table(found: Inspection) -> Table:

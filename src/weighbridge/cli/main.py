@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import signal
 import sys
-from typing import Annotated
+import threading
+import traceback
+from collections.abc import Iterator
+from types import FrameType, TracebackType
+from typing import Annotated, Final
 
 import typer
 
@@ -14,12 +21,19 @@ from weighbridge.cli import (
     demo,
     inertia,
     inspect,
+    map,
     reproduce,
     simulate,
     vehicle,
     weigh,
 )
+from weighbridge.cli.terminal import complain, guarded, leave_quietly, say
 from weighbridge.errors import WeighbridgeError
+from weighbridge.signals.visible import visible_text
+
+_INTERRUPTED: Final = 130
+_NOBODY_READS: Final = 141
+"""Exit statuses that a shell gives a program ended by SIGINT and by SIGPIPE: 128 + number."""
 
 app = typer.Typer(
     name="weighbridge",
@@ -36,12 +50,13 @@ app.command()(inertia.inertia)
 app.command()(simulate.simulate)
 app.command()(convert.convert)
 app.command()(reproduce.reproduce)
+app.command("map")(map.map_log)
 app.add_typer(vehicle.app, name="vehicle")
 
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"weighbridge {__version__}")
+        say(f"weighbridge {__version__}")
         raise typer.Exit
 
 
@@ -59,8 +74,84 @@ def options(
 
 def run() -> None:
     """Run the command line; a mistake of the caller is one line and exit status 2."""
+    words = sys.argv[1:]
+    # A help page is ours alone: its colours may pass.
+    with guarded(styled=not words or "--help" in words), _interruptible() as interrupted:
+        try:
+            code = _started(words)
+            sys.stdout.flush()
+        except KeyboardInterrupt:
+            code = _INTERRUPTED
+        except SystemExit as leaving:
+            code = leaving.code
+            if _is_broken_pipe(leaving.__context__):
+                leave_quietly()
+                code = _NOBODY_READS
+        except Exception as error:
+            # Libraries turn an interruption inside an import into errors of their own.
+            code = _INTERRUPTED if interrupted else _failed(error)
+        if interrupted:
+            code = _INTERRUPTED
+    if code not in (None, 0):
+        sys.exit(code)
+
+
+def _started(words: list[str]) -> int | str | None:
+    """Run a command; return its exit status."""
+    if not words:
+        app(["--help"], standalone_mode=False)
+        return 2
+    found = app(standalone_mode=False)
+    return found if isinstance(found, int) else 0
+
+
+def _failed(error: Exception) -> int:
+    """Tell an error that the caller can mend in one line; raise any other again."""
+    if isinstance(error, WeighbridgeError):
+        complain(f"weighbridge: {error}")
+    elif _is_broken_pipe(error):
+        leave_quietly()
+        return _NOBODY_READS
+    elif isinstance(error, OSError):
+        # The machine's fault, not ours: a full disk, a name too long, a folder closed to us.
+        if error.filename is None:
+            leave_quietly()
+        complain(f"weighbridge: {error.filename or 'standard output'}: {error.strerror or error}")
+    elif isinstance(error, MemoryError):
+        complain("weighbridge: the memory is full; close other programs, or give shorter drives")
+    elif hasattr(error, "format_message"):
+        # Usage errors of typer, whose home differs between its versions.
+        complain(f"weighbridge: {error.format_message()}; weighbridge COMMAND --help shows how")
+    else:
+        sys.excepthook = _show_bug
+        raise error
+    return 2
+
+
+def _show_bug(kind: type[BaseException], error: BaseException, at: TracebackType | None) -> None:
+    text = "".join(traceback.format_exception(kind, error, at))
+    sys.stderr.write(visible_text(text))
+
+
+def _is_broken_pipe(error: BaseException | None) -> bool:
+    return isinstance(error, OSError) and error.errno == errno.EPIPE
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[list[int]]:
+    """Collect interruptions, which otherwise may be lost inside an import."""
+    interrupted: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        interrupted.append(number)
+        raise KeyboardInterrupt
+
+    ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)
+    if ignored or threading.current_thread() is not threading.main_thread():
+        yield interrupted
+        return
+    before = signal.signal(signal.SIGINT, note)
     try:
-        app()
-    except WeighbridgeError as error:
-        typer.echo(f"weighbridge: {error}", err=True)
-        sys.exit(2)
+        yield interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.errors import ConfigError
-
 if TYPE_CHECKING:
     from weighbridge.signals import Drive
     from weighbridge.vehicle.model import Vehicle
@@ -52,58 +50,3 @@ def load(path: Path, mapping: Path | None, dbc: list[str] | None = None) -> Driv
     from weighbridge.io import read_drive
 
     return read_drive(path, mapping, dbc or ())
-
-
-def refuse_overwriting(path: Path, force: bool, what: str) -> None:
-    """Raise where ``path`` exists and ``--force`` was not given."""
-    if path.exists() and not force:
-        raise ConfigError(
-            f"{path}: exists already; name another {what}, or give --force to replace it"
-        )
-
-
-def refuse_results(
-    inputs: list[Path],
-    *,
-    track: Path | None,
-    report: Path | None,
-    json_path: str | None,
-) -> None:
-    """Raise before the work where a result could not be written, or would replace an input.
-
-    Parameters
-    ----------
-    inputs : files and folders that are read
-    track, report, json_path : where results go; None, or - for standard output
-    """
-    if track is not None and track.suffix.lower() not in (".csv", ".parquet"):
-        raise ConfigError(f"--track {track}: a track is written as .csv or .parquet")
-    outputs = (track, report, Path(json_path) if json_path and json_path != "-" else None)
-    refuse_missing_folder(*outputs)
-    known = {path.resolve() for path in inputs}
-    for output in outputs:
-        if output is None:
-            continue
-        if output.resolve() in known:
-            raise ConfigError(f"{output}: is an input; results must go to another file")
-        # A table of a drive's folder, or what else may be one.
-        if output.exists() and output.resolve().parent in known and _may_be_read(output):
-            raise ConfigError(
-                f"{output}: is there already, in the folder of a drive that is read; results must "
-                "go to another file"
-            )
-
-
-def _may_be_read(path: Path) -> bool:
-    from weighbridge.io import READERS
-
-    return path.suffix.lower() in (*READERS, ".toml")
-
-
-def refuse_missing_folder(*outputs: Path | None) -> None:
-    """Raise before the work where a result could not be written after it."""
-    for path in outputs:
-        if path is not None and not path.parent.is_dir():
-            raise ConfigError(f"{path}: there is no folder {path.parent}; make it first")
-        if path is not None and path.is_dir():
-            raise ConfigError(f"{path}: is a folder; name a file in it")

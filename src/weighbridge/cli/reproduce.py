@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
-from weighbridge.cli.options import refuse_missing_folder
+from weighbridge.cli.results import Result, inputs, refuse_results
+from weighbridge.cli.terminal import console, say
 
 if TYPE_CHECKING:
     from weighbridge.papers import Reproduced
@@ -37,19 +38,22 @@ def reproduce(
 
     if paper != "all" and paper not in papers.PAPERS:
         raise ConfigError(f"{paper}: known papers are {', '.join(papers.PAPERS)} and all")
-    refuse_missing_folder(report)
     names = list(papers.PAPERS) if paper == "all" else [paper]
+    pages: dict[str, Path] = {}
+    if report is not None:
+        for name in names:
+            pages[name] = report if paper != "all" else report.with_stem(f"{report.stem}-{name}")
+    refuse_results(inputs(), [Result("--report", page, "report") for page in pages.values()])
     behind: list[str] = []
     for name in names:
         done = papers.paper(name)(seed, _bar())
         show(done)
         behind += [f"{name}: {figure}" for figure in done.behind]
-        if report is not None:
-            page = report if paper != "all" else report.with_stem(f"{report.stem}-{name}")
-            done.write_report(page)
-            typer.echo(f"written: {page}")
+        if name in pages:
+            done.write_report(pages[name])
+            say(f"written: {pages[name]}")
     for figure in behind:
-        typer.echo(f"behind, {figure}")
+        say(f"behind, {figure}")
     if behind:
         raise typer.Exit(1)
 
@@ -61,17 +65,19 @@ def _bar() -> Any:
 
     def show_progress(done: int, total: int) -> None:
         end = "\n" if done == total else ""
-        print(f"\r{done} of {total} steps", end=end, file=sys.stderr, flush=True)  # noqa: T201
+        # Back to the begin of the line: a control character of ours.
+        below = getattr(sys.stderr, "below", sys.stderr)
+        print(f"\r{done} of {total} steps", end=end, file=below, flush=True)
 
     return show_progress
 
 
 def show(done: Reproduced) -> None:
     """Print the tables and the comparison with the paper."""
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=max(130, Console().width))
+    screen = console()
+    screen.width = max(130, screen.width)
     for shown in (*done.tables, done.comparison):
         table = Table(title=shown.title)
         for k, name in enumerate(shown.columns):
@@ -79,4 +85,4 @@ def show(done: Reproduced) -> None:
             table.add_column(name, justify="left" if k == 0 else "right", overflow="fold")
         for row in shown.rows:
             table.add_row(*row)
-        console.print(table)
+        screen.print(table)

@@ -7,7 +7,8 @@ from typing import Annotated, Optional
 
 import typer
 
-from weighbridge.cli.options import refuse_overwriting
+from weighbridge.cli.results import inputs, refuse_folder, refuse_overwriting
+from weighbridge.cli.terminal import say
 
 
 def simulate(
@@ -61,6 +62,7 @@ def simulate(
     from weighbridge.signals.units import scalar_to_si
     from weighbridge.simulation import make_scenario, simulate_car
 
+    refuse_folder(inputs(), output)
     refuse_overwriting(output, force, "folder")
     if table not in ("csv", "parquet"):
         raise ConfigError(f"--format {table}: must be csv or parquet")
@@ -83,7 +85,7 @@ def simulate(
     made = simulate_car(chosen)
     made.write(output, format=table)  # type: ignore[arg-type]
     minutes = made.drive.duration / 60.0
-    typer.echo(f"{output}: {minutes:.1f} min, {made.truth.mass[0]:.0f} kg at the start")
+    say(f"{output}: {minutes:.1f} min, {made.truth.mass[0]:.0f} kg at the start")
 
 
 def _simulate_ride(
@@ -112,4 +114,4 @@ def _simulate_ride(
         )
     )
     made.write(output, format=table)  # type: ignore[arg-type]
-    typer.echo(f"{output}: {made.drive.duration:.0f} s, {made.scenario.vehicle.mass:.0f} kg")
+    say(f"{output}: {made.drive.duration:.0f} s, {made.scenario.vehicle.mass:.0f} kg")

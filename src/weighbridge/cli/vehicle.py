@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.options import refuse_missing_folder, refuse_overwriting
+from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
+from weighbridge.cli.terminal import console, say, shown
 
 if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
@@ -86,7 +87,7 @@ def new(
     from weighbridge.vehicle.file import save_vehicle
     from weighbridge.vehicle.known import Known, describe
 
-    refuse_missing_folder(output)
+    refuse_results(inputs(), [Result("--output", output, "vehicle file")])
     refuse_overwriting(output, force, "vehicle file")
     made = describe(
         Known(
@@ -107,7 +108,7 @@ def new(
     )
     save_vehicle(made.vehicle, output, made.origins)
     _print(output, made.vehicle)
-    typer.echo(f"written: {output}")
+    say(f"written: {output}")
 
 
 @app.command()
@@ -137,17 +138,15 @@ def _ratios(text: str | None) -> tuple[float, ...]:
 
 
 def _print(path: Path, vehicle: Vehicle) -> None:
-    from rich.console import Console
     from rich.table import Table
-    from rich.text import Text
 
     from weighbridge.vehicle.telling import can_weigh, tell
 
-    shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for heading, sentence in tell(vehicle):
-        shown.add_row(Text(heading), Text(sentence))
-    Console().print(shown)
-    typer.echo(
+        table.add_row(heading, shown(sentence))
+    console().print(table)
+    say(
         f"next: weighbridge weigh DRIVE --vehicle {path}"
         if can_weigh(vehicle)
         else f"next: weighbridge calibrate DRIVE --mass KG --vehicle {path} -o calibrated.toml"

@@ -15,8 +15,9 @@ from weighbridge.cli.options import (
     ReportPath,
     load,
     mapping_for,
-    refuse_results,
 )
+from weighbridge.cli.results import asked_for, inputs, refuse_results
+from weighbridge.cli.terminal import console, say, say_json, shown
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -61,13 +62,16 @@ def weigh(
     Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
     """
     from weighbridge.errors import ConfigError, WeighbridgeError
+    from weighbridge.signals.whole import write_whole
     from weighbridge.vehicle.model import Vehicle
 
     if track is not None and len(drives) > 1:
         raise ConfigError("--track takes one drive; weigh them one by one, or use --json")
-    refuse_results([*drives, vehicle], track=track, report=report, json_path=json_path)
     car = Vehicle.load(vehicle)
     chosen = mapping_for(mapping, car, vehicle)
+    refuse_results(
+        inputs(drives, vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
+    )
     weighed: list[Weighing] = []
     failed: list[tuple[Path, str]] = []
     for path in _progress(drives):
@@ -91,10 +95,10 @@ def weigh(
         _failure(path, why, car, method) for path, why in failed
     ]
     if json_path == "-":
-        typer.echo("\n".join(lines))
+        say_json("\n".join(lines))
     else:
         if json_path is not None:
-            Path(json_path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+            write_whole(json_path, "\n".join(lines) + "\n")
         _show(weighed, failed, compared)
     if failed:
         raise typer.Exit(2)
@@ -114,10 +118,9 @@ def _progress(drives: list[Path]) -> Any:
     """Show a bar on a terminal while several drives are weighed."""
     if len(drives) == 1 or not sys.stderr.isatty():
         return drives
-    from rich.console import Console
     from rich.progress import track
 
-    return track(drives, description="weighing", console=Console(stderr=True), transient=True)
+    return track(drives, description="weighing", console=console(stderr=True), transient=True)
 
 
 def _failure(path: Path, why: str, car: Vehicle, method: str) -> str:
@@ -125,8 +128,10 @@ def _failure(path: Path, why: str, car: Vehicle, method: str) -> str:
     import json
 
     from weighbridge.pipeline.weighing import empty_result
+    from weighbridge.signals.visible import visible, visible_json
 
-    return json.dumps(empty_result(path.name, car.name, method, why), ensure_ascii=False)
+    failed = empty_result(visible(path.name), car.name, method, why)
+    return visible_json(json.dumps(failed, ensure_ascii=False))
 
 
 def _show(
@@ -134,44 +139,39 @@ def _show(
     failed: list[tuple[Path, str]],
     compared: list[tuple[Weighing, ...]],
 ) -> None:
-    from rich.console import Console
-
-    console = Console()
-    if not console.is_terminal:
-        console.width = _WIDTH
+    screen = console()
+    if not screen.is_terminal:
+        screen.width = _WIDTH
     if len(weighed) == 1 and not failed:
         _show_one(weighed[0])
     else:
-        console.print(result_table(weighed, failed))
+        screen.print(result_table(weighed, failed))
     for methods in compared:
-        console.print(method_table(methods))
+        screen.print(method_table(methods))
 
 
 def _show_one(w: Weighing) -> None:
     if w.status == "converged":
         low, high = w.interval(0.95)
-        typer.echo(f"{w.drive.name}: {w.mass:.0f} kg, 95 % between {low:.0f} and {high:.0f} kg")
+        say(f"{w.drive.name}: {w.mass:.0f} kg, 95 % between {low:.0f} and {high:.0f} kg")
         if w.vehicle.tare is not None:
-            typer.echo(f"payload {w.payload:.0f} kg over a tare of {w.vehicle.tare:.0f} kg")
+            say(f"payload {w.payload:.0f} kg over a tare of {w.vehicle.tare:.0f} kg")
         if w.load_changed:
             loads = ", then ".join(f"{s.mass:.0f} ± {1.96 * s.std:.0f} kg" for s in w.segments)
-            typer.echo(f"the load changed: {loads}")
+            say(f"the load changed: {loads}")
         minutes = w.used_time / 60.0
-        typer.echo(
-            f"from {minutes:.1f} min of {w.drive.duration / 60.0:.1f} min, method {w.method}"
-        )
+        say(f"from {minutes:.1f} min of {w.drive.duration / 60.0:.1f} min, method {w.method}")
     else:
-        typer.echo(f"{w.drive.name}: no mass ({w.status}): {w.reason}")
+        say(f"{w.drive.name}: no mass ({w.status}): {w.reason}")
     for warning in w.warnings:
-        typer.echo(f"  note: {warning}")
+        say(f"  note: {warning}")
 
 
 def method_table(methods: tuple[Weighing, ...]) -> Table:
     """One row a method: its mass of one drive, or why there is none."""
-    from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=escape(methods[0].drive.name), title_justify="left")
+    table = Table(title=shown(methods[0].drive.name), title_justify="left")
     table.add_column("method", no_wrap=True)
     for name in ("mass kg", "95 % from", "to", "payload kg"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -187,15 +187,11 @@ def _numbers(w: Weighing) -> list[str]:
 
 
 def _outcome(w: Weighing) -> str:
-    from rich.markup import escape
-
-    # Sections of a vehicle file stand in brackets, as rich's own marks do.
-    return str(w.status) if w.status == "converged" else escape(f"{w.status}: {w.reason}")
+    return str(w.status) if w.status == "converged" else shown(f"{w.status}: {w.reason}")
 
 
 def result_table(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> Table:
     """One row a drive: its mass, or why there is none."""
-    from rich.markup import escape
     from rich.table import Table
 
     table = Table()
@@ -207,12 +203,12 @@ def result_table(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> Tab
     table.add_column("status or reason")
     for w in weighed:
         table.add_row(
-            escape(w.drive.name),
+            shown(w.drive.name),
             f"{w.drive.duration / 60.0:.1f}",
             f"{w.used_time / 60.0:.1f}",
             *_numbers(w),
             _outcome(w),
         )
     for path, why in failed:
-        table.add_row(escape(path.name), "", "", "", "", "", "", escape(f"unreadable: {why}"))
+        table.add_row(shown(path.name), "", "", "", "", "", "", shown(f"unreadable: {why}"))
     return table

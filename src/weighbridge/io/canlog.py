@@ -21,6 +21,7 @@ from weighbridge.io.candump import filled, room, whole_lines
 from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
+from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
 from weighbridge.kernels.frame_text import TraceColumns, parse_asc, parse_trace
 from weighbridge.signals import Problem
 from weighbridge.signals.words import counted
@@ -209,14 +210,15 @@ def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) ->
         No frame in it.
     """
     try:
-        cells = pl.read_csv(
-            path.read_bytes(),
-            infer_schema=False,
-            ignore_errors=True,
-            truncate_ragged_lines=True,
-            quote_char=None,
-            encoding="utf8-lossy",
-        )
+        with quietly():
+            cells = pl.read_csv(
+                path.read_bytes(),
+                infer_schema=False,
+                ignore_errors=True,
+                truncate_ragged_lines=True,
+                quote_char=None,
+                encoding="utf8-lossy",
+            )
         rows = cells.select(
             pl.col("timestamp").cast(pl.Float64, strict=False),
             pl.col("arbitration_id").str.strip_prefix("0x").str.to_integer(base=16, strict=False),
@@ -224,9 +226,8 @@ def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) ->
             (pl.col("remote") == "1") | (pl.col("error") == "1"),
             pl.col("data").fill_null("").str.decode("base64", strict=False),
         )
-    except pl.exceptions.PolarsError as error:
-        reason = str(error).split("\n", 1)[0]
-        raise DriveError(f"{path} cannot be read ({reason}); copy it again") from None
+    except PARSE_ERRORS as error:
+        raise DriveError(f"{path} cannot be read ({first_line(error)}); copy it again") from None
     usable = rows.drop_nulls().filter(
         (pl.col("data").bin.size() <= _LONGEST)
         & pl.col("arbitration_id").is_between(0, EXTENDED_MASK)

@@ -20,11 +20,15 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
     "%": "pct", "percent": "pct", "-": "ratio", "1": "ratio",
     "°c": "degc", "℃": "degc", "c": "degc", "deg c": "degc", "celsius": "degc",
-    "°f": "degf", "℉": "degf", "â°c": "degc", "â°": "deg", "f": "degf", "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
+    "°f": "degf", "℉": "degf", "f": "degf", "â°c": "degc", "â°": "deg",
+    "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
     "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""
+
+# Letters of a name that may resemble a canonical one; comparing takes their square.
+_LONGEST_NAME: Final = 200
 
 _BRACKETED: Final = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
@@ -131,6 +135,8 @@ def near_column(column: str) -> str | None:
     """Canonical column that an unknown name resembles, or None."""
     known = [q.column for q in QUANTITIES.values() if q.stem not in _GENERAL] + [TIME_COLUMN]
     name = column.strip().lower()
+    if len(name) > _LONGEST_NAME:
+        return None
     whole = [k for k in known if k.endswith(f"_{name}")]
     near = whole[:1] or difflib.get_close_matches(name, known, n=1, cutoff=0.75)
     return near[0] if near else None

@@ -23,6 +23,9 @@ from weighbridge.signals import Bools, Floats
 DbcSource = str | Path
 """A DBC file, for one bus alone where it is written ``1:file.dbc``."""
 
+# Characters of a library's message that help.
+_LONGEST_REASON: Final = 200
+
 _CHANNEL: Final = re.compile(r"^(\d{1,3}):(.+)$")
 
 
@@ -80,14 +83,20 @@ def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
         found = _CHANNEL.match(str(source))
         channel = int(found.group(1)) if found else None
         path = Path(found.group(2) if found else source)
-        if not path.is_file():
-            raise ConfigError(f"--dbc {path}: no such file")
         try:
+            if not path.is_file() and path.exists():
+                kind = "folder" if path.is_dir() else "device or a pipe"
+                raise ConfigError(f"--dbc {path} is a {kind}; name a DBC file")
             text = path.read_bytes().decode("cp1252", "replace")
+        except FileNotFoundError:
+            raise ConfigError(f"--dbc {path}: no such file") from None
+        except OSError as error:
+            raise ConfigError(f"--dbc {path} cannot be read: {error.strerror or error}") from None
+        try:
             database = cantools.database.load_string(text, "dbc", strict=False)
         # The library's errors on text that is no DBC are of many kinds.
         except Exception as error:
-            reason = str(error).strip().split("\n", 1)[0]
+            reason = str(error).strip().split("\n", 1)[0][:_LONGEST_REASON]
             raise ConfigError(f"--dbc {path} is no readable DBC ({reason})") from None
         messages = tuple(getattr(database, "messages", ()))
         if not messages:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
-from decimal import Decimal
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +9,7 @@ import tomlkit
 
 from weighbridge.errors import DriveError
 from weighbridge.signals import QUANTITIES, DriveInfo
-from weighbridge.signals.tomlfile import Section, exact_text, read_toml, suggestion
+from weighbridge.signals.tomlfile import Section, exact_text, parse_toml, read_toml, suggestion
 
 FILE_NAME: Final = "drive.toml"
 
@@ -48,11 +46,7 @@ def parse_info(text: str, name: str) -> DriveInfo:
     DriveError
         It is no TOML, a key is unknown or a value impossible.
     """
-    try:
-        data = tomllib.loads(text, parse_float=Decimal)
-    except tomllib.TOMLDecodeError as e:
-        raise DriveError(f"{name}: what is known of the drive is no TOML ({e})") from None
-    return _info(Section(data, name, {}, error=DriveError))
+    return _info(Section(parse_toml(text, name, DriveError), name, {}, error=DriveError))
 
 
 def _info(root: Section) -> DriveInfo:
@@ -69,11 +63,6 @@ def _info(root: Section) -> DriveInfo:
             root.fail("trusted", f"names {name!r}, no quantity{suggestion(name, QUANTITIES)}")
     root.done()
     return DriveInfo(**texts, **numbers, trusted=trusted)  # type: ignore[arg-type]
-
-
-def write_info(info: DriveInfo, path: Path) -> None:
-    """Write a ``drive.toml``; what is unknown is left out."""
-    path.write_text(info_text(info), encoding="utf-8")
 
 
 def info_text(info: DriveInfo) -> str:

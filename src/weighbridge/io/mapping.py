@@ -44,13 +44,19 @@ from typing import Any, Final
 
 from weighbridge.errors import ConfigError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
-from weighbridge.io.table import TextFormat
+from weighbridge.io.table import MOST_COLUMNS, TextFormat
 from weighbridge.signals import QUANTITIES, Problem, Quantity
 from weighbridge.signals.tomlfile import Section, read_toml, suggestion
 from weighbridge.signals.units import UNITS
 
 FORMAT_VERSION: Final = 1
 """Version of the mapping file this program reads."""
+
+# What cells of numbers, ends of lines and quotes are made of.
+_NO_SEPARATORS: Final = frozenset('0123456789.+-eE"\r\n\0')
+
+# Text that any encoding of tables must keep.
+_CELLS: Final = "time_s;speed,1.5\t-2e3|\n"
 
 MappingSource = str | Path | Mapping[str, Any]
 
@@ -198,32 +204,51 @@ def _text_format(section: Section | None) -> TextFormat:
     if section is None:
         return TextFormat()
     separator = section.text("separator")
-    if separator is not None and len(separator) != 1:
-        section.fail("separator", f'must be one character such as ";" or "\\t", got {separator!r}')
+    if separator is not None and (
+        len(separator) != 1 or not separator.isascii() or separator in _NO_SEPARATORS
+    ):
+        section.fail(
+            "separator",
+            'must be one character such as ";" or "\\t": of ASCII, no quote, line end or part of a '
+            f"number, got {separator!r:.40}",
+        )
     decimal = section.text("decimal") or "."
     if decimal not in (".", ","):
         section.fail("decimal", f'must be "." or ",", got {decimal!r}')
     encoding = section.text("encoding")
-    if encoding is not None:
-        try:
-            "".encode(encoding)
-        except LookupError:
-            section.fail(
-                "encoding", f"is not a text encoding: {encoding!r}; try utf-8, latin-1 or cp1252"
-            )
+    if encoding is not None and not _is_encoding(encoding):
+        section.fail(
+            "encoding",
+            f"is not a text encoding: {encoding!r:.40}; try utf-8, latin-1 or cp1252",
+        )
     fmt = TextFormat(
         separator=separator,
         encoding=encoding,
         decimal=decimal,
         skip_rows=section.count("skip_rows") or 0,
         skip_after_header=section.count("skip_after_header") or 0,
-        columns=section.texts("columns") or (),
+        columns=_column_names(section),
         missing=section.texts("missing") or (),
     )
     if fmt.decimal == "," and fmt.separator == ",":
         section.fail("decimal", "and separator cannot both be a comma")
     section.done()
     return fmt
+
+
+def _is_encoding(name: str) -> bool:
+    """Tell whether text tables may be in an encoding: some of Python's turn no text into bytes."""
+    try:
+        return _CELLS.encode(name).decode(name) == _CELLS
+    except (LookupError, ValueError):
+        return False
+
+
+def _column_names(section: Section) -> tuple[str, ...]:
+    names = section.texts("columns") or ()
+    if len(names) > MOST_COLUMNS:
+        section.fail("columns", f"must be {MOST_COLUMNS} names at most, got {len(names)}")
+    return names
 
 
 def _time(section: Section | None) -> TimeColumn:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import stat
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -35,9 +36,12 @@ from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import MappingSource, TableMapping, load_mapping, mapping_for
+from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.table import read_parquet, read_text, start_text
 from weighbridge.signals import Drive, DriveInfo, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
+from weighbridge.signals.visible import visible
+from weighbridge.signals.whole import REPLACING
 
 _logger = logging.getLogger(__name__)
 
@@ -150,7 +154,7 @@ def read_drive(
             )
         path = paths[0]
     path = Path(path)
-    if path.is_dir():
+    if is_folder(path):
         logs, info = _read_folder(path, mappings)
         return _drive(path.resolve().name, logs, info, mappings, databases)
     return _drive(path.stem, [_read_file(path, None, mappings)], info, mappings, databases)
@@ -173,17 +177,35 @@ def read_table(path: str | Path) -> dict[str, Floats]:
         No such file, or not a table of numbers.
     """
     path = Path(path)
-    if not path.is_file():
+    if is_folder(path) or not path.is_file():
         raise DriveError(f"{path}: no such file")
     raw = read_parquet(path) if path.suffix.lower() in (".parquet", ".pq") else read_text(path)
     return {name: raw.numbers(i)[0] for i, name in enumerate(raw.names)}
 
 
 def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list[Log], DriveInfo]:
-    files = sorted(f for f in folder.iterdir() if f.is_file() and f.suffix.lower() in READERS)
+    try:
+        inside = sorted(folder.iterdir())
+    except OSError as e:
+        raise DriveError(f"{folder} cannot be read: {e.strerror or e}") from None
+    unfinished = next((f for f in inside if f.name.startswith(REPLACING)), None)
+    if unfinished is not None:
+        raise DriveError(
+            f"{folder}: the program was stopped while it replaced this drive; the drive before is "
+            f"in {unfinished / 'old'}, the new one here and in {unfinished}: keep the tables of "
+            "one of them and remove that folder"
+        )
+    logs_there = [f for f in inside if f.suffix.lower() in READERS]
+    for f in logs_there:
+        if f.stem.lower() in TABLES and not f.is_file():
+            kind = "a folder" if f.is_dir() else "a link that leads nowhere, or a device"
+            raise DriveError(f"{f} is {kind}: a table is one file; put it there, or remove this")
+    files = [f for f in logs_there if f.is_file()]
     files = [f for f in files if f.stem.lower() != TRUTH_NAME]
     info_path = folder / INFO_NAME
-    info = read_info(info_path) if info_path.is_file() else DriveInfo()
+    if info_path in inside and not info_path.is_file():
+        raise DriveError(f"{info_path} is no file: put the file there, or remove this")
+    info = read_info(info_path) if info_path in inside else DriveInfo()
     tables: dict[str, Path] = {}
     for f in files:
         table = f.stem.lower()
@@ -214,11 +236,29 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
     return logs, info
 
 
+def is_folder(path: Path) -> bool:
+    """Tell whether a path is a folder.
+
+    Raises
+    ------
+    DriveError
+        The path can be none: its name is too long, or its links lead round.
+    """
+    try:
+        # Raises where `Path.is_dir` would answer no, or in some versions raise.
+        return stat.S_ISDIR(path.stat().st_mode)
+    except FileNotFoundError:
+        raise DriveError(f"{path}: no such file or folder") from None
+    except (OSError, ValueError) as e:
+        reason = e.strerror if isinstance(e, OSError) else e
+        raise DriveError(f"{path} cannot be read: {reason}") from None
+
+
 def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]) -> Log:
-    if path.is_dir():
+    if is_folder(path):
         raise DriveError(f"{path} is a folder; give it alone, or name files only")
     if not path.is_file():
-        raise DriveError(f"{path}: no such file or folder")
+        raise DriveError(f"{path} is no file: a device or a pipe cannot be read as a drive")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise DriveError(
@@ -241,6 +281,8 @@ def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]
         log = reader(path, table, mapping if written else named)
     except OSError as e:
         raise DriveError(f"{path} cannot be read: {e.strerror or e}") from None
+    except PARSE_ERRORS as e:
+        raise DriveError(f"{path} cannot be read ({first_line(e)}); copy it again") from None
     if mapping is not None:
         log.align = mapping.time.align
         if named is None:
@@ -281,7 +323,7 @@ def _drive(
     joined: dict[tuple[int, ...], Floats] = {}
     signals = {n: p[0][1] if len(p) == 1 else _joined(n, p, joined) for n, p in parts.items()}
     drive = Drive(
-        name=name, signals=signals, info=info, problems=tuple(problems), contents=contents
+        name=visible(name), signals=signals, info=info, problems=tuple(problems), contents=contents
     )
     _logger.info("%s: %d signals over %.0f s", name, len(signals), drive.duration)
     return drive

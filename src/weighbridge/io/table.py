@@ -15,16 +15,17 @@ import numpy as np
 import polars as pl
 
 from weighbridge.errors import DriveError
+from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
 from weighbridge.signals import Floats
 
 SEPARATORS: Final = (",", ";", "\t", "|")
 MISSING: Final = ("", "na", "n/a", "nan", "null", "none", "-", "#n/a")
 """Cells that mean "no value", in any case."""
 
-# Panics of the parser are no subclass of its errors, nor of Exception.
-_PARSE_ERRORS: Final = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
-
 _COMMA_NUMBER: Final = re.compile(r"[-+]?\d+,\d+$")
+
+MOST_COLUMNS: Final = 10_000
+"""Columns of a table: ten times those of the widest bus databases."""
 
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
@@ -107,7 +108,7 @@ class RawTable:
         DriveError
             Most of the column is text.
         """
-        series, name, notes = self.column(index), self.names[index], []
+        series, name, notes = _plain_text(self.column(index)), self.names[index], []
         if series.dtype == pl.String:
             text = series.str.strip_chars()
             if self.decimal == ",":
@@ -150,6 +151,12 @@ class RawTable:
         return np.asarray(values, dtype=np.float64), notes
 
 
+def _plain_text(series: pl.Series) -> pl.Series:
+    """Give categories, which some writers make of any text, as the text they stand for."""
+    categories = isinstance(series.dtype, pl.Categorical | pl.Enum)
+    return series.cast(pl.String) if categories else series
+
+
 def _plain(name: str) -> str:
     return " ".join(name.split()).casefold()
 
@@ -169,6 +176,12 @@ def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
     if not header.strip():
         raise DriveError(f"{path} is empty: it has no header line; remove it or record it again")
     separator = fmt.separator or _separator(path, header)
+    columns = len(fmt.columns) or 1 + header.count(separator)
+    if columns > MOST_COLUMNS:
+        raise DriveError(
+            f"{path}: its first line has {columns} columns, and a table may have {MOST_COLUMNS}; "
+            "it is no table, or its separator is another one"
+        )
     names = fmt.columns or tuple(_cells(header, separator))
     skip = fmt.skip_rows + (0 if fmt.columns else 1 + fmt.skip_after_header)
     body = text if skip == 0 else _after_line(text, skip)
@@ -187,10 +200,10 @@ def _decode(path: Path, fmt: TextFormat) -> tuple[str, list[str]]:
     if fmt.encoding is not None:
         try:
             return data.decode(fmt.encoding).removeprefix("\ufeff"), []
-        except UnicodeDecodeError as e:
+        except UnicodeError as e:
+            place = f" (byte {e.start})" if isinstance(e, UnicodeDecodeError) else ""
             raise DriveError(
-                f"{path} is not {fmt.encoding} (byte {e.start}): "
-                "set encoding in [csv] of the mapping"
+                f"{path} is not {fmt.encoding}{place}: set encoding in [csv] of the mapping"
             ) from None
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace"), []
@@ -232,35 +245,32 @@ def _parse(
 ) -> pl.DataFrame:
     names = [str(i) for i in range(columns)]
     # With a header of its own, the width does not hang on the first row.
-    data = f"{separator.join(names)}\n{body}".encode()
+    data = f"{separator.join(names)}\n{body}".encode(errors="replace")
     # A quote that is never closed would swallow the rest of the file.
     quote = '"' if data.count(b'"') % 2 == 0 else None
     if quote is None:
         notes.append("a quote is never closed; quotes were taken as text")
 
     def parse(dtype: type[pl.DataType]) -> pl.DataFrame:
-        return pl.read_csv(
-            io.BytesIO(data),
-            separator=separator,
-            decimal_comma=decimal == ",",
-            schema=dict.fromkeys(names, dtype),
-            null_values=None if dtype is pl.String else ["NA", "na", "N/A", "null", "-"],
-            truncate_ragged_lines=True,
-            quote_char=quote,
-        )
+        with quietly():
+            return pl.read_csv(
+                io.BytesIO(data),
+                separator=separator,
+                decimal_comma=decimal == ",",
+                schema=dict.fromkeys(names, dtype),
+                null_values=None if dtype is pl.String else ["NA", "na", "N/A", "null", "-"],
+                truncate_ragged_lines=True,
+                quote_char=quote,
+            )
 
     try:
         return parse(pl.Float64)
-    except _PARSE_ERRORS:
+    except PARSE_ERRORS:
         # Some cell is no number: take all as text, and judge column by column.
         try:
             return parse(pl.String)
-        except _PARSE_ERRORS as e:
-            raise DriveError(f"{path} is not a readable table: {_first_line(e)}") from None
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().split("\n", 1)[0]
+        except PARSE_ERRORS as e:
+            raise DriveError(f"{path} is not a readable table: {first_line(e)}") from None
 
 
 def read_parquet(path: Path, text_format: TextFormat | None = None) -> RawTable:
@@ -272,13 +282,17 @@ def read_parquet(path: Path, text_format: TextFormat | None = None) -> RawTable:
         Not a Parquet file, or only the first part of one.
     """
     try:
-        frame = pl.read_parquet(path)
-    except (*_PARSE_ERRORS, OSError) as e:
+        # An open file: a path would be taken for a pattern, and joined with its neighbours.
+        with path.open("rb") as file, quietly():
+            frame = pl.read_parquet(file)
+    except (*PARSE_ERRORS, OSError) as e:
         raise DriveError(
-            f"{path} is not a readable Parquet file ({_first_line(e)}); "
+            f"{path} is not a readable Parquet file ({first_line(e)}); "
             "it may have been cut off: copy or convert it again"
         ) from None
     names = tuple(frame.columns)
+    if len(names) > MOST_COLUMNS:
+        raise DriveError(f"{path} has {len(names)} columns, and a table may have {MOST_COLUMNS}")
     frame.columns = [str(i) for i in range(len(names))]
     return RawTable(path, names, frame)
 
@@ -322,7 +336,14 @@ def time_seconds(
         )
         seconds, absolute = unwrapped(3600.0 * hour + 60.0 * minute + second), False
     else:
-        parsed = _parse_datetime(text, time_format)
+        try:
+            with quietly():
+                parsed = _parse_datetime(text, time_format)
+        except PARSE_ERRORS as e:
+            raise DriveError(
+                f"{table.path}: column {table.names[index]!r} cannot be read in the format "
+                f"{time_format!r} ({first_line(e)}); set format in [time] of the mapping"
+            ) from None
         seconds, absolute = _temporal(parsed)
     present = text.is_not_null() & (text != "")
     lost = int(present.sum()) - int(np.count_nonzero(np.isfinite(seconds)))

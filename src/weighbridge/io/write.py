@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import logging
 import warnings
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 import polars as pl
 
-from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.errors import DriveError, MissingExtraError, WeighbridgeError
 from weighbridge.io.info import FILE_NAME as INFO_NAME
-from weighbridge.io.info import MDF_INFO_MARK, info_text, write_info
+from weighbridge.io.info import MDF_INFO_MARK, info_text
 from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
 from weighbridge.signals.units import from_si
+from weighbridge.signals.whole import whole_file, whole_folder
 
 TableFormat = Literal["csv", "parquet"]
+
+_PARQUET: Final = (".parquet", ".pq")
+
+DRIVE_FILES: Final = frozenset(
+    f"{table}{suffix}" for table in (*TABLES, "truth") for suffix in (".csv", *_PARQUET)
+) | {INFO_NAME}
+"""Files that a drive written as a folder may have: those of another drive would be read with it."""
 
 
 def write_drive(
@@ -32,7 +43,7 @@ def write_drive(
     Parameters
     ----------
     drive : what to write
-    folder : made where it is not there
+    folder : made where it is not there; a drive in it is replaced, other files stay
     table_format : "csv" or "parquet"
     truth : columns of a ``truth`` table, with unit suffixes, as they are
 
@@ -41,19 +52,15 @@ def write_drive(
     DriveError
         The folder cannot be written to.
     """
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as e:
-        raise DriveError(f"{folder} cannot be made: {e.strerror or e}") from None
-    for table in TABLES:
-        signals = [s for s in drive.signals.values() if QUANTITIES[s.name].table == table]
-        if signals:
-            write_table(_columns(signals), folder / f"{table}.{table_format}")
-    if truth is not None:
-        write_table(truth, folder / f"truth.{table_format}")
-    if drive.info != DriveInfo():
-        write_info(drive.info, folder / INFO_NAME)
+    with whole_folder(folder, DRIVE_FILES, DriveError) as part:
+        for table in TABLES:
+            signals = [s for s in drive.signals.values() if QUANTITIES[s.name].table == table]
+            if signals:
+                _write_frame(_frame(_columns(signals)), part / f"{table}.{table_format}")
+        if truth is not None:
+            _write_frame(_frame(truth), part / f"truth.{table_format}")
+        if drive.info != DriveInfo():
+            (part / INFO_NAME).write_text(info_text(drive.info), encoding="utf-8")
 
 
 def write_mdf(drive: Drive, path: str | Path) -> None:
@@ -83,9 +90,11 @@ def write_mdf(drive: Drive, path: str | Path) -> None:
     clocks: dict[int, list[Signal]] = {}
     for s in drive.signals.values():
         clocks.setdefault(id(s.time), []).append(s)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), whole_file(path, DriveError) as part:
         warnings.simplefilter("ignore")
-        with MDF(version="4.10") as file:
+        # The library tells of a full disk with a traceback of its own, beside raising.
+        logging.getLogger("asammdf").setLevel(logging.CRITICAL)
+        with contextlib.redirect_stdout(io.StringIO()), MDF(version="4.10") as file:
             # The clock of a drive counts from its own zero.
             file.header.start_time = datetime.fromtimestamp(0.0, UTC)
             if drive.info != DriveInfo():
@@ -98,10 +107,9 @@ def write_mdf(drive: Drive, path: str | Path) -> None:
                     name = f"{s.name}_{suffix}" if suffix else s.name
                     channels.append(Channel(values, s.time, name=name, unit=suffix))
                 file.append(channels)
-            try:
-                file.save(path, overwrite=True, compression=2)
-            except OSError as e:
-                raise DriveError(f"{path} cannot be written: {e.strerror or e}") from None
+            saved = Path(file.save(part, overwrite=True, compression=2))
+        if saved != part:
+            saved.replace(part)
 
 
 def write_table(columns: Mapping[str, Floats], path: str | Path) -> None:
@@ -112,18 +120,41 @@ def write_table(columns: Mapping[str, Floats], path: str | Path) -> None:
     DriveError
         The suffix is another one, or the file cannot be written.
     """
+    write_frame(_frame(columns), path)
+
+
+def write_frame(
+    frame: pl.DataFrame, path: str | Path, error: type[WeighbridgeError] = DriveError
+) -> None:
+    """Write a table whole or not at all, as CSV or Parquet, by suffix.
+
+    Raises
+    ------
+    WeighbridgeError
+        Of the type given: the suffix is another one, or the file cannot be written.
+    """
     path = Path(path)
-    frame = pl.DataFrame({k: np.asarray(v) for k, v in columns.items()}, nan_to_null=True)
+    if path.suffix.lower() not in (".csv", *_PARQUET):
+        raise error(f"{path}: tables are written as .csv or .parquet, not {path.suffix!r}")
+    with whole_file(path, error) as part:
+        _write_frame(frame, part)
+
+
+def _frame(columns: Mapping[str, Floats]) -> pl.DataFrame:
+    return pl.DataFrame({k: np.asarray(v) for k, v in columns.items()}, nan_to_null=True)
+
+
+def _write_frame(frame: pl.DataFrame, path: Path) -> None:
+    # An open file: polars takes no path that is not UTF-8.
     try:
-        match path.suffix.lower():
-            case ".csv":
-                frame.write_csv(path)
-            case ".parquet" | ".pq":
-                frame.write_parquet(path)
-            case other:
-                raise DriveError(f"{path}: tables are written as .csv or .parquet, not {other!r}")
-    except OSError as e:
-        raise DriveError(f"{path} cannot be written: {e.strerror or e}") from None
+        with path.open("wb") as file:
+            if path.suffix.lower() in _PARQUET:
+                frame.write_parquet(file)
+            else:
+                frame.write_csv(file)
+    except pl.exceptions.PolarsError as e:
+        # A full disk, told in the library's words.
+        raise OSError(str(e).strip().split("\n", 1)[0]) from None
 
 
 def _columns(signals: list[Signal]) -> dict[str, Floats]:

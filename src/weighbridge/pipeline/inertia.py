@@ -51,6 +51,7 @@ from weighbridge.pipeline.ride_checks import (
     ride_samples,
 )
 from weighbridge.signals import Drive, Floats
+from weighbridge.signals.visible import visible_json
 from weighbridge.vehicle.model import MASS_RANGE, Ride, Vehicle
 
 if TYPE_CHECKING:
@@ -263,7 +264,7 @@ class Inertia:
 
     def to_json(self) -> str:
         """Return `to_dict` as one line of JSON."""
-        return json.dumps(self.to_dict(), ensure_ascii=False)
+        return visible_json(json.dumps(self.to_dict(), ensure_ascii=False))
 
     @property
     def table(self) -> pl.DataFrame:

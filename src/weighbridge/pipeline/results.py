@@ -35,13 +35,10 @@ def write_track(table: pl.DataFrame, path: str | Path) -> None:
     Raises
     ------
     ConfigError
-        The suffix is neither.
+        The suffix is neither, or the file cannot be written.
     """
-    path = Path(path)
-    match path.suffix.lower():
-        case ".csv":
-            table.write_csv(path)
-        case ".parquet":
-            table.write_parquet(path)
-        case _:
-            raise ConfigError(f"{path}: a track is written as .csv or .parquet")
+    from weighbridge.io.write import write_frame
+
+    if Path(path).suffix.lower() not in (".csv", ".parquet"):
+        raise ConfigError(f"{path}: a track is written as .csv or .parquet")
+    write_frame(table, path, ConfigError)

@@ -24,6 +24,7 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
+from weighbridge.signals.visible import visible_json
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
@@ -177,7 +178,7 @@ class Weighing:
 
     def to_json(self) -> str:
         """Return `to_dict` as one line of JSON."""
-        return json.dumps(self.to_dict(), ensure_ascii=False)
+        return visible_json(json.dumps(self.to_dict(), ensure_ascii=False))
 
     def write_track(self, path: str | Path) -> None:
         """Write the track as CSV or Parquet, by the suffix of ``path``.

@@ -34,6 +34,8 @@ from weighbridge.report.text import (
     sentence,
     signed_kg,
 )
+from weighbridge.signals.visible import shown_json, visible, visible_text
+from weighbridge.signals.whole import write_whole
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.calibrating import Calibration
@@ -128,7 +130,7 @@ class Page:
 
         Plotly writes every ``<`` as an escape, so no text can end the element.
         """
-        body = ",".join(f"{json.dumps(k)}:{v}" for k, v in self.figures.items())
+        body = ",".join(f"{json.dumps(k)}:{shown_json(v)}" for k, v in self.figures.items())
         return "{" + body + "}"
 
 
@@ -177,6 +179,8 @@ def write_document(heading: str, parts: Sequence[str], page: Page, path: Path) -
         The file cannot be written.
     """
     here = files(__package__)
+    # Texts of files are shown, never obeyed: no control character turns a line round.
+    heading = visible(heading)
     html = "".join(
         [
             '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">',
@@ -187,7 +191,7 @@ def write_document(heading: str, parts: Sequence[str], page: Page, path: Path) -
             f"<style>{here.joinpath('page.css').read_text(encoding='utf-8')}</style>",
             f"</head><body><h1>{escape(heading)}</h1>",
             "<noscript><p>The figures need JavaScript; the tables do not.</p></noscript>",
-            *parts,
+            *map(visible_text, parts),
             "<footer>Made by weighbridge from data the vehicle recorded. For screening: not a "
             "legal-for-trade weighing. Masses are of all that rolls, with the 95 % interval."
             "</footer>",
@@ -197,12 +201,7 @@ def write_document(heading: str, parts: Sequence[str], page: Page, path: Path) -
             "</body></html>\n",
         ]
     )
-    try:
-        path.write_text(html, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(
-            f"{path}: the report cannot be written ({error.strerror}); choose another file"
-        ) from error
+    write_whole(path, html)
 
 
 def _title(weighings: Sequence[Weighing]) -> str:

@@ -15,8 +15,11 @@ from typing import Any, Final, NoReturn
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.signals.units import UNITS, Unit, unit
 
-_HEADER: Final = re.compile(r"^\s*\[\[?\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_HEADER: Final = re.compile(r"^\s*\[\[?([^\[\]]+)\]\]?\s*(?:#.*)?$")
 _KEY: Final = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*[\w"'-]+)*)\s*=""")
+
+_PART_OF_KEY: Final = re.compile(r"""\.\s*[\w"'-]""")
+_NO_KEY: Final = re.compile(r"""[^\w"'\-.\s]+""")
 
 _TYPES: Final[dict[type, str]] = {
     bool: "true or false",
@@ -29,9 +32,40 @@ _TYPES: Final[dict[type, str]] = {
 }
 
 
+LARGEST: Final = 30
+"""Power of ten that no number of a file may reach: no quantity in any unit does, and its powers
+stay doubles."""
+
+SMALLEST: Final = -300
+"""Power of ten below which no number of a file but 0 may be: doubles end at -308, and units take
+their part."""
+
+_LARGEST_BITS: Final = int(LARGEST * math.log2(10.0))
+
+# Digits that are read: 800 tell any double from its neighbour, exactly written (IEEE 754).
+_MOST_DIGITS: Final = 1000
+
+MOST_COUNTED: Final = 1_000_000_000
+"""Most that a file may count: samples of a fit, lines to skip."""
+
+LONGEST_FILE: Final = 4_000_000
+"""Bytes of a TOML file that a person wrote: some hundred times those of the longest seen."""
+
+# Levels of sections and lists that are in use are three; the library calls itself for each.
+_DEEPEST: Final = 100
+
+# Letters of a word that may be a known one written wrong.
+_LONGEST_WORD: Final = 100
+
+# Texts that stand in brackets in a message.
+_SHOWN: Final = 40
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Return ``; did you mean ...?`` for a near miss, or the known words."""
     known = list(known)
+    if len(word) > _LONGEST_WORD:
+        return f"; known are {', '.join(known)}"
     near = difflib.get_close_matches(word.lower(), known, n=1, cutoff=0.6)
     return f"; did you mean {near[0]}?" if near else f"; known are {', '.join(known)}"
 
@@ -99,7 +133,7 @@ class Section:
 
     def _wrong_type(self, key: str, wanted: str, value: Any) -> NoReturn:
         kind = _TYPES.get(type(value), type(value).__name__)
-        shown = f" ({value!s:.40})" if not isinstance(value, dict) else ""
+        shown = f" ({_shortened(value)})" if not isinstance(value, dict) else ""
         self.fail(key, f"must be {wanted}, not {kind}{shown}")
 
     def section(self, key: str) -> Section | None:
@@ -145,16 +179,31 @@ class Section:
             return None
         if isinstance(value, bool) or not isinstance(value, int):
             self._wrong_type(key, "a whole number", value)
-        if value < 0:
-            self.fail(key, f"must be zero or more, got {value}")
+        if not 0 <= value <= MOST_COUNTED:
+            self.fail(key, f"must be from 0 to {MOST_COUNTED}, got {_shortened(value)}")
         return value
 
     def _exact(self, key: str, value: Any) -> Fraction:
         if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
             self._wrong_type(key, "a number", value)
+        self._refuse_size(key, value)
+        return Fraction(value)
+
+    def _refuse_size(self, key: str, value: int | float | Decimal) -> None:
+        """Refuse what no double holds, before a fraction of it fills the memory."""
+        if isinstance(value, int):
+            # Bits of a number of LARGEST decimal places.
+            if value.bit_length() > _LARGEST_BITS:
+                self.fail(key, f"must be below 1e{LARGEST}, got {_shortened(value)}")
+            return
         if not math.isfinite(value):
             self.fail(key, f"must be a finite number, got {value}")
-        return Fraction(value)
+        if value and not SMALLEST <= Decimal(value).adjusted() < LARGEST:
+            self.fail(
+                key, f"must be 0 or from 1e{SMALLEST} to 1e{LARGEST}, got {_shortened(value)}"
+            )
+        if isinstance(value, Decimal) and len(value.as_tuple().digits) > _MOST_DIGITS:
+            self.fail(key, f"has {len(value.as_tuple().digits)} digits; {_MOST_DIGITS} are enough")
 
     def number(self, key: str) -> float | None:
         """Return a finite number without a unit."""
@@ -262,16 +311,68 @@ def read_toml(path: Path, error: type[WeighbridgeError] = ConfigError) -> Sectio
         Of the type given: no such file, not text, or not TOML.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open("rb") as file:
+            content = file.read(LONGEST_FILE + 1)
     except FileNotFoundError:
         raise error(f"{path}: no such file") from None
+    except (OSError, ValueError) as e:
+        reason = (e.strerror or e) if isinstance(e, OSError) else e
+        raise error(f"{path} cannot be read: {reason}") from None
+    if len(content) > LONGEST_FILE:
+        raise error(
+            f"{path} is longer than {LONGEST_FILE / 1e6:.0f} MB: it is no file that a person "
+            "wrote; name another one"
+        )
+    try:
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as e:
         line = e.object[: e.start].count(b"\n") + 1
         raise error(f"{path} is not UTF-8 (line {line}): save it as UTF-8") from None
-    except OSError as e:
-        raise error(f"{path} cannot be read: {e.strerror or e}") from None
+    return Section(parse_toml(text, str(path), error), str(path), key_lines(text), (), error)
+
+
+def parse_toml(text: str, name: str, error: type[WeighbridgeError]) -> dict[str, Any]:
+    """Parse TOML, numbers with a point as `Decimal`.
+
+    Parameters
+    ----------
+    text : the file
+    name : what it is called in messages
+    error : the exception to raise
+
+    Raises
+    ------
+    WeighbridgeError
+        Of the type given: it is no TOML, or nested without end.
+    """
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.count(".") > _DEEPEST and _dots(line) > _DEEPEST:
+            raise error(
+                f"{name}, line {number}: a key of more than {_DEEPEST} parts; sections are nested "
+                "three deep at most"
+            )
     try:
-        data = tomllib.loads(text, parse_float=Decimal)
+        return tomllib.loads(text, parse_float=Decimal)
     except tomllib.TOMLDecodeError as e:
-        raise error(f"{path} is not valid TOML: {e}") from None
-    return Section(data, str(path), key_lines(text), (), error)
+        raise error(f"{name} is not valid TOML: {e}") from None
+    except RecursionError:
+        raise error(f"{name} is nested too deep; remove brackets inside brackets") from None
+    except ValueError as e:
+        # Python reads no whole number of more than some thousand digits.
+        raise error(f"{name} holds a number that cannot be read ({e})") from None
+
+
+def _dots(line: str) -> int:
+    """Parts of the longest key in a line: the library's time grows with their square."""
+    return max(len(_PART_OF_KEY.findall(piece)) for piece in _NO_KEY.split(line))
+
+
+def _shortened(value: Any) -> str:
+    """Text of a value, the first of it where it is long; no list inside lists is followed."""
+    if isinstance(value, int) and value.bit_length() > _LARGEST_BITS:
+        return f"one of {int(value.bit_length() * math.log10(2.0)) + 1} digits"
+    try:
+        text = str(value)
+    except RecursionError:
+        return "nested too deep"
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} …"

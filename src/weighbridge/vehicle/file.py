@@ -18,6 +18,7 @@ from tomlkit.items import Table
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals.tomlfile import Section, exact_text, read_toml
+from weighbridge.signals.whole import write_whole
 from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import (
     FORMAT_VERSION,
@@ -394,10 +395,7 @@ def save_vehicle(
             table.add("format_version", version)
         if len(table):
             document.add(name, table)
-    try:
-        path.write_text(tomlkit.dumps(document), encoding="utf-8")
-    except OSError as e:
-        raise ConfigError(f"{path} cannot be written: {e.strerror or e}") from None
+    write_whole(path, tomlkit.dumps(document))
 
 
 def _refuse_gaps(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.errors import ConfigError
+from weighbridge.signals.visible import visible
 
 FORMAT_VERSION: Final = 1
 """Version of the vehicle file this program writes and reads."""
@@ -28,6 +29,14 @@ MASS_RANGE: Final[dict[VehicleClass, tuple[float, float]]] = {
 with a trailer [kg]: outside, data or vehicle file are wrong."""
 
 
+# Angles are written from -180 to 180 or from 0 to 360 degrees [rad].
+_TURN: Final = 2.0 * math.pi + 1e-9
+
+
+_MASSES: Final = (10.0, 1_000_000.0)
+"""Masses that may stand in a vehicle file, of any class and with any payload [kg]."""
+
+
 def _curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, ...]) -> None:
     """Refuse a curve with other counts of ``x`` and ``y``, or whose ``x`` does not rise."""
     if len(y) != len(x):
@@ -44,6 +53,14 @@ def _positive(name: str, value: float | None) -> None:
 def _not_negative(name: str, value: float | None) -> None:
     if value is not None and not (math.isfinite(value) and value >= 0.0):
         raise ConfigError(f"{name} must be zero or positive, got {value}")
+
+
+def _within(name: str, value: float | None, low: float, high: float, unit: str = "") -> None:
+    """Refuse what no vehicle has, wide enough for any: its powers would be no numbers."""
+    if value is not None and not low <= value <= high:
+        raise ConfigError(
+            f"{name} must be between {low:g} and {high:g}{' ' * bool(unit)}{unit}, got {value:g}"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,18 +100,26 @@ class Driveline:
     def __post_init__(self) -> None:
         for g in self.gearings:
             _positive("a gearing", g)
+            _within("a gearing", g, 0.01, 10_000.0, "per m")
         if list(self.gearings) != sorted(self.gearings, reverse=True):
             raise ConfigError(f"gearings must fall from first to last gear, got {self.gearings}")
         if self.gearing_stds and len(self.gearing_stds) != len(self.gearings):
             raise ConfigError("gearing_stds must be as many as gearings")
         _not_negative("engine_inertia", self.engine_inertia)
         _not_negative("wheel_inertia", self.wheel_inertia)
+        _within("engine_inertia", self.engine_inertia, 0.0, 1_000.0, "kg m^2")
+        _within("wheel_inertia", self.wheel_inertia, 0.0, 10_000.0, "kg m^2")
+        _within("engine_inertia_std", self.engine_inertia_std, 0.0, 1_000.0, "kg m^2")
+        _within("wheel_inertia_std", self.wheel_inertia_std, 0.0, 10_000.0, "kg m^2")
         _positive("wheel_radius", self.wheel_radius)
+        _within("wheel_radius", self.wheel_radius, 0.05, 3.0, "m")
         _not_negative("idle_speed", self.idle_speed)
+        _within("idle_speed", self.idle_speed, 0.0, 1_000.0, "rad/s")
         if self.layout not in (None, "transverse", "longitudinal"):
             raise ConfigError(f"layout must be transverse or longitudinal, got {self.layout!r}")
         if self.efficiency is not None and not 0.0 < self.efficiency <= 1.0:
             raise ConfigError(f"efficiency must be in (0, 1], got {self.efficiency}")
+        _within("efficiency", self.efficiency, 0.05, 1.0)
         if not 0.8 <= self.speed_scale <= 1.2:
             raise ConfigError(f"speed_scale must be in [0.8, 1.2], got {self.speed_scale}")
 
@@ -167,11 +192,20 @@ class TorqueModel:
         if self.curvature_stds and len(self.curvature_stds) != len(self.curvature):
             raise ConfigError("curvature_stds must be as many as curvature")
         _curve("knots", self.knots, "knot_slopes", self.knot_slopes)
+        for name in ("coefficients", "coefficient_stds", "curvature", "curvature_stds"):
+            for w in getattr(self, name):
+                _within(f"one of {name}", w, -1e9, 1e9)
+        for w in (*self.knots, *self.knot_slopes):
+            _within("one of knots and knot_slopes", w, -1e9, 1e9)
         _positive("reference_torque", self.reference_torque)
+        _within("reference_torque", self.reference_torque, 1.0, 1e6, "N m")
         _positive("noise", self.noise)
+        _within("noise", self.noise, 1e-6, 1e6, "N m")
         _not_negative("scale_std", self.scale_std)
+        _within("scale_std", self.scale_std, 0.0, 10.0)
         if not 0.0 < self.engine_efficiency <= 1.0:
             raise ConfigError(f"engine_efficiency must be in (0, 1], got {self.engine_efficiency}")
+        _within("engine_efficiency", self.engine_efficiency, 0.01, 1.0)
 
     def scaled(self, scale: float) -> TorqueModel:
         """Return the model that gives ``scale`` times the torque."""
@@ -216,6 +250,8 @@ class RoadLoad:
                 "rolling_speed_coefficient must be in [0, 0.002) s/m, "
                 f"got {self.rolling_speed_coefficient}"
             )
+        _within("drag_area_std", self.drag_area_std, 0.0, 1_000.0, "m^2")
+        _within("rolling_coefficient_std", self.rolling_coefficient_std, 0.0, 10.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -238,6 +274,14 @@ class Mounting:
     squat: float | None = None
     squat_std: float | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("roll", "pitch", "yaw"):
+            _within(name, getattr(self, name), -_TURN, _TURN, "rad")
+        for std in self.std or ():
+            _within("one of std", std, 0.0, _TURN, "rad")
+        _within("squat", self.squat, -1.0, 1.0, "rad per m/s^2")
+        _within("squat_std", self.squat_std, 0.0, 1.0, "rad per m/s^2")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
@@ -259,6 +303,7 @@ class Timing:
         delay = self.torque_delay
         if delay is not None and not -1.0 <= delay <= 3.0:
             raise ConfigError(f"torque_delay must be in [-1, 3] s, got {delay}")
+        _within("torque_delay_std", self.torque_delay_std, 0.0, 1_000.0, "s")
         if not 0.0 <= self.torque_lag <= 3.0:
             raise ConfigError(f"torque_lag must be in [0, 3] s, got {self.torque_lag}")
 
@@ -289,6 +334,8 @@ class DraggedReading:
         _positive("scatter", self.scatter)
         _positive("span", self.span)
         _not_negative("reach", self.reach)
+        for value in (*self.engine_speed, *self.level, self.scatter, self.span, self.reach):
+            _within("a number of [dragged]", value, -1e9, 1e9)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -330,6 +377,11 @@ class SpeedModel:
             _positive(name, getattr(self, name))
         for name in ("drag", "rotating_mass"):
             _not_negative(name, getattr(self, name))
+        _within("mass", self.mass, *_MASSES, "kg")
+        _within("rotating_mass", self.rotating_mass, 0.0, _MASSES[1], "kg")
+        _within("force_gain", self.force_gain, 1e-6, 1e6, "per m")
+        _within("drag", self.drag, 0.0, 1e3, "kg/m")
+        _within("scale_std", self.scale_std, 1e-9, 1e3)
         if not 1.0 <= self.sample_time <= 60.0:
             raise ConfigError(f"sample_time must be in [1, 60] s, got {self.sample_time}")
         if not 0.0 <= self.rolling_coefficient < 0.1:
@@ -461,6 +513,9 @@ class Provenance:
 
     def __post_init__(self) -> None:
         _not_negative("mass_scale_std", self.mass_scale_std)
+        _within("mass_scale_std", self.mass_scale_std, 0.0, 1e3)
+        for mass in self.masses:
+            _within("one of masses", mass, *_MASSES, "kg")
         size = math.isqrt(2 * len(self.fit_cov))
         if size * (size + 1) != 2 * len(self.fit_cov):
             raise ConfigError(
@@ -510,8 +565,13 @@ class Vehicle:
     def __post_init__(self) -> None:
         if self.kind not in ("car", "van", "bus", "truck"):
             raise ConfigError(f"class must be car, van, bus or truck, got {self.kind!r}")
-        _positive("tare", self.tare)
-        _positive("gross", self.gross)
+        for name in ("tare", "gross"):
+            _positive(name, getattr(self, name))
+            _within(name, getattr(self, name), *_MASSES, "kg")
+        if self.mapping is not None and visible(self.mapping) != self.mapping:
+            raise ConfigError(
+                f"mapping must be a path without control characters, got {self.mapping!r}"
+            )
 
     @classmethod
     def load(cls, path: str | Path) -> Vehicle:

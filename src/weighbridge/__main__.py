@@ -1,0 +1,20 @@
+"""The command ``weighbridge``, quiet from the first import on when it is interrupted."""
+
+from __future__ import annotations
+
+import sys
+
+
+def run() -> None:
+    """Run the command line."""
+    try:
+        from weighbridge.cli.main import run as run_commands
+
+        run_commands()
+    except KeyboardInterrupt:
+        # As a shell ends a program by SIGINT.
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,157 @@
+"""``weighbridge map``: describe a foreign log without writing TOML by hand."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Optional
+
+import typer
+
+from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
+from weighbridge.cli.terminal import complain, console, say, shown
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from weighbridge.io.draft import Draft, DraftColumn
+
+_SUFFIXES = (".csv", ".tsv", ".txt", ".parquet")
+_SHOWN = 12
+"""Columns that are not taken, named at most."""
+
+
+def map_log(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Tables of one drive: CSV or other text, Parquet, or a folder of them.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
+        typer.Option("-o", "--output", help="Mapping to write; else it is printed."),
+    ] = None,
+    ask: Annotated[
+        bool, typer.Option("--ask", help="Ask for each unit that the log does not state.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Draft the mapping of a log: its separator, its time, its columns and their units.
+
+    Example: weighbridge map trip.csv -o map.toml
+    """
+    from weighbridge.errors import DriveError
+    from weighbridge.io.draft import draft
+    from weighbridge.io.mapping_text import mapping_text
+    from weighbridge.signals.whole import whole_file
+
+    if output is not None:
+        refuse_results(inputs(logs), [Result("--output", output, "mapping")])
+        refuse_overwriting(output, force, "mapping")
+    drafts: list[Draft] = []
+    refused: list[str] = []
+    for path in _files(logs):
+        try:
+            found = draft(path)
+        except DriveError as error:
+            refused.append(str(error))
+            continue
+        drafts.append(_asked(found) if ask else found)
+    if not drafts:
+        raise DriveError("; ".join(refused))
+    screen = console(stderr=output is None)
+    for found in drafts:
+        _show(found, screen)
+    for sentence in refused:
+        complain(f"  left out: {sentence}")
+    text = mapping_text(drafts)
+    if output is None:
+        sys.stdout.write(text)
+        return
+    with whole_file(output) as part:
+        part.write_text(text, encoding="utf-8")
+    say(f"written: {output}")
+    say(f"next: weighbridge inspect {_drive(logs)} --mapping {output}")
+
+
+def _files(logs: list[Path]) -> list[Path]:
+    """Tables named, those of folders included."""
+    from weighbridge.errors import DriveError
+
+    found: list[Path] = []
+    for path in logs:
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES)
+            if not inside:
+                raise DriveError(f"{path}: holds no table ({', '.join(_SUFFIXES)})")
+            found += inside
+        elif not path.exists():
+            raise DriveError(f"{path}: no such file")
+        elif path.suffix.lower() not in _SUFFIXES:
+            raise DriveError(
+                f"{path}: map drafts mappings of tables ({', '.join(_SUFFIXES)}); other logs are "
+                "read as they are: weighbridge inspect tells what they hold"
+            )
+        else:
+            found.append(path)
+    return found
+
+
+def _drive(logs: list[Path]) -> Path:
+    return logs[0] if len(logs) == 1 else logs[0].parent
+
+
+def _show(found: Draft, screen: Console) -> None:
+    """Print what a file seems to be, and what is doubtful."""
+    from rich.table import Table
+
+    taken = found.time_format or found.time_unit or "date"
+    table = Table(
+        title=f"{shown(found.path.name)}: time {shown(found.time)!r} ({taken}), "
+        f"{found.rate:.3g} rows per second for {found.duration:.0f} s",
+        title_justify="left",
+    )
+    for heading in ("column", "is", "unit"):
+        table.add_column(heading)
+    for heading in ("lowest", "median", "highest", "values"):
+        table.add_column(heading, justify="right")
+    for column in found.known:
+        unit = column.unit + ("" if column.stated or not column.unit else " ?")
+        values = (f"{x:.4g}" for x in (column.low, column.usual, column.high))
+        table.add_row(shown(column.name), column.quantity, unit, *values, str(column.count))
+    screen.print(table)
+    others = [c.name for c in found.columns if not c.quantity]
+    if others:
+        more = f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
+        names = ", ".join(shown(n) for n in others[:_SHOWN])
+        screen.print(f"  not taken: {names}{more}", highlight=False)
+    for doubt in found.all_doubts:
+        screen.print(f"  doubtful: {shown(doubt)}", highlight=False)
+
+
+def _asked(found: Draft) -> Draft:
+    """Ask for the unit of each column whose log states none."""
+    return replace(found, columns=tuple(_asked_unit(c) for c in found.columns))
+
+
+def _asked_unit(column: DraftColumn) -> DraftColumn:
+    from weighbridge.io.columns import suffixes_of
+    from weighbridge.signals import QUANTITIES
+
+    if not column.quantity or column.stated or not column.unit:
+        return column
+    allowed = suffixes_of(QUANTITIES[column.quantity])
+    while True:
+        told = typer.prompt(
+            f"{shown(column.name)} is {column.quantity}, {column.low:.4g} to {column.high:.4g}; "
+            f"unit ({', '.join(allowed)}, or none to leave it out)",
+            default=column.unit,
+            err=True,
+        ).strip()
+        if told == "none":
+            return replace(column, quantity="")
+        if told in allowed:
+            return replace(column, unit=told, stated=True, doubt="")

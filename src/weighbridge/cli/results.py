@@ -1,0 +1,255 @@
+"""Where results go: never over what is read, nor over what is no result of the same kind."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from weighbridge.errors import ConfigError
+from weighbridge.signals.whole import is_stream
+
+Kind = Literal["report", "JSON file", "track", "vehicle file", "mapping", "MF4"]
+
+# What a file of each kind shows at its beginning.
+_BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
+    "report": re.compile(rb"\A\s*<(?:!doctype\s+html|html)\b", re.IGNORECASE),
+    "JSON file": re.compile(rb"\A\s*\{"),
+    # Columns that no drive has and no truth; a Parquet file names them within its first page.
+    "track": re.compile(rb"\A[^\r\n]*\btime_s\b[^\r\n]*(?:\bstd_kg\b|\bsprung_mass_std_kg\b)"),
+    "vehicle file": re.compile(
+        rb"^[ \t]*\[[ \t]*(?:vehicle|driveline|torque|road_load|provenance)[ \t]*\]", re.MULTILINE
+    ),
+    "mapping": re.compile(rb"^[ \t]*\[[ \t]*(?:csv|time|signals|tables)\b", re.MULTILINE),
+    "MF4": re.compile(rb"\A(?:MDF     |UnFinMF )"),
+}
+
+# Bytes in which a file shows what it is.
+_HEAD: Final = 65_536
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One file that a command is to write.
+
+    Attributes
+    ----------
+    option : how it was asked for, such as ``--report``
+    path : where it goes
+    kind : what it is
+    """
+
+    option: str
+    path: Path
+    kind: Kind
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """What a command reads.
+
+    Attributes
+    ----------
+    drives : folders and logs
+    files : vehicle file, mapping and databases
+    """
+
+    drives: tuple[Path, ...] = ()
+    files: tuple[Path, ...] = ()
+
+    def all(self) -> Iterator[Path]:
+        """Yield every file that is read, or may be, tables of folders included."""
+        yield from self.files
+        for drive in self.drives:
+            yield drive
+            folder = drive if drive.is_dir() else None
+            if folder is None and drive.suffix.lower() == ".npy":
+                # Its times may stand in an array beside it.
+                folder = drive.parent
+            if folder is not None:
+                with contextlib.suppress(OSError):
+                    yield from (f for f in folder.iterdir() if _may_be_read(f))
+
+
+def inputs(
+    drives: Sequence[Path] = (),
+    vehicle: Path | None = None,
+    mapping: Path | None = None,
+    dbc: Sequence[str] | None = None,
+) -> Inputs:
+    """Gather what a command reads; a DBC may be written ``1:FILE``."""
+    named = [Path(re.sub(r"^\d{1,3}:", "", name)) for name in dbc or ()]
+    files = [p for p in (vehicle, mapping) if p is not None] + named
+    return Inputs(tuple(drives), tuple(files))
+
+
+def asked_for(*, track: Path | None, report: Path | None, json: str | None) -> list[Result]:
+    """Gather the files that a command is to write; ``-`` is standard output."""
+    found = []
+    if track is not None:
+        found.append(Result("--track", track, "track"))
+    if report is not None:
+        found.append(Result("--report", report, "report"))
+    if json is not None and json != "-":
+        found.append(Result("--json", Path(json), "JSON file"))
+    return found
+
+
+def refuse_results(read: Inputs, results: Sequence[Result]) -> None:
+    """Raise before the work where a result could not be written, or would replace what stays.
+
+    Parameters
+    ----------
+    read : what the command reads
+    results : what it is to write
+
+    Raises
+    ------
+    ConfigError
+        A result is an input, by any name or link; two are one file; or a file is there that is
+        no earlier result of the same kind.
+    """
+    known = {place: path for path in read.all() if (place := _place(path)) is not None}
+    asked: dict[object, Result] = {}
+    for result in results:
+        path = result.path
+        if result.kind == "track" and path.suffix.lower() not in (".csv", ".parquet"):
+            raise ConfigError(f"{result.option} {path}: a track is written as .csv or .parquet")
+        refuse_missing_folder(path)
+        if is_stream(path):
+            continue
+        place = _place(path)
+        if place is not None and place in known:
+            raise ConfigError(_is_input(path, known[place], read))
+        target = os.path.realpath(path)
+        _refuse_new_table(read, path, Path(target))
+        other = asked.get(target) or asked.get(place)
+        if other is not None:
+            raise ConfigError(
+                f"{path}: {other.option} and {result.option} name the same file; name two"
+            )
+        asked[target] = result
+        if place is not None:
+            asked[place] = result
+            if not _is_of_kind(path, result.kind):
+                raise ConfigError(
+                    f"{path}: is there already and is no {result.kind}; name another file for "
+                    f"{result.option}, or remove this one"
+                )
+
+
+def refuse_folder(read: Inputs, folder: Path) -> None:
+    """Raise before the work where a drive written to a folder would replace what is read.
+
+    Raises
+    ------
+    ConfigError
+        The folder is a file, the drive that is read, or holds it.
+    """
+    from weighbridge.io.write import DRIVE_FILES
+
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"{folder}: is a file; name a folder, or a file that ends in .mf4")
+    place = _place(folder)
+    if place is None:
+        return
+    for drive in read.drives:
+        if _place(drive) == place:
+            raise ConfigError(f"{folder}: is the drive itself; name another folder or file")
+        homes = {_place(drive.absolute().parent), _place(drive.resolve().parent)}
+        if not drive.is_dir() and place in homes:
+            raise ConfigError(f"{folder}: holds {drive.name}, which is read; name another folder")
+    known = {p: path for path in read.all() if (p := _place(path)) is not None}
+    for name in sorted(DRIVE_FILES):
+        at = _place(folder / name)
+        if at is not None and at in known:
+            raise ConfigError(f"{folder / name}: is {known[at]}, an input; name another folder")
+
+
+def refuse_overwriting(path: Path, force: bool, what: str) -> None:
+    """Raise where ``path`` exists and ``--force`` was not given."""
+    if not force and not is_stream(path) and os.path.lexists(path):
+        raise ConfigError(
+            f"{path}: exists already; name another {what}, or give --force to replace it"
+        )
+
+
+def refuse_missing_folder(*outputs: Path | None) -> None:
+    """Raise before the work where a result could not be written after it."""
+    for path in outputs:
+        if path is not None and not path.parent.is_dir():
+            raise ConfigError(f"{path}: there is no folder {path.parent}; make it first")
+        if path is not None and path.is_dir():
+            raise ConfigError(f"{path}: is a folder; name a file in it")
+
+
+def _refuse_new_table(read: Inputs, path: Path, target: Path) -> None:
+    """Raise where a result would be read as a table of a drive from then on."""
+    from weighbridge.io import READERS
+    from weighbridge.signals.catalogue import TABLES
+
+    if target.suffix.lower() not in READERS:
+        return
+    home = _place(target.parent)
+    for drive in read.drives:
+        if drive.is_dir() and _place(drive) == home:
+            tables = any(f.stem.lower() in TABLES and _may_be_read(f) for f in drive.iterdir())
+            if target.stem.lower() in TABLES or not tables:
+                raise ConfigError(
+                    f"{path}: would be read as a table of the drive {drive.name}; results must go "
+                    "to another folder"
+                )
+
+
+def _is_input(path: Path, known: Path, read: Inputs) -> str:
+    if _place(path.parent) in {_place(drive) for drive in read.drives}:
+        return (
+            f"{path}: is there already, in the folder of a drive that is read; results must "
+            "go to another file"
+        )
+    name = "" if path == known else f" ({known})"
+    return f"{path}: is an input{name}; results must go to another file"
+
+
+def _place(path: Path) -> tuple[int, int] | None:
+    """Device and inode: the same for every name of a file."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    return found.st_dev, found.st_ino
+
+
+def _may_be_read(path: Path) -> bool:
+    from weighbridge.io import READERS
+
+    return path.suffix.lower() in (*READERS, ".toml")
+
+
+def _is_of_kind(path: Path, kind: Kind) -> bool:
+    """Tell whether a file is empty or an earlier result of a kind."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+            if head[:4] == b"PAR1" and kind == "track":
+                return _names_a_track(path)
+    except OSError:
+        return False
+    return not head or _BEGINS[kind].search(head) is not None
+
+
+def _names_a_track(path: Path) -> bool:
+    import polars as pl
+
+    from weighbridge.io.quiet import PARSE_ERRORS, quietly
+
+    try:
+        with path.open("rb") as file, quietly():
+            names = ",".join(pl.read_parquet_schema(file))
+    except (*PARSE_ERRORS, OSError):
+        return False
+    return _BEGINS["track"].search(names.encode()) is not None

@@ -1,0 +1,79 @@
+"""Nothing is ever sent: no network module in the code, no connection while commands run."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import weighbridge
+
+GOLDEN = Path(__file__).parent.parent / "golden"
+SOURCE = Path(weighbridge.__file__).parent
+
+NETWORK = {
+    "aiohttp", "asyncio", "ftplib", "http", "httpx", "imaplib", "poplib", "requests", "smtplib",
+    "socket", "socketserver", "ssl", "telnetlib", "urllib", "urllib3", "websockets", "xmlrpc",
+}  # fmt: skip
+
+FORBIDDING = """
+import os, sys
+def forbid(event, arguments):
+    name = event.partition(".")[0]
+    if name in ("socket", "urllib", "http", "ftplib", "smtplib", "poplib", "imaplib", "ssl"):
+        os.write(2, f"NETWORK {event}\\n".encode())
+        os._exit(99)
+    if event in ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen"):
+        os.write(2, f"PROGRAM {arguments}\\n".encode())
+        os._exit(98)
+"""
+
+RUN = "sys.addaudithook(forbid)\nfrom weighbridge.cli.main import run\nrun()\n"
+
+
+def test_no_module_of_ours_knows_the_network():
+    for path in SOURCE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [a.name for a in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [node.module or ""]
+            assert not {n.partition(".")[0] for n in names} & NETWORK, path
+
+
+def run(*words):
+    return subprocess.run(
+        [sys.executable, "-c", FORBIDDING + RUN, *map(os.fspath, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_no_command_opens_a_connection_or_starts_a_program(tmp_path):
+    car = tmp_path / "car.toml"
+    car.write_text("[vehicle]\n[mounting]\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 0\n")
+    report = tmp_path / "r.html"
+    commands = (
+        (0, "inspect", GOLDEN / "csv", "--vehicle", car),
+        (0, "inspect", GOLDEN / "can.blf", "--dbc", GOLDEN / "golden.dbc"),
+        (0, "convert", GOLDEN / "log.gpx", tmp_path / "out.mf4"),
+        (1, "weigh", GOLDEN / "csv", "--vehicle", car, "--report", report, "--json", "-"),
+    )
+    for code, *words in commands:
+        ran = run(*words)
+        assert ran.returncode == code, ran.stderr
+    page = report.read_text(encoding="utf-8")
+    own = page[: page.index("<script>")] + page[page.rindex("<script>") :]
+    assert "http" not in own.replace('http-equiv="', "").replace("http://www.w3.org", "")
+
+
+def test_the_guard_of_this_test_works():
+    code = "import socket\nsocket.create_connection(('localhost', 9))"
+    ran = subprocess.run(
+        [sys.executable, "-c", f"{FORBIDDING}sys.addaudithook(forbid)\n{code}"],
+        capture_output=True,
+        check=False,
+    )
+    assert ran.returncode == 99
