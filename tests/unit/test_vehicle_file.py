@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from weighbridge.errors import ConfigError
+from weighbridge.signals.visible import visible
 from weighbridge.vehicle.file import load_vehicle, save_vehicle
 from weighbridge.vehicle.model import (
     DraggedReading,
@@ -26,6 +27,7 @@ positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)
 angle = st.floats(-math.pi, math.pi)
 text = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\r\x00"), max_size=12)
+masses = st.floats(10.0, 1e6)
 
 
 def maybe(strategy):
@@ -34,11 +36,13 @@ def maybe(strategy):
 
 drivelines = st.builds(
     Driveline,
-    gearings=st.lists(positive, max_size=6).map(lambda g: tuple(sorted(g, reverse=True))),
-    engine_inertia=positive,
-    wheel_inertia=positive,
-    wheel_radius=positive,
-    efficiency=st.floats(1e-3, 1.0),
+    gearings=st.lists(st.floats(0.01, 1e4), max_size=6).map(
+        lambda g: tuple(sorted(g, reverse=True))
+    ),
+    engine_inertia=st.floats(1e-3, 1e3),
+    wheel_inertia=st.floats(1e-3, 1e4),
+    wheel_radius=st.floats(0.05, 3.0),
+    efficiency=st.floats(0.05, 1.0),
     speed_scale=st.floats(0.8, 1.2),
     idle_speed=st.floats(0.0, 200.0),
 )
@@ -59,10 +63,10 @@ torques = st.builds(
     TorqueModel,
     source=st.just("load"),
     coefficients=st.lists(finite, min_size=2, max_size=5).map(tuple),
-    reference_torque=maybe(positive),
-    engine_efficiency=st.floats(1e-3, 1.0),
+    reference_torque=maybe(st.floats(1.0, 1e6)),
+    engine_efficiency=st.floats(0.01, 1.0),
     noise=maybe(positive),
-    scale_std=maybe(positive),
+    scale_std=maybe(st.floats(0.0, 10.0)),
     load_range=maybe(pairs),
     speed_range=maybe(pairs),
 )
@@ -72,24 +76,24 @@ dragged = st.tuples(curve("engine_speed", "level"), positive, positive, st.float
 )
 speed_models = st.builds(
     SpeedModel,
-    mass=positive,
+    mass=masses,
     sample_time=st.floats(1.0, 60.0),
     force_gain=positive,
-    drag=positive,
+    drag=st.floats(0.0, 1e3),
     rolling_coefficient=st.floats(0.0, 0.099),
-    rotating_mass=positive,
+    rotating_mass=st.floats(0.0, 1e6),
     corrections=st.tuples(*[finite] * 7),
     r_squared=maybe(st.floats(0.0, 1.0)),
     samples=maybe(st.integers(0, 10_000)),
-    scale_std=positive,
+    scale_std=st.floats(1e-3, 1e3),
 )
 vehicles = st.builds(
     Vehicle,
     name=text,
     kind=st.sampled_from(["car", "van", "bus", "truck"]),
-    tare=maybe(positive),
-    gross=maybe(positive),
-    mapping=maybe(text),
+    tare=maybe(masses),
+    gross=maybe(masses),
+    mapping=maybe(text.map(visible)),
     driveline=drivelines,
     torque=torques | bent,
     road_load=st.builds(
@@ -104,15 +108,15 @@ vehicles = st.builds(
             roll=angle,
             pitch=angle,
             yaw=angle,
-            std=maybe(st.tuples(positive, positive, positive)),
+            std=maybe(st.tuples(*[st.floats(0.0, 3.0)] * 3)),
             squat=maybe(st.floats(-0.1, 0.1)),
-            squat_std=maybe(positive),
+            squat_std=maybe(st.floats(0.0, 1.0)),
         )
     ),
     timing=st.builds(
         Timing,
         torque_delay=maybe(st.floats(-1.0, 3.0)),
-        torque_delay_std=maybe(positive),
+        torque_delay_std=maybe(st.floats(0.0, 1e3)),
     ),
     dragged=maybe(dragged),
     speed_model=maybe(speed_models),
@@ -123,7 +127,7 @@ vehicles = st.builds(
         r_squared=maybe(st.floats(0.0, 1.0)),
         residual_std=maybe(positive),
         samples=maybe(st.integers(0, 10**9)),
-        mass_scale_std=maybe(positive),
+        mass_scale_std=maybe(st.floats(0.0, 1e3)),
         fit_cov=st.sampled_from(((), (2.0,), (1.5, -0.25, 3e-7))),
         notes=maybe(text),
     ),

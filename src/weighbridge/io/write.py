@@ -17,6 +17,7 @@ import polars as pl
 from weighbridge.errors import DriveError, MissingExtraError, WeighbridgeError
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import MDF_INFO_MARK, info_text
+from weighbridge.io.quiet import first_line
 from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
 from weighbridge.signals.units import from_si
@@ -153,8 +154,8 @@ def _write_frame(frame: pl.DataFrame, path: Path) -> None:
             else:
                 frame.write_csv(file)
     except pl.exceptions.PolarsError as e:
-        # A full disk, told in the library's words.
-        raise OSError(str(e).strip().split("\n", 1)[0]) from None
+        # A full disk, told behind words of the library's own.
+        raise OSError(first_line(e).rpartition("IO error: ")[2]) from None
 
 
 def _columns(signals: list[Signal]) -> dict[str, Floats]:

@@ -36,8 +36,8 @@ LARGEST: Final = 30
 """Power of ten that no number of a file may reach: no quantity in any unit does, and its powers
 stay doubles."""
 
-SMALLEST: Final = -300
-"""Power of ten below which no number of a file but 0 may be: doubles end at -308, and units take
+SMALLEST: Final = -340
+"""Power of ten below which no number of a file but 0 may be: doubles end at -324, and units take
 their part."""
 
 _LARGEST_BITS: Final = int(LARGEST * math.log2(10.0))

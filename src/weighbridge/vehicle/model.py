@@ -200,7 +200,7 @@ class TorqueModel:
         _positive("reference_torque", self.reference_torque)
         _within("reference_torque", self.reference_torque, 1.0, 1e6, "N m")
         _positive("noise", self.noise)
-        _within("noise", self.noise, 1e-6, 1e6, "N m")
+        _within("noise", self.noise, 1e-15, 1e6, "N m")
         _not_negative("scale_std", self.scale_std)
         _within("scale_std", self.scale_std, 0.0, 10.0)
         if not 0.0 < self.engine_efficiency <= 1.0:
@@ -381,7 +381,7 @@ class SpeedModel:
         _within("rotating_mass", self.rotating_mass, 0.0, _MASSES[1], "kg")
         _within("force_gain", self.force_gain, 1e-6, 1e6, "per m")
         _within("drag", self.drag, 0.0, 1e3, "kg/m")
-        _within("scale_std", self.scale_std, 1e-9, 1e3)
+        _within("scale_std", self.scale_std, 1e-15, 1e3)
         if not 1.0 <= self.sample_time <= 60.0:
             raise ConfigError(f"sample_time must be in [1, 60] s, got {self.sample_time}")
         if not 0.0 <= self.rolling_coefficient < 0.1:
