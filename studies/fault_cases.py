@@ -70,6 +70,7 @@ class Outcome:
     error, std : of the mass over the true one [-]; NaN where there is none
     text : reason of a refusal, warning that names the fault, or last line of a traceback
     where : what refused: the status, or the stage that raised
+    wider : standard deviation over that of the undamaged drive [-]
     """
 
     case: Case
@@ -79,6 +80,7 @@ class Outcome:
     std: float = math.nan
     text: str = ""
     where: str = ""
+    wider: float = math.nan
 
 
 def all_cases() -> list[Case]:
@@ -156,10 +158,18 @@ def vehicle_of(case: Case, subject: Subject) -> Vehicle:
 
 
 def run_case(case: Case, subject: Subject) -> list[Outcome]:
-    """Do one case by every method.
+    """Do one case by every method that weighs the undamaged drive, or weighs this one.
 
     An exception of the fault itself is the study's and is raised.
     """
+    return [
+        o
+        for o in _by_every_method(case, subject)
+        if o.kind != "refused" or math.isfinite(subject.undamaged[o.method])
+    ]
+
+
+def _by_every_method(case: Case, subject: Subject) -> list[Outcome]:
     drive = injected(case, subject)
     with (
         tempfile.TemporaryDirectory() as place,
@@ -176,13 +186,12 @@ def run_case(case: Case, subject: Subject) -> list[Outcome]:
             weighed = weigh_by_all(drive, vehicle)
         except WeighbridgeError as error:
             return [Outcome(case, m, "refused", text=str(error), where=stage) for m in METHODS]
-        except MemoryError as error:
-            return [Outcome(case, m, "memory", text=repr(error), where=stage) for m in METHODS]
         except Exception as error:
-            if stage == "checks":
+            if stage == "checks" and not isinstance(error, MemoryError):
                 return [_alone(case, subject, drive, vehicle, m) for m in METHODS]
             return [_broken(case, m, error) for m in METHODS]
-    shared = (*weighed[0].warnings, *(str(w.message) for w in caught))
+    spoken = (str(w.message) for w in caught if issubclass(w.category, UserWarning))
+    shared = (*weighed[0].warnings, *spoken)
     return [judge(case, subject, w, shared) for w in weighed]
 
 
@@ -199,7 +208,8 @@ def _alone(case: Case, subject: Subject, drive: Drive, vehicle: Vehicle, method:
 def _broken(case: Case, method: str, error: Exception) -> Outcome:
     frame = traceback.extract_tb(error.__traceback__)[-1]
     text = f"{type(error).__name__}: {error} ({Path(frame.filename).name}, {frame.name})"
-    return Outcome(case, method, "traceback", text=text)
+    kind = "memory" if isinstance(error, MemoryError) else "traceback"
+    return Outcome(case, method, kind, text=text)
 
 
 def naming(case: Case, subject: Subject, told: Sequence[str]) -> str:
@@ -231,4 +241,5 @@ def judge(case: Case, subject: Subject, weighing: Weighing, shared: Sequence[str
     if any(f.must_tell for f, _ in case.faults) and not warning:
         return Outcome(case, method, "silent", error, std, "nothing is told of it")
     kind = "right" if right else "told" if warning else "silent"
-    return Outcome(case, method, kind, error, std, warning)
+    wider = weighing.std / subject.stds[method]
+    return Outcome(case, method, kind, error, std, warning, wider=wider)

@@ -47,10 +47,11 @@ class Subject:
     ----------
     mean, final : mass over the drive, and at its end [kg]
     known, masses : drives of the calibration and what they weighed [kg]
-    known_of : what was known of the vehicle before
+    known_of : what was known of the vehicle before, tare and gross mass among it; ``vehicle``
+        has neither, so that no fault is found by the luck of its mass alone
     other : drive of another vehicle of the kind
     undamaged : mass of the undamaged drive by method [kg]; NaN where there is none
-    errors : how far that is from the truth by method [-]
+    stds : its standard deviation by method [kg]
     warnings : of the undamaged drive, without their numbers
     """
 
@@ -64,6 +65,7 @@ class Subject:
     known_of: Vehicle
     other: Drive
     undamaged: dict[str, float]
+    stds: dict[str, float]
     warnings: frozenset[str]
 
     def truth(self, method: str) -> float:
@@ -115,7 +117,7 @@ def build(
     known = [drive(part, k) for k, part in enumerate((0.0, 0.5, 0.9))]
     heaviest = 1.05 * (1.0 + FULL[car.kind]) * car.mass
     limits = {"tare": car.mass, "gross": heaviest}
-    vehicle = replace(calibrated(car, known), **limits)
+    vehicle = calibrated(car, known)
     known_of = replace(bare(car), **limits)
     made = {name: drive(float(rng.uniform(0.1, 0.8)), 10)}
     other = drive(float(rng.uniform(0.1, 0.8)), 11, another)
@@ -138,6 +140,7 @@ def build(
                 known_of=known_of,
                 other=without_weather(other.drive),
                 undamaged={w.method: w.mass for w in weighed},
+                stds={w.method: w.std for w in weighed},
                 warnings=frozenset(without_numbers(t) for w in weighed for t in w.warnings),
             )
         )

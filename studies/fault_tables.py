@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from statistics import median
 
 from fault_cases import KINDS, Outcome
 from fault_subjects import METHODS, Subject, without_numbers
@@ -152,15 +153,18 @@ def harmless(outcomes: Sequence[Outcome]) -> str:
     rows = _by(meek, lambda o: o.case.faults[0][0].name)
     rows["**all**"] = meek
     lines = [
-        f"| fault | cases | {DEFAULT}: weighed | right | all methods: outcomes | weighed | right |",
-        "|---|---|---|---|---|---|---|",
+        f"| fault | {DEFAULT}: cases | weighed | right | std / undamaged, median "
+        "| all methods: outcomes | weighed | right | std / undamaged, median |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, part in rows.items():
         mine = [o for o in part if o.method == DEFAULT]
-        cells = []
+        cells: list[int | str] = []
         for those in (mine, part):
             weighed = sum(math.isfinite(o.error) for o in those)
+            wider = [o.wider for o in those if math.isfinite(o.wider)]
             cells += [len(those), weighed, sum(o.kind == "right" for o in those)]
+            cells.append(f"{median(wider):.2f}" if wider else "")
         lines.append(f"| {name} | " + " | ".join(map(str, cells)) + " |")
     return "\n".join(lines)
 
@@ -177,11 +181,13 @@ def harmless_refused(outcomes: Sequence[Outcome]) -> str:
     return "\n".join(lines)
 
 
+def line(o: Outcome) -> str:
+    """Tell of one outcome in a line."""
+    figures = _figures(o) if math.isfinite(o.error) else o.method
+    text = f": {o.text}" if o.text else ""
+    return f"{o.case.name}: {o.kind}, {figures}{text}"
+
+
 def each(outcomes: Sequence[Outcome]) -> str:
     """Tell of every outcome in a line, for work on a few."""
-    lines = []
-    for o in outcomes:
-        figures = f" {_figures(o)}" if math.isfinite(o.error) else f" {o.method}"
-        text = f": {o.text}" if o.text else ""
-        lines.append(f"{o.case.name}: {o.kind}{figures}{text}")
-    return "\n".join(lines)
+    return "\n".join(map(line, outcomes))

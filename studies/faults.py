@@ -14,10 +14,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from accuracy_drives import compile_all
 from fault_cases import Case, Outcome, all_cases, pairs, run_case, subset
 from fault_subjects import METHODS, Subject, build_all
-from fault_tables import tables
+from fault_tables import DEFAULT, line, tables
 from fault_workers import Done, done_apart
 
 HERE = Path(__file__).parent
@@ -41,10 +42,7 @@ def chosen(given: argparse.Namespace) -> list[Case]:
 
 
 def outcomes_of(case: Case, done: Done) -> list[Outcome]:
-    """Return what came of a case, stopped ones included; nothing where the study is wrong."""
-    if done.failure and not done.stopped:
-        print(f"the fault {case.name} cannot be put in: {done.failure}", file=sys.stderr)
-        return []
+    """Return what came of a case, stopped ones included."""
     if not done.stopped:
         return list(done.result)
     kind = "traceback" if done.stopped == "died" else done.stopped
@@ -52,19 +50,38 @@ def outcomes_of(case: Case, done: Done) -> list[Outcome]:
     return [Outcome(case, m, kind, text=text) for m in METHODS]
 
 
-def run_all(cases: Sequence[Case], subjects: dict[str, Subject]) -> tuple[list[Outcome], float]:
-    """Do all cases; return their outcomes in order, and the highest memory of a case [B]."""
+def run_all(
+    cases: Sequence[Case], subjects: dict[str, Subject], seed: int
+) -> tuple[list[Outcome], float, bool]:
+    """Do all cases, in an order drawn by the seed; an interrupt ends it with what there is.
+
+    Returns
+    -------
+    outcomes : in the order of the cases
+    peak : highest memory of a process [B]
+    whole : all cases were done
+    """
     found: dict[str, list[Outcome]] = {}
-    peak = 0.0
-    begun = time.monotonic()
-    work = ((case, subjects[case.vehicle]) for case in cases)
-    for (case, _), done in done_apart(lambda job: run_case(*job), list(work)):
-        found[case.name] = outcomes_of(case, done)
-        peak = max(peak, done.peak)
-        if sys.stderr.isatty() or len(found) % 50 == 0:
-            spent = time.monotonic() - begun
-            print(f"{len(found)} of {len(cases)} cases, {spent:.0f} s", file=sys.stderr)
-    return [o for case in cases for o in found.get(case.name, [])], peak
+    peak, begun = 0.0, time.monotonic()
+    order = np.random.default_rng([seed, 4]).permutation(len(cases))
+    work = [(cases[k], subjects[cases[k].vehicle]) for k in order]
+    try:
+        for (case, _), done in done_apart(lambda job: run_case(*job), work):
+            if done.failure and not done.stopped:
+                print(f"{case.name} cannot be put in: {done.failure}", file=sys.stderr)
+                continue
+            found[case.name] = outcomes_of(case, done)
+            peak = max(peak, done.peak)
+            for o in found[case.name]:
+                if o.method == DEFAULT and o.kind not in ("right", "refused"):
+                    print(line(o), file=sys.stderr)
+            if len(found) % 50 == 0:
+                spent = time.monotonic() - begun
+                print(f"{len(found)} of {len(cases)} cases, {spent:.0f} s", file=sys.stderr)
+    except KeyboardInterrupt:
+        print(f"interrupted after {len(found)} of {len(cases)} cases", file=sys.stderr)
+    whole = all(case.name in found for case in cases)
+    return [o for case in cases for o in found.get(case.name, [])], peak, whole
 
 
 def main() -> None:
@@ -83,7 +100,7 @@ def main() -> None:
         parser.error("no case is of that name; --list names them")
     compile_all()
     subjects = build_all(sorted({c.vehicle for c in cases}), given.seed)
-    outcomes, peak = run_all(cases, subjects)
+    outcomes, peak, whole = run_all(cases, subjects, given.seed)
     texts = tables(outcomes, subjects, peak=peak, seed=given.seed)
     if given.case or given.group:
         texts = {"cases": texts.pop("cases"), **texts}
@@ -91,8 +108,8 @@ def main() -> None:
         texts.pop("cases")
     for name, text in texts.items():
         print(f"{name}\n\n{text}\n", flush=True)
-    if len({o.case.name for o in outcomes}) < len(cases):
-        sys.exit("some faults could not be put in")
+    if not whole:
+        sys.exit("not all faults were put in; no page is written")
     if given.seed == SEED and not (given.quick or given.group or given.case):
         page = (HERE / "faults.template.md").read_text(encoding="utf-8")
         for name, text in texts.items():

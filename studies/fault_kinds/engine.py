@@ -26,7 +26,7 @@ TORQUE_WORDS = r"load|torque|air.?flow|dropout|full scale|clip|step"
 UNITS = "speed and units"
 UNITS_WORDS = r"mph|mile|km/h|unit|speed|scale|lb"
 WHOLE = "another vehicle, impossible values"
-WHOLE_WORDS = r"vehicle|plausible|outside|range|out of|tare|payload|gearing|impossible"
+WHOLE_WORDS = r"another vehicle|two vehicles|plausible|outside|range|out of|gearing|impossible"
 
 Rng = np.random.Generator
 

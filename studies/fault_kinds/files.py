@@ -14,7 +14,7 @@ STAMPS_WORDS = r"clock|stamp|time|1970|jump|rows"
 CELLS = "cells in files"
 CELLS_WORDS = r"plausible|outside|range|left out|value|impossible|infinite"
 MASSES = "mass of a calibration"
-MASSES_WORDS = r"tare|gross|pound|\blb|mass of|calibration mass|plausible"
+MASSES_WORDS = r"tare|pound|\blb|calibration|masses|mass given|plausible"
 
 Rng = np.random.Generator
 Cells = list[list[str]]
