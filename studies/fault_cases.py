@@ -238,7 +238,9 @@ def judge(case: Case, subject: Subject, weighing: Weighing, shared: Sequence[str
         or abs(mass / subject.undamaged[method] - 1.0) < NEAR
         or abs(error) <= max(FAR, FAR_STD * std, abs(subject.error(method)))
     )
-    if any(f.must_tell for f, _ in case.faults) and not warning:
+    # A payload that may be nothing need not be told; one that is unknown counts as impossible.
+    possible = weighing.payload > -FAR_STD * weighing.std
+    if any(f.must_tell for f, _ in case.faults) and not warning and not possible:
         return Outcome(case, method, "silent", error, std, "nothing is told of it")
     kind = "right" if right else "told" if warning else "silent"
     wider = weighing.std / subject.stds[method]
