@@ -1,0 +1,193 @@
+"""The study of faults puts in what it says, judges as it says, and outlives what it stops."""
+
+import os
+import sys
+import time
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "studies"))
+
+from fault_cases import Case, all_cases, injected, pairs, run_case, subset, through_files
+from fault_kinds import FAULTS, Fault
+from fault_subjects import METHODS, build
+from fault_workers import done_apart
+
+from weighbridge.io import read_drive
+from weighbridge.signals import Problem, Signal
+
+needs_compiler = pytest.mark.skipif(
+    numba.config.DISABLE_JIT, reason="half a million steps need compiled code"
+)
+
+
+@pytest.fixture(scope="module")
+def car():
+    (subject,) = build("car", 8300, duration=600.0)
+    return subject
+
+
+def kinds_of(outcomes):
+    return {o.method: o.kind for o in outcomes}
+
+
+def one(apply, **more):
+    return Case(((Fault("test", apply, (1.0,), **more), 1.0),), "car")
+
+
+def untouched(drive, severity, rng):
+    return drive
+
+
+def named(drive, severity, rng):
+    return drive.with_problems(Problem("", "the sensor has gone soft"))
+
+
+def without_speed(drive, severity, rng):
+    return drive.without("vehicle_speed", "gnss_speed", "latitude", "longitude")
+
+
+def of_two_lengths(drive, severity, rng):
+    s = drive.signals["accel_x"]
+    return drive.with_signals(Signal(s.name, s.time, s.values[:-7]))
+
+
+@needs_compiler
+def test_undamaged_drive_is_right_by_every_method(car):
+    outcomes = run_case(one(untouched, harmless=True), car)
+    assert kinds_of(outcomes) == dict.fromkeys(METHODS, "right")
+    assert all(np.isfinite(o.error) and o.std > 0.0 for o in outcomes)
+
+
+@needs_compiler
+def test_wrong_mass_is_silent_unless_a_warning_names_the_fault(car):
+    # What is undamaged weighs half of what this subject is said to weigh.
+    heavy = replace(
+        car,
+        mean=2.0 * car.mean,
+        final=2.0 * car.final,
+        undamaged={m: 2.0 * x for m, x in car.undamaged.items()},
+    )
+    assert set(kinds_of(run_case(one(untouched), heavy)).values()) == {"silent"}
+    assert set(kinds_of(run_case(one(named), heavy)).values()) == {"silent"}
+    outcomes = run_case(one(named, words="soft"), heavy)
+    assert set(kinds_of(outcomes).values()) == {"told"}
+    assert {o.text for o in outcomes} == {"the sensor has gone soft"}
+    assert outcomes[0].error == pytest.approx(-0.5, abs=0.05)
+
+
+@needs_compiler
+def test_what_must_be_told_and_is_not_is_silent(car):
+    assert set(kinds_of(run_case(one(untouched, must_tell=True), car)).values()) == {"silent"}
+    told = run_case(one(named, must_tell=True, words="soft"), car)
+    assert set(kinds_of(told).values()) == {"right"}
+
+
+@needs_compiler
+def test_refusals_and_tracebacks_are_told_apart(car):
+    refused = run_case(one(without_speed), car)
+    assert set(kinds_of(refused).values()) == {"refused"}
+    assert all(o.text for o in refused)
+    broken = run_case(one(of_two_lengths), car)
+    assert set(kinds_of(broken).values()) == {"traceback"}
+    assert "Error" in broken[0].text
+
+
+@needs_compiler
+def test_every_fault_damages_its_drive_and_leaves_signals(car, tmp_path):
+    short = replace(car, drive=car.drive.between(60.0, 180.0), other=car.other.between(60.0, 180.0))
+    cases = {
+        c.faults[0][0].name: c
+        for c in all_cases()
+        if c.vehicle == "car" and c.faults[0][0].stage in ("drive", "splice")
+    }
+    del cases["undamaged"], cases["cut_short"], cases["tail_alone"]
+    for case in cases.values():
+        drive = injected(case, short)
+        same = [
+            np.array_equal(s.values, short.drive.signals[s.name].values)
+            and np.array_equal(s.time, short.drive.signals[s.name].time)
+            for s in drive.signals.values()
+        ]
+        assert not all(same) or len(same) < len(short.drive.signals), case.name
+        for s in drive.signals.values():
+            assert s.time.size == s.values.size > 0, case.name
+            assert np.isfinite(s.values).all(), case.name
+            assert (np.diff(s.time) > 0.0).all(), case.name
+
+
+@needs_compiler
+def test_faults_of_files_reach_the_reader(car, tmp_path):
+    drive = car.drive.between(60.0, 120.0)
+    case = next(c for c in all_cases() if c.name == "two_accel_cells@1e+06/car")
+    assert through_files(case, drive, tmp_path / "drive")
+    read = read_drive(tmp_path / "drive")
+    assert np.count_nonzero(np.abs(read.signals["accel_x"].values) > 1e5) in (0, 2)
+    text = (tmp_path / "drive" / "imu.csv").read_text()
+    assert text.count("1000000.0") == 2
+
+
+def test_cases_are_many_named_once_and_seeded():
+    cases = all_cases()
+    names = [c.name for c in cases]
+    assert len(set(names)) == len(names) >= 300
+    assert {c.name for c in pairs(20, 1)} == {c.name for c in pairs(20, 1)}
+    assert {c.name for c in pairs(20, 1)} != {c.name for c in pairs(20, 2)}
+    assert all(not c.harmless for c in pairs(20, 1))
+    usual = {f.name for f in FAULTS if set(f.vehicles) & {"car", "van", "electric"}}
+    assert {c.faults[0][0].name for c in subset(cases, 1)} == usual
+
+
+def doing(job):
+    what, amount = job
+    if what == "sleep":
+        time.sleep(amount)
+    elif what == "compute":
+        until = time.process_time() + amount
+        while time.process_time() < until:
+            pass
+    elif what == "hold":
+        held = np.ones(int(amount))
+        time.sleep(2.0)
+        return held.size
+    elif what == "end":
+        os._exit(int(amount))
+    elif what == "fail":
+        raise ValueError("no")
+    return amount
+
+
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_cases_that_hang_die_or_fill_memory_are_stopped_and_the_rest_is_done():
+    jobs = [
+        ("return", 1),
+        ("compute", 30.0),
+        ("end", 3),
+        ("hold", 6.0e7),
+        ("fail", 0),
+        ("sleep", 60.0),
+        ("return", 2),
+    ]
+    run = partial(done_apart, doing, jobs, workers=2, longest=1.0)
+    found = dict(run(most=5e7 + held_now()))
+    assert {job: d.stopped for job, d in found.items()} == {
+        ("return", 1): "",
+        ("compute", 30.0): "hang",
+        ("end", 3): "died",
+        ("hold", 6.0e7): "memory",
+        ("fail", 0): "",
+        ("sleep", 60.0): "hang",
+        ("return", 2): "",
+    }
+    assert found["return", 2].result == 2
+    assert found["fail", 0].failure == "ValueError: no"
+
+
+def held_now():
+    pages = Path("/proc/self/statm").read_text().split()[1]
+    return int(pages) * os.sysconf("SC_PAGE_SIZE")
