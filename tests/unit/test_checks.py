@@ -656,3 +656,19 @@ def test_drive_without_speed_has_no_way_at_all(sane):
     found = inspect_drive(sane.without("vehicle_speed", "gnss_speed", "latitude", "longitude"))
     assert not any(w.possible for w in found.ways)
     assert found.ways[-1].needs == ("vehicle_speed",)
+
+
+def test_what_to_expect_follows_the_rate_of_the_torque():
+    drive = make_drive()
+    fast = Signal("engine_load", np.arange(0.0, 800.0, 0.25), np.full(3200, 0.3))
+    speed = Signal("engine_speed", fast.time, np.full(3200, 200.0))
+    slow = [every_fourth(s) for s in (fast, speed)]
+    best = [
+        inspect_drive(drive.with_signals(*signals), CAR).ways[0].accuracy
+        for signals in ((fast, speed), slow)
+    ]
+    assert best == ["0.5–2.5 %", "1–2 %"]
+
+
+def every_fourth(signal):
+    return Signal(signal.name, signal.time[::4], signal.values[::4])

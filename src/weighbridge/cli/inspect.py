@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 import typer
 
 from weighbridge.cli.options import DbcPaths, DrivePaths, MappingPath, load, mapping_for
-from weighbridge.cli.terminal import console, shown
+from weighbridge.cli.terminal import console, say, shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,7 +46,30 @@ def inspect(
     if not screen.is_terminal:
         screen.width = _WIDTH
     for path in drives:
-        _show(screen, inspect_drive(load(path, chosen, dbc), car), every_way)
+        found = inspect_drive(load(path, chosen, dbc), car)
+        _show(screen, found, every_way)
+        say(_next(found, path, mapping, vehicle, dbc))
+
+
+def _next(
+    found: Inspection,
+    path: Path,
+    mapping: Path | None,
+    vehicle: Path | None,
+    dbc: list[str] | None,
+) -> str:
+    """Say what to type next."""
+    if any(p.serious for p in found.problems):
+        return "next: settle what is serious above, then inspect again"
+    if not any(w.possible and w.torque != "speed" for w in found.ways):
+        return "next: record what the nearest way lacks"
+    named = (f"--dbc {d}" for d in dbc or ())
+    more = " ".join((*([f"--mapping {mapping}"] if mapping is not None else []), *named))
+    if vehicle is not None:
+        words = f"weigh {path} --vehicle {vehicle} {more}"
+    else:
+        words = f"calibrate {path} --mass KG -o vehicle.toml {more}"
+    return f"next: weighbridge {words.rstrip()}"
 
 
 def _show(screen: Console, found: Inspection, every_way: bool) -> None:
@@ -115,7 +138,7 @@ def _way_table(found: Inspection, every_way: bool) -> Table:
     if not any(w.torque != "speed" for w in ways):
         ways = [found.ways[0], *ways]
     table = Table()
-    for name in ("way to weigh by", "expect", "because", "lacks"):
+    for name in ("way to weigh by", "expect (one std)", "limited by", "lacks"):
         table.add_column(name)
     for w in ways:
         mark = " (weigh goes this way)" if w.chosen else ""

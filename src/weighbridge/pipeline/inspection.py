@@ -71,7 +71,8 @@ class Way:
         "speed" where it is taken as proportional to the speed
     possible : whether nothing is missing
     needs : what is missing
-    accuracy : what to expect of the mass after a calibration, "none" where no mass comes of it
+    accuracy : what to expect of the mass after a calibration, as a standard deviation; "none"
+        where no mass comes of it
     because : what limits it
     chosen : the way `weigh` would go with the vehicle file given
     """
@@ -124,20 +125,25 @@ _TORQUES: Final[dict[TorqueSource, str]] = {
     "air_flow": "air flow",
 }
 
-# Half-width of what to expect of a mass [%], best to worst, and what sets it. The range of
-# "load" by IMU is what Jensen et al. 2022 report; the others are graded from it.
-_MOTION_LIMITS: Final[dict[MotionSource, tuple[float, str]]] = {
-    "inertial": (1.0, "the IMU sees acceleration and grade at once"),
-    "longitudinal_accel": (1.0, "the accelerometer sees acceleration and grade at once"),
-    "speed_grade": (2.5, "acceleration and grade come from smoothed speed and height"),
-    "speed": (5.0, "grade is unknown, so only level roads can be weighed on"),
+FAST: Final = 2.9
+"""Readings of torque or load per second from which they are in time for the motion [1/s]."""
+
+_EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
+    ("inertial", True): (0.5, 2.5, "what the torque's reading is worth, squat and wind"),
+    ("inertial", False): (1.0, 2.0, "how late slow readings are"),
+    ("longitudinal_accel", True): (1.5, 3.5, "the lean of the accelerometer, the torque's scale"),
+    ("longitudinal_accel", False): (2.0, 4.0, "how late slow readings are, the sensor's lean"),
+    ("speed_grade", True): (2.0, 3.0, "acceleration and grade come from smoothed speed and height"),
+    ("speed_grade", False): (3.0, 5.0, "acceleration comes from slowly polled speed"),
+    ("speed", True): (4.0, 5.0, "no grade is measured"),
+    ("speed", False): (5.0, 8.0, "no grade is measured, and speed is slowly polled"),
 }
-_TORQUE_LIMITS: Final[dict[TorqueSource, tuple[float, str]]] = {
-    "measured": (2.0, "torque is measured or well modelled"),
-    "percent": (3.0, "torque is the engine control's own estimate"),
-    "load": (5.0, "engine load is only roughly linear in torque"),
-    "air_flow": (6.0, "air flow says little of efficiency and ignition"),
-}
+"""Standard deviation of a mass, best to worst [%], and what sets it, by motion and whether the
+torque is read at `FAST` or more: the drives of the README's table. Of slow speed alone and of a
+slow longitudinal accelerometer nothing was measured; theirs are graded from the others."""
+
+_AIR_FLOW: Final = (1.0, "air flow says little of efficiency and ignition")
+"""What air flow adds to both [%]; graded, not measured."""
 
 
 def inspect_drive(drive: Drive, vehicle: Vehicle | None = None) -> Inspection:
@@ -228,12 +234,12 @@ def quantisation(values: Floats) -> float | None:
 
 def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
     ways = []
-    for motion, (motion_limit, motion_reason) in _MOTION_LIMITS.items():
-        for torque, (torque_limit, torque_reason) in _TORQUE_LIMITS.items():
+    for motion in _MOTIONS:
+        for torque in _TORQUES:
             needs = (*_motion_needs(drive, motion), *_torque_needs(drive, torque, vehicle))
-            best = max(motion_limit, 0.5 * torque_limit)
-            worst = motion_limit + torque_limit
-            reason = motion_reason if motion_limit > torque_limit else torque_reason
+            best, worst, reason = _EXPECTED[motion, _is_fast(drive, torque)]
+            if torque == "air_flow":
+                best, worst, reason = best + _AIR_FLOW[0], worst + _AIR_FLOW[0], _AIR_FLOW[1]
             ways.append(
                 (
                     worst,
@@ -242,13 +248,19 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
                         torque=torque,
                         possible=not needs,
                         needs=tuple(dict.fromkeys(needs)),
-                        accuracy=f"{best:.0f}–{worst:.0f} %",
+                        accuracy=f"{best:g}–{worst:g} %",
                         because=reason,
                     ),
                 )
             )
     ways.sort(key=lambda w: (not w[1].possible, len(w[1].needs), w[0]))
     return _mark_chosen([*(w for _, w in ways), _by_speed_alone(drive)], vehicle)
+
+
+def _is_fast(drive: Drive, torque: TorqueSource) -> bool:
+    """Whether the slowest signal of a torque is read at `FAST` or more."""
+    read = [s for name in SIGNALS[torque] if (s := drive.get(name)) is not None and len(s) > 1]
+    return all(s.period > 0.0 and 1.0 / s.period >= FAST for s in read)
 
 
 def _by_speed_alone(drive: Drive) -> Way:
@@ -267,7 +279,7 @@ def _by_speed_alone(drive: Drive) -> Way:
 def _mark_chosen(ways: list[Way], vehicle: Vehicle | None) -> tuple[Way, ...]:
     """Mark the way that `weigh` goes: the vehicle file's torque, the best motion."""
     source = vehicle.torque.source if vehicle is not None else None
-    order = list(_MOTION_LIMITS)
+    order = list(_MOTIONS)
     possible = [w for w in ways if w.possible and w.torque == source]
     best = min(possible, key=lambda w: order.index(w.motion), default=None)
     return tuple(replace(w, chosen=True) if w is best else w for w in ways)
