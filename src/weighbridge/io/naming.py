@@ -146,7 +146,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "latitude": ("latitude", "lat", "breitengrad", "breite", "latitud", "latitudine", "gps latitude", "latitude deg", "gps lat", "position latitude"),
     "longitude": ("longitude", "lon", "lng", "long", "langengrad", "lange", "longitud", "longitudine", "gps longitude", "gps lon", "gps long", "gps lng"),
     "altitude": ("altitude", "alt", "height", "elevation", "ele", "hohe", "altitud", "altitudine", "gps altitude", "gps alt", "gps height", "hauteur", "altura", "msl altitude", "height above msl", "location altitude"),
-    "gnss_speed": ("gpsspeed", "gps speed", "speed gps", "gnss speed", "speed over ground", "gps geschwindigkeit", "vitesse gps", "velocidad gps", "location speed", "gps velocity", "sog", "velocita gps", "geschwindigkeit gps"),
+    "gnss_speed": ("gp sspeed", "gps speed", "speed gps", "gnss speed", "speed over ground", "gps geschwindigkeit", "vitesse gps", "velocidad gps", "location speed", "gps velocity", "sog", "velocita gps", "geschwindigkeit gps"),
     "gnss_course": ("course", "heading", "bearing", "gps course", "gps bearing", "gps heading", "course over ground", "cog", "kurs", "cap", "rumbo", "track angle", "location course", "direction", "gps direction", "location bearing"),
     "hdop": ("hdop", "horizontal dilution of precision", "dop", "gps hdop"),
     "gnss_accuracy": ("horizontal accu", "accuracy", "gps accuracy", "horizontal accuracy", "genauigkeit", "precision", "location accuracy", "location horizontal accuracy", "position accuracy", "h accuracy", "gps horizontal accuracy"),
@@ -268,7 +268,8 @@ def _kept(bracketed: str) -> str:
     """What stands in brackets, where it is a word and no unit."""
     word = bracketed.strip()
     plain = len(_WORD.findall(word.lower())) and word.lower() not in _MARKS
-    return f" {word} " if plain and len(word) > 2 and unit_suffix(word) is None else " "
+    told = word.lower() == "gps" or unit_suffix(word) is None
+    return f" {word} " if plain and len(word) > 2 and told else " "
 
 
 def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
