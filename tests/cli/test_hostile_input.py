@@ -306,6 +306,23 @@ def test_loops_devices_and_what_is_no_file(refused, tmp_path):
     refused("convert", GOLDEN / "csv", tmp_path / "loop", "--force", said="cannot be written")
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        'BO_ 291 M: 8 A\n SG_ s : 0|999999999@1+ (1,0) [0|0] "km/h" A\n',
+        'BO_ 291 M: 8 A\n SG_ s : 99999999999|8@1+ (1,0) [0|0] "km/h" A\n',
+        'BO_ 291 M: 999999999 A\n SG_ s : 0|8@1+ (1,0) [0|0] "km/h" A\n',
+        f'BO_ {"9" * 5000} M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|0] "km/h" A\n',
+        f'BO_ 291 M: 8 A\n SG_ s : 0|{"9" * 5000}@1+ (1,0) [0|0] "km/h" A\n',
+        'BO_ 1 M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|0] "' + "x" * 3_000_000,
+    ],
+)
+def test_databases(refused, tmp_path, body):
+    dbc = tmp_path / "x.dbc"
+    dbc.write_text(f'VERSION ""\nBU_: A\n{body}')
+    refused("inspect", GOLDEN / "can.blf", "--dbc", dbc, said="x.dbc")
+
+
 def limited() -> None:
     """Let files of this process end at 2000 bytes, as a full disk would."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))

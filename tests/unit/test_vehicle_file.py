@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from weighbridge.errors import ConfigError
-from weighbridge.signals.visible import visible
 from weighbridge.vehicle.file import load_vehicle, save_vehicle
 from weighbridge.vehicle.model import (
     DraggedReading,
@@ -22,6 +21,7 @@ from weighbridge.vehicle.model import (
     TorqueModel,
     Vehicle,
 )
+from weighbridge.visible import visible
 
 positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from weighbridge.signals.visible import (
+from weighbridge.visible import (
     LONGEST,
     cut,
     plain_json,

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from weighbridge import whole
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import read_drive, write_table
 from weighbridge.io.write import DRIVE_FILES
-from weighbridge.signals import whole
-from weighbridge.signals.whole import PART, REPLACING, whole_file, whole_folder, write_whole
+from weighbridge.whole import PART, REPLACING, whole_file, whole_folder, write_whole
 
 TABLE = "time_s,vehicle_speed_kmh\n0,{}\n1,20\n2,30\n"
 
@@ -67,7 +67,7 @@ def test_an_error_at_the_end_leaves_the_old_file(tmp_path, monkeypatch, step):
 
 KILLED = """
 import sys, os, signal
-from weighbridge.signals.whole import whole_file
+from weighbridge.whole import whole_file
 with whole_file(sys.argv[1]) as part, part.open("w") as file:
     for k in range(1000):
         file.write("half of a result " * 100)
@@ -155,7 +155,7 @@ def test_devices_stay():
 def test_standard_output_in_a_file_is_added_to(tmp_path):
     out = tmp_path / "out.txt"
     code = (
-        "from weighbridge.signals.whole import write_whole\n"
+        "from weighbridge.whole import write_whole\n"
         "print('before')\nwrite_whole('/dev/stdout', 'whole\\n')\nprint('after')"
     )
     with out.open("wb") as stream:
@@ -241,7 +241,7 @@ SWAP_KILLED = """
 import os, signal, sys
 from pathlib import Path
 from weighbridge.io.write import DRIVE_FILES
-from weighbridge.signals.whole import whole_folder
+from weighbridge.whole import whole_folder
 real, left = Path.replace, [int(sys.argv[2])]
 def replace(self, target):
     if left[0] == 0:

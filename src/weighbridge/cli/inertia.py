@@ -56,8 +56,8 @@ def inertia(
     Example: weighbridge inertia ride/ --vehicle truck.toml --report ride.html
     """
     from weighbridge.pipeline.inertia import estimate_inertia
-    from weighbridge.signals.whole import write_whole
     from weighbridge.vehicle.model import Vehicle
+    from weighbridge.whole import write_whole
 
     car = Vehicle.load(vehicle)
     chosen = mapping_for(mapping, car, vehicle)

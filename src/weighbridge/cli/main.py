@@ -27,9 +27,9 @@ from weighbridge.cli import (
     vehicle,
     weigh,
 )
-from weighbridge.cli.terminal import complain, guarded, leave_quietly, say
+from weighbridge.cli.terminal import STREAM, complain, guarded, leave_quietly, say
 from weighbridge.errors import WeighbridgeError
-from weighbridge.signals.visible import visible_text
+from weighbridge.visible import visible_text
 
 _INTERRUPTED: Final = 130
 _NOBODY_READS: Final = 141
@@ -92,8 +92,7 @@ def run() -> None:
             code = _INTERRUPTED if interrupted else _failed(error)
         if interrupted:
             code = _INTERRUPTED
-    if code not in (None, 0):
-        sys.exit(code)
+    sys.exit(code)
 
 
 def _started(words: list[str]) -> int | str | None:
@@ -114,9 +113,10 @@ def _failed(error: Exception) -> int:
         return _NOBODY_READS
     elif isinstance(error, OSError):
         # The machine's fault, not ours: a full disk, a name too long, a folder closed to us.
-        if error.filename is None:
+        if error.filename == STREAM:
             leave_quietly()
-        complain(f"weighbridge: {error.filename or 'standard output'}: {error.strerror or error}")
+        place = f"{error.filename}: " if error.filename else ""
+        complain(f"weighbridge: {place}{error.strerror or error}")
     elif isinstance(error, MemoryError):
         complain("weighbridge: the memory is full; close other programs, or give shorter drives")
     elif hasattr(error, "format_message"):

@@ -46,7 +46,7 @@ def map_log(
     from weighbridge.errors import DriveError
     from weighbridge.io.draft import draft
     from weighbridge.io.mapping_text import mapping_text
-    from weighbridge.signals.whole import whole_file
+    from weighbridge.whole import whole_file
 
     if output is not None:
         refuse_results(inputs(logs), [Result("--output", output, "mapping")])

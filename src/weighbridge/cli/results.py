@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.errors import ConfigError
-from weighbridge.signals.whole import is_stream
+from weighbridge.whole import is_stream
 
 Kind = Literal["report", "JSON file", "track", "vehicle file", "mapping", "MF4"]
 

@@ -8,9 +8,9 @@ import io
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Final, TextIO
+from typing import IO, TYPE_CHECKING, Any, Final, TextIO, cast
 
-from weighbridge.signals.visible import cut, plain_json, visible, visible_json, visible_text
+from weighbridge.visible import cut, plain_json, visible, visible_json, visible_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,6 +21,9 @@ _PLAIN: Final = {
     "’": "'", "“": '"', "”": '"', "×": "x", "é": "e", "ä": "ae", "ö": "oe", "ü": "ue", "ã": "a",
     "ß": "ss", "→": "->", "≥": ">=", "≤": "<=", "µ": "u", "μ": "u", "σ": "sigma", "α": "alpha",
 }  # fmt: skip
+
+STREAM: Final = "standard output"
+"""What errors call a stream."""
 
 _ERRORS: Final = "weighbridge.plain"
 
@@ -47,12 +50,14 @@ class Terminal(io.TextIOBase):
 
     def write(self, text: str) -> int:
         """Write text."""
-        self.below.write(text if self.styled else visible_text(text))
+        with _named():
+            self.below.write(text if self.styled else visible_text(text))
         return len(text)
 
     def flush(self) -> None:
         """Flush the stream below."""
-        self.below.flush()
+        with _named():
+            self.below.flush()
 
     def isatty(self) -> bool:
         """Tell whether a person reads along."""
@@ -75,6 +80,16 @@ class Terminal(io.TextIOBase):
     def errors(self) -> str | None:  # type: ignore[override]
         """What happens to letters that the encoding lacks."""
         return self.below.errors
+
+
+@contextlib.contextmanager
+def _named() -> Iterator[None]:
+    """Name the stream in an error, as errors of files name theirs."""
+    try:
+        yield
+    except OSError as e:
+        e.filename = e.filename or STREAM
+        raise
 
 
 @contextlib.contextmanager
@@ -152,4 +167,5 @@ def console(*, stderr: bool = False, **settings: Any) -> Console:
             raise
 
     stream = sys.stderr if stderr else sys.stdout
-    return SafeConsole(file=getattr(stream, "below", stream), **settings)
+    below = stream.below if isinstance(stream, Terminal) else stream
+    return SafeConsole(file=cast("IO[str]", Terminal(below, styled=True)), **settings)

@@ -62,8 +62,8 @@ def weigh(
     Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
     """
     from weighbridge.errors import ConfigError, WeighbridgeError
-    from weighbridge.signals.whole import write_whole
     from weighbridge.vehicle.model import Vehicle
+    from weighbridge.whole import write_whole
 
     if track is not None and len(drives) > 1:
         raise ConfigError("--track takes one drive; weigh them one by one, or use --json")
@@ -128,7 +128,7 @@ def _failure(path: Path, why: str, car: Vehicle, method: str) -> str:
     import json
 
     from weighbridge.pipeline.weighing import empty_result
-    from weighbridge.signals.visible import visible, visible_json
+    from weighbridge.visible import visible, visible_json
 
     failed = empty_result(visible(path.name), car.name, method, why)
     return visible_json(json.dumps(failed, ensure_ascii=False))

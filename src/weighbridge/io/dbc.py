@@ -23,6 +23,13 @@ from weighbridge.signals import Bools, Floats
 DbcSource = str | Path
 """A DBC file, for one bus alone where it is written ``1:file.dbc``."""
 
+# Where a signal lies, and how long a message is. The library makes room for every bit told.
+_PLACES: Final = re.compile(r":\s*(\d+)\s*\|\s*(\d+)\s*@")
+_SIZES: Final = re.compile(r"\bBO_\s+\d+\s+\w+\s*:\s*(\d+)")
+
+MOST_BITS: Final = 65_536
+"""Bits of a message: ISO 15765-2 carries 4095 bytes, J1939-21 1785."""
+
 # Characters of a library's message that help.
 _LONGEST_REASON: Final = 200
 
@@ -92,6 +99,7 @@ def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
             raise ConfigError(f"--dbc {path}: no such file") from None
         except OSError as error:
             raise ConfigError(f"--dbc {path} cannot be read: {error.strerror or error}") from None
+        _refuse_endless(path, text)
         try:
             database = cantools.database.load_string(text, "dbc", strict=False)
         # The library's errors on text that is no DBC are of many kinds.
@@ -103,6 +111,19 @@ def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
             raise ConfigError(f"--dbc {path} defines no message; name another file")
         databases.append(Database(path, channel, messages))
     return tuple(databases)
+
+
+def _refuse_endless(path: Path, text: str) -> None:
+    """Refuse signals and messages that no bus carries: reading them takes minutes."""
+    numbers = [n for found in _PLACES.finditer(text) for n in found.groups()]
+    numbers += [found.group(1) for found in _SIZES.finditer(text)]
+    for number in numbers:
+        # The length first: Python reads no whole number of thousands of digits.
+        if len(number.lstrip("0")) > len(str(MOST_BITS)) or int(number) > MOST_BITS:
+            raise ConfigError(
+                f"--dbc {path}: a signal or message of {number[:20]} bits or bytes; {MOST_BITS} "
+                "are the most, correct the file"
+            )
 
 
 def message_frames(frames: Frames, database: Database) -> dict[str, NDArray[np.intp]]:

@@ -40,8 +40,8 @@ from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.table import read_parquet, read_text, start_text
 from weighbridge.signals import Drive, DriveInfo, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
-from weighbridge.signals.visible import visible
-from weighbridge.signals.whole import REPLACING
+from weighbridge.visible import visible
+from weighbridge.whole import REPLACING
 
 _logger = logging.getLogger(__name__)
 

@@ -21,7 +21,7 @@ from weighbridge.io.quiet import first_line
 from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
 from weighbridge.signals.units import from_si
-from weighbridge.signals.whole import whole_file, whole_folder
+from weighbridge.whole import whole_file, whole_folder
 
 TableFormat = Literal["csv", "parquet"]
 

@@ -51,8 +51,8 @@ from weighbridge.pipeline.ride_checks import (
     ride_samples,
 )
 from weighbridge.signals import Drive, Floats
-from weighbridge.signals.visible import visible_json
 from weighbridge.vehicle.model import MASS_RANGE, Ride, Vehicle
+from weighbridge.visible import visible_json
 
 if TYPE_CHECKING:
     import polars as pl

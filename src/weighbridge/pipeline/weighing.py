@@ -24,11 +24,11 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
-from weighbridge.signals.visible import visible_json
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
 from weighbridge.vehicle.torque import SIGNALS
+from weighbridge.visible import visible_json
 
 if TYPE_CHECKING:
     import polars as pl

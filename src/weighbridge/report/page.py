@@ -34,8 +34,8 @@ from weighbridge.report.text import (
     sentence,
     signed_kg,
 )
-from weighbridge.signals.visible import shown_json, visible, visible_text
-from weighbridge.signals.whole import write_whole
+from weighbridge.visible import shown_json, visible, visible_text
+from weighbridge.whole import write_whole
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.calibrating import Calibration

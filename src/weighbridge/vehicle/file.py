@@ -18,7 +18,6 @@ from tomlkit.items import Table
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals.tomlfile import Section, exact_text, read_toml
-from weighbridge.signals.whole import write_whole
 from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import (
     FORMAT_VERSION,
@@ -33,6 +32,7 @@ from weighbridge.vehicle.model import (
     TorqueModel,
     Vehicle,
 )
+from weighbridge.whole import write_whole
 
 Kind = Literal["text", "texts", "number", "numbers", "count"]
 

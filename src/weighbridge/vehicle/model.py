@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.errors import ConfigError
-from weighbridge.signals.visible import visible
+from weighbridge.visible import visible
 
 FORMAT_VERSION: Final = 1
 """Version of the vehicle file this program writes and reads."""
