@@ -255,9 +255,9 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     if method not in ESTIMATORS:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
 
-    from weighbridge.checks import check_drive
+    from weighbridge.checks import settle_drive
 
-    drive = drive.with_problems(*check_drive(drive, vehicle))
+    drive = settle_drive(drive, vehicle)
     for problem in drive.problems:
         if problem.serious:
             raise DriveError(f"{drive.name}: {problem.text}")
