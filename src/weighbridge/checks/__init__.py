@@ -19,6 +19,7 @@ from weighbridge.checks.speed import check_scales
 from weighbridge.checks.travel import check_sign, check_standstill
 from weighbridge.checks.values import check_load, check_pressure, check_range, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
+from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
 from weighbridge.signals.timeline import one_recording
 from weighbridge.vehicle.model import Vehicle
@@ -69,7 +70,7 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     found = tuple(check_overlap(drive, vehicle))
     if any(p.serious for p in found):
         return drive.with_problems(*found)
-    drive = without_strays(drive, vehicle)
+    drive = mend_clocks(without_strays(drive, vehicle))
     problems = [*drive.problems[len(told) :], *found]
     if not any(p.serious for p in problems):
         problems += (
