@@ -202,3 +202,13 @@ def test_a_drive_made_of_broken_signals_is_mended(sane):
     assert np.isfinite(found.values).all()
     assert (np.diff(found.time) > 0.0).all()
     assert len(found) == len(s) - 2
+
+
+def test_a_drive_made_with_whole_seconds_is_spread(sane):
+    """Stamps that repeat are no rate without end."""
+    floored = [replace(sane.signals[n], time=np.floor(sane.signals[n].time)) for n in OBD]
+    settled = settle_drive(sane.with_signals(*floored), CAR)
+    assert not any(p.serious for p in settled.problems)
+    found = settled.signals["vehicle_speed"]
+    assert len(found) == len(sane.signals["vehicle_speed"])
+    assert np.abs(found.time - sane.signals["vehicle_speed"].time).max() < 0.3

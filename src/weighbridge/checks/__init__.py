@@ -21,7 +21,7 @@ from weighbridge.checks.values import check_load, check_pressure, check_range, c
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
-from weighbridge.signals.timeline import one_recording
+from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle.model import Vehicle
 
 __all__ = ["check_drive", "settle_drive"]
@@ -63,14 +63,17 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
         serious ones first. What is wrong with a signal that a person vouches for
         (``drive.info.trusted``) is never serious.
     """
+    told = drive.problems
+    drive = well_formed(drive)
     if found := tuple(check_rates(drive, vehicle)):
         return drive.with_problems(*found)
-    told = drive.problems
     drive = one_recording(drive)
     found = tuple(check_overlap(drive, vehicle))
     if any(p.serious for p in found):
         return drive.with_problems(*found)
-    drive = mend_clocks(without_strays(drive, vehicle))
+    drive = without_strays(drive, vehicle)
+    if not any(p.serious for p in check_range(drive, vehicle)):
+        drive = mend_clocks(drive)
     problems = [*drive.problems[len(told) :], *found]
     if not any(p.serious for p in problems):
         problems += (

@@ -28,6 +28,8 @@ _LEVEL: Final = 20.0
 # Pieces of a drive, and how far they lie apart [s].
 _PIECE: Final = 180.0
 _HOP: Final = 90.0
+# A step is found to within so long: means over `_LEVEL` hold both of its sides [s].
+_ABOUT: Final = 15.0
 # Gaps across which force and speed are not followed [s].
 _FORCE_GAP: Final = 0.5
 _SPEED_GAP: Final = 3.0
@@ -139,6 +141,45 @@ def find_offset(accel: Sequence[Signal], speed: Signal) -> float | None:
         return None
     shift = best if best < axes.shape[0] else best - size
     return start - (first + shift * STEP)
+
+
+def locate_step(
+    accel: Sequence[Signal], speed: Signal, cut: tuple[float, float], lags: tuple[float, float]
+) -> tuple[float, float]:
+    """Narrow the time in which the lag of a speed steps from one value to another [s].
+
+    Parameters
+    ----------
+    accel : specific force of the three sensor axes
+    speed : by the clock that steps
+    cut : in which the step lies, by that clock [s]
+    lags : before and after it [s]
+
+    Returns
+    -------
+    start, end : about the instant at which the force at the one lag, and then at the other,
+        explains the speed best
+    """
+    start = max(cut[0] - _PIECE, float(speed.time[0]))
+    end = min(cut[1] + _PIECE, float(speed.time[-1]))
+    grid = np.arange(start, end, STEP)
+    x, seen = _speed_changes(speed, grid)
+    x = _high_passed(x, seen)
+    sides = []
+    for lag in lags:
+        changes, felt = _force_changes(accel, grid - lag)
+        sides.append(np.column_stack([_high_passed(c, felt) for c in changes]))
+        seen &= felt
+    sure = seen & ((grid < cut[0]) | (grid > cut[1]))
+    rows = np.where((grid < cut[0])[:, None], sides[0], sides[1])[sure]
+    if rows.shape[0] < 100:
+        return cut
+    fit, *_ = np.linalg.lstsq(rows, x[sure], rcond=None)
+    before, after = (np.where(seen, (x - side @ fit) ** 2, 0.0) for side in sides)
+    cost = np.cumsum(before) + np.sum(after) - np.cumsum(after)
+    cost[(grid < cut[0]) | (grid > cut[1])] = np.inf
+    at = float(grid[int(np.argmin(cost))])
+    return max(at - _ABOUT, cut[0]), min(at + _ABOUT, cut[1])
 
 
 def _speed_changes(speed: Signal, grid: Floats) -> tuple[Floats, Bools]:

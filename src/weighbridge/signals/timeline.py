@@ -42,44 +42,8 @@ class _Piece:
 _Part = list[_Piece]
 
 
-def one_recording(drive: Drive) -> Drive:
-    """Leave the stamps out that lie hours from the rest of a drive.
-
-    A computer without a clock starts in 1970 and jumps to the date; a damaged stamp lies
-    anywhere. Of the parts between which nothing was recorded for hours, the one with most of
-    the samples is kept. The part before or after it is joined where the vehicle moved on at the
-    same speed, so that the clock was set and the recording went on.
-
-    Parameters
-    ----------
-    drive : in which the clocks are in seconds
-
-    Returns
-    -------
-    Drive
-        The drive itself where nothing is wrong; else what was left out or joined is in its
-        ``problems``. Afterwards all clocks rise, all values are finite, and the time from
-        first to last sample is bounded by the number of samples.
-    """
-    drive = _rising(drive)
-    clocks = {id(s.time): s.time for s in drive.signals.values() if len(s)}
-    if not clocks or drive.duration <= NO_DRIVE:
-        return drive
-    tables = {id(s.time): QUANTITIES[s.name].table for s in drive.signals.values() if len(s)}
-    for limit in _LIMITS:
-        parts = _parts(clocks, limit)
-        best = max(range(len(parts)), key=lambda k: _weight(parts[k], clocks, tables))
-        kept = parts[best]
-        span = max(p.end for p in kept) - min(p.start for p in kept)
-        if span <= max(_SPARE, _IDLE * _recorded(kept, clocks)):
-            break
-    if len(parts) == 1:
-        return drive
-    return _kept(drive, clocks, tables, parts, best)
-
-
-def _rising(drive: Drive) -> Drive:
-    """Leave out what breaks the contract of a signal, in a drive that was made, not read."""
+def well_formed(drive: Drive) -> Drive:
+    """Leave out stamps that do not rise and values that are not finite, in a drive not read."""
     good: dict[int, bool] = {}
     broken: dict[int, list[Signal]] = {}
     for s in drive.signals.values():
@@ -95,6 +59,41 @@ def _rising(drive: Drive) -> Drive:
         drive = drive.without(*(name for name, _ in columns)).with_signals(*found)
         drive = drive.with_problems(*problems)
     return drive
+
+
+def one_recording(drive: Drive) -> Drive:
+    """Leave the stamps out that lie hours from the rest of a drive.
+
+    A computer without a clock starts in 1970 and jumps to the date; a damaged stamp lies
+    anywhere. Of the parts between which nothing was recorded for hours, the one with most of
+    the samples is kept. The part before or after it is joined where the vehicle moved on at the
+    same speed, so that the clock was set and the recording went on.
+
+    Parameters
+    ----------
+    drive : well formed, its clocks in seconds
+
+    Returns
+    -------
+    Drive
+        The drive itself where nothing is wrong; else what was left out or joined is in its
+        ``problems``. Afterwards the time from first to last sample is bounded by the number of
+        samples.
+    """
+    clocks = {id(s.time): s.time for s in drive.signals.values() if len(s)}
+    if not clocks or drive.duration <= NO_DRIVE:
+        return drive
+    tables = {id(s.time): QUANTITIES[s.name].table for s in drive.signals.values() if len(s)}
+    for limit in _LIMITS:
+        parts = _parts(clocks, limit)
+        best = max(range(len(parts)), key=lambda k: _weight(parts[k], clocks, tables))
+        kept = parts[best]
+        span = max(p.end for p in kept) - min(p.start for p in kept)
+        if span <= max(_SPARE, _IDLE * _recorded(kept, clocks)):
+            break
+    if len(parts) == 1:
+        return drive
+    return _kept(drive, clocks, tables, parts, best)
 
 
 def _parts(clocks: dict[int, Floats], limit: float) -> list[_Part]:
