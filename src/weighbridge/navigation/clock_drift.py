@@ -33,11 +33,15 @@ _MIXED: Final = 0.12
 # simulated drives 0.94 and more do, with a speed in steps of 5 km/h 0.25 of a truck's.
 _ENOUGH: Final = 6
 _AGREES: Final = 0.2
+# Clocks are looked at again once they were moved; so often at most.
+_ROUNDS: Final = 4
 # Pieces that must show a lag, and lie on what is mended [-].
 _SHOWN: Final = 0.6
 _FOLLOWS: Final = 0.9
 # How far a piece may lie off what is mended [s].
 _NEAR: Final = 0.25
+# A quarter of a piece [s]: the error of its lag per drift.
+_BLUR: Final = 45.0
 # A sensor's own lateness: speeds are late by this where nothing else is known, and by no more or
 # less than that where their clock is right [s].
 _USUAL: Final = 0.1
@@ -92,6 +96,18 @@ def mend_clocks(drive: Drive) -> Drive:
     Drive
         What was moved is in its ``problems``; serious where the clocks cannot be brought together.
     """
+    mended = _round(drive)
+    for _ in range(_ROUNDS - 1):
+        if mended is drive or any(p.serious for p in mended.problems[len(drive.problems) :]):
+            return mended
+        drive, mended = mended, _round(mended)
+    if all(mended.get(name) is drive.get(name) for name in ("vehicle_speed", "accel_x")):
+        return mended
+    return mended.with_problems(_hopeless("obd", "what was tried does not bring them together"))
+
+
+def _round(drive: Drive) -> Drive:
+    """Move what is seen to be off; the drive itself where nothing is."""
     accel = [s for a in "xyz" if (s := drive.get(f"accel_{a}")) is not None and len(s) > 50]
     if len(accel) < 3:
         return drive
@@ -100,12 +116,13 @@ def mend_clocks(drive: Drive) -> Drive:
         if speed is None or len(speed) < 50:
             continue
         lags = _lags(accel, speed)
+        lost = _lost(lags) if table == "obd" else ()
+        if lost:
+            return _left_out(drive, table, lost)
         path = _judged(lags, table)
         if isinstance(path, Problem):
-            if path.serious:
-                return drive.with_problems(path)
-            drive = drive.with_problems(path)
-        elif path is not None:
+            return drive.with_problems(path)
+        if path is not None:
             path = _narrowed(path, accel, speed)
             found[table] = path
     if len(found) == 2 and _alike(found["obd"], found["gnss"]):
@@ -150,12 +167,12 @@ def _lags(accel: Sequence[Signal], speed: Signal) -> Lags:
 
 def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
-    if table == "obd" and lags.pieces >= _ENOUGH and lags.lag.size < _AGREES * lags.pieces:
+    if table == "obd" and lags.pieces >= _ENOUGH and _strangers(lags):
         return Problem(
             "",
             f"vehicle speed and accelerometer agree in {lags.lag.size} of {lags.pieces} pieces of "
-            "the drive only, whatever the lag between their clocks: a clock jumps all the time, "
-            "or one of the two is wrong; record both by one clock",
+            "the drive only, each at a lag of its own: a clock jumps all the time, or one of the "
+            "two is wrong; record both by one clock",
             serious=True,
         )
     if lags.lag.size < _FEWEST:
@@ -164,22 +181,24 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     time, lag = lags.time[~lone], lags.lag[~lone]
     if lag.size < _FEWEST:
         return None
-    # From piece to piece, so that neither drift nor step counts as scatter.
-    scatter = max(1.0483 * float(np.median(np.abs(np.diff(lag)))), float(np.median(lags.std)))
+    # By second differences, so that neither drift nor step counts as scatter.
+    bends = float(np.median(np.abs(np.diff(lag, 2))))
+    scatter = max(1.4826 * bends / np.sqrt(6.0), float(np.median(lags.std)))
     slope, slope_std, fit = _line(time, lag, scatter)
     span = float(time[-1] - time[0])
     drifts = abs(slope) * span > _DRIFT and abs(slope) > _SURE * slope_std
-    smooth = _median_of_three(lag)
-    wanders = float(np.ptp(smooth)) > _WANDER + 4.0 * scatter
+    allowed = _WANDER + 4.0 * scatter
+    wanders = float(np.ptp(_median_of_three(lag))) > allowed
     apart = not _OWN[0] < float(np.median(lag)) < _OWN[1]
     if not (drifts or wanders or apart):
         return None
     if lags.lag.size < _SHOWN * lags.pieces:
-        if table != "obd":
-            # Poor fixes; the filter leaves out what does not fit.
-            return None
-        return _hopeless(table, lag, "the rest of the drive does not show by how much")
-    if float(np.mean(np.abs(lag - fit) < _NEAR)) >= _FOLLOWS and np.ptp(lag - fit) < 2 * _STEP:
+        # What does not fit of the fixes, the filter leaves out.
+        return _hopeless(table, "most of the drive does not show it") if table == "obd" else None
+    # In a piece of a clock that drifts fast the lag is less sure; the next round sees to the rest.
+    more = _BLUR * abs(slope)
+    follows = float(np.mean(np.abs(lag - fit) < _NEAR + more)) >= _FOLLOWS
+    if follows and np.ptp(_median_of_three(lag - fit)) <= allowed + 2.0 * more:
         slope = slope if drifts else 0.0
         knots = time[[0, -1]]
         told = f"drifts by {1e6 * slope:+.0f} ppm" if drifts else ""
@@ -187,7 +206,32 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     return _broken(time, lag, table)
 
 
-def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem:
+def _strangers(lags: Lags) -> bool:
+    """Tell whether hardly a piece shows a lag, or each another one."""
+    few = lags.lag.size < _AGREES * lags.pieces
+    return few or (lags.lag.size > 2 and float(np.median(np.abs(np.diff(lags.lag, 2)))) > _STEP)
+
+
+def _lost(lags: Lags) -> tuple[tuple[float, float], ...]:
+    """Times in which no piece shows a lag, though nearly all others do [s]."""
+    if lags.lag.size < _FEWEST:
+        return ()
+    time = np.concatenate((lags.time, lags.missed))
+    order = np.argsort(time)
+    time, shown = time[order], (np.arange(time.size) < lags.lag.size)[order]
+    edges = np.diff(np.concatenate(([0], (~shown).astype(np.int8), [0])))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    runs = [(a, b) for a, b in zip(starts, ends, strict=True) if b - a >= _FEWEST]
+    others = time.size - sum(b - a for a, b in runs)
+    if not runs or lags.lag.size < _FOLLOWS * others:
+        return ()
+    return tuple(
+        (float(time[a - 1]) if a else -np.inf, float(time[b]) if b < time.size else np.inf)
+        for a, b in runs
+    )
+
+
+def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     """Follow a lag that changes by steps, or slowly but not evenly."""
     smooth = _median_of_three(lag)
     jumps = np.flatnonzero(np.abs(np.diff(smooth)) > _STEP)
@@ -208,7 +252,7 @@ def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem:
     level = np.concatenate([_median_of_three(lag[p]) for p in parts])
     follows = np.count_nonzero(np.abs(lag - level) < _NEAR) + np.count_nonzero(blended)
     if len(cuts) > _MOST_STEPS or follows < _FOLLOWS * blended.size:
-        return _hopeless(table, lag, "it jumps about")
+        return _hopeless(table, "it jumps about") if table == "obd" else None
     told = "is late by " + f"{float(level.min()):.2f} to {float(level.max()):.2f} s in turn"
     if cuts:
         several = ", ".join(f"{s:+.2f} s" for s in sizes)
@@ -216,14 +260,25 @@ def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem:
     return _Path(time, level, 0.0, tuple(cuts), told)
 
 
-def _hopeless(table: str, lag: Floats, why: str) -> Problem:
+def _hopeless(table: str, why: str) -> Problem:
     return Problem(
         "",
-        f"the clocks of {table} and imu run apart (by {float(np.min(lag)):+.2f} to "
-        f"{float(np.max(lag)):+.2f} s, by speed and acceleration), and {why}: record both by one "
-        "clock, or cut the recording where they agree",
-        # What does not fit of the fixes, the filter leaves out.
-        serious=table == "obd",
+        f"the clocks of {table} and imu run apart, by speed and acceleration, and {why}: record "
+        "both by one clock, or cut the recording where they agree",
+        serious=True,
+    )
+
+
+def _left_out(drive: Drive, table: str, lost: tuple[tuple[float, float], ...]) -> Drive:
+    """Leave the rows of a table out where its speed does not fit the accelerometer at all."""
+    first, last = drive.start, drive.end
+    told = " and ".join(f"{max(a, first):.0f} to {min(b, last):.0f} s" for a, b in lost)
+    return _moved(drive, table, lambda t: t, lost).with_problems(
+        Problem(
+            "",
+            f"from {told} vehicle speed does not fit the accelerometer at any lag of its clock; "
+            f"the rows of {table} were left out there",
+        )
     )
 
 

@@ -55,13 +55,18 @@ class Lags:
     time : (k,) middles of the pieces, by the table's own clock [s]
     lag : (k,) stamp minus the instant of the same motion by the inertial clock [s]
     std : (k,) standard deviation of the lag [s]
-    pieces : number of pieces that were lively enough to show one
+    missed : (j,) middles of pieces lively enough to show a lag that showed none [s]
     """
 
     time: Floats
     lag: Floats
     std: Floats
-    pieces: int
+    missed: Floats
+
+    @property
+    def pieces(self) -> int:
+        """Number of pieces lively enough to show a lag."""
+        return self.lag.size + self.missed.size
 
 
 def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) -> Lags:
@@ -80,7 +85,7 @@ def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) ->
     count = int((end - start) / STEP)
     hop, size = (round(x / STEP) for x in (_HOP, _PIECE))
     if count < size or min(len(s) for s in accel) < 50:
-        return Lags(np.empty(0), np.empty(0), np.empty(0), 0)
+        return Lags(*(np.empty(0) for _ in range(4)))
     grid: Floats = np.asarray(start + STEP * np.arange(count), dtype=np.float64)
     x, seen = _speed_changes(speed, grid)
     x = _high_passed(x, seen)
@@ -110,7 +115,7 @@ def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) ->
         # Force later in the row is force at a smaller lag.
         centre - np.array([found[k][0] for k in at]),
         np.array([found[k][1] for k in at]),
-        len(lively),
+        grid[[k for k in lively if k not in found]] + 0.5 * _PIECE,
     )
 
 

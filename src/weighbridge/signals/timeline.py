@@ -57,7 +57,7 @@ def well_formed(drive: Drive) -> Drive:
         columns = [(s.name, s.values) for s in group]
         found, problems = clean_columns(group[0].time, columns, drive.name)
         drive = drive.without(*(name for name, _ in columns)).with_signals(*found)
-        drive = drive.with_problems(*problems)
+        drive = drive.with_problems(*(p for p in problems if p not in drive.problems))
     return drive
 
 
