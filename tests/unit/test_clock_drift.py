@@ -7,10 +7,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import weighbridge as wb
+from weighbridge.balance.force_balance import smoothed
 from weighbridge.checks import settle_drive
 from weighbridge.errors import DriveError
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.navigation.clock_lag import find_lags
+from weighbridge.navigation.select import find_motion
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import MIDSIZE, Scenario, Sensors, jensen_route, simulate_car
 
@@ -43,6 +45,15 @@ def retimed(drive, tables, change):
         *(replace(s, time=clocks[id(s.time)]) for s in drive.signals.values()
           if id(s.time) in clocks)
     )  # fmt: skip
+
+
+def without_inertial(drive, gaps):
+    """Take the rows of the inertial sensor out of some times."""
+    imu = [s for s in drive.signals.values() if QUANTITIES[s.name].table == "imu"]
+    time = imu[0].time
+    keep = np.logical_and.reduce([(time < a) | (time > b) for a, b in gaps])
+    rest = time[keep]
+    return drive.with_signals(*(replace(s, time=rest, values=s.values[keep]) for s in imu))
 
 
 def lags(drive, speed="vehicle_speed"):
@@ -135,14 +146,19 @@ def test_clocks_seconds_apart_are_no_swapped_axes(made):
 
 def test_a_part_that_fits_at_no_lag_is_left_out(made, car, mass):
     """Minutes of the inertial sensor are lost, and its clock counts rows."""
-    imu = {
-        n: s for n, s in made.drive.signals.items() if QUANTITIES[s.name].table == "imu"
-    }  # fmt: skip
-    keep = next(iter(imu.values())).time
-    keep = (keep < 500.0) | (keep > 600.0)
-    cut = made.drive.with_signals(
-        *(replace(s, time=s.time[keep], values=s.values[keep]) for s in imu.values())
-    )
+    cut = without_inertial(made.drive, [(500.0, 600.0)])
     told = wb.weigh(retimed(cut, {"imu"}, lambda t: np.where(t > 550.0, t - 99.9, t)), car)
     assert any("at any lag of its clock; the rows of obd were left out" in w for w in told.warnings)
     assert told.mass == pytest.approx(mass, rel=0.02)
+
+
+def test_a_gap_of_the_inertial_sensor_leaks_no_zeros(made):
+    """A lag passes on what stood in the gap; what is valid behind it must not hold any of that."""
+    gaps = [(at, at + 2.0) for at in np.arange(200.0, 1300.0, 50.0)]
+    whole = smoothed(find_motion(made.drive), 0.3)
+    gapped = smoothed(find_motion(without_inertial(made.drive, gaps)), 0.3)
+    behind = np.logical_or.reduce([(whole.time > b) & (whole.time < b + 2.0) for _, b in gaps])
+    rows = behind & gapped.valid & whole.valid
+    assert np.count_nonzero(rows) > 200
+    off = (gapped.specific_force - whole.specific_force)[rows]
+    assert np.sqrt(np.mean(off**2)) < 0.1
