@@ -112,7 +112,11 @@ def test_fuel_counts_in_a_calibration(made, car):
     """A fuel rate that is far too high: 200 kg are said to burn in the drive."""
     time = made.drive.signals["vehicle_speed"].time
     rate = np.full(time.size, 200.0 / 790.0 / (time[-1] - time[0]))
-    thirsty = made.drive.with_signals(Signal("fuel_rate", time, rate))
+    # No engine burns so much; who vouches for it is believed.
+    thirsty = replace(
+        made.drive.with_signals(Signal("fuel_rate", time, rate)),
+        info=replace(made.drive.info, trusted=("fuel_rate",)),
+    )
     lighter = wb.calibrate([thirsty], mass=made.scenario.mass)
     told = wb.weigh(made.drive, lighter).mass
     assert told == pytest.approx(wb.weigh(made.drive, car).mass - 100.0, abs=40.0)
@@ -178,7 +182,7 @@ def test_a_mass_that_no_load_explains_is_refused(balance, car, factor, status):
         assert "times the" in found.why
 
 
-@pytest.mark.parametrize("late", [-1.0, 1.0, 2.0])
+@pytest.mark.parametrize("late", [-1.0, 1.0, 1.5])
 def test_torque_on_another_clock_is_refused(made, car, late):
     recorded = {
         name: Signal(name, s.time + late, s.values)

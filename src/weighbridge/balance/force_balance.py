@@ -433,16 +433,35 @@ def headwind(drive: Drive, heading: Floats) -> Floats:
     return np.asarray(np.where(np.isfinite(along), along, 0.0))
 
 
+_FORGOTTEN: Final = 2.0
+"""Time constants after which a first-order lag has forgotten a gap that a line bridges [-]."""
+
+_LONG_GAP: Final = 0.5
+"""Across less a line is near to what was not seen [s]."""
+
+
 def smoothed(motion: Motion, lag: float) -> Motion:
     """Pass what the force side is compared with through a first-order lag [s]."""
     if lag <= 0.0:
         return motion
     return replace(
         motion,
+        valid=_settled(motion.valid, motion.rate, lag),
         specific_force=behind(motion.specific_force, motion.rate, lag),
         accel=behind(motion.accel, motion.rate, lag),
         grade=behind(motion.grade, motion.rate, lag),
     )
+
+
+def _settled(valid: Bools, rate: float, lag: float) -> Bools:
+    """Take out what follows long gaps, too, as long as a lag passes on what was not seen there."""
+    edges = np.diff(np.concatenate(([0], (~valid).astype(np.int8), [0])))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    long = ends - starts > _LONG_GAP * rate
+    change = np.zeros(valid.size + 1, dtype=np.int64)
+    np.add.at(change, ends[long], 1)
+    np.add.at(change, np.minimum(ends[long] + round(_FORGOTTEN * lag * rate), valid.size), -1)
+    return np.asarray(valid & (np.cumsum(change)[:-1] == 0))
 
 
 def behind(values: Floats, rate: float, lag: float) -> Floats:

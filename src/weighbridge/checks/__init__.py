@@ -11,24 +11,24 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from weighbridge.checks.clocks import check_long_gaps, check_overlap, check_pauses, check_rates
+from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates
 from weighbridge.checks.engine import check_engine_speed, check_friction, check_whole_torque
 from weighbridge.checks.inertial import check_imu
+from weighbridge.checks.ranges import within_ranges, without_strays
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.travel import check_sign, check_standstill
 from weighbridge.checks.values import check_load, check_pressure, check_range, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
+from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
+from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle.model import Vehicle
 
-__all__ = ["check_drive"]
+__all__ = ["check_drive", "settle_drive"]
 
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
 _CHECKS: Final[tuple[_Check, ...]] = (
-    check_rates,
-    check_overlap,
-    check_long_gaps,
     check_pauses,
     check_stuck,
     check_load,
@@ -45,23 +45,52 @@ _CHECKS: Final[tuple[_Check, ...]] = (
 )
 
 
-def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, ...]:
-    """Look for what cannot be so in a drive.
+def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
+    """Judge a drive, and leave out of it what cannot be so.
+
+    Clocks come first: what is laid on an even grid later grows with the time from first to last
+    stamp. Where they are seriously wrong, nothing else is looked at.
 
     Parameters
     ----------
-    drive : the drive as read
+    drive : the drive as read, or as made
     vehicle : its gearings help to judge the speed's unit
 
     Returns
     -------
-    What was found, serious problems first. The drive's own ``problems`` (from
-    reading it) are not repeated. What is wrong with a signal that a person vouches for
-    (``drive.info.trusted``) is never serious.
+    Drive
+        On clocks that rise, within physical ranges. What was found is added to its ``problems``,
+        serious ones first. What is wrong with a signal that a person vouches for
+        (``drive.info.trusted``) is never serious.
     """
-    problems = [
-        replace(p, serious=False) if p.signal in drive.info.trusted else p
-        for check in _CHECKS
-        for p in check(drive, vehicle)
-    ]
-    return tuple(sorted(problems, key=lambda p: not p.serious))
+    told = drive.problems
+    drive = well_formed(drive)
+    if found := tuple(check_rates(drive, vehicle)):
+        return drive.with_problems(*found)
+    drive = one_recording(drive)
+    found = tuple(check_overlap(drive, vehicle))
+    if any(p.serious for p in found):
+        return drive.with_problems(*found)
+    drive = without_strays(drive, vehicle)
+    if not any(p.serious for p in check_range(drive, vehicle)):
+        drive = mend_clocks(drive)
+    problems = [*drive.problems[len(told) :], *found]
+    if not any(p.serious for p in problems):
+        problems += (
+            replace(p, serious=False) if p.signal in drive.info.trusted else p
+            for check in _CHECKS
+            for p in check(drive, vehicle)
+        )
+    problems.sort(key=lambda p: not p.serious)
+    return replace(within_ranges(drive), problems=(*told, *problems))
+
+
+def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, ...]:
+    """Look for what cannot be so in a drive; parameters as of `settle_drive`.
+
+    Returns
+    -------
+    What was found, serious problems first. The drive's own ``problems`` (from
+    reading it) are not repeated.
+    """
+    return settle_drive(drive, vehicle).problems[len(drive.problems) :]

@@ -10,11 +10,11 @@ import numpy as np
 
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem
 from weighbridge.signals.catalogue import TABLES
+from weighbridge.signals.cleaning import NO_DRIVE
 from weighbridge.vehicle.model import Vehicle
 
-# A pause in which nothing was recorded is told [s]; no drive has one so long [s].
+# A pause in which nothing was recorded is told [s].
 _PAUSE: Final = 60.0
-_NO_DRIVE: Final = 6 * 3600.0
 
 
 def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -67,24 +67,6 @@ def check_overlap(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             yield Problem("", f"{a} and {b} were recorded together for {shared:.0f} s only")
 
 
-def check_long_gaps(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Find jumps of the clock that no recording makes."""
-    seen: set[int] = set()
-    for s in drive.signals.values():
-        if id(s.time) in seen or len(s) < 2:
-            continue
-        seen.add(id(s.time))
-        step = np.diff(s.time)
-        k = int(np.argmax(step))
-        if step[k] > _NO_DRIVE:
-            yield Problem(
-                s.name,
-                f"the clock of {s.name} jumps by {step[k]:.6g} s after {s.time[k]:.6g} s; "
-                "cut the recording there, or correct that time stamp",
-                serious=True,
-            )
-
-
 def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Tell of times in which nothing was recorded, which a clock set forward looks like, too."""
     clocks: dict[str, dict[int, Floats]] = {}
@@ -131,5 +113,5 @@ def _pauses(time: Floats) -> list[tuple[float, float]]:
     if time.size < 10:
         return []
     step = np.diff(time)
-    pause = (step > max(_PAUSE, 10.0 * float(np.median(step)))) & (step <= _NO_DRIVE)
+    pause = (step > max(_PAUSE, 10.0 * float(np.median(step)))) & (step <= NO_DRIVE)
     return [(float(time[k]), float(step[k])) for k in np.flatnonzero(pause)]

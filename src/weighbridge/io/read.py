@@ -40,6 +40,7 @@ from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.table import read_parquet, read_text, start_text
 from weighbridge.signals import Drive, DriveInfo, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
+from weighbridge.signals.cleaning import NO_DRIVE
 from weighbridge.visible import visible
 from weighbridge.whole import REPLACING
 
@@ -431,13 +432,20 @@ def _joined(
     return Signal(name, clocks[key], np.concatenate([s.values for _, s in parts]))
 
 
+def _begin(time: Floats) -> float:
+    """First stamp of the recording that the middle stamp of a clock is in [s]."""
+    with np.errstate(over="ignore"):
+        jumps = np.flatnonzero(np.diff(time[: time.size // 2 + 1]) > NO_DRIVE)
+    return float(time[jumps[-1] + 1 if jumps.size else 0])
+
+
 def _rebase(logs: Sequence[Log], info: DriveInfo) -> DriveInfo:
     """Count from the drive's first full second where clocks count from 1970."""
     filled = [log for log in logs if log.signals]
     absolute = [log for log in filled if log.absolute]
     if not absolute:
         return info
-    start = float(math.floor(min(float(s.time[0]) for log in absolute for s in log.signals)))
+    start = float(math.floor(min(_begin(s.time) for log in absolute for s in log.signals)))
     for log in absolute:
         shift_clock(log, -start)
     return info if info.start_time is not None else replace(info, start_time=start_text(start))

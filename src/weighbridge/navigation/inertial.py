@@ -50,7 +50,7 @@ from weighbridge.navigation.aiding import (
     speed_from_fixes,
     still_state,
 )
-from weighbridge.navigation.motion import Motion, noise_level
+from weighbridge.navigation.motion import Motion, bridged, noise_level
 from weighbridge.navigation.mounting import TooLittleMotionError, coarse_mounting
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.navigation.timing import estimate_speed_delay
@@ -503,7 +503,7 @@ def _motion(
     cp, sp = np.cos(pitch), np.sin(pitch)
     body_accel = force + GRAVITY * np.column_stack([-sp, cp * np.sin(roll), cp * np.cos(roll)])
     accel = body_accel[:, 0] + yaw0 * body_accel[:, 1] + pitch0 * body_accel[:, 2]
-    held = np.nan_to_num(accel)
+    held = bridged(grid, accel)
     width = max(1, round(0.3 / (grid[1] - grid[0]))) | 1
     lean = np.convolve(np.pad(held, width // 2, mode="edge"), np.full(width, 1.0 / width), "valid")
     grade = pitch - pitch0 - use_squat * lean
@@ -540,8 +540,8 @@ def _motion(
         away = np.minimum(np.abs(grid - fixes.time[right]), np.abs(grid - fixes.time[right - 1]))
         aided = np.minimum(aided, away)
     valid &= aided < 10.0
-    accel = np.where(np.isfinite(accel), accel, 0.0)
-    specific_force = np.where(np.isfinite(specific_force), specific_force, 0.0)
+    # A line across gaps, which are not valid: zeros would leak out of them through later filters.
+    accel, specific_force = bridged(grid, accel), bridged(grid, specific_force)
 
     nothing = np.full(grid.size, np.nan)
     latitude, longitude, altitude = nothing, nothing, nothing

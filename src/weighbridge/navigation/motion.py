@@ -106,6 +106,14 @@ def noise_level(y: Floats) -> float:
     return max(0.005, float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)))
 
 
+def bridged(time: Floats, y: Floats) -> Floats:
+    """Draw a line across what is NaN; values (n,) at ``time``, 0 where all of them are."""
+    known = np.isfinite(y)
+    if known.all():
+        return y
+    return np.interp(time, time[known], y[known]) if known.any() else np.zeros_like(y)
+
+
 def with_squat(motion: Motion, squat: float, std: float) -> Motion:
     """Take another squat out of the grade than the one found in the drive.
 

@@ -25,7 +25,7 @@ from weighbridge.calibration.regression import (
     fit,
     join_rows,
 )
-from weighbridge.checks import check_drive
+from weighbridge.checks import settle_drive
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, HIDDEN_BRAKE_STD, WIDEST, cold_share
 from weighbridge.estimators.regression import regression
@@ -175,11 +175,12 @@ def _checked(
         # Friction in the torque is no fault here: the fit finds it as an offset.
         model = replace(model, source=source, coefficients=(-1.0, 1.0))
     known = replace(base, torque=model)
-    for drive in drives:
-        for problem in check_drive(drive, known):
+    settled = [settle_drive(drive, known) for drive in drives]
+    for drive in settled:
+        for problem in drive.problems:
             if problem.serious:
                 raise DriveError(f"{drive.name}: {problem.text}")
-    return drives, base, masses
+    return settled, base, masses
 
 
 def run_calibration(

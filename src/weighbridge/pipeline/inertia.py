@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from weighbridge.checks import check_drive
+from weighbridge.checks import settle_drive
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.inertia import (
@@ -50,7 +50,7 @@ from weighbridge.pipeline.ride_checks import (
     ride_of,
     ride_samples,
 )
-from weighbridge.signals import Drive, Floats
+from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.vehicle.model import MASS_RANGE, Ride, Vehicle
 from weighbridge.visible import visible_json
 
@@ -365,13 +365,13 @@ def estimate_inertia(
             "every signal of the ride repeats one value: the vehicle stood, or nothing was "
             "measured; drive at 20 km/h or more while recording",
         )
-    problems = [*drive.problems, *check_drive(only), *check_signals(only)]
-    samples = ride_samples(only)
+    settled = settle_drive(only)
+    problems = [*settled.problems, *check_signals(only)]
+    _refuse(drive, problems)
+    samples = ride_samples(settled)
     seen = response(samples, ride)
     problems += check_response(seen) if seen is not None else ()
-    for problem in problems:
-        if problem.serious:
-            raise DriveError(f"{drive.name}: {problem.text}")
+    _refuse(drive, problems)
     warnings = tuple(dict.fromkeys(p.text for p in problems))
     if not samples.period <= SLOWEST:
         return nothing(
@@ -397,6 +397,12 @@ def estimate_inertia(
             warnings,
         )
     return _judged(drive, vehicle, ride, samples, track, seen.slope, warnings)
+
+
+def _refuse(drive: Drive, problems: list[Problem]) -> None:
+    for problem in problems:
+        if problem.serious:
+            raise DriveError(f"{drive.name}: {problem.text}")
 
 
 def _judged(

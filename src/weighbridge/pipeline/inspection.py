@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.balance.speed_balance import SPEEDS
-from weighbridge.checks import check_drive
+from weighbridge.checks import settle_drive
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.navigation.select import IMU_SIGNALS
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
@@ -160,7 +160,10 @@ def inspect_drive(drive: Drive, vehicle: Vehicle | None = None) -> Inspection:
     """
     order = list(QUANTITIES)
     signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
-    problems = (*drive.problems, *check_drive(drive, vehicle), *_by_battery(drive, vehicle))
+    settled = settle_drive(drive, vehicle)
+    problems = settled.problems
+    if not any(p.serious for p in problems):
+        problems += _by_battery(settled, vehicle)
     return Inspection(
         drive=drive,
         signals=tuple(describe(s) for s in signals),

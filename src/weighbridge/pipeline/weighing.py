@@ -256,9 +256,9 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     if method not in ESTIMATORS:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
 
-    from weighbridge.checks import check_drive
+    from weighbridge.checks import settle_drive
 
-    drive = drive.with_problems(*check_drive(drive, vehicle))
+    drive = settle_drive(drive, vehicle)
     for problem in drive.problems:
         if problem.serious:
             raise DriveError(f"{drive.name}: {problem.text}")
@@ -357,7 +357,13 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
             delay = 0.0
             notes += ("the drive does not show how late its torque is; taken as 0 s",)
     elif vehicle.provenance.torque_fitted:
-        _refuse_other_clock(drive, vehicle, motion, delay)
+        later = _other_clock(drive, vehicle, motion, delay)
+        if later:
+            delay += later
+            notes += (
+                f"torque is {_later(later)} against the motion than in the calibration; "
+                "its clock was moved by that",
+            )
     if vehicle.provenance.mass_scale_std is None:
         by_speed = vehicle.provenance.method == "speed-ekf"
         made = "calibrated for speed-ekf alone" if by_speed else "not made by a calibration"
@@ -382,8 +388,8 @@ def other_equipment(vehicle: Vehicle, motion: Motion) -> tuple[str, ...]:
     )
 
 
-def _refuse_other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, delay: float) -> None:
-    """Refuse a drive whose torque is much later or earlier than in the calibration.
+def _other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, delay: float) -> float:
+    """By how much the torque of a drive is later than in the calibration [s]; 0 where it is not.
 
     Raises
     ------
@@ -392,12 +398,16 @@ def _refuse_other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, delay: f
     """
     later = clock_shift(drive, vehicle, motion, delay)
     if abs(later) > CLOCKS_APART:
-        side = "later" if later > 0.0 else "earlier"
         raise DriveError(
-            f"{drive.name}: its torque lies {abs(later):.1f} s {side} against the motion than in "
+            f"{drive.name}: its torque lies {_later(later)} against the motion than in "
             "the calibration, so that the clocks of its tables differ, "
             "and the mass would be wrong; give offset_s, or align = true, under [time] in a mapping"
         )
+    return later
+
+
+def _later(by: float) -> str:
+    return f"{abs(by):.1f} s {'later' if by > 0.0 else 'earlier'}"
 
 
 def fitted_for_another(vehicle: Vehicle, method: str) -> tuple[str, ...]:

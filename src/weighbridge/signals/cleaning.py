@@ -21,6 +21,12 @@ SHARED: Final = 0.25
 """Part of the rows with the stamp of the row before, from which the clock is coarse and the
 stamps are no mistake [-]."""
 
+NO_DRIVE: Final = 6 * 3600.0
+"""Nothing of one drive is recorded for so long [s]."""
+
+_STRAYS: Final = 0.01
+"""Part of the rows from which stamps far from their neighbours are no mistake but a unit [-]."""
+
 FEWEST_ROWS: Final = 20
 """Fewer rows do not tell a coarse clock from repeated rows."""
 
@@ -69,6 +75,16 @@ def rising(time: Floats) -> Bools:
     return front if np.count_nonzero(front) >= np.count_nonzero(back) else back
 
 
+def _strays(time: Floats) -> Bools:
+    """Mark the few stamps that lie hours from both neighbours, (n,)."""
+    with np.errstate(over="ignore"):
+        far = np.abs(np.diff(time)) > NO_DRIVE
+    alone = np.ones(time.size, dtype=bool)
+    alone[1:] &= far
+    alone[:-1] &= far
+    return alone if 0 < np.count_nonzero(alone) <= _STRAYS * time.size else np.zeros_like(alone)
+
+
 def clean_clock(time: Floats, source: str) -> Clock:
     """Leave out stamps that are missing, repeated or out of order.
 
@@ -86,11 +102,21 @@ def clean_clock(time: Floats, source: str) -> Clock:
         return Clock(time, None)
 
     problems = []
-    keep = finite.copy()
     if missing := int(time.size - np.count_nonzero(finite)):
         problems.append(
             Problem("", f"{source}: {missing} of {time.size} rows have no time and were left out")
         )
+    stray = _strays(time[finite])
+    if count := int(np.count_nonzero(stray)):
+        problems.append(
+            Problem(
+                "",
+                f"{source}: {count} of {time.size} time stamps lie hours from those around them, "
+                f"such as {time[finite][stray][0]:.6g} s; their rows were left out",
+            )
+        )
+        finite[finite] = ~stray
+    keep = finite.copy()
     present = time[finite]
     step = np.diff(present)
     repeated = int(np.count_nonzero(step == 0.0))
@@ -102,7 +128,7 @@ def clean_clock(time: Floats, source: str) -> Clock:
             Problem(
                 "",
                 f"{source}: {repeated} of {time.size} time stamps repeat the one before; "
-                "the later rows were left out",
+                "of such rows the first value of each column was kept",
             )
         )
     if lost > repeated:
@@ -172,6 +198,28 @@ def _one_to_a_row(time: Floats, columns: Sequence[tuple[str, Floats]]) -> bool:
     return True
 
 
+def _first_present(time: Floats, columns: Sequence[tuple[str, Floats]]) -> list[tuple[str, Floats]]:
+    """Fill an empty cell from the next row with the same stamp that has one.
+
+    Of rows that share a stamp the first is kept, and it may be the empty one.
+    """
+    same = np.flatnonzero(time[1:] == time[:-1]) + 1
+    if not same.size:
+        return list(columns)
+    start = np.arange(time.size)
+    start[same] = 0
+    start = np.maximum.accumulate(start)
+    filled = []
+    for name, raw in columns:
+        # From the back, so that of several rows the earliest is written last.
+        rows = same[np.isfinite(raw[same]) & ~np.isfinite(raw[start[same]])][::-1]
+        if rows.size:
+            raw = raw.copy()
+            raw[start[rows]] = raw[rows]
+        filled.append((name, raw))
+    return filled
+
+
 def clean_columns(
     time: Floats, columns: Sequence[tuple[str, Floats]], source: str
 ) -> tuple[list[Signal], list[Problem]]:
@@ -207,6 +255,7 @@ def clean_columns(
                 "they were spread evenly over the step",
             )
         )
+    columns = _first_present(time, columns)
     clock = clean_clock(time, source)
     problems += clock.problems
     mask: Bools | None = None

@@ -1,0 +1,88 @@
+"""Values that no road vehicle can have are left out of use, not only told."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.checks.needed import needed, show
+from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
+from weighbridge.vehicle.model import Vehicle
+
+FEW: Final = 0.01
+"""Part of the values outside their range from which the unit is doubted, and the mass withheld."""
+
+# Times the range's larger bound: no unit under another's name is so far off (units differ by 3600
+# at most), and squares and cubes of what is left cannot overflow.
+_ABSURD: Final = 1e4
+
+
+def without_strays(drive: Drive, vehicle: Vehicle | None) -> Drive:
+    """Leave out the few values outside the physical range, and those beyond any unit.
+
+    More than a hundredth of a signal is left for the checks, which know what another unit would
+    make of it; what no unit explains is left out whatever its number, and is serious in a signal
+    the mass is made from.
+
+    Returns
+    -------
+    Drive
+        With what was left out in its ``problems``; itself where nothing was.
+    """
+    made_of: frozenset[str] | None = None
+    for s in drive.signals.values():
+        outside = _outside(s)
+        if outside is None:
+            continue
+        trusted = s.name in drive.info.trusted
+        absurd = np.abs(s.values) > _ABSURD * _bound(s.name)
+        few = np.count_nonzero(outside) <= FEW * len(s)
+        out = outside if few and not trusted else absurd
+        if not out.any():
+            continue
+        made_of = made_of if made_of is not None else needed(drive, vehicle)
+        serious = not few and not trusted and s.name in made_of
+        drive = _cut(drive, s, out, serious=serious)
+    return drive
+
+
+def within_ranges(drive: Drive) -> Drive:
+    """Leave out every value outside the physical range that the checks let pass."""
+    for s in drive.signals.values():
+        outside = None if s.name in drive.info.trusted else _outside(s)
+        if outside is not None:
+            drive = _cut(drive, s, outside, told=False)
+    return drive
+
+
+def _bound(name: str) -> float:
+    q = QUANTITIES[name]
+    return max(abs(q.low), abs(q.high))
+
+
+def _outside(s: Signal) -> Bools | None:
+    """Mark values outside the range (n,); None where there are none."""
+    q = QUANTITIES[s.name]
+    if not len(s) or (float(s.values.min()) >= q.low and float(s.values.max()) <= q.high):
+        return None
+    return np.asarray((s.values < q.low) | (s.values > q.high))
+
+
+def _cut(drive: Drive, s: Signal, out: Bools, *, serious: bool = False, told: bool = True) -> Drive:
+    count = int(np.count_nonzero(out))
+    if told:
+        q = QUANTITIES[s.name]
+        k = int(np.argmax(np.where(out, np.abs(s.values), -1.0)))
+        drive = drive.with_problems(
+            Problem(
+                s.name,
+                f"{count} of {len(s)} values of {s.name} are outside {show(s.name, q.low)} to "
+                f"{show(s.name, q.high)}, such as {show(s.name, float(s.values[k]))} at "
+                f"{s.time[k]:.6g} s, and were left out; check its unit",
+                serious=serious,
+            )
+        )
+    if count == len(s):
+        return drive.without(s.name)
+    return drive.with_signals(Signal(s.name, s.time[~out], s.values[~out]))

@@ -1,0 +1,394 @@
+"""Tables whose clock drifts or jumps against the inertial sensor, brought back onto one clock."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.navigation.aiding import read_fixes, speed_from_fixes
+from weighbridge.navigation.clock_lag import Lags, find_lags, find_offset, locate_step
+from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
+
+_LOG = logging.getLogger(__name__)
+
+# Sound clocks of 15 simulated drives of five vehicles stay within 0.08 s of their mean (GNSS within
+# 0.15 s) and 10 ppm. 0.15 s over a drive is worth 0.05 to 0.2 % of the mass.
+_DRIFT: Final = 0.15
+_SURE: Final = 6.0
+# Range of the lag over a drive, beyond the scatter of its pieces, that is no sound clock's [s].
+_WANDER: Final = 0.3
+# Fewer pieces show no drift, and pieces overlap, so that they repeat each other's noise [-].
+_FEWEST: Final = 4
+_OVERLAP: Final = 2.0
+# A change from one piece to the next that is a step of the clock [s].
+_STEP: Final = 0.4
+_MOST_STEPS: Final = 4
+# A piece so far off its neighbour holds both sides of a step [s].
+_MIXED: Final = 0.12
+# Pieces from which on most must show a lag, and how many do [-]. Of those of 33 recorded and 15
+# simulated drives 0.94 and more do, with a speed in steps of 5 km/h 0.25 of a truck's.
+_ENOUGH: Final = 6
+_AGREES: Final = 0.2
+# Clocks are looked at again once they were moved; so often at most.
+_ROUNDS: Final = 4
+# Pieces that must show a lag, and lie on what is mended [-].
+_SHOWN: Final = 0.6
+_FOLLOWS: Final = 0.9
+# How far a piece may lie off what is mended [s].
+_NEAR: Final = 0.25
+# A quarter of a piece [s]: the error of its lag per drift.
+_BLUR: Final = 45.0
+# A sensor's own lateness: speeds are late by this where nothing else is known, and by no more or
+# less than that where their clock is right [s].
+_USUAL: Final = 0.1
+_OWN: Final = (-1.0, 2.0)
+# Of a clock that was right when the recording began [s].
+_BEGUN: Final = (-0.3, 0.8)
+# Two tables that drift alike against the third: it is the third whose clock is wrong [s].
+_ALIKE: Final = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """Lag over time: a line or a broken one, with the steps cut out.
+
+    Attributes
+    ----------
+    time, lag : (k,) knots [s]; beyond them ``slope`` goes on
+    slope : at both ends [-]
+    cuts : (start, end) of times in which a step lies [s]
+    told : what was found, for the sentence
+    """
+
+    time: Floats
+    lag: Floats
+    slope: float
+    cuts: tuple[tuple[float, float], ...]
+    told: str
+
+    def at(self, time: Floats) -> Floats:
+        """Lag at instants of the table's clock [s]."""
+        inner = np.interp(time, self.time, self.lag)
+        before = np.minimum(time - self.time[0], 0.0)
+        after = np.maximum(time - self.time[-1], 0.0)
+        return np.asarray(inner + self.slope * (before + after))
+
+
+def mend_clocks(drive: Drive) -> Drive:
+    """Bring tables back onto the clock of the inertial sensor where they leave it.
+
+    The lag of vehicle speed and of speed over ground against the accelerometer is found in
+    pieces of a few minutes. Where it changes over the drive, by drift, by a step or by rows that
+    were lost, the table is moved so that it stays what it was at the beginning; rows about a step
+    are left out. Where both drift alike, the inertial sensor is moved. Sound clocks are left as
+    they are, to the last bit.
+
+    Parameters
+    ----------
+    drive : with an accelerometer of three axes and a speed, else it is returned as it is
+
+    Returns
+    -------
+    Drive
+        What was moved is in its ``problems``; serious where the clocks cannot be brought together.
+    """
+    mended = _round(drive)
+    for _ in range(_ROUNDS - 1):
+        if mended is drive or any(p.serious for p in mended.problems[len(drive.problems) :]):
+            return mended
+        drive, mended = mended, _round(mended)
+    if all(mended.get(name) is drive.get(name) for name in ("vehicle_speed", "accel_x")):
+        return mended
+    return mended.with_problems(_hopeless("obd", "what was tried does not bring them together"))
+
+
+def _round(drive: Drive) -> Drive:
+    """Move what is seen to be off; the drive itself where nothing is."""
+    accel = [s for a in "xyz" if (s := drive.get(f"accel_{a}")) is not None and len(s) > 50]
+    if len(accel) < 3:
+        return drive
+    found = {}
+    for table, speed in (("obd", drive.get("vehicle_speed")), ("gnss", _gnss_speed(drive))):
+        if speed is None or len(speed) < 50:
+            continue
+        lags = _lags(accel, speed)
+        lost = _lost(lags) if table == "obd" else ()
+        if lost:
+            return _left_out(drive, table, lost)
+        path = _judged(lags, table)
+        if isinstance(path, Problem):
+            return drive.with_problems(path)
+        if path is not None:
+            path = _narrowed(path, accel, speed)
+            found[table] = path
+    if len(found) == 2 and _alike(found["obd"], found["gnss"]):
+        return _imu_moved(drive, found["obd"])
+    for table, path in found.items():
+        drive = _table_moved(drive, table, path)
+    return drive
+
+
+def _narrowed(path: _Path, accel: Sequence[Signal], speed: Signal) -> _Path:
+    """Cut out no more about each step than is in doubt, and keep both its sides to the edge."""
+    time, lag, cuts = path.time, path.lag, []
+    for cut in path.cuts:
+        sides = (float(lag[time <= cut[0]][-1]), float(lag[time >= cut[1]][0]))
+        near = locate_step(accel, speed, cut, sides)
+        cuts.append(near)
+        time, lag = np.append(time, near), np.append(lag, sides)
+    time, first = np.unique(time, return_index=True)
+    return replace(path, time=time, lag=lag[first], cuts=tuple(cuts))
+
+
+def _gnss_speed(drive: Drive) -> Signal | None:
+    """Speed over ground, else between fixes."""
+    speed = drive.get("gnss_speed")
+    if speed is not None:
+        return speed
+    fixes = read_fixes(drive, -np.inf, np.inf)
+    return speed_from_fixes(fixes) if fixes is not None and fixes.time.size > 50 else None
+
+
+def _lags(accel: Sequence[Signal], speed: Signal) -> Lags:
+    """Lags about zero, or about where else the drive fits."""
+    lags = find_lags(accel, speed)
+    if lags.pieces >= _FEWEST and lags.lag.size < 0.3 * lags.pieces:
+        offset = find_offset(accel, speed)
+        if offset is not None:
+            other = find_lags(accel, speed, centre=offset)
+            if other.lag.size >= _SHOWN * other.pieces:
+                return other
+    return lags
+
+
+def _judged(lags: Lags, table: str) -> _Path | Problem | None:
+    """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
+    if table == "obd" and lags.pieces >= _ENOUGH and _strangers(lags):
+        return Problem(
+            "",
+            f"vehicle speed and accelerometer agree in {lags.lag.size} of {lags.pieces} pieces of "
+            "the drive only, each at a lag of its own: a clock jumps all the time, or one of the "
+            "two is wrong; record both by one clock",
+            serious=True,
+        )
+    if lags.lag.size < _FEWEST:
+        return None
+    lone = _lone(lags.lag)
+    time, lag = lags.time[~lone], lags.lag[~lone]
+    if lag.size < _FEWEST:
+        return None
+    # By second differences, so that neither drift nor step counts as scatter.
+    bends = float(np.median(np.abs(np.diff(lag, 2))))
+    scatter = max(1.4826 * bends / np.sqrt(6.0), float(np.median(lags.std)))
+    slope, slope_std, fit = _line(time, lag, scatter)
+    span = float(time[-1] - time[0])
+    drifts = abs(slope) * span > _DRIFT and abs(slope) > _SURE * slope_std
+    allowed = _WANDER + 4.0 * scatter
+    wanders = float(np.ptp(_median_of_three(lag))) > allowed
+    apart = not _OWN[0] < float(np.median(lag)) < _OWN[1]
+    if not (drifts or wanders or apart):
+        return None
+    if lags.lag.size < _SHOWN * lags.pieces:
+        # What does not fit of the fixes, the filter leaves out.
+        return _hopeless(table, "most of the drive does not show it") if table == "obd" else None
+    # In a piece of a clock that drifts fast the lag is less sure; the next round sees to the rest.
+    more = _BLUR * abs(slope)
+    follows = float(np.mean(np.abs(lag - fit) < _NEAR + more)) >= _FOLLOWS
+    if follows and np.ptp(_median_of_three(lag - fit)) <= allowed + 2.0 * more:
+        slope = slope if drifts else 0.0
+        knots = time[[0, -1]]
+        told = f"drifts by {1e6 * slope:+.0f} ppm" if drifts else ""
+        return _Path(knots, float(np.mean(fit)) + slope * (knots - time.mean()), slope, (), told)
+    return _broken(time, lag, table)
+
+
+def _strangers(lags: Lags) -> bool:
+    """Tell whether hardly a piece shows a lag, or each another one."""
+    few = lags.lag.size < _AGREES * lags.pieces
+    return few or (lags.lag.size > 2 and float(np.median(np.abs(np.diff(lags.lag, 2)))) > _STEP)
+
+
+def _lost(lags: Lags) -> tuple[tuple[float, float], ...]:
+    """Times in which no piece shows a lag, though nearly all others do [s]."""
+    if lags.lag.size < _FEWEST:
+        return ()
+    time = np.concatenate((lags.time, lags.missed))
+    order = np.argsort(time)
+    time, shown = time[order], (np.arange(time.size) < lags.lag.size)[order]
+    edges = np.diff(np.concatenate(([0], (~shown).astype(np.int8), [0])))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    runs = [(a, b) for a, b in zip(starts, ends, strict=True) if b - a >= _FEWEST]
+    others = time.size - sum(b - a for a, b in runs)
+    if not runs or lags.lag.size < _FOLLOWS * others:
+        return ()
+    return tuple(
+        (float(time[a - 1]) if a else -np.inf, float(time[b]) if b < time.size else np.inf)
+        for a, b in runs
+    )
+
+
+def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
+    """Follow a lag that changes by steps, or slowly but not evenly."""
+    smooth = _median_of_three(lag)
+    jumps = np.flatnonzero(np.abs(np.diff(smooth)) > _STEP)
+    # One step shows as two or three where a piece holds both sides of it.
+    groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > 2) + 1) if jumps.size else []
+    cuts, sizes, blended = [], [], np.zeros(lag.size, dtype=bool)
+    for g in groups:
+        first, last = int(g[0]), int(g[-1]) + 1
+        # A piece that holds a little of the other side lies a little off its own.
+        first -= first > 0 and abs(lag[first] - lag[first - 1]) > _MIXED
+        last += last + 1 < lag.size and abs(lag[last] - lag[last + 1]) > _MIXED
+        cuts.append((float(time[first]), float(time[last])))
+        sizes.append(float(lag[last] - lag[first]))
+        blended[first + 1 : last] = True
+    time, lag = time[~blended], lag[~blended]
+    ends = [float(b) for _, b in cuts]
+    parts = np.split(np.arange(lag.size), np.searchsorted(time, ends))
+    level = np.concatenate([_median_of_three(lag[p]) for p in parts])
+    follows = np.count_nonzero(np.abs(lag - level) < _NEAR) + np.count_nonzero(blended)
+    if len(cuts) > _MOST_STEPS or follows < _FOLLOWS * blended.size:
+        return _hopeless(table, "it jumps about") if table == "obd" else None
+    told = "is late by " + f"{float(level.min()):.2f} to {float(level.max()):.2f} s in turn"
+    if cuts:
+        several = ", ".join(f"{s:+.2f} s" for s in sizes)
+        told = f"jumps by {several}"
+    return _Path(time, level, 0.0, tuple(cuts), told)
+
+
+def _hopeless(table: str, why: str) -> Problem:
+    return Problem(
+        "",
+        f"the clocks of {table} and imu run apart, by speed and acceleration, and {why}: record "
+        "both by one clock, or cut the recording where they agree",
+        serious=True,
+    )
+
+
+def _left_out(drive: Drive, table: str, lost: tuple[tuple[float, float], ...]) -> Drive:
+    """Leave the rows of a table out where its speed does not fit the accelerometer at all."""
+    first, last = drive.start, drive.end
+    told = " and ".join(f"{max(a, first):.0f} to {min(b, last):.0f} s" for a, b in lost)
+    return _moved(drive, table, lambda t: t, lost).with_problems(
+        Problem(
+            "",
+            f"from {told} vehicle speed does not fit the accelerometer at any lag of its clock; "
+            f"the rows of {table} were left out there",
+        )
+    )
+
+
+def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floats]:
+    """Robust line: slope, its standard deviation, and its values (k,)."""
+    t = time - time.mean()
+    i, j = np.triu_indices(t.size, 1)
+    slope = float(np.median((lag[j] - lag[i]) / (t[j] - t[i])))
+    middle = float(np.median(lag - slope * t))
+    weight = np.ones(t.size)
+    scale = 0.01
+    for _ in range(20):
+        left = lag - middle - slope * t
+        scale = max(1.4826 * float(np.median(np.abs(left))), 0.01)
+        weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(left), 1e-9))
+        mean = np.average(t, weights=weight)
+        slope = float(
+            np.sum(weight * (t - mean) * lag) / max(np.sum(weight * (t - mean) ** 2), 1e-9)
+        )
+        middle = float(np.average(lag - slope * t, weights=weight))
+    std = scatter * float(np.sqrt(_OVERLAP / max(np.sum(weight * t**2), 1e-9)))
+    return slope, std, middle + slope * t
+
+
+def _median_of_three(y: Floats) -> Floats:
+    if y.size < 3:
+        return y
+    padded = np.concatenate((y[:1], y, y[-1:]))
+    return np.asarray(np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0))
+
+
+def _lone(lag: Floats) -> Bools:
+    """Mark pieces far from both neighbours, which agree: a false peak."""
+    lone = np.zeros(lag.size, dtype=bool)
+    before, here, after = lag[:-2], lag[1:-1], lag[2:]
+    off = np.minimum(np.abs(here - before), np.abs(here - after))
+    lone[1:-1] = (off > 2.0 * _STEP) & (np.abs(before - after) < _STEP)
+    return lone
+
+
+def _alike(a: _Path, b: _Path) -> bool:
+    if a.cuts or b.cuts:
+        return False
+    time = np.linspace(max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1]), 50)
+    apart = a.at(time) - b.at(time)
+    return bool(np.ptp(apart) < _ALIKE)
+
+
+def _level(path: _Path) -> float:
+    """Lag to leave: that of the beginning where it is a sensor's own, else a usual one [s]."""
+    first = float(path.lag[0])
+    return first if _BEGUN[0] < first < _BEGUN[1] else _USUAL
+
+
+def _table_moved(drive: Drive, table: str, path: _Path) -> Drive:
+    """Move the signals of a table onto the inertial clock; leave out rows about a step."""
+    level = _level(path)
+    return _moved(
+        drive, table, lambda t: t - path.at(t) + level, path.cuts
+    ).with_problems(_note(table, "imu", path, level))  # fmt: skip
+
+
+def _imu_moved(drive: Drive, path: _Path) -> Drive:
+    """Move the inertial signals onto the clock that the other tables share."""
+    level = _level(path)
+    ends = [f(s.time) for n, s in drive.signals.items() if _of(n, "imu") for f in (np.min, np.max)]
+    reach = max(ends) - min(ends)
+    knots = np.concatenate((path.time[:1] - reach, path.time, path.time[-1:] + reach))
+    own = knots - path.at(knots) + level
+    return _moved(drive, "imu", lambda t: np.interp(t, own, knots), ()).with_problems(
+        _note("obd and gnss", "imu", path, level)
+    )
+
+
+def _of(name: str, table: str) -> bool:
+    return QUANTITIES[name].table == table
+
+
+def _moved(
+    drive: Drive,
+    table: str,
+    onto: Callable[[Floats], Floats],
+    cuts: tuple[tuple[float, float], ...],
+) -> Drive:
+    """Give the signals of a table other stamps; those that share a clock go on sharing one."""
+    clocks: dict[int, tuple[Floats, Bools | None]] = {}
+    signals = dict(drive.signals)
+    for name, s in drive.signals.items():
+        if not _of(name, table):
+            continue
+        if id(s.time) not in clocks:
+            keep = np.ones(len(s), dtype=bool)
+            for a, b in cuts:
+                keep &= (s.time < a) | (s.time > b)
+            clocks[id(s.time)] = (onto(s.time[keep]), None if keep.all() else keep)
+        time, kept = clocks[id(s.time)]
+        signals[name] = Signal(name, time, s.values if kept is None else s.values[kept])
+    return replace(drive, signals=signals)
+
+
+def _note(table: str, other: str, path: _Path, level: float) -> Problem:
+    most = path.lag - level
+    far = float(most[int(np.argmax(np.abs(most)))])
+    what = path.told or f"is {far:+.2f} s off"
+    left_out = ""
+    if path.cuts:
+        at = ", ".join(f"{0.5 * (a + b):.0f} s" for a, b in path.cuts)
+        left_out = f"; rows about the step at {at} were left out"
+    return Problem(
+        "",
+        f"the clock of {table} {what} against that of {other}, by speed and acceleration; they "
+        f"were brought together (by up to {abs(far):.2f} s){left_out}",
+    )

@@ -1,0 +1,273 @@
+"""How late one table of a drive is against its inertial sensor, piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
+
+from weighbridge.signals import Bools, Floats, Signal
+
+STEP: Final = 0.2
+"""Grid on which force and speed are compared [s]."""
+
+REACH: Final = (5.0, 30.0)
+"""Lags looked at, on either side [s]: the second where the first shows none (2000 ppm over
+eight hours)."""
+
+# Changes of speed are compared over this time [s]: the rate of a speed in steps of 1 km/h is
+# noise over shorter times, and a peak over longer ones is blunt.
+_SPAN: Final = 2.0
+# Means over so long are taken off: grade and bias [s].
+_LEVEL: Final = 20.0
+# Pieces of a drive, and how far they lie apart [s].
+_PIECE: Final = 180.0
+_HOP: Final = 90.0
+# A step is found to within so long: means over `_LEVEL` hold both of its sides [s].
+_ABOUT: Final = 15.0
+# Gaps across which force and speed are not followed [s].
+_FORCE_GAP: Final = 0.5
+_SPEED_GAP: Final = 3.0
+# Part of a piece that must be seen, and spread of the changes of speed in it [m/s].
+_SEEN: Final = 0.5
+_LIVELY: Final = 0.25
+# Part of the variance that the three axes explain, at least; by chance they explain 0.2 at most.
+_EXPLAINED: Final = 0.5
+# The same over a whole drive, whose clocks may overlap in part only.
+_SOME: Final = 0.2
+# Unexplained at the best lag over unexplained at the next best: above, either may be the one.
+_AMBIGUOUS: Final = 0.75
+# The next best lies beyond the peak of the best [s].
+_PEAK: Final = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Lags:
+    """Lag of a table against the inertial sensor, by pieces of the drive.
+
+    Attributes
+    ----------
+    time : (k,) middles of the pieces, by the table's own clock [s]
+    lag : (k,) stamp minus the instant of the same motion by the inertial clock [s]
+    std : (k,) standard deviation of the lag [s]
+    missed : (j,) middles of pieces lively enough to show a lag that showed none [s]
+    """
+
+    time: Floats
+    lag: Floats
+    std: Floats
+    missed: Floats
+
+    @property
+    def pieces(self) -> int:
+        """Number of pieces lively enough to show a lag."""
+        return self.lag.size + self.missed.size
+
+
+def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) -> Lags:
+    """Find the lag of a speed against an accelerometer of any mounting, piece by piece.
+
+    In each piece the changes of speed are regressed on those of the integrated specific force
+    of the three axes, moved by every lag in turn; the best is refined by a parabola.
+
+    Parameters
+    ----------
+    accel : specific force of the three sensor axes
+    speed : by the clock that is examined
+    centre : lag around which is looked [s]
+    """
+    start, end = float(speed.time[0]), float(speed.time[-1])
+    count = int((end - start) / STEP)
+    hop, size = (round(x / STEP) for x in (_HOP, _PIECE))
+    if count < size or min(len(s) for s in accel) < 50:
+        return Lags(*(np.empty(0) for _ in range(4)))
+    grid: Floats = np.asarray(start + STEP * np.arange(count), dtype=np.float64)
+    x, seen = _speed_changes(speed, grid)
+    x = _high_passed(x, seen)
+    lively = [
+        first
+        for first in range(0, count - size + 1, hop)
+        if np.mean(seen[first : first + size]) > _SEEN
+        and float(np.sqrt(np.mean(x[first : first + size] ** 2))) > _LIVELY
+    ]
+    # The force reaches beyond the speed on both sides by the lags looked at.
+    most = round(REACH[-1] / STEP)
+    wide: Floats = np.asarray(start - centre + STEP * np.arange(-most, count + most))
+    changes, felt = _force_changes(accel, wide)
+    force = np.column_stack([_high_passed(c, felt) for c in changes])
+    lively = [k for k in lively if np.mean(felt[k + most : k + most + size]) > _SEEN]
+    found: dict[int, tuple[float, float]] = {}
+    for reach in (round(r / STEP) for r in REACH):
+        for first in lively:
+            there = slice(first + most - reach, first + most + size + reach)
+            if first not in found:
+                peak = _peak(x[first : first + size], force[there], felt[there])
+                if peak is not None:
+                    found[first] = peak
+    at = sorted(found)
+    return Lags(
+        grid[at] + 0.5 * _PIECE,
+        # Force later in the row is force at a smaller lag.
+        centre - np.array([found[k][0] for k in at]),
+        np.array([found[k][1] for k in at]),
+        grid[[k for k in lively if k not in found]] + 0.5 * _PIECE,
+    )
+
+
+def find_offset(accel: Sequence[Signal], speed: Signal) -> float | None:
+    """Find one lag for a whole drive among all that leave the records together [s].
+
+    Returns
+    -------
+    Coarse, to be refined by `find_lags`; None where no lag explains much.
+    """
+    first = min(float(s.time[0]) for s in accel)
+    last = max(float(s.time[-1]) for s in accel)
+    start, end = float(speed.time[0]), float(speed.time[-1])
+    if min(last - first, end - start) < _PIECE:
+        return None
+    x, seen = _speed_changes(speed, np.arange(start, end, STEP))
+    x = _high_passed(x, seen)
+    changes, felt = _force_changes(accel, np.arange(first, last, STEP))
+    axes = np.column_stack([_high_passed(c, felt) for c in changes])
+    gram = axes.T @ axes
+    gram += 1e-6 * np.trace(gram) * np.eye(3) + 1e-12 * np.eye(3)
+    size = next_fast_len(x.size + axes.shape[0], real=True)
+    spectrum = np.conj(rfft(x, size))
+    cross = np.column_stack([irfft(rfft(f, size) * spectrum, size) for f in axes.T])
+    explained = np.einsum("ij,ij->i", cross, np.linalg.solve(gram, cross.T).T)
+    best = int(np.argmax(explained))
+    if explained[best] < _SOME * max(float(x @ x), 1e-12):
+        return None
+    shift = best if best < axes.shape[0] else best - size
+    return start - (first + shift * STEP)
+
+
+def locate_step(
+    accel: Sequence[Signal], speed: Signal, cut: tuple[float, float], lags: tuple[float, float]
+) -> tuple[float, float]:
+    """Narrow the time in which the lag of a speed steps from one value to another [s].
+
+    Parameters
+    ----------
+    accel : specific force of the three sensor axes
+    speed : by the clock that steps
+    cut : in which the step lies, by that clock [s]
+    lags : before and after it [s]
+
+    Returns
+    -------
+    start, end : about the instant at which the force at the one lag, and then at the other,
+        explains the speed best
+    """
+    start = max(cut[0] - _PIECE, float(speed.time[0]))
+    end = min(cut[1] + _PIECE, float(speed.time[-1]))
+    grid = np.arange(start, end, STEP)
+    x, seen = _speed_changes(speed, grid)
+    x = _high_passed(x, seen)
+    sides = []
+    for lag in lags:
+        changes, felt = _force_changes(accel, grid - lag)
+        sides.append(np.column_stack([_high_passed(c, felt) for c in changes]))
+        seen &= felt
+    sure = seen & ((grid < cut[0]) | (grid > cut[1]))
+    rows = np.where((grid < cut[0])[:, None], sides[0], sides[1])[sure]
+    if rows.shape[0] < 100:
+        return cut
+    fit, *_ = np.linalg.lstsq(rows, x[sure], rcond=None)
+    before, after = (np.where(seen, (x - side @ fit) ** 2, 0.0) for side in sides)
+    cost = np.cumsum(before) + np.sum(after) - np.cumsum(after)
+    cost[(grid < cut[0]) | (grid > cut[1])] = np.inf
+    at = float(grid[int(np.argmin(cost))])
+    return max(at - _ABOUT, cut[0]), min(at + _ABOUT, cut[1])
+
+
+def _speed_changes(speed: Signal, grid: Floats) -> tuple[Floats, Bools]:
+    """Change of speed over `_SPAN` about each instant (n,), and where it was seen."""
+    half = 0.5 * _SPAN
+    change = speed.at(grid + half) - speed.at(grid - half)
+    seen = np.isfinite(change)
+    for side in (-half, 0.0, half):
+        seen &= speed.age(grid + side) < 0.5 * max(_SPEED_GAP, 3.0 * speed.period)
+    return np.where(seen, change, 0.0), seen
+
+
+def _force_changes(accel: Sequence[Signal], grid: Floats) -> tuple[list[Floats], Bools]:
+    """Integral of each axis over `_SPAN` about each instant, (n,) each, and where it was felt."""
+    felt = np.ones(grid.size, dtype=bool)
+    changes = [_change(s.time, _integral(s), grid) for s in accel]
+    for time in {id(s.time): s.time for s in accel}.values():
+        step = np.diff(time)
+        holes = np.concatenate(([0.0], np.cumsum(np.where(step > _FORCE_GAP, step, 0.0))))
+        felt &= (grid - _SPAN > time[0]) & (grid + _SPAN < time[-1])
+        felt &= _change(time, holes, grid) == 0.0
+    return [np.where(felt, c, 0.0) for c in changes], felt
+
+
+def _integral(s: Signal) -> Floats:
+    # Less gravity, so that the sum stays small.
+    values = s.values - np.median(s.values[:: max(1, len(s) // 1000)])
+    area = np.zeros(len(s))
+    np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(s.time), out=area[1:])
+    return area
+
+
+def _change(time: Floats, y: Floats, grid: Floats) -> Floats:
+    half = 0.5 * _SPAN
+    return np.asarray(np.interp(grid + half, time, y) - np.interp(grid - half, time, y))
+
+
+def _high_passed(y: Floats, seen: Bools) -> Floats:
+    """Take off the moving mean of what was seen; 0 where nothing was."""
+    width = round(_LEVEL / STEP) | 1
+    weight = np.maximum(uniform_filter1d(seen.astype(np.float64), width, mode="nearest"), 1e-9)
+    mean = uniform_filter1d(y, width, mode="nearest")
+    return np.where(seen, y - mean / weight, 0.0)
+
+
+def _peak(x: Floats, force: Floats, felt: Bools) -> tuple[float, float] | None:
+    """Shift of the force, from the middle, that explains the speed best [s], and its std.
+
+    Parameters
+    ----------
+    x : (n,) changes of speed
+    force : (n + 2 r, 3) changes of the integrated force
+    felt : (n + 2 r,) where there are any
+    """
+    explained, enough = _explained(x, force, felt)
+    explained[~enough] = 0.0
+    best = int(np.argmax(explained))
+    if not 0 < best < explained.size - 1 or explained[best] < _EXPLAINED:
+        return None
+    near = round(_PEAK / STEP)
+    beyond = np.concatenate((explained[: max(best - near, 0)], explained[best + near + 1 :]))
+    left = 1.0 - explained
+    if beyond.size and left[best] > _AMBIGUOUS * (1.0 - float(beyond.max())):
+        return None
+    low, mid, high = left[best - 1 : best + 2]
+    curvature = low - 2.0 * mid + high
+    if curvature <= 0.0:
+        return None
+    shift = 0.5 * (low - high) / curvature
+    independent = x.size * STEP / _SPAN
+    std = STEP * float(np.sqrt(2.0 * max(mid, 1e-3) / (independent * curvature)))
+    middle = (explained.size - 1) // 2
+    return (best - middle + float(shift)) * STEP, std
+
+
+def _explained(x: Floats, force: Floats, felt: Bools) -> tuple[Floats, Bools]:
+    """Part of the variance of ``x`` that the axes explain at each shift, and where it is told."""
+    cross = np.einsum("kjn,n->kj", sliding_window_view(force, x.size, axis=0), x)
+    products = force[:, :, None] * force[:, None, :]
+    total = np.concatenate((np.zeros((1, 3, 3)), np.cumsum(products, axis=0)))
+    gram = total[x.size :] - total[: -x.size]
+    gram += 1e-6 * np.trace(total[-1]) * np.eye(3) / 3.0 + 1e-12 * np.eye(3)
+    fit = np.linalg.solve(gram, cross[:, :, None])[:, :, 0]
+    seen = np.concatenate(([0], np.cumsum(felt)))
+    enough = (seen[x.size :] - seen[: -x.size]) >= _SEEN * x.size
+    return np.einsum("ij,ij->i", cross, fit) / max(float(x @ x), 1e-12), enough

@@ -1,0 +1,164 @@
+"""Clocks that drift, jump or are set wrong against each other: mended, or refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import weighbridge as wb
+from weighbridge.balance.force_balance import smoothed
+from weighbridge.checks import settle_drive
+from weighbridge.errors import DriveError
+from weighbridge.navigation.clock_drift import mend_clocks
+from weighbridge.navigation.clock_lag import find_lags
+from weighbridge.navigation.select import find_motion
+from weighbridge.signals import QUANTITIES
+from weighbridge.simulation import MIDSIZE, Scenario, Sensors, jensen_route, simulate_car
+
+LENGTH = 1500.0
+
+
+@pytest.fixture(scope="module")
+def made():
+    scenario = Scenario(name="clocks", car=MIDSIZE, route=jensen_route(3), seed=91)
+    return simulate_car(replace(scenario, duration=LENGTH, sensors=Sensors(imu_rate=50.0)))
+
+
+@pytest.fixture(scope="module")
+def car(made):
+    return wb.calibrate([made.drive], mass=made.scenario.mass)
+
+
+@pytest.fixture(scope="module")
+def mass(made, car):
+    return wb.weigh(made.drive, car).mass
+
+
+def retimed(drive, tables, change):
+    """Change the stamps of tables; signals that share a clock go on sharing one."""
+    clocks = {}
+    for s in drive.signals.values():
+        if QUANTITIES[s.name].table in tables:
+            clocks.setdefault(id(s.time), change(s.time))
+    return drive.with_signals(
+        *(replace(s, time=clocks[id(s.time)]) for s in drive.signals.values()
+          if id(s.time) in clocks)
+    )  # fmt: skip
+
+
+def without_inertial(drive, gaps):
+    """Take the rows of the inertial sensor out of some times."""
+    imu = [s for s in drive.signals.values() if QUANTITIES[s.name].table == "imu"]
+    time = imu[0].time
+    keep = np.logical_and.reduce([(time < a) | (time > b) for a, b in gaps])
+    rest = time[keep]
+    return drive.with_signals(*(replace(s, time=rest, values=s.values[keep]) for s in imu))
+
+
+def lags(drive, speed="vehicle_speed"):
+    return find_lags([drive.signals[f"accel_{a}"] for a in "xyz"], drive.signals[speed])
+
+
+def counted(period, share, seed=1):
+    """Stamps of a logger that counts rows, and loses some of them."""
+    lost = np.sort(np.random.default_rng(seed).uniform(0, LENGTH, int(LENGTH / period * share)))
+    return lambda t: t - 0.98 * period * np.searchsorted(lost, t)
+
+
+def test_sound_clocks_are_left_to_the_last_bit(made):
+    mended = mend_clocks(made.drive)
+    assert mended.problems == made.drive.problems
+    for name, s in made.drive.signals.items():
+        assert mended.signals[name].time is s.time
+
+
+def test_the_lag_of_each_piece_is_found_to_hundredths(made):
+    found = lags(made.drive)
+    assert found.lag.size == found.pieces > 10
+    assert np.ptp(found.lag) < 0.2
+    late = lags(retimed(made.drive, {"obd"}, lambda t: t + 17.0))
+    np.testing.assert_allclose(late.lag, found.lag + 17.0, atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("tables", "change"),
+    [
+        ({"imu"}, lambda t: t * (1.0 + 1e-3)),
+        ({"imu"}, lambda t: t * (1.0 - 4e-4)),
+        ({"imu"}, lambda t: t * 0.99),
+        ({"obd"}, lambda t: t * (1.0 + 2e-3)),
+        ({"obd"}, lambda t: t + 2.0 * (t > 700.0)),
+        ({"obd"}, lambda t: t - 2.0 * (t < 900.0)),
+        ({"imu"}, counted(0.02, 1e-3)),
+        ({"obd"}, counted(0.25, 1e-3)),
+        ({"obd"}, lambda t: t + 1.2 * np.sin(np.pi * t / LENGTH)),
+        ({"obd"}, lambda t: t + np.interp(t, [0, 400, 800, 1100, 1500], [0, 0.2, 0, 0.6, 0.9])),
+        ({"obd"}, lambda t: t + 18.0),
+        ({"obd"}, lambda t: t - 600.0),
+        ({"obd"}, lambda t: t + 0.4),
+        ({"imu", "gnss"}, lambda t: t + 0.4),
+    ],
+    ids=[
+        "imu+1000ppm", "imu-400ppm", "imu-1%", "obd+2000ppm", "step", "step-back", "imu-rows-lost",
+        "obd-rows-lost", "wander", "bends", "18s", "-600s", "0.4s", "-0.4s",
+    ],
+)  # fmt: skip
+def test_clocks_that_part_are_brought_together(made, car, mass, tables, change):
+    told = wb.weigh(retimed(made.drive, tables, change), car)
+    assert told.mass == pytest.approx(mass, rel=0.01)
+    assert any("clock" in warning for warning in told.warnings)
+
+
+def test_an_inertial_clock_of_its_own_is_the_one_that_is_moved(made):
+    mended = mend_clocks(retimed(made.drive, {"imu"}, lambda t: t * (1.0 + 1e-3)))
+    assert mended.signals["vehicle_speed"].time is made.drive.signals["vehicle_speed"].time
+    assert "the clock of obd and gnss drifts by -" in mended.problems[-1].text
+    moved = mended.signals["accel_x"].time - made.drive.signals["accel_x"].time
+    assert np.abs(moved).max() < 0.15
+
+
+def test_a_clock_that_jumps_about_is_refused(made, car):
+    """Set by several seconds every two minutes, as by a network in bad order."""
+    jumps = np.random.default_rng(4).uniform(-4.0, 4.0, 100)
+    drive = retimed(made.drive, {"obd"}, lambda t: np.sort(t + jumps[(t // 120.0).astype(int)]))
+    with pytest.raises(DriveError, match="each at a lag of its own"):
+        wb.weigh(drive, car)
+
+
+def test_rows_about_a_step_are_left_out(made):
+    drive = retimed(made.drive, {"obd"}, lambda t: t + 2.0 * (t > 700.0))
+    settled = settle_drive(drive)
+    assert any("jumps by +2.0" in p.text and "left out" in p.text for p in settled.problems)
+    speed = settled.signals["vehicle_speed"]
+    assert len(speed) > 0.8 * len(made.drive.signals["vehicle_speed"])
+    assert np.ptp(lags(settled).lag) < 0.2
+
+
+def test_clocks_seconds_apart_are_no_swapped_axes(made):
+    settled = settle_drive(retimed(made.drive, {"obd", "gnss"}, lambda t: t + 40.0))
+    assert not any(p.serious for p in settled.problems)
+    assert any("obd and gnss is +39.9" in p.text for p in settled.problems)
+    assert_array_equal(
+        settled.signals["engine_load"].values, made.drive.signals["engine_load"].values
+    )
+
+
+def test_a_part_that_fits_at_no_lag_is_left_out(made, car, mass):
+    """Minutes of the inertial sensor are lost, and its clock counts rows."""
+    cut = without_inertial(made.drive, [(500.0, 600.0)])
+    told = wb.weigh(retimed(cut, {"imu"}, lambda t: np.where(t > 550.0, t - 99.9, t)), car)
+    assert any("at any lag of its clock; the rows of obd were left out" in w for w in told.warnings)
+    assert told.mass == pytest.approx(mass, rel=0.02)
+
+
+def test_a_gap_of_the_inertial_sensor_leaks_no_zeros(made):
+    """A lag passes on what stood in the gap; what is valid behind it must not hold any of that."""
+    gaps = [(at, at + 2.0) for at in np.arange(200.0, 1300.0, 50.0)]
+    whole = smoothed(find_motion(made.drive), 0.3)
+    gapped = smoothed(find_motion(without_inertial(made.drive, gaps)), 0.3)
+    behind = np.logical_or.reduce([(whole.time > b) & (whole.time < b + 2.0) for _, b in gaps])
+    rows = behind & gapped.valid & whole.valid
+    assert np.count_nonzero(rows) > 200
+    off = (gapped.specific_force - whole.specific_force)[rows]
+    assert np.sqrt(np.mean(off**2)) < 0.1
