@@ -11,7 +11,9 @@ from typing import Final
 import numpy as np
 
 from weighbridge.checks import windows
+from weighbridge.checks.needed import IMU
 from weighbridge.constants import GRAVITY
+from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
 
@@ -31,6 +33,7 @@ _AGAINST: Final = -0.12
 
 def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Compare the inertial sensor with gravity, with the course and with itself."""
+    drive = thawed(drive, IMU)
     accel = _axes(drive, "accel")
     gyro = _axes(drive, "gyro")
     fine = True

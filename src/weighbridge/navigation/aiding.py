@@ -21,6 +21,7 @@ from weighbridge.kernels.ins import (
     Z_VVAR,
     lowpass_resample,
 )
+from weighbridge.navigation.frozen import thawed
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
@@ -68,7 +69,7 @@ class Fixes:
 
 
 def read_imu(drive: Drive) -> Imu:
-    """Gather the six inertial signals on the clock of ``accel_x``.
+    """Gather the six inertial signals on the clock of ``accel_x``; frozen stretches are left out.
 
     Raises
     ------
@@ -79,6 +80,7 @@ def read_imu(drive: Drive) -> Imu:
     missing = drive.missing(names)
     if missing:
         raise DriveError(f"{drive.name}: inertial navigation lacks {', '.join(missing)}")
+    drive = thawed(drive, names)
     signals = [drive.signals[n] for n in names]
     start = max(float(s.time[0]) if len(s) else np.inf for s in signals)
     end = min(float(s.time[-1]) if len(s) else -np.inf for s in signals)
