@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -53,6 +53,7 @@ from weighbridge.navigation.aiding import (
     still_state,
 )
 from weighbridge.navigation.even import Even, coarsely, evenly
+from weighbridge.navigation.gain import find_gain
 from weighbridge.navigation.motion import Motion, noise_level
 from weighbridge.navigation.mounting import TooLittleMotionError, coarse_mounting
 from weighbridge.navigation.remounting import Change, find_changes, loosened, told, undo, unsure
@@ -75,6 +76,9 @@ _FIRST_PASS = 900.0
 
 _SQUAT_TIME = 60.0
 """One start alone shows anything but squat: it takes so much driving [s]."""
+
+_SCALE_ROUNDS = 4
+"""A wrong scale also bends the attitude: each round finds most of what is left."""
 
 _FINE_RATE = 20.0
 """Clock of the delays [Hz]."""
@@ -171,8 +175,49 @@ def inertial_motion(
             f"{drive.name}: inertial navigation lacks vehicle_speed, gnss_speed or latitude and "
             "longitude: with the inertial sensor alone the motion drifts away"
         )
-    notes: list[str] = []
+    motion = _solved(drive, imu, fixes, wheel, reference, mounting, settings, rate)
+    scale = np.ones(imu.time.size)
+    scale_std = 0.0
+    for _ in range(_SCALE_ROUNDS if wheel is not None else 0):
+        gain = find_gain(motion, reference, again=scale_std > 0.0)
+        if gain is None or motion.mounting is None:
+            break
+        scale /= gain.at(imu.time)
+        scale_std = gain.std
+        scaled = _scaled(imu, euler_to_matrix(*motion.mounting)[0], scale)
+        motion = _solved(drive, scaled, fixes, wheel, reference, mounting, settings, rate)
+    if scale_std == 0.0:
+        return motion
+    return replace(
+        motion,
+        specific_force_scale_std=scale_std,
+        notes=(*motion.notes, _scale_note(1.0 / scale)),
+    )
 
+
+def _scaled(imu: Imu, forward: Floats, scale: Floats) -> Imu:
+    """Multiply the specific force along the vehicle (3,) by a scale (n,)."""
+    along = imu.accel @ forward
+    accel = imu.accel + ((scale - 1.0) * along)[:, None] * forward
+    return Imu(imu.time, np.ascontiguousarray(accel), imu.gyro, imu.period)
+
+
+def _scale_note(gain: Floats) -> str:
+    low, high = float(np.min(gain)), float(np.max(gain))
+    size = f"{high:.3f}" if high - low < 0.005 else f"{gain[0]:.3f} to {gain[-1]:.3f}"
+    return (
+        f"the accelerometer reads {size} times what the speed changes by along the vehicle: its "
+        "scale is off, and was corrected"
+    )
+
+
+def _solved(
+    drive: Drive, imu: Imu, fixes: Fixes | None, wheel: Signal | None, reference: Signal,
+    mounting: Mounting | None, settings: NavigationSettings, rate: float,
+) -> Motion:  # fmt: skip
+    """Align the sensor, run the filter and lay its solution out."""
+    notes: list[str] = []
+    start = float(imu.time[0])
     imu, fine, aligned, changes = _settled(imu, reference, drive, mounting, notes)
     rot_bs, tilt_std, yaw_std, yaw_bias, delay, mounting = aligned
     reference = Signal(reference.name, reference.time - delay, reference.values)

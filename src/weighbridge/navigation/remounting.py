@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.even import Even
+from weighbridge.navigation.steps import SIDE, Step, fitted
 from weighbridge.signals import Bools, Floats, Signal
 
 _SPAN: Final = 4
@@ -33,20 +34,11 @@ _HILL: Final = 60.0
 _HILL_WAY: Final = 300.0
 """and over so much way [m]."""
 
-_SIDE: Final = 3
-"""Blocks on either side that show a mounting."""
-
 _LIKE: Final = 3.0
 """Neighbouring blocks share hills and bends: so many count as one [-]."""
 
 _SURE: Final = 36.0
 """Squared error that a change must explain, over its variance [-]: six standard deviations."""
-
-_RAMPS: Final = (60.0, 120.0, 300.0, 600.0, 900.0, 1200.0)
-"""Lengths of slow changes tried [s]."""
-
-_RAMP_SURE: Final = 12.0
-"""Further squared error that a slow change must explain, over its variance [-]."""
 
 _LEAST: Final = (math.radians(2.5), math.radians(0.8), math.radians(6.0))
 """Smaller changes of roll, pitch and yaw do not matter to a mass or are the road's [rad]: six
@@ -263,11 +255,11 @@ def _surest(rows: _Rows, rot_bs: Floats) -> Change | None:
     number = ((rows.time[moving] - rows.time[moving[0]]) / _BLOCK).astype(np.int64)
     count = np.bincount(number)
     enough = 2 * count >= 0.5 * _BLOCK / (rows.time[1] - rows.time[0])
-    if enough.sum() < 2 * _SIDE:
+    if enough.sum() < 2 * SIDE:
         return None
 
     def means(y: Floats) -> Floats:
-        return np.bincount(number, weights=y)[enough] / count[enough]
+        return np.asarray(np.bincount(number, weights=y)[enough] / count[enough])
 
     at = means(rows.time[moving])
     felt, shown = rows.felt[moving], rows.shown[moving]
@@ -281,7 +273,8 @@ def _surest(rows: _Rows, rot_bs: Floats) -> Change | None:
     turned = np.bincount(own, weights=product.real) + 1j * np.bincount(own, weights=product.imag)
     usual = max(float(np.median(size)), 1e-6)
     even = np.ones(at.size)
-    best, sureness = None, _SURE
+    best: tuple[int, Step] | None = None
+    sureness = _SURE
     for k, (y, weight) in enumerate(
         (
             (means(rows.tilt[moving, 0]), even),
@@ -289,58 +282,19 @@ def _surest(rows: _Rows, rot_bs: Floats) -> Change | None:
             (np.angle(turned * np.conj(turned.sum())), np.minimum(size / usual, 4.0)),
         )
     ):
-        found = _fitted(at, y, weight, _FLOOR[k])
-        if found is None or abs(found[3]) < _LEAST[k]:
-            continue
-        sure, center, length, angle = found
-        if sure > sureness:
-            sureness, best = sure, (k, center, length, angle)
+        found = fitted(at, y, weight, _FLOOR[k], like=_LIKE)
+        if abs(found.size) >= _LEAST[k] and found.sureness > sureness:
+            sureness, best = found.sureness, (k, found)
     if best is None:
         return None
-    k, center, length, angle = best
+    k, step = best
+    center, length, angle = step.center, step.length, step.size
     axis = rot_bs[k]
     turn = angle if k == _PITCH else -angle
     if length > 0.0:
         return Change(k, center - 0.5 * length, center + 0.5 * length, axis, turn, True)
     start, end = _instant(rows, k, center, angle)
     return Change(k, start, end, axis, turn, False)
-
-
-def _fitted(
-    at: Floats, y: Floats, weight: Floats, floor: float
-) -> tuple[float, float, float, float] | None:
-    """Fit a step and ramps to the means of blocks.
-
-    Returns
-    -------
-    sureness : squared error explained over the variance [-]
-    center, length : of the change, 0 for a step [s]
-    size : [rad]
-    """
-    middles = 0.5 * (at[1:] + at[:-1])
-    centers, lengths = middles[_SIDE - 1 : middles.size - _SIDE + 1], np.zeros(1)
-    lengths = np.array([1e-3, *(r for r in _RAMPS if r < 0.8 * (at[-1] - at[0]))])
-    where, long = (x.ravel() for x in np.meshgrid(centers, lengths))
-    shape = np.clip((at[None, :] - where[:, None]) / long[:, None] + 0.5, 0.0, 1.0)
-    total = float(weight.sum())
-    level = y - float(weight @ y) / total
-    centred = shape - (shape @ weight)[:, None] / total
-    spread = centred**2 @ weight
-    common = centred @ (weight * level)
-    explained = np.where(spread > 0.5, common**2 / np.maximum(spread, 1e-9), 0.0)
-    whole = float(weight @ level**2)
-    free = max(at.size - 3, 1)
-    step = int(np.argmax(explained[: centers.size]))
-    ramp = int(np.argmax(explained))
-    variance = _LIKE * max((whole - float(explained[ramp])) / free, floor**2)
-    best = ramp if explained[ramp] - explained[step] > _RAMP_SURE * variance else step
-    length = 0.0 if best < centers.size else float(long[best])
-    return (
-        float(explained[best]) / variance,
-        float(where[best]),
-        length,
-        float(common[best] / spread[best]),
-    )
 
 
 def _instant(rows: _Rows, k: int, center: float, angle: float) -> tuple[float, float]:
