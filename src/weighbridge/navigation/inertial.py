@@ -80,6 +80,9 @@ _SQUAT_TIME = 60.0
 _SCALE_ROUNDS = 4
 """A wrong scale also bends the attitude: each round finds most of what is left."""
 
+_FALSE_TOLD = 1e-3
+"""A smaller part of false samples is left out without a word [-]."""
+
 _FINE_RATE = 20.0
 """Clock of the delays [Hz]."""
 
@@ -199,7 +202,7 @@ def _scaled(imu: Imu, forward: Floats, scale: Floats) -> Imu:
     """Multiply the specific force along the vehicle (3,) by a scale (n,)."""
     along = imu.accel @ forward
     accel = imu.accel + ((scale - 1.0) * along)[:, None] * forward
-    return Imu(imu.time, np.ascontiguousarray(accel), imu.gyro, imu.period)
+    return replace(imu, accel=np.ascontiguousarray(accel))
 
 
 def _scale_note(gain: Floats) -> str:
@@ -217,6 +220,11 @@ def _solved(
 ) -> Motion:  # fmt: skip
     """Align the sensor, run the filter and lay its solution out."""
     notes: list[str] = []
+    if imu.false > _FALSE_TOLD:
+        notes.append(
+            f"{100.0 * imu.false:.1f} % of the inertial samples are zeros, spikes or at a limit "
+            "of the sensor, and were left out"
+        )
     start = float(imu.time[0])
     imu, fine, aligned, changes = _settled(imu, reference, drive, mounting, notes)
     rot_bs, tilt_std, yaw_std, yaw_bias, delay, mounting = aligned
