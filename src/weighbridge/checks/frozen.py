@@ -1,4 +1,4 @@
-"""Did an axis of the inertial sensor stop to read on the way?"""
+"""Did an axis of the inertial sensor stop to read on the way, or is it at its limit?"""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from typing import Final
 import numpy as np
 
 from weighbridge.checks.needed import IMU
+from weighbridge.constants import GRAVITY
 from weighbridge.navigation.frozen import frozen_stretches, shown_speed
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
 
 _TOLD: Final = 5.0
 """Frozen for less in all is left out without a word [s]."""
+
+_AT_LIMIT: Final = 0.05
+"""With a larger part of its samples at one extreme value an axis is clipped [-]."""
 
 _LEAST: Final = 120.0
 """What is left must be as long to show how the sensor sits and what moved [s]."""
@@ -57,3 +61,21 @@ def _told(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
         else "the inertial sensor is left out there"
     )
     return Problem(names[0], f"{text}; {remedy}", serious=too_little)
+
+
+def check_limit(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find an accelerometer whose range is too small for gravity and the road's shaking."""
+    for name in IMU[:3]:
+        s = drive.get(name)
+        if s is None or len(s) < 50:
+            continue
+        for limit in (float(s.values.min()), float(s.values.max())):
+            share = float(np.mean(s.values == limit))
+            if _AT_LIMIT < share < 0.9 and 0.5 * GRAVITY < abs(limit) < 2.0 * GRAVITY:
+                yield Problem(
+                    name,
+                    f"{name} lies at {limit:.4g} m/s^2, its extreme, in {100.0 * share:.0f} % of "
+                    "the samples: its range is too small and its mean is bent; record it with a "
+                    "range of 2 g or more",
+                    serious=True,
+                )

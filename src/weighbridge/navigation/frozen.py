@@ -18,6 +18,12 @@ _RARE: Final = 1e-9
 _LONG: Final = 1.0
 """Runs as long say nothing of how often neighbours are alike by rounding [s]."""
 
+_COARSE: Final = 0.5
+"""With a larger share of neighbours alike, rounding hides small motion altogether [-]:"""
+
+_COARSE_RUN: Final = 20.0
+"""only longer runs are no smooth road [s]."""
+
 _MOVES: Final = 1.0
 """Faster, a body shakes too much for an accelerometer or gyro to repeat itself [m/s]."""
 
@@ -50,7 +56,8 @@ def frozen_stretches(signal: Signal, speed: Signal | None) -> Floats:
     others = same.size - int(repeats[~short].sum())
     share = float(repeats[short].sum()) / others if others > 0 else 0.0
     fewest = np.log(_RARE) / np.log(share) if 0.0 < share < 1.0 else 1.0
-    long = (length >= SHORTEST) & (repeats > max(fewest, 4.0))
+    shortest = _COARSE_RUN if share > _COARSE else SHORTEST
+    long = (length >= shortest) & (repeats > max(fewest, 4.0))
     first, last = first[long], last[long]
     found = np.column_stack([signal.time[first], signal.time[last]])
     if speed is None or not len(speed) or not found.size:

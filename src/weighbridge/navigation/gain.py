@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from weighbridge.navigation.aiding import resolution
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.steps import fitted
 from weighbridge.signals import Floats, Signal
@@ -44,6 +45,13 @@ _LEFT: Final = 0.002
 
 _MOST: Final = 0.35
 """A larger one is another fault's [-]."""
+
+_ALIKE: Final = 2.0
+"""Mean squared errors before and after a change of the scale differ by less [-]: by up to 1.5 in
+simulated drives with such a change, by 2.6 where an axis of the gyro was reversed."""
+
+_SMALL: Final = 0.07
+"""Errors of so much are small, whatever their ratio [m/s]."""
 
 _CHANGE_SURE: Final = 25.0
 """Squared error that a change of the scale must explain, over its variance [-]."""
@@ -109,13 +117,31 @@ def find_gain(motion: Motion, speed: Signal, *, again: bool = False) -> Gain | N
         half = 0.5 * max(found.length, 1.0)
         ends = np.array([found.center - half, found.center + half])
         curve = found.level + np.array([0.0, found.size])
-    left = weight * (inverse - np.interp(at, ends, curve))
+    inverse_then = np.interp(at, ends, curve)
+    left = weight * (inverse - inverse_then)
     std = float(np.sqrt(left @ left * at.size / (at.size - 1))) / float(weight.sum())
-    off = float(np.average(np.abs(1.0 / np.interp(at, ends, curve) - 1.0), weights=weight))
+    off = np.abs(1.0 / inverse_then - 1.0)
+    error = (np.interp(time, ends, curve) * force - shown) ** 2
+    # Noise of the force passes for scale; that of the speed's rounding, of two ends, does not.
+    rounding = resolution(speed.values) ** 2 / 6.0
+    noise = max(float(np.mean(error)) - rounding, 0.0) / float(np.mean(shown**2))
     least = _LEFT if again else max(_LEAST, _SURE * std)
-    if not least < off < _MOST:
+    if float(np.average(off, weights=weight)) < least + noise or float(np.max(off)) > _MOST:
+        return None
+    if curve[0] != curve[1] and _rougher(time, error, ends):
         return None
     return Gain(ends, 1.0 / curve, std)
+
+
+def _rougher(time: Floats, error: Floats, ends: Floats) -> bool:
+    """Tell whether speed and force also fit worse after a change: then it is not the scale."""
+    middle = 0.5 * (ends[0] + ends[1])
+    # Blocks do not tell the instant: next to it the fit may be wrong.
+    before, after = error[time < middle - _BLOCK], error[time > middle + _BLOCK]
+    if not before.size or not after.size:
+        return True
+    ratio = (float(np.mean(after)) + _SMALL**2) / (float(np.mean(before)) + _SMALL**2)
+    return not 1.0 / _ALIKE < ratio < _ALIKE
 
 
 def _changes(motion: Motion, speed: Signal) -> tuple[Floats, Floats, Floats] | None:

@@ -289,7 +289,7 @@ def _settled(
         np.ascontiguousarray(values[:, 3:]),
         imu.period,
     )
-    notes += told(changes)
+    notes += told(changes, float(imu.time[0]), float(imu.time[-1]))
     fine = evenly(imu, _FINE_RATE)
     return imu, fine, _align(fine, reference, mounting, notes), changes
 

@@ -187,13 +187,14 @@ def loosened(time: Floats, changes: list[Change]) -> tuple[Floats, Floats]:
     return instants[order][within], variances[order][within]
 
 
-def told(changes: list[Change]) -> list[str]:
-    """Say in sentences what changed when."""
+def told(changes: list[Change], start: float, end: float) -> list[str]:
+    """Say in sentences what changed when in a drive from ``start`` to ``end`` [s]."""
     texts = []
     for change in sorted(changes, key=lambda c: c.start):
         size = f"{math.degrees(abs(change.angle)):.1f} deg"
         if change.slow:
-            when = f"slowly from {change.start:.0f} to {change.end:.0f} s"
+            first, last = max(change.start, start), min(change.end, end)
+            when = f"slowly from {first:.0f} to {last:.0f} s"
         else:
             when = f"at {0.5 * (change.start + change.end):.0f} s"
         texts.append(
