@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from weighbridge.constants import GRAVITY
 from weighbridge.signals import Bools, Floats
 
 _LEAST_FORCE, _MOST_FORCE = 2.0, 50.0
@@ -52,7 +53,10 @@ def false_rows(accel: Floats, gyro: Floats, moving: Bools, period: float) -> Boo
     (n,)
     """
     size = np.sqrt(np.einsum("ij,ij->i", accel, accel))
-    false = (size < _LEAST_FORCE) | (size > _MOST_FORCE)
+    false = np.zeros(size.size, dtype=bool)
+    if 0.5 * GRAVITY < float(np.median(size)) < 2.0 * GRAVITY:
+        # Otherwise the unit is wrong, which others tell.
+        false |= (size < _LEAST_FORCE) | (size > _MOST_FORCE)
     for kind, block in enumerate((accel, gyro)):
         for axis in range(3):
             x = block[:, axis]
