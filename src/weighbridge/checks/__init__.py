@@ -13,6 +13,7 @@ from typing import Final
 
 from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates
 from weighbridge.checks.engine import check_engine_speed, check_friction, check_whole_torque
+from weighbridge.checks.frozen import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
 from weighbridge.checks.ranges import within_ranges, without_strays
 from weighbridge.checks.speed import check_scales
@@ -31,6 +32,8 @@ _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 _CHECKS: Final[tuple[_Check, ...]] = (
     check_pauses,
     check_stuck,
+    check_frozen,
+    check_limit,
     check_load,
     check_pressure,
     check_whole_torque,

@@ -6,12 +6,16 @@ Any fixed mounting is allowed: only what no rotation can explain is a problem.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from weighbridge.checks import windows
+from weighbridge.checks.needed import IMU
 from weighbridge.constants import GRAVITY
+from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
 
@@ -28,9 +32,14 @@ _SOME: Final = 100
 # Sane drives tie tilt and gravity by 0.3 to 0.8; a mirrored axis turns the sign.
 _AGAINST: Final = -0.12
 
+# Parts of a drive that are looked at alone, and their least length [s].
+_PARTS: Final = 3
+_PART: Final = 300.0
+
 
 def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Compare the inertial sensor with gravity, with the course and with itself."""
+    drive = thawed(drive, IMU)
     accel = _axes(drive, "accel")
     gyro = _axes(drive, "gyro")
     fine = True
@@ -42,8 +51,24 @@ def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         for problem in _check_rate(drive, gyro):
             fine = False
             yield problem
-    if fine and accel is not None and gyro is not None:
-        yield from _check_axes(drive, accel, gyro)
+    if not fine or accel is None or gyro is None:
+        return
+    found = list(_check_axes(drive, accel, gyro))
+    yield from found or _check_parts(drive)
+
+
+def _check_parts(drive: Drive) -> Iterator[Problem]:
+    """Find axes that were swapped or reversed on the way: what the whole drive hides."""
+    edges = np.linspace(drive.start, drive.end, _PARTS + 1)
+    for start, end in pairwise(edges) if drive.duration > _PARTS * _PART else ():
+        part = drive.between(float(start), float(end))
+        accel, gyro = _axes(part, "accel"), _axes(part, "gyro")
+        if accel is None or gyro is None:
+            continue
+        for problem in _check_axes(part, accel, gyro):
+            text = f"from {start:.0f} to {end:.0f} s {problem.text}; or cut this part off"
+            yield replace(problem, text=text)
+            return
 
 
 def _axes(drive: Drive, kind: str) -> tuple[Signal, Signal, Signal] | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.checks.needed import IMU, MOTION, TORQUE, moves, needed, show
 from weighbridge.checks.speed import SETTLED
-from weighbridge.signals import QUANTITIES, Drive, Floats, Problem
+from weighbridge.signals import QUANTITIES, Drive, Problem
 from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.model import Vehicle
 
@@ -29,8 +29,6 @@ _PERCENT: Final = (
 # No drive that gets anywhere stays below: 0 to 1 under a percent name ends near 1 %, of a torque
 # with its boost below 2 %.
 _LEAST_PERCENT: Final = 0.02
-# Samples that a noisy sensor does not repeat by chance.
-_FROZEN: Final = 200
 
 
 def check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -53,7 +51,7 @@ def check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Find signals that never change, and sensors that froze on the way."""
+    """Find signals that never change."""
     moving = moves(drive)
     made_of = needed(drive, vehicle)
     for s in drive.signals.values():
@@ -72,15 +70,6 @@ def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 "leave the column out or record it again",
                 serious=s.name in made_of,
             )
-        elif s.name in IMU:
-            run, at = _longest_run(s.values)
-            length = float(s.time[at + run - 1] - s.time[at])
-            if run > _FROZEN and length > 5.0:
-                yield Problem(
-                    s.name,
-                    f"{s.name} repeats one value for {length:.1f} s from {s.time[at]:.6g} s",
-                    serious=length > 0.2 * s.duration,
-                )
 
 
 def _along_an_axis(drive: Drive, name: str) -> bool:
@@ -90,17 +79,6 @@ def _along_an_axis(drive: Drive, name: str) -> bool:
     if part is None or course is None or not len(course):
         return False
     return bool(np.percentile(np.abs(part(course.values)), 90) < 0.02)
-
-
-def _longest_run(values: Floats) -> tuple[int, int]:
-    """Length and start of the longest run of one value; (1, 0) where none is long."""
-    same = values[1:] == values[:-1]
-    if np.count_nonzero(same) < _FROZEN:
-        return 1, 0
-    ends = np.flatnonzero(np.concatenate((~same, [True])))
-    lengths = np.diff(np.concatenate(([-1], ends)))
-    k = int(np.argmax(lengths))
-    return int(lengths[k]), int(ends[k] - lengths[k] + 1)
 
 
 def check_load(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:

@@ -309,6 +309,7 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     made = vehicle.provenance
     scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(vehicle)
     left = float(np.hypot(scale, MOTION_STD[balance.motion.source]))
+    left = float(np.hypot(left, balance.motion.specific_force_scale_std))
     if balance.brake_hidden:
         left = float(np.hypot(left, HIDDEN_BRAKE_STD))
     if lacks_accelerometer(vehicle, balance.motion):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,11 +21,22 @@ from weighbridge.kernels.ins import (
     Z_VVAR,
     lowpass_resample,
 )
+from weighbridge.navigation.dropouts import false_rows, repeated_rows
+from weighbridge.navigation.frozen import shown_speed, thawed
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 
 _AXES = ("x", "y", "z")
+
+_FEWEST = 50
+"""Fewer inertial samples show nothing."""
+
+_MOVES = 1.0
+"""Slower, a sensor may well repeat itself or read zero [m/s]."""
+
+_SLOWEST = 0.11
+"""Inertial samples further apart lose what happens between them [s]."""
 
 _HEIGHT_PERIOD, _HEIGHT_TIME = 10.0, 300.0
 """Without heights, distance of the pseudo-heights and how long hills last [s]."""
@@ -41,12 +52,14 @@ class Imu:
     accel : (n, 3) specific force [m/s^2]
     gyro : (n, 3) angular rate [rad/s]
     period : median distance of samples [s]
+    false : part of the samples that could not be and were left out [-]
     """
 
     time: Floats
     accel: Floats
     gyro: Floats
     period: float
+    false: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +81,7 @@ class Fixes:
 
 
 def read_imu(drive: Drive) -> Imu:
-    """Gather the six inertial signals on the clock of ``accel_x``.
+    """Gather the six inertial signals on the clock of ``accel_x``; frozen stretches are left out.
 
     Raises
     ------
@@ -79,6 +92,7 @@ def read_imu(drive: Drive) -> Imu:
     missing = drive.missing(names)
     if missing:
         raise DriveError(f"{drive.name}: inertial navigation lacks {', '.join(missing)}")
+    drive = thawed(drive, names)
     signals = [drive.signals[n] for n in names]
     start = max(float(s.time[0]) if len(s) else np.inf for s in signals)
     end = min(float(s.time[-1]) if len(s) else -np.inf for s in signals)
@@ -89,7 +103,7 @@ def read_imu(drive: Drive) -> Imu:
         # An axis that has a gap of its own must not be invented across it.
         if s.time is not clock and not np.array_equal(s.time, clock):
             keep &= s.age(clock) <= 2.0 * max(usual, s.period)
-    if keep.sum() < 50:
+    if keep.sum() < _FEWEST:
         raise DriveError(
             f"{drive.name}: accel and gyro have only {int(keep.sum())} samples in common: "
             "check their time stamps"
@@ -101,13 +115,39 @@ def read_imu(drive: Drive) -> Imu:
             s = drive.signals[f"{kind}_{axis}"]
             same = s.time is clock or np.array_equal(s.time, clock)
             block[:, i] = s.values[keep] if same else np.interp(time, s.time, s.values)
-    period = float(np.median(np.diff(time)))
-    if period > 0.11:
+    speed = shown_speed(drive)
+    moving = np.ones(time.size, dtype=bool)
+    if speed is not None and len(speed):
+        moving = np.interp(time, speed.time, speed.values) > _MOVES
+    imu = Imu(time, data["accel"], data["gyro"], float(np.median(np.diff(time))))
+    repeated = repeated_rows(imu.accel, imu.gyro, moving)
+    if repeated.any():
+        own = time[moving & ~repeated]
+        imu = _kept(imu, ~repeated, float(np.median(np.diff(own))) if own.size > 1 else np.inf)
+        moving = moving[~repeated]
+    if imu.period > _SLOWEST:
         raise DriveError(
-            f"{drive.name}: inertial samples come every {period:.2f} s; navigation needs 0.1 s "
-            "or less"
+            f"{drive.name}: inertial samples come every {imu.period:.2f} s; navigation needs "
+            "0.1 s or less: leave accel_x..z and gyro_x..z out to weigh by speed alone"
         )
-    return Imu(time, data["accel"], data["gyro"], period)
+    false = false_rows(imu.accel, imu.gyro, moving, imu.period)
+    if not false.any():
+        return imu
+    if np.count_nonzero(~false) < _FEWEST:
+        raise DriveError(
+            f"{drive.name}: {np.count_nonzero(false)} of {false.size} inertial samples are zeros, "
+            "spikes or at a limit of the sensor: record accel_x..z and gyro_x..z again"
+        )
+    return replace(_kept(imu, ~false, imu.period), false=float(np.mean(false)))
+
+
+def _kept(imu: Imu, keep: Bools, period: float) -> Imu:
+    return Imu(
+        np.ascontiguousarray(imu.time[keep]),
+        np.ascontiguousarray(imu.accel[keep]),
+        np.ascontiguousarray(imu.gyro[keep]),
+        period,
+    )
 
 
 def read_fixes(drive: Drive, start: float, end: float) -> Fixes | None:

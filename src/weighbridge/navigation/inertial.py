@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -50,8 +52,11 @@ from weighbridge.navigation.aiding import (
     speed_from_fixes,
     still_state,
 )
+from weighbridge.navigation.even import Even, coarsely, evenly
+from weighbridge.navigation.gain import find_gain
 from weighbridge.navigation.motion import Motion, bridged, noise_level
 from weighbridge.navigation.mounting import TooLittleMotionError, coarse_mounting
+from weighbridge.navigation.remounting import Change, find_changes, loosened, told, undo, unsure
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.navigation.timing import estimate_speed_delay
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
@@ -72,34 +77,24 @@ _FIRST_PASS = 900.0
 _SQUAT_TIME = 60.0
 """One start alone shows anything but squat: it takes so much driving [s]."""
 
+_SCALE_ROUNDS = 4
+"""A wrong scale also bends the attitude: each round finds most of what is left."""
+
+_FALSE_TOLD = 1e-3
+"""A smaller part of false samples is left out without a word [-]."""
+
 _FINE_RATE = 20.0
 """Clock of the delays [Hz]."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Even:
-    """Inertial samples, low-passed on an even clock.
-
-    Attributes
-    ----------
-    time : (n,) [s]
-    values : (n, 6) specific force and angular rate in sensor axes; NaN in gaps
-    """
-
-    time: Floats
-    values: Floats
-
-
-def _evenly(imu: Imu, rate: float) -> _Even:
-    """Low-pass the inertial samples and take them to an even clock."""
-    start = float(imu.time[0])
-    count = max(4, math.floor((imu.time[-1] - start) * rate) + 1)
-    both = [resample(imu.time, y, start, 1.0 / rate, count) for y in (imu.accel, imu.gyro)]
-    return _Even(start + np.arange(count) / rate, np.hstack(both))
-
-
 MOST_MOVED = 0.2
-"""A mounting further from the one given is another one [rad]."""
+"""A mounting further from the one given is another one [rad],"""
+
+_MOVED_SURE = 4.0
+"""if it is by so many standard deviations: a steady drive hardly shows where ahead is [-]."""
+
+
+_Alignment: TypeAlias = tuple[Floats, float, float, float, float, Mounting | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,15 +178,61 @@ def inertial_motion(
             f"{drive.name}: inertial navigation lacks vehicle_speed, gnss_speed or latitude and "
             "longitude: with the inertial sensor alone the motion drifts away"
         )
-    notes: list[str] = []
+    motion = _solved(drive, imu, fixes, wheel, reference, mounting, settings, rate)
+    scale = np.ones(imu.time.size)
+    scale_std = 0.0
+    for _ in range(_SCALE_ROUNDS if wheel is not None else 0):
+        gain = find_gain(motion, reference, again=scale_std > 0.0)
+        if gain is None or motion.mounting is None:
+            break
+        scale /= gain.at(imu.time)
+        scale_std = gain.std
+        scaled = _scaled(imu, euler_to_matrix(*motion.mounting)[0], scale)
+        motion = _solved(drive, scaled, fixes, wheel, reference, mounting, settings, rate)
+    if scale_std == 0.0:
+        return motion
+    return replace(
+        motion,
+        specific_force_scale_std=scale_std,
+        notes=(*motion.notes, _scale_note(1.0 / scale)),
+    )
 
-    fine = _evenly(imu, _FINE_RATE)
-    rot_bs, tilt_std, yaw_std, yaw_bias, delay, mounting = _align(fine, reference, mounting, notes)
+
+def _scaled(imu: Imu, forward: Floats, scale: Floats) -> Imu:
+    """Multiply the specific force along the vehicle (3,) by a scale (n,)."""
+    along = imu.accel @ forward
+    accel = imu.accel + ((scale - 1.0) * along)[:, None] * forward
+    return replace(imu, accel=np.ascontiguousarray(accel))
+
+
+def _scale_note(gain: Floats) -> str:
+    low, high = float(np.min(gain)), float(np.max(gain))
+    size = f"{high:.3f}" if high - low < 0.005 else f"{gain[0]:.3f} to {gain[-1]:.3f}"
+    return (
+        f"the accelerometer reads {size} times what the speed changes by along the vehicle: its "
+        "scale is off, and was corrected"
+    )
+
+
+def _solved(
+    drive: Drive, imu: Imu, fixes: Fixes | None, wheel: Signal | None, reference: Signal,
+    mounting: Mounting | None, settings: NavigationSettings, rate: float,
+) -> Motion:  # fmt: skip
+    """Align the sensor, run the filter and lay its solution out."""
+    notes: list[str] = []
+    if imu.false > _FALSE_TOLD:
+        notes.append(
+            f"{100.0 * imu.false:.1f} % of the inertial samples are zeros, spikes or at a limit "
+            "of the sensor, and were left out"
+        )
+    start = float(imu.time[0])
+    imu, fine, aligned, changes = _settled(imu, reference, drive, mounting, notes)
+    rot_bs, tilt_std, yaw_std, yaw_bias, delay, mounting = aligned
     reference = Signal(reference.name, reference.time - delay, reference.values)
     gnss_delay = delay if wheel is None else _gnss_delay(drive, fine, fixes, rot_bs)
     speed = reference if wheel is not None or drive.has("gnss_speed") else None
 
-    even = fine if rate == _FINE_RATE else _evenly(imu, rate)
+    even = fine if rate == _FINE_RATE else evenly(imu, rate)
     grid, sensor = even.time, even.values
     accel, gyro = sensor[:, :3] @ rot_bs.T, sensor[:, 3:] @ rot_bs.T
 
@@ -213,13 +254,44 @@ def inertial_motion(
         free_scale=wheel is not None and fixes is not None,
     )  # fmt: skip
     first_end = min(nodes.size, int(np.searchsorted(node_time, start + _FIRST_PASS)) + 1)
-    found = _filter(imu, rot_bs, nodes[:first_end], z[:first_end], begin, noise, False)
+    loose = _loose_nodes(node_time, changes)
+    found = _filter(imu, rot_bs, nodes[:first_end], z[:first_end], begin, noise, False, loose)
     rot_bs, begin = _restart(rot_bs, begin, found)
-    solution = _filter(imu, rot_bs, nodes, z, begin, noise, settings.smooth)
+    solution = _filter(imu, rot_bs, nodes, z, begin, noise, settings.smooth, loose)
     return _motion(
         drive, imu, grid, sensor, rot_bs, solution, fixes, reference, wheel is not None, delay,
-        settings, mounting, notes, begin,
+        settings, mounting, notes, begin, bool(loose),
     )  # fmt: skip
+
+
+def _settled(
+    imu: Imu, reference: Signal, drive: Drive, mounting: Mounting | None, notes: list[str]
+) -> tuple[Imu, Even, _Alignment, list[Change]]:
+    """Align the sensor; where it was moved on the way, turn its later samples back first.
+
+    Samples during which it may or may not have been moved are left out.
+    """
+    fine = evenly(imu, _FINE_RATE)
+    first_notes: list[str] = []
+    aligned = _align(fine, reference, mounting, first_notes)
+    shifted = Signal(reference.name, reference.time - aligned[4], reference.values)
+    coarse = coarsely(fine, _COARSE_PERIOD)
+    changes = find_changes(coarse, shifted, aligned[0], drive.get("altitude"))
+    if not changes:
+        notes += first_notes
+        return imu, fine, aligned, changes
+    keep = ~unsure(imu.time, changes)
+    time = imu.time[keep]
+    values = undo(time, np.hstack([imu.accel[keep], imu.gyro[keep]]), changes)
+    imu = Imu(
+        time,
+        np.ascontiguousarray(values[:, :3]),
+        np.ascontiguousarray(values[:, 3:]),
+        imu.period,
+    )
+    notes += told(changes, float(imu.time[0]), float(imu.time[-1]))
+    fine = evenly(imu, _FINE_RATE)
+    return imu, fine, _align(fine, reference, mounting, notes), changes
 
 
 def _usable(signal: Signal | None, start: float, end: float) -> Signal | None:
@@ -231,17 +303,14 @@ def _usable(signal: Signal | None, start: float, end: float) -> Signal | None:
 
 
 def _align(
-    fine: _Even, reference: Signal, mounting: Mounting | None, notes: list[str]
-) -> tuple[Floats, float, float, float, float, Mounting | None]:
+    fine: Even, reference: Signal, mounting: Mounting | None, notes: list[str]
+) -> _Alignment:
     """Find sensor to body axes, their uncertainty, the yaw rate's bias and the speed's delay.
 
     The last value is the mounting given, or None where the sensor was moved since.
     """
-    start = float(fine.time[0])
-    count = max(4, math.floor((fine.time[-1] - start) / _COARSE_PERIOD) + 1)
-    grid = start + np.arange(count) * _COARSE_PERIOD
-    whole = np.isfinite(fine.values).all(axis=1)
-    data = resample(fine.time[whole], fine.values[whole], start, _COARSE_PERIOD, count)
+    coarse_imu = coarsely(fine, _COARSE_PERIOD)
+    grid, data = coarse_imu.time, coarse_imu.values
 
     delay = 0.0
     rot = np.eye(3) if mounting is None else euler_to_matrix(
@@ -268,7 +337,8 @@ def _align(
                 rot, tilt_std, yaw_std = coarse.rot_bs, coarse.tilt_std, coarse.yaw_std
             else:
                 angle = math.acos(np.clip(0.5 * (np.trace(rot @ coarse.rot_bs.T) - 1.0), -1, 1))
-                if angle > MOST_MOVED:
+                unsure = math.hypot(coarse.yaw_std, coarse.tilt_std, tilt_std, yaw_std)
+                if angle > max(MOST_MOVED, _MOVED_SURE * unsure):
                     notes.append(
                         f"the sensor sits {math.degrees(angle):.0f} deg from the mounting given: "
                         "it was moved, and its mounting is found from this drive alone"
@@ -291,7 +361,7 @@ def _align(
     return rot, tilt_std, yaw_std, yaw_bias, delay, mounting
 
 
-def _gnss_delay(drive: Drive, fine: _Even, fixes: Fixes | None, rot_bs: Floats) -> float:
+def _gnss_delay(drive: Drive, fine: Even, fixes: Fixes | None, rot_bs: Floats) -> float:
     """Find how late GNSS is, from its speed or that between fixes; 0 where not shown [s]."""
     if fixes is None:
         return 0.0
@@ -419,6 +489,16 @@ def _first_heading(
     return float(np.angle(cross)), min(0.1 + 3.0 / size, 1.0)
 
 
+def _loose_nodes(time: Floats, changes: list[Change]) -> dict[int, Floats]:
+    """Nodes before which the mounting may have changed, with variances of pitch and yaw (2,)."""
+    loose: dict[int, Floats] = {}
+    if changes:
+        at, variance = loosened(time, changes)
+        for node, var in zip(np.searchsorted(time, at), variance, strict=True):
+            loose[int(node)] = loose.get(int(node), np.zeros(2)) + var
+    return loose
+
+
 def _restart(rot_bs: Floats, begin: _Start, found: Solution) -> tuple[Floats, _Start]:
     """Move the beginning to the constants a pass has found, uncertain as they were.
 
@@ -436,17 +516,24 @@ def _restart(rot_bs: Floats, begin: _Start, found: Solution) -> tuple[Floats, _S
 
 
 def _filter(
-    imu: Imu, rot_bs: Floats, nodes: Ints, z: Floats, begin: _Start, noise: Noise, backward: bool
-) -> Solution:
-    """Run forward over the nodes and, if asked, backward."""
+    imu: Imu, rot_bs: Floats, nodes: Ints, z: Floats, begin: _Start, noise: Noise, backward: bool,
+    loose: dict[int, Floats],
+) -> Solution:  # fmt: skip
+    """Run forward over the nodes and, if asked, backward.
+
+    Before the nodes ``loose`` the mounting may have changed, by these variances of pitch and yaw.
+    """
     x, cov, work = begin.x.copy(), begin.cov.copy(), new_work()
     count = nodes.size
     states = np.empty((count, SHOWN))
     stds = np.empty(count)
     empty = new_log(0)
     kept = []
-    for first in range(0, count, _STRETCH):
-        last = min(first + _STRETCH, count)
+    edges = sorted({*range(0, count, _STRETCH), *(k for k in loose if 0 < k < count), count})
+    for first, last in pairwise(edges):
+        if first in loose:
+            cov[[15, 16], [15, 16]] += loose[first]
+            cov[[6, 7, 8], [6, 7, 8]] += loose[first][1]
         if backward:
             kept.append((x.copy(), cov.copy()))
         run(
@@ -459,8 +546,7 @@ def _filter(
         # covariances of a whole drive would fill the memory
         adjoint = np.zeros(ERRORS)
         log = new_log(_STRETCH)
-        for first in reversed(range(0, count, _STRETCH)):
-            last = min(first + _STRETCH, count)
+        for first, last in reversed(list(pairwise(edges))):
             x, cov = kept.pop()
             run(
                 x, cov, work, imu.time, imu.accel, imu.gyro, rot_bs, nodes, first, last, z, noise,
@@ -474,6 +560,7 @@ def _motion(
     drive: Drive, imu: Imu, grid: Floats, sensor: Floats, rot_bs: Floats, solution: Solution,
     fixes: Fixes | None, reference: Signal, has_wheel: bool, delay: float,
     settings: NavigationSettings, mounting: Mounting | None, notes: list[str], begin: _Start,
+    remounted: bool,
 ) -> Motion:  # fmt: skip
     """Lay the solution out on the even clock."""
     time, states, stds = solution.time, solution.states, solution.stds
@@ -502,11 +589,13 @@ def _motion(
     force = sensor[:, :3] @ rot_bs.T - bias
     cp, sp = np.cos(pitch), np.sin(pitch)
     body_accel = force + GRAVITY * np.column_stack([-sp, cp * np.sin(roll), cp * np.cos(roll)])
-    accel = body_accel[:, 0] + yaw0 * body_accel[:, 1] + pitch0 * body_accel[:, 2]
+    pitched: Floats | float = on_grid(states[:, PITCH0]) if remounted else pitch0
+    yawed: Floats | float = on_grid(states[:, YAW0]) if remounted else yaw0
+    accel = body_accel[:, 0] + yawed * body_accel[:, 1] + pitched * body_accel[:, 2]
     held = bridged(grid, accel)
     width = max(1, round(0.3 / (grid[1] - grid[0]))) | 1
     lean = np.convolve(np.pad(held, width // 2, mode="edge"), np.full(width, 1.0 / width), "valid")
-    grade = pitch - pitch0 - use_squat * lean
+    grade = pitch - pitched - use_squat * lean
     floor = settings.body_pitch_std
     if fixes is None or not fixes.has_height:
         # without heights a bias of the accelerometer passes for a hill, but a

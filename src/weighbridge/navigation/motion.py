@@ -52,6 +52,7 @@ class Motion:
     mounting_std : their standard deviations [rad]
     speed_std : of ``speed`` where ``accel`` is its slope, as a smoother knows it; 0 where an
         accelerometer gave ``accel`` [m/s]
+    specific_force_scale_std : relative, of the accelerometer's scale where it was corrected [-]
     notes : sentences on what was found and what was doubtful
     """
 
@@ -79,6 +80,7 @@ class Motion:
     mounting: tuple[float, float, float] | None = None
     mounting_std: tuple[float, float, float] | None = None
     speed_std: float = 0.0
+    specific_force_scale_std: float = 0.0
     notes: tuple[str, ...] = ()
 
     @property

@@ -1,0 +1,132 @@
+"""Inertial samples that cannot be: zeros in place of a reading, spikes, an axis at its limit."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from weighbridge.constants import GRAVITY
+from weighbridge.signals import Bools, Floats
+
+_LEAST_FORCE, _MOST_FORCE = 2.0, 50.0
+"""No body on wheels feels less or more than so for a sample [m/s^2]."""
+
+_SPIKE: Final = 20.0
+"""A sample off the mean of its neighbours by so many usual deviations is a spike [-],"""
+
+_LEAST_SPIKE: Final = (4.0, 1.0)
+"""if it is also off by so much: force [m/s^2], rate [rad/s]."""
+
+_ZEROS: Final = 0.002
+"""A larger part of zeros in motion is no chance [-],"""
+
+_MORE: Final = 4.0
+"""if there are so many times more of them than of the values beside them [-]."""
+
+_REPEATS: Final = 0.3
+"""With a larger part of repeated samples in motion the sensor is slower than its table [-]."""
+
+_AT_LIMIT: Final = (5e-4, 0.3)
+"""Part of the samples at an axis's highest or lowest value at which it is a limit [-]: with more
+than the larger part it is the axis of gravity, whose limit does not matter."""
+
+_CLIPPED: Final = 0.1
+"""A larger part of samples at the limit leaves no mean [-],"""
+
+_WINDOW: Final = 1.0
+"""over so long [s]."""
+
+
+def false_rows(accel: Floats, gyro: Floats, moving: Bools, period: float) -> Bools:
+    """Mark samples that say nothing of the motion.
+
+    Parameters
+    ----------
+    accel, gyro : (n, 3) specific force [m/s^2] and rate [rad/s]
+    moving : (n,) the vehicle moves
+    period : of the samples [s]
+
+    Returns
+    -------
+    (n,)
+    """
+    size = np.sqrt(np.einsum("ij,ij->i", accel, accel))
+    false = np.zeros(size.size, dtype=bool)
+    if 0.5 * GRAVITY < float(np.median(size)) < 2.0 * GRAVITY:
+        # Otherwise the unit is wrong, which others tell.
+        false |= (size < _LEAST_FORCE) | (size > _MOST_FORCE)
+    for kind, block in enumerate((accel, gyro)):
+        for axis in range(3):
+            x = block[:, axis]
+            false |= _spikes(x, _LEAST_SPIKE[kind]) | _zeros(x, moving)
+    # What has no reading must not pass for the lowest one.
+    left = np.flatnonzero(~false)
+    if left.size:
+        for block in (accel, gyro):
+            for axis in range(3):
+                false[left] |= _clipped(block[left, axis], round(_WINDOW / period))
+    return np.asarray(false)
+
+
+def repeated_rows(accel: Floats, gyro: Floats, moving: Bools) -> Bools:
+    """Mark samples in motion that a slower sensor only repeats; none where few are alike.
+
+    Parameters
+    ----------
+    accel, gyro : (n, 3)
+    moving : (n,) the vehicle moves
+
+    Returns
+    -------
+    (n,)
+    """
+    same = np.zeros(moving.size, dtype=bool)
+    same[1:] = (accel[1:] == accel[:-1]).all(axis=1) & (gyro[1:] == gyro[:-1]).all(axis=1)
+    same &= moving
+    if np.count_nonzero(same) < _REPEATS * np.count_nonzero(moving):
+        same[:] = False
+    return same
+
+
+def _spikes(x: Floats, least: float) -> Bools:
+    off = np.zeros(x.size)
+    off[1:-1] = np.abs(x[1:-1] - 0.5 * (x[2:] + x[:-2]))
+    limit = max(_SPIKE * 1.4826 * float(np.median(off)), least)
+    found = off > limit
+    if not found.any():
+        return found
+    # The neighbours of a spike are off by half of it.
+    beside = np.maximum(np.append(off[1:], 0.0), np.append(0.0, off[:-1]))
+    return np.asarray(found & (off > beside))
+
+
+def _zeros(x: Floats, moving: Bools) -> Bools:
+    zero = x == 0.0
+    here = int(np.count_nonzero(zero & moving))
+    if here <= _ZEROS * np.count_nonzero(moving):
+        return np.zeros(x.size, dtype=bool)
+    some = x[moving][:200_000]
+    levels = np.unique(some)
+    place = int(np.searchsorted(levels, 0.0))
+    low, high = levels[max(place - 5, 0)], levels[min(place + 5, levels.size - 1)]
+    if high - low > np.percentile(some, 84.0) - np.percentile(some, 16.0):
+        # Rounding is so coarse that the middle may well be zero.
+        return np.zeros(x.size, dtype=bool)
+    near = int(np.count_nonzero((x >= low) & (x <= high) & moving)) - here
+    return zero if here > _MORE * max(near, 1) / 10.0 else np.zeros(x.size, dtype=bool)
+
+
+def _clipped(x: Floats, width: int) -> Bools:
+    lost = np.zeros(x.size, dtype=bool)
+    for limit in (float(x.max()), float(x.min())):
+        at = x == limit
+        share = float(np.mean(at))
+        if not _AT_LIMIT[0] < share < _AT_LIMIT[1]:
+            continue
+        inner = 0.98 * limit if abs(limit) > 0.0 else 0.0
+        near = int(np.count_nonzero((x > min(inner, limit)) & (x < max(inner, limit))))
+        if np.count_nonzero(at) > _MORE * near:
+            lost |= uniform_filter1d(at.astype(np.float64), max(width, 3)) > _CLIPPED
+    return lost

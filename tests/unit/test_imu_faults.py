@@ -1,0 +1,271 @@
+"""Faults of the inertial sensor on the way: moved, mis-scaled, frozen, noisy, slow, clipped."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numba import config
+
+from weighbridge.checks import check_drive
+from weighbridge.errors import DriveError
+from weighbridge.navigation.aiding import read_imu
+from weighbridge.navigation.inertial import inertial_motion
+from weighbridge.signals import Signal
+from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.vehicle.model import Mounting
+
+pytestmark = pytest.mark.skipif(
+    bool(config.DISABLE_JIT), reason="whole drives take minutes without the compiler"
+)
+
+ACCEL = ("accel_x", "accel_y", "accel_z")
+GYRO = ("gyro_x", "gyro_y", "gyro_z")
+MIDDLE = 600.0
+
+
+def made_of(name, seed):
+    """Drive, and its motion with a squat that is known, as vehicle files have it."""
+    made = simulate_car(replace(make_scenario(name, seed=seed), duration=1200.0))
+    free = inertial_motion(made.drive)
+    return made.drive, inertial_motion(made.drive, known(free))
+
+
+def known(motion):
+    return Mounting(
+        roll=motion.mounting[0],
+        pitch=motion.mounting[1],
+        yaw=motion.mounting[2],
+        std=motion.mounting_std,
+        squat=motion.squat,
+        squat_std=5e-4,
+    )
+
+
+@pytest.fixture(scope="module", params=[("car", 81), ("truck", 82), ("electric", 83)])
+def any_vehicle(request):
+    return made_of(*request.param)
+
+
+@pytest.fixture(scope="module")
+def car():
+    return made_of("car", 81)
+
+
+def columns(drive, names):
+    return np.column_stack([drive.signals[n].values for n in names])
+
+
+def replaced(drive, names, values, keep=slice(None)):
+    return drive.with_signals(
+        *(
+            Signal(n, drive.signals[n].time[keep], values[keep, i].copy())
+            for i, n in enumerate(names)
+        )
+    )
+
+
+def turned(drive, axis, degrees, *, slow=0.0):
+    """Turn both sensors from the middle on; at once, or within ``slow`` seconds."""
+    time = drive.signals["accel_x"].time
+    share = np.clip((time - MIDDLE) / slow, 0.0, 1.0) if slow else time >= MIDDLE
+    angle = np.radians(degrees) * share
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    for names in (ACCEL, GYRO):
+        old = columns(drive, names)
+        new = old.copy()
+        new[:, i] = np.cos(angle) * old[:, i] - np.sin(angle) * old[:, j]
+        new[:, j] = np.sin(angle) * old[:, i] + np.cos(angle) * old[:, j]
+        drive = replaced(drive, names, new)
+    return drive
+
+
+def scaled(drive, gain):
+    """Multiply the accelerometer by ``gain`` of the time's share."""
+    time = drive.signals["accel_x"].time
+    share = (time - time[0]) / (time[-1] - time[0])
+    return replaced(drive, ACCEL, columns(drive, ACCEL) * gain(share)[:, None])
+
+
+def force_slope(motion, plain):
+    """Slope and offset of the force along the road on that of the drive as it was."""
+    at = np.interp(motion.time, plain.time, plain.specific_force)
+    use = motion.valid & (motion.speed > 2.0) & (motion.time < plain.time[-1])
+    use &= np.interp(motion.time, plain.time, plain.valid) == 1.0
+    slope, offset = np.polyfit(at[use], motion.specific_force[use], 1)
+    return slope, offset
+
+
+def halves_apart(motion, plain):
+    """Mean error of the force after the middle less that before it [m/s^2]."""
+    at = np.interp(motion.time, plain.time, plain.specific_force)
+    use = motion.valid & (motion.speed > 2.0)
+    late = motion.time > MIDDLE
+    error = motion.specific_force - at
+    return np.mean(error[use & late]) - np.mean(error[use & ~late])
+
+
+@pytest.mark.parametrize(("axis", "degrees"), [("y", 3.0), ("y", -8.0), ("z", 30.0)])
+def test_a_sensor_moved_on_the_way_is_found_anew(any_vehicle, axis, degrees):
+    drive, plain = any_vehicle
+    motion = inertial_motion(turned(drive, axis, degrees), known(plain))
+    (note,) = [n for n in motion.notes if "was moved" in n]
+    assert float(note.split(" deg")[0].split()[-1]) == pytest.approx(abs(degrees), abs=4.0)
+    assert abs(halves_apart(motion, plain)) < 0.03
+    slope, _ = force_slope(motion, plain)
+    assert slope == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_mount_that_creeps_is_followed(any_vehicle):
+    drive, plain = any_vehicle
+    motion = inertial_motion(turned(drive, "y", 5.0, slow=500.0), known(plain))
+    assert any("was moved" in n for n in motion.notes)
+    assert abs(halves_apart(motion, plain)) < 0.1
+
+
+def test_a_moved_sensor_is_found_without_heights(car):
+    drive, _ = car
+    without = drive.without("altitude")
+    plain = inertial_motion(without)
+    assert not any("was moved" in n for n in plain.notes)
+    motion = inertial_motion(turned(without, "y", 5.0), known(plain))
+    assert any("was moved by" in n for n in motion.notes)
+    assert abs(halves_apart(motion, plain)) < 0.05
+
+
+@pytest.mark.parametrize("start", [0.0, 300.0, 700.0])
+def test_no_steady_drive_is_called_moved(any_vehicle, start):
+    drive, plain = any_vehicle
+    assert not any("was moved" in n for n in plain.notes)
+    part = drive.between(start, start + 300.0)
+    assert not any("moved" in n for n in inertial_motion(part, known(plain)).notes)
+
+
+@pytest.mark.parametrize(
+    "gain",
+    [
+        lambda u: np.full(u.size, 0.95),
+        lambda u: np.full(u.size, 1.1),
+        lambda u: 1.0 + 0.1 * u,
+        lambda u: np.where(u < 0.5, 1.0, 1.1),
+    ],
+    ids=["low", "high", "ramp", "step"],
+)
+def test_a_wrong_scale_is_corrected(any_vehicle, gain):
+    drive, plain = any_vehicle
+    motion = inertial_motion(scaled(drive, gain), known(plain))
+    assert any("its scale is off" in n for n in motion.notes)
+    assert not any("its scale is off" in n for n in plain.notes)
+    assert motion.specific_force_scale_std > 0.0
+    slope, _ = force_slope(motion, plain)
+    assert slope == pytest.approx(1.0, abs=0.025)
+
+
+def test_frozen_stretches_are_left_out(car):
+    drive, plain = car
+    for name in ("accel_x", "gyro_y"):
+        s = drive.signals[name]
+        values = s.values.copy()
+        stuck = (s.time >= 400.0) & (s.time < 460.0)
+        values[stuck] = values[np.flatnonzero(stuck)[0]]
+        frozen = drive.with_signals(Signal(name, s.time, values))
+        (problem,) = [p for p in check_drive(frozen) if p.signal == name]
+        assert "repeats one value for 60.0 s" in problem.text
+        assert not problem.serious
+        motion = inertial_motion(frozen, known(plain))
+        assert not motion.valid[(motion.time > 402.0) & (motion.time < 458.0)].any()
+        slope, _ = force_slope(motion, plain)
+        assert slope == pytest.approx(1.0, abs=0.01)
+
+
+def test_an_axis_that_dies_leaves_what_was_before(car):
+    drive, _ = car
+    s = drive.signals["gyro_z"]
+    dead = drive.with_signals(Signal("gyro_z", s.time, np.where(s.time < 700.0, s.values, 0.0)))
+    assert not any(p.serious for p in check_drive(dead))
+    motion = inertial_motion(dead)
+    assert motion.valid[motion.time < 650.0].any()
+    assert not motion.valid[motion.time > 702.0].any()
+
+
+def test_rounding_is_not_called_frozen(car):
+    drive, _ = car
+    rounded = replaced(drive, GYRO, np.round(columns(drive, GYRO) / 0.01) * 0.01)
+    before, after = read_imu(drive), read_imu(rounded)
+    assert after.time.size > 0.95 * before.time.size
+
+
+@pytest.mark.parametrize("value", [0.0, 40.0])
+def test_dropouts_and_spikes_are_left_out(any_vehicle, value):
+    drive, plain = any_vehicle
+    force = columns(drive, ACCEL)
+    force[np.random.default_rng(5).random(force.shape[0]) < 0.03] = value
+    motion = inertial_motion(replaced(drive, ACCEL, force), known(plain))
+    assert any("zeros, spikes" in n for n in motion.notes)
+    slope, _ = force_slope(motion, plain)
+    assert slope == pytest.approx(1.0, abs=0.005)
+
+
+def test_one_axis_that_drops_out_to_zero_is_left_out(car):
+    drive, plain = car
+    force = columns(drive, ACCEL)
+    force[np.random.default_rng(6).random(force.shape[0]) < 0.05, 0] = 0.0
+    slope, _ = force_slope(inertial_motion(replaced(drive, ACCEL, force), known(plain)), plain)
+    assert slope == pytest.approx(1.0, abs=0.005)
+
+
+def test_a_clipped_axis_is_left_out_where_it_is_clipped(car):
+    drive, plain = car
+    force = columns(drive, ACCEL)
+    force[:, 0] = np.clip(force[:, 0], -1.0, 1.0)
+    motion = inertial_motion(replaced(drive, ACCEL, force), known(plain))
+    hard = np.abs(np.interp(motion.time, plain.time, plain.specific_force)) > 1.4
+    hard &= motion.speed > 3.0
+    assert np.mean(motion.valid[hard]) < 0.2
+    slope, _ = force_slope(motion, plain)
+    assert slope == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_range_too_small_for_gravity_is_told(car):
+    drive, _ = car
+    force = np.clip(columns(drive, ACCEL), -10.0, 10.0)
+    (problem,) = [p for p in check_drive(replaced(drive, ACCEL, force)) if p.serious]
+    assert problem.signal == "accel_z"
+    assert "range is too small" in problem.text
+
+
+def at_ten_hertz(drive):
+    """Average the inertial samples over a tenth of a second."""
+    for names in (ACCEL, GYRO):
+        time, values = drive.signals[names[0]].time, columns(drive, names)
+        each = round(0.1 / np.median(np.diff(time)))
+        count = time.size // each
+        mean = values[: count * each].reshape(count, each, 3).mean(axis=1)
+        stamps = time[: count * each].reshape(count, each).mean(axis=1)
+        drive = drive.with_signals(*(Signal(n, stamps, mean[:, i]) for i, n in enumerate(names)))
+    return drive
+
+
+def test_ten_samples_a_second_leave_no_holes(any_vehicle):
+    drive, plain = any_vehicle
+    motion = inertial_motion(at_ten_hertz(drive), known(plain))
+    assert motion.speed_delay == pytest.approx(plain.speed_delay, abs=0.03)
+    assert np.mean(motion.valid) > 0.98 * np.mean(plain.valid)
+
+
+def test_a_sensor_slower_than_its_table_is_told(car):
+    drive, _ = car
+    for names in (ACCEL, GYRO):
+        values = columns(drive, names)
+        drive = replaced(drive, names, values[np.arange(values.shape[0]) // 60 * 60])
+    with pytest.raises(DriveError, match=r"inertial samples come every 0\.30 s"):
+        inertial_motion(drive)
+
+
+def test_axes_swapped_on_the_way_are_told(car):
+    drive, _ = car
+    late = drive.signals["accel_x"].time > MIDDLE
+    force = columns(drive, ACCEL)
+    force[late, 1] *= -1.0
+    assert not any(p.serious for p in check_drive(drive))
+    (problem,) = [p for p in check_drive(replaced(drive, ACCEL, force)) if p.serious]
+    assert "cut this part off" in problem.text
