@@ -26,6 +26,7 @@ from weighbridge.calibration.regression import (
     join_rows,
 )
 from weighbridge.checks import check_drive
+from weighbridge.checks.mending import mended
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, HIDDEN_BRAKE_STD, WIDEST, cold_share
 from weighbridge.estimators.regression import regression
@@ -179,7 +180,7 @@ def _checked(
         for problem in check_drive(drive, known):
             if problem.serious:
                 raise DriveError(f"{drive.name}: {problem.text}")
-    return drives, base, masses
+    return [mended(drive, known) for drive in drives], base, masses
 
 
 def run_calibration(

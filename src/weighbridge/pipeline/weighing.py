@@ -14,9 +14,11 @@ from scipy.stats import t as student
 from weighbridge.balance import REASON_TEXT, ForceBalance, Reason, force_balance
 from weighbridge.balance.delay import clock_shift, estimate_torque_delay
 from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
+from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
+from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status, joint
+from weighbridge.estimators.changing import largest
 from weighbridge.estimators.foreign import of_another
 from weighbridge.estimators.judging import lacks_accelerometer, uncalibrated_std
 from weighbridge.estimators.squat import of_vehicle
@@ -256,12 +258,13 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
 
     from weighbridge.checks import check_drive
+    from weighbridge.checks.mending import mended
 
     drive = drive.with_problems(*check_drive(drive, vehicle))
     for problem in drive.problems:
         if problem.serious:
             raise DriveError(f"{drive.name}: {problem.text}")
-    return weigh_checked(drive, vehicle, method)
+    return weigh_checked(mended(drive, vehicle), vehicle, method)
 
 
 def weigh_checked(drive: Drive, vehicle: Vehicle, method: str) -> Weighing:
@@ -300,9 +303,15 @@ def weigh_balance(
             f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
             "are wrong; calibrate this vehicle"
         )
+    elif method not in SPEED_ALONE and (why := scale_contradiction(balance, vehicle)):
+        status, reason = Status.INCONSISTENT, why
     if status is Status.CONVERGED and method not in SPEED_ALONE:
-        refused, doubt = of_another(balance, vehicle, result)
-        if refused:
+        joined = result if result.filtered is not None else joint.estimate(balance, vehicle)
+        refused, doubt = of_another(vehicle, joined)
+        change = largest(joined.filtered) if joined.filtered is not None else None
+        if change is not None and change.sure:
+            status, reason = Status.INCONSISTENT, change.text
+        elif refused:
             status, reason = Status.INCONSISTENT, doubt
         elif doubt:
             warnings += (doubt,)
