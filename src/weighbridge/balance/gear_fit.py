@@ -43,8 +43,13 @@ def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     time, ratio = held_ratios(balance)
     if time.size < FEWEST:
         return None
-    distance = np.abs(ratio[:, None] - np.log(np.array(vehicle.driveline.gearings))).min(axis=1)
-    return float(np.mean(distance < NEAR))
+    gearings = np.log(np.array(vehicle.driveline.gearings))
+    # A short drive may not show the scale of its speed, which stays the indicated one then.
+    true, indicated = (
+        float(np.mean(np.abs(ratio[:, None] - gearings + shift).min(axis=1) < NEAR))
+        for shift in (0.0, np.log(vehicle.driveline.speed_scale))
+    )
+    return max(true, indicated)
 
 
 def held_ratios(balance: ForceBalance) -> tuple[Floats, Floats]:

@@ -32,11 +32,17 @@ AROUND: Final = 1.0
 """That ratio is compared so long before and after [s]."""
 
 OFTEN: Final = 0.003
-"""Part of the samples from which they are no chance [-]; in undamaged drives of simulated cars,
-vans, trucks and electric cars at most 0.0005 looked so."""
+"""Part of the samples at one level from which they are no chance [-]: none of 43 undamaged drives
+of three simulators reached it."""
 
 FEWEST: Final = 5
-"""Fewer runs are left alone."""
+"""Fewer runs at one level are left alone."""
+
+CUT: Final = 0.97
+"""Highest reading over that of the calibration from which nothing is cut off [-]."""
+
+PILED: Final = 0.005
+"""Part of the samples that repeat the highest reading where it is cut off [-]."""
 
 SLOW: Final = 0.4
 """Renewed at longer times, a reading is late enough to matter [s]."""
@@ -46,7 +52,7 @@ REPEATS: Final = 3
 
 
 def isolated(drive: Drive, name: str) -> Bools:
-    """Mark samples at zero, or at the lowest or highest reading, that stand alone.
+    """Mark samples of one level that stand alone, again and again.
 
     Parameters
     ----------
@@ -70,11 +76,13 @@ def isolated(drive: Drive, name: str) -> Bools:
     before, after, level = values[first - 1], values[last], values[first]
     apart = np.minimum(np.abs(before - level), np.abs(after - level))
     alone = (apart > reach) & (np.abs(after - before) < ALIKE * apart)
-    alone &= np.isin(level, (0.0, values.min(), values.max()))
     alone &= signal.time[last] - signal.time[first - 1] < 3.0 * LONGEST
     alone &= _same_gear(drive, signal.time[first] - AROUND, signal.time[last] + AROUND)
-    many = int(np.sum((last - first)[alone]))
-    if np.count_nonzero(alone) < FEWEST or many < OFTEN * values.size:
+    # Dropouts fall to a level of their own, again and again.
+    told, which = np.unique(level, return_inverse=True)
+    often = np.bincount(which, weights=alone, minlength=told.size)
+    alone &= (often >= max(FEWEST, OFTEN * values.size))[which]
+    if not alone.any():
         return marked
     edges = np.zeros(values.size + 1, dtype=np.int64)
     np.add.at(edges, first[alone], 1)
@@ -122,3 +130,28 @@ def repeated(signal: Signal) -> tuple[Bools, float]:
     number = np.floor(since / period + 0.5 * signal.period / period).astype(np.int64)
     new = np.concatenate(([True], (number[1:] != number[:-1]) | (since[1:] == 0.0)))
     return np.asarray(~new), period
+
+
+def clipped(signal: Signal, highest: float) -> Bools:
+    """Mark samples at the top of a reading that was cut off below what the engine gives.
+
+    Parameters
+    ----------
+    signal
+    highest : reading that the calibration has seen; infinite where it is not known
+
+    Returns
+    -------
+    (n,) all False where the reading ends by itself
+    """
+    values = signal.values
+    nothing = np.zeros(values.size, dtype=bool)
+    if values.size < 200 or not np.isfinite(highest):
+        return nothing
+    top = float(values.max())
+    runs = runs_of(signal)
+    at_top = values[runs.first] == top
+    piled = int(np.sum(runs.length[at_top & (runs.length > 1)]))
+    if top >= CUT * highest or piled < PILED * values.size:
+        return nothing
+    return np.asarray(values == top)

@@ -96,9 +96,7 @@ def _impossible(drive: Drive, signal: Signal, part: slice, runs: Runs) -> bool:
         return False
     if value in (0.0, float(signal.values.min()), float(signal.values.max())):
         low, high, reach = EXTREME
-        return bool(
-            accel.min() < low and accel.max() > high and np.ptp(speed[known]) > reach
-        )
+        return bool(accel.min() < low and accel.max() > high and np.ptp(speed[known]) > reach)
     engine = _of(drive, "engine_speed", grid)
     engine = engine[(engine > 30.0) & (speed > SLOWEST)]
     revs = engine.size >= 5 and engine.max() > REVS * engine.min()

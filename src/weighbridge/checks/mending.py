@@ -6,12 +6,15 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.false_samples import isolated, repeated
+from weighbridge.checks.false_samples import clipped, isolated, repeated
 from weighbridge.checks.frozen import frozen
-from weighbridge.checks.needed import needed
+from weighbridge.checks.needed import needed, show
 from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import SIGNALS
+
+WIDENED: Final = 1.02
+"""Load range of a vehicle file over the highest load its drives had [-]."""
 
 ENDS: Final = 60.0
 """A signal that ends, or begins, so long before, or after, the rest is told [s]."""
@@ -44,6 +47,7 @@ def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     for name in names:
         if name in torque:
             drive = _without_false(drive, name)
+            drive = _without_ends(drive, name, vehicle)
     return drive.with_problems(*_ends(drive, names))
 
 
@@ -92,6 +96,42 @@ def _without_false(drive: Drive, name: str) -> Drive:
             )
         )
     return drive
+
+
+def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
+    """Leave out what lies at ends of the range that the calibration had wider."""
+    if vehicle is None or name != SIGNALS[vehicle.torque.source][0]:
+        return drive
+    signal, model, dragged = drive.signals[name], vehicle.torque, vehicle.dragged
+    told = []
+    highest = np.inf
+    if model.load_range is not None:
+        highest = model.load_range[1] / WIDENED if model.source == "load" else np.inf
+    elif dragged is not None:
+        highest = dragged.span + min(dragged.level)
+    marked = clipped(signal, highest)
+    if marked.any():
+        told.append(
+            f"{name} never exceeds {show(name, float(signal.values.max()))}, which "
+            f"{np.count_nonzero(marked)} of {len(signal)} samples read, and the calibration's went "
+            f"up to {show(name, highest)}: it is cut off there, and those rows are left out"
+        )
+    if dragged is not None and len(signal) > 200:
+        floor = min(dragged.level) + 3.0 * dragged.scatter
+        if floor < 0.0 <= float(signal.values.min()):
+            # What may be the size of a negative reading is as doubtful as a zero.
+            doubtful = signal.values <= 3.0 * dragged.scatter - min(dragged.level)
+            marked = marked | doubtful
+            told.append(
+                f"{name} is never below zero, and a dragged engine read down to "
+                f"{show(name, min(dragged.level))} in the calibration: its sign is lost, and the "
+                f"{np.count_nonzero(doubtful)} samples it may concern are left out"
+            )
+    if not told or marked.all():
+        return drive
+    return drive.with_signals(_without(signal, marked)).with_problems(
+        *(Problem(name, text) for text in told)
+    )
 
 
 def _without(signal: Signal, marked: Bools) -> Signal:

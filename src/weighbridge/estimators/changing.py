@@ -111,9 +111,7 @@ def largest(given: FilterInput) -> ScaleChange | None:
     instants = np.interp((np.arange(STEPS - 1) + 1) / STEPS, told / told[-1], time)
     shapes = [(float(t), float(t), (time >= t).astype(np.float64)) for t in instants]
     end = float(time[-1])
-    shapes += [
-        (float(t), end, np.clip((time - t) / (end - t), 0.0, 1.0)) for t in instants[3:-4:4]
-    ]
+    shapes += [(float(t), end, np.clip((time - t) / (end - t), 0.0, 1.0)) for t in instants[3:-4:4]]
     none = np.zeros_like(time)
     same, *_ = _run(given, none, given.added)
     jumps = [given.added]

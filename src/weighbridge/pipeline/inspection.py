@@ -10,6 +10,7 @@ import numpy as np
 
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.checks import check_drive
+from weighbridge.checks.mending import mended
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.navigation.select import IMU_SIGNALS
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
@@ -154,7 +155,8 @@ def inspect_drive(drive: Drive, vehicle: Vehicle | None = None) -> Inspection:
     """
     order = list(QUANTITIES)
     signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
-    problems = (*drive.problems, *check_drive(drive, vehicle), *_by_battery(drive, vehicle))
+    checked = mended(drive.with_problems(*check_drive(drive, vehicle)), vehicle)
+    problems = (*checked.problems, *_by_battery(drive, vehicle))
     return Inspection(
         drive=drive,
         signals=tuple(describe(s) for s in signals),

@@ -322,7 +322,7 @@ def weigh_balance(
         status=status,
         reason=reason,
         result=result,
-        warnings=warnings + overload(vehicle, result),
+        warnings=warnings + overload(vehicle, result) + below_tare(vehicle, result),
     )
 
 
@@ -425,6 +425,17 @@ def overload(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
         return ()
     sure = "surely" if result.mass - 2.0 * result.std > gross else "perhaps"
     return (f"{sure} above the permitted mass of {gross:.0f} kg",)
+
+
+def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
+    """Say in a sentence whether a mass is surely below the empty one; nothing if not."""
+    tare = vehicle.tare
+    if tare is None or result.status is not Status.CONVERGED or result.mass + 2 * result.std > tare:
+        return ()
+    return (
+        f"the payload is {result.mass - tare:.0f} kg, which is below nothing: tank and driver's "
+        f"seat are empty, or the tare of {tare:.0f} kg, the vehicle file or the torque is wrong",
+    )
 
 
 def empty_result(drive: str, vehicle: str, method: str, reason: str) -> dict[str, Any]:
