@@ -326,3 +326,18 @@ def test_a_sign_that_was_never_seen_is_not_missed():
     negative = replace(dragged, level=(-0.09,))
     left = mended(drive, replace(vehicle, dragged=negative)).signals[torque.name]
     assert left.values.min() > 0.09
+
+
+@pytest.mark.parametrize("kind", SOURCE)
+def test_coarse_steps_widen_the_interval(fleet, kind):
+    def change(t, x):
+        step = 0.08 * np.ptp(x)
+        return np.floor(x / step) * step
+
+    own = fleet.weigh(kind, fleet.drive(kind))
+    found = fleet.weigh(kind, with_signal(fleet.drive(kind), SOURCE[kind], change))
+    assert own.result.balance.coarse_std == 0.0
+    assert any("coarse steps" in w for w in found.warnings)
+    if found.status is Status.CONVERGED:
+        assert found.std > 1.5 * own.std
+        assert abs(found.mass - fleet.mass(kind)) < 2.6 * found.std

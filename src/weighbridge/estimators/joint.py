@@ -320,7 +320,7 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     """Relative standard deviation that no row of this drive can take away [-]."""
     made = vehicle.provenance
     scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(vehicle)
-    left = float(np.hypot(scale, MOTION_STD[balance.motion.source]))
+    left = math.hypot(scale, MOTION_STD[balance.motion.source], balance.coarse_std)
     if balance.brake_hidden:
         left = float(np.hypot(left, HIDDEN_BRAKE_STD))
     if lacks_accelerometer(vehicle, balance.motion):
