@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from weighbridge.estimators.joint import change_odds
+from weighbridge.estimators.joint import change_odds, stood_before
 from weighbridge.kernels import disturbance
 from weighbridge.kernels import load_change as kernel
 
@@ -105,7 +105,7 @@ def test_longer_stops_change_the_load_more_often():
     kept = (time < 900.0) | (time > 960.0)  # a gap in the log
     view = SimpleNamespace(time=time[kept], speed=speed[kept])
     windows = np.array([50.0, 120.0, 290.0, 330.0, 590.0, 850.0, 890.0, 970.0])
-    odds = change_odds(view, windows)
+    odds = change_odds(stood_before(view, windows))
     assert np.isfinite(odds).tolist() == [False, False, False, True, False, True, False, True]
     light, long, gap = odds[[3, 5, 7]]
     assert light < np.log(0.1)

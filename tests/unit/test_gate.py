@@ -233,7 +233,7 @@ def test_a_file_whose_resistance_is_another_vehicles_is_refused(made, car, own, 
     balance = own.result.balance
     sure = replace(car.road_load, drag_area_std=0.03, rolling_coefficient_std=0.001)
     car = replace(car, road_load=sure)
-    assert foreign.of_another(balance, car, own.result) == (False, "")
+    assert foreign.of_another(car, own.result) == (False, "")
     view = balance.merged
     more = 0.4 * made.scenario.mass
     slower = replace(balance, merged=replace(view, traction_force=view.traction_force + more))

@@ -25,6 +25,7 @@ def test_a_cold_start_counts_by_its_share_of_the_information():
         merged=SimpleNamespace(time=time),
         motion=SimpleNamespace(source="inertial"),
         brake_hidden=False,
+        coarse_std=0.0,
     )
     assert consider_std(balance, phi, every, CAR) == pytest.approx(share * COLD_STD["load"])
     first = time < 600.0

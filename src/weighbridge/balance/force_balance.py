@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from weighbridge.balance.coarse import coarse_note, coarse_std
 from weighbridge.balance.cornering import cornering
 from weighbridge.balance.foot import find_foot, learn_dragged, near
 from weighbridge.constants import (
@@ -220,17 +221,19 @@ class ForceBalance:
     force, motion, merged
     brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading tells
         where it is braked
+    coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
     """
 
     force: ForceSide
     motion: Motion
     merged: MergedView
     brake_hidden: bool = False
+    coarse_std: float = 0.0
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What is doubted, one sentence each."""
-        return (BRAKE_HIDDEN,) if self.brake_hidden else ()
+        return ((BRAKE_HIDDEN,) if self.brake_hidden else ()) + coarse_note(self.coarse_std)
 
 
 def force_balance(
@@ -346,6 +349,7 @@ def force_balance(
             reason=reason,
         ),
         brake_hidden=bool(hidden),
+        coarse_std=coarse_std(source, source.at(recorded), reason == Reason.USED),
     )
 
 

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.force_balance import ForceBalance
+from weighbridge.signals import Floats
 from weighbridge.vehicle.gear import steady
 from weighbridge.vehicle.model import Vehicle
 
@@ -39,12 +40,28 @@ def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     """
     if not vehicle.driveline.gearings:
         return None
+    time, ratio = held_ratios(balance)
+    if time.size < FEWEST:
+        return None
+    gearings = np.log(np.array(vehicle.driveline.gearings))
+    # A short drive may not show the scale of its speed, which stays the indicated one then.
+    true, indicated = (
+        float(np.mean(np.abs(ratio[:, None] - gearings + shift).min(axis=1) < NEAR))
+        for shift in (0.0, np.log(vehicle.driveline.speed_scale))
+    )
+    return max(true, indicated)
+
+
+def held_ratios(balance: ForceBalance) -> tuple[Floats, Floats]:
+    """Logarithms of the steady ratios of engine to vehicle speed while it rises.
+
+    Returns
+    -------
+    time : (n,) [s]
+    ratio : (n,) of ratios in 1/m
+    """
     view, engine_speed = balance.merged, balance.force.engine_speed
     pulling = (view.speed > SLOWEST) & (view.accel > 0.0) & (engine_speed > 0.0)
     ratio = np.where(pulling, engine_speed / np.where(pulling, view.speed, 1.0), 0.0)
     held = pulling & steady(view.time, ratio, np.full(ratio.size, 0.02))
-    if np.count_nonzero(held) < FEWEST:
-        return None
-    gearings = np.array(vehicle.driveline.gearings)
-    distance = np.abs(np.log(ratio[held][:, None] / gearings)).min(axis=1)
-    return float(np.mean(distance < NEAR))
+    return view.time[held], np.log(ratio[held])

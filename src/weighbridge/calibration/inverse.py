@@ -261,6 +261,8 @@ def _torque_per_reading(drives: list[DriveRows]) -> float:
         target = d.mass * d.view.specific_force[rows] / d.view.gearing[rows]
         reading = d.regressor[rows]
         centred = reading - reading.mean()
+        if not float(centred @ centred) > 0.0:
+            raise TooShort("torque or load never changes in the usable rows; record it again")
         slopes.append(float(centred @ target) / float(centred @ centred))
     return float(np.median(slopes))
 

@@ -13,8 +13,9 @@ from typing import Final
 
 from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates
 from weighbridge.checks.engine import check_engine_speed, check_friction, check_whole_torque
-from weighbridge.checks.frozen import check_frozen, check_limit
+from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
+from weighbridge.checks.mending import mended
 from weighbridge.checks.ranges import within_ranges, without_strays
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.travel import check_sign, check_standstill
@@ -62,8 +63,8 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     Returns
     -------
     Drive
-        On clocks that rise, within physical ranges. What was found is added to its ``problems``,
-        serious ones first. What is wrong with a signal that a person vouches for
+        On clocks that rise, within physical ranges, without samples that are false. What was found
+        is added to its ``problems``, serious ones first. What is wrong with a signal that a person vouches for
         (``drive.info.trusted``) is never serious.
     """
     told = drive.problems
@@ -85,7 +86,8 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
             for p in check(drive, vehicle)
         )
     problems.sort(key=lambda p: not p.serious)
-    return replace(within_ranges(drive), problems=(*told, *problems))
+    settled = replace(within_ranges(drive), problems=(*told, *problems))
+    return settled if any(p.serious for p in problems) else mended(settled, vehicle)
 
 
 def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, ...]:

@@ -1,81 +1,133 @@
-"""Did an axis of the inertial sensor stop to read on the way, or is it at its limit?"""
+"""Values that stand still while the vehicle goes on: torque, engine speed, vehicle speed.
+
+A bus that fell silent, or a logger that writes its last value on, leaves readings that look
+sound. They are told apart from a steady drive by what else changes meanwhile, and left out.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.needed import IMU
-from weighbridge.constants import GRAVITY
-from weighbridge.navigation.frozen import frozen_stretches, shown_speed
-from weighbridge.signals import Drive, Problem, Signal
-from weighbridge.vehicle.model import Vehicle
+from weighbridge.checks.runs import Runs, runs_of
+from weighbridge.signals import Bools, Drive, Floats, Signal
 
-_TOLD: Final = 5.0
-"""Frozen for less in all is left out without a word [s]."""
+SHORTEST: Final[dict[str, float]] = {"engine_speed": 10.0, "vehicle_speed": 20.0}
+"""Runs of one value below may be a steady drive [s]."""
 
-_AT_LIMIT: Final = 0.05
-"""With a larger part of its samples at one extreme value an axis is clipped [-]."""
+SHORTEST_TORQUE: Final = 20.0
+"""The same of torque, load and air flow [s]: cruise control on the level holds a rounded load
+so long, and loaded trucks climb at full load for minutes, which is told by the rest."""
 
-_LEAST: Final = 120.0
-"""What is left must be as long to show how the sensor sits and what moved [s]."""
+ACROSS: Final = 4.0
+"""Acceleration is that of the speed over this time [s]."""
+
+VARIES: Final = 0.4
+"""Range of acceleration that one torque does not make [m/s^2]: 4 % of grade."""
+
+EXTREME: Final = (-0.8, 0.4, 8.0)
+"""Least and greatest acceleration [m/s^2] and range of speed [m/s] that no torque at its
+lowest, at zero or at its highest makes: coasting and full load last long."""
+
+REVS: Final = 1.3
+"""Highest over lowest engine speed that one torque does not outlast [-]."""
+
+IN_GEAR: Final = 1.15
+"""Highest over lowest vehicle speed that one engine speed does not outlast in gear [-]."""
+
+SLOWEST: Final = 3.0
+"""Below, clutch and converter slip [m/s]."""
+
+IDLING: Final = 1.25
+"""Engine speed over that at standstill below which it may idle on its own [-]."""
+
+SHIFTED: Final = 1.6
+"""Highest over lowest engine speed that no two gears explain at one speed [-]."""
+
+APART: Final = 3.0
+"""Range of the speed over ground while the vehicle speed stands still [m/s]."""
 
 
-def check_frozen(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Name the frozen stretches of the inertial axes, which navigation leaves out.
+def frozen(drive: Drive, name: str) -> Bools:
+    """Mark the samples of a signal that repeat a value which cannot have lasted.
 
-    Serious only where too little is left.
+    Parameters
+    ----------
+    drive
+    name : of torque, load, engine speed or vehicle speed
+
+    Returns
+    -------
+    (n,) the first of each run is not marked
     """
-    speed = shown_speed(drive)
-    alike: dict[bytes, list[str]] = {}
-    for name in IMU:
-        s = drive.get(name)
-        if s is None or len(s) < 50 or s.duration < 20.0 or not np.any(s.values != s.values[0]):
-            continue
-        stretches = frozen_stretches(s, speed)
-        if float(np.sum(stretches[:, 1] - stretches[:, 0])) >= _TOLD:
-            alike.setdefault(np.round(stretches).tobytes(), []).append(name)
-    for names in alike.values():
-        yield _told(names, drive.signals[names[0]], speed)
+    signal = drive.signals[name]
+    marked = np.zeros(len(signal), dtype=bool)
+    if len(signal) < 20:
+        return marked
+    runs = runs_of(signal)
+    shortest = SHORTEST.get(name, SHORTEST_TORQUE)
+    for k in np.flatnonzero((runs.duration >= shortest) & (runs.length >= 8)):
+        part = slice(int(runs.first[k]), int(runs.first[k] + runs.length[k]))
+        if _impossible(drive, signal, part, runs):
+            marked[part.start + 1 : part.stop] = True
+    return marked
 
 
-def _told(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
-    """Tell of axes that froze together, such as ``axis``."""
-    stretches = frozen_stretches(axis, speed)
-    lengths = stretches[:, 1] - stretches[:, 0]
-    total = float(lengths.sum())
-    k = int(np.argmax(lengths))
-    verb = "repeats" if len(names) == 1 else "repeat"
-    text = (
-        f"{', '.join(names)} {verb} one value for {lengths[k]:.1f} s from {stretches[k, 0]:.6g} s"
-    )
-    if lengths.size > 1:
-        text += f", and in {lengths.size} stretches for {total:.1f} s in all"
-    left = axis.duration - total
-    too_little = left < min(_LEAST, 0.5 * axis.duration)
-    remedy = (
-        f"only {left:.0f} s are left: record it again, or leave its columns out"
-        if too_little
-        else "the inertial sensor is left out there"
-    )
-    return Problem(names[0], f"{text}; {remedy}", serious=too_little)
+def _impossible(drive: Drive, signal: Signal, part: slice, runs: Runs) -> bool:
+    time, value = signal.time[part], float(signal.values[part.start])
+    grid = np.linspace(time[0], time[-1], max(int((time[-1] - time[0]) / 1.0), 8))
+    if signal.name == "vehicle_speed":
+        return _speed_frozen(drive, grid, value)
+    speed = _speed(drive, grid)
+    if signal.name == "engine_speed":
+        moving = speed[speed > SLOWEST]
+        idle = _idle(drive, signal)
+        return bool(
+            value > IDLING * idle and moving.size >= 5 and moving.max() > IN_GEAR * moving.min()
+        )
+    known = np.isfinite(speed)
+    if np.count_nonzero(known) < 8:
+        return False
+    step = max(int(ACROSS / (grid[1] - grid[0])), 1)
+    accel = (speed[step:] - speed[:-step]) / (grid[step:] - grid[:-step])
+    accel = accel[np.isfinite(accel)]
+    if not accel.size:
+        return False
+    if value in (0.0, float(signal.values.min()), float(signal.values.max())):
+        low, high, reach = EXTREME
+        return bool(accel.min() < low and accel.max() > high and np.ptp(speed[known]) > reach)
+    engine = _of(drive, "engine_speed", grid)
+    engine = engine[(engine > 30.0) & (speed > SLOWEST)]
+    revs = engine.size >= 5 and engine.max() > REVS * engine.min()
+    return bool((np.ptp(accel) > VARIES or revs) and np.nanmax(speed) > SLOWEST)
 
 
-def check_limit(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Find an accelerometer whose range is too small for gravity and the road's shaking."""
-    for name in IMU[:3]:
-        s = drive.get(name)
-        if s is None or len(s) < 50:
-            continue
-        for limit in (float(s.values.min()), float(s.values.max())):
-            share = float(np.mean(s.values == limit))
-            if _AT_LIMIT < share < 0.9 and 0.5 * GRAVITY < abs(limit) < 2.0 * GRAVITY:
-                yield Problem(
-                    name,
-                    f"{name} lies at {limit:.4g} m/s^2, its extreme, in {100.0 * share:.0f} % of "
-                    "the samples: its range is too small and its mean is bent; record it with a "
-                    "range of 2 g or more",
-                    serious=True,
-                )
+def _speed_frozen(drive: Drive, grid: Floats, value: float) -> bool:
+    ground = _of(drive, "gnss_speed", grid)
+    ground = ground[np.isfinite(ground)]
+    if ground.size > 0.5 * grid.size:
+        return bool(np.ptp(ground) > APART and np.max(np.abs(ground - value)) > APART)
+    engine = _of(drive, "engine_speed", grid)
+    engine = engine[engine > 30.0]
+    return bool(value > SLOWEST and engine.size >= 5 and engine.max() > SHIFTED * engine.min())
+
+
+def _speed(drive: Drive, at: Floats) -> Floats:
+    """Speed of the vehicle, by GNSS where it has no other; NaN where unknown (n,) [m/s]."""
+    own = _of(drive, "vehicle_speed", at)
+    return np.where(np.isfinite(own), own, _of(drive, "gnss_speed", at))
+
+
+def _of(drive: Drive, name: str, at: Floats) -> Floats:
+    signal = drive.get(name)
+    if signal is None or not len(signal):
+        return np.full(at.size, np.nan)
+    return np.where(signal.age(at) < 2.0, signal.at(at), np.nan)
+
+
+def _idle(drive: Drive, engine: Signal) -> float:
+    """Engine speed at standstill [rad/s]; 0 where it was not seen."""
+    standing = np.abs(_speed(drive, engine.time)) < 0.3
+    turning = engine.values[standing & (engine.values > 30.0)]
+    return float(np.median(turning)) if turning.size >= 10 else 0.0

@@ -337,7 +337,10 @@ def _gear_ratio(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> float |
     scales = np.array([1.0, *sorted({c[2] for c in _CONFUSIONS})])
     hits = np.array([_on_gears(ratio + np.log(c), gears) for c in scales])
     best = int(np.argmax(hits))
-    if hits[0] > 0.5:
+    # One that reads some percent off is nearer than another unit.
+    near = [c for low in (0.88, 1.05) for c in np.geomspace(low, 1.08 * low, 9)]
+    slight = max(_on_gears(ratio + np.log(c), gears) for c in near)
+    if hits[0] > 0.5 or slight > hits[best] + 0.1:
         return 1.0
     return float(scales[best]) if hits[best] > 0.6 and hits[best] > 2.0 * hits[0] else None
 

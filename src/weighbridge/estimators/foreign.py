@@ -6,8 +6,6 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance import ForceBalance
-from weighbridge.estimators import joint
 from weighbridge.estimators.slow_errors import NAMES, prior_std
 from weighbridge.estimators.track import MassTrack
 from weighbridge.vehicle.model import Vehicle
@@ -42,7 +40,7 @@ def stretched(track: MassTrack, vehicle: Vehicle) -> float:
     return float(np.hypot(resistance, drag))
 
 
-def of_another(balance: ForceBalance, vehicle: Vehicle, track: MassTrack) -> tuple[bool, str]:
+def of_another(vehicle: Vehicle, track: MassTrack) -> tuple[bool, str]:
     """Say why the vehicle file is another vehicle's, in a sentence; nothing if it may be its own.
 
     Only files of a calibration for ``joint`` can tell: a data sheet leaves more open, and fits
@@ -50,8 +48,8 @@ def of_another(balance: ForceBalance, vehicle: Vehicle, track: MassTrack) -> tup
 
     Parameters
     ----------
-    balance, vehicle
-    track : of any method; the joint estimator is run where it is of another
+    vehicle
+    track : of the joint estimator
 
     Returns
     -------
@@ -60,8 +58,6 @@ def of_another(balance: ForceBalance, vehicle: Vehicle, track: MassTrack) -> tup
     """
     if vehicle.provenance.method != "joint" or not vehicle.provenance.torque_fitted:
         return False, ""
-    if track.method != "joint":
-        track = joint.estimate(balance, vehicle)
     far = stretched(track, vehicle)
     if far <= DOUBTFUL:
         return False, ""

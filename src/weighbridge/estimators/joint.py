@@ -36,7 +36,7 @@ from weighbridge.estimators.slow_errors import (
     usable_rows,
 )
 from weighbridge.estimators.squat import Lean, lean
-from weighbridge.estimators.track import MassTrack, Segment
+from weighbridge.estimators.track import FilterInput, MassTrack, Segment
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import Bools, Floats
@@ -218,7 +218,8 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
         return nothing("joint", balance, vehicle, reason, int(cut.count.size))
 
     time = cut.mean(view.time)
-    odds = change_odds(view, time) if load_changes else np.full(time.size, np.nan)
+    stood = stood_before(view, time)
+    odds = change_odds(stood) if load_changes else np.full(time.size, np.nan)
     rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
 
     def problem_of(mass: float | None) -> tuple[_Problem, Lean, Floats, Floats]:
@@ -293,6 +294,17 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
         why=why,
         segments=_segments(view, time, begins, smoothed, np.sqrt(var[:, 0]), left),
         slow_errors=SlowErrors.from_states(time, x, var, running_var, problem.rows[:, 1]),
+        filtered=FilterInput(
+            start=start,
+            params=params,
+            time=time,
+            rows=problem.rows,
+            y=problem.y,
+            noise=noise,
+            added=added,
+            stood=stood,
+            traction=problem.rows[:, 0] * x[:, 0] + cut.mean(view.traction_force - y),
+        ),
     )
 
 
@@ -308,8 +320,12 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     """Relative standard deviation that no row of this drive can take away [-]."""
     made = vehicle.provenance
     scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(vehicle)
-    left = float(np.hypot(scale, MOTION_STD[balance.motion.source]))
-    left = float(np.hypot(left, balance.motion.specific_force_scale_std))
+    left = math.hypot(
+        scale,
+        MOTION_STD[balance.motion.source],
+        balance.motion.specific_force_scale_std,
+        balance.coarse_std,
+    )
     if balance.brake_hidden:
         left = float(np.hypot(left, HIDDEN_BRAKE_STD))
     if lacks_accelerometer(vehicle, balance.motion):
@@ -339,11 +355,11 @@ def _sizes(
     }
 
 
-def change_odds(view: MergedView, time: Floats) -> Floats:
-    """Logarithm of the odds that the load changed between each window and the one before it.
+def stood_before(view: MergedView, time: Floats) -> Floats:
+    """How long the vehicle stood between each window and the one before it (m,) [s].
 
-    NaN where the vehicle did not stand for `STOP` between them. A gap in the
-    log counts as standing: what happened in it is not known.
+    A gap in the log counts as standing: what happened in it is not known. Of several stops
+    between two windows the longest tells.
 
     Parameters
     ----------
@@ -355,17 +371,27 @@ def change_odds(view: MergedView, time: Floats) -> Floats:
     # Rows near in time stand for the time until the next; a long gap stands for itself.
     still = np.cumsum(np.where(standing | (gap > STOP), gap, 0.0))
     moved = np.flatnonzero(~standing)
-    odds = np.full(time.size, np.nan)
-    if moved.size < 2:
-        return odds
-    rest = still[moved[1:] - 1] - np.where(moved[:-1] > 0, still[moved[:-1] - 1], 0.0)
-    long = rest >= STOP
-    at = np.searchsorted(time, view.time[moved[1:]][long])
-    within = (at > 0) & (at < time.size)
-    # Of several stops between two windows the longest tells.
     stood = np.zeros(time.size)
-    np.maximum.at(stood, at[within], rest[long][within])
-    stops = stood > 0.0
+    if moved.size < 2:
+        return stood
+    rest = still[moved[1:] - 1] - np.where(moved[:-1] > 0, still[moved[:-1] - 1], 0.0)
+    at = np.searchsorted(time, view.time[moved[1:]])
+    within = (at > 0) & (at < time.size) & (rest > 0.0)
+    np.maximum.at(stood, at[within], rest[within])
+    return stood
+
+
+def change_odds(stood: Floats) -> Floats:
+    """Logarithm of the odds that the load changed between each window and the one before it.
+
+    NaN where the vehicle did not stand for `STOP` between them.
+
+    Parameters
+    ----------
+    stood : (m,) how long it stood there [s]
+    """
+    odds = np.full(stood.size, np.nan)
+    stops = stood >= STOP
     odds[stops] = CHANGE_ODDS + CHANGE_RISE * np.log(stood[stops] / STOP)
     return odds
 

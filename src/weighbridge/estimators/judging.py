@@ -54,6 +54,15 @@ whose few starts are all that weighs more."""
 LIGHTEST: Final = 0.95
 """Least mass of an empty vehicle over its tare [-]: tank and driver's seat may be empty."""
 
+EMPTIED: Final[dict[VehicleClass, float]] = {
+    "car": 130.0,
+    "van": 160.0,
+    "bus": 350.0,
+    "truck": 400.0,
+}
+"""What may be missing of an empty vehicle [kg]: a driver of 75 kg and a tank of 60, 90, 300 or 400
+litres."""
+
 HEAVIEST: Final[dict[VehicleClass, float]] = {"car": 2.6, "van": 3.2, "bus": 2.6, "truck": 8.0}
 """Above this multiple of the empty mass neither load nor a trailer explains the mass [-]: cars of
 1.4 t may draw as much again and carry 0.5 t, tractors of 6 t make 40 t and more."""
@@ -120,7 +129,7 @@ def calibration_std(balance: ForceBalance, vehicle: Vehicle) -> float:
     if scale is None:
         scale = uncalibrated_std(vehicle, balance.motion)
     hidden = HIDDEN_BRAKE_STD if balance.brake_hidden else 0.0
-    return math.hypot(scale, MOTION_STD[balance.motion.source], hidden)
+    return math.hypot(scale, MOTION_STD[balance.motion.source], hidden, balance.coarse_std)
 
 
 def lacks_accelerometer(vehicle: Vehicle, motion: Motion) -> bool:
@@ -286,7 +295,10 @@ def _plausible(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
             f"{lightest:.0f} kg of the empty {vehicle.kind}; check that the vehicle file is this "
             "vehicle's, and the unit and scale of the torque or load"
         )
-    if vehicle.tare is not None and mass + std < LIGHTEST * vehicle.tare:
+    if vehicle.tare is None:
+        return _PASSED
+    emptied = vehicle.tare - EMPTIED[vehicle.kind]
+    if mass + std < LIGHTEST * vehicle.tare or mass + 2.0 * std < emptied:
         return Status.INCONSISTENT, (
             f"the estimate is {mass:.0f} kg, less than the tare of {vehicle.tare:.0f} kg; "
             "check that the vehicle file is this vehicle's, and the torque's scale"

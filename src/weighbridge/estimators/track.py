@@ -14,6 +14,7 @@ from weighbridge.signals import Bools, Floats
 
 if TYPE_CHECKING:
     from weighbridge.estimators.slow_errors import SlowErrors
+    from weighbridge.kernels import disturbance
 
 
 class Status(StrEnum):
@@ -42,6 +43,32 @@ class Segment:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FilterInput:
+    """What the filter of the joint estimator was given, one row per window.
+
+    Attributes
+    ----------
+    start, params : first state and parameters of `weighbridge.kernels.disturbance`
+    time : (m,) [s]
+    rows : (m, k) of the states; the mass is the first
+    y, noise : (m,) force [N] and its noise variance [N^2]
+    added : (m, k) variance by which states jump where the load changes
+    stood : (m,) how long the vehicle stood before each window [s]
+    traction : (m,) what the whole model says of the force at the wheels [N]
+    """
+
+    start: disturbance.DisturbanceState
+    params: disturbance.DisturbanceParams
+    time: Floats
+    rows: Floats
+    y: Floats
+    noise: Floats
+    added: Floats
+    stood: Floats
+    traction: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MassTrack:
     """The mass over time and the final answer of one estimator.
 
@@ -64,6 +91,7 @@ class MassTrack:
     sensitivity : (k,) how far one unit of each parameter of the calibration moves the mass
         [kg per unit]; None where a method does not say
     slow_errors : what was estimated beside the mass; None where a method does not
+    filtered : what the filter of the joint estimator was given; None of other methods
     """
 
     method: str
@@ -82,6 +110,7 @@ class MassTrack:
     segments: tuple[Segment, ...]
     sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
+    filtered: FilterInput | None = None
 
     @property
     def time(self) -> Floats:

@@ -34,12 +34,12 @@ from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, noted, refine
+from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
-    MASS_RANGE,
     Driveline,
     Mounting,
     Provenance,
@@ -169,7 +169,7 @@ def _checked(
     """List the drives, what is known of the vehicle, and the drives' masses; check them."""
     drives = [drives] if isinstance(drives, Drive) else list(drives)
     base = vehicle or Vehicle(name=_name(drives))
-    masses = _masses(drives, mass, base.kind)
+    masses = _masses(drives, mass, base)
     model = TorqueModel(reference_torque=base.torque.reference_torque)
     if source is not None:
         # Friction in the torque is no fault here: the fit finds it as an offset.
@@ -310,7 +310,9 @@ def run_calibration(
             lambda car: [force_balance(d, car, m) for d, m in zip(drives, motions, strict=True)],
         )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
-    finished = _with_doubts(finished, balances, _other_masses(drives, masses))
+    doubt = scale_doubt(finished, masses, ", ".join(drive.name for drive in drives))
+    others = [*_other_masses(drives, masses), *([doubt] if doubt else [])]
+    finished = _with_doubts(finished, balances, others)
     _refuse_useless(finished)
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
 
@@ -463,7 +465,7 @@ def _name(drives: Sequence[Drive]) -> str:
 
 
 def _masses(
-    drives: Sequence[Drive], mass: float | Sequence[float] | None, kind: VehicleClass
+    drives: Sequence[Drive], mass: float | Sequence[float] | None, base: Vehicle
 ) -> list[float]:
     if not drives:
         raise ConfigError("no drive to calibrate with")
@@ -480,12 +482,7 @@ def _masses(
             raise ConfigError(
                 f"{drive.name}: its mass is not known; give --mass, or mass_kg in its drive.toml"
             )
-        low, high = MASS_RANGE[kind]
-        if not low <= kg <= high:
-            raise ConfigError(
-                f"{drive.name}: a mass of {kg:g} kg is no {kind}'s, which is between {low:g} and "
-                f"{high:g} kg; give the mass in kg, and the class under [vehicle] of --vehicle"
-            )
+        check_mass(drive, kg, base)
     return [float(kg) for kg in known if kg is not None]
 
 

@@ -14,9 +14,11 @@ from scipy.stats import t as student
 from weighbridge.balance import REASON_TEXT, ForceBalance, Reason, force_balance
 from weighbridge.balance.delay import clock_shift, estimate_torque_delay
 from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
+from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status
+from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status, joint
+from weighbridge.estimators.changing import largest
 from weighbridge.estimators.foreign import of_another
 from weighbridge.estimators.judging import lacks_accelerometer, uncalibrated_std
 from weighbridge.estimators.squat import of_vehicle
@@ -301,9 +303,15 @@ def weigh_balance(
             f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
             "are wrong; calibrate this vehicle"
         )
+    elif method not in SPEED_ALONE and (why := scale_contradiction(balance, vehicle)):
+        status, reason = Status.INCONSISTENT, why
     if status is Status.CONVERGED and method not in SPEED_ALONE:
-        refused, doubt = of_another(balance, vehicle, result)
-        if refused:
+        joined = result if result.filtered is not None else joint.estimate(balance, vehicle)
+        refused, doubt = of_another(vehicle, joined)
+        change = largest(joined.filtered) if joined.filtered is not None else None
+        if change is not None and change.sure:
+            status, reason = Status.INCONSISTENT, change.text
+        elif refused:
             status, reason = Status.INCONSISTENT, doubt
         elif doubt:
             warnings += (doubt,)
@@ -314,7 +322,7 @@ def weigh_balance(
         status=status,
         reason=reason,
         result=result,
-        warnings=warnings + overload(vehicle, result),
+        warnings=warnings + overload(vehicle, result) + below_tare(vehicle, result),
     )
 
 
@@ -427,6 +435,17 @@ def overload(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
         return ()
     sure = "surely" if result.mass - 2.0 * result.std > gross else "perhaps"
     return (f"{sure} above the permitted mass of {gross:.0f} kg",)
+
+
+def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
+    """Say in a sentence whether a mass is surely below the empty one; nothing if not."""
+    tare = vehicle.tare
+    if tare is None or result.status is not Status.CONVERGED or result.mass + 2 * result.std > tare:
+        return ()
+    return (
+        f"the payload is {result.mass - tare:.0f} kg, which is below nothing: tank and driver's "
+        f"seat are empty, or the tare of {tare:.0f} kg, the vehicle file or the torque is wrong",
+    )
 
 
 def empty_result(drive: str, vehicle: str, method: str, reason: str) -> dict[str, Any]:

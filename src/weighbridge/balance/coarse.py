@@ -1,0 +1,53 @@
+"""What the steps of a coarse torque reading leave open in a mass."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from weighbridge.signals import Bools, Floats, Signal
+
+FINE: Final = 0.025
+"""Steps of a reading over its range that do no harm [-]: control units send 0.4 and 1 %."""
+
+LEAST: Final = 0.01
+"""What is left open below is not told [-]."""
+
+ROUNDING: Final = 1.0 / math.sqrt(12.0)
+"""Standard deviation of an even error over its step [-]."""
+
+
+def coarse_std(source: Signal, reading: Floats, usable: Bools) -> float:
+    """Relative standard deviation of a mass by the steps of the torque's reading [-].
+
+    Rounding down takes half a step of every reading, and nothing tells it from rounding to the
+    nearest: the error does not average, and goes with the mean reading of the rows that weigh.
+
+    Parameters
+    ----------
+    source : as recorded, in its own unit
+    reading : (n,) the same at the rows
+    usable : (n,)
+    """
+    if len(source) < 200 or not usable.any():
+        return 0.0
+    levels = np.unique(source.values)
+    if levels.size < 3:
+        return 0.0
+    step, span = float(np.median(np.diff(levels))), float(np.ptp(levels))
+    mean = float(np.nanmean(np.abs(reading[usable])))
+    if step < FINE * span or not mean > 0.0:
+        return 0.0
+    return ROUNDING * step / mean
+
+
+def coarse_note(std: float) -> tuple[str, ...]:
+    """Say in a sentence what the steps leave open; nothing where it is little."""
+    if std <= LEAST:
+        return ()
+    return (
+        f"the torque or load was recorded in coarse steps, which leave {100.0 * std:.0f} % of the "
+        "mass open, as standard deviation; log it as finely as it is sent",
+    )

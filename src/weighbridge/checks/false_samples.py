@@ -1,0 +1,157 @@
+"""Samples of torque or load that no engine makes: dropouts, full scale, and repeats.
+
+A reading that falls to zero for one sample and returns is no torque, unless the gear changes
+there. A reading that a slow source renews is true when it changes, and late until the next.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.checks.runs import runs_of
+from weighbridge.signals import Bools, Drive, Floats, Signal
+
+LONGEST: Final = 0.5
+"""Runs beyond are no isolated samples [s], or `FEW` samples of a slow reading."""
+
+FEW: Final = 3
+"""Samples of a run that may still be isolated."""
+
+FAR: Final = 0.2
+"""Part of the range by which both neighbours of a false sample are away from it [-]."""
+
+ALIKE: Final = 0.5
+"""Difference of the neighbours over their distance from it, at most [-]."""
+
+SAME_GEAR: Final = 0.04
+"""Change of engine over vehicle speed across it, at most, in one gear [-]."""
+
+AROUND: Final = 1.0
+"""That ratio is compared so long before and after [s]."""
+
+OFTEN: Final = 0.003
+"""Part of the samples at one level from which they are no chance [-]: none of 43 undamaged drives
+of three simulators reached it."""
+
+FEWEST: Final = 5
+"""Fewer runs at one level are left alone."""
+
+CUT: Final = 0.97
+"""Highest reading over that of the calibration from which nothing is cut off [-]."""
+
+PILED: Final = 0.005
+"""Part of the samples that repeat the highest reading where it is cut off [-]."""
+
+SLOW: Final = 0.4
+"""Renewed at longer times, a reading is late enough to matter [s]."""
+
+REPEATS: Final = 3
+"""Samples from one renewal to the next, at least."""
+
+
+def isolated(drive: Drive, name: str) -> Bools:
+    """Mark samples of one level that stand alone, again and again.
+
+    Parameters
+    ----------
+    drive
+    name : of torque or load
+
+    Returns
+    -------
+    (n,) all False where they are too few to be a fault
+    """
+    signal = drive.signals[name]
+    values = signal.values
+    marked = np.zeros(values.size, dtype=bool)
+    if values.size < 200:
+        return marked
+    reach = FAR * float(np.ptp(values))
+    runs = runs_of(signal)
+    inner = (runs.first > 0) & (runs.first + runs.length < values.size)
+    inner &= (runs.duration <= LONGEST) | (runs.length <= FEW)
+    first, last = runs.first[inner], (runs.first + runs.length)[inner]
+    before, after, level = values[first - 1], values[last], values[first]
+    apart = np.minimum(np.abs(before - level), np.abs(after - level))
+    alone = (apart > reach) & (np.abs(after - before) < ALIKE * apart)
+    alone &= signal.time[last] - signal.time[first - 1] < 3.0 * LONGEST
+    alone &= _same_gear(drive, signal.time[first] - AROUND, signal.time[last] + AROUND)
+    # Dropouts fall to a level of their own, again and again.
+    told, which = np.unique(level, return_inverse=True)
+    often = np.bincount(which, weights=alone, minlength=told.size)
+    alone &= (often >= max(FEWEST, OFTEN * values.size))[which]
+    if not alone.any():
+        return marked
+    edges = np.zeros(values.size + 1, dtype=np.int64)
+    np.add.at(edges, first[alone], 1)
+    np.add.at(edges, last[alone], -1)
+    return np.asarray(np.cumsum(edges)[:-1] > 0)
+
+
+def _same_gear(drive: Drive, before: Floats, after: Floats) -> Bools:
+    """Whether engine over vehicle speed is the same at both instants, as far as is known."""
+    engine, speed = drive.get("engine_speed"), drive.get("vehicle_speed")
+    if engine is None or speed is None or not len(engine) or not len(speed):
+        return np.ones(before.size, dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        change = np.log(engine.at(after) / speed.at(after)) - np.log(
+            engine.at(before) / speed.at(before)
+        )
+    return np.asarray(~(np.abs(change) > SAME_GEAR))
+
+
+def repeated(signal: Signal) -> tuple[Bools, float]:
+    """Mark samples that repeat an older reading of a source that is renewed slowly.
+
+    Parameters
+    ----------
+    signal
+
+    Returns
+    -------
+    repeats : (n,)
+    period : of the renewal [s]; 0 where every sample may be new
+    """
+    nothing = np.zeros(len(signal), dtype=bool)
+    if len(signal) < 200:
+        return nothing, 0.0
+    runs = runs_of(signal)
+    if runs.first.size < 50:
+        return nothing, 0.0
+    # A reading that is renewed with every sample changes from one to the next somewhere.
+    usual = float(np.percentile(runs.length[1:-1], 5.0))
+    period = float(np.percentile(np.diff(signal.time[runs.first]), 25.0))
+    if usual < REPEATS or period < SLOW:
+        return nothing, 0.0
+    since = signal.time - np.repeat(signal.time[runs.first], runs.length)
+    # In the middle between two stamps a renewal that changes nothing is not missed.
+    number = np.floor(since / period + 0.5 * signal.period / period).astype(np.int64)
+    new = np.concatenate(([True], (number[1:] != number[:-1]) | (since[1:] == 0.0)))
+    return np.asarray(~new), period
+
+
+def clipped(signal: Signal, highest: float) -> Bools:
+    """Mark samples at the top of a reading that was cut off below what the engine gives.
+
+    Parameters
+    ----------
+    signal
+    highest : reading that the calibration has seen; infinite where it is not known
+
+    Returns
+    -------
+    (n,) all False where the reading ends by itself
+    """
+    values = signal.values
+    nothing = np.zeros(values.size, dtype=bool)
+    if values.size < 200 or not np.isfinite(highest):
+        return nothing
+    top = float(values.max())
+    runs = runs_of(signal)
+    at_top = values[runs.first] == top
+    piled = int(np.sum(runs.length[at_top & (runs.length > 1)]))
+    if top >= CUT * highest or piled < PILED * values.size:
+        return nothing
+    return np.asarray(values == top)

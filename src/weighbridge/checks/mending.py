@@ -1,0 +1,167 @@
+"""Leave out samples that cannot be true, so that the rest can be weighed."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.checks.false_samples import clipped, isolated, repeated
+from weighbridge.checks.frozen import frozen
+from weighbridge.checks.needed import needed, show
+from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import SIGNALS
+
+WIDENED: Final = 1.02
+"""Load range of a vehicle file over the highest load its drives had [-]."""
+
+ENDS: Final = 60.0
+"""A signal that ends, or begins, so long before, or after, the rest is told [s]."""
+
+
+def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
+    """Return the drive without samples of torque, engine and vehicle speed that are false.
+
+    Left out are values no vehicle has, values that freeze, isolated dropouts, and repeats of a
+    torque that is renewed slowly. Each is told as a problem. Signals that a person vouches for
+    (``drive.info.trusted``) stay as they are.
+
+    Parameters
+    ----------
+    drive, vehicle : as of `weighbridge.checks.check_drive`
+    """
+    made_of = needed(drive, vehicle)
+    torque = {name for names in SIGNALS.values() for name in names} - {"engine_speed"}
+    names = [
+        name
+        for name in ("vehicle_speed", "engine_speed", *sorted(torque & made_of))
+        if drive.has(name) and len(drive.signals[name]) and name not in drive.info.trusted
+    ]
+    # What the others are judged by is mended first.
+    for name in names:
+        drive = _within_range(drive, name)
+    marks = {name: frozen(drive, name) for name in names}
+    for name, marked in marks.items():
+        drive = _without_frozen(drive, name, marked)
+    for name in names:
+        if name in torque:
+            drive = _without_false(drive, name)
+            drive = _without_ends(drive, name, vehicle)
+    return drive.with_problems(*_ends(drive, names))
+
+
+def _within_range(drive: Drive, name: str) -> Drive:
+    """Leave out what is outside the plausible range; `check_range` tells of it."""
+    signal, q = drive.signals[name], QUANTITIES[name]
+    outside = (signal.values < q.low) | (signal.values > q.high)
+    return drive.with_signals(_without(signal, outside)) if outside.any() else drive
+
+
+def _without_frozen(drive: Drive, name: str, marked: Bools) -> Drive:
+    if not marked.any():
+        return drive
+    signal = drive.signals[name]
+    begins = np.flatnonzero(marked & ~np.concatenate(([False], marked[:-1])))
+    lasted = float(np.sum(np.diff(signal.time, prepend=signal.time[0])[marked]))
+    often = f"{begins.size} times, " if begins.size > 1 else ""
+    text = (
+        f"{name} repeats one value while the vehicle goes on, {often}first from "
+        f"{signal.time[begins[0]]:.6g} s, for {lasted:.0f} s in all: its source froze, and those "
+        "rows are left out"
+    )
+    return drive.with_signals(_without(signal, marked)).with_problems(Problem(name, text))
+
+
+def _without_false(drive: Drive, name: str) -> Drive:
+    signal = drive.signals[name]
+    marked = isolated(drive, name)
+    if marked.any():
+        drive = drive.with_signals(_without(signal, marked)).with_problems(
+            Problem(
+                name,
+                f"{np.count_nonzero(marked)} of {len(signal)} samples of {name} fall to zero or "
+                "to the end of its range and return at once, in one gear, as no engine does: "
+                "they are left out; check the connection",
+            )
+        )
+        signal = drive.signals[name]
+    repeats, period = repeated(signal)
+    if repeats.any():
+        drive = drive.with_signals(_without(signal, repeats)).with_problems(
+            Problem(
+                name,
+                f"{name} is sampled every {signal.period:.3g} s and renewed every {period:.2g} s "
+                "only: the repeats are left out; poll it as fast as it is renewed",
+            )
+        )
+    return drive
+
+
+def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
+    """Leave out what lies at ends of the range that the calibration had wider."""
+    if vehicle is None or name != SIGNALS[vehicle.torque.source][0]:
+        return drive
+    signal, model, dragged = drive.signals[name], vehicle.torque, vehicle.dragged
+    told = []
+    highest = np.inf
+    if model.load_range is not None:
+        highest = model.load_range[1] / WIDENED if model.source == "load" else np.inf
+    elif dragged is not None:
+        highest = dragged.span + min(dragged.level)
+    marked = clipped(signal, highest)
+    if marked.any():
+        told.append(
+            f"{name} never exceeds {show(name, float(signal.values.max()))}, which "
+            f"{np.count_nonzero(marked)} of {len(signal)} samples read, and the calibration's went "
+            f"up to {show(name, highest)}: it is cut off there, and those rows are left out"
+        )
+    if dragged is not None and len(signal) > 200:
+        floor = min(dragged.level) + 3.0 * dragged.scatter
+        if floor < 0.0 <= float(signal.values.min()):
+            # What may be the size of a negative reading is as doubtful as a zero.
+            doubtful = signal.values <= 3.0 * dragged.scatter - min(dragged.level)
+            marked = marked | doubtful
+            told.append(
+                f"{name} is never below zero, and a dragged engine read down to "
+                f"{show(name, min(dragged.level))} in the calibration: its sign is lost, and the "
+                f"{np.count_nonzero(doubtful)} samples it may concern are left out"
+            )
+    if not told or marked.all():
+        return drive
+    return drive.with_signals(_without(signal, marked)).with_problems(
+        *(Problem(name, text) for text in told)
+    )
+
+
+def _without(signal: Signal, marked: Bools) -> Signal:
+    return Signal(signal.name, signal.time[~marked], signal.values[~marked])
+
+
+def _ends(drive: Drive, names: list[str]) -> list[Problem]:
+    """Tell of signals that end long before the drive, or begin long after."""
+    ends = [s.time[-1] for s in drive.signals.values() if len(s) > 10]
+    starts = [s.time[0] for s in drive.signals.values() if len(s) > 10]
+    told = []
+    for name in names:
+        signal = drive.signals[name]
+        if not len(signal):
+            continue
+        early, late = max(ends) - signal.time[-1], signal.time[0] - min(starts)
+        if early > ENDS:
+            told.append(
+                Problem(
+                    name,
+                    f"{name} ends at {signal.time[-1]:.6g} s, {early:.0f} s before the drive: "
+                    "what comes after is not weighed by it",
+                )
+            )
+        if late > ENDS:
+            told.append(
+                Problem(
+                    name,
+                    f"{name} begins at {signal.time[0]:.6g} s, {late:.0f} s after the drive: "
+                    "what comes before is not weighed by it",
+                )
+            )
+    return told

@@ -1,0 +1,120 @@
+"""Can the mass that a calibration is told be true? By tare, gross, class and torque."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.judging import HEAVIEST
+from weighbridge.signals import Drive
+from weighbridge.vehicle.data_sheet import scale_std, usual_efficiency
+from weighbridge.vehicle.model import MASS_RANGE, Vehicle, VehicleClass
+
+POUND: Final = 0.45359237
+"""[kg], by definition."""
+
+LIGHTEST: Final = 0.9
+"""Least mass over the tare [-]: an empty tank, no driver's 75 kg, and what was taken out."""
+
+LOADED: Final[dict[VehicleClass, float]] = {"car": 1.8, "van": 2.2, "bus": 2.2}
+"""Largest mass over the tare where the permitted one is not known [-]: without a trailer cars
+carry half of their tare and vans three quarters. Trucks may carry several times theirs."""
+
+OVERLOAD: Final = 1.25
+"""Largest mass over the permitted one [-]."""
+
+UNLADEN_CAR: Final = 3500.0
+"""Permitted mass of cars [kg], by the driving licence; more is a trailer, or pounds."""
+
+SURE: Final = 0.3
+"""Scale of a measured torque that is off by more is the mass's fault [-]: makers allow torque
+5 %, and their reference torques were found 15 % off."""
+
+DOUBTFUL: Final = 3.0
+"""Standard deviations from which such a scale is told [-]."""
+
+
+def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:
+    """Refuse a mass that the vehicle cannot have.
+
+    Parameters
+    ----------
+    drive, kg : a drive of the calibration and its mass [kg]
+    base : what is known of the vehicle: class, tare, gross
+
+    Raises
+    ------
+    ConfigError
+        The sentence says what is plausible, and what the number would be from pounds.
+    """
+    low, high = MASS_RANGE[base.kind]
+    why = f"is no {base.kind}'s, which is between {low:g} and {high:g} kg"
+    remedy = "give the mass in kg, and the class under [vehicle] of --vehicle"
+    if base.tare is not None or base.gross is not None:
+        low = LIGHTEST * base.tare if base.tare is not None else low
+        if base.gross is not None:
+            high = OVERLOAD * base.gross
+        elif base.tare is not None:
+            high = LOADED.get(base.kind, HEAVIEST[base.kind]) * base.tare
+        known = [f"tare {base.tare:g} kg"] if base.tare is not None else []
+        known += [f"gross {base.gross:g} kg"] if base.gross is not None else []
+        why = f"is not between {low:.0f} and {high:.0f} kg, as {' and '.join(known)} have it"
+        remedy = (
+            "give the mass in kg, correct tare_kg, or state gross_kg (of a trailer, too) under "
+            "[vehicle] of --vehicle"
+        )
+    elif base.kind == "car" and UNLADEN_CAR < kg <= high:
+        high = UNLADEN_CAR
+        why = f"is more than the {high:g} kg a car may have without a trailer"
+        remedy = "give the mass in kg, or state tare_kg and gross_kg under [vehicle] of --vehicle"
+    if low <= kg <= high:
+        return
+    pounds = kg * POUND
+    stated = drive.info.mass
+    likely = low <= pounds <= high if stated is None else abs(pounds / stated - 1.0) < 0.05
+    hint = f"; {kg:g} lb are {pounds:.0f} kg" if likely and kg > high else ""
+    raise ConfigError(f"{drive.name}: a mass of {kg:g} kg {why}{hint}; {remedy}")
+
+
+def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
+    """Compare the scale that a calibration gives a torque in N m or percent with a data sheet's.
+
+    Parameters
+    ----------
+    vehicle : calibrated
+    masses : it was calibrated with [kg]
+    names : of the drives
+
+    Returns
+    -------
+    What is doubted, one sentence; empty where nothing is
+
+    Raises
+    ------
+    DriveError
+        No torque is so far off.
+    """
+    model = vehicle.torque
+    if model.source not in ("measured", "percent") or len(model.coefficients) < 2:
+        return ""
+    slope = model.coefficients[1] + (float(np.mean(model.knot_slopes)) if model.knots else 0.0)
+    ratio = slope / usual_efficiency(vehicle)[0]
+    std = scale_std(vehicle)
+    if abs(ratio - 1.0) <= DOUBTFUL * std:
+        return ""
+    told = " and ".join(f"{kg:.0f}" for kg in masses)
+    likely = " and ".join(f"{kg / ratio:.0f}" for kg in masses)
+    text = (
+        f"with {told} kg the torque of {names} would read {1.0 / ratio:.2f} of what it is; by data "
+        f"sheets, which are good to {200.0 * std:.0f} %, {likely} kg are plausible"
+    )
+    if abs(np.log(ratio)) > SURE:
+        pounds = " and ".join(f"{kg * POUND:.0f}" for kg in masses)
+        hint = f" (the same number of pounds is {pounds} kg)" if 1.9 < ratio < 2.5 else ""
+        raise DriveError(
+            f"{text}{hint}; give the mass in kg, and check gearings, wheel radius and the "
+            "torque's unit"
+        )
+    return f"{text}: check the mass"

@@ -1,0 +1,61 @@
+"""The mass of a calibration must be one that the vehicle can have."""
+
+from dataclasses import replace
+
+import pytest
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.pipeline.known_mass import check_mass, scale_doubt
+from weighbridge.signals import Drive
+from weighbridge.signals.drive import DriveInfo
+from weighbridge.vehicle.model import TorqueModel, Vehicle
+
+DRIVE = Drive("drive", {})
+
+
+@pytest.mark.parametrize("known", [{"tare": 1500.0}, {"tare": 1500.0, "gross": 2100.0}, {}])
+def test_pounds_are_told_in_kilograms(known):
+    car = Vehicle(kind="car", **known)
+    check_mass(DRIVE, 1580.0, car)
+    if not known:
+        check_mass(DRIVE, 3483.0, car)  # below what a car may have
+        with pytest.raises(ConfigError, match=r"3968 lb are 1800 kg"):
+            check_mass(DRIVE, 3968.0, car)
+        return
+    with pytest.raises(ConfigError, match=r"3483 lb are 1580 kg"):
+        check_mass(DRIVE, 3483.0, car)
+
+
+def test_pounds_by_what_the_drive_states():
+    stated = replace(DRIVE, info=DriveInfo(mass=1580.0))
+    with pytest.raises(ConfigError, match=r"3483 lb are 1580 kg"):
+        check_mass(stated, 3483.0, Vehicle(kind="car", tare=1500.0))
+
+
+def test_a_mass_below_the_tare_is_refused():
+    with pytest.raises(ConfigError, match="is not between 1350 and 2700 kg, as tare 1500 kg"):
+        check_mass(DRIVE, 1264.0, Vehicle(kind="car", tare=1500.0))
+    check_mass(DRIVE, 1400.0, Vehicle(kind="car", tare=1500.0))
+
+
+def test_a_trailer_is_stated_as_gross():
+    with pytest.raises(ConfigError, match="gross_kg"):
+        check_mass(DRIVE, 3000.0, Vehicle(kind="car", tare=1500.0))
+    check_mass(DRIVE, 3000.0, Vehicle(kind="car", tare=1500.0, gross=3600.0))
+    check_mass(DRIVE, 39_000.0, Vehicle(kind="truck", tare=7500.0))
+
+
+@pytest.mark.parametrize(("slope", "said"), [(0.93, ""), (1.12, "check the mass"), (0.76, "check")])
+def test_the_torque_of_a_calibration_tells_of_its_mass(slope, said):
+    vehicle = Vehicle(kind="van", torque=TorqueModel(source="measured", coefficients=(0.0, slope)))
+    found = scale_doubt(vehicle, [2100.0], "drive")
+    assert said in found
+    assert bool(found) is bool(said)
+
+
+def test_a_torque_twice_too_strong_is_pounds():
+    vehicle = Vehicle(kind="van", torque=TorqueModel(source="percent", coefficients=(0.0, 2.05)))
+    with pytest.raises(DriveError, match="the same number of pounds is 2100 kg"):
+        scale_doubt(vehicle, [4630.0], "drive")
+    load = replace(vehicle, torque=TorqueModel(source="load", coefficients=(0.0, 205.0)))
+    assert scale_doubt(load, [4630.0], "drive") == ""
