@@ -64,8 +64,8 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     -------
     Drive
         On clocks that rise, within physical ranges, without samples that are false. What was found
-        is added to its ``problems``, serious ones first. What is wrong with a signal that a person vouches for
-        (``drive.info.trusted``) is never serious.
+        is added to its ``problems``, serious ones first. What is wrong with a signal that a person
+        vouches for (``drive.info.trusted``) is never serious.
     """
     told = drive.problems
     drive = well_formed(drive)

@@ -24,6 +24,9 @@ _COARSE: Final = 0.5
 _COARSE_RUN: Final = 20.0
 """only longer runs are no smooth road [s]."""
 
+_FEWEST: Final = 100
+"""An axis that has fewer samples left stays as it is: the checks refuse it where it is needed."""
+
 _MOVES: Final = 1.0
 """Faster, a body shakes too much for an accelerometer or gyro to repeat itself [m/s]."""
 
@@ -86,7 +89,7 @@ def thawed(drive: Drive, names: Iterable[str]) -> Drive:
         if s is None or len(s) < 2:
             continue
         lost = inside(frozen_stretches(s, speed), s.time)
-        if lost.any() and not lost.all():
+        if lost.any() and np.count_nonzero(~lost) >= _FEWEST:
             mended.append(Signal(name, s.time[~lost], s.values[~lost]))
     return drive.with_signals(*mended) if mended else drive
 
