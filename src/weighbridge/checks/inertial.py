@@ -32,6 +32,8 @@ _SOME: Final = 100
 # Sane drives tie tilt and gravity by 0.3 to 0.8; a mirrored axis turns the sign.
 _AGAINST: Final = -0.12
 
+# Specific force per change of speed above which the speed is in another unit [-].
+_STEEPEST: Final = 1.3
 # Parts of a drive that are looked at alone, and their least length [s].
 _PARTS: Final = 3
 _PART: Final = 300.0
@@ -234,8 +236,9 @@ def _check_axes(
     full &= np.isfinite(accel_along)
     if np.count_nonzero(full) < 30:
         return
-    forward, agreement = _forward(accel_along[full], force[full], down)
-    if forward is None or agreement < 0.7:
+    forward, agreement, slope = _forward(accel_along[full], force[full], down)
+    # A speed in another unit would pass for gravity across the vehicle.
+    if forward is None or agreement < 0.7 or slope > _STEEPEST:
         return
     right = np.cross(down, forward)
     bias = np.median(rate[full], axis=0)
@@ -339,17 +342,24 @@ def _alike(a: Floats, b: Floats) -> bool:
     return float(np.corrcoef(a, b)[0, 1]) > 0.8
 
 
-def _forward(accel: Floats, force: Floats, down: Floats) -> tuple[Floats | None, float]:
-    """Horizontal direction whose specific force follows the change of speed."""
+def _forward(accel: Floats, force: Floats, down: Floats) -> tuple[Floats | None, float, float]:
+    """Horizontal direction whose specific force follows the change of speed.
+
+    Returns
+    -------
+    forward : (3,); None where there is none
+    agreement : their correlation
+    slope : specific force per change of speed; noise of the speed makes it smaller than 1
+    """
     x = accel - np.mean(accel)
     y = force - np.mean(force, axis=0)
     spread = float(x @ x)
     if spread / x.size < 0.15**2:
-        return None, 0.0
+        return None, 0.0, 0.0
     slope = x @ y / spread
     slope = slope - (slope @ down) * down
     size = float(np.linalg.norm(slope))
     if size < 0.2:
-        return None, 0.0
+        return None, 0.0, 0.0
     forward = slope / size
-    return forward, float(np.corrcoef(y @ forward, x)[0, 1])
+    return forward, float(np.corrcoef(y @ forward, x)[0, 1]), size

@@ -142,8 +142,8 @@ def _ends(drive: Drive, names: list[str]) -> list[Problem]:
     """Tell of signals that end long before the drive, or begin long after."""
     ends = [s.time[-1] for s in drive.signals.values() if len(s) > 10]
     starts = [s.time[0] for s in drive.signals.values() if len(s) > 10]
-    told = []
-    for name in names:
+    told: list[Problem] = []
+    for name in names if ends else ():
         signal = drive.signals[name]
         if not len(signal):
             continue

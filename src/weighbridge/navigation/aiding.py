@@ -29,6 +29,8 @@ from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 
 _AXES = ("x", "y", "z")
 
+# Too short to be weighed, whatever its samples are [s].
+_BRIEF: Final = 30.0
 _FEWEST = 50
 """Fewer inertial samples show nothing."""
 
@@ -121,9 +123,9 @@ def read_imu(drive: Drive) -> Imu:
         moving = np.interp(time, speed.time, speed.values) > _MOVES
     imu = Imu(time, data["accel"], data["gyro"], float(np.median(np.diff(time))))
     repeated = repeated_rows(imu.accel, imu.gyro, moving)
-    if repeated.any():
-        own = time[moving & ~repeated]
-        imu = _kept(imu, ~repeated, float(np.median(np.diff(own))) if own.size > 1 else np.inf)
+    own = time[moving & ~repeated]
+    if repeated.any() and own.size >= _FEWEST:
+        imu = _kept(imu, ~repeated, float(np.median(np.diff(own))))
         moving = moving[~repeated]
     if imu.period > _SLOWEST:
         raise DriveError(
@@ -131,7 +133,7 @@ def read_imu(drive: Drive) -> Imu:
             "0.1 s or less: leave accel_x..z and gyro_x..z out to weigh by speed alone"
         )
     false = false_rows(imu.accel, imu.gyro, moving, imu.period)
-    if not false.any():
+    if not false.any() or time[-1] - time[0] < _BRIEF:
         return imu
     if np.count_nonzero(~false) < _FEWEST:
         raise DriveError(
