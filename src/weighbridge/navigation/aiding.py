@@ -29,10 +29,11 @@ from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 
 _AXES = ("x", "y", "z")
 
-# Too short to be weighed, whatever its samples are [s].
-_BRIEF: Final = 30.0
 _FEWEST = 50
 """Fewer inertial samples show nothing."""
+
+_BRIEF = 30.0
+"""Too short to be weighed, whatever its samples are [s]."""
 
 _MOVES = 1.0
 """Slower, a sensor may well repeat itself or read zero [m/s]."""
