@@ -149,3 +149,19 @@ def test_what_cannot_be_drafted_is_one_sentence(lines, words, tmp_path):
         draft(path)
     assert str(told.value).startswith(str(path))
     assert "\n" not in str(told.value)
+
+
+def test_a_unit_that_is_not_known_is_told_and_the_column_left_out(tmp_path):
+    rows = [f"{t:.2f},{2.0 + 0.01 * t:.3f},50,7" for t in T]
+    head = "Time (s),MAF air flow rate (lb/min),Vehicle speed (km/h),Wheel speed FL (km/h)"
+    found = draft(written(tmp_path / "maf.csv", [head, *rows]))
+    assert [c.quantity for c in found.known] == ["vehicle_speed"]
+    assert "its unit 'lb/min' is not known" in " ".join(found.all_doubts)
+
+
+def test_empty_columns_and_text_are_told(tmp_path):
+    rows = [f"{t:.2f},,2100 rpm,50" for t in T]
+    head = "Time (s),Engine Torque (Nm),Engine RPM,Vehicle speed (km/h)"
+    doubts = " ".join(draft(written(tmp_path / "x.csv", [head, *rows])).all_doubts)
+    assert "not taken for engine_torque: it has no values" in doubts
+    assert "not taken for engine_speed: its cells are no numbers" in doubts

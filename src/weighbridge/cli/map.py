@@ -123,7 +123,7 @@ def _show(found: Draft, screen: Console) -> None:
         values = (f"{x:.4g}" for x in (column.low, column.usual, column.high))
         table.add_row(shown(column.name), column.quantity, unit, *values, str(column.count))
     screen.print(table)
-    others = [c.name for c in found.columns if not c.quantity]
+    others = [c.name for c in found.columns if not c.quantity and not c.doubt]
     if others:
         more = f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
         names = ", ".join(shown(n) for n in others[:_SHOWN])
@@ -145,12 +145,16 @@ def _asked_unit(column: DraftColumn) -> DraftColumn:
         return column
     allowed = suffixes_of(QUANTITIES[column.quantity])
     while True:
-        told = typer.prompt(
-            f"{shown(column.name)} is {column.quantity}, {column.low:.4g} to {column.high:.4g}; "
-            f"unit ({', '.join(allowed)}, or none to leave it out)",
-            default=column.unit,
-            err=True,
-        ).strip()
+        try:
+            told = typer.prompt(
+                f"{shown(column.name)} is {column.quantity}, {column.low:.4g} to {column.high:.4g};"
+                f" unit ({', '.join(allowed)}, or none to leave it out)",
+                default=column.unit,
+                err=True,
+            ).strip()
+        except typer.Abort:
+            # Nobody is there to answer: the doubt stays.
+            return column
         if told == "none":
             return replace(column, quantity="")
         if told in allowed:

@@ -23,6 +23,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "°f": "degf", "℉": "degf", "f": "degf", "â°c": "degc", "â°": "deg",
     "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
     "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
+    "tr/min": "rpm",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""

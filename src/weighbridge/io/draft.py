@@ -52,6 +52,9 @@ DATE_FORMATS: Final = (
 _EPOCHS: Final = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Least number of a clock that counts from 1970, and its unit."""
 
+_STRANGE_UNIT: Final = re.compile(r"[\[(]\s*([^\])\s]*[/•*·][^\])]*?)\s*[\])]\s*$")
+"""A unit of two at the end of a name, such as lb/min."""
+
 _NUMBER: Final = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?$")
 _COMMA: Final = re.compile(r"[-+]?\d+,\d+$")
 _CLOCK: Final = re.compile(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?$")
@@ -122,7 +125,7 @@ class Draft:
     @property
     def all_doubts(self) -> tuple[str, ...]:
         """Doubts of the file and of its columns."""
-        return (*self.doubts, *(f"{c.name!r}: {c.doubt}" for c in self.known if c.doubt))
+        return (*self.doubts, *(f"{c.name!r}: {c.doubt}" for c in self.columns if c.doubt))
 
 
 @dataclass(slots=True)
@@ -368,19 +371,25 @@ def _column(raw: RawTable, name: str, found: Named, *, stated: str | None) -> Dr
     try:
         values, _ = raw.numbers(raw.names.index(name))
     except DriveError:
-        return replace(nothing, doubt="its cells are no numbers")
+        return replace(nothing, doubt=f"not taken for {found.quantity}: its cells are no numbers")
     known = values[np.isfinite(values)]
     if known.size == 0:
-        return nothing
+        return replace(nothing, doubt=f"not taken for {found.quantity}: it has no values")
     quantity = QUANTITIES[found.quantity]
     unit, doubt, by_log = stated or found.unit, "", True
+    strange = _STRANGE_UNIT.search(name)
+    if quantity.suffix and unit is None and strange is not None:
+        return replace(
+            nothing,
+            doubt=f"not taken for {found.quantity}: its unit {strange.group(1)!r} is not known",
+        )
     if not quantity.suffix:
         unit = ""
     elif unit is not None and UNITS[unit].dimension == dimension_of(quantity):
         doubt = _beyond(found.quantity, unit, known)
     else:
         by_log = False
-        unit, doubt = _plausible_unit(found.quantity, known)
+        unit, doubt = _plausible_unit(name, found.quantity, known)
     low, usual, high = map(float, np.quantile(known, [0.0, 0.5, 1.0]))
     return DraftColumn(name, found.quantity, unit, by_log, low, usual, high, known.size, doubt)
 
@@ -394,11 +403,13 @@ def _beyond(quantity: str, unit: str, values: Floats) -> str:
     return f"{100.0 * outside:.0f} % of its values are impossible in {unit}; check its unit"
 
 
-def _plausible_unit(quantity: str, values: Floats) -> tuple[str, str]:
+def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]:
     """Unit in which values are those of a drive: the usual one first, and a doubt."""
     q = QUANTITIES[quantity]
     high = float(np.percentile(np.abs(values), 99.5))
     if quantity in ("vehicle_speed", "gnss_speed"):
+        if "ego" in name.lower():
+            return "mps", "states no unit; of names with ego it is mps"
         # Few drives stay below 60 km/h, and none is faster than 60 m/s.
         unit = "kmh" if high > 45.0 or (quantity == "vehicle_speed" and high > 28.0) else "mps"
         return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"

@@ -17,14 +17,14 @@ from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
 PHRASES: Final[dict[str, tuple[str, ...]]] = {
-    "vehicle_speed": ("obd 2 speed", "kmph meas", "kmph", "kph",
+    "vehicle_speed": ("veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph",
         "vehicle speed", "speed", "obd speed", "speed obd", "car speed", "wheel speed", "wheel based vehicle speed",
         "ground speed can", "velocity", "geschwindigkeit", "fahrgeschwindigkeit", "fahrzeuggeschwindigkeit",
         "vitesse", "vitesse vehicule", "velocidad", "velocidad vehiculo", "velocita", "velocita veicolo",
         "velocidade", "velocidade veiculo", "snelheid", "vss", "vspeed", "speedometer", "speed sensor",
         "vehicle speed sensor", "v ego", "vego", "esp speed",
     ),
-    "engine_speed": ("nmot", "n mot",
+    "engine_speed": ("eng rpm", "eng spd", "nmot", "n mot",
         "engine speed", "engine rpm", "rpm", "rpms", "engine rpms", "revs", "motor speed", "motor rpm", "motordrehzahl",
         "drehzahl", "regime moteur", "regime", "regimen motor", "revoluciones", "revoluciones motor",
         "giri motore", "giri", "regime motore", "rotacao", "rotacao motor", "toerental", "engine revolutions",
@@ -37,17 +37,17 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
         "eng load",
     ),
     "absolute_load": ("absolute engine load", "absolute load", "absolute load value", "absolute throttle load"),
-    "engine_torque": (
+    "engine_torque": ("trq", "eng trq", "engine trq", "eng torque",
         "engine torque", "torque", "motor torque", "drehmoment", "motordrehmoment", "couple", "couple moteur",
         "par motor", "coppia", "coppia motore", "torque motor", "actual engine torque", "net torque",
-        "emotor torque", "electric motor torque", "brake torque", "flywheel torque",
+        "emotor torque", "electric motor torque", "flywheel torque",
     ),
-    "engine_torque_fraction": (
+    "engine_torque_fraction": ("actual eng percent torque", "eng percent torque",
         "actual engine percent torque", "actual engine torque", "percent torque", "engine percent torque",
         "actual engine torque percent", "engine torque", "motor torque percent", "actual torque", "torque",
         "drehmoment", "engine torque mode percent",
     ),
-    "demanded_torque": (
+    "demanded_torque": ("drivers demand eng percent torque", "drivers demand engine percent torque",
         "driver s demand engine percent torque", "drivers demand engine percent torque", "demanded torque",
         "driver demand torque", "demand engine torque", "driver s demand engine torque",
     ),
@@ -75,7 +75,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "relative_throttle": ("relative throttle position", "relative throttle"),
     "commanded_throttle": ("commanded throttle actuator", "commanded throttle", "commanded throttle actuator control"),
     "throttle_b": ("absolute throttle position b", "throttle position b", "absolute throttle b"),
-    "accelerator_pedal": ("aps", "accel pedal pos",
+    "accelerator_pedal": ("acc pedal", "aps", "accel pedal pos",
         "accelerator pedal position", "accelerator pedal position d", "accelerator pedal", "accelerator",
         "pedal position", "gas pedal", "gaspedal", "gaspedalstellung", "fahrpedal", "fahrpedalstellung",
         "position pedale accelerateur", "pedal acelerador", "pedale acceleratore", "pedal accelerator",
@@ -123,7 +123,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
         "marcia", "transmission gear", "gear position", "actual gear", "transmission current gear",
     ),
     "gear_ratio": ("transmission actual gear ratio", "actual gear ratio", "gear ratio"),
-    "brake_switch": (
+    "brake_switch": ("brk sw", "brk",
         "brake switch", "brake pressed", "brake", "brake pedal", "brake pedal pressed", "brake status", "bremse", "bremspedal",
         "bremslicht", "frein", "freno", "brake light", "brake pedal status", "brakes", "brake lights",
     ),
@@ -143,10 +143,10 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "fuel_level": ("fuel level", "fuel tank level", "fuel level input", "tankfullstand", "niveau carburant", "nivel combustible", "fuel remaining", "livello carburante"),
     "run_time": ("run time since engine start", "time since engine start", "engine run time", "engine runtime", "runtime since engine start", "tiempo desde arranque motor"),
     "odometer": ("odometer", "mileage", "kilometerstand", "total distance", "kilometrage", "vehicle odometer"),
-    "latitude": ("latitude", "lat", "breitengrad", "breite", "latitud", "latitudine", "gps latitude", "latitude deg", "gps lat", "position latitude"),
-    "longitude": ("longitude", "lon", "lng", "long", "langengrad", "lange", "longitud", "longitudine", "gps longitude", "gps lon", "gps long", "gps lng"),
-    "altitude": ("altitude", "alt", "height", "elevation", "ele", "hohe", "altitud", "altitudine", "gps altitude", "gps alt", "gps height", "hauteur", "altura", "msl altitude", "height above msl", "location altitude"),
-    "gnss_speed": ("gp sspeed", "gps speed", "speed gps", "gnss speed", "speed over ground", "gps geschwindigkeit", "vitesse gps", "velocidad gps", "location speed", "gps velocity", "sog", "velocita gps", "geschwindigkeit gps"),
+    "latitude": ("pos lat", "latitude", "lat", "breitengrad", "breite", "latitud", "latitudine", "gps latitude", "latitude deg", "gps lat", "position latitude"),
+    "longitude": ("pos lon", "pos lng", "pos long", "longitude", "lon", "lng", "long", "langengrad", "lange", "longitud", "longitudine", "gps longitude", "gps lon", "gps long", "gps lng"),
+    "altitude": ("alt msl", "hgt", "altitude", "alt", "height", "elevation", "ele", "hohe", "altitud", "altitudine", "gps altitude", "gps alt", "gps height", "hauteur", "altura", "msl altitude", "height above msl", "location altitude"),
+    "gnss_speed": ("gps spd", "gp sspeed", "gps speed", "speed gps", "gnss speed", "speed over ground", "gps geschwindigkeit", "vitesse gps", "velocidad gps", "location speed", "gps velocity", "sog", "velocita gps", "geschwindigkeit gps"),
     "gnss_course": ("course", "heading", "bearing", "gps course", "gps bearing", "gps heading", "course over ground", "cog", "kurs", "cap", "rumbo", "track angle", "location course", "direction", "gps direction", "location bearing"),
     "hdop": ("hdop", "horizontal dilution of precision", "dop", "gps hdop"),
     "gnss_accuracy": ("horizontal accu", "accuracy", "gps accuracy", "horizontal accuracy", "genauigkeit", "precision", "location accuracy", "location horizontal accuracy", "position accuracy", "h accuracy", "gps horizontal accuracy"),
@@ -183,7 +183,7 @@ TIME_PHRASES: Final = frozenset(
         "elapsed", "elapsed time", "seconds elapsed", "seconds", "millis", "milliseconds", "utc", "utc time", "epoch",
         "time since start", "time utc", "unix time", "log time", "timestamps", "created at", "measured at", "sec", "ms",
         "session time", "meta time", "relative time", "recording time", "logging time", "time since start in ms", "running time",
-        "ts", "local time", "elapsed seconds", "offset", "trip time", "time elapsed", "tijd", "timestamp ms", "unix timestamp",
+        "ts", "stamp", "log mono time", "local time", "elapsed seconds", "offset", "trip time", "time elapsed", "tijd", "timestamp ms", "unix timestamp",
     )
 )  # fmt: skip
 """What loggers call their time, likewise."""
@@ -195,11 +195,11 @@ _NOISE: Final = frozenset(
 """Words that say nothing of the quantity."""
 
 _AGAINST: Final[dict[str, frozenset[str]]] = {
-    "vehicle_speed": frozenset(("gps", "gnss", "engine", "motor", "wind", "fan", "limit", "cruise", "max", "min", "average", "avg",
+    "vehicle_speed": frozenset(("fl", "fr", "rl", "rr", "front", "rear", "left", "right", "gps", "gnss", "engine", "motor", "wind", "fan", "limit", "cruise", "max", "min", "average", "avg",
                       "target", "accuracy", "set", "shaft", "output", "input", "turbine", "angular", "idle", "course")),
     "engine_speed": frozenset(("idle", "max", "min", "target", "wheel", "shaft", "turbo", "vehicle", "fan", "limit", "desired", "average")),
     "engine_load": frozenset(("absolute", "sensor", "cpu", "axle", "torque")),
-    "engine_torque": frozenset(("reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder")),
+    "engine_torque": frozenset(("reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder")),
     "engine_torque_fraction": frozenset(("reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "nominal", "converter")),
     "throttle": frozenset(("relative", "commanded", "b", "c", "pedal", "accelerator", "volts", "voltage")),
     "accelerator_pedal": frozenset(("relative", "e", "f", "brake", "clutch", "x", "y", "z")),
@@ -213,7 +213,7 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
     "gnss_course": frozenset(("accuracy", "magnetic", "rate", "north")),
     "gnss_accuracy": frozenset(("vertical", "speed", "bearing", "course", "heading", "altitude")),
     "intake_pressure": frozenset(("fuel", "delta", "temperature")),
-    "coolant_temperature": frozenset(("oil", "intake", "gearbox", "transmission", "2", "inverter", "battery", "heater", "heatercore")),
+    "coolant_temperature": frozenset(("requested", "oil", "intake", "gearbox", "transmission", "2", "inverter", "battery", "heater", "heatercore")),
     "battery_voltage": frozenset(("12v", "12", "cell", "min", "max", "module", "sensor", "phone", "adapter", "starter")),
     "battery_current": frozenset(("12v", "12", "max", "min", "limit", "phone", "starter", "charger")),
     "mass_air_flow": frozenset(("temperature", "voltage", "volts", "pressure", "2")),

@@ -173,7 +173,8 @@ def _no_time(raw: RawTable, known: bool) -> str:
         )
     return (
         f"{raw.path} has no canonical columns ({TIME_COLUMN}, vehicle_speed_kmh …); "
-        f"it has {column_list(raw.names)}: name them in a mapping file{_separator_hint(raw)}"
+        f"it has {column_list(raw.names)}: name them in a mapping file{_separator_hint(raw)} "
+        f"(weighbridge map {raw.path} drafts one)"
     )
 
 

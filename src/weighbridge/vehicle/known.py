@@ -117,12 +117,21 @@ def describe(known: Known) -> Described:
         driveline=driveline,
         torque=torque,
         road_load=_road_load(known, origins),
-        provenance=Provenance(notes="written by weighbridge vehicle new; nothing is calibrated"),
+        provenance=Provenance(notes=_notes(known)),
     )
     if driveline.efficiency is None:
         mean, std = usual_efficiency(vehicle)
         origins["driveline", "efficiency"] = f"not given; taken as {mean:.3f} ± {std:.3f}"
     return Described(vehicle=vehicle, origins=origins)
+
+
+def _notes(known: Known) -> str:
+    told = ["written by weighbridge vehicle new; nothing is calibrated"]
+    if known.engine is not None:
+        told.append(f"{known.engine} engine" if known.engine != "electric" else "electric motor")
+    if known.torque in ("load", "air_flow"):
+        told.append(f"torque by {known.torque.replace('_', ' ')}, which calibrate finds")
+    return "; ".join(told)
 
 
 def _refuse(known: Known) -> None:
