@@ -27,6 +27,9 @@ _COMMA_NUMBER: Final = re.compile(r"[-+]?\d+,\d+$")
 MOST_COLUMNS: Final = 10_000
 """Columns of a table: ten times those of the widest bus databases."""
 
+DATES: Final = (631_152_000.0, 4_102_444_800.0)
+"""Numbers of seconds between these count from 1970: the years 1990 to 2100 [s]."""
+
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
 
@@ -326,7 +329,8 @@ def time_seconds(
         return (*_temporal(series), [])
     if time_format is None:
         values, notes = table.numbers(index)
-        return values * unit_factor if unit_factor != 1.0 else values, False, notes
+        seconds = values * unit_factor if unit_factor != 1.0 else values
+        return seconds, _since_1970(seconds), notes
     text = series.cast(pl.String).str.strip_chars()
     if time_format == "clock":
         part = text.str.extract_groups(r"^(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)$").struct.unnest()
@@ -355,6 +359,12 @@ def time_seconds(
         )
     notes = [f"{lost} time stamps could not be read and their rows were left out"] if lost else []
     return seconds, absolute, notes
+
+
+def _since_1970(seconds: Floats) -> bool:
+    """Whether numbers are a date: most of them lie in `DATES`."""
+    known = seconds[np.isfinite(seconds)]
+    return bool(known.size) and DATES[0] < float(np.median(known)) < DATES[1]
 
 
 def _parse_datetime(text: pl.Series, time_format: str) -> pl.Series:
