@@ -108,6 +108,27 @@ def test_a_brake_switch_leaves_the_dragged_rows_of_a_torque():
     assert np.all(found[away & (foot(STAMPS) < 0.5)] == Reason.USED)
 
 
+@pytest.mark.parametrize("late", [None, 8.0])
+def test_a_brake_switch_that_misses_hard_braking_is_not_believed(late):
+    """Dead, or late: the floor of the torque tells where the foot may be on the brake then."""
+    hard = np.where((CLOCK % 40.0 > 16.8) & (CLOCK % 40.0 < 19.5), 3000.0, 0.0)
+    accel = (GEARING * torque_of(CLOCK) - MASS * GRAVITY * 0.01 - hard) / MASS
+    moved = replace(motion(), specific_force=accel, accel=accel)
+    on = np.interp(STAMPS - (late or 0.0), CLOCK, hard) > 0.0
+    switch = np.zeros(STAMPS.size) if late is None else on.astype(float)
+    balance = force_balance(
+        recorded(engine_torque=torque_of(STAMPS), brake_switch=switch), CAR, moved
+    )
+    assert balance.switch_dead
+    assert "brake switch is off in much of the hard braking" in " ".join(balance.notes)
+    braked = np.interp(STAMPS, CLOCK, hard) > 0.0
+    assert not np.any(balance.merged.usable & braked)
+    true = force_balance(
+        recorded(engine_torque=torque_of(STAMPS), brake_switch=braked.astype(float)), CAR, moved
+    )
+    assert not true.switch_dead
+
+
 def test_a_pressed_accelerator_is_no_brake_and_a_pedal_that_is_up_may_be_cruise_control():
     pressed = np.where(STAMPS < 0.5 * END, 0.45, 0.15)
     read = torque_of(STAMPS)

@@ -100,6 +100,20 @@ BRAKING_FORCE: Final = 0.06
 SWITCH_MARGIN: Final = 0.3
 """Samples nearer than this to a pressed brake switch may be braked [s]."""
 
+HARD_BRAKING: Final = 0.15
+"""Braking force over weight that no retarder makes: a brake switch is on there [-]."""
+
+SWITCH_ROWS: Final = 20
+"""Rows of hard braking that tell whether a brake switch can be believed."""
+
+SWITCH_MISSES: Final = 0.2
+"""Part of them with the switch off from which it is not believed [-]; true ones miss none."""
+
+SWITCH_DEAD: Final = (
+    "the brake switch is off in much of the hard braking: it is not connected, late or of another "
+    "drive, and is not used; check brake_switch, or leave its column out"
+)
+
 TRAIL: Final = 0.0015
 """Braking force over weight that smoothing may still hold of a brake let go [-]."""
 
@@ -221,6 +235,7 @@ class ForceBalance:
     force, motion, merged
     brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading tells
         where it is braked
+    switch_dead : the brake switch contradicts the motion and is not used
     coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
     """
 
@@ -228,12 +243,14 @@ class ForceBalance:
     motion: Motion
     merged: MergedView
     brake_hidden: bool = False
+    switch_dead: bool = False
     coarse_std: float = 0.0
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What is doubted, one sentence each."""
-        return ((BRAKE_HIDDEN,) if self.brake_hidden else ()) + coarse_note(self.coarse_std)
+        told = ((BRAKE_HIDDEN, self.brake_hidden), (SWITCH_DEAD, self.switch_dead))
+        return tuple(text for text, so in told if so) + coarse_note(self.coarse_std)
 
 
 def force_balance(
@@ -286,6 +303,8 @@ def force_balance(
     signed = signed and vehicle.torque.source in ("measured", "percent")
     needed, weight = _needed_force(vehicle, rows["specific_force"], drag, rotating)
     pressed = brake_pressed(drive, recorded)
+    dead = pressed is not None and _misses(pressed, rows, traction, needed, weight)
+    pressed = None if dead else pressed
     told = np.nan if motion.source in BY_SPEED else 1.0
     foot = find_foot(drive, vehicle, source, told * needed / weight, told * needed / gearing)
     # What a dragged engine takes is told by a torque alone, and by none where a foot may brake.
@@ -349,6 +368,7 @@ def force_balance(
             reason=reason,
         ),
         brake_hidden=bool(hidden),
+        switch_dead=dead,
         coarse_std=coarse_std(source, source.at(recorded), reason == Reason.USED),
     )
 
@@ -584,6 +604,17 @@ def brake_pressed(drive: Drive, recorded: Floats) -> Bools | None:
         return None
     on = switch.values > 0.5
     return (switch.held(recorded) > 0.5) | near(switch.time, on, recorded, SWITCH_MARGIN)
+
+
+def _misses(
+    pressed: Bools, rows: dict[str, Floats], traction: Floats, needed: Floats, weight: float
+) -> bool:
+    """Whether a brake switch is off in most of the hard braking."""
+    beyond = needed - np.minimum(np.nan_to_num(traction), 0.0)
+    moving = (rows["valid"] > 0.99) & (rows["speed"] > SLOWEST)
+    hard = moving & (np.nan_to_num(beyond) < -HARD_BRAKING * weight)
+    count = np.count_nonzero(hard)
+    return bool(count >= SWITCH_ROWS and np.mean(~pressed[hard]) > SWITCH_MISSES)
 
 
 def _braking(
