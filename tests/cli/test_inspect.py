@@ -1,5 +1,6 @@
 """``weighbridge inspect`` end to end."""
 
+import io
 import re
 from pathlib import Path
 
@@ -116,3 +117,20 @@ def test_the_next_command_stands_at_the_end(run, weighbridge, loaded, car):
     assert last == f"next: weighbridge calibrate {loaded.folder} --mass KG -o vehicle.toml"
     last = weighbridge("inspect", loaded.folder, "--vehicle", car).out.strip().splitlines()[-1]
     assert last == f"next: weighbridge weigh {loaded.folder} --vehicle {car}"
+
+
+def test_a_narrow_terminal_shows_whole_numbers():
+    from rich.console import Console
+
+    from weighbridge.cli.inspect import _signal_table
+    from weighbridge.io import read_drive
+    from weighbridge.pipeline.inspection import inspect_drive
+
+    found = inspect_drive(read_drive(GOLDEN / "csv"))
+    for width in (80, 140):
+        screen = Console(width=width, record=True, file=io.StringIO())
+        screen.print(_signal_table(found, width))
+        shown = screen.export_text()
+        assert "…" not in shown
+        assert "251" in shown
+        assert ("jitter ms" in shown) == (width == 140)

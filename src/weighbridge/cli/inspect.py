@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Width of tables where no terminal gives one.
 _WIDTH = 140
+# Narrower, the rarer columns of the signals are left out.
+_WHOLE = 116
 
 
 def inspect(
@@ -79,7 +81,7 @@ def _show(screen: Console, found: Inspection, every_way: bool) -> None:
     screen.print(f"[bold]{shown(drive.name)}[/]: {drive.duration / 60.0:.1f} min")
     for line in drive.contents:
         screen.print(f"  {shown(line)}", soft_wrap=True)
-    screen.print(_signal_table(found))
+    screen.print(_signal_table(found, screen.width))
     if found.problems:
         screen.print("Problems")
         for p in found.problems:
@@ -99,19 +101,22 @@ def _show(screen: Console, found: Inspection, every_way: bool) -> None:
     screen.print()
 
 
-def _signal_table(found: Inspection) -> Table:
+def _signal_table(found: Inspection, width: int) -> Table:
+    """List the signals; a narrow terminal gets the columns that matter most."""
     from rich.table import Table
 
+    whole = width >= _WHOLE
     table = Table()
+    columns = ["samples", "Hz", "period s", "jitter ms", "gaps", "longest s", "lowest", "highest"]
+    columns += ["step"]
+    rare = {"period s", "jitter ms", "longest s", "step"}
+    kept = [c for c in columns if whole or c not in rare]
     table.add_column("signal", no_wrap=True)
-    for name in ("samples", "Hz", "period s", "jitter ms", "gaps", "longest s"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for name in ("lowest", "highest", "step"):
+    for name in kept:
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("unit", no_wrap=True)
     for s in found.signals:
-        table.add_row(
-            s.name,
+        cells = (
             str(s.count),
             _shown(s.rate, 4),
             _shown(s.period, 4),
@@ -121,8 +126,9 @@ def _signal_table(found: Inspection) -> Table:
             f"{s.low:.5g}",
             f"{s.high:.5g}",
             f"{s.step:.3g}" if s.step is not None else "fine",
-            s.unit,
         )
+        told = dict(zip(columns, cells, strict=True))
+        table.add_row(s.name, *(told[c] for c in kept), s.unit)
     return table
 
 
