@@ -260,7 +260,7 @@ def find_foot(drive: Drive, vehicle: Vehicle, source: Signal, need: Floats, torq
 
 def _stops(drive: Drive) -> bool:
     """Whether the vehicle comes to a stop from more than walking pace."""
-    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    speed = drive.speed
     if speed is None:
         return False
     size = np.abs(speed.values)
@@ -372,7 +372,7 @@ def _turning(drive: Drive, source: Signal) -> Floats:
 
 def _driven(drive: Drive, source: Signal) -> Floats:
     """Readings of the source while the vehicle moves (n,), else NaN."""
-    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    speed = drive.speed
     if speed is None:
         return source.values
     return np.where(np.nan_to_num(speed.at(source.time)) > MOVING, source.values, np.nan)

@@ -22,6 +22,7 @@ from weighbridge.constants import (
 )
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.signals.runs import marked_runs
 from weighbridge.vehicle.air import air_density
 from weighbridge.vehicle.data_sheet import wheel_share
 from weighbridge.vehicle.fuel import fuel_burnt
@@ -430,10 +431,10 @@ def filled(signal: Signal, time: Floats) -> Bools:
     straight = np.concatenate(([False], np.abs(np.diff(values, 2)) <= tolerance, [False]))
     # Idling and coasting read a constant zero for long, recuperation its limit.
     straight &= ~np.isin(values, (0.0, np.nanmin(values)))
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], straight.astype(np.int8), [0]))))
     runs = np.zeros(values.size, dtype=bool)
-    for begin, end in edges.reshape(-1, 2)[np.diff(edges)[::2] >= least]:
-        runs[begin:end] = True
+    for begin, end in zip(*marked_runs(straight), strict=True):
+        if end - begin >= least:
+            runs[begin:end] = True
     index = np.clip(np.searchsorted(signal.time, time), 0, values.size - 1)
     return np.asarray(runs[index])
 
@@ -479,8 +480,7 @@ def smoothed(motion: Motion, lag: float) -> Motion:
 
 def _settled(valid: Bools, rate: float, lag: float) -> Bools:
     """Take out what follows long gaps, too, as long as a lag passes on what was not seen there."""
-    edges = np.diff(np.concatenate(([0], (~valid).astype(np.int8), [0])))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    starts, ends = marked_runs(~valid)
     long = ends - starts > _LONG_GAP * rate
     change = np.zeros(valid.size + 1, dtype=np.int64)
     np.add.at(change, ends[long], 1)
@@ -609,7 +609,7 @@ def brake_pressed(drive: Drive, recorded: Floats) -> Bools | None:
 def _misses(
     pressed: Bools, rows: dict[str, Floats], traction: Floats, needed: Floats, weight: float
 ) -> bool:
-    """Whether a brake switch is off in most of the hard braking."""
+    """Whether a brake switch is off in much of the hard braking."""
     beyond = needed - np.minimum(np.nan_to_num(traction), 0.0)
     moving = (rows["valid"] > 0.99) & (rows["speed"] > SLOWEST)
     hard = moving & (np.nan_to_num(beyond) < -HARD_BRAKING * weight)

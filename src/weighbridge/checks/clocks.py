@@ -78,7 +78,7 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     whole = _pauses(np.unique(np.concatenate(list(tables.values()))))
     if whole:
         start, length = max(whole, key=lambda p: p[1])
-        speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+        speed = drive.speed
         ends = np.array([start, start + length])
         moving = (
             speed is not None

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.runs import runs_of
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.runs import runs_of
 
 LONGEST: Final = 0.5
 """Runs beyond are no isolated samples [s], or `FEW` samples of a slow reading."""

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.runs import Runs, runs_of
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.runs import Runs, runs_of
 
 SHORTEST: Final[dict[str, float]] = {"engine_speed": 10.0, "vehicle_speed": 20.0}
 """Runs of one value below may be a steady drive [s]."""

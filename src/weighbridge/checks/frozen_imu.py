@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.needed import IMU
 from weighbridge.constants import GRAVITY
-from weighbridge.navigation.frozen import frozen_stretches, shown_speed
+from weighbridge.navigation.frozen import frozen_stretches
 from weighbridge.signals import Drive, Problem, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.vehicle.model import Vehicle
 
 _TOLD: Final = 5.0
@@ -28,9 +28,9 @@ def check_frozen(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
     Serious only where too little is left.
     """
-    speed = shown_speed(drive)
+    speed = drive.speed
     alike: dict[bytes, list[str]] = {}
-    for name in IMU:
+    for name in IMU_SIGNALS:
         s = drive.get(name)
         if s is None or len(s) < 50 or s.duration < 20.0 or not np.any(s.values != s.values[0]):
             continue
@@ -65,7 +65,7 @@ def _told(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
 
 def check_limit(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find an accelerometer whose range is too small for gravity and the road's shaking."""
-    for name in IMU[:3]:
+    for name in IMU_SIGNALS[:3]:
         s = drive.get(name)
         if s is None or len(s) < 50:
             continue

@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 
 from weighbridge.checks import windows
-from weighbridge.checks.needed import IMU
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.vehicle.model import Vehicle
 
 # Samples enough for a median; more would only take time.
@@ -41,7 +41,7 @@ _PART: Final = 300.0
 
 def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Compare the inertial sensor with gravity, with the course and with itself."""
-    drive = thawed(drive, IMU)
+    drive = thawed(drive, IMU_SIGNALS)
     accel = _axes(drive, "accel")
     gyro = _axes(drive, "gyro")
     fine = True
@@ -168,7 +168,7 @@ def _check_axes(
     drive: Drive, accel: tuple[Signal, Signal, Signal], gyro: tuple[Signal, Signal, Signal]
 ) -> Iterator[Problem]:
     """In a bend the lateral acceleration is speed times yaw rate, about one right-handed system."""
-    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    speed = drive.speed
     turns = _turns(drive)
     sides: tuple[Signal, ...] = (*accel, *gyro)
     if speed is not None and len(speed) > 20:

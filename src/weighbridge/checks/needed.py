@@ -8,14 +8,14 @@ from typing import Final
 import numpy as np
 
 from weighbridge.signals import QUANTITIES, Drive
+from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque import SIGNALS
 
-IMU: Final = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
 MOTION: Final = frozenset(
     (
-        *IMU,
+        *IMU_SIGNALS,
         "longitudinal_accel",
         "vehicle_speed",
         "engine_speed",

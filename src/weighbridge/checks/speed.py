@@ -269,7 +269,7 @@ def _swapped(lat: Signal, lon: Signal) -> Problem:
 def _check_altitude(drive: Drive) -> Iterator[Problem]:
     """Find feet for metres: by roads too steep, or by the accelerometer along the vehicle."""
     altitude = drive.get("altitude")
-    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    speed = drive.speed
     if altitude is None or speed is None or len(altitude) < 20 or len(speed) < 20:
         return
     length = 20.0

@@ -8,13 +8,14 @@ import numpy as np
 
 from weighbridge.checks.needed import show
 from weighbridge.signals import Bools, Drive, Problem, Signal
+from weighbridge.signals.runs import marked_runs
 from weighbridge.signals.words import counted
 from weighbridge.vehicle.model import Vehicle
 
 
 def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Tell of long standstills and cuts; neither spoils a mass."""
-    s = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    s = drive.speed
     if s is None or len(s) < 2:
         return
     standing = np.abs(s.values) < 0.3
@@ -47,11 +48,10 @@ def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
 
 def _longest_time(s: Signal, mask: Bools) -> tuple[float, float]:
     """Duration and start of the longest run of True [s]."""
-    edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    starts, ends = marked_runs(mask)
     if starts.size == 0:
         return 0.0, 0.0
-    lengths = s.time[ends] - s.time[starts]
+    lengths = s.time[ends - 1] - s.time[starts]
     k = int(np.argmax(lengths))
     return float(lengths[k]), float(s.time[starts[k]])
 

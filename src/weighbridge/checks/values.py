@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.needed import IMU, MOTION, TORQUE, moves, needed, show
+from weighbridge.checks.needed import MOTION, TORQUE, moves, needed, show
 from weighbridge.checks.speed import SETTLED
 from weighbridge.signals import QUANTITIES, Drive, Problem
+from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.model import Vehicle
 
@@ -60,7 +61,7 @@ def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         value = float(s.values[0])
         if bool(np.all(s.values == value)):
             standing = s.name in ("vehicle_speed", "gnss_speed", "latitude", "longitude")
-            if (standing or s.name not in IMU) and not moving:
+            if (standing or s.name not in IMU_SIGNALS) and not moving:
                 continue
             if _along_an_axis(drive, s.name):
                 continue

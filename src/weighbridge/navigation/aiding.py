@@ -22,10 +22,11 @@ from weighbridge.kernels.ins import (
     lowpass_resample,
 )
 from weighbridge.navigation.dropouts import false_rows, repeated_rows
-from weighbridge.navigation.frozen import shown_speed, thawed
+from weighbridge.navigation.frozen import thawed
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
 
 _AXES = ("x", "y", "z")
 
@@ -91,12 +92,11 @@ def read_imu(drive: Drive) -> Imu:
     DriveError
         Signals are missing, hardly overlap or are far too slow.
     """
-    names = [f"{kind}_{a}" for kind in ("accel", "gyro") for a in _AXES]
-    missing = drive.missing(names)
+    missing = drive.missing(IMU_SIGNALS)
     if missing:
         raise DriveError(f"{drive.name}: inertial navigation lacks {', '.join(missing)}")
-    drive = thawed(drive, names)
-    signals = [drive.signals[n] for n in names]
+    drive = thawed(drive, IMU_SIGNALS)
+    signals = [drive.signals[n] for n in IMU_SIGNALS]
     start = max(float(s.time[0]) if len(s) else np.inf for s in signals)
     end = min(float(s.time[-1]) if len(s) else -np.inf for s in signals)
     clock = signals[0].time
@@ -118,7 +118,7 @@ def read_imu(drive: Drive) -> Imu:
             s = drive.signals[f"{kind}_{axis}"]
             same = s.time is clock or np.array_equal(s.time, clock)
             block[:, i] = s.values[keep] if same else np.interp(time, s.time, s.values)
-    speed = shown_speed(drive)
+    speed = drive.speed
     moving = np.ones(time.size, dtype=bool)
     if speed is not None and len(speed):
         moving = np.interp(time, speed.time, speed.values) > _MOVES

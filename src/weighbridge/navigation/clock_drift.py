@@ -12,6 +12,7 @@ import numpy as np
 from weighbridge.navigation.aiding import read_fixes, speed_from_fixes
 from weighbridge.navigation.clock_lag import Lags, find_lags, find_offset, locate_step
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals.runs import marked_runs
 
 _LOG = logging.getLogger(__name__)
 
@@ -219,9 +220,7 @@ def _lost(lags: Lags) -> tuple[tuple[float, float], ...]:
     time = np.concatenate((lags.time, lags.missed))
     order = np.argsort(time)
     time, shown = time[order], (np.arange(time.size) < lags.lag.size)[order]
-    edges = np.diff(np.concatenate(([0], (~shown).astype(np.int8), [0])))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    runs = [(a, b) for a, b in zip(starts, ends, strict=True) if b - a >= _FEWEST]
+    runs = [(a, b) for a, b in zip(*marked_runs(~shown), strict=True) if b - a >= _FEWEST]
     others = time.size - sum(b - a for a, b in runs)
     if not runs or lags.lag.size < _FOLLOWS * others:
         return ()

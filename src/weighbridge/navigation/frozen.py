@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.runs import marked_runs
 
 SHORTEST: Final = 0.5
 """Shorter runs are bridged by the samples around them, as gaps are [s]."""
@@ -51,8 +52,7 @@ def frozen_stretches(signal: Signal, speed: Signal | None) -> Floats:
     same = signal.values[1:] == signal.values[:-1]
     if not same.any():
         return nothing
-    edges = np.diff(np.concatenate(([0], same.view(np.int8), [0])))
-    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    first, last = marked_runs(same)
     length = signal.time[last] - signal.time[first]
     repeats = last - first
     short = length < _LONG
@@ -82,7 +82,7 @@ def inside(stretches: Floats, time: Floats) -> Bools:
 
 def thawed(drive: Drive, names: Iterable[str]) -> Drive:
     """Leave the frozen stretches out of the axes named; a drive without any is returned as is."""
-    speed = shown_speed(drive)
+    speed = drive.speed
     mended = []
     for name in names:
         s = drive.get(name)
@@ -92,8 +92,3 @@ def thawed(drive: Drive, names: Iterable[str]) -> Drive:
         if lost.any() and np.count_nonzero(~lost) >= _FEWEST:
             mended.append(Signal(name, s.time[~lost], s.values[~lost]))
     return drive.with_signals(*mended) if mended else drive
-
-
-def shown_speed(drive: Drive) -> Signal | None:
-    """Return the signal that tells motion from standing; None where the drive has none."""
-    return drive.get("vehicle_speed") or drive.get("gnss_speed")

@@ -7,9 +7,8 @@ from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.speed import speed_motion
 from weighbridge.signals import Drive, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.vehicle.model import Vehicle
-
-IMU_SIGNALS = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
 
 
 def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:

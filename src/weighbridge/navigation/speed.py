@@ -37,7 +37,7 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
     DriveError
         No speed, or too little of it.
     """
-    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    speed = drive.speed
     if speed is None or len(speed) < 20:
         raise DriveError(
             f"{drive.name}: no vehicle_speed and no gnss_speed of at least 20 samples; "

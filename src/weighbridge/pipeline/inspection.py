@@ -11,8 +11,8 @@ import numpy as np
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.checks import settle_drive
 from weighbridge.navigation.motion import MotionSource
-from weighbridge.navigation.select import IMU_SIGNALS
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import TorqueSource, Vehicle
 from weighbridge.vehicle.power_balance import find_power_balance

@@ -54,7 +54,7 @@ def positions(weighing: Weighing) -> Positions | None:
     if latitude is None or longitude is None or len(latitude) < 2:
         return None
     east = longitude.at(latitude.time)
-    speed = weighing.drive.get("vehicle_speed") or weighing.drive.get("gnss_speed")
+    speed = weighing.drive.speed
     pace = speed.at(latitude.time) if speed is not None else np.full(len(latitude), np.nan)
     known = np.isfinite(east)
     if np.count_nonzero(known) < 2:

@@ -112,7 +112,7 @@ def speed_panel(weighing: Weighing) -> Panel:
     result = weighing.result
     figure = blank(TIME_AXIS, "Speed [km/h]", height=420)
     if result is None:
-        signal = weighing.drive.get("vehicle_speed") or weighing.drive.get("gnss_speed")
+        signal = weighing.drive.speed
         if signal is None or not len(signal):
             return Panel(title="Speed over time", absent="no speed over time: none was recorded.")
         time = minutes(weighing.drive, signal.time)

@@ -140,5 +140,8 @@ QUANTITIES: Final[dict[str, Quantity]] = {q.name: q for q in _ROWS}
 TABLES: Final = ("imu", "obd", "gnss", "ride")
 """Canonical tables of a drive folder."""
 
+IMU_SIGNALS: Final = tuple(q.name for q in _ROWS if q.table == "imu")
+"""Specific force and angular rate along the three axes of an inertial sensor."""
+
 TIME_COLUMN: Final = "time_s"
 """The time column of every canonical table: seconds on one common clock."""

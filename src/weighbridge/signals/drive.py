@@ -84,6 +84,11 @@ class Drive:
         return [name for name in names if name not in self.signals]
 
     @property
+    def speed(self) -> Signal | None:
+        """Speed from the wheels, else over ground; None where the drive has neither."""
+        return self.get("vehicle_speed") or self.get("gnss_speed")
+
+    @property
     def start(self) -> float:
         """First time stamp [s]; 0 without signals."""
         return min((float(s.time[0]) for s in self.signals.values() if len(s)), default=0.0)

@@ -88,7 +88,7 @@ def one_recording(drive: Drive) -> Drive:
         parts = _parts(clocks, limit)
         best = max(range(len(parts)), key=lambda k: _weight(parts[k], clocks, tables))
         kept = parts[best]
-        span = max(p.end for p in kept) - min(p.start for p in kept)
+        span = _end(kept) - _start(kept)
         if span <= max(_SPARE, _IDLE * _recorded(kept, clocks)):
             break
     if len(parts) == 1:
@@ -186,11 +186,11 @@ def _clock_set(
     drive: Drive, before: _Part, after: _Part, clocks: dict[int, Floats], tables: dict[int, str]
 ) -> float | None:
     """By how much the clock was set between two parts in which the vehicle moved on [s]."""
-    speed = drive.get("vehicle_speed") or drive.get("gnss_speed")
+    speed = drive.speed
     if speed is None:
         return None
-    end, start = max(p.end for p in before), min(p.start for p in after)
-    if min(end - min(p.start for p in before), max(p.end for p in after) - start) < _SHORTEST:
+    end, start = _end(before), _start(after)
+    if min(end - _start(before), _end(after) - start) < _SHORTEST:
         return None
     if {tables[p.clock] for p in before} != {tables[p.clock] for p in after}:
         return None
@@ -223,7 +223,7 @@ def _told(
     moved: dict[int, float],
 ) -> list[Problem]:
     """Say what was joined and what was left out."""
-    start, end = (f(parts[best]) for f in (_start, _end))
+    start, end = _start(parts[best]), _end(parts[best])
     problems = []
     if len(moved) > 1:
         k = min(moved)

@@ -1,4 +1,4 @@
-"""Runs of one value in a signal."""
+"""Runs: of samples that a mask marks, and of one value in a signal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from weighbridge.signals import Floats, Ints, Signal
+from weighbridge.signals.signal import Bools, Floats, Ints, Signal
 
 
 class Runs(NamedTuple):
@@ -22,6 +22,12 @@ class Runs(NamedTuple):
     first: Ints
     length: Ints
     duration: Floats
+
+
+def marked_runs(mask: Bools) -> tuple[Ints, Ints]:
+    """Find the runs of True: index of the first of each (m,), and of the one behind its last."""
+    edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
 
 def runs_of(signal: Signal) -> Runs:
