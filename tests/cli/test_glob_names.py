@@ -8,6 +8,7 @@ import polars as pl
 import pytest
 
 from weighbridge.cli.results import Result, inputs, refuse_results
+from weighbridge.errors import ConfigError
 from weighbridge.io import read_drive, read_table
 
 GOLDEN = Path(__file__).parent.parent / "golden"
@@ -46,8 +47,12 @@ def test_a_name_with_an_equals_sign_is_no_partition(tmp_path):
 def test_results_named_like_patterns(tmp_path):
     frame = pl.DataFrame({"time_s": [0.0], "mass_kg": [1.0], "std_kg": [1.0]})
     frame.write_parquet(tmp_path / "ab.parquet")
-    (tmp_path / "a?.parquet").write_bytes((tmp_path / "ab.parquet").read_bytes())
-    refuse_results(inputs(), [Result("--track", tmp_path / "a?.parquet", "track")])
+    other = tmp_path / "a?.parquet"
+    other.write_bytes((tmp_path / "ab.parquet").read_bytes())
+    refuse_results(inputs(), [Result("--track", other, "track")])
+    pl.DataFrame({"time_s": [0.0]}).write_parquet(other)
+    with pytest.raises(ConfigError, match="track"):
+        refuse_results(inputs(), [Result("--track", other, "track")])
 
 
 def test_the_command_reads_the_folder_named(weighbridge, tmp_path):

@@ -1,5 +1,7 @@
 """``weighbridge map``: from a foreign log to a mapping that reads it."""
 
+import os
+
 import polars as pl
 import pytest
 
@@ -80,3 +82,11 @@ def test_an_input_is_never_overwritten(weighbridge, foreign):
     ran = weighbridge("map", foreign, "-o", foreign / "auto.csv", "--force")
     assert ran.code == 2
     assert (foreign / "auto.csv").read_bytes() == before
+
+
+def test_a_pipe_named_like_a_table_is_no_table(weighbridge, tmp_path):
+    os.mkfifo(tmp_path / "live.csv")
+    done = weighbridge("map", tmp_path / "live.csv")
+    assert done.code == 2
+    assert "no plain file" in done.err
+    assert "holds no table" in weighbridge("map", tmp_path).err

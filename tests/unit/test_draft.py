@@ -6,9 +6,10 @@ import pytest
 
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
-from weighbridge.io.draft import draft
+from weighbridge.io.draft import HEAD_LINES, draft
 from weighbridge.io.mapping import load_mapping
 from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io.table import head
 
 ROWS = 400
 T = 0.25 * np.arange(ROWS)
@@ -165,3 +166,34 @@ def test_empty_columns_and_text_are_told(tmp_path):
     doubts = " ".join(draft(written(tmp_path / "x.csv", [head, *rows])).all_doubts)
     assert "not taken for engine_torque: it has no values" in doubts
     assert "not taken for engine_speed: its cells are no numbers" in doubts
+
+
+def test_a_head_that_ends_within_a_character_is_still_utf_8(tmp_path):
+    # Long cells of two bytes each fill the piece that is looked at, and one more byte shifts it.
+    for shift in ("", "x"):
+        rows = [f"{k},{v:.1f},{shift}{'ü' * 5000}" for k, v in enumerate(SPEED)]
+        path = written(tmp_path / "log.csv", ["time_s,Geschwindigkeit [km/h],Länge", *rows])
+        found = draft(path)
+        assert {c.name: c.quantity for c in found.columns} == {
+            "Geschwindigkeit [km/h]": "vehicle_speed",
+            "Länge": "",
+        }
+        lines = head(path, HEAD_LINES)
+        assert lines[0].endswith("Länge")
+        assert "Ã" not in "".join(lines)
+
+
+def test_cells_longer_than_a_csv_reader_takes_are_one_sentence_or_a_draft(tmp_path):
+    rows = [f'{k},{v:.1f},"{"y" * 140_000}"' for k, v in enumerate(SPEED[:40])]
+    path = written(tmp_path / "log.csv", ["time_s,Vehicle speed (km/h),Text", *rows])
+    assert [c.quantity for c in draft(path).known] == ["vehicle_speed"]
+
+
+def test_a_name_with_a_line_end_stays_in_its_comment(tmp_path):
+    names = ["Time (s)", "Vehicle speed\n(km/h)", "RPM\r\n[rpm]"]
+    frame = pl.DataFrame(dict(zip(names, (T, SPEED, RPM), strict=True)))
+    frame.write_parquet(tmp_path / "log.parquet")
+    text = mapping_text([draft(tmp_path / "log.parquet")])
+    (tmp_path / "map.toml").write_text(text)
+    drive = read_drive(tmp_path / "log.parquet", tmp_path / "map.toml")
+    np.testing.assert_allclose(drive.signals["vehicle_speed"].values, SPEED / 3.6)

@@ -7,7 +7,7 @@ can show never counts as serious.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -16,17 +16,18 @@ from weighbridge.checks.engine import check_engine_speed, check_friction, check_
 from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
 from weighbridge.checks.mending import mended
-from weighbridge.checks.ranges import within_ranges, without_strays
+from weighbridge.checks.ranges import check_range, within_ranges, without_strays
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.travel import check_sign, check_standstill
-from weighbridge.checks.values import check_load, check_pressure, check_range, check_stuck
+from weighbridge.checks.values import check_load, check_pressure, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
+from weighbridge.errors import DriveError
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
 from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle.model import Vehicle
 
-__all__ = ["check_drive", "settle_drive"]
+__all__ = ["check_drive", "refuse_serious", "settle_drive"]
 
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
@@ -88,6 +89,13 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     problems.sort(key=lambda p: not p.serious)
     settled = replace(within_ranges(drive), problems=(*told, *problems))
     return settled if any(p.serious for p in problems) else mended(settled, vehicle)
+
+
+def refuse_serious(name: str, problems: Iterable[Problem]) -> None:
+    """Raise `DriveError` with the first serious problem of the drive of that name."""
+    for problem in problems:
+        if problem.serious:
+            raise DriveError(f"{name}: {problem.text}")
 
 
 def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from weighbridge.checks.false_samples import clipped, isolated, repeated
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.needed import needed, show
-from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
+from weighbridge.signals import Bools, Drive, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import SIGNALS
 
@@ -23,8 +23,8 @@ ENDS: Final = 60.0
 def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     """Return the drive without samples of torque, engine and vehicle speed that are false.
 
-    Left out are values no vehicle has, values that freeze, isolated dropouts, and repeats of a
-    torque that is renewed slowly. Each is told as a problem. Signals that a person vouches for
+    Left out are values that freeze, isolated dropouts, and repeats of a torque that is renewed
+    slowly. Each is told as a problem. Signals that a person vouches for
     (``drive.info.trusted``) stay as they are.
 
     Parameters
@@ -38,9 +38,6 @@ def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
         for name in ("vehicle_speed", "engine_speed", *sorted(torque & made_of))
         if drive.has(name) and len(drive.signals[name]) and name not in drive.info.trusted
     ]
-    # What the others are judged by is mended first.
-    for name in names:
-        drive = _within_range(drive, name)
     marks = {name: frozen(drive, name) for name in names}
     for name, marked in marks.items():
         drive = _without_frozen(drive, name, marked)
@@ -49,13 +46,6 @@ def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
             drive = _without_false(drive, name)
             drive = _without_ends(drive, name, vehicle)
     return drive.with_problems(*_ends(drive, names))
-
-
-def _within_range(drive: Drive, name: str) -> Drive:
-    """Leave out what is outside the plausible range; `check_range` tells of it."""
-    signal, q = drive.signals[name], QUANTITIES[name]
-    outside = (signal.values < q.low) | (signal.values > q.high)
-    return drive.with_signals(_without(signal, outside)) if outside.any() else drive
 
 
 def _without_frozen(drive: Drive, name: str, marked: Bools) -> Drive:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -56,6 +57,16 @@ def within_ranges(drive: Drive) -> Drive:
     return drive
 
 
+def check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find values no road vehicle can have: many of them are another unit."""
+    made_of = needed(drive, vehicle)
+    for s in drive.signals.values():
+        out = _outside(s)
+        if out is not None:
+            many = bool(np.count_nonzero(out) > FEW * len(s))
+            yield _problem(s, out, "", serious=many and s.name in made_of)
+
+
 def _bound(name: str) -> float:
     q = QUANTITIES[name]
     return max(abs(q.low), abs(q.high))
@@ -70,19 +81,20 @@ def _outside(s: Signal) -> Bools | None:
 
 
 def _cut(drive: Drive, s: Signal, out: Bools, *, serious: bool = False, told: bool = True) -> Drive:
-    count = int(np.count_nonzero(out))
     if told:
-        q = QUANTITIES[s.name]
-        k = int(np.argmax(np.where(out, np.abs(s.values), -1.0)))
-        drive = drive.with_problems(
-            Problem(
-                s.name,
-                f"{count} of {len(s)} values of {s.name} are outside {show(s.name, q.low)} to "
-                f"{show(s.name, q.high)}, such as {show(s.name, float(s.values[k]))} at "
-                f"{s.time[k]:.6g} s, and were left out; check its unit",
-                serious=serious,
-            )
-        )
-    if count == len(s):
+        drive = drive.with_problems(_problem(s, out, ", and were left out", serious=serious))
+    if out.all():
         return drive.without(s.name)
     return drive.with_signals(Signal(s.name, s.time[~out], s.values[~out]))
+
+
+def _problem(s: Signal, out: Bools, done: str, *, serious: bool) -> Problem:
+    q = QUANTITIES[s.name]
+    k = int(np.argmax(np.where(out, np.abs(s.values), -1.0)))
+    return Problem(
+        s.name,
+        f"{np.count_nonzero(out)} of {len(s)} values of {s.name} are outside "
+        f"{show(s.name, q.low)} to {show(s.name, q.high)}, such as "
+        f"{show(s.name, float(s.values[k]))} at {s.time[k]:.6g} s{done}; check its unit",
+        serious=serious,
+    )

@@ -32,25 +32,6 @@ _PERCENT: Final = (
 _LEAST_PERCENT: Final = 0.02
 
 
-def check_range(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Find values no road vehicle can have."""
-    made_of = needed(drive, vehicle)
-    for s in drive.signals.values():
-        q = QUANTITIES[s.name]
-        outside = (s.values < q.low) | (s.values > q.high)
-        count = int(np.count_nonzero(outside))
-        if count == 0:
-            continue
-        k = int(np.argmax(np.where(outside, np.abs(s.values), -1.0)))
-        yield Problem(
-            s.name,
-            f"{count} of {len(s)} values of {s.name} are outside {show(s.name, q.low)} to "
-            f"{show(s.name, q.high)}, such as {show(s.name, float(s.values[k]))} at "
-            f"{s.time[k]:.6g} s; check its unit",
-            serious=s.name in made_of and count > 0.01 * len(s),
-        )
-
-
 def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find signals that never change."""
     moving = moves(drive)

@@ -84,12 +84,14 @@ def _files(logs: list[Path]) -> list[Path]:
     found: list[Path] = []
     for path in logs:
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES)
+            inside = sorted(
+                p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file()
+            )
             if not inside:
                 raise DriveError(f"{path}: holds no table ({', '.join(_SUFFIXES)})")
             found += inside
-        elif not path.exists():
-            raise DriveError(f"{path}: no such file")
+        elif not path.is_file():
+            raise DriveError(f"{path}: {'no plain file' if path.exists() else 'no such file'}")
         elif path.suffix.lower() not in _SUFFIXES:
             raise DriveError(
                 f"{path}: map drafts mappings of tables ({', '.join(_SUFFIXES)}); other logs are "

@@ -5,7 +5,6 @@ Nothing is asked and nothing is guessed silently: what is doubtful is told with 
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -23,7 +22,9 @@ from weighbridge.io.table import (
     SEPARATORS,
     RawTable,
     TextFormat,
+    cells,
     column_list,
+    head,
     read_parquet,
     read_text,
     time_seconds,
@@ -191,22 +192,6 @@ def draft(path: Path) -> Draft:
     )
 
 
-def _head(path: Path) -> list[str]:
-    with path.open("rb") as file:
-        data = file.read(1 << 18)
-    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig",):
-        try:
-            return data.decode(encoding, errors="strict").splitlines()[:HEAD_LINES]
-        except UnicodeDecodeError:
-            # The piece may end within a character.
-            return data.decode("latin-1").splitlines()[:HEAD_LINES]
-    return []
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    return [c.strip() for c in next(csv.reader([line], delimiter=separator), [])]
-
-
 def _is_number(cell: str) -> bool:
     return _NUMBER.match(cell) is not None
 
@@ -219,11 +204,12 @@ def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
     text
     units : suffixes that a row below the header states, by column
     """
-    lines = [line for line in _head(path) if line.strip("\r\n")]
+    found = head(path, HEAD_LINES)
+    lines = [line for line in found if line]
     if not lines:
         raise DriveError(f"{path} is empty; record it again")
     separator = _separator(lines)
-    rows = [_cells(line, separator) for line in lines]
+    rows = [cells(line, separator) for line in lines]
     width = int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
     first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
     if first is None:
@@ -243,7 +229,7 @@ def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
     body = [c for r in rows[first + 1 + after :] for c in r]
     commas = sum(_COMMA.match(c) is not None for c in body)
     decimal = "," if separator != "," and commas > 0.2 * max(len(body), 1) else "."
-    skipped = _head(path).index(lines[first])
+    skipped = found.index(lines[first])
     text = TextFormat(
         separator=separator, decimal=decimal, skip_rows=skipped, skip_after_header=after
     )

@@ -11,6 +11,7 @@ from tomlkit.items import Table
 from weighbridge.io.draft import Draft, DraftColumn
 from weighbridge.io.table import TextFormat
 from weighbridge.signals import QUANTITIES
+from weighbridge.visible import visible
 
 
 def mapping_text(drafts: Sequence[Draft]) -> str:
@@ -57,7 +58,7 @@ def _csv(text: TextFormat) -> Table:
 def _time(one: Draft) -> Table:
     table = tomlkit.table()
     for doubt in one.doubts:
-        table.add(tomlkit.comment(doubt))
+        table.add(tomlkit.comment(visible(doubt)))
     table.add("column", one.time)
     if one.time_unit:
         table.add("unit", one.time_unit)
@@ -77,9 +78,9 @@ def _signal(column: DraftColumn) -> Table:
     table = tomlkit.table()
     quantity = QUANTITIES[column.quantity]
     seen = f"{quantity.meaning}; {column.low:.4g} to {column.high:.4g}"
-    table.add(tomlkit.comment(f"{seen} {column.unit}".rstrip()))
+    table.add(tomlkit.comment(visible(f"{seen} {column.unit}".rstrip())))
     if column.doubt:
-        table.add(tomlkit.comment(f"doubtful: {column.doubt}"))
+        table.add(tomlkit.comment(visible(f"doubtful: {column.doubt}")))
     table.add("column", column.name)
     if column.unit:
         table.add("unit", column.unit)

@@ -30,6 +30,11 @@ MOST_COLUMNS: Final = 10_000
 DATES: Final = (631_152_000.0, 4_102_444_800.0)
 """Numbers of seconds between these count from 1970: the years 1990 to 2100 [s]."""
 
+_HEAD: Final = 1 << 18
+"""Bytes at the beginning of a text that hold its header and its first rows."""
+
+_UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
 
@@ -185,7 +190,7 @@ def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
             f"{path}: its first line has {columns} columns, and a table may have {MOST_COLUMNS}; "
             "it is no table, or its separator is another one"
         )
-    names = fmt.columns or tuple(_cells(header, separator))
+    names = fmt.columns or tuple(cells(header, separator))
     skip = fmt.skip_rows + (0 if fmt.columns else 1 + fmt.skip_after_header)
     body = text if skip == 0 else _after_line(text, skip)
     if not body.strip():
@@ -197,7 +202,37 @@ def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
 
 
 def _decode(path: Path, fmt: TextFormat) -> tuple[str, list[str]]:
-    data = path.read_bytes()
+    return _decoded(path, path.read_bytes(), fmt)
+
+
+def head(path: Path, count: int) -> list[str]:
+    """Return the first lines of a text without their ends, as `read_text` decodes them.
+
+    Raises
+    ------
+    DriveError
+        Not a text.
+    """
+    with path.open("rb") as file:
+        data = file.read(_HEAD)
+    wide = data[:2] in _UTF_16
+    if len(data) == _HEAD and not wide:
+        # The last line may end within a character.
+        data = data[: data.rfind(b"\n") + 1] or data
+    text, _ = _decoded(path, data, TextFormat())
+    return [line.rstrip("\r") for line in text.split("\n", count)[:count]]
+
+
+def cells(line: str, separator: str) -> list[str]:
+    """Split a line at its separators, quotes taken off where they are closed."""
+    try:
+        found = next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        found = line.split(separator)
+    return [cell.strip() for cell in found]
+
+
+def _decoded(path: Path, data: bytes, fmt: TextFormat) -> tuple[str, list[str]]:
     if data[:4] in (b"PAR1", b"MDF ", b"UnFi"):
         raise DriveError(f"{path} is not a text table; give it its own suffix (.parquet, .mf4)")
     if fmt.encoding is not None:
@@ -208,7 +243,7 @@ def _decode(path: Path, fmt: TextFormat) -> tuple[str, list[str]]:
             raise DriveError(
                 f"{path} is not {fmt.encoding}{place}: set encoding in [csv] of the mapping"
             ) from None
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if data[:2] in _UTF_16:
         return data.decode("utf-16", errors="replace"), []
     notes = []
     if b"\x00" in data:
@@ -224,14 +259,6 @@ def _separator(path: Path, header: str) -> str:
     if path.suffix.lower() == ".tsv":
         return "\t"
     return max(SEPARATORS, key=header.count)
-
-
-def _cells(header: str, separator: str) -> list[str]:
-    try:
-        cells = next(csv.reader([header], delimiter=separator))
-    except csv.Error:
-        cells = header.split(separator)
-    return [cell.strip() for cell in cells]
 
 
 def _after_line(text: str, count: int) -> str:

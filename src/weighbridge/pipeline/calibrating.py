@@ -25,7 +25,7 @@ from weighbridge.calibration.regression import (
     fit,
     join_rows,
 )
-from weighbridge.checks import settle_drive
+from weighbridge.checks import refuse_serious, settle_drive
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import COLD_STD, HIDDEN_BRAKE_STD, WIDEST, cold_share
 from weighbridge.estimators.regression import regression
@@ -177,9 +177,7 @@ def _checked(
     known = replace(base, torque=model)
     settled = [settle_drive(drive, known) for drive in drives]
     for drive in settled:
-        for problem in drive.problems:
-            if problem.serious:
-                raise DriveError(f"{drive.name}: {problem.text}")
+        refuse_serious(drive.name, drive.problems)
     return settled, base, masses
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from weighbridge.errors import WeighbridgeError
-from weighbridge.estimators import SPEED_ALONE
+from weighbridge.estimators import SPEED_ALONE, MassTrack
 from weighbridge.pipeline.weighing import (
     Weighing,
     fitted_for_another,
@@ -32,18 +32,21 @@ def compare(weighing: Weighing) -> tuple[Weighing, ...]:
     -------
     (6,) in the order of `METHODS`; a method that could not be tried says why
     """
-    return tuple(
-        weighing if method == weighing.method else _by(weighing, method) for method in METHODS
-    )
+    found: dict[str, Weighing] = {weighing.method: weighing}
+    for method in METHODS:
+        if method not in found:
+            joint = found.get("joint")
+            found[method] = _by(weighing, method, joint.result if joint is not None else None)
+    return tuple(found[method] for method in METHODS)
 
 
-def _by(weighing: Weighing, method: str) -> Weighing:
+def _by(weighing: Weighing, method: str, joined: MassTrack | None) -> Weighing:
     """Weigh by another method."""
     drive, vehicle, done = weighing.drive, weighing.vehicle, weighing.result
     try:
         if done is None or {method, weighing.method} & SPEED_ALONE:
             return weigh_checked(drive, vehicle, method)
         warnings = fitted_for_another(vehicle, method)
-        return weigh_balance(drive, vehicle, method, done.balance, warnings)
+        return weigh_balance(drive, vehicle, method, done.balance, warnings, joined)
     except WeighbridgeError as error:
         return without_mass(drive, vehicle, method, str(error))

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from weighbridge.checks import settle_drive
+from weighbridge.checks import refuse_serious, settle_drive
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge.errors import ConfigError
 from weighbridge.estimators.inertia import (
     AXES,
     METHODS,
@@ -50,7 +50,7 @@ from weighbridge.pipeline.ride_checks import (
     ride_of,
     ride_samples,
 )
-from weighbridge.signals import Drive, Floats, Problem
+from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import MASS_RANGE, Ride, Vehicle
 from weighbridge.visible import visible_json
 
@@ -367,11 +367,11 @@ def estimate_inertia(
         )
     settled = settle_drive(only)
     problems = [*settled.problems, *check_signals(only)]
-    _refuse(drive, problems)
+    refuse_serious(drive.name, problems)
     samples = ride_samples(settled)
     seen = response(samples, ride)
     problems += check_response(seen) if seen is not None else ()
-    _refuse(drive, problems)
+    refuse_serious(drive.name, problems)
     warnings = tuple(dict.fromkeys(p.text for p in problems))
     if not samples.period <= SLOWEST:
         return nothing(
@@ -397,12 +397,6 @@ def estimate_inertia(
             warnings,
         )
     return _judged(drive, vehicle, ride, samples, track, seen.slope, warnings)
-
-
-def _refuse(drive: Drive, problems: list[Problem]) -> None:
-    for problem in problems:
-        if problem.serious:
-            raise DriveError(f"{drive.name}: {problem.text}")
 
 
 def _judged(

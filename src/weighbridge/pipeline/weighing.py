@@ -258,12 +258,10 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
     if method not in ESTIMATORS:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
 
-    from weighbridge.checks import settle_drive
+    from weighbridge.checks import refuse_serious, settle_drive
 
     drive = settle_drive(drive, vehicle)
-    for problem in drive.problems:
-        if problem.serious:
-            raise DriveError(f"{drive.name}: {problem.text}")
+    refuse_serious(drive.name, drive.problems)
     return weigh_checked(drive, vehicle, method)
 
 
@@ -291,8 +289,17 @@ def weigh_balance(
     method: str,
     balance: ForceBalance,
     warnings: tuple[str, ...] = (),
+    joined: MassTrack | None = None,
 ) -> Weighing:
-    """Weigh from forces and motion that are found already; parameters as of `weigh`."""
+    """Weigh from forces and motion that are found already.
+
+    Parameters
+    ----------
+    drive, vehicle, method : as of `weigh`
+    balance : forces and motion
+    warnings : what is known of the drive
+    joined : what ``joint`` makes of the balance, which judges the other methods; None to find it
+    """
     result = ESTIMATORS[method](balance, vehicle)
     status, reason = result.status, result.why
     share = None if method in SPEED_ALONE else share_on_gears(balance, vehicle)
@@ -306,7 +313,9 @@ def weigh_balance(
     elif method not in SPEED_ALONE and (why := scale_contradiction(balance, vehicle)):
         status, reason = Status.INCONSISTENT, why
     if status is Status.CONVERGED and method not in SPEED_ALONE:
-        joined = result if result.filtered is not None else joint.estimate(balance, vehicle)
+        if result.filtered is not None:
+            joined = result
+        joined = joined or joint.estimate(balance, vehicle)
         refused, doubt = of_another(vehicle, joined)
         change = largest(joined.filtered) if joined.filtered is not None else None
         if change is not None and change.sure:
