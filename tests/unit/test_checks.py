@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from weighbridge.checks import check_drive, settle_drive
+from weighbridge.checks.inertial import check_imu
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.pipeline.inspection import describe, inspect_drive, quantisation
@@ -429,6 +430,24 @@ def test_axes_of_the_accelerometer_alone_swapped(sane):
 
 def test_one_axis_with_the_wrong_sign(sane):
     assert "wrong sign" in only(scaled(sane, accel_y=-1.0).without(*GNSS)).text
+
+
+def quiet_motorway(seed):
+    """Five minutes on an even, straight road, whose pitch and roll are below the gyro's noise."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 310.0, 0.1)
+    noise = rng.normal(size=(7, time.size))
+    accel = 0.3 * np.sin(0.3 * time) + 0.2 * np.sin(0.9 * time)
+    speed = 33.0 + 0.1 * np.cumsum(accel)
+    force = (accel + 0.2 * noise[0], 0.2 * noise[1], 9.81 + 0.2 * noise[2])
+    signals = {f"accel_{a}": f for a, f in zip("xyz", force, strict=True)}
+    signals |= {f"gyro_{a}": 0.02 * n for a, n in zip("xyz", noise[3:6], strict=True)}
+    signals["vehicle_speed"] = speed + 0.02 * noise[6]
+    return Drive(name="quiet", signals={n: Signal(n, time, v) for n, v in signals.items()})
+
+
+def test_chance_mirrors_no_axis_of_a_quiet_motorway():
+    assert [k for k in range(60) if any(check_imu(quiet_motorway(k), None))] == []
 
 
 def test_accelerometer_that_reads_gravity_instead_of_specific_force(sane):

@@ -5,6 +5,7 @@ Any fixed mounting is allowed: only what no rotation can explain is a problem.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -29,8 +30,10 @@ _YAWS: Final = 0.1
 # Windows enough for a correlation of 0.3 to be no chance.
 _MANY: Final = 150
 _SOME: Final = 100
-# Sane drives tie tilt and gravity by 0.3 to 0.8; a mirrored axis turns the sign.
-_AGAINST: Final = -0.12
+# Sane drives tie tilt and gravity by 0.3 to 0.8, quiet motorways by 0 to 0.3; a mirrored axis turns
+# the sign. Of n windows that are tied by nothing the correlation scatters by about 1 / sqrt(n).
+_AGAINST: Final = 0.12
+_CHANCE: Final = 3.5
 
 # Specific force per change of speed above which the speed is in another unit [-].
 _STEEPEST: Final = 1.3
@@ -263,10 +266,18 @@ def _check_axes(
             "its axes are swapped; map them the other way round",
             serious=True,
         )
-    elif pitch < -0.15 or _tilt_tie(force @ forward - accel_along, rate @ right, full) < _AGAINST:
+        return
+    against = -max(_AGAINST, _CHANCE / math.sqrt(max(np.count_nonzero(_inner(full)), 1)))
+    felt = _tilt_tie(force @ forward - accel_along, rate @ right, full)
+    if pitch < against or (felt < against and pitch <= 0.0):
         yield _mirrored("gyro_y", "nose down", "nose up")
-    elif _tilt_tie(v * ((rate - bias) @ down) - force @ right, rate @ forward, full) < _AGAINST:
+    elif _tilt_tie(v * ((rate - bias) @ down) - force @ right, rate @ forward, full) < against:
         yield _mirrored("gyro_x", "right side down", "right side up")
+
+
+def _inner(full: Bools) -> Bools:
+    """Windows whose neighbours have no gap either (n - 2,)."""
+    return np.asarray(full[1:-1] & full[2:] & full[:-2])
 
 
 def _mirrored(name: str, said: str, felt: str) -> Problem:
@@ -295,7 +306,7 @@ def _tilt_tie(gravity: Floats, rate: Floats, full: Bools) -> float:
     -------
     1 at best; 0 where there are too few windows to tell
     """
-    inner = full[1:-1] & full[2:] & full[:-2]
+    inner = _inner(full)
     if np.count_nonzero(inner) < _SOME:
         return 0.0
     change = (gravity[2:] - gravity[:-2])[inner]
@@ -322,7 +333,7 @@ def _ties(
     pitch : of pitch rate and force along
     All 0 where there are too few windows to tell.
     """
-    inner = full[1:-1] & full[2:] & full[:-2]
+    inner = _inner(full)
     if np.count_nonzero(inner) < _MANY:
         return 0.0, 0.0, 0.0
     change = (force[2:] - force[:-2])[inner]
