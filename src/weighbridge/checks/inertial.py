@@ -267,7 +267,7 @@ def _check_axes(
             serious=True,
         )
         return
-    against = -max(_AGAINST, _CHANCE / math.sqrt(max(np.count_nonzero(_inner(full)), 1)))
+    against = -max(_AGAINST, _CHANCE / math.sqrt(max(int(np.count_nonzero(_inner(full))), 1)))
     felt = _tilt_tie(force @ forward - accel_along, rate @ right, full)
     if pitch < against or (felt < against and pitch <= 0.0):
         yield _mirrored("gyro_y", "nose down", "nose up")
