@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numba import config
+from scipy.signal import lfilter
 
 from weighbridge.checks import check_drive
 from weighbridge.errors import DriveError
 from weighbridge.navigation.aiding import read_imu
+from weighbridge.navigation.gain import find_gain
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
@@ -158,6 +160,28 @@ def test_a_wrong_scale_is_corrected(any_vehicle, gain):
     assert motion.specific_force_scale_std > 0.0
     slope, _ = force_slope(motion, plain)
     assert slope == pytest.approx(1.0, abs=0.025)
+
+
+@pytest.mark.parametrize("lag", [0.7, 1.5, 3.0])
+def test_a_speed_that_is_smoothed_is_no_fault_of_the_sensor(any_vehicle, lag):
+    drive, right = any_vehicle
+    speed = drive.signals["vehicle_speed"]
+    time = np.arange(speed.time[0], speed.time[-1], 0.05)
+    kept = np.exp(-0.05 / lag)
+    values = speed.at(time)
+    late, _ = lfilter([1.0 - kept], [1.0, -kept], values, zi=[kept * values[0]])
+    smoothed = Signal(speed.name, speed.time, np.interp(speed.time, time, late))
+    motion = inertial_motion(drive.with_signals(smoothed), known(right))
+    assert not any("its scale is off" in note for note in motion.notes)
+
+
+def test_a_small_scale_that_gravity_denies_is_left_to_the_squat(any_vehicle):
+    drive, right = any_vehicle
+    ahead = drive.signals["accel_x"]
+    scaled = drive.with_signals(Signal(ahead.name, ahead.time, 1.05 * ahead.values))
+    motion = inertial_motion(scaled, known(right))
+    assert not any("its scale is off" in note for note in motion.notes)
+    assert find_gain(motion, drive.signals["vehicle_speed"], (np.zeros(1), np.full(1, 1.05)))
 
 
 def test_frozen_stretches_are_left_out(car):

@@ -53,7 +53,7 @@ from weighbridge.navigation.aiding import (
     still_state,
 )
 from weighbridge.navigation.even import Even, coarsely, evenly
-from weighbridge.navigation.gain import find_gain
+from weighbridge.navigation.gain import find_gain, gravity_read
 from weighbridge.navigation.motion import Motion, bridged, noise_level
 from weighbridge.navigation.mounting import TooLittleMotionError, coarse_mounting
 from weighbridge.navigation.remounting import Change, find_changes, loosened, told, undo, unsure
@@ -79,6 +79,9 @@ _SQUAT_TIME = 60.0
 
 _SCALE_ROUNDS = 4
 """A wrong scale also bends the attitude: each round finds most of what is left."""
+
+_CLOSER = 0.6
+"""A round that finds more than so much of what the one before found leads nowhere [-]."""
 
 _FALSE_TOLD = 1e-3
 """A smaller part of false samples is left out without a word [-]."""
@@ -180,11 +183,16 @@ def inertial_motion(
         )
     motion = _solved(drive, imu, fixes, wheel, reference, mounting, settings, rate)
     scale = np.ones(imu.time.size)
-    scale_std = 0.0
+    scale_std, before = 0.0, math.inf
+    gravity = gravity_read(imu.time, imu.accel)
     for _ in range(_SCALE_ROUNDS if wheel is not None else 0):
-        gain = find_gain(motion, reference, again=scale_std > 0.0)
+        gain = find_gain(motion, reference, gravity, again=scale_std > 0.0)
         if gain is None or motion.mounting is None:
             break
+        off = float(np.max(np.abs(gain.value - 1.0)))
+        if off > _CLOSER * before:
+            break
+        before = off
         scale /= gain.at(imu.time)
         scale_std = gain.std
         scaled = _scaled(imu, euler_to_matrix(*motion.mounting)[0], scale)
