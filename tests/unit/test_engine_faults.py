@@ -9,6 +9,7 @@ import weighbridge as wb
 from weighbridge.balance.gear_fit import share_on_gears
 from weighbridge.checks import check_drive
 from weighbridge.checks.false_samples import clipped, isolated, repeated
+from weighbridge.checks.frozen import frozen
 from weighbridge.checks.mending import mended
 from weighbridge.estimators import Status, changing, joint
 from weighbridge.estimators.judging import Evidence, judge
@@ -92,6 +93,31 @@ def test_a_signal_that_freezes_is_weighed_by_the_rest(fleet, kind, name):
     found = fleet.weigh(kind, damaged)
     assert any(f"{name} repeats one value while the vehicle goes on" in w for w in found.warnings)
     right(fleet, kind, found)
+
+
+def test_a_dragged_engine_in_whole_percent_is_not_frozen(fleet):
+    # Downhill for a minute: speed and engine speed change, drag rounds to one value.
+    drive = fleet.drive("truck")
+    reading = drive.signals["engine_torque_fraction"]
+    time = reading.time - drive.start
+    downhill = (time > 600.0) & (time < 660.0)
+    speed = 15.0 + 6.0 * np.sin((time - 600.0) / 8.0)
+    lowest, highest = reading.values.min(), reading.values.max()
+
+    def held_at(part):
+        value = lowest + part * (highest - lowest)
+        steady = drive.with_signals(
+            Signal(reading.name, reading.time, np.where(downhill, value, reading.values)),
+            Signal(
+                "vehicle_speed",
+                reading.time,
+                np.where(downhill, speed, drive.signals["vehicle_speed"].at(reading.time)),
+            ),
+        )
+        return np.count_nonzero(frozen(steady, reading.name))
+
+    assert held_at(0.04) == 0
+    assert held_at(0.08) > 100
 
 
 def test_a_signal_that_ends_is_told(fleet):

@@ -30,6 +30,10 @@ EXTREME: Final = (-0.8, 0.4, 8.0)
 """Least and greatest acceleration [m/s^2] and range of speed [m/s] that no torque at its
 lowest, at zero or at its highest makes: coasting and full load last long."""
 
+DRAGGED: Final = 0.05
+"""Part of its range above its lowest up to which a reading may be a dragged engine's [-]: drag goes
+with speed and warmth, by up to 0.035 in four undamaged vehicles of the second model."""
+
 REVS: Final = 1.3
 """Highest over lowest engine speed that one torque does not outlast [-]."""
 
@@ -94,7 +98,8 @@ def _impossible(drive: Drive, signal: Signal, part: slice, runs: Runs) -> bool:
     accel = accel[np.isfinite(accel)]
     if not accel.size:
         return False
-    if value in (0.0, float(signal.values.min()), float(signal.values.max())):
+    lowest, highest = float(signal.values.min()), float(signal.values.max())
+    if value in (0.0, highest) or value <= lowest + DRAGGED * (highest - lowest):
         low, high, reach = EXTREME
         return bool(accel.min() < low and accel.max() > high and np.ptp(speed[known]) > reach)
     engine = _of(drive, "engine_speed", grid)
