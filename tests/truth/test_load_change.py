@@ -1,13 +1,19 @@
 """Two hypotheses of the load after every stop."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba import config
 
+import weighbridge as wb
+from weighbridge.estimators import Status
 from weighbridge.estimators.joint import change_odds, stood_before
 from weighbridge.kernels import disturbance
 from weighbridge.kernels import load_change as kernel
+from weighbridge.simulation import Loading, make_scenario, simulate_car
+from weighbridge.vehicle.model import Driveline, Vehicle
 
 
 def drive(jump, seed=3, n=300, at=150):
@@ -100,14 +106,41 @@ def test_a_launch_on_a_slipping_clutch_moves_the_running_mass_little():
 def test_longer_stops_change_the_load_more_often():
     time = np.arange(0.0, 1000.0, 0.25)
     speed = np.full(time.size, 10.0)
-    for begin, duration in ((100.0, 10.0), (300.0, 25.0), (600.0, 240.0)):
+    for begin, duration in ((100.0, 7.0), (300.0, 9.0), (450.0, 25.0), (600.0, 240.0)):
         speed[(time >= begin) & (time < begin + duration)] = 0.0
     kept = (time < 900.0) | (time > 960.0)  # a gap in the log
     view = SimpleNamespace(time=time[kept], speed=speed[kept])
-    windows = np.array([50.0, 120.0, 290.0, 330.0, 590.0, 850.0, 890.0, 970.0])
+    windows = np.array([50.0, 120.0, 290.0, 330.0, 490.0, 590.0, 850.0, 890.0, 970.0])
     odds = change_odds(stood_before(view, windows))
-    assert np.isfinite(odds).tolist() == [False, False, False, True, False, True, False, True]
-    light, long, gap = odds[[3, 5, 7]]
-    assert light < np.log(0.1)
+    assert np.flatnonzero(np.isfinite(odds)).tolist() == [3, 4, 6, 8]
+    short, light, long, gap = odds[[3, 4, 6, 8]]
+    assert short < np.log(0.03)
+    assert short < light < np.log(0.1)
     assert light < gap < long
     assert long > np.log(1.0)
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="whole drives take minutes without a compiler")
+@pytest.mark.parametrize("load", [-250.0, 350.0])
+def test_a_parcel_handed_over_in_twelve_seconds_is_weighed(load):
+    known = simulate_car(replace(make_scenario("car", payload=250.0, seed=910), duration=1500.0))
+    mass = float(known.truth.mass[0])
+    file = wb.calibrate([known.drive], mass=mass, vehicle=known_vehicle(known))
+    made = replace(make_scenario("car", payload=250.0, seed=911), duration=1500.0)
+    middle = float(np.interp(700.0, *along(simulate_car(made))))
+    stop = Loading(distance=middle, duration=12.0, load=load)
+    drive = simulate_car(replace(made, loading=(stop,)))
+    found = wb.weigh(drive.drive, file)
+    assert found.status is Status.CONVERGED, found.reason
+    first, last = found.segments
+    assert first.mass == pytest.approx(float(drive.truth.mass[0]), rel=0.03)
+    assert last.mass == pytest.approx(float(drive.truth.mass[-1]), rel=0.03)
+
+
+def known_vehicle(made):
+    car = made.scenario.car
+    return Vehicle(kind=car.kind, driveline=Driveline(wheel_radius=car.wheel_radius))
+
+
+def along(made):
+    return made.truth.time, made.truth.distance

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
 
 import weighbridge as wb
 from weighbridge.balance.gear_fit import share_on_gears
@@ -118,6 +119,29 @@ def test_a_dragged_engine_in_whole_percent_is_not_frozen(fleet):
 
     assert held_at(0.04) == 0
     assert held_at(0.08) > 100
+
+
+def without_quick_changes(span):
+    def change(t, x):
+        return uniform_filter1d(x, round(span / np.median(np.diff(t))))
+
+    return change
+
+
+@pytest.mark.parametrize("kind", ["car", "truck"])
+def test_a_torque_that_is_smoothed_gives_no_mass(fleet, kind):
+    smoothed = with_signal(fleet.drive(kind), SOURCE[kind], without_quick_changes(6.0))
+    found = fleet.weigh(kind, smoothed)
+    assert found.status is Status.INCONSISTENT
+    assert "was smoothed" in found.reason
+    for method in ("rls", "robust-rls", "ekf", "hybrid"):
+        assert np.isnan(fleet.weigh(kind, smoothed, method).mass)
+
+
+@pytest.mark.parametrize("kind", SOURCE)
+def test_a_torque_averaged_over_half_a_second_is_weighed(fleet, kind):
+    averaged = with_signal(fleet.drive(kind), SOURCE[kind], without_quick_changes(0.5))
+    right(fleet, kind, fleet.weigh(kind, averaged))
 
 
 def test_a_signal_that_ends_is_told(fleet):

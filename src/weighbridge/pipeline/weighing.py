@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from weighbridge.balance import REASON_TEXT, ForceBalance, Reason, force_balance
+from weighbridge.balance.bandwidth import smoothed_torque
 from weighbridge.balance.delay import clock_shift, estimate_torque_delay
 from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
@@ -310,7 +311,9 @@ def weigh_balance(
             f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
             "are wrong; calibrate this vehicle"
         )
-    elif method not in SPEED_ALONE and (why := scale_contradiction(balance, vehicle)):
+    elif method not in SPEED_ALONE and (
+        why := scale_contradiction(balance, vehicle) or smoothed_torque(balance, vehicle)
+    ):
         status, reason = Status.INCONSISTENT, why
     if status is Status.CONVERGED and method not in SPEED_ALONE:
         if result.filtered is not None:
