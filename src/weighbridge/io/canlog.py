@@ -195,10 +195,9 @@ def _trace_head(path: Path, block: bytes) -> tuple[TraceColumns, float]:
     return columns, start if math.isfinite(start) else 0.0
 
 
-def is_can_csv(path: Path) -> bool:
+def is_can_csv(head: bytes) -> bool:
     """Tell whether a CSV begins as python-can writes them."""
-    with path.open("rb") as file:
-        return file.read(len(CSV_HEADER)).decode("latin-1") == CSV_HEADER
+    return head.startswith(CSV_HEADER.encode())
 
 
 def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:

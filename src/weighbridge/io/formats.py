@@ -1,0 +1,250 @@
+"""Every log format, one record each: the only place that lists them.
+
+A package of its own adds a format by an entry point of the group ``weighbridge.formats`` that
+names a `weighbridge.io.format.Format`.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from weighbridge.io import (
+    blf,
+    candump,
+    canlog,
+    gpx,
+    mdf,
+    nmea,
+    npy,
+    racechrono,
+    sensor_logger,
+    tabular,
+    torque_pro,
+    vbo,
+)
+from weighbridge.io.draft import draft
+from weighbridge.io.format import Format, Takes, starts_with
+
+_logger = logging.getLogger(__name__)
+
+GROUP: Final = "weighbridge.formats"
+"""Entry points by which packages add formats."""
+
+_HEAD: Final = 4096
+
+FORMATS: Final[tuple[Format, ...]] = (
+    Format(
+        name="CSV",
+        suffixes=(".csv", ".tsv", ".txt"),
+        read=tabular.read_csv,
+        about="a table of text: canonical names, or those of a mapping",
+        takes=Takes.TEXT,
+        draft=draft,
+    ),
+    Format(
+        name="python-can CSV",
+        suffixes=(".csv",),
+        read=canlog.read_can_csv,
+        begins=canlog.is_can_csv,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="RaceChrono CSV v3",
+        suffixes=(".csv",),
+        read=racechrono.read_racechrono,
+        begins=racechrono.is_racechrono,
+        about="position, speeds and engine speed, by source",
+        takes=Takes.PLAIN,
+        draft=draft,
+    ),
+    Format(
+        name="Torque Pro CSV",
+        suffixes=(".csv",),
+        read=torque_pro.read_torque_pro,
+        begins=torque_pro.is_torque_pro,
+        about="position, OBD values with the unit in their name",
+        takes=Takes.PLAIN,
+        draft=draft,
+    ),
+    Format(
+        name="Sensor Logger CSV",
+        suffixes=(".csv",),
+        read=sensor_logger.read_sensor_logger,
+        begins=sensor_logger.is_sensor_logger,
+        about="total acceleration, rotation and location of a phone",
+        takes=Takes.PLAIN,
+        draft=draft,
+    ),
+    Format(
+        name="Parquet",
+        suffixes=(".parquet", ".pq"),
+        read=tabular.read_pq,
+        begins=starts_with(b"PAR1"),
+        magic=True,
+        about="a table: canonical names, or those of a mapping",
+        takes=Takes.COLUMNS,
+        draft=draft,
+    ),
+    Format(
+        name="MDF",
+        suffixes=(".mf4", ".mdf"),
+        read=mdf.read_mdf,
+        begins=starts_with(b"MDF ", b"UnFinMF"),
+        magic=True,
+        about="measurement channels, and CAN frames of bus logging",
+        takes=Takes.CHANNELS,
+        package="asammdf",
+        extra="mdf",
+    ),
+    Format(
+        name="BLF",
+        suffixes=(".blf",),
+        read=blf.read_blf,
+        begins=starts_with(b"LOGG"),
+        magic=True,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="ASC",
+        suffixes=(".asc",),
+        read=canlog.read_asc,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="TRC",
+        suffixes=(".trc",),
+        read=canlog.read_trc,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="candump",
+        suffixes=(".log",),
+        read=candump.read_candump,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="NMEA 0183",
+        suffixes=(".nmea", ".ubx"),
+        read=nmea.read_nmea,
+        about="RMC, GGA, GNS, GST, VTG of any talker",
+        takes=Takes.CLOCK,
+        self_described=True,
+        package="pynmea2",
+        extra="position",
+    ),
+    Format(
+        name="GPX",
+        suffixes=(".gpx",),
+        read=gpx.read_gpx,
+        about="track points with time",
+        takes=Takes.CLOCK,
+        self_described=True,
+        package="gpxpy",
+        extra="position",
+    ),
+    Format(
+        name="VBOX",
+        suffixes=(".vbo",),
+        read=vbo.read_vbo,
+        about="position, speed, height, brake trigger; CAN columns by a mapping",
+        takes=Takes.CHANNELS,
+        self_described=True,
+    ),
+    Format(
+        name="NumPy",
+        suffixes=(".npy",),
+        read=npy.read_npy,
+        begins=starts_with(b"\x93NUMPY"),
+        magic=True,
+        about="columns by number, with a mapping",
+        takes=Takes.COLUMNS,
+    ),
+)
+"""The formats of this project; where several have one suffix, the first that recognises a file's
+first bytes reads it, else the one that needs no recognising."""
+
+
+def formats() -> tuple[Format, ...]:
+    """All formats, those that packages add included."""
+    return (*FORMATS, *_added(tuple(sys.path)))
+
+
+def suffixes() -> tuple[str, ...]:
+    """Ends of file names that are read, each once."""
+    return tuple(dict.fromkeys(s for f in formats() for s in f.suffixes))
+
+
+def is_log(path: Path) -> bool:
+    """Tell by its name whether a file is read as a log."""
+    return any(f.ends(path.name) for f in formats())
+
+
+def format_of(path: Path) -> Format | None:
+    """Format of a file, by its name and by its first bytes; None where it is not known.
+
+    Parameters
+    ----------
+    path : a file that is there
+
+    Raises
+    ------
+    OSError
+        It cannot be opened.
+    """
+    known = [(f.ends(path.name), f) for f in formats()]
+    longest = max(length for length, _ in known)
+    named = [f for length, f in known if length == longest > 0]
+    if len(named) == 1:
+        return named[0]
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    among = named or [f for f in formats() if f.magic]
+    for found in among:
+        if found.begins is not None and found.begins(head):
+            return found
+    return next((f for f in named if f.begins is None), named[0] if named else None)
+
+
+@lru_cache(maxsize=4)
+def _added(places: tuple[str, ...]) -> tuple[Format, ...]:
+    """Formats of packages; ``places`` is where they are looked for."""
+    from importlib.metadata import entry_points
+
+    found = []
+    for point in entry_points(group=GROUP):
+        try:
+            record = point.load()
+        # A package of others may raise anything while it is imported.
+        except Exception as e:
+            _logger.warning(
+                "log format %s cannot be loaded (%s: %s)", point.value, type(e).__name__, e
+            )
+            continue
+        if isinstance(record, Format):
+            found.append(record)
+        else:
+            _logger.warning("log format %s is no weighbridge.io.format.Format", point.value)
+    return tuple(found)
