@@ -22,6 +22,7 @@ class Takes(Enum):
     TEXT = "all of it"
     PLAIN = "[signals] with the rest, as a plain table, or offset_s and align of [time] alone"
     COLUMNS = "[time] and [signals]"
+    NUMBERS = "[signals], and all of [time] but format"
     CHANNELS = "[signals], and offset_s and align of [time]"
     CLOCK = "offset_s and align of [time]"
 
@@ -69,6 +70,8 @@ class Format:
             return "[csv]"
         if mapping.time != clock and self.takes in (Takes.CHANNELS, Takes.CLOCK):
             return "column, unit or format of [time]"
+        if mapping.time.format is not None and self.takes is Takes.NUMBERS:
+            return "format of [time]"
         if mapping.signals and self.takes is Takes.CLOCK:
             return "[signals]"
         return ""

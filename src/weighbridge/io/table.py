@@ -357,7 +357,7 @@ def time_seconds(
     if time_format is None:
         values, notes = table.numbers(index)
         seconds = values * unit_factor if unit_factor != 1.0 else values
-        return seconds, _since_1970(seconds), notes
+        return seconds, since_1970(seconds), notes
     text = series.cast(pl.String).str.strip_chars()
     if time_format == "clock":
         part = text.str.extract_groups(r"^(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)$").struct.unnest()
@@ -388,7 +388,7 @@ def time_seconds(
     return seconds, absolute, notes
 
 
-def _since_1970(seconds: Floats) -> bool:
+def since_1970(seconds: Floats) -> bool:
     """Whether numbers are a date: most of them lie in `DATES`."""
     known = seconds[np.isfinite(seconds)]
     return bool(known.size) and DATES[0] < float(np.median(known)) < DATES[1]
