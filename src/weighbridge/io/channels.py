@@ -224,15 +224,15 @@ def draft_of(path: Path, found: Recording) -> Draft:
     channels = [c for c in channels if channel_named(found.channels, c.name) is c]
     if not channels:
         raise DriveError(f"{path} has no channel with samples; record it again")
-    units = [unit_suffix(c.unit) for c in channels]
-    names = [_told(c.name) for c in channels]
-    named = recognise_all(names, units)
     known = {c.quantity for c in channels if c.quantity}
+    unnamed = [c for c in channels if not c.quantity]
+    units = [unit_suffix(c.unit) for c in unnamed]
+    named = recognise_all([_told(c.name) for c in unnamed], units)
     columns = gravity_checked(
         tuple(
             draft_column(c.name, n, c.values, u)
-            for c, n, u in zip(channels, named, units, strict=True)
-            if not c.quantity and n.quantity not in known
+            for c, n, u in zip(unnamed, named, units, strict=True)
+            if n.quantity not in known
         )
     )
     if known and not any(c.quantity for c in columns):
