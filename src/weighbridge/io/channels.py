@@ -121,8 +121,11 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
     log = Log(path, absolute=found.absolute, start=found.start, frames=found.frames)
     log.problems += [Problem("", f"{path.name}: {note}") for note in found.notes]
     wanted = _mapped(log, found, mapping) if mapping is not None and mapping.signals else {}
+    # What a mapping names and is no channel may be a signal of the frames.
+    named = {s.name for s in mapping.signals} if mapping and found.frames is not None else set()
     for name, entry in _known(log, found, table).items():
-        wanted.setdefault(name, entry)
+        if name not in named:
+            wanted.setdefault(name, entry)
     if not wanted and (found.frames is None or not len(found.frames)):
         names = column_list(c.name for c in found.channels) if found.channels else "no channels"
         source = f"that {mapping.source} names" if mapping and mapping.signals else "that is known"

@@ -25,6 +25,7 @@ from weighbridge.io import (
     messages,
     nmea,
     npy,
+    openpilot,
     racechrono,
     sensor_logger,
     tabular,
@@ -280,6 +281,16 @@ FORMATS: Final[tuple[Format, ...]] = (
         package="rosbags",
         extra="ros",
         draft=drafter(messages.open_bag),
+    ),
+    Format(
+        name="openpilot",
+        suffixes=("rlog", "rlog.bz2", "rlog.zst", "qlog", "qlog.bz2", "qlog.zst"),
+        read=reader(openpilot.open_openpilot),
+        about="speed, engine speed, pedals, inertial sensor, position; CAN frames with a DBC",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="pycapnp",
+        extra="openpilot",
     ),
 )
 """The formats of this project; where several have one suffix, the first that recognises a file's
