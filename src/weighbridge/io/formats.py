@@ -30,6 +30,7 @@ from weighbridge.io import (
     sensor_logger,
     tabular,
     tdms,
+    tesla,
     torque_pro,
     vbo,
 )
@@ -98,6 +99,15 @@ FORMATS: Final[tuple[Format, ...]] = (
         read=sensor_logger.read_sensor_logger,
         begins=sensor_logger.is_sensor_logger,
         about="total acceleration, rotation and location of a phone",
+        takes=Takes.PLAIN,
+        draft=draft,
+    ),
+    Format(
+        name="Tesla Track Mode CSV",
+        suffixes=(".csv",),
+        read=tesla.read_track_mode,
+        begins=tesla.is_track_mode,
+        about="speed, position, accelerator, over all laps",
         takes=Takes.PLAIN,
         draft=draft,
     ),
