@@ -31,6 +31,7 @@ from weighbridge.io import (
     tabular,
     tdms,
     tesla,
+    tesla_fleet,
     torque_pro,
     vbo,
 )
@@ -301,6 +302,17 @@ FORMATS: Final[tuple[Format, ...]] = (
         self_described=True,
         package="pycapnp",
         extra="openpilot",
+    ),
+    Format(
+        name="Tesla Fleet Telemetry JSON",
+        # A .json is read where it is named: in a folder it is rather a result or a setting.
+        suffixes=(".jsonl", ".ndjson"),
+        read=reader(tesla_fleet.open_fleet_telemetry),
+        begins=tesla_fleet.is_fleet_telemetry,
+        magic=True,
+        about="position; numbers by a mapping, for the protocol states no units",
+        takes=Takes.CHANNELS,
+        draft=drafter(tesla_fleet.open_fleet_telemetry),
     ),
 )
 """The formats of this project; where several have one suffix, the first that recognises a file's
