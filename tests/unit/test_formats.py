@@ -1,11 +1,15 @@
 """The table of formats: how a file finds its reader, and what of a mapping is refused."""
 
+import re
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import polars as pl
 import pytest
 
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.io import FORMATS, read_drive
+from weighbridge.io import FORMATS, Takes, read_drive
 from weighbridge.io.formats import format_of, is_log
 
 NAMED = {"signals": {"vehicle_speed": {"column": "v", "unit": "kmh"}}, "time": {"column": "t"}}
@@ -24,6 +28,41 @@ def test_of_formats_with_one_suffix_at_most_one_needs_no_recognising():
     for suffix in {s for f in FORMATS for s in f.suffixes}:
         alike = [f for f in FORMATS if suffix in f.suffixes]
         assert len(alike) == 1 or sum(f.begins is None for f in alike) == 1, suffix
+
+
+ROOT = Path(__file__).parents[2]
+WORDS = {
+    Takes.TEXT: "all",
+    Takes.PLAIN: "plain",
+    Takes.COLUMNS: "columns",
+    Takes.NUMBERS: "numbers",
+    Takes.CHANNELS: "signals",
+    Takes.CLOCK: "clock",
+}
+
+
+def test_the_page_of_formats_says_what_the_table_says():
+    page = (ROOT / "docs/formats.md").read_text(encoding="utf-8")
+    rows = [[c.strip() for c in line.split("|")[1:-1]] for line in page.splitlines()]
+    told = {row[0]: row for row in rows if len(row) == 7}
+    assert set(told) - {"format", "---"} == {f.name for f in FORMATS}
+    for record in FORMATS:
+        _, names, _, extra, mapping, drafted, tried = told[record.name]
+        written = re.findall(r"`([^`]+)`", names)
+        assert all(any(s.endswith(w) for w in written) for s in record.suffixes), record.name
+        assert extra.split(" ")[0].strip("`") == record.extra, record.name
+        assert mapping == WORDS[record.takes], record.name
+        assert drafted == ("yes" if record.draft is not None else ""), record.name
+        assert tried
+
+
+def test_every_extra_is_there_and_tested():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    extras = project["project"]["optional-dependencies"]
+    used = {f.extra for f in FORMATS} - {""}
+    assert used <= extras.keys()
+    assert used <= set(re.findall(r"\w+", extras["formats"][0]))
+    assert "weighbridge[formats]" in extras["dev"]
 
 
 def test_content_decides_where_the_name_says_nothing(tmp_path):

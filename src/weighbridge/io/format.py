@@ -44,7 +44,8 @@ class Format:
     magic : whether ``begins`` knows the format under any suffix
     self_described : whether it names quantities and units itself, so that a mapping of the
         drive's other files need not know it
-    package : library that parses it and is no dependency of the project; empty for none
+    package : library that parses it, or the DBC of its frames, and is no dependency of the project;
+        empty for none
     extra : extra of the project that installs that library
     draft : drafts a mapping; None where it is read as it is
     """
