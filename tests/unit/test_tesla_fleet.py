@@ -76,6 +76,14 @@ def test_another_json_beside_a_drive_is_no_log(tmp_path):
         read_drive(tmp_path / "result.json")
 
 
+def test_a_long_first_record_is_recognised(tmp_path):
+    first = payload(0)
+    first["data"] += [{"key": f"Field{k}", "value": {"intValue": k}} for k in range(200)]
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(first) + "\n" + lines(payload))
+    assert read_drive(path, MAPPING).has("vehicle_speed")
+
+
 def test_two_vehicles_are_refused(tmp_path):
     path = tmp_path / "a.jsonl"
     path.write_text(lines(payload) + json.dumps(payload(21, "7SAY")) + "\n")

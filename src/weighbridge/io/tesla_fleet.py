@@ -9,6 +9,7 @@ are named by a mapping; the position alone is known.
 from __future__ import annotations
 
 import json
+import re
 from array import array
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,14 +24,15 @@ from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.table import MOST_COLUMNS
 from weighbridge.signals import Floats
 
-_MARKS: Final = (b'"createdAt"', b'"CreatedAt"')
+_BEGIN: Final = re.compile(rb'(?:\xef\xbb\xbf)?\s*\[?\s*\{\s*"data"\s*:\s*\[\s*\{\s*"key"\s*:')
+_LOGGED: Final = re.compile(rb'(?:\xef\xbb\xbf)?\s*\[?\s*\{.{0,4000}?"CreatedAt"\s*:', re.DOTALL)
 _PLACE: Final = ("latitude", "longitude")
 _OTHERS: Final = frozenset(("Vin", "CreatedAt", "IsResend"))
 
 
 def is_fleet_telemetry(head: bytes) -> bool:
     """Tell whether a text holds records of Fleet Telemetry."""
-    return head.lstrip(b"\xef\xbb\xbf \r\n\t[").startswith(b"{") and any(m in head for m in _MARKS)
+    return bool(_BEGIN.match(head) or _LOGGED.match(head))
 
 
 def open_fleet_telemetry(path: Path, time: TimeColumn) -> Recording:
