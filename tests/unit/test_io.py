@@ -397,3 +397,11 @@ def test_no_bytes_give_a_traceback(tmp_path_factory, content):
     for s in drive.signals.values():
         assert np.all(np.diff(s.time) > 0.0)
         assert np.all(np.isfinite(s.values))
+
+
+def test_a_message_shows_the_begin_of_a_long_name(tmp_path):
+    # Text behind a mark of another encoding is one line of many thousand letters.
+    (tmp_path / "obd.csv").write_bytes(b"\xfe\xff" + 5000 * "\u4e00".encode("utf-16-be"))
+    with pytest.raises(DriveError, match="no canonical columns") as refused:
+        read_drive(tmp_path / "obd.csv")
+    assert len(str(refused.value)) < 500

@@ -30,6 +30,9 @@ MOST_COLUMNS: Final = 10_000
 DATES: Final = (631_152_000.0, 4_102_444_800.0)
 """Numbers of seconds between these count from 1970: the years 1990 to 2100 [s]."""
 
+_LONGEST_NAME: Final = 60
+"""Letters of a column's name that a message shows."""
+
 _HEAD: Final = 1 << 18
 """Bytes at the beginning of a text that hold its header and its first rows."""
 
@@ -431,7 +434,8 @@ def start_text(seconds: float) -> str:
 
 
 def column_list(names: Iterable[str], limit: int = 12) -> str:
-    """Name the columns found, the first of them where there are many."""
+    """Name the columns found, the first of them where there are many, the begin of long ones."""
     names = list(names)
-    shown = ", ".join(repr(n) for n in names[:limit])
+    short = (n if len(n) <= _LONGEST_NAME else f"{n[:_LONGEST_NAME]}…" for n in names[:limit])
+    shown = ", ".join(map(repr, short))
     return f"{shown} and {len(names) - limit} more" if len(names) > limit else shown
