@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io.candump import read_candump
-from weighbridge.io.read import READERS, read_drive
+from weighbridge.io.formats import format_of
+from weighbridge.io.read import read_drive
 
 START = 1_600_000_000.0
 
@@ -52,7 +53,7 @@ def test_frames_come_back(tmp_path, suffix, fd):
     with can.Logger(path) as logger:
         for message in sent:
             logger(message)
-    log = READERS[suffix](path, None, None)
+    log = format_of(path).read(path, None, None)
     expected = [m for m in sent if not m.is_remote_frame]
     frames = log.frames
     assert log.absolute
@@ -196,7 +197,7 @@ TRACES = {
 def test_traces_of_every_version_as_python_can_reads_them(tmp_path, version):
     path = tmp_path / "log.trc"
     path.write_text("".join(TRACES[version]))
-    log = READERS[".trc"](path, None, None)
+    log = format_of(path).read(path, None, None)
     with can.TRCReader(path) as reader:
         expected = [m for m in reader if not m.is_remote_frame]
     assert log.problems == []
@@ -231,7 +232,7 @@ def test_vector_lines_as_python_can_reads_them(tmp_path):
         "date Tue Mar 3 03:04:05.250 pm 2020\nbase hex  timestamps absolute\n"
         f"internal events logged\n// version 9.0.0\n{ASC_LINES}"
     )
-    log = READERS[".asc"](path, None, None)
+    log = format_of(path).read(path, None, None)
     with can.ASCReader(path, relative_timestamp=False) as reader:
         expected = [m for m in reader if not (m.is_remote_frame or m.is_error_frame)]
     assert log.problems == []
@@ -246,7 +247,7 @@ def test_vector_lines_in_decimals_on_relative_clocks(tmp_path):
         "date Tue Mar 3 03:04:05 2020\nbase dec  timestamps relative\n"
         "   0.5 1  2024  Rx d 2 255 16\n   0.25 1  Statistic: D 0\n   0.25 1  2025  Rx d 1 9\n"
     )
-    frames = READERS[".asc"](path, None, None).frames
+    frames = format_of(path).read(path, None, None).frames
     assert_allclose(np.diff(frames.time), 0.5)
     assert_array_equal(frames.id, [2024, 2025])
     assert_array_equal(frames.data[:, :2], [[255, 16], [9, 0]])
@@ -282,7 +283,7 @@ def test_fd_frames_of_mf4(tmp_path):
     with MDF(version="4.11") as file:
         file.append(Signal(rows, times, name="CAN_DataFrame", source=source), acq_source=source)
         file.save(path)
-    frames = READERS[".mf4"](path, None, None).frames
+    frames = format_of(path).read(path, None, None).frames
     assert_array_equal(frames.id, [m.arbitration_id for m in sent])
     assert [bytes(d[:n]) for d, n in zip(frames.data, frames.length, strict=True)] == [
         bytes(m.data) for m in sent

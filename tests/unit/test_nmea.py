@@ -153,11 +153,7 @@ def test_mapping_moves_the_clock_and_need_not_name_the_file(tmp_path):
     (tmp_path / "obd.csv").write_text("t,v\n0,36\n20,36\n")
     mapping = {
         "tables": {
-            "gps": {
-                "files": "*.nmea",
-                "time": {"offset_s": 5.0},
-                "signals": {"latitude": {"column": "-", "optional": True}},
-            },
+            "gps": {"files": "*.nmea", "time": {"offset_s": 5.0}},
             "obd": {
                 "files": "obd.csv",
                 "time": {"column": "t"},

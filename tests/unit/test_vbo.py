@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from weighbridge.errors import DriveError
+from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import read_drive
 
 TITLES = ("satellites", "time", "latitude", "longitude", "velocity kmh", "heading", "height")
@@ -156,3 +156,40 @@ def test_any_damage_leaves_signals_or_one_sentence(
     path = tmp_path_factory.mktemp("vbo") / "log.vbo"
     path.write_bytes(WHOLE[:at] + junk + WHOLE[at + cut :])
     assert_salvaged(path)
+
+
+CAN_NAMES = f"{NAMES} rpm eng_trq"
+CAN_TITLES = (*TITLES, "Engine speed", "Engine torque")
+
+
+def can_drive(tmp_path, signals):
+    path = tmp_path / "can.vbo"
+    rows = (f"{row(f'12000{k}.00')} {3000 + k} {100 + k}" for k in range(3))
+    path.write_text(vbo(*rows, titles=CAN_TITLES, names=CAN_NAMES))
+    return read_drive(path, {"signals": signals})
+
+
+def test_a_mapping_names_the_columns_of_a_can_module(tmp_path):
+    found = can_drive(
+        tmp_path,
+        {
+            "engine_speed": {"column": "RPM", "unit": "rpm"},
+            "engine_torque": {"column": "Engine torque", "unit": "nm", "factor": 0.5},
+        },
+    )
+    assert_allclose(found.signals["engine_speed"].values, np.pi / 30 * np.array([3000, 3001, 3002]))
+    assert_array_equal(found.signals["engine_torque"].values, [50.0, 50.5, 51.0])
+    assert "latitude" in found.signals
+    assert found.problems == ()
+
+
+def test_a_mapping_goes_before_a_known_column(tmp_path):
+    signals = {"gnss_speed": {"column": "rpm", "unit": "kmh", "factor": 0.001}}
+    assert_allclose(can_drive(tmp_path, signals).signals["gnss_speed"].values[0], 3.0 / 3.6)
+
+
+def test_a_mapped_column_that_is_not_there_is_told(tmp_path):
+    found = can_drive(tmp_path, {"engine_speed": {"column": "revs", "unit": "rpm"}})
+    assert [p.signal for p in found.problems if p.serious] == ["engine_speed"]
+    with pytest.raises(ConfigError, match=r"no unit and column 'rpm' states none"):
+        can_drive(tmp_path, {"engine_speed": {"column": "rpm"}})

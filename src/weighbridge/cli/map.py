@@ -13,11 +13,12 @@ from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_r
 from weighbridge.cli.terminal import complain, console, say, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Console
 
     from weighbridge.io.draft import Draft, DraftColumn
 
-_SUFFIXES = (".csv", ".tsv", ".txt", ".parquet")
 _SHOWN = 12
 """Columns that are not taken, named at most."""
 
@@ -26,7 +27,7 @@ def map_log(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="Tables of one drive: CSV or other text, Parquet, or a folder of them.",
+            help="Logs of one drive whose names are foreign (CSV, Parquet …), or a folder of them.",
             show_default=False,
         ),
     ],
@@ -44,7 +45,6 @@ def map_log(
     Example: weighbridge map trip.csv -o map.toml
     """
     from weighbridge.errors import DriveError
-    from weighbridge.io.draft import draft
     from weighbridge.io.mapping_text import mapping_text
     from weighbridge.whole import whole_file
 
@@ -53,7 +53,7 @@ def map_log(
         refuse_overwriting(output, force, "mapping")
     drafts: list[Draft] = []
     refused: list[str] = []
-    for path in _files(logs):
+    for path, draft in _files(logs):
         try:
             found = draft(path)
         except DriveError as error:
@@ -77,29 +77,41 @@ def map_log(
     say(f"next: weighbridge inspect {_drive(logs)} --mapping {output}")
 
 
-def _files(logs: list[Path]) -> list[Path]:
-    """Tables named, those of folders included."""
+def _files(logs: list[Path]) -> list[tuple[Path, Callable[[Path], Draft]]]:
+    """Files named, those of folders included, each with what drafts its mapping."""
     from weighbridge.errors import DriveError
+    from weighbridge.io.formats import formats, is_log
 
-    found: list[Path] = []
+    drafted = tuple(dict.fromkeys(s for f in formats() if f.draft is not None for s in f.suffixes))
+    found = []
     for path in logs:
         if path.is_dir():
-            inside = sorted(
-                p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file()
-            )
-            if not inside:
-                raise DriveError(f"{path}: holds no table ({', '.join(_SUFFIXES)})")
-            found += inside
+            inside = sorted(p for p in path.iterdir() if p.is_file() and is_log(p))
+            there = [(p, draft) for p in inside if (draft := _draft(p)) is not None]
+            if not there:
+                raise DriveError(f"{path}: holds no table ({', '.join(drafted)})")
+            found += there
         elif not path.is_file():
             raise DriveError(f"{path}: {'no plain file' if path.exists() else 'no such file'}")
-        elif path.suffix.lower() not in _SUFFIXES:
+        elif (draft := _draft(path)) is None:
             raise DriveError(
-                f"{path}: map drafts mappings of tables ({', '.join(_SUFFIXES)}); other logs are "
+                f"{path}: map drafts mappings of tables ({', '.join(drafted)}); other logs are "
                 "read as they are: weighbridge inspect tells what they hold"
             )
         else:
-            found.append(path)
+            found.append((path, draft))
     return found
+
+
+def _draft(path: Path) -> Callable[[Path], Draft] | None:
+    from weighbridge.errors import DriveError
+    from weighbridge.io.formats import format_of
+
+    try:
+        form = format_of(path)
+    except OSError as error:
+        raise DriveError(f"{path} cannot be read: {error.strerror or error}") from None
+    return form.draft if form is not None else None
 
 
 def _drive(logs: list[Path]) -> Path:
@@ -111,8 +123,9 @@ def _show(found: Draft, screen: Console) -> None:
     from rich.table import Table
 
     taken = found.time_format or found.time_unit or "date"
+    clock = f"time {shown(found.time)!r} ({taken})" if found.time else "a clock of its own"
     table = Table(
-        title=f"{shown(found.path.name)}: time {shown(found.time)!r} ({taken}), "
+        title=f"{shown(found.path.name)}: {clock}, "
         f"{found.rate:.3g} rows per second for {found.duration:.0f} s",
         title_justify="left",
     )

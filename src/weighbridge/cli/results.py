@@ -189,10 +189,10 @@ def refuse_missing_folder(*outputs: Path | None) -> None:
 
 def _refuse_new_table(read: Inputs, path: Path, target: Path) -> None:
     """Raise where a result would be read as a table of a drive from then on."""
-    from weighbridge.io import READERS
+    from weighbridge.io.formats import is_log
     from weighbridge.signals.catalogue import TABLES
 
-    if target.suffix.lower() not in READERS:
+    if not is_log(target):
         return
     home = _place(target.parent)
     for drive in read.drives:
@@ -225,9 +225,9 @@ def _place(path: Path) -> tuple[int, int] | None:
 
 
 def _may_be_read(path: Path) -> bool:
-    from weighbridge.io import READERS
+    from weighbridge.io.formats import is_log
 
-    return path.suffix.lower() in (*READERS, ".toml")
+    return path.suffix.lower() == ".toml" or is_log(path)
 
 
 def _is_of_kind(path: Path, kind: Kind) -> bool:

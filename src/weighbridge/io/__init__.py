@@ -1,6 +1,17 @@
 """Drives in files: read them, write them."""
 
-from weighbridge.io.read import READERS, read_drive, read_table
+from weighbridge.io.format import Format, Takes
+from weighbridge.io.formats import FORMATS
+from weighbridge.io.read import read_drive, read_table
 from weighbridge.io.write import write_drive, write_mdf, write_table
 
-__all__ = ["READERS", "read_drive", "read_table", "write_drive", "write_mdf", "write_table"]
+__all__ = [
+    "FORMATS",
+    "Format",
+    "Takes",
+    "read_drive",
+    "read_table",
+    "write_drive",
+    "write_mdf",
+    "write_table",
+]

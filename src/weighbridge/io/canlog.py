@@ -17,8 +17,9 @@ import polars as pl
 from numpy.typing import NDArray
 
 from weighbridge.errors import DriveError
+from weighbridge.io.bus_text import frames_of_table
 from weighbridge.io.candump import filled, room, whole_lines
-from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
+from weighbridge.io.frames import Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
@@ -195,10 +196,9 @@ def _trace_head(path: Path, block: bytes) -> tuple[TraceColumns, float]:
     return columns, start if math.isfinite(start) else 0.0
 
 
-def is_can_csv(path: Path) -> bool:
+def is_can_csv(head: bytes) -> bool:
     """Tell whether a CSV begins as python-can writes them."""
-    with path.open("rb") as file:
-        return file.read(len(CSV_HEADER)).decode("latin-1") == CSV_HEADER
+    return head.startswith(CSV_HEADER.encode())
 
 
 def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -219,33 +219,22 @@ def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) ->
                 quote_char=None,
                 encoding="utf8-lossy",
             )
+        identifier = pl.col("arbitration_id").str.strip_prefix("0x")
         rows = cells.select(
-            pl.col("timestamp").cast(pl.Float64, strict=False),
-            pl.col("arbitration_id").str.strip_prefix("0x").str.to_integer(base=16, strict=False),
-            pl.col("extended") == "1",
-            (pl.col("remote") == "1") | (pl.col("error") == "1"),
-            pl.col("data").fill_null("").str.decode("base64", strict=False),
+            time=pl.col("timestamp").cast(pl.Float64, strict=False),
+            channel=pl.lit(0, pl.Int16),
+            id=identifier.str.to_integer(base=16, strict=False),
+            extended=pl.col("extended") == "1",
+            data=pl.col("data").fill_null("").str.decode("base64", strict=False),
+            remote=(pl.col("remote") == "1") | (pl.col("error") == "1"),
         )
     except PARSE_ERRORS as error:
         raise DriveError(f"{path} cannot be read ({first_line(error)}); copy it again") from None
-    usable = rows.drop_nulls().filter(
-        (pl.col("data").bin.size() <= _LONGEST)
-        & pl.col("arbitration_id").is_between(0, EXTENDED_MASK)
-    )
-    strange = len(rows) - len(usable)
-    known = usable.filter(~pl.col("remote"))
-    if len(known) == 0:
+    sent = rows.filter(~pl.col("remote")).drop("remote")
+    frames = frames_of_table(sent)
+    strange = len(sent) - len(frames) + int(rows["remote"].null_count())
+    if not len(frames):
         raise DriveError(f"{path} holds no CAN frame that can be read; record it again")
-    chunks = known["data"].to_list()
-    width = max(8, *(len(c) for c in chunks))
-    frames = Frames(
-        known["timestamp"].to_numpy(),
-        np.zeros(len(known), np.int16),
-        known["arbitration_id"].cast(pl.UInt32).to_numpy(),
-        known["extended"].to_numpy(),
-        known["data"].bin.size().cast(pl.UInt8).to_numpy(),
-        np.frombuffer(b"".join(c.ljust(width, b"\0") for c in chunks), np.uint8).reshape(-1, width),
-    )
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
     if strange:
         log.problems.append(

@@ -99,7 +99,7 @@ class Draft:
     ----------
     path : the file
     text : how it is written
-    time : name of the time column
+    time : name of the time column; empty where the format has a clock of its own
     time_unit : suffix of a time in numbers; empty for a text
     time_format : "clock", "iso" or a `strptime` format; empty for numbers
     rate : rows per second in the median; NaN where it is not known
@@ -109,7 +109,7 @@ class Draft:
     """
 
     path: Path
-    text: TextFormat
+    text: TextFormat = field(default_factory=TextFormat)
     time: str
     time_unit: str
     time_format: str
@@ -166,7 +166,7 @@ def draft(path: Path) -> Draft:
         _column(raw, name, found, stated=units.get(name))
         for name, found in zip(names, named, strict=True)
     )
-    columns = _accelerometer_unit(columns)
+    columns = gravity_checked(columns)
     if not any(c.quantity for c in columns):
         raise DriveError(
             f"{path}: none of its columns is known by its name; it has {column_list(raw.names)}: "
@@ -297,12 +297,12 @@ def _as_time(raw: RawTable, index: int) -> _Time | None:
     if stated is not None and UNITS[stated].dimension == "s":
         unit = stated
     else:
-        unit, doubt = _time_unit(name, known)
+        unit, doubt = guessed_time_unit(name, known)
         doubts += [doubt] if doubt else []
     return _Time(name, index, unit, "", values * UNITS[unit].factor, doubts)
 
 
-def _time_unit(name: str, values: Floats) -> tuple[str, str]:
+def guessed_time_unit(name: str, values: Floats) -> tuple[str, str]:
     """Unit of a time in numbers, by its size and its steps, and a doubt."""
     usual = float(np.median(np.abs(values)))
     for least, unit in _EPOCHS:
@@ -326,23 +326,39 @@ def _time_unit(name: str, values: Floats) -> tuple[str, str]:
 
 def _text_time(raw: RawTable, index: int, texts: Sequence[str]) -> _Time | None:
     name = raw.names[index]
-    doubts = []
-    if all(_CLOCK.match(t) for t in texts):
-        form = "clock"
-    elif all(_ISO.match(t) for t in texts):
-        form = "iso"
-    else:
-        fits = [f for f in DATE_FORMATS if _fits(texts, f)]
-        if not fits:
-            return None
-        form = fits[0]
-        if len(fits) > 1 and {f[:5] for f in fits} >= {"%d/%m", "%m/%d"}:
-            doubts.append(f"{texts[0]!r} is read with the day before the month")
+    form, doubts = text_time_format(texts)
+    if not form:
+        return None
     try:
         seconds, _, _ = time_seconds(raw, index, 1.0, form)
     except DriveError:
         return None
     return _Time(name, index, "", form, seconds, doubts)
+
+
+def text_time_format(texts: Sequence[str]) -> tuple[str, list[str]]:
+    """Find how times are written, as ``format`` of a mapping names it.
+
+    Parameters
+    ----------
+    texts : some of them, without blanks around
+
+    Returns
+    -------
+    format : empty where they are no times, or numbers
+    doubts : what is not sure, one sentence each
+    """
+    if not texts:
+        return "", []
+    if all(_CLOCK.match(t) for t in texts):
+        return "clock", []
+    if all(_ISO.match(t) for t in texts):
+        return "iso", []
+    fits = [f for f in DATE_FORMATS if _fits(texts, f)]
+    doubts = []
+    if len(fits) > 1 and {f[:5] for f in fits} >= {"%d/%m", "%m/%d"}:
+        doubts.append(f"{texts[0]!r} is read with the day before the month")
+    return (fits[0] if fits else ""), doubts
 
 
 def _fits(texts: Sequence[str], form: str) -> bool:
@@ -351,13 +367,33 @@ def _fits(texts: Sequence[str], form: str) -> bool:
 
 
 def _column(raw: RawTable, name: str, found: Named, *, stated: str | None) -> DraftColumn:
-    nothing = DraftColumn(name, "", "", False, float("nan"), float("nan"), float("nan"), 0)
     if not found.quantity:
-        return nothing
+        return _nothing(name)
     try:
         values, _ = raw.numbers(raw.names.index(name))
     except DriveError:
-        return replace(nothing, doubt=f"not taken for {found.quantity}: its cells are no numbers")
+        doubt = f"not taken for {found.quantity}: its cells are no numbers"
+        return replace(_nothing(name), doubt=doubt)
+    return draft_column(name, found, values, stated)
+
+
+def _nothing(name: str) -> DraftColumn:
+    return DraftColumn(name, "", "", False, float("nan"), float("nan"), float("nan"), 0)
+
+
+def draft_column(name: str, found: Named, values: Floats, stated: str | None) -> DraftColumn:
+    """Say what a column is taken for, by its name and its values.
+
+    Parameters
+    ----------
+    name : as it stands in the log
+    found : what the name says
+    values : (n,) in the log's unit; NaN where there is none
+    stated : suffix of the unit that the log states elsewhere than in the name
+    """
+    nothing = _nothing(name)
+    if not found.quantity:
+        return nothing
     known = values[np.isfinite(values)]
     if known.size == 0:
         return replace(nothing, doubt=f"not taken for {found.quantity}: it has no values")
@@ -414,7 +450,7 @@ def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]
     return q.suffix, f"states no unit, and its values fit none; taken as {q.suffix}"
 
 
-def _accelerometer_unit(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Tell m/s^2 from g by gravity where the log states no unit, and gravity that is missing."""
     axes = [c for c in columns if c.quantity.startswith("accel_")]
     if len(axes) < 3:

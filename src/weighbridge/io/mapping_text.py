@@ -59,7 +59,8 @@ def _time(one: Draft) -> Table:
     table = tomlkit.table()
     for doubt in one.doubts:
         table.add(tomlkit.comment(visible(doubt)))
-    table.add("column", one.time)
+    if one.time:
+        table.add("column", one.time)
     if one.time_unit:
         table.add("unit", one.time_unit)
     if one.time_format:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import stat
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,28 +13,17 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.errors import DriveError
-from weighbridge.io import (
-    blf,
-    candump,
-    canlog,
-    gpx,
-    mdf,
-    nmea,
-    npy,
-    racechrono,
-    sensor_logger,
-    tabular,
-    torque_pro,
-    vbo,
-)
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io import tabular
 from weighbridge.io.bus import decode
 from weighbridge.io.clocks import settle_clocks, shift_clock
 from weighbridge.io.dbc import Database, DbcSource, load_dbcs
+from weighbridge.io.format import Format, Takes
+from weighbridge.io.formats import format_of, is_log, suffixes
 from weighbridge.io.frames import Frames, join_frames, settle_clock
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
-from weighbridge.io.log import Log, Reader
+from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappingSource, TableMapping, load_mapping, mapping_for
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.table import read_parquet, read_text, start_text
@@ -48,61 +37,6 @@ _logger = logging.getLogger(__name__)
 
 DrivePath = str | Path | Sequence[str | Path]
 
-
-APPS: Final[tuple[tuple[Callable[[bytes], bool], Reader], ...]] = (
-    (racechrono.is_racechrono, racechrono.read_racechrono),
-    (torque_pro.is_torque_pro, torque_pro.read_torque_pro),
-    (sensor_logger.is_sensor_logger, sensor_logger.read_sensor_logger),
-)
-"""CSV of apps, by how their first bytes look."""
-
-
-def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    """Read a CSV: a table, frames of python-can or an app's log; see `weighbridge.io.log.Reader`.
-
-    An app's log is read as a plain table where a mapping names its columns.
-
-    Raises
-    ------
-    DriveError
-        The file cannot be understood.
-    """
-    if canlog.is_can_csv(path):
-        return canlog.read_can_csv(path, table, mapping)
-    if mapping is None or not mapping.signals:
-        with path.open("rb") as file:
-            head = file.read(4096)
-        for recognised, reader in APPS:
-            if recognised(head):
-                return reader(path, table, mapping)
-    return tabular.read_csv(path, table, mapping)
-
-
-READERS: Final[dict[str, Reader]] = {
-    ".csv": read_csv,
-    ".tsv": tabular.read_csv,
-    ".txt": tabular.read_csv,
-    ".parquet": tabular.read_pq,
-    ".pq": tabular.read_pq,
-    ".mf4": mdf.read_mdf,
-    ".mdf": mdf.read_mdf,
-    ".blf": blf.read_blf,
-    ".asc": canlog.read_asc,
-    ".trc": canlog.read_trc,
-    ".log": candump.read_candump,
-    ".nmea": nmea.read_nmea,
-    ".ubx": nmea.read_nmea,
-    ".gpx": gpx.read_gpx,
-    ".vbo": vbo.read_vbo,
-    ".npy": npy.read_npy,
-}
-"""Every log format, by file suffix."""
-
-TEXT_TABLES: Final = frozenset({".csv", ".tsv", ".txt"})
-"""Formats whose separator, encoding and decimal mark a mapping may tell."""
-
-SELF_DESCRIBED: Final = frozenset({".nmea", ".ubx", ".gpx", ".vbo", ".blf", ".asc", ".trc", ".log"})
-"""Formats that name their quantities and units themselves: a mapping need not know them."""
 
 # The dates that logs of one recording begin with are rounded, to a second in some ASC [s].
 _ROUNDING: Final = 1.0
@@ -150,15 +84,14 @@ def read_drive(
             raise DriveError("no file was given: name a folder or at least one file")
         if len(paths) > 1:
             name = f"{paths[0].stem}+{len(paths) - 1}"
-            return _drive(
-                name, [_read_file(p, None, mappings) for p in paths], info, mappings, databases
-            )
+            logs = _read_files([(p, None) for p in paths], mappings)
+            return _drive(name, logs, info, mappings, databases)
         path = paths[0]
     path = Path(path)
     if is_folder(path):
         logs, info = _read_folder(path, mappings)
         return _drive(path.resolve().name, logs, info, mappings, databases)
-    return _drive(path.stem, [_read_file(path, None, mappings)], info, mappings, databases)
+    return _drive(path.stem, _read_files([(path, None)], mappings), info, mappings, databases)
 
 
 def read_table(path: str | Path) -> dict[str, Floats]:
@@ -196,7 +129,7 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
             f"in {unfinished / 'old'}, the new one here and in {unfinished}: keep the tables of "
             "one of them and remove that folder"
         )
-    logs_there = [f for f in inside if f.suffix.lower() in READERS]
+    logs_there = [f for f in inside if is_log(f)]
     for f in logs_there:
         if f.stem.lower() in TABLES and not f.is_file():
             kind = "a folder" if f.is_dir() else "a link that leads nowhere, or a device"
@@ -217,24 +150,22 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
                 )
             tables[table] = f
     if tables and not mappings:
-        others = [
-            f for f in files if f.suffix.lower() in SELF_DESCRIBED and f not in tables.values()
-        ]
+        others = [f for f in files if f not in tables.values() and _self_described(f)]
         known = [*((f, t) for t, f in tables.items()), *((f, None) for f in others)]
-        return [_read_file(f, t, ()) for f, t in known], info
+        return _read_files(known, ()), info
     if not files:
         raise DriveError(
             f"{folder} holds no drive: it needs at least one of "
             f"{', '.join(f'{t}.csv' for t in TABLES)} (or .parquet), "
-            f"or one log ({', '.join(READERS)})"
+            f"or one log ({', '.join(suffixes())})"
         )
-    logs = []
-    for f in files:
-        named = f.stem.lower() in TABLES or f.suffix.lower() in SELF_DESCRIBED
-        if mappings and not named and mapping_for(f, mappings) is None:
-            continue
-        logs.append(_read_file(f, None, mappings))
-    return logs, info
+    if mappings:
+        files = [
+            f
+            for f in files
+            if f.stem.lower() in TABLES or mapping_for(f, mappings) or _self_described(f)
+        ]
+    return _read_files([(f, None) for f in files], mappings), info
 
 
 def is_folder(path: Path) -> bool:
@@ -255,38 +186,78 @@ def is_folder(path: Path) -> bool:
         raise DriveError(f"{path} cannot be read: {reason}") from None
 
 
-def _read_file(path: Path, table: str | None, mappings: tuple[TableMapping, ...]) -> Log:
+def _read_files(
+    files: Sequence[tuple[Path, str | None]], mappings: tuple[TableMapping, ...]
+) -> list[Log]:
+    """Read the files of one drive, each with the canonical table it is known to be."""
+    known = [(path, table, _format(path)) for path, table in files]
+    pairs = [(path, form, m) for path, _, form in known if (m := mapping_for(path, mappings))]
+    for path, form, mapping in pairs:
+        section = form.unusable(mapping)
+        # What a mapping for all files says may be meant for another of them.
+        others = (f for p, f, m in pairs if m is mapping and p != path)
+        if section and not (mapping.files == "*" and any(not f.unusable(mapping) for f in others)):
+            raise ConfigError(
+                f"{mapping.source}: {path.name} is {form.name}, which has no use for {section}; "
+                f"it takes {form.takes.value}: remove the rest, or give it another [tables] section"
+            )
+    return [_read_file(path, table, form, mappings) for path, table, form in known]
+
+
+def _format(path: Path) -> Format:
+    """Format of a file.
+
+    Raises
+    ------
+    DriveError
+        No plain file, or of no format that is known.
+    """
     if is_folder(path):
         raise DriveError(f"{path} is a folder; give it alone, or name files only")
     if not path.is_file():
         raise DriveError(f"{path} is no file: a device or a pipe cannot be read as a drive")
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
+    try:
+        found = format_of(path)
+    except OSError as e:
+        raise DriveError(f"{path} cannot be read: {e.strerror or e}") from None
+    if found is None:
         raise DriveError(
             f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; "
-            f"known are {', '.join(READERS)}, and folders of tables"
+            f"known are {', '.join(suffixes())}, and folders of tables"
         )
+    return found
+
+
+def _self_described(path: Path) -> bool:
+    return _format(path).self_described
+
+
+def _read_file(
+    path: Path, table: str | None, form: Format, mappings: tuple[TableMapping, ...]
+) -> Log:
     if table is None and path.stem.lower() in TABLES:
         table = path.stem.lower()
     mapping = mapping_for(path, mappings)
-    if mappings and mapping is None and table is None and path.suffix.lower() not in SELF_DESCRIBED:
+    if mappings and mapping is None and table is None and not form.self_described:
         raise DriveError(
             f"{path}: no [tables] section of {mappings[0].source} has a pattern "
             "in files that fits its name"
         )
-    self_described = path.suffix.lower() in SELF_DESCRIBED
-    named = mapping if mapping is not None and (mapping.signals or self_described) else None
-    written = path.suffix.lower() in TEXT_TABLES and mapping is not None
+    names = mapping is not None and bool(mapping.signals or form.self_described)
+    read = form.read
+    if form.takes is Takes.PLAIN and names:
+        read = tabular.read_csv
+    # A mapping that names nothing may still tell how a text table is written.
+    taken = mapping if names or form.takes is Takes.TEXT else None
     try:
-        # A mapping that names nothing may still tell how a text table is written.
-        log = reader(path, table, mapping if written else named)
+        log = read(path, table, taken)
     except OSError as e:
         raise DriveError(f"{path} cannot be read: {e.strerror or e}") from None
     except PARSE_ERRORS as e:
         raise DriveError(f"{path} cannot be read ({first_line(e)}); copy it again") from None
     if mapping is not None:
         log.align = mapping.time.align
-        if named is None:
+        if not names:
             shift_clock(log, mapping.time.offset)
         if log.frames is not None:
             log.frames = replace(log.frames, time=log.frames.time + mapping.time.offset)

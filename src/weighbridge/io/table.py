@@ -30,6 +30,9 @@ MOST_COLUMNS: Final = 10_000
 DATES: Final = (631_152_000.0, 4_102_444_800.0)
 """Numbers of seconds between these count from 1970: the years 1990 to 2100 [s]."""
 
+_LONGEST_NAME: Final = 60
+"""Letters of a column's name that a message shows."""
+
 _HEAD: Final = 1 << 18
 """Bytes at the beginning of a text that hold its header and its first rows."""
 
@@ -357,7 +360,7 @@ def time_seconds(
     if time_format is None:
         values, notes = table.numbers(index)
         seconds = values * unit_factor if unit_factor != 1.0 else values
-        return seconds, _since_1970(seconds), notes
+        return seconds, since_1970(seconds), notes
     text = series.cast(pl.String).str.strip_chars()
     if time_format == "clock":
         part = text.str.extract_groups(r"^(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)$").struct.unnest()
@@ -388,7 +391,7 @@ def time_seconds(
     return seconds, absolute, notes
 
 
-def _since_1970(seconds: Floats) -> bool:
+def since_1970(seconds: Floats) -> bool:
     """Whether numbers are a date: most of them lie in `DATES`."""
     known = seconds[np.isfinite(seconds)]
     return bool(known.size) and DATES[0] < float(np.median(known)) < DATES[1]
@@ -431,7 +434,8 @@ def start_text(seconds: float) -> str:
 
 
 def column_list(names: Iterable[str], limit: int = 12) -> str:
-    """Name the columns found, the first of them where there are many."""
+    """Name the columns found, the first of them where there are many, the begin of long ones."""
     names = list(names)
-    shown = ", ".join(repr(n) for n in names[:limit])
+    short = (n if len(n) <= _LONGEST_NAME else f"{n[:_LONGEST_NAME]}…" for n in names[:limit])
+    shown = ", ".join(map(repr, short))
     return f"{shown} and {len(names) - limit} more" if len(names) > limit else shown

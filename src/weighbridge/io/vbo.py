@@ -19,7 +19,7 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import TableMapping
+from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.table import column_list, unwrapped
 from weighbridge.signals import Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
@@ -43,12 +43,16 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     """Read a VBOX log; see `weighbridge.io.log.Reader`.
 
     The accelerations in it are differences of its speed and say nothing of
-    the road's slope, so they are not taken for specific force.
+    the road's slope, so they are not taken for specific force. A mapping names
+    the columns of CAN modules, by the short name or by the title, and goes
+    before the columns known.
 
     Raises
     ------
     DriveError
         Not a VBOX log, or one without rows.
+    ConfigError
+        The mapping gives a column no unit that it could be in.
     """
     text = _text(path)
     head, sections = _sections(text)
@@ -71,6 +75,12 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
 
     used = {"time", "sats"}
     columns: list[tuple[str, Floats]] = []
+    for signal, place in _mapped(log, mapping, names, sections.get("header", [])):
+        values = cells[:, place] * signal.factor + signal.offset
+        suffix = resolved_unit(signal, None, mapping.source if mapping else "")
+        used.add(names[place])
+        columns.append((signal.name, to_si(values, suffix) if suffix else values))
+    taken = {name for name, _ in columns}
     fixed = np.ones(clock.size, dtype=bool)
     if "sats" in places:
         sats = np.nan_to_num(cells[:, places["sats"]]).astype(np.int64)
@@ -85,11 +95,11 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
             )
         # Without a wire to the brake the flag is never set, and says nothing.
         brake = (sats // _BRAKE) % 2
-        if brake.any():
+        if brake.any() and "brake_switch" not in taken:
             columns.append(("brake_switch", brake.astype(np.float64)))
 
     def take(column: str, name: str, unit: str, factor: float = 1.0) -> None:
-        if column in places:
+        if column in places and name not in taken:
             used.add(column)
             values = np.where(fixed, factor * cells[:, places[column]], np.nan)
             columns.append((name, to_si(values, unit)))
@@ -104,6 +114,24 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     log.signals, problems = clean_columns(time, columns, path.name)
     log.problems += problems
     return log
+
+
+def _mapped(
+    log: Log, mapping: TableMapping | None, names: list[str], titles: list[str]
+) -> list[tuple[MappedSignal, int]]:
+    """Columns that a mapping names, the speed apart of which it tells the unit alone."""
+    found = []
+    by_title = [t.lower() for t in titles] if len(titles) == len(names) else []
+    for signal in mapping.signals if mapping else ():
+        wanted = signal.column.strip().lower()
+        if signal.name == "gnss_speed" and wanted == "velocity":
+            continue
+        place = next((x.index(wanted) for x in (names, by_title) if wanted in x), None)
+        if place is not None:
+            found.append((signal, place))
+        elif not signal.optional and mapping is not None:
+            log.lacking.append(lacking(f"{log.path.name}: column", signal, mapping.source))
+    return found
 
 
 def _text(path: Path) -> str:

@@ -1,0 +1,263 @@
+"""Logs of named channels, each on a clock of its own: from channels to signals and to a draft.
+
+A format of this kind needs one function that hands over its `Recording`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import DriveError
+from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
+from weighbridge.io.draft import Draft, draft_column, gravity_checked
+from weighbridge.io.frames import Frames
+from weighbridge.io.log import Log, Reader
+from weighbridge.io.mapping import MappedSignal, TableMapping, TimeColumn, lacking, resolved_unit
+from weighbridge.io.naming import recognise_all
+from weighbridge.io.table import column_list
+from weighbridge.signals import Floats, Problem
+from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.units import to_si
+
+# Last parts of a name that say nothing of the quantity without the part before.
+_EMPTY_NAMES: Final = frozenset(
+    ("data", "value", "values", "val", "signal", "y", "x", "z", "ch", "channel", "0")
+)
+_PARTS: Final = re.compile(r"[/.]")
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One quantity of a log as it is written there.
+
+    Attributes
+    ----------
+    name : what the log calls it; parts of a place in it are parted by ``/`` or ``.``
+    time : (n,) when [s]; channels with one clock share the array
+    values : (n,) in ``unit``; NaN where there is none
+    unit : as the log writes it; empty where it states none
+    quantity : canonical name, where the format itself says what it is; ``unit`` is a suffix then
+    """
+
+    name: str
+    time: Floats
+    values: Floats
+    unit: str = ""
+    quantity: str = ""
+
+
+@dataclass(slots=True)
+class Recording:
+    """What a log of channels holds.
+
+    Attributes
+    ----------
+    channels : in the order of the log
+    absolute : whether their time counts from 1970
+    start : where it begins [s since 1970], if it does not count from there and the log tells
+    time : what a mapping has to call the time; empty where the format has a clock of its own
+    time_unit : suffix of that time's unit, where the log does not state it
+    time_format : how that time is written, as a mapping tells it; empty for numbers
+    notes : what was left out or is not sure, one sentence each
+    frames : raw bus traffic beside the channels
+    """
+
+    channels: list[Channel]
+    absolute: bool = False
+    start: float | None = None
+    time: str = ""
+    time_unit: str = ""
+    time_format: str = ""
+    notes: list[str] = field(default_factory=list)
+    frames: Frames | None = None
+
+
+Opener = Callable[[Path, TimeColumn], Recording]
+"""Reads a file, given what a mapping says of its time."""
+
+_Wanted = dict[str, tuple[Channel, str, MappedSignal | None]]
+
+
+def reader(opener: Opener) -> Reader:
+    """Make the reader of a format of channels."""
+
+    def read(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+        time = mapping.time if mapping is not None else TimeColumn()
+        return log_of(path, opener(path, time), table, mapping)
+
+    return read
+
+
+def drafter(opener: Opener) -> Callable[[Path], Draft]:
+    """Make what drafts the mapping of a format of channels."""
+    return lambda path: draft_of(path, opener(path, TimeColumn()))
+
+
+def log_of(path: Path, found: Recording, table: str | None, mapping: TableMapping | None) -> Log:
+    """Take the channels that a mapping names, and those that the format or a canonical name tells.
+
+    Parameters
+    ----------
+    path : the file
+    found : what it holds
+    table : canonical table it is; None where one file holds all
+    mapping : goes before what is known otherwise; None for canonical names
+
+    Raises
+    ------
+    DriveError
+        No channel is known and there are no frames.
+    ConfigError
+        A mapped channel has no unit, or one that it cannot be in.
+    """
+    log = Log(path, absolute=found.absolute, start=found.start, frames=found.frames)
+    log.problems += [Problem("", f"{path.name}: {note}") for note in found.notes]
+    wanted = _mapped(log, found, mapping) if mapping is not None and mapping.signals else {}
+    # What a mapping names and is no channel may be a signal of the frames.
+    named = {s.name for s in mapping.signals} if mapping and found.frames is not None else set()
+    for name, entry in _known(log, found, table).items():
+        if name not in named:
+            wanted.setdefault(name, entry)
+    if not wanted and (found.frames is None or not len(found.frames)):
+        names = column_list(c.name for c in found.channels) if found.channels else "no channels"
+        source = f"that {mapping.source} names" if mapping and mapping.signals else "that is known"
+        raise DriveError(
+            f"{path} has no channel {source}; it has {names}: name its channels in a mapping file "
+            f"(weighbridge map {path.name} drafts one)"
+        )
+    offset = mapping.time.offset if mapping is not None else 0.0
+    clocks: dict[int, tuple[Floats, list[tuple[str, Floats]]]] = {}
+    for name, (channel, suffix, signal) in wanted.items():
+        values = channel.values
+        if signal is not None and (signal.factor != 1.0 or signal.offset != 0.0):
+            values = values * signal.factor + signal.offset
+        time, columns = clocks.setdefault(id(channel.time), (channel.time, []))
+        columns.append((name, to_si(values, suffix) if suffix else values))
+    for time, columns in clocks.values():
+        if time.size == 0:
+            names = ", ".join(n for n, _ in columns)
+            log.problems.append(Problem("", f"{path.name}: {names} has no samples"))
+            continue
+        signals, problems = clean_columns(time + offset if offset else time, columns, path.name)
+        log.signals += signals
+        log.problems += problems
+    return log
+
+
+def _mapped(log: Log, found: Recording, mapping: TableMapping) -> _Wanted:
+    wanted: _Wanted = {}
+    for s in mapping.signals:
+        channel = channel_named(found.channels, s.column)
+        if channel is not None:
+            stated = unit_suffix(channel.unit)
+            wanted[s.name] = (channel, resolved_unit(s, stated, mapping.source), s)
+        elif not s.optional and found.frames is None:
+            near = difflib.get_close_matches(s.column, [c.name for c in found.channels], n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            log.lacking.append(lacking(f"{log.path.name}: channel", s, mapping.source, hint))
+    return wanted
+
+
+def channel_named(channels: list[Channel], name: str) -> Channel | None:
+    """Find a channel by its name, in any case, or by the end of it where that is unambiguous.
+
+    Of several with one name the longest.
+    """
+    plain = name.strip().casefold()
+    alike = [c for c in channels if c.name == name]
+    alike = alike or [c for c in channels if c.name.strip().casefold() == plain]
+    if not alike:
+        ends = [c for c in channels if c.name.casefold().endswith((f"/{plain}", f".{plain}"))]
+        alike = ends if len({c.name for c in ends}) == 1 else []
+    return max(alike, key=lambda c: c.time.size, default=None)
+
+
+def _known(log: Log, found: Recording, table: str | None) -> _Wanted:
+    wanted: _Wanted = {}
+    unknown: list[str] = []
+    for channel in found.channels:
+        if channel.quantity:
+            wanted.setdefault(channel.quantity, (channel, channel.unit, None))
+            continue
+        try:
+            column = parse_column(_last(channel.name), table, unit_suffix(channel.unit))
+        except UnitlessColumnError:
+            column = None
+        if column is None:
+            unknown.append(channel.name)
+        else:
+            wanted.setdefault(column[0].name, (channel, column[1], None))
+    if wanted and unknown:
+        log.problems.append(
+            Problem("", f"{log.path.name}: not known and ignored: {column_list(unknown, 6)}")
+        )
+    return wanted
+
+
+def _last(name: str) -> str:
+    return _PARTS.split(name)[-1]
+
+
+def _told(name: str) -> str:
+    """What of a name tells the quantity: its last part, or two where that says nothing."""
+    parts = _PARTS.split(name)
+    if len(parts) > 1 and parts[-1].lower() in _EMPTY_NAMES:
+        return f"{parts[-2]} {parts[-1]}"
+    return parts[-1]
+
+
+def draft_of(path: Path, found: Recording) -> Draft:
+    """Draft the mapping of a log of channels.
+
+    Raises
+    ------
+    DriveError
+        It has no channels, none is known by its name, or none needs a mapping.
+    """
+    counted = Counter(c.name for c in found.channels)
+    channels = [c for c in found.channels if c.time.size]
+    channels = [c for c in channels if channel_named(found.channels, c.name) is c]
+    if not channels:
+        raise DriveError(f"{path} has no channel with samples; record it again")
+    known = {c.quantity for c in channels if c.quantity}
+    unnamed = [c for c in channels if not c.quantity]
+    units = [unit_suffix(c.unit) for c in unnamed]
+    named = recognise_all([_told(c.name) for c in unnamed], units)
+    columns = gravity_checked(
+        tuple(
+            draft_column(c.name, n, c.values, u)
+            for c, n, u in zip(unnamed, named, units, strict=True)
+            if n.quantity not in known
+        )
+    )
+    if known and not any(c.quantity for c in columns):
+        raise DriveError(f"{path}: what is known of it is read as it is; it needs no mapping")
+    if not any(c.quantity for c in columns):
+        raise DriveError(
+            f"{path}: none of its channels is known by its name; it has {column_list(counted)}: "
+            "write [signals] of a mapping by hand"
+        )
+    ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in channels]
+    rates = [c.time.size / max(b - a, 1e-9) for c, (a, b) in zip(channels, ends, strict=True)]
+    doubts = [*found.notes]
+    doubts += [
+        f"{n!r} is there {k} times; the longest is taken" for n, k in counted.items() if k > 1
+    ]
+    return Draft(
+        path=path,
+        time=found.time,
+        time_unit=found.time_unit,
+        time_format=found.time_format,
+        rate=float(np.median(rates)),
+        duration=max(b for _, b in ends) - min(a for a, _ in ends),
+        columns=columns,
+        doubts=tuple(doubts),
+    )

@@ -1,0 +1,382 @@
+"""Every log format, one record each: the only place that lists them.
+
+A package of its own adds a format by an entry point of the group ``weighbridge.formats`` that
+names a `weighbridge.io.format.Format`.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from weighbridge.io import (
+    blf,
+    bus_text,
+    candump,
+    canlog,
+    gpx,
+    hdf5,
+    long_csv,
+    matlab,
+    mdf,
+    messages,
+    nmea,
+    npy,
+    openpilot,
+    racechrono,
+    sensor_logger,
+    tabular,
+    tdms,
+    tesla,
+    tesla_fleet,
+    torque_pro,
+    vbo,
+)
+from weighbridge.io.channels import drafter, reader
+from weighbridge.io.draft import draft
+from weighbridge.io.format import Format, Takes, starts_with
+
+_logger = logging.getLogger(__name__)
+
+GROUP: Final = "weighbridge.formats"
+"""Entry points by which packages add formats."""
+
+_HEAD: Final = 4096
+
+FORMATS: Final[tuple[Format, ...]] = (
+    Format(
+        name="CSV",
+        suffixes=(".csv", ".tsv", ".txt"),
+        read=tabular.read_csv,
+        about="a table of text: canonical names, or those of a mapping",
+        takes=Takes.TEXT,
+        draft=draft,
+    ),
+    Format(
+        name="python-can CSV",
+        suffixes=(".csv",),
+        read=canlog.read_can_csv,
+        begins=canlog.is_can_csv,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="SavvyCAN GVRET CSV",
+        suffixes=(".csv",),
+        read=bus_text.read_gvret,
+        begins=bus_text.is_gvret,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="RaceChrono CSV v3",
+        suffixes=(".csv",),
+        read=racechrono.read_racechrono,
+        begins=racechrono.is_racechrono,
+        about="position, speeds and engine speed, by source",
+        takes=Takes.PLAIN,
+        draft=draft,
+    ),
+    Format(
+        name="Torque Pro CSV",
+        suffixes=(".csv",),
+        read=torque_pro.read_torque_pro,
+        begins=torque_pro.is_torque_pro,
+        about="position, OBD values with the unit in their name",
+        takes=Takes.PLAIN,
+        draft=draft,
+    ),
+    Format(
+        name="Sensor Logger CSV",
+        suffixes=(".csv",),
+        read=sensor_logger.read_sensor_logger,
+        begins=sensor_logger.is_sensor_logger,
+        about="total acceleration, rotation and location of a phone",
+        takes=Takes.PLAIN,
+        draft=draft,
+    ),
+    Format(
+        name="Tesla Track Mode CSV",
+        suffixes=(".csv",),
+        read=tesla.read_track_mode,
+        begins=tesla.is_track_mode,
+        about="speed, position, accelerator, over all laps",
+        takes=Takes.PLAIN,
+        draft=draft,
+    ),
+    Format(
+        name="long CSV",
+        suffixes=(".csv", ".tsv", ".txt"),
+        read=reader(long_csv.open_long),
+        begins=long_csv.is_long,
+        about="one row for each value, with its name, as Car Scanner writes it",
+        takes=Takes.COLUMNS,
+        draft=drafter(long_csv.open_long),
+    ),
+    Format(
+        name="Parquet",
+        suffixes=(".parquet", ".pq"),
+        read=tabular.read_pq,
+        begins=starts_with(b"PAR1"),
+        magic=True,
+        about="a table: canonical names, or those of a mapping",
+        takes=Takes.COLUMNS,
+        draft=draft,
+    ),
+    Format(
+        name="MDF",
+        suffixes=(".mf4", ".mdf"),
+        read=mdf.read_mdf,
+        begins=starts_with(b"MDF ", b"UnFinMF"),
+        magic=True,
+        about="measurement channels, and CAN frames of bus logging",
+        takes=Takes.CHANNELS,
+        package="asammdf",
+        extra="mdf",
+    ),
+    Format(
+        name="BLF",
+        suffixes=(".blf",),
+        read=blf.read_blf,
+        begins=starts_with(b"LOGG"),
+        magic=True,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="ASC",
+        suffixes=(".asc",),
+        read=canlog.read_asc,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="TRC",
+        suffixes=(".trc",),
+        read=canlog.read_trc,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="candump",
+        suffixes=(".log",),
+        read=candump.read_candump,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="OVMS CRTD",
+        suffixes=(".crtd", ".log", ".txt"),
+        read=bus_text.read_crtd,
+        begins=bus_text.is_crtd,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="NMEA 0183",
+        suffixes=(".nmea", ".ubx"),
+        read=nmea.read_nmea,
+        about="RMC, GGA, GNS, GST, VTG of any talker",
+        takes=Takes.CLOCK,
+        self_described=True,
+        package="pynmea2",
+        extra="position",
+    ),
+    Format(
+        name="GPX",
+        suffixes=(".gpx",),
+        read=gpx.read_gpx,
+        about="track points with time",
+        takes=Takes.CLOCK,
+        self_described=True,
+        package="gpxpy",
+        extra="position",
+    ),
+    Format(
+        name="VBOX",
+        suffixes=(".vbo",),
+        read=vbo.read_vbo,
+        about="position, speed, height, brake trigger; CAN columns by a mapping",
+        takes=Takes.CHANNELS,
+        self_described=True,
+    ),
+    Format(
+        name="NumPy",
+        suffixes=(".npy",),
+        read=npy.read_npy,
+        begins=starts_with(b"\x93NUMPY"),
+        magic=True,
+        about="columns by number, with a mapping",
+        takes=Takes.NUMBERS,
+    ),
+    Format(
+        name="MATLAB",
+        suffixes=(".mat",),
+        read=reader(matlab.open_mat),
+        begins=starts_with(b"MATLAB 5.0", b"MATLAB 7.3"),
+        magic=True,
+        about="arrays and structures, of any version",
+        takes=Takes.NUMBERS,
+        package="pymatreader",
+        extra="mat",
+        draft=drafter(matlab.open_mat),
+    ),
+    Format(
+        name="HDF5",
+        suffixes=(".h5", ".hdf5", ".hdf"),
+        read=reader(hdf5.open_hdf5),
+        begins=starts_with(b"\x89HDF\r\n\x1a\n"),
+        magic=True,
+        about="data sets in groups, tables",
+        takes=Takes.NUMBERS,
+        package="h5py",
+        extra="hdf5",
+        draft=drafter(hdf5.open_hdf5),
+    ),
+    Format(
+        name="TDMS",
+        suffixes=(".tdms",),
+        read=reader(tdms.open_tdms),
+        begins=starts_with(b"TDSm"),
+        magic=True,
+        about="channels and waveforms of LabVIEW",
+        takes=Takes.NUMBERS,
+        package="npTDMS",
+        extra="tdms",
+        draft=drafter(tdms.open_tdms),
+    ),
+    Format(
+        name="MCAP",
+        suffixes=(".mcap",),
+        read=reader(messages.open_mcap),
+        begins=starts_with(b"\x89MCAP0\r\n"),
+        magic=True,
+        about="Imu and NavSatFix of ROS 1, ROS 2 or JSON; numbers of other messages by a mapping",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="mcap",
+        extra="ros",
+        draft=drafter(messages.open_mcap),
+    ),
+    Format(
+        name="ROS bag",
+        suffixes=(".bag", ".db3"),
+        read=reader(messages.open_bag),
+        begins=starts_with(b"#ROSBAG V2.0"),
+        about="Imu and NavSatFix of ROS 1 or ROS 2; numbers of other messages by a mapping",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="rosbags",
+        extra="ros",
+        draft=drafter(messages.open_bag),
+    ),
+    Format(
+        name="openpilot",
+        suffixes=("rlog", "rlog.bz2", "rlog.zst", "qlog", "qlog.bz2", "qlog.zst"),
+        read=reader(openpilot.open_openpilot),
+        about="speed, engine speed, pedals, inertial sensor, position; CAN frames with a DBC",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="pycapnp",
+        extra="openpilot",
+    ),
+    Format(
+        name="Tesla Fleet Telemetry JSON",
+        # A .json is read where it is named: in a folder it is rather a result or a setting.
+        suffixes=(".jsonl", ".ndjson"),
+        read=reader(tesla_fleet.open_fleet_telemetry),
+        begins=tesla_fleet.is_fleet_telemetry,
+        magic=True,
+        about="position; numbers by a mapping, for the protocol states no units",
+        takes=Takes.CHANNELS,
+        draft=drafter(tesla_fleet.open_fleet_telemetry),
+    ),
+)
+"""The formats of this project; where several have one suffix, the first that recognises a file's
+first bytes reads it, else the one that needs no recognising."""
+
+
+def formats() -> tuple[Format, ...]:
+    """All formats, those that packages add included."""
+    return (*FORMATS, *_added(tuple(sys.path)))
+
+
+def suffixes() -> tuple[str, ...]:
+    """Ends of file names that are read, each once."""
+    return tuple(dict.fromkeys(s for f in formats() for s in f.suffixes))
+
+
+def is_log(path: Path) -> bool:
+    """Tell by its name whether a file is read as a log."""
+    return any(f.ends(path.name) for f in formats())
+
+
+def format_of(path: Path) -> Format | None:
+    """Format of a file, by its name and by its first bytes; None where it is not known.
+
+    Parameters
+    ----------
+    path : a file that is there
+
+    Raises
+    ------
+    OSError
+        It cannot be opened.
+    """
+    known = [(f.ends(path.name), f) for f in formats()]
+    longest = max(length for length, _ in known)
+    named = [f for length, f in known if length == longest > 0]
+    if len(named) == 1:
+        return named[0]
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    among = named or [f for f in formats() if f.magic]
+    for found in among:
+        if found.begins is not None and found.begins(head):
+            return found
+    return next((f for f in named if f.begins is None), named[0] if named else None)
+
+
+@lru_cache(maxsize=4)
+def _added(places: tuple[str, ...]) -> tuple[Format, ...]:
+    """Formats of packages; ``places`` is where they are looked for."""
+    from importlib.metadata import entry_points
+
+    found = []
+    for point in entry_points(group=GROUP):
+        try:
+            record = point.load()
+        # A package of others may raise anything while it is imported.
+        except Exception as e:
+            _logger.warning(
+                "log format %s cannot be loaded (%s: %s)", point.value, type(e).__name__, e
+            )
+            continue
+        if isinstance(record, Format):
+            found.append(record)
+        else:
+            _logger.warning("log format %s is no weighbridge.io.format.Format", point.value)
+    return tuple(found)

@@ -1,0 +1,173 @@
+"""Long tables of text: one row for each value, with its time, its name and often its unit.
+
+Car Scanner ELM OBD2 writes ``"SECONDS";"PID";"VALUE";"UNITS";"LATITUDE";"LONGTITUDE";``: seconds
+of the day, and the phone's position, 0 while there is none, repeated in every row. The form is
+that of exports which public programs read; no specification is published.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import polars as pl
+
+from weighbridge.errors import DriveError
+from weighbridge.io.channels import Channel, Recording
+from weighbridge.io.columns import bracketed_unit, time_unit
+from weighbridge.io.draft import text_time_format
+from weighbridge.io.mapping import TimeColumn
+from weighbridge.io.naming import is_time, unit_of
+from weighbridge.io.table import (
+    MOST_COLUMNS,
+    SEPARATORS,
+    RawTable,
+    cells,
+    column_list,
+    read_text,
+    time_seconds,
+    unwrapped,
+)
+from weighbridge.signals import Floats
+from weighbridge.signals.units import UNITS
+
+_NAMES: Final = frozenset(
+    ("pid", "name", "parameter", "param", "param_name", "signal", "signal_name", "channel",
+     "metric", "key", "variable", "field", "parameter name", "sensor name")
+)  # fmt: skip
+_VALUES: Final = frozenset(("value", "val", "values", "wert", "valeur", "valor", "reading"))
+_UNITS: Final = frozenset(("unit", "units", "einheit", "unite", "unidad", "uom"))
+_PLACES: Final = {
+    "latitude": ("latitude", "lat"),
+    "longitude": ("longitude", "longtitude", "lon", "lng"),
+}
+
+# Columns of a table that is long: what a row says is in a few.
+_MOST: Final = 12
+
+
+def _plain(name: str) -> str:
+    return name.strip().strip('"').strip().lower()
+
+
+def _place(names: list[str], among: frozenset[str] | tuple[str, ...]) -> int | None:
+    return next((k for k, name in enumerate(names) if _plain(name) in among), None)
+
+
+def _time_place(names: list[str]) -> int | None:
+    return next((k for k, n in enumerate(names) if is_time(n) or time_unit(n) is not None), None)
+
+
+def is_long(head: bytes) -> bool:
+    """Tell whether a text begins with the header of a long table."""
+    line = head.removeprefix(b"\xef\xbb\xbf").split(b"\n", 1)[0].decode("utf-8", "replace")
+    names = cells(line.strip("\r "), max(SEPARATORS, key=line.count))
+    return (
+        3 <= len(names) <= _MOST
+        and _place(names, _NAMES) is not None
+        and _place(names, _VALUES) is not None
+        and _time_place(names) is not None
+    )
+
+
+def open_long(path: Path, time: TimeColumn) -> Recording:
+    """Read a long table, one channel for each name; see `weighbridge.io.channels.Opener`.
+
+    Raises
+    ------
+    DriveError
+        It has no rows, no time that can be read, or too many names.
+    """
+    raw = read_text(path)
+    names = list(raw.names)
+    named, valued = _place(names, _NAMES), _place(names, _VALUES)
+    if named is None or valued is None:
+        raise DriveError(f"{path} has no columns of names and values; it has {column_list(names)}")
+    if raw.rows == 0:
+        raise DriveError(f"{path} has a header and no rows; record it again")
+    found = Recording([], notes=list(raw.notes))
+    seconds = _seconds(raw, names, time, found)
+    united = _place(names, _UNITS)
+    table = pl.DataFrame(
+        {
+            "time": seconds,
+            "name": raw.column(named).cast(pl.String).str.strip_chars(),
+            "value": _numbers(raw.column(valued)),
+            "unit": pl.lit("", pl.String) if united is None else raw.column(united).cast(pl.String),
+        }
+    )
+    known = table.drop_nulls(["name", "value"]).filter(pl.col("time").is_finite())
+    if known.height == 0:
+        raise DriveError(f"{path} has no row with a time, a name and a number; record it again")
+    if (lost := table.height - known.height) > 0:
+        found.notes.append(f"left out {lost} of {table.height} rows without a time or a number")
+    if known["name"].n_unique() > MOST_COLUMNS:
+        raise DriveError(f"{path} has {known['name'].n_unique()} names, {MOST_COLUMNS} at most")
+    for (name,), rows in known.partition_by("name", as_dict=True, maintain_order=True).items():
+        unit = rows["unit"].drop_nulls().mode().sort()
+        found.channels.append(
+            Channel(
+                str(name),
+                np.array(rows["time"].to_numpy(), dtype=np.float64),
+                np.array(rows["value"].to_numpy(), dtype=np.float64),
+                str(unit[0]).strip() if unit.len() else "",
+            )
+        )
+    found.channels += _position(raw, names, seconds)
+    return found
+
+
+def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording) -> Floats:
+    """Times of the rows [s], as a mapping tells or as they look."""
+    index = _time_place(names) if time.column is None else raw.index(time.column)
+    if index is None:
+        raise DriveError(
+            f"{raw.path} has no time column {time.column or ''!r}; it has {column_list(names)}: "
+            "name it as column in [time] of a mapping"
+        )
+    name = names[index]
+    found.time = name
+    texts = raw.column(index)
+    found.time_format = time.format or ""
+    if not found.time_format and texts.dtype == pl.String:
+        sample = [t.strip() for t in texts.drop_nulls().head(200).to_list() if t.strip()]
+        found.time_format, doubts = text_time_format(sample)
+        found.notes += doubts
+    stated, _ = unit_of(name)
+    if stated is None or UNITS[stated].dimension != "s":
+        stated = bracketed_unit(name) or time_unit(name) or "s"
+    unit = time.unit or (stated if UNITS[stated].dimension == "s" else "s")
+    found.time_unit = "" if found.time_format else unit
+    seconds, found.absolute, notes = time_seconds(
+        raw, index, UNITS[unit].factor, found.time_format or None
+    )
+    found.notes += notes
+    # Seconds of a day begin anew at midnight.
+    return seconds if found.absolute else unwrapped(seconds)
+
+
+def _numbers(values: pl.Series) -> pl.Series:
+    """Cells as numbers, with a point or a comma; null where one is none."""
+    if values.dtype != pl.String:
+        return values.cast(pl.Float64)
+    text = values.str.strip_chars()
+    return text.str.replace(",", ".", literal=True).cast(pl.Float64, strict=False)
+
+
+def _position(raw: RawTable, names: list[str], seconds: Floats) -> list[Channel]:
+    """Position of the rows where it is one and changes."""
+    places = {q: _place(names, words) for q, words in _PLACES.items()}
+    if None in places.values():
+        return []
+    values = [np.array(_numbers(raw.column(k or 0)).fill_null(np.nan)) for k in places.values()]
+    fixed = np.isfinite(values[0]) & np.isfinite(values[1]) & np.isfinite(seconds)
+    fixed &= (values[0] != 0.0) | (values[1] != 0.0)
+    rows = np.flatnonzero(fixed)
+    if rows.size == 0:
+        return []
+    changed = np.ones(rows.size, dtype=bool)
+    changed[1:] = (np.diff(values[0][rows]) != 0.0) | (np.diff(values[1][rows]) != 0.0)
+    rows = rows[changed]
+    time = seconds[rows]
+    return [Channel(q, time, v[rows], "deg", q) for q, v in zip(places, values, strict=True)]

@@ -1,0 +1,115 @@
+"""The table of formats: how a file finds its reader, and what of a mapping is refused."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io import FORMATS, Takes, read_drive
+from weighbridge.io.formats import format_of, is_log
+
+NAMED = {"signals": {"vehicle_speed": {"column": "v", "unit": "kmh"}}, "time": {"column": "t"}}
+
+
+def test_every_record_is_whole():
+    assert len({f.name for f in FORMATS}) == len(FORMATS)
+    for record in FORMATS:
+        assert record.about
+        assert record.suffixes
+        assert all(s == s.lower() for s in record.suffixes)
+        assert bool(record.package) == bool(record.extra)
+
+
+def test_of_formats_with_one_suffix_at_most_one_needs_no_recognising():
+    for suffix in {s for f in FORMATS for s in f.suffixes}:
+        alike = [f for f in FORMATS if suffix in f.suffixes]
+        assert len(alike) == 1 or sum(f.begins is None for f in alike) == 1, suffix
+
+
+ROOT = Path(__file__).parents[2]
+WORDS = {
+    Takes.TEXT: "all",
+    Takes.PLAIN: "plain",
+    Takes.COLUMNS: "columns",
+    Takes.NUMBERS: "numbers",
+    Takes.CHANNELS: "signals",
+    Takes.CLOCK: "clock",
+}
+
+
+def test_the_page_of_formats_says_what_the_table_says():
+    page = (ROOT / "docs/formats.md").read_text(encoding="utf-8")
+    rows = [[c.strip() for c in line.split("|")[1:-1]] for line in page.splitlines()]
+    told = {row[0]: row for row in rows if len(row) == 7}
+    assert set(told) - {"format", "---"} == {f.name for f in FORMATS}
+    for record in FORMATS:
+        _, names, _, extra, mapping, drafted, tried = told[record.name]
+        written = re.findall(r"`([^`]+)`", names)
+        assert all(any(s.endswith(w) for w in written) for s in record.suffixes), record.name
+        assert extra.split(" ")[0].strip("`") == record.extra, record.name
+        assert mapping == WORDS[record.takes], record.name
+        assert drafted == ("yes" if record.draft is not None else ""), record.name
+        assert tried
+
+
+def test_every_extra_is_there_and_tested():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    extras = project["project"]["optional-dependencies"]
+    used = {f.extra for f in FORMATS} - {""}
+    assert used <= extras.keys()
+    assert used <= set(re.findall(r"\w+", extras["formats"][0]))
+    assert "weighbridge[formats]" in extras["dev"]
+
+
+def test_content_decides_where_the_name_says_nothing(tmp_path):
+    path = tmp_path / "trip.dat"
+    pl.DataFrame({"time_s": [0.0, 1.0], "vehicle_speed_kmh": [36.0, 36.0]}).write_parquet(path)
+    assert format_of(path).name == "Parquet"
+    assert read_drive(path).has("vehicle_speed")
+    path.write_text("neither")
+    with pytest.raises(DriveError, match=r"'\.dat' cannot be read"):
+        read_drive(path)
+
+
+def test_a_suffix_alone_is_no_name(tmp_path):
+    assert not is_log(tmp_path / ".csv")
+    assert is_log(tmp_path / "A.CSV")
+
+
+@pytest.mark.parametrize(
+    ("name", "mapping", "said"),
+    [
+        ("log.gpx", NAMED, "GPX, which has no use for column, unit or format of"),
+        ("log.gpx", {"signals": NAMED["signals"]}, r"GPX, which has no use for \[signals\]"),
+        ("log.vbo", NAMED, "VBOX, which has no use for column"),
+        ("log.mf4", {**NAMED, "time": {"column": "x"}}, "MDF, which has no use for column"),
+        ("log.parquet", {**NAMED, "csv": {"decimal": ","}}, r"Parquet, which has no use for \[csv"),
+        ("log.gpx", {"csv": {"decimal": ","}}, r"has no use for \[csv\]; it takes offset_s"),
+    ],
+)
+def test_a_mapping_is_used_or_refused(tmp_path, name, mapping, said):
+    (tmp_path / name).write_bytes(b"")
+    with pytest.raises(ConfigError, match=said) as refused:
+        read_drive(tmp_path / name, mapping)
+    assert name in str(refused.value)
+
+
+def test_a_mapping_for_all_files_is_for_those_that_can_use_it(tmp_path):
+    rows = "".join(f"{1577836800 + k},36\n" for k in range(3))
+    (tmp_path / "a.csv").write_text(f"t,v\n{rows}")
+    points = "".join(
+        f'<trkpt lat="1.{k}" lon="2"><time>2020-01-01T00:00:0{k}Z</time></trkpt>' for k in range(3)
+    )
+    (tmp_path / "b.gpx").write_text(f"<gpx><trk><trkseg>{points}</trkseg></trk></gpx>")
+    with pytest.raises(ConfigError, match=r"b\.gpx is GPX"):
+        read_drive(tmp_path / "b.gpx", NAMED)
+    drive = read_drive(tmp_path, NAMED)
+    np.testing.assert_array_equal(drive.signals["vehicle_speed"].values, 10.0)
+    assert drive.has("latitude")
+    named = {"tables": {"all": {"files": "*.*", **NAMED}}}
+    with pytest.raises(ConfigError, match=r"b\.gpx is GPX"):
+        read_drive(tmp_path, named)

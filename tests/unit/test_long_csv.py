@@ -1,0 +1,106 @@
+"""Long tables: one row for each value, as Car Scanner exports them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io import read_drive
+from weighbridge.io.draft import Draft
+from weighbridge.io.formats import format_of
+from weighbridge.io.mapping_text import mapping_text
+
+HEAD = '"SECONDS";"PID";"VALUE";"UNITS";"LATITUDE";"LONGTITUDE";'
+
+
+def scanner(start=48373.0, rows=20):
+    """Rows as Car Scanner writes them: values in turn, a position that is held, none at first."""
+    lines = [HEAD]
+    for k in range(rows):
+        t = (start + k) % 86400.0
+        place = f'"{45.0 + 1e-4 * (k // 2)}";"15.7";' if k > 3 else '"0.0";"0.0";'
+        lines.append(f'"{t}";"Vehicle speed";"{36 + k}";"km/h";{place}')
+        lines.append(f'"{t + 0.4}";"Engine RPM";"{800 + 10 * k}";"rpm";{place}')
+        lines.append(f'"{t + 0.6}";"Calculated engine load value";"40";"%";{place}')
+        lines.append(f'"{t + 0.7}";"Fuel system status";"closed";"";{place}')
+    return "\n".join(lines) + "\n"
+
+
+def mapped(path, tmp_path):
+    """Read a log by the mapping that is drafted for it."""
+    found = format_of(path).draft(path)
+    assert isinstance(found, Draft)
+    (tmp_path / "map.toml").write_text(mapping_text([found]), encoding="utf-8")
+    return read_drive(path, tmp_path / "map.toml")
+
+
+def test_from_a_log_of_car_scanner_to_signals(tmp_path):
+    path = tmp_path / "trip.csv"
+    path.write_text(scanner())
+    assert format_of(path).name == "long CSV"
+    drive = mapped(path, tmp_path)
+    assert_allclose(drive.signals["vehicle_speed"].values * 3.6, np.arange(36.0, 56.0))
+    assert_allclose(drive.signals["engine_speed"].time, 48373.4 + np.arange(20))
+    assert_allclose(drive.signals["engine_load"].values, 0.4)
+    assert_allclose(np.degrees(drive.signals["latitude"].values), 45.0 + 1e-4 * np.arange(2, 10))
+    assert_allclose(np.diff(drive.signals["latitude"].time), 2.0)
+    assert "left out 20 of 80 rows" in " ".join(p.text for p in drive.problems)
+
+
+def test_a_trip_over_midnight_goes_on(tmp_path):
+    path = tmp_path / "trip.csv"
+    path.write_text(scanner(start=86390.0))
+    assert_allclose(mapped(path, tmp_path).signals["vehicle_speed"].time, 86390.0 + np.arange(20))
+
+
+def test_other_words_separators_and_times(tmp_path):
+    path = tmp_path / "trip.txt"
+    rows = "".join(
+        f"2026-05-01T10:00:{k:02d}Z,{name},{v},{unit}\n"
+        for k in range(10)
+        for name, v, unit in (("speed", 10 * k, "km/h"), ("rpm", 900 + k, "rpm"))
+    )
+    path.write_text(f"timestamp,signal,value,unit\n{rows}")
+    drive = mapped(path, tmp_path)
+    assert drive.info.start_time == "2026-05-01T10:00:00+00:00"
+    assert_allclose(drive.signals["vehicle_speed"].values, np.arange(0, 100, 10) / 3.6)
+
+
+def test_a_wide_table_is_none(tmp_path):
+    path = tmp_path / "wide.csv"
+    path.write_text("time_s,vehicle_speed_kmh,gear\n0,36,1\n")
+    assert format_of(path).name == "CSV"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (f"{HEAD}\n", "no rows"),
+        (f'{HEAD}\n"1";"Engine RPM";"on";"";"0";"0";\n', "no row with a time, a name and a number"),
+        (scanner(), "has no channel that is known"),
+    ],
+)
+def test_what_cannot_be_read_is_one_sentence(tmp_path, text, said):
+    path = tmp_path / "trip.csv"
+    path.write_text(text.replace('"45', '"0').replace('"15.7', '"0') if "channel" in said else text)
+    if "channel" in said:
+        path.write_text("\n".join(";".join(x.split(";")[:4]) for x in text.splitlines()))
+    with pytest.raises(DriveError, match=said):
+        read_drive(path)
+
+
+def test_a_unit_that_does_not_fit_is_refused(tmp_path):
+    path = tmp_path / "trip.csv"
+    path.write_text(scanner().replace("km/h", "furlong"))
+    with pytest.raises(ConfigError, match="no unit"):
+        read_drive(path, {"signals": {"vehicle_speed": {"column": "Vehicle speed"}}})
+
+
+@settings(max_examples=30, deadline=None)
+@given(cut=st.integers(0, 4000), junk=st.binary(max_size=8))
+def test_damage_leaves_signals_or_one_sentence(tmp_path_factory, assert_salvaged, cut, junk):
+    path = tmp_path_factory.mktemp("cut") / "trip.csv"
+    path.write_bytes(scanner().encode()[:cut] + junk)
+    assert_salvaged(path)
