@@ -34,7 +34,7 @@ SERIOUS: Final = 0.09
 DOUBT_SURE: Final = 2.0
 SURE: Final = 3.5
 """Standard deviations by which it has to be off for the one and for the other [-]. With these, 8 of
-1169 pairs of calibration and drive of recorded vehicles were doubted (a petrol car's load by
+1184 pairs of calibration and drive of recorded vehicles were doubted (a petrol car's load by
 intake pressure, another's torque by it, an electric car by its battery), and 2 refused beside those
 with a trip whose torque repeats one value to its end."""
 
