@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
+from scipy.signal import lfilter
 
 import weighbridge as wb
 from weighbridge.balance.gear_fit import share_on_gears
@@ -51,6 +52,10 @@ class Fleet:
 
     def weigh(self, kind, drive, method="joint"):
         return wb.weigh(drive, self.files[kind], method)
+
+    def weigh_alone(self, kind, drive, method="joint"):
+        """Weigh by a file without witnesses of the torque's reading."""
+        return wb.weigh(drive, replace(self.files[kind], witnesses=()), method)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +164,7 @@ def test_torque_whose_scale_changes_while_driving_gives_no_mass(fleet, kind, ram
     def change(t, x):
         return x * (1.0 - 0.25 * (np.clip((t - 500.0) / 700.0, 0.0, 1.0) if ramp else t > 500.0))
 
-    found = fleet.weigh(kind, with_signal(fleet.drive(kind), SOURCE[kind], change))
+    found = fleet.weigh_alone(kind, with_signal(fleet.drive(kind), SOURCE[kind], change))
     assert found.status is Status.INCONSISTENT
     assert "while the vehicle drives, where no load can change" in found.reason
     assert np.isnan(found.mass)
@@ -177,6 +182,24 @@ def test_every_method_obeys_a_scale_that_changes(fleet, method):
     assert np.isnan(weighed[method].mass)
 
 
+@pytest.mark.parametrize("method", ["joint", "rls", "robust-rls", "ekf", "hybrid"])
+def test_air_flow_shows_a_load_that_is_scaled_or_smoothed(fleet, method):
+    (witness,) = fleet.files["car"].witnesses
+    assert witness.signal == "mass_air_flow"
+
+    def scaled(t, x):
+        return 0.8 * x
+
+    def smoothed(t, x):
+        made, _ = lfilter([0.08], [1.0, -0.92], x, zi=[0.92 * x[0]])
+        return made
+
+    for change, words in ((scaled, r"0\.80 times as much"), (smoothed, "a time constant of 3")):
+        damaged = with_signal(fleet.drive("car"), "engine_load", change)
+        with pytest.raises(wb.DriveError, match=words):
+            fleet.weigh("car", damaged, method)
+
+
 def test_a_load_that_changes_at_stops_is_no_change_of_scale(fleet):
     made = make_scenario("car-loading", payload=0.0, seed=3)
     sensors = replace(made.sensors, imu_rate=50.0)
@@ -190,7 +213,7 @@ def test_a_load_that_changes_at_stops_is_no_change_of_scale(fleet):
 def test_engine_speed_a_gear_step_off_gives_no_mass(fleet, scale):
     damaged = with_signal(fleet.drive("car"), "engine_speed", lambda t, x: x * scale)
     for method in ("joint", "rls"):
-        found = fleet.weigh("car", damaged, method)
+        found = fleet.weigh_alone("car", damaged, method)
         assert found.status is Status.INCONSISTENT
         assert "gearing" in found.reason
     if scale > 1.0:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.file import load_vehicle, save_vehicle
 from weighbridge.vehicle.model import (
+    WITNESS_TERMS,
     DraggedReading,
     Driveline,
     Mounting,
@@ -20,6 +21,7 @@ from weighbridge.vehicle.model import (
     Timing,
     TorqueModel,
     Vehicle,
+    WitnessRelation,
 )
 from weighbridge.visible import visible
 
@@ -74,6 +76,33 @@ bent = st.tuples(torques, curve("knots", "knot_slopes")).map(lambda t: replace(t
 dragged = st.tuples(curve("engine_speed", "level"), positive, positive, st.floats(0.0, 1e6)).map(
     lambda d: DraggedReading(**d[0], scatter=d[1], span=d[2], reach=d[3])
 )
+rising = st.tuples(st.floats(-1e8, 0.0), st.floats(0.1, 1e8))
+witness_fields = {
+    "scatter": positive,
+    "span": positive,
+    "scale_std": positive,
+    "value_range": rising,
+    "speed_range": st.tuples(st.floats(0.0, 10.0), st.floats(20.0, 1e4)),
+    "blur": maybe(st.floats(0.0, 60.0)),
+    "lag": maybe(st.floats(-60.0, 60.0)),
+    "unexplained": maybe(st.floats(0.0, 1.0)),
+    "pressure": maybe(st.floats(1e4, 2e5)),
+    "temperature": maybe(st.floats(150.0, 400.0)),
+}
+witnesses = st.sets(st.sampled_from(sorted(WITNESS_TERMS)), max_size=3).flatmap(
+    lambda names: st.tuples(
+        *(
+            st.builds(
+                WitnessRelation,
+                signal=st.just(name),
+                coefficients=st.tuples(*[finite] * many),
+                **witness_fields,
+            )
+            for name, many in WITNESS_TERMS.items()
+            if name in names
+        )
+    )
+)
 speed_models = st.builds(
     SpeedModel,
     mass=masses,
@@ -119,6 +148,7 @@ vehicles = st.builds(
         torque_delay_std=maybe(st.floats(0.0, 1e3)),
     ),
     dragged=maybe(dragged),
+    witnesses=witnesses,
     speed_model=maybe(speed_models),
     provenance=st.builds(
         Provenance,
@@ -224,6 +254,14 @@ rotating_mass_kg = 71
 scale_std = 0.2"""
 
 
+WITNESS = """[witnesses.mass_air_flow]
+scatter = 0.01
+span = 0.5
+scale_std = 0.03
+value_range = [0.1, 1.0]
+speed_range_rpm = [900, 4000]"""
+
+
 DRAGGED = "[dragged]\nengine_speed_rpm = [900, 2000]\nscatter = 0.01\nspan = 0.8"
 
 
@@ -258,6 +296,11 @@ DRAGGED = "[dragged]\nengine_speed_rpm = [900, 2000]\nscatter = 0.01\nspan = 0.8
         (DRAGGED + "\nlevel = []", 5, "one number at least"),
         (DRAGGED.replace("2000", "700") + "\nlevel = [1, 2]", 2, "engine_speed must rise"),
         ("[dragged]\nspan = 1.0", 1, "lacks"),
+        (WITNESS, 1, "lacks coefficients; calibrate writes"),
+        (WITNESS + "\ncoefficients = [1, 2]", 7, "must be 4 numbers for mass_air_flow, got 2"),
+        (WITNESS + "\ncoefficients = [0, 1, 0, 0]\nblur = 1", 8, "no unit"),
+        (WITNESS.replace("0.1, 1.0", "1.0, 0.1"), 5, "the lower first"),
+        (WITNESS.replace("air_flow", "air_flwo"), 1, "did you mean mass_air_flow"),
         ("[provenance]\nformat_version = 99", 2, "reads version 1"),
         ("[provenance]\nsamples = 1.5", 2, "a whole number"),
         ("[speed_model]\nmass_kg = 1092", 1, "lacks force_gain_per_m, drag_kg_per_m, rotating_"),

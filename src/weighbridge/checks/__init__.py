@@ -21,6 +21,7 @@ from weighbridge.checks.speed import check_scales
 from weighbridge.checks.travel import check_sign, check_standstill
 from weighbridge.checks.values import check_load, check_pressure, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
+from weighbridge.checks.witnesses import check_witnesses
 from weighbridge.errors import DriveError
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
@@ -88,7 +89,13 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
         )
     problems.sort(key=lambda p: not p.serious)
     settled = replace(within_ranges(drive), problems=(*told, *problems))
-    return settled if any(p.serious for p in problems) else mended(settled, vehicle)
+    if any(p.serious for p in problems):
+        return settled
+    settled = mended(settled, vehicle)
+    # Last: what froze or dropped out is not held against a witness.
+    problems = [*settled.problems[len(told) :], *check_witnesses(settled, vehicle)]
+    problems.sort(key=lambda p: not p.serious)
+    return replace(settled, problems=(*told, *problems))
 
 
 def refuse_serious(name: str, problems: Iterable[Problem]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.delay import best_delay, delay_std
 from weighbridge.balance.force_balance import ForceBalance, dragged_reading
+from weighbridge.balance.witness_learning import learn_witnesses
 from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.regression import (
@@ -174,7 +175,7 @@ def _checked(
     if source is not None:
         # Friction in the torque is no fault here: the fit finds it as an offset.
         model = replace(model, source=source, coefficients=(-1.0, 1.0))
-    known = replace(base, torque=model)
+    known = replace(base, torque=model, witnesses=())
     settled = [settle_drive(drive, known) for drive in drives]
     for drive in settled:
         refuse_serious(drive.name, drive.problems)
@@ -274,7 +275,12 @@ def run_calibration(
         ),
     )
     learnt = dragged_reading(drives, motions, finished)
-    finished = replace(finished, dragged=learnt or finished.dragged)
+    witnesses, contradictions = learn_witnesses(drives, finished)
+    finished = replace(
+        finished,
+        dragged=learnt or finished.dragged,
+        witnesses=witnesses or finished.witnesses,
+    )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
     scale, scale_std = _self_weighing(balances, finished, masses)
     finished = replace(
@@ -309,7 +315,7 @@ def run_calibration(
         )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
     doubt = scale_doubt(finished, masses, ", ".join(drive.name for drive in drives))
-    others = [*_other_masses(drives, masses), *([doubt] if doubt else [])]
+    others = [*_other_masses(drives, masses), *([doubt] if doubt else []), *contradictions]
     finished = _with_doubts(finished, balances, others)
     _refuse_useless(finished)
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
@@ -366,9 +372,15 @@ def _draft(
         reference_torque=base.torque.reference_torque,
         engine_efficiency=base.torque.engine_efficiency,
     )
-    # A floor is told in the unit of its reading.
-    dragged = base.dragged if base.torque.source == source else None
-    return gears, replace(base, driveline=driveline, torque=model, dragged=dragged)
+    # A floor is told in the unit of its reading, and a witness is one of it.
+    same = base.torque.source == source
+    return gears, replace(
+        base,
+        driveline=driveline,
+        torque=model,
+        dragged=base.dragged if same else None,
+        witnesses=base.witnesses if same else (),
+    )
 
 
 def _bounds(base: Vehicle, driveline: Driveline) -> tuple[Floats, Floats]:

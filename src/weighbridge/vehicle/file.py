@@ -21,6 +21,7 @@ from weighbridge.signals.tomlfile import Section, exact_text, read_toml
 from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import (
     FORMAT_VERSION,
+    WITNESS_TERMS,
     DraggedReading,
     Driveline,
     Mounting,
@@ -31,6 +32,7 @@ from weighbridge.vehicle.model import (
     Timing,
     TorqueModel,
     Vehicle,
+    WitnessRelation,
 )
 from weighbridge.whole import write_whole
 
@@ -65,6 +67,26 @@ _VEHICLE: Final = (
     _Key("tare", "tare", "mass without payload; the payload is counted from it", suffix="kg"),
     _Key("gross", "gross", "permitted mass", suffix="kg"),
     _Key("mapping", "mapping", "mapping TOML of its logs, seen from this file's folder", "text"),
+)
+
+_WITNESS: Final = (
+    _Key(
+        "coefficients",
+        "coefficients",
+        "reading = c0 + c1 w + c2 w N + c3 w^2, by a battery c0 + c1 w + c2 / N; w and N as parts "
+        "of the upper ends of their ranges",
+        "numbers",
+    ),
+    _Key("scatter", "scatter", "standard deviation about it; a share for load, else N m"),
+    _Key("span", "span", "range of the reading"),
+    _Key("scale_std", "scale_std", "by how much its scale differs between drives"),
+    _Key("value_range", "value_range", "w it has seen, in SI", "numbers", pair=True),
+    _Key("speed_range", "speed_range", "N it has seen", "numbers", "rpm", pair=True),
+    _Key("blur", "blur", "by how much the reading is smoother than w", suffix="s"),
+    _Key("lag", "lag", "by how much it is later than w", suffix="s"),
+    _Key("unexplained", "unexplained", "part of its variance that w leaves"),
+    _Key("pressure", "pressure", "of the air on the drives", suffix="kpa"),
+    _Key("temperature", "temperature", "of the air on the drives", suffix="degc"),
 )
 
 _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
@@ -341,12 +363,34 @@ def load_vehicle(path: str | Path) -> Vehicle:
         section.done()
         _refuse_gaps(section, build, keys, values)
         sections[name] = _built(build, section, values)
+    sections["witnesses"] = _witnesses(root)
     section = root.section("vehicle") or Section({}, root.name, root.lines, ("vehicle",))
     values = {key.field: value for key in _VEHICLE if (value := _value(section, key)) is not None}
     section.done()
     root.done()
     vehicle: Vehicle = _built(Vehicle, section, {**values, **sections})
     return _with_usual_inertias(vehicle, stated)
+
+
+def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
+    """Read what other signals of the engine say of the torque's reading."""
+    every = root.section("witnesses")
+    if every is None:
+        return ()
+    found = []
+    for signal in WITNESS_TERMS:
+        section = every.section(signal)
+        if section is None:
+            continue
+        values = {
+            key.field: value for key in _WITNESS if (value := _value(section, key)) is not None
+        }
+        section.done()
+        values["signal"] = signal
+        _refuse_gaps(section, WitnessRelation, _WITNESS, values)
+        found.append(_built(WitnessRelation, section, values))
+    every.done()
+    return tuple(found)
 
 
 def _with_usual_inertias(vehicle: Vehicle, stated: Collection[str]) -> Vehicle:
@@ -395,6 +439,11 @@ def save_vehicle(
             table.add("format_version", version)
         if len(table):
             document.add(name, table)
+    if vehicle.witnesses:
+        every = tomlkit.table(is_super_table=True)
+        for witness in vehicle.witnesses:
+            every.add(witness.signal, _table(_WITNESS, witness))
+        document.add("witnesses", every)
     write_whole(path, tomlkit.dumps(document))
 
 
@@ -493,7 +542,9 @@ def _built(build: type[Any], section: Section, values: Mapping[str, Any]) -> Any
         return build(**values)
     except ConfigError as e:
         message = str(e)
-        keys = _VEHICLE if build is Vehicle else _SECTIONS[section.path[-1]][1]
+        keys = {Vehicle: _VEHICLE, WitnessRelation: _WITNESS}.get(build) or _SECTIONS[
+            section.path[-1]
+        ][1]
         said = [
             k
             for key in sorted(keys, key=lambda k: len(k.stem), reverse=True)

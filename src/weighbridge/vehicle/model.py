@@ -339,6 +339,80 @@ class DraggedReading:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WitnessRelation:
+    """How the reading that torque is made from goes with another signal of the same engine.
+
+    With w the witness and N the engine speed, both over the ends of their ranges, an engine reads
+    ``c0 + c1 w + c2 w N + c3 w^2``, and a motor, by the power of its battery over its speed,
+    ``c0 + c1 w + c2 / N``.
+
+    Attributes
+    ----------
+    signal : name of the signal, as in `weighbridge.signals.QUANTITIES`
+    coefficients : c0, c1 ... in the unit of the reading
+    scatter : standard deviation of the reading about the relation, of means over seconds
+    span : range of such means; the unit of both is that of the reading, as `regressor` in
+        `weighbridge.vehicle.torque` has it: a share for load, else N m
+    scale_std : by how much the scale of reading over witness differs between drives [-]
+    value_range : values of the witness that the relation has seen, in its own SI unit
+    speed_range : engine speeds that it has seen [rad/s]
+    blur, lag : time constant by which the reading is smoother than the witness, and by how much
+        it is later [s]; None where the drives were sampled too slowly to tell
+    unexplained : part of the variance of single readings that is left then [-]
+    pressure, temperature : of the ambient air [Pa], [K]; None where it was not known
+    """
+
+    signal: str
+    coefficients: tuple[float, ...]
+    scatter: float
+    span: float
+    scale_std: float
+    value_range: tuple[float, float]
+    speed_range: tuple[float, float]
+    blur: float | None = None
+    lag: float | None = None
+    unexplained: float | None = None
+    pressure: float | None = None
+    temperature: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.signal not in WITNESS_TERMS:
+            raise ConfigError(
+                f"signal must be one of {', '.join(WITNESS_TERMS)}, got {self.signal!r}"
+            )
+        many = WITNESS_TERMS[self.signal]
+        if len(self.coefficients) != many:
+            raise ConfigError(
+                f"coefficients must be {many} numbers for {self.signal}, "
+                f"got {len(self.coefficients)}"
+            )
+        for value in (*self.coefficients, *self.value_range, *self.speed_range):
+            _within("a number of a witness", value, -1e9, 1e9)
+        _within("the upper end of speed_range", self.speed_range[1], 1.0, 1e5, "rad/s")
+        for name in ("scatter", "span", "scale_std"):
+            _positive(name, getattr(self, name))
+            _within(name, getattr(self, name), 1e-15, 1e9)
+        _not_negative("blur", self.blur)
+        _within("blur", self.blur, 0.0, 60.0, "s")
+        _within("lag", self.lag, -60.0, 60.0, "s")
+        _within("unexplained", self.unexplained, 0.0, 1.0)
+        _within("pressure", self.pressure, 1e4, 2e5, "Pa")
+        _within("temperature", self.temperature, 150.0, 400.0, "K")
+
+
+WITNESS_TERMS: Final[dict[str, int]] = {
+    "mass_air_flow": 4,
+    "absolute_load": 4,
+    "intake_pressure": 4,
+    "fuel_rate": 4,
+    "engine_load": 4,
+    "demanded_torque": 4,
+    "battery_current": 3,
+}
+"""Signals that can be a witness, and how many coefficients the relation to each has."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedModel:
     """Model of ``--method speed-ekf``, in which torque is proportional to speed.
 
@@ -544,6 +618,7 @@ class Vehicle:
     mapping : path of a mapping TOML for its logs
     dragged : what the torque source reads without a foot on the accelerator; None where it was
         not calibrated, or its drives did not show it
+    witnesses : how that source goes with other signals of the engine, those alone that tell
     speed_model : for ``--method speed-ekf``; None where it was not calibrated
     """
 
@@ -558,6 +633,7 @@ class Vehicle:
     mounting: Mounting | None = None
     timing: Timing = field(default_factory=Timing)
     dragged: DraggedReading | None = None
+    witnesses: tuple[WitnessRelation, ...] = ()
     speed_model: SpeedModel | None = None
     ride: Ride | None = None
     provenance: Provenance = field(default_factory=Provenance)
@@ -568,6 +644,9 @@ class Vehicle:
         for name in ("tare", "gross"):
             _positive(name, getattr(self, name))
             _within(name, getattr(self, name), *_MASSES, "kg")
+        signals = [witness.signal for witness in self.witnesses]
+        if len(set(signals)) < len(signals):
+            raise ConfigError(f"a witness must stand once, got {', '.join(signals)}")
         if self.mapping is not None and visible(self.mapping) != self.mapping:
             raise ConfigError(
                 f"mapping must be a path without control characters, got {self.mapping!r}"

@@ -1,0 +1,394 @@
+"""Other signals of the same engine that bear witness of the reading its torque is made from.
+
+Air, fuel or current that an engine takes go with its torque. How they go with the reading is
+learnt from drives of known mass, so that a later drive shows whether the reading is still what it
+was. Both sides are compared as means over seconds: values asked for one after another, gear
+changes and short delays then matter little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final, TypeAlias
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import lfilter
+
+from weighbridge.errors import DriveError
+from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.vehicle.air import standard_pressure
+from weighbridge.vehicle.model import TorqueSource, Vehicle, WitnessRelation
+from weighbridge.vehicle.torque import SIGNALS, regressor
+
+WINDOW: Final = 3.0
+"""Both sides are averaged over so long, at least three periods of the slowest signal [s]."""
+
+SLOWEST: Final = 2.0
+"""The vehicle drives faster while the engine's witnesses are learnt [m/s]."""
+
+SLOWEST_MOTOR: Final = 6.0
+"""Battery power over motor speed says little of the torque below this vehicle speed [m/s]."""
+
+BLURS: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
+"""Time constants that are tried for a reading smoother than its witness [s]."""
+
+DELAYS: Final = tuple(float(d) for d in np.arange(-1.0, 1.51, 0.25))
+"""Delays of the reading against its witness that are tried beside [s]."""
+
+SLOW_PERIOD: Final = 1.0
+"""Signals sampled more slowly tell of no blur [s]."""
+
+BLOCKS: Final = 12
+"""Parts of a drive that are left out one after another for a standard deviation."""
+
+FEWEST: Final = 40
+"""Means from which a drive, or a part of it, can tell."""
+
+
+Ranges: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
+"""Lowest and highest value of a witness [SI], and speed of the engine [rad/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """One signal that can bear witness of a torque reading.
+
+    Attributes
+    ----------
+    signal : its name
+    needs : signals it is made from
+    of : its value at stamps (n,), of drive, vehicle, stamps and engine speed there [SI]
+    not_of : torque sources that are made from it, of which it is no witness
+    air : lowest and highest power of the pressure of the air, and of its temperature, to which
+        it may go at one charge of the engine
+    enriched : more of it than the torque needs is no fault: enrichment, regeneration of a filter
+    per_turn : it is taken over the engine's speed
+    battery : it goes with a motor's torque in both directions, and with what else takes current
+    """
+
+    signal: str
+    needs: tuple[str, ...]
+    of: Callable[[Drive, Floats, Floats], Floats]
+    not_of: tuple[TorqueSource, ...] = ()
+    air: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
+    enriched: bool = False
+    per_turn: bool = False
+    battery: bool = False
+
+
+def _as_it_is(name: str) -> Callable[[Drive, Floats, Floats], Floats]:
+    return lambda drive, time, _: drive.signals[name].at(time)
+
+
+def _per_turn(name: str) -> Callable[[Drive, Floats, Floats], Floats]:
+    """Per radian of the engine [SI unit of the signal times s/rad]."""
+
+    def value(drive: Drive, time: Floats, turning: Floats) -> Floats:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(turning > 0.0, drive.signals[name].at(time) / turning, np.nan)
+
+    return value
+
+
+def _battery(drive: Drive, time: Floats, turning: Floats) -> Floats:
+    """Power of the battery over the speed of the motor [N m], of the sign of the current."""
+    power = drive.signals["battery_voltage"].at(time) * drive.signals["battery_current"].at(time)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(turning > 0.0, power / turning, np.nan)
+
+
+# PID 04 is load over the highest at that speed, pressure and temperature (SAE J1979): the charge
+# over p / sqrt(T). Many engines do not reckon with the air; both are accepted.
+LOAD_AIR: Final = ((-1.0, 0.0), (0.0, 0.5))
+
+# A charge takes the more pressure the warmer the air gets, heated on its way in.
+_PRESSURE_AIR: Final = ((0.0, 0.0), (0.5, 1.0))
+
+WITNESSES: Final = (
+    Witness(
+        "mass_air_flow",
+        ("mass_air_flow",),
+        _per_turn("mass_air_flow"),
+        not_of=("air_flow",),
+        per_turn=True,
+    ),
+    Witness("absolute_load", ("absolute_load",), _as_it_is("absolute_load")),
+    Witness(
+        "intake_pressure", ("intake_pressure",), _as_it_is("intake_pressure"), air=_PRESSURE_AIR
+    ),
+    Witness("fuel_rate", ("fuel_rate",), _per_turn("fuel_rate"), enriched=True, per_turn=True),
+    Witness("engine_load", ("engine_load",), _as_it_is("engine_load"), ("load",), air=LOAD_AIR),
+    Witness("demanded_torque", ("demanded_torque",), _as_it_is("demanded_torque")),
+    Witness("battery_current", ("battery_voltage", "battery_current"), _battery, battery=True),
+)
+"""Every signal that can be a witness."""
+
+BY_SIGNAL: Final = {witness.signal: witness for witness in WITNESSES}
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Reading and witness at the stamps of the reading.
+
+    Attributes
+    ----------
+    time : (n,) [s]
+    reading : (n,) as `weighbridge.vehicle.torque.regressor` has it
+    value : (n,) of the witness [SI]
+    turning : (n,) speed of engine or motor [rad/s]
+    driving : (n,) all are known, and the vehicle drives
+    period : of the slowest of them [s]
+    """
+
+    time: Floats
+    reading: Floats
+    value: Floats
+    turning: Floats
+    driving: Bools
+    period: float
+
+
+@dataclass(frozen=True, slots=True)
+class Means:
+    """Means over windows that lie in the ranges of a relation.
+
+    Attributes
+    ----------
+    time : (m,) [s]
+    reading : (m,)
+    terms : (m, k) of the relation
+    """
+
+    time: Floats
+    reading: Floats
+    terms: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Reading against what a witness tells, ``reading = level + scale (told - told's mean)``.
+
+    Attributes
+    ----------
+    scale, scale_std : [-]
+    level, level_std : reading where the witness tells ``told``, in the reading's unit
+    told : mean of what the witness tells
+    """
+
+    scale: float
+    scale_std: float
+    level: float
+    level_std: float
+    told: float
+
+
+@dataclass(frozen=True, slots=True)
+class Following:
+    """How late and how smooth a reading is against its witness.
+
+    Attributes
+    ----------
+    blur : time constant by which it is smoother [s]
+    left : variance left unexplained with it [-]
+    usual_left : the same with the blur of the calibration [-]
+    lag : by how much it is later then [s]
+    """
+
+    blur: float
+    left: float
+    usual_left: float
+    lag: float
+
+
+def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0) -> Rows | None:
+    """Reading and witness of a drive; None where one is missing, or the vehicle is another kind.
+
+    Parameters
+    ----------
+    drive, vehicle, witness
+    later : by how much the reading is later than the witness, which is moved by it [s]
+    """
+    source = vehicle.torque.source
+    name = SIGNALS[source][0]
+    motor = vehicle.driveline.single_speed
+    if source in witness.not_of or motor != witness.battery:
+        return None
+    turning_of = drive.get("engine_speed") or (drive.get("vehicle_speed") if motor else None)
+    speed = drive.speed
+    if drive.missing((name, *witness.needs)) or turning_of is None or speed is None:
+        return None
+    used = [drive.signals[n] for n in (name, *witness.needs)] + [turning_of, speed]
+    if min(map(len, used)) < FEWEST:
+        return None
+    time = drive.signals[name].time
+    try:
+        reading = regressor(drive, source, time, vehicle.torque)
+    except DriveError:
+        return None  # Percent of an unknown torque: weighing says so.
+    gearing = vehicle.driveline.gearings[0] if turning_of.name == "vehicle_speed" else 1.0
+    # One false value would be in all that is divided by it, or filtered.
+    steady = replace(turning_of, values=median_filter(turning_of.values, 3, mode="nearest"))
+    moved = time - later
+    turning = steady.at(moved) * gearing
+    value = witness.of(drive, moved, turning)
+    driving = np.isfinite(reading) & np.isfinite(value) & np.isfinite(turning)
+    least = SLOWEST_MOTOR if motor else SLOWEST
+    driving &= np.nan_to_num(speed.at(moved)) > least
+    for signal in used[1:]:
+        driving &= signal.age(moved) <= 2.0 * signal.period
+    period = max(signal.period for signal in used[:-1])
+    return Rows(time, reading, np.nan_to_num(value), np.nan_to_num(turning), driving, period)
+
+
+def terms(witness: Witness, value: Floats, turning: Floats, ranges: Ranges) -> Floats:
+    """Columns of the relation (n, k); see `weighbridge.vehicle.model.WitnessRelation`."""
+    (low, high), (_, fastest) = ranges
+    w = value / max(abs(low), abs(high), 1e-300)
+    speed = turning / fastest
+    if witness.battery:
+        return np.column_stack([np.ones_like(w), w, 1.0 / np.maximum(speed, 1e-3)])
+    return np.column_stack([np.ones_like(w), w, w * speed, w**2])
+
+
+def means(rows: Rows, witness: Witness, ranges: Ranges) -> Means:
+    """Average over windows that lie in the ranges with all their samples.
+
+    The witness chooses the windows, not the reading: what is wrong with the reading must not
+    choose what it is judged by.
+    """
+    value_range, speed_range = ranges
+    inside = rows.driving & (rows.value >= value_range[0]) & (rows.value <= value_range[1])
+    inside &= (rows.turning >= speed_range[0]) & (rows.turning <= speed_range[1])
+    window = max(WINDOW, 3.0 * rows.period)
+    number: Ints = np.floor((rows.time - rows.time[0]) / window).astype(np.int64)
+    _, place = np.unique(number, return_inverse=True)
+    count = np.bincount(place)
+    own = float(np.median(np.diff(rows.time)))
+    whole = np.bincount(place, inside.astype(np.float64)) == count
+    whole &= count >= max(2.0, 0.6 * window / own)
+
+    def mean(x: Floats) -> Floats:
+        return np.asarray(np.bincount(place, np.nan_to_num(x))[whole] / count[whole])
+
+    columns = terms(witness, rows.value, rows.turning, ranges)
+    averaged = np.column_stack([mean(column) for column in columns.T])
+    return Means(mean(rows.time), mean(rows.reading), averaged)
+
+
+def ranges_of(relation: WitnessRelation) -> Ranges:
+    """Ranges that a relation has seen."""
+    return relation.value_range, relation.speed_range
+
+
+def told_by(relation: WitnessRelation, rows: Means) -> Floats:
+    """Reading that a witness tells (m,)."""
+    return np.asarray(rows.terms @ np.array(relation.coefficients))
+
+
+def compare(reading: Floats, told: Floats) -> Comparison:
+    """Fit a scale and a level of the reading against what a witness tells.
+
+    Parameters
+    ----------
+    reading, told : (m,) in the order of time
+
+    References
+    ----------
+    Huber, Robust Statistics, 1981, ch. 7; standard deviations by leaving out one part of the
+    drive after another (Efron, Stein, Ann. Statist. 9, 1981).
+    """
+    middle = float(np.mean(told))
+    columns = np.column_stack([told - middle, np.ones_like(told)])
+    (scale, level), weight = robust_fit(columns, reading)
+    part = np.arange(told.size) * BLOCKS // told.size
+    left_out = []
+    for k in range(BLOCKS):
+        kept = part != k
+        weighted = columns[kept] * weight[kept, None]
+        left_out.append(
+            np.linalg.lstsq(weighted.T @ columns[kept], weighted.T @ reading[kept], rcond=None)[0]
+        )
+    spread = (BLOCKS - 1) / BLOCKS * np.sum((np.array(left_out) - np.mean(left_out, 0)) ** 2, 0)
+    scale_std, level_std = np.sqrt(spread)
+    return Comparison(float(scale), float(scale_std), float(level), float(level_std), middle)
+
+
+def robust_fit(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Least squares with Huber's weights: parameters (k,) and weights (m,)."""
+    size = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+    scaled = columns / size
+    weight = np.ones_like(y)
+    found = np.zeros(size.size)
+    for _ in range(12):
+        root = np.sqrt(weight)
+        found = np.linalg.lstsq(scaled * root[:, None], y * root, rcond=None)[0]
+        off = np.abs(y - scaled @ found)
+        limit = 2.0 * float(np.median(off)) + 1e-12 * float(np.abs(y).max())
+        weight = np.minimum(1.0, limit / np.maximum(off, 1e-300))
+    return found / size, weight
+
+
+def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following | None:
+    """Find how late and how smooth the reading is against what the witness tells.
+
+    Parameters
+    ----------
+    rows, witness
+    relation : of which the ranges and the blur are taken
+
+    Returns
+    -------
+    Following
+        None where the signals are sampled too slowly, or the drive is too short.
+    """
+    if rows.period > SLOW_PERIOD or np.count_nonzero(rows.driving) < 10 * FEWEST:
+        return None
+    value = np.clip(rows.value, *relation.value_range)
+    turning = np.clip(rows.turning, *relation.speed_range)
+    told = terms(witness, value, turning, ranges_of(relation)) @ np.array(relation.coefficients)
+    period = float(np.median(np.diff(rows.time)))
+    reading = rows.reading[rows.driving]
+    left = np.empty((len(BLURS), len(DELAYS)))
+    for i, blur in enumerate(BLURS):
+        kept = np.exp(-period / blur) if blur > 0.0 else 0.0
+        smooth, _ = lfilter([1.0 - kept], [1.0, -kept], told, zi=[kept * told[0]])
+        for j, delay in enumerate(DELAYS):
+            moved = np.interp(rows.time - delay, rows.time, smooth)[rows.driving]
+            left[i, j] = 1.0 - _correlation(moved, reading) ** 2
+    best = int(np.argmin(left.min(axis=1)))
+    usual = int(np.argmin(np.abs(np.array(BLURS) - (relation.blur or 0.0))))
+    return Following(
+        blur=BLURS[best],
+        left=float(left[best].min()),
+        usual_left=float(left[usual].min()),
+        lag=DELAYS[int(np.argmin(left[usual]))],
+    )
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    a, b = a - a.mean(), b - b.mean()
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size > 0.0 else 0.0
+
+
+def air_of(drive: Drive, start: float, end: float) -> tuple[float, float]:
+    """Pressure [Pa] and temperature [K] of the air within a time; NaN where they are unknown."""
+    pressure = _median(drive.get("barometric_pressure"), start, end)
+    if np.isnan(pressure):
+        height = _median(drive.get("altitude"), start, end)
+        known = drive.info.barometric_pressure
+        pressure = known if known is not None else float(standard_pressure(np.asarray(height)))
+    temperature = _median(drive.get("ambient_temperature"), start, end)
+    if np.isnan(temperature) and drive.info.ambient_temperature is not None:
+        temperature = drive.info.ambient_temperature
+    return pressure, temperature
+
+
+def _median(signal: Signal | None, start: float, end: float) -> float:
+    """Median within a time, else of all; NaN without samples."""
+    if signal is None or not len(signal):
+        return float("nan")
+    first, last = signal.time.searchsorted([start, end])
+    return float(np.median(signal.values[first:last] if last > first else signal.values))

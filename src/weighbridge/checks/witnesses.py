@@ -1,0 +1,105 @@
+"""Is the torque's reading what other signals of the engine say it is?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from weighbridge.balance.disagreement import Finding, difference, findings
+from weighbridge.balance.witness import BY_SIGNAL
+from weighbridge.signals import Drive, Problem
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import SIGNALS
+
+
+def check_witnesses(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:
+    """Hold the torque's reading against the witnesses of the vehicle file.
+
+    One witness that agrees with the reading clears it: those that do not are then off themselves.
+
+    Parameters
+    ----------
+    drive : without samples that are known to be false
+    vehicle : with the witnesses of its calibration; None where there is none
+
+    Returns
+    -------
+    Problems, of the reading, or of witnesses that are off
+    """
+    if vehicle is None or not vehicle.witnesses:
+        return ()
+    found = findings(drive, vehicle)
+    reading = SIGNALS[vehicle.torque.source][0]
+    off = [f for f in found if f.verdict != "agrees"]
+    agree = [f.signal for f in found if f.verdict == "agrees"]
+    if agree:
+        return tuple(_witness_off(reading, f, agree) for f in off)
+    if not off:
+        return ()
+    worst = max(off, key=lambda f: (f.verdict == "serious", abs(f.scale - 1.0)))
+    together = [f for f in off if (f.blur > 0.0, f.sign) == (worst.blur > 0.0, worst.sign)]
+    serious = worst.verdict == "serious" and reading not in drive.info.trusted
+    return (
+        Problem(
+            reading, _reading_off(reading, vehicle, worst, together, len(off)), serious=serious
+        ),
+    )
+
+
+def _reading_off(
+    reading: str, vehicle: Vehicle, worst: Finding, together: Sequence[Finding], many: int
+) -> str:
+    """Say by how much the reading is off, by which witnesses, and what to do."""
+    names = " and ".join(f.signal for f in together)
+    if worst.before:
+        source = f"from {worst.start:.6g} s on against before"
+    else:
+        source = f"by the calibration of {vehicle.name}{_when(worst)}"
+    if worst.blur > 0.0:
+        return (
+            f"{reading} follows {names} with a time constant of {worst.blur:.2g} s, as it did not "
+            f"in the calibration of {vehicle.name}: something smooths the load or torque; record "
+            "it as the vehicle sends it"
+        )
+    if len(together) > 1:
+        which = f"{reading} is wrong"
+    elif many > 1:
+        which = "they do not agree with each other either, and one of them is wrong"
+    else:
+        which = "one of the two is wrong"
+    if any(BY_SIGNAL[f.signal].per_turn for f in together):
+        which = which.replace("of the two is wrong", "of the two, or engine_speed, is wrong")
+    two = " (or the recording is of two vehicles)" if _part(worst) else ""
+    tells = (
+        f"{'as' if worst.scaled else 'than'} {names} {'tells' if len(together) == 1 else 'tell'}"
+    )
+    return (
+        f"{reading} reads {difference(worst)} {tells} {source}: {which}, and a mass from it is off "
+        f"by as much{two}; check the unit and scale of {reading} in the log and its mapping, or "
+        "calibrate again"
+    )
+
+
+def _witness_off(reading: str, finding: Finding, agree: Sequence[str]) -> Problem:
+    if finding.blur > 0.0:
+        how = f"{reading} follows it with a time constant of {finding.blur:.2g} s"
+    else:
+        than = "as" if finding.scaled else "than"
+        how = f"{reading} reads {difference(finding)} {than} it tells{_when(finding)}"
+    return Problem(
+        finding.signal,
+        f"{finding.signal} is off: {how}, and {' and '.join(agree)} "
+        f"{'agrees' if len(agree) == 1 else 'agree'} with {reading}; nothing is taken from it",
+    )
+
+
+def _part(finding: Finding) -> bool:
+    return bool(np.isfinite(finding.start) or np.isfinite(finding.end))
+
+
+def _when(finding: Finding) -> str:
+    """In which part of the drive, in words."""
+    if np.isfinite(finding.start):
+        return f" from {finding.start:.6g} s on"
+    return f" until {finding.end:.6g} s" if np.isfinite(finding.end) else ""

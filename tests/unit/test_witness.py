@@ -1,0 +1,359 @@
+"""Torque readings held against other signals of the same engine, on made-up drives."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+import weighbridge as wb
+from weighbridge.balance.disagreement import accepted_scales, findings
+from weighbridge.balance.witness import BY_SIGNAL, compare, rows_of
+from weighbridge.balance.witness_learning import learn_witnesses
+from weighbridge.checks.witnesses import check_witnesses
+from weighbridge.errors import DriveError
+from weighbridge.pipeline.comparing import METHODS
+from weighbridge.signals import Drive, DriveInfo, Signal
+from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle, WitnessRelation
+
+END = 1500.0
+MIDDLE = 0.5 * END
+FULL_CHARGE = 1.9e-4  # kg per radian of a petrol engine of 2 l
+CAR = Vehicle(
+    name="car",
+    driveline=Driveline(gearings=(20.0, 12.0, 8.0)),
+    torque=TorqueModel(source="load", coefficients=(-20.0, 180.0)),
+)
+ELECTRIC = Vehicle(driveline=Driveline(gearings=(28.0,)), torque=TorqueModel(source="measured"))
+
+
+def slow_noise(random, time, span):
+    """Of unit size, changing within about ``span`` [s]."""
+    knots = np.arange(0.0, time[-1] + 2.0 * span, span)
+    return np.interp(time, knots, random.standard_normal(knots.size))
+
+
+def drive(seed, *, warm=288.0, pressure=1.0e5, diesel=False, normalised=False):
+    """Half an hour of town and country: load of a petrol engine with its air, pressure and fuel.
+
+    Each signal is asked for in its turn, four times a second.
+    """
+    random = np.random.default_rng(seed)
+    fine = np.arange(0.0, END, 0.05)
+    turning = np.clip(210.0 + 55.0 * slow_noise(random, fine, 9.0), 90.0, 420.0)
+    part = np.clip(0.45 + 0.22 * slow_noise(random, fine, 4.0), 0.12, 1.0)
+    # Volumetric efficiency has its best in the middle, and charge the more air the colder it is.
+    best = FULL_CHARGE * (1.0 - 3e-6 * (turning - 260.0) ** 2)
+    air = (pressure / 1.0e5) * np.sqrt(288.0 / warm)
+    charge = part * best * (air if normalised else 1.0)
+    load = part if normalised else part * np.sqrt(1.0)
+    if diesel:
+        charge = best * (0.8 + 0.1 * slow_noise(random, fine, 6.0))
+    values = {
+        "vehicle_speed": turning / 12.0,
+        "engine_speed": turning,
+        "engine_load": load,
+        "mass_air_flow": charge * turning,
+        "intake_pressure": 1.0e5 * charge / best * np.sqrt(warm / 288.0),
+        "fuel_rate": charge * turning / 14.7 / 745.0,
+    }
+    signals = {}
+    for k, (name, row) in enumerate(values.items()):
+        time = 0.3 + 0.04 * k + 0.25 * np.arange(int((END - 2.0) / 0.25))
+        read = np.interp(time - 0.1, fine, row)
+        signals[name] = Signal(name, time, read * (1.0 + 0.01 * random.standard_normal(time.size)))
+    info = DriveInfo(ambient_temperature=warm, barometric_pressure=pressure)
+    return Drive(f"drive {seed}", signals, info=info)
+
+
+def changed(made, name, change):
+    s = made.signals[name]
+    return made.with_signals(replace(s, values=change(s.time, s.values)))
+
+
+def smoothed(span):
+    def change(time, x):
+        kept = np.exp(-np.median(np.diff(time)) / span)
+        return lfilter([1.0 - kept], [1.0, -kept], x, zi=[kept * x[0]])[0]
+
+    return change
+
+
+KNOWN = [drive(seed) for seed in (1, 2, 3)]
+
+
+def learnt(signals=("mass_air_flow",), known=KNOWN, vehicle=CAR):
+    """The car with these witnesses."""
+    found, doubts = learn_witnesses(known, vehicle)
+    assert not doubts
+    return replace(vehicle, witnesses=tuple(w for w in found if w.signal in signals))
+
+
+ALONE = learnt()
+TWO = learnt(("mass_air_flow", "intake_pressure"))
+
+
+def test_the_relation_gives_the_reading_back():
+    found, doubts = learn_witnesses(KNOWN, CAR)
+    assert [w.signal for w in found] == ["mass_air_flow", "intake_pressure", "fuel_rate"]
+    assert not doubts
+    for relation in found:
+        assert relation.scatter < 0.02 * relation.span
+        assert (relation.pressure, relation.temperature) == (1.0e5, 288.0)
+        assert relation.blur == 0.0
+        assert abs(relation.lag) <= 0.25
+
+
+def test_a_comparison_equals_least_squares_without_outliers():
+    random = np.random.default_rng(5)
+    told = random.uniform(0.2, 0.9, 400)
+    read = 0.83 * told + 0.04 + 0.01 * random.standard_normal(400)
+    found = compare(read, told)
+    slope, offset = np.polyfit(told, read, 1)
+    assert_allclose(found.scale, slope, atol=3e-3)
+    assert_allclose(found.level, offset + slope * told.mean(), atol=1e-3)
+    residual = np.std(read - slope * told - offset)
+    assert_allclose(found.scale_std, residual / (np.std(told) * np.sqrt(400)), rtol=0.6)
+
+
+def test_what_does_not_explain_the_reading_is_no_witness():
+    diesels = [drive(seed, diesel=True) for seed in (1, 2, 3)]
+    assert learn_witnesses(diesels, CAR) == ((), ())
+
+
+def test_a_source_is_no_witness_of_itself():
+    air = replace(CAR, torque=TorqueModel(source="air_flow"))
+    found, _ = learn_witnesses(KNOWN, air)
+    assert "mass_air_flow" not in [w.signal for w in found]
+    assert "engine_load" in [w.signal for w in found]
+
+
+def test_other_drives_agree():
+    for seed in range(10, 18):
+        made = drive(seed)
+        assert [f.verdict for f in findings(made, TWO)] == ["agrees", "agrees"]
+        assert check_witnesses(made, TWO) == ()
+
+
+FAULTS = {
+    "scale 0.8": (lambda t, x: 0.8 * x, "0.80 times as much as mass_air_flow tells"),
+    "scale 1.25": (lambda t, x: 1.25 * x, "1.25 times as much"),
+    "scale from the middle": (lambda t, x: np.where(t < MIDDLE, x, 0.8 * x), "s on: one of"),
+    "scale until the middle": (lambda t, x: np.where(t < MIDDLE, 0.8 * x, x), " until "),
+    "ramp": (lambda t, x: x * (1.0 - 0.25 * t / END), "times as much as mass_air_flow"),
+    "offset from the middle": (lambda t, x: x + 0.12 * (t > MIDDLE), "% of its range more than"),
+    "smoothed by 1 s": (smoothed(1.0), "with a time constant of 1 s"),
+    "smoothed by 3 s": (smoothed(3.0), "with a time constant of 3 s"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_reading_that_left_its_only_witness_gives_no_mass(fault):
+    change, words = FAULTS[fault]
+    (problem,) = check_witnesses(changed(drive(20), "engine_load", change), ALONE)
+    assert problem.serious
+    assert problem.signal == "engine_load"
+    assert words in problem.text
+
+
+@pytest.mark.parametrize("method", METHODS[:-1])
+def test_every_method_refuses_it(method):
+    made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
+    with pytest.raises(
+        DriveError, match=r"drive 20: engine_load reads 0\.80 times as much as mass"
+    ):
+        wb.weigh(made, ALONE, method)
+
+
+def test_a_moderate_disagreement_is_a_warning():
+    made = changed(drive(20), "engine_load", lambda t, x: 0.93 * x)
+    (problem,) = check_witnesses(made, ALONE)
+    assert not problem.serious
+    assert "0.93 times as much as mass_air_flow" in problem.text
+
+
+def test_where_the_change_begins_is_told():
+    made = changed(drive(20), "engine_load", lambda t, x: np.where(t < 1050.0, x, 0.8 * x))
+    (found,) = findings(made, ALONE)
+    assert abs(found.start - 1050.0) < 0.06 * END
+    assert abs(found.scale - 0.8) < 0.02
+
+
+def test_a_small_change_in_the_drive_is_told_against_what_was_before():
+    # 3 % up before and down after: neither leaves what drives of one car differ by.
+    made = changed(drive(20), "engine_load", lambda t, x: np.where(t < MIDDLE, 1.03, 0.97) * x)
+    (problem,) = check_witnesses(made, ALONE)
+    assert not problem.serious
+    assert "on against before" in problem.text
+
+
+def test_two_witnesses_say_that_the_reading_is_wrong():
+    made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
+    (problem,) = check_witnesses(made, TWO)
+    assert problem.serious
+    assert "mass_air_flow and intake_pressure tell" in problem.text
+    assert "engine_load is wrong" in problem.text
+
+
+def test_a_witness_alone_against_another_is_off_itself():
+    made = changed(drive(20), "mass_air_flow", lambda t, x: 0.7 * x)
+    (problem,) = check_witnesses(made, TWO)
+    assert not problem.serious
+    assert problem.signal == "mass_air_flow"
+    assert "mass_air_flow is off" in problem.text
+    assert "intake_pressure agrees with engine_load" in problem.text
+
+
+def test_more_fuel_than_torque_is_doubted_and_less_refused():
+    fuel = learnt(("fuel_rate",))
+    regenerating = changed(drive(20), "fuel_rate", lambda t, x: 1.25 * x)
+    (problem,) = check_witnesses(regenerating, fuel)
+    assert not problem.serious
+    (problem,) = check_witnesses(changed(drive(20), "fuel_rate", lambda t, x: 0.8 * x), fuel)
+    assert problem.serious
+
+
+def test_what_a_person_vouches_for_gives_a_mass():
+    made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
+    made = replace(made, info=replace(made.info, trusted=("engine_load",)))
+    (problem,) = check_witnesses(made, ALONE)
+    assert not problem.serious
+
+
+@pytest.mark.parametrize("normalised", [True, False])
+def test_thin_air_is_no_fault(normalised):
+    """Load is the share of what the air there lets the engine take, or it is not (SAE J1979)."""
+    car = learnt(known=[drive(seed, normalised=normalised) for seed in (1, 2, 3)])
+    high = drive(20, warm=303.0, pressure=0.82e5, normalised=normalised)
+    assert check_witnesses(high, car) == ()
+    # Without the air known to the check the same drive would be doubted, one way or the other.
+    (found,) = findings(high, car)
+    assert abs(found.scale - 1.0) < 0.02 if not normalised else found.scale > 1.15
+
+
+def test_air_accounts_for_no_more_than_it_can():
+    relation = ALONE.witnesses[0]
+    low, high = accepted_scales("load", relation, (0.8e5, 288.0))
+    assert_allclose((low, high), (1.0, 1.25), rtol=1e-9)
+    assert accepted_scales("measured", relation, (0.8e5, 300.0)) == (1.0, 1.0)
+    low, high = accepted_scales("load", relation, (np.nan, 288.0))
+    assert low < 0.95 < 1.05 < high
+
+
+def test_delays_gaps_jitter_and_dropouts_are_no_fault():
+    random = np.random.default_rng(7)
+    made = drive(20)
+
+    def moved(name, shift):
+        s = made.signals[name]
+        return made.with_signals(replace(s, time=s.time + shift))
+
+    def thinned(keep):
+        return replace(
+            made,
+            signals={
+                n: Signal(n, s.time[m := keep(s.time)], s.values[m])
+                for n, s in made.signals.items()
+            },
+        )
+
+    harmless = {
+        "the reading late by 1 s": moved("engine_load", 1.0),
+        "the witness late by 0.8 s": moved("mass_air_flow", 0.8),
+        "half of all cells empty": thinned(lambda t: random.random(t.size) < 0.5),
+        "gaps": thinned(lambda t: (t % 200.0) > 20.0),
+        "dropouts of engine speed": changed(
+            made, "engine_speed", lambda t, x: np.where(random.random(x.size) < 0.03, 0.0, x)
+        ),
+        "steps of load": changed(made, "engine_load", lambda t, x: np.round(x / 0.05) * 0.05),
+        "a noisy witness": changed(
+            made, "mass_air_flow", lambda t, x: x * (1.0 + 0.1 * random.standard_normal(x.size))
+        ),
+        "an hour's jump of all clocks": replace(
+            made,
+            signals={
+                n: replace(s, time=s.time + 3600.0 * (s.time > MIDDLE))
+                for n, s in made.signals.items()
+            },
+        ),
+    }
+    for what, spoilt in harmless.items():
+        assert not any(p.serious for p in check_witnesses(spoilt, ALONE)), what
+
+
+def test_nothing_is_said_where_nothing_can_be():
+    made = drive(20)
+    assert check_witnesses(made, None) == ()
+    assert check_witnesses(made, CAR) == ()
+    assert check_witnesses(made.without("mass_air_flow"), ALONE) == ()
+    assert check_witnesses(made.without("engine_load"), ALONE) == ()
+    assert check_witnesses(made.without("vehicle_speed"), ALONE) == ()
+    assert check_witnesses(made.between(0.0, 60.0), ALONE) == ()
+    empty = Signal("mass_air_flow", np.zeros(0), np.zeros(0))
+    assert check_witnesses(made.with_signals(empty), ALONE) == ()
+    still = changed(made, "engine_speed", lambda t, x: 0.0 * x)
+    assert check_witnesses(still, ALONE) == ()
+
+
+def test_calibration_drives_that_contradict_each_other_are_told():
+    off = changed(drive(4), "engine_load", lambda t, x: 0.8 * x)
+    found, doubts = learn_witnesses([*KNOWN[:2], off], CAR)
+    assert found == ()
+    assert len(doubts) == 3
+    assert "drive 1 and drive 4 contradict each other" in doubts[0]
+    assert "same mass_air_flow engine_load reads 0.80 times as much in the second" in doubts[0]
+
+
+def electric_drive(seed, heating=0.0, read=1.0):
+    """Motor torque of both signs with voltage and current, which is positive while charging."""
+    random = np.random.default_rng(seed)
+    time = np.arange(0.0, END, 0.2)
+    turning = np.clip(400.0 + 150.0 * slow_noise(random, time, 20.0), 30.0, 1100.0)
+    torque = 70.0 * slow_noise(random, time, 5.0)
+    power = torque * turning * np.where(torque > 0.0, 1.0 / 0.9, 0.9) + 600.0 + heating
+    volts = 360.0 - 2e-4 * power
+    values = {
+        "vehicle_speed": turning / 28.0,
+        "engine_torque": read * torque,
+        "battery_voltage": volts,
+        "battery_current": -power / volts,
+    }
+    return Drive(f"trip {seed}", {n: Signal(n, time, x) for n, x in values.items()})
+
+
+def test_a_battery_bears_witness_of_a_motor_whatever_is_heated():
+    found, _ = learn_witnesses([electric_drive(seed) for seed in (1, 2)], ELECTRIC)
+    assert [w.signal for w in found] == ["battery_current"]
+    car = replace(ELECTRIC, witnesses=found)
+    assert check_witnesses(electric_drive(3, heating=4000.0), car) == ()
+    (found,) = findings(electric_drive(3, read=0.8), car)
+    assert_allclose(found.scale, 0.8, atol=0.015)
+    (problem,) = check_witnesses(electric_drive(3, read=0.8), car)
+    assert problem.serious
+    assert "times as much as battery_current tells" in problem.text
+
+
+def test_rows_need_a_reference_torque_to_be_a_torque():
+    percent = replace(CAR, torque=TorqueModel(source="percent"))
+    s = KNOWN[0].signals["engine_load"]
+    made = KNOWN[0].with_signals(replace(s, name="engine_torque_fraction"))
+    assert rows_of(made, percent, BY_SIGNAL["mass_air_flow"]) is None
+    known = replace(percent, torque=replace(percent.torque, reference_torque=250.0))
+    rows = rows_of(made, known, BY_SIGNAL["mass_air_flow"])
+    assert_allclose(rows.reading, 250.0 * s.values)
+
+
+def test_a_relation_is_one_of_a_known_signal():
+    good = ALONE.witnesses[0]
+    for fields, words in (
+        ({"signal": "throttle"}, "signal must be one of"),
+        ({"coefficients": (1.0, 2.0)}, "must be 4 numbers"),
+        ({"span": 0.0}, "span must be a positive"),
+        ({"blur": -1.0}, "blur must be zero or positive"),
+    ):
+        with pytest.raises(wb.ConfigError, match=words):
+            replace(good, **fields)
+    with pytest.raises(wb.ConfigError, match="must stand once"):
+        replace(CAR, witnesses=(good, good))
+    assert isinstance(good, WitnessRelation)
