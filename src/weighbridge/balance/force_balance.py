@@ -33,7 +33,7 @@ from weighbridge.vehicle.gear import (
     shifting,
 )
 from weighbridge.vehicle.model import DraggedReading, Vehicle, VehicleClass
-from weighbridge.vehicle.torque import engine_torque, source_signal
+from weighbridge.vehicle.torque import engine_torque, source_of, source_signal
 
 
 class Reason(IntEnum):
@@ -301,7 +301,7 @@ def force_balance(
     air_speed = rows["speed"] + headwind(drive, rows["heading"])
     drag = 0.5 * density * vehicle.road_load.drag_area * air_speed * np.abs(air_speed)
 
-    signed = signed and vehicle.torque.source in ("measured", "percent")
+    signed = signed and source_of(vehicle).signed
     needed, weight = _needed_force(vehicle, rows["specific_force"], drag, rotating)
     pressed = brake_pressed(drive, recorded)
     dead = pressed is not None and _misses(pressed, rows, traction, needed, weight)

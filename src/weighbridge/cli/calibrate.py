@@ -81,10 +81,11 @@ def calibrate(
         run_speed_calibration,
     )
     from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
     refuse_overwriting(output, force, "vehicle file")
-    if torque not in (None, "measured", "percent", "load", "air_flow"):
-        raise ConfigError(f"--torque {torque}: must be measured, percent, load or air_flow")
+    if torque is not None and torque not in TORQUE_SOURCES:
+        raise ConfigError(f"--torque {torque}: must be {TORQUE_SOURCES.names}")
     base = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = mapping_for(mapping, base, vehicle)
     read = inputs(drives, vehicle, chosen, dbc)
@@ -92,7 +93,7 @@ def calibrate(
     recorded = [load(path, chosen, dbc) for path in drives]
     settings = CalibrationSettings(
         order=order,
-        source=torque,  # type: ignore[arg-type]
+        source=torque,
         grid=grid,
         curved=not straight,
         method=method,  # type: ignore[arg-type]

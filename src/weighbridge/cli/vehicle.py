@@ -99,7 +99,7 @@ def new(
             tyre=tyre,
             gear_ratios=_ratios(gear_ratios),
             final_drive=final_drive,
-            torque=torque,  # type: ignore[arg-type]
+            torque=torque,
             reference_torque=reference_torque,
             drag_coefficient=drag_coefficient,
             frontal_area=frontal_area,

@@ -18,24 +18,14 @@ from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
-from weighbridge.vehicle.model import MASS_RANGE, TorqueSource, Vehicle, VehicleClass
+from weighbridge.vehicle.model import MASS_RANGE, Vehicle, VehicleClass
+from weighbridge.vehicle.torque import source_of
 
 STOP: Final = 20.0
 """A standstill this long may change the load [s]."""
 
 WARMING: Final = 600.0
 """Time in which engine and tyres warm [s]."""
-
-COLD_STD: Final[dict[TorqueSource, float]] = {
-    "measured": 0.02,
-    "percent": 0.02,
-    "load": 0.05,
-    "air_flow": 0.05,
-}
-"""Standard deviation of a mass made from the first `WARMING` alone, relative [-]. Load and
-air flow count the friction of a cold engine as traction: simulated cold drives of 13
-minutes came out 5 to 8 % heavy, and right when warm. Measured torque leaves the tyres, a
-fifth more rolling resistance."""
 
 OTHER_METHOD_STD: Final = 0.06
 """Relative standard deviation of masses that the joint estimator makes with a torque that
@@ -112,11 +102,11 @@ def consider_std(balance: ForceBalance, phi: Floats, used: Bools, vehicle: Vehic
 
     What the calibration left open, how the motion was found, and the cold
     start: engine and tyres that are not warm yet make a vehicle seem heavy, by
-    as much as `COLD_STD` where all that was learnt is from the first `WARMING`
+    as much as `TorqueSource.cold_std` where all that was learnt is from the first `WARMING`
     of driving.
     """
     share = cold_share(balance.merged.time, phi, used)
-    cold = share * COLD_STD[vehicle.torque.source]
+    cold = share * source_of(vehicle).cold_std
     return float(np.hypot(calibration_std(balance, vehicle), cold))
 
 
@@ -352,7 +342,7 @@ def segments(
             continue
         mass, std = weigh_part(part)
         cold = cold_share(time[part], phi[part], used[part], begin)
-        spread = (slow, UNMODELLED_STD, cold * COLD_STD[vehicle.torque.source])
+        spread = (slow, UNMODELLED_STD, cold * source_of(vehicle).cold_std)
         std = float(np.sqrt(std**2 + np.sum(np.square(spread)) * mass**2))
         known = np.isfinite(std) and std < 0.15 * mass and low < mass < high
         found.append(

@@ -11,6 +11,7 @@ from weighbridge.estimators.judging import HEAVIEST
 from weighbridge.signals import Drive
 from weighbridge.vehicle.data_sheet import scale_std, usual_efficiency
 from weighbridge.vehicle.model import MASS_RANGE, Vehicle, VehicleClass
+from weighbridge.vehicle.torque import source_of
 
 POUND: Final = 0.45359237
 """[kg], by definition."""
@@ -97,7 +98,7 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
         No torque is so far off.
     """
     model = vehicle.torque
-    if model.source not in ("measured", "percent") or len(model.coefficients) < 2:
+    if not source_of(vehicle).signed or len(model.coefficients) < 2:
         return ""
     slope = model.coefficients[1] + (float(np.mean(model.knot_slopes)) if model.knots else 0.0)
     ratio = slope / usual_efficiency(vehicle)[0]

@@ -29,7 +29,8 @@ from weighbridge.signals import Drive
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
-from weighbridge.vehicle.torque import SIGNALS
+from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.visible import visible_json
 
 if TYPE_CHECKING:
@@ -480,9 +481,9 @@ def empty_result(drive: str, vehicle: str, method: str, reason: str) -> dict[str
 
 def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
     """Say which signals a drive lacks for this vehicle; empty if none."""
-    source = vehicle.torque.source
-    missing = drive.missing(SIGNALS[source])
-    if source in ("measured", "percent") and vehicle.driveline.single_speed:
+    source = source_of(vehicle)
+    missing = drive.missing(source.signals)
+    if source.signed and vehicle.driveline.single_speed:
         missing = [name for name in missing if name != "engine_speed"]
     if not (drive.has("vehicle_speed") or drive.has("gnss_speed")) and not drive.has("latitude"):
         missing.append("vehicle_speed")
@@ -496,12 +497,12 @@ def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
             "neither gears nor torque: calibrate without --method speed-ekf to weigh by torque"
         )
     names = " and ".join(dict.fromkeys(missing))
-    sentence = f"the drive has no {names}, which torque source {source!r} needs"
-    others = [s for s, needed in SIGNALS.items() if s != source and drive.has(*needed)]
+    sentence = f"the drive has no {names}, which torque source {source.name!r} needs"
+    others = [s for s in TORQUE_SOURCES.values() if s != source and drive.has(*s.signals)]
     if others and drive.has("vehicle_speed"):
         return (
-            f"{sentence}; it has {' and '.join(SIGNALS[others[0]])}: weigh it with a vehicle file "
-            f"of torque source {others[0]!r} (weighbridge calibrate --torque {others[0]})"
+            f"{sentence}; it has {' and '.join(others[0].signals)}: weigh it with a vehicle file "
+            f"of torque source {others[0].name!r} (weighbridge calibrate --torque {others[0].name})"
         )
     return f"{sentence}; nothing can be weighed"
 

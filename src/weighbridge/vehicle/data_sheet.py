@@ -15,7 +15,8 @@ import numpy as np
 
 from weighbridge.signals import Floats
 from weighbridge.vehicle.class_values import road_prior
-from weighbridge.vehicle.model import Layout, TorqueSource, Vehicle, VehicleClass
+from weighbridge.vehicle.model import Layout, Vehicle, VehicleClass
+from weighbridge.vehicle.torque import source_of
 
 Fuel = Literal["petrol", "diesel"]
 
@@ -45,19 +46,6 @@ CLASS_EFFICIENCY: Final[dict[VehicleClass, tuple[float, float]]] = {
 between both layouts. Trucks: 0.99 in a direct and 0.96 in other gears (Annex VI, as above),
 times 0.98 in a single reduction axle without its drag (Annex VII); buses have automatic
 gearboxes."""
-
-TORQUE_STD: Final[dict[TorqueSource, float]] = {
-    "measured": 0.04,
-    "percent": 0.04,
-    "load": 0.06,
-    "air_flow": 0.06,
-}
-"""Scale of the torque that a control unit tells, relative standard deviation [-]: a maker's
-bus specification grants 10 % or 5 N m, Regulation (EU) 582/2011 7 % of the full load
-torque, and limits are two standard deviations. Load and air flow are only roughly torque."""
-
-MOTOR_TORQUE_STD: Final = 0.03
-"""The same of an electric motor, told from its currents [-]: its limit is 5 %."""
 
 RADIUS_STD: Final = 0.015
 """Rolling radius from the size of the tyre, relative standard deviation [-]: tolerance of the
@@ -105,8 +93,7 @@ MOST_ACCESSORIES: Final = 0.5
 
 def by_data_sheet(vehicle: Vehicle) -> bool:
     """Whether torque is told by the vehicle, and nothing has calibrated it."""
-    told = vehicle.torque.source in ("measured", "percent")
-    return told and not vehicle.provenance.torque_fitted
+    return source_of(vehicle).signed and not vehicle.provenance.torque_fitted
 
 
 def usual_efficiency(vehicle: Vehicle) -> tuple[float, float]:
@@ -142,9 +129,10 @@ def torque_std(vehicle: Vehicle) -> float:
     """Relative standard deviation of the torque's scale: as the file says, else as usual."""
     if vehicle.torque.scale_std is not None:
         return vehicle.torque.scale_std
-    if vehicle.driveline.single_speed and vehicle.torque.source == "measured":
-        return MOTOR_TORQUE_STD
-    return TORQUE_STD[vehicle.torque.source]
+    source = source_of(vehicle)
+    if vehicle.driveline.single_speed and source.motor_scale_std is not None:
+        return source.motor_scale_std
+    return source.scale_std
 
 
 def scale_std(vehicle: Vehicle) -> float:

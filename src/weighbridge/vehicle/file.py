@@ -108,7 +108,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
     "torque": (
         TorqueModel,
         (
-            _Key("source", "source", "load, measured, percent or air_flow", "text"),
+            _Key("source", "source", "how torque is found, such as load or measured", "text"),
             _Key(
                 "coefficients",
                 "coefficients",

@@ -17,10 +17,10 @@ from weighbridge.vehicle.model import (
     Provenance,
     RoadLoad,
     TorqueModel,
-    TorqueSource,
     Vehicle,
     VehicleClass,
 )
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
 
 EngineKind = Literal["petrol", "diesel", "electric"]
@@ -49,7 +49,7 @@ class Known:
     tyre : size as on its side, such as ``205/55 R16``
     gear_ratios : of the gears, falling; of an electric car 1 alone where ``final_drive`` has all
     final_drive : ratio behind the gearbox; 1 when None
-    torque : how the drives tell torque: "measured" in N m, "percent", "load" or "air_flow"
+    torque : how the drives tell torque, by the name of its source
     reference_torque : 100 % of a torque in percent [N m]
     drag_coefficient, frontal_area : [-], [m^2]
     layout : how the engine lies, "transverse" or "longitudinal"
@@ -63,7 +63,7 @@ class Known:
     tyre: str | None = None
     gear_ratios: Sequence[float] = ()
     final_drive: float | None = None
-    torque: TorqueSource | None = None
+    torque: str | None = None
     reference_torque: float | None = None
     drag_coefficient: float | None = None
     frontal_area: float | None = None
@@ -106,7 +106,7 @@ def describe(known: Known) -> Described:
     origins: dict[tuple[str, str], str] = {}
     driveline = _driveline(known, origins)
     torque = TorqueModel()
-    if known.torque in ("measured", "percent"):
+    if known.torque is not None and TORQUE_SOURCES[known.torque].signed:
         torque = TorqueModel(source=known.torque, reference_torque=known.reference_torque)
         origins["torque", "source"] = "given"
     vehicle = Vehicle(
@@ -129,7 +129,7 @@ def _notes(known: Known) -> str:
     told = ["written by weighbridge vehicle new; nothing is calibrated"]
     if known.engine is not None:
         told.append(f"{known.engine} engine" if known.engine != "electric" else "electric motor")
-    if known.torque in ("load", "air_flow"):
+    if known.torque is not None and not TORQUE_SOURCES[known.torque].signed:
         told.append(f"torque by {known.torque.replace('_', ' ')}, which calibrate finds")
     return "; ".join(told)
 
@@ -139,7 +139,7 @@ def _refuse(known: Known) -> None:
         raise ConfigError(f"class must be {', '.join(MASS_RANGE)}, got {known.kind!r}")
     for name, value, choice in (
         ("engine", known.engine, get_args(EngineKind)),
-        ("torque", known.torque, get_args(TorqueSource)),
+        ("torque", known.torque, tuple(TORQUE_SOURCES)),
     ):
         if value is not None and value not in choice:
             raise ConfigError(f"{name} must be {', '.join(choice)}, got {value!r}")
@@ -165,7 +165,8 @@ def _refuse(known: Known) -> None:
         raise ConfigError("a final drive needs gear ratios, such as 3.8,2.1,1.4,1.0")
     if (known.drag_coefficient is None) != (known.frontal_area is None):
         raise ConfigError("drag coefficient and frontal area belong together; give both or none")
-    if known.reference_torque is not None and known.torque != "percent":
+    source = TORQUE_SOURCES[known.torque] if known.torque is not None else None
+    if known.reference_torque is not None and not (source and source.needs_reference):
         raise ConfigError("a reference torque is that of a torque in percent; name percent as well")
 
 

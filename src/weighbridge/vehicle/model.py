@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.errors import ConfigError
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.visible import visible
 
 FORMAT_VERSION: Final = 1
 """Version of the vehicle file this program writes and reads."""
 
-TorqueSource = Literal["load", "measured", "percent", "air_flow"]
 VehicleClass = Literal["car", "van", "bus", "truck"]
 Layout = Literal["transverse", "longitudinal"]
 
@@ -135,8 +135,7 @@ class TorqueModel:
 
     Attributes
     ----------
-    source : "load" (regression, Jensen 2022 eq. 49), "measured" (torque in N m),
-        "percent" (percent of the reference torque) or "air_flow" (eq. 51)
+    source : name of one of `weighbridge.vehicle.torque_sources.TORQUE_SOURCES`
     coefficients : w0, w1 (per unit of load or of air flow torque), then w2, w3 ...
         of rising powers of engine speed in rad/s; for measured and percent
         torque (offset [N m], scale [-]), empty meaning (0, 1), then as well powers of
@@ -157,7 +156,7 @@ class TorqueModel:
         extrapolated and the sample left out ([-], [rad/s])
     """
 
-    source: TorqueSource = "measured"
+    source: str = "measured"
     coefficients: tuple[float, ...] = ()
     coefficient_stds: tuple[float, ...] = ()
     curvature: tuple[float, ...] = ()
@@ -172,15 +171,15 @@ class TorqueModel:
     speed_range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        if self.source not in ("load", "measured", "percent", "air_flow"):
+        source = TORQUE_SOURCES.get(self.source)
+        if source is None:
+            raise ConfigError(f"torque source must be {TORQUE_SOURCES.names}, got {self.source!r}")
+        if source.needs_map and len(self.coefficients) < 2:
             raise ConfigError(
-                f"torque source must be load, measured, percent or air_flow, got {self.source!r}"
+                f"torque source {self.source!r} needs at least two coefficients: "
+                "run weighbridge calibrate"
             )
-        if self.source == "load" and len(self.coefficients) < 2:
-            raise ConfigError(
-                "torque source 'load' needs at least two coefficients: run weighbridge calibrate"
-            )
-        if self.source in ("measured", "percent") and len(self.coefficients) == 1:
+        if source.signed and len(self.coefficients) == 1:
             raise ConfigError(
                 f"torque source {self.source!r} takes two coefficients, offset and scale, and "
                 "powers of engine speed behind them, or none, got 1"
