@@ -96,10 +96,10 @@ def calibrate(
         source=torque,
         grid=grid,
         curved=not straight,
-        method=method,  # type: ignore[arg-type]
+        method=method,
     )
     masses = mass[0] if mass is not None and len(mass) == 1 else mass
-    if settings.method == "speed-ekf":
+    if not settings.fit.torque:
         _refuse_torque_options(torque, order, grid, straight)
         by_speed = run_speed_calibration(recorded, masses, vehicle=base)
         car, found = by_speed.vehicle, speed_table(by_speed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
     Driveline,
@@ -79,17 +80,23 @@ class CalibrationSettings:
     source: str | None = None
     grid: bool = False
     curved: bool = True
-    method: Literal["joint", "rls", "speed-ekf"] = "joint"
+    method: str = JOINT.name
 
     def __post_init__(self) -> None:
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
         if self.source is not None and self.source not in TORQUE_SOURCES:
             raise ConfigError(f"source must be one of {TORQUE_SOURCES.names}, got {self.source!r}")
-        if self.method not in ("joint", "rls", "speed-ekf"):
-            raise ConfigError(f"method must be joint, rls or speed-ekf, got {self.method!r}")
-        if self.grid and self.method != "rls":
+        if self.method not in FITS:
+            *most, last = FITS
+            raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+        if self.grid and self.fit != RLS:
             raise ConfigError("the grid of Jensen 2022 is of method rls; calibrate with that")
+
+    @property
+    def fit(self) -> Fit:
+        """What is fitted."""
+        return FITS[self.method]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +140,7 @@ def calibrate(
     DriveError, ConfigError
         A drive or an argument cannot be used; the sentence says why.
     """
-    if settings is not None and settings.method == "speed-ekf":
+    if settings is not None and not settings.fit.torque:
         return run_speed_calibration(drives, mass, vehicle=vehicle).vehicle
     return run_calibration(drives, mass, vehicle=vehicle, settings=settings).vehicle
 
@@ -179,8 +186,8 @@ def run_calibration(
 ) -> Calibration:
     """As `calibrate`, keeping what the report shows."""
     settings = settings or CalibrationSettings()
-    if settings.method == "speed-ekf":
-        raise ConfigError("method speed-ekf has no torque fit; use run_speed_calibration")
+    if not settings.fit.torque:
+        raise ConfigError(f"method {settings.method} has no torque fit; use run_speed_calibration")
     drives, base, masses = _checked(drives, mass, vehicle, settings.source)
     source = TORQUE_SOURCES[settings.source] if settings.source else best_source(drives, base)
     for drive in drives:
@@ -258,7 +265,7 @@ def run_calibration(
             r_squared=fitted.r_squared,
             residual_std=fitted.residual_std,
             samples=int(rows.target.size),
-            method="rls",
+            method=RLS.name,
             motion=motions[0].source if len({m.source for m in motions}) == 1 else None,
             notes=_notes(fitted, low < high, rows.target.size, found),
         ),
@@ -279,7 +286,7 @@ def run_calibration(
             ),
         ),
     )
-    if settings.method == "joint":
+    if settings.fit.refined:
         asked = JointProblem(
             balance_at=_balance_at(
                 drives, motions, replace(draft, dragged=finished.dragged), source, floors

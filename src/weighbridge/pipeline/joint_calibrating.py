@@ -25,6 +25,7 @@ from weighbridge.estimators import joint
 from weighbridge.estimators.considered import pinned, triangle
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.fits import JOINT
 from weighbridge.vehicle.model import Driveline, Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -190,7 +191,7 @@ def refine(
 
 def _as_it_is(vehicle: Vehicle, why: str) -> Vehicle:
     """Keep the torque of eq. 48, to be scaled alone."""
-    made = replace(vehicle, provenance=replace(vehicle.provenance, method="joint"))
+    made = replace(vehicle, provenance=replace(vehicle.provenance, method=JOINT.name))
     return noted(made, f"scaled, not fitted anew: {why}")
 
 
@@ -286,7 +287,7 @@ def _with(
             wheel_inertia_std=stds[-1],
         ),
         timing=replace(vehicle.timing, torque_delay=delay, torque_lag=lag),
-        provenance=replace(vehicle.provenance, method="joint", mass_scale_std=None),
+        provenance=replace(vehicle.provenance, method=JOINT.name, mass_scale_std=None),
     )
 
 

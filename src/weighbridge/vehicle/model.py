@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.errors import ConfigError
+from weighbridge.vehicle.fits import FITS, Fit
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.visible import visible
 
@@ -521,13 +522,19 @@ class Provenance:
                 "fit_cov must be the lower triangle of a square, 1, 3, 6, 10 ... numbers, "
                 f"got {len(self.fit_cov)}"
             )
-        if self.method not in (None, "joint", "rls", "speed-ekf"):
-            raise ConfigError(f"method must be joint, rls or speed-ekf, got {self.method!r}")
+        if self.method is not None and self.method not in FITS:
+            *most, last = FITS
+            raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+
+    @property
+    def fit(self) -> Fit | None:
+        """What was fitted; None where nothing was, or the file does not say it."""
+        return FITS[self.method] if self.method is not None else None
 
     @property
     def torque_fitted(self) -> bool:
         """Whether a calibration has fitted the torque to drives of known mass."""
-        return self.method in ("joint", "rls") or (self.method is None and bool(self.masses))
+        return bool(self.masses) if self.fit is None else self.fit.torque
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

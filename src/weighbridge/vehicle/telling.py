@@ -50,7 +50,7 @@ def tell(vehicle: Vehicle) -> list[tuple[str, str]]:
 
 def can_weigh(vehicle: Vehicle) -> bool:
     """Whether a drive can be weighed with it: gears are known, and what the torque is worth."""
-    if vehicle.provenance.torque_fitted or vehicle.provenance.method == "speed-ekf":
+    if vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None:
         return True
     stated = vehicle.torque.source != "measured" or vehicle.torque != TorqueModel()
     return bool(vehicle.driveline.gearings) and (stated or by_data_sheet(vehicle))
