@@ -51,6 +51,7 @@ def commands(folder: Path) -> None:
 def calibration() -> None:
     """Time the calibration and its parts beside their peers."""
     from weighbridge.calibration import grid, regression
+    from weighbridge.vehicle.classes import VEHICLE_CLASSES
     from weighbridge.pipeline.calibrating import run_calibration
     from weighbridge.simulation import make_scenario, simulate_car
 
@@ -83,7 +84,7 @@ def calibration() -> None:
         f"{'  one regression per point (from 81 points)':<44}{whole:8.0f} s, {whole / ours:.0f} x"
     )
 
-    low, high = regression.BOUNDS["car"]
+    low, high = VEHICLE_CLASSES["car"].road_bounds
     begin = time.perf_counter()
     regression.fit(rows, low, high)
     ours = time.perf_counter() - begin

@@ -130,7 +130,7 @@ def test_a_mass_below_the_tare_is_none(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_mass_above_what_loads_explain_is_none(method):
-    light = replace(BUS, tare=MASS / (1.15 * judging.HEAVIEST["bus"]))
+    light = replace(BUS, tare=MASS / (1.15 * BUS.of_class.heaviest))
     track = ESTIMATORS[method].track(balance(), light)
     assert track.status is Status.INCONSISTENT
     assert "more than 2.6 times" in track.why

@@ -10,7 +10,7 @@ import weighbridge as wb
 from weighbridge.pipeline.inspection import inspect_drive
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import ELECTRIC, make_scenario, simulate_car
-from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 from weighbridge.vehicle.power_balance import METER_STD, by_power, find_power_balance
@@ -21,7 +21,7 @@ VOLTS = 370.0
 
 def sheet(car=ELECTRIC):
     """The vehicle file of a data sheet."""
-    mean, _ = road_prior("car", single_speed=True)
+    mean, _ = VEHICLE_CLASSES["car"].road_prior(single_speed=True)
     return Vehicle(
         name="electric",
         tare=car.mass,

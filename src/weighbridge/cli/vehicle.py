@@ -92,7 +92,7 @@ def new(
     made = describe(
         Known(
             name=name,
-            kind=kind,  # type: ignore[arg-type]
+            kind=kind,
             engine=engine,  # type: ignore[arg-type]
             tare=tare,
             gross=gross,

@@ -14,7 +14,6 @@ from weighbridge.estimators.regression import regression
 from weighbridge.kernels.disturbance import DisturbanceParams
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.data_sheet import (
     USUAL_SPEED,
     by_data_sheet,
@@ -258,7 +257,7 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, grade_open: float
     load = vehicle.road_load
     drag, rolling = load.drag_area_std, load.rolling_coefficient_std
     if vehicle.provenance.mass_scale_std is None:
-        _, std = road_prior(vehicle.kind, single_speed=vehicle.driveline.single_speed)
+        _, std = vehicle.of_class.road_prior(single_speed=vehicle.driveline.single_speed)
         drag = float(std[0]) if drag is None else drag
         rolling = float(std[1]) if rolling is None else rolling
     grade = GRAVITY * grade_open

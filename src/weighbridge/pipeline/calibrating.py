@@ -15,7 +15,6 @@ from weighbridge.balance.force_balance import ForceBalance, dragged_reading
 from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.regression import (
-    BOUNDS,
     ROAD_PARAMETERS,
     TorqueFit,
     TorqueRows,
@@ -37,7 +36,7 @@ from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointPro
 from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.classes import VehicleClass
 from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
@@ -48,7 +47,6 @@ from weighbridge.vehicle.model import (
     Timing,
     TorqueModel,
     Vehicle,
-    VehicleClass,
 )
 from weighbridge.vehicle.torque import DRAGGED_TIME, averaged, source_of
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
@@ -197,7 +195,7 @@ def run_calibration(
                 f"which torque source {source.name!r} needs"
             )
     found_motions = [find_motion(drive, base) for drive in drives]
-    motions, squat = _one_squat(found_motions, masses, base.kind)
+    motions, squat = _one_squat(found_motions, masses, base.of_class)
 
     gears, draft = _draft(drives, motions, base, source)
     driveline = draft.driveline
@@ -234,7 +232,7 @@ def run_calibration(
     fitted = fit(rows, low, high)
     _refuse_nonsense(drives, fitted, rows, source, curved)
     if settings.grid:
-        if base.kind != "car" or driveline.single_speed:
+        if not base.of_class.jensen_grid or driveline.single_speed:
             raise ConfigError(
                 "the grid of Jensen 2022 is for cars with gears; calibrate without --grid"
             )
@@ -356,7 +354,7 @@ def _draft(
             gearing_stds=tuple(float(g) for g in gears.stds),
         )
     if driveline.single_speed and driveline.engine_inertia == Driveline().engine_inertia:
-        mean, _ = road_prior(base.kind, single_speed=True)
+        mean, _ = base.of_class.road_prior(single_speed=True)
         driveline = replace(driveline, engine_inertia=float(mean[2]))
     model = TorqueModel(
         source="measured" if source.needs_map else source.name,
@@ -370,11 +368,10 @@ def _draft(
 
 def _bounds(base: Vehicle, driveline: Driveline) -> tuple[Floats, Floats]:
     """Bounds of the road parameters; equal where a parameter is known."""
-    low, high = BOUNDS[base.kind]
+    low, high = base.of_class.road_bounds
     if driveline.single_speed:
         # One gear cannot tell the inertias from the mass, nor rolling resistance from an
         # offset of the torque.
-        low, high = low.copy(), high.copy()
         low[1:] = high[1:] = (
             base.road_load.rolling_coefficient,
             driveline.engine_inertia,

@@ -24,7 +24,6 @@ from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.considered import pinned, triangle
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.fits import JOINT
 from weighbridge.vehicle.model import Driveline, Vehicle
 from weighbridge.vehicle.torque import source_of
@@ -206,7 +205,7 @@ def noted(vehicle: Vehicle, note: str) -> Vehicle:
 
 def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
     """Road load and inertias of the class, and what the given vehicle file says of them."""
-    mean, std = road_prior(vehicle.kind, single_speed=vehicle.driveline.single_speed)
+    mean, std = vehicle.of_class.road_prior(single_speed=vehicle.driveline.single_speed)
     usual = Driveline()
     for k, name in ((2, "engine_inertia"), (3, "wheel_inertia")):
         given, given_std = getattr(known, name), getattr(known, f"{name}_std")

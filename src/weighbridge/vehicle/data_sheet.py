@@ -14,8 +14,7 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.signals import Floats
-from weighbridge.vehicle.class_values import road_prior
-from weighbridge.vehicle.model import Layout, Vehicle, VehicleClass
+from weighbridge.vehicle.model import Layout, Vehicle
 from weighbridge.vehicle.torque import source_of
 
 Fuel = Literal["petrol", "diesel"]
@@ -35,17 +34,6 @@ with drag and pumps (Joachim et al. 2012), a gear without drag 96 % (standard lo
 Regulation (EU) 2017/2400, Annex VI, App. 8, which is meant to be on the safe side). Lengthwise:
 0.97 in the gearbox, in which some gears are direct, times 0.96 in the hypoid axle: 95.5 %
 (40 CFR 1036.545); a van's lost at least 6 % (Transport Research Laboratory, report RR 10)."""
-
-CLASS_EFFICIENCY: Final[dict[VehicleClass, tuple[float, float]]] = {
-    "car": (0.95, 0.020),
-    "van": (0.945, 0.025),
-    "bus": (0.94, 0.025),
-    "truck": (0.95, 0.020),
-}
-"""Of a class, where the layout is not told, or is always lengthwise [-]. Cars and vans stand
-between both layouts. Trucks: 0.99 in a direct and 0.96 in other gears (Annex VI, as above),
-times 0.98 in a single reduction axle without its drag (Annex VII); buses have automatic
-gearboxes."""
 
 RADIUS_STD: Final = 0.015
 """Rolling radius from the size of the tyre, relative standard deviation [-]: tolerance of the
@@ -101,9 +89,9 @@ def usual_efficiency(vehicle: Vehicle) -> tuple[float, float]:
     line = vehicle.driveline
     if line.single_speed:
         return SINGLE_SPEED_EFFICIENCY
-    if vehicle.kind in ("car", "van") and line.layout is not None:
+    if vehicle.of_class.layouts and line.layout is not None:
         return LAYOUT_EFFICIENCY[line.layout]
-    return CLASS_EFFICIENCY[vehicle.kind]
+    return vehicle.of_class.efficiency
 
 
 def wheel_efficiency(vehicle: Vehicle) -> float:
@@ -169,7 +157,7 @@ def inertia_std(vehicle: Vehicle) -> tuple[float, float]:
     As the vehicle file says, else as those of its class scatter.
     """
     line = vehicle.driveline
-    _, std = road_prior(vehicle.kind, single_speed=line.single_speed)
+    _, std = vehicle.of_class.road_prior(single_speed=line.single_speed)
     engine, wheels = line.engine_inertia_std, line.wheel_inertia_std
     return (
         float(std[2]) if engine is None else engine,

@@ -18,7 +18,6 @@ from tomlkit.items import Table
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals.tomlfile import Section, exact_text, read_toml
-from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import (
     FORMAT_VERSION,
     DraggedReading,
@@ -61,7 +60,7 @@ _LINE: Final = 90
 
 _VEHICLE: Final = (
     _Key("name", "name", "for people", "text"),
-    _Key("class", "kind", "car, van, bus or truck", "text"),
+    _Key("class", "kind", "such as car, van, bus or truck", "text"),
     _Key("tare", "tare", "mass without payload; the payload is counted from it", suffix="kg"),
     _Key("gross", "gross", "permitted mass", suffix="kg"),
     _Key("mapping", "mapping", "mapping TOML of its logs, seen from this file's folder", "text"),
@@ -352,7 +351,7 @@ def load_vehicle(path: str | Path) -> Vehicle:
 def _with_usual_inertias(vehicle: Vehicle, stated: Collection[str]) -> Vehicle:
     """Give the inertias that a file leaves out those of its class."""
     line = vehicle.driveline
-    mean, _ = road_prior(vehicle.kind, single_speed=line.single_speed)
+    mean, _ = vehicle.of_class.road_prior(single_speed=line.single_speed)
     engine = line.engine_inertia if "engine_inertia" in stated else float(mean[2])
     wheels = line.wheel_inertia if "wheel_inertia" in stated else float(mean[3])
     return replace(vehicle, driveline=replace(line, engine_inertia=engine, wheel_inertia=wheels))

@@ -5,33 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, Literal, get_args
+from typing import Literal, get_args
 
 from weighbridge.errors import ConfigError
-from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import RADIUS_STD, usual_efficiency
 from weighbridge.vehicle.model import (
-    MASS_RANGE,
     Driveline,
     Layout,
     Provenance,
     RoadLoad,
     TorqueModel,
     Vehicle,
-    VehicleClass,
 )
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
 
 EngineKind = Literal["petrol", "diesel", "electric"]
-
-CLASS_TYRE: Final[dict[VehicleClass, str]] = {
-    "car": "205/55 R16",
-    "van": "235/65 R16",
-    "bus": "275/70 R22.5",
-    "truck": "315/80 R22.5",
-}
-"""Usual tyre of a class. Those of cars lie within 6 % of its radius, of trucks within 8 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +31,7 @@ class Known:
     Attributes
     ----------
     name : for people
-    kind : "car", "van", "bus" or "truck"
+    kind : name of its class
     engine : "petrol", "diesel" or "electric"
     tare : mass of the empty vehicle; of an EU registration document field G, driver of 75 kg and
         fuel included [kg]
@@ -56,7 +46,7 @@ class Known:
     """
 
     name: str = "vehicle"
-    kind: VehicleClass = "car"
+    kind: str = "car"
     engine: EngineKind | None = None
     tare: float | None = None
     gross: float | None = None
@@ -135,15 +125,15 @@ def _notes(known: Known) -> str:
 
 
 def _refuse(known: Known) -> None:
-    if known.kind not in MASS_RANGE:
-        raise ConfigError(f"class must be {', '.join(MASS_RANGE)}, got {known.kind!r}")
+    if known.kind not in VEHICLE_CLASSES:
+        raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {known.kind!r}")
     for name, value, choice in (
         ("engine", known.engine, get_args(EngineKind)),
         ("torque", known.torque, tuple(TORQUE_SOURCES)),
     ):
         if value is not None and value not in choice:
             raise ConfigError(f"{name} must be {', '.join(choice)}, got {value!r}")
-    low, high = MASS_RANGE[known.kind]
+    low, high = VEHICLE_CLASSES[known.kind].mass_range
     for name, mass in (("tare", known.tare), ("gross", known.gross)):
         if mass is not None and not low <= mass <= high:
             raise ConfigError(
@@ -171,7 +161,7 @@ def _refuse(known: Known) -> None:
 
 
 def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
-    tyre = known.tyre or CLASS_TYRE[known.kind]
+    tyre = known.tyre or VEHICLE_CLASSES[known.kind].tyre
     radius = round(rolling_radius(tyre), 4)
     origins["driveline", "wheel_radius"] = (
         f"of {tyre}, ± {100.0 * RADIUS_STD:.1f} %"
@@ -185,7 +175,7 @@ def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
     if ratios:
         origins["driveline", "gearings"] = "of ratios and tyre"
     single = known.engine == "electric" or len(ratios) == 1
-    mean, std = road_prior(known.kind, single_speed=single)
+    mean, std = VEHICLE_CLASSES[known.kind].road_prior(single_speed=single)
     for name, k in (("engine_inertia", 2), ("wheel_inertia", 3)):
         origins["driveline", name] = f"usual for a {known.kind}, ± {std[k]:.2g}"
     return Driveline(
@@ -198,7 +188,7 @@ def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
 
 
 def _road_load(known: Known, origins: dict[tuple[str, str], str]) -> RoadLoad:
-    mean, std = road_prior(known.kind, single_speed=False)
+    mean, std = VEHICLE_CLASSES[known.kind].road_prior(single_speed=False)
     area = float(mean[0])
     origins["road_load", "drag_area"] = f"usual for a {known.kind}, ± {std[0]:.2g}"
     if known.drag_coefficient is not None and known.frontal_area is not None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.errors import ConfigError
+from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
 from weighbridge.vehicle.fits import FITS, Fit
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.visible import visible
@@ -16,18 +17,7 @@ from weighbridge.visible import visible
 FORMAT_VERSION: Final = 1
 """Version of the vehicle file this program writes and reads."""
 
-VehicleClass = Literal["car", "van", "bus", "truck"]
 Layout = Literal["transverse", "longitudinal"]
-
-
-MASS_RANGE: Final[dict[VehicleClass, tuple[float, float]]] = {
-    "car": (250.0, 8_000.0),
-    "van": (600.0, 15_000.0),
-    "bus": (1_500.0, 45_000.0),
-    "truck": (1_500.0, 80_000.0),
-}
-"""Masses a vehicle of each class can have, from the lightest empty one to an overloaded one
-with a trailer [kg]: outside, data or vehicle file are wrong."""
 
 
 # Angles are written from -180 to 180 or from 0 to 360 degrees [rad].
@@ -544,7 +534,7 @@ class Vehicle:
     Attributes
     ----------
     name : for people
-    kind : "car", "van", "bus" or "truck"
+    kind : name of one of `weighbridge.vehicle.classes.VEHICLE_CLASSES`
     tare : mass without payload [kg]
     gross : permitted mass [kg]
     mapping : path of a mapping TOML for its logs
@@ -554,7 +544,7 @@ class Vehicle:
     """
 
     name: str = "vehicle"
-    kind: VehicleClass = "car"
+    kind: str = "car"
     tare: float | None = None
     gross: float | None = None
     mapping: str | None = None
@@ -569,8 +559,8 @@ class Vehicle:
     provenance: Provenance = field(default_factory=Provenance)
 
     def __post_init__(self) -> None:
-        if self.kind not in ("car", "van", "bus", "truck"):
-            raise ConfigError(f"class must be car, van, bus or truck, got {self.kind!r}")
+        if self.kind not in VEHICLE_CLASSES:
+            raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {self.kind!r}")
         for name in ("tare", "gross"):
             _positive(name, getattr(self, name))
             _within(name, getattr(self, name), *_MASSES, "kg")
@@ -578,6 +568,11 @@ class Vehicle:
             raise ConfigError(
                 f"mapping must be a path without control characters, got {self.mapping!r}"
             )
+
+    @property
+    def of_class(self) -> VehicleClass:
+        """What vehicles of its class have in common."""
+        return VEHICLE_CLASSES[self.kind]
 
     @classmethod
     def load(cls, path: str | Path) -> Vehicle:
