@@ -506,6 +506,8 @@ def _motion_at(motion: Motion, time: Floats) -> dict[str, Floats]:
 
 def _engine_speed(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Floats) -> Floats:
     """Engine speed at the stamps it was recorded with: it is as late as vehicle speed."""
+    if source_of(vehicle).gearing is not None:
+        return speed * vehicle.driveline.gearings[0]
     signal = drive.get("engine_speed")
     if signal is not None and len(signal):
         near = signal.age(recorded) <= 3.0 * signal.period

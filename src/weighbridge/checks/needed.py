@@ -28,9 +28,18 @@ MOTION: Final = frozenset(
 """Signals a mass is made from beside the torque's: what is wrong with them is serious."""
 
 
+STEADY: Final = frozenset(("battery_voltage",))
+"""Signals that may stay the same for long, whatever the vehicle does."""
+
+
 def of_torque() -> frozenset[str]:
     """Signals of torque: only what is wrong with those of the source in use is serious."""
-    return frozenset(name for s in TORQUE_SOURCES.values() for name in s.signals) - MOTION
+    return frozenset(
+        name
+        for source in TORQUE_SOURCES.values()
+        for names in (source.signals, *source.others)
+        for name in names
+    ).difference(MOTION, STEADY)
 
 
 def needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
@@ -38,13 +47,13 @@ def needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
 
     The torque is that of the vehicle file; without one, of the source that a calibration takes.
     """
-    sources = [source for source in TORQUE_SOURCES.values() if drive.has(*source.signals)]
+    sources = [source for source in TORQUE_SOURCES.values() if not source.lacking(drive)]
     if vehicle is not None and replace(vehicle.torque, reference_torque=None) != TorqueModel():
         sources = [TORQUE_SOURCES[vehicle.torque.source]]
     elif len(sources) > 1 and sources[0].needs_reference and not drive.has("reference_torque"):
         # A vehicle file may yet give the reference torque.
-        return MOTION.union(sources[0].signals, sources[1].signals)
-    return MOTION.union(*(source.signals for source in sources[:1]))
+        return MOTION.union(sources[0].found(drive), sources[1].found(drive))
+    return MOTION.union(*(source.found(drive) for source in sources[:1]))
 
 
 def show(name: str, value: float) -> str:

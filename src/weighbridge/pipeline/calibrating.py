@@ -36,6 +36,7 @@ from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointPro
 from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.classes import VehicleClass
 from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
@@ -189,11 +190,14 @@ def run_calibration(
     drives, base, masses = _checked(drives, mass, vehicle, settings.source)
     source = TORQUE_SOURCES[settings.source] if settings.source else best_source(drives, base)
     for drive in drives:
-        if missing := drive.missing(source.signals):
+        if missing := source.lacking(drive):
             raise DriveError(
                 f"{drive.name}: no {' and no '.join(missing)}, "
                 f"which torque source {source.name!r} needs"
             )
+        if why := source.refusal(drive, base.driveline.driven):
+            raise DriveError(f"{drive.name}: {why}")
+    given, base = base.driveline, _held(base, source)
     found_motions = [find_motion(drive, base) for drive in drives]
     motions, squat = _one_squat(found_motions, masses, base.of_class)
 
@@ -306,6 +310,8 @@ def run_calibration(
     doubt = scale_doubt(finished, masses, ", ".join(drive.name for drive in drives))
     others = [*_other_masses(drives, masses), *([doubt] if doubt else [])]
     finished = _with_doubts(finished, balances, others)
+    if source.gearing is not None:
+        finished = _with_gears(finished, given)
     _refuse_useless(finished)
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
 
@@ -338,6 +344,27 @@ def _refuse_useless(vehicle: Vehicle) -> None:
             f"standard deviation, with which no drive can be weighed ({made.notes or 'no notes'}); "
             "check that every sample was recorded, and calibrate on other or longer drives"
         )
+
+
+def _held(base: Vehicle, source: TorqueSource) -> Vehicle:
+    """See a vehicle as the source reads it; what turns before the wheels is not fitted there."""
+    if source.gearing is None:
+        return base
+    seen = as_read(base, source)
+    return replace(seen, driveline=replace(seen.driveline, engine_inertia_std=0.0))
+
+
+def _with_gears(vehicle: Vehicle, given: Driveline) -> Vehicle:
+    """Return a vehicle with the gears it has, not those that its torque is read behind."""
+    line = replace(
+        vehicle.driveline,
+        gearings=given.gearings,
+        gearing_stds=given.gearing_stds,
+        engine_inertia=given.engine_inertia,
+        engine_inertia_std=given.engine_inertia_std,
+        idle_speed=given.idle_speed,
+    )
+    return replace(vehicle, driveline=line)
 
 
 def _draft(
@@ -405,7 +432,7 @@ def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
         None of them has any.
     """
     for source in TORQUE_SOURCES.values():
-        if all(drive.has(*source.signals) for drive in drives):
+        if not any(source.lacking(drive) for drive in drives):
             reference = vehicle.torque.reference_torque is not None or all(
                 drive.has("reference_torque") for drive in drives
             )

@@ -253,7 +253,7 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
 
 def _is_fast(drive: Drive, torque: TorqueSource) -> bool:
     """Whether the slowest signal of a torque is read at `FAST` or more."""
-    read = [s for name in torque.signals if (s := drive.get(name)) is not None and len(s) > 1]
+    read = [s for name in torque.found(drive) if (s := drive.get(name)) is not None and len(s) > 1]
     return all(s.period > 0.0 and 1.0 / s.period >= FAST for s in read)
 
 
@@ -301,12 +301,15 @@ def _motion_needs(drive: Drive, motion: MotionSource) -> list[str]:
 
 
 def _torque_needs(drive: Drive, torque: TorqueSource, vehicle: Vehicle | None) -> list[str]:
-    needs = drive.missing(torque.signals)
+    needs = torque.lacking(drive)
     if torque.needs_reference and not drive.has("reference_torque"):
         known = vehicle is not None and vehicle.torque.reference_torque is not None
         if not known:
             needs.append("reference_torque (or reference_torque_nm in the vehicle file)")
-    fixed_gear = vehicle is not None and vehicle.driveline.single_speed
+    line = vehicle.driveline if vehicle is not None else None
+    if not needs and torque.refusal(drive, line.driven if line is not None else None):
+        needs.append("the torque of every driven axle (or driven in the vehicle file)")
+    fixed_gear = torque.gearing is not None or (line is not None and line.single_speed)
     if not fixed_gear and not drive.has("engine_speed") and "engine_speed" not in needs:
         needs.append("engine_speed (or the one gearing of a single-speed car in the vehicle file)")
     return needs

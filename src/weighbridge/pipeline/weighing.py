@@ -26,6 +26,7 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
+from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
@@ -275,6 +276,8 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str) -> Weighing:
     """Weigh as `weigh` does, from a drive that was checked and a known method."""
     warnings = tuple(p.text for p in drive.problems)
     alone = ESTIMATORS[method].speed_alone
+    if not alone:
+        vehicle = as_read(vehicle)
     lacking = no_speed(drive) if alone else what_is_missing(drive, vehicle)
     if lacking:
         return without_mass(drive, vehicle, method, lacking, warnings)
@@ -492,15 +495,13 @@ def empty_result(drive: str, vehicle: str, method: str, reason: str) -> dict[str
 def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
     """Say which signals a drive lacks for this vehicle; empty if none."""
     source = source_of(vehicle)
-    missing = drive.missing(source.signals)
-    if source.signed and vehicle.driveline.single_speed:
-        missing = [name for name in missing if name != "engine_speed"]
+    missing = source.lacking(drive)
     if not (drive.has("vehicle_speed") or drive.has("gnss_speed")) and not drive.has("latitude"):
         missing.append("vehicle_speed")
     if not vehicle.driveline.single_speed and not drive.has("engine_speed"):
         missing.append("engine_speed")
     if not missing:
-        return ""
+        return source.refusal(drive, vehicle.driveline.driven)
     fit = vehicle.provenance.fit
     if fit is not None and not fit.torque and not vehicle.driveline.gearings:
         return (
@@ -509,11 +510,12 @@ def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
         )
     names = " and ".join(dict.fromkeys(missing))
     sentence = f"the drive has no {names}, which torque source {source.name!r} needs"
-    others = [s for s in TORQUE_SOURCES.values() if s != source and drive.has(*s.signals)]
+    others = [s for s in TORQUE_SOURCES.values() if s != source and not s.lacking(drive)]
     if others and drive.has("vehicle_speed"):
         return (
-            f"{sentence}; it has {' and '.join(others[0].signals)}: weigh it with a vehicle file "
-            f"of torque source {others[0].name!r} (weighbridge calibrate --torque {others[0].name})"
+            f"{sentence}; it has {' and '.join(others[0].found(drive))}: weigh it with a vehicle "
+            f"file of torque source {others[0].name!r} "
+            f"(weighbridge calibrate --torque {others[0].name})"
         )
     return f"{sentence}; nothing can be weighed"
 

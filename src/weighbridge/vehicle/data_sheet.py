@@ -86,7 +86,9 @@ def by_data_sheet(vehicle: Vehicle) -> bool:
 
 def usual_efficiency(vehicle: Vehicle) -> tuple[float, float]:
     """Return the slope of wheel over engine torque of such a vehicle and its standard deviation."""
-    line = vehicle.driveline
+    line, of_source = vehicle.driveline, source_of(vehicle).efficiency
+    if of_source is not None:
+        return of_source
     if line.single_speed:
         return SINGLE_SPEED_EFFICIENCY
     if vehicle.of_class.layouts and line.layout is not None:
@@ -125,7 +127,8 @@ def torque_std(vehicle: Vehicle) -> float:
 
 def scale_std(vehicle: Vehicle) -> float:
     """Relative standard deviation of a mass by torque, efficiency and rolling radius."""
-    return float(np.linalg.norm([torque_std(vehicle), usual_efficiency(vehicle)[1], RADIUS_STD]))
+    radius = RADIUS_STD if source_of(vehicle).by_radius else 0.0
+    return float(np.linalg.norm([torque_std(vehicle), usual_efficiency(vehicle)[1], radius]))
 
 
 def offset_std(vehicle: Vehicle, torque: float) -> tuple[float, float]:

@@ -94,6 +94,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 suffix="kgm2",
             ),
             _Key("wheel_radius", "wheel_radius", "effective rolling radius", suffix="m"),
+            _Key("driven", "driven", "which axles are: front, rear or all", "text"),
             _Key("layout", "layout", "of a car or van: transverse or longitudinal", "text"),
             _Key(
                 "efficiency",

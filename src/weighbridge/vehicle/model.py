@@ -18,6 +18,7 @@ FORMAT_VERSION: Final = 1
 """Version of the vehicle file this program writes and reads."""
 
 Layout = Literal["transverse", "longitudinal"]
+Driven = Literal["front", "rear", "all"]
 
 
 # Angles are written from -180 to 180 or from 0 to 360 degrees [rad].
@@ -69,6 +70,7 @@ class Driveline:
     wheel_radius : effective rolling radius [m]
     layout : how the engine of a car or van lies, "transverse" or "longitudinal"; None where
         it is not known
+    driven : which axles are: "front", "rear" or "all"; None where it is not known
     efficiency : wheel over engine power when driving, in (0, 1] [-]; 1 where the
         torque was calibrated at the wheels; None for that of such drivelines, see
         `weighbridge.vehicle.data_sheet.wheel_efficiency`
@@ -84,6 +86,7 @@ class Driveline:
     wheel_inertia_std: float | None = None
     wheel_radius: float = 0.31
     layout: Layout | None = None
+    driven: Driven | None = None
     efficiency: float | None = None
     speed_scale: float = 1.0
     idle_speed: float = 0.0
@@ -98,9 +101,9 @@ class Driveline:
             raise ConfigError("gearing_stds must be as many as gearings")
         _not_negative("engine_inertia", self.engine_inertia)
         _not_negative("wheel_inertia", self.wheel_inertia)
-        _within("engine_inertia", self.engine_inertia, 0.0, 1_000.0, "kg m^2")
+        _within("engine_inertia", self.engine_inertia, 0.0, 10_000.0, "kg m^2")
         _within("wheel_inertia", self.wheel_inertia, 0.0, 10_000.0, "kg m^2")
-        _within("engine_inertia_std", self.engine_inertia_std, 0.0, 1_000.0, "kg m^2")
+        _within("engine_inertia_std", self.engine_inertia_std, 0.0, 10_000.0, "kg m^2")
         _within("wheel_inertia_std", self.wheel_inertia_std, 0.0, 10_000.0, "kg m^2")
         _positive("wheel_radius", self.wheel_radius)
         _within("wheel_radius", self.wheel_radius, 0.05, 3.0, "m")
@@ -108,6 +111,8 @@ class Driveline:
         _within("idle_speed", self.idle_speed, 0.0, 1_000.0, "rad/s")
         if self.layout not in (None, "transverse", "longitudinal"):
             raise ConfigError(f"layout must be transverse or longitudinal, got {self.layout!r}")
+        if self.driven not in (None, "front", "rear", "all"):
+            raise ConfigError(f"driven must be front, rear or all, got {self.driven!r}")
         if self.efficiency is not None and not 0.0 < self.efficiency <= 1.0:
             raise ConfigError(f"efficiency must be in (0, 1], got {self.efficiency}")
         _within("efficiency", self.efficiency, 0.05, 1.0)

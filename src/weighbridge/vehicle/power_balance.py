@@ -129,7 +129,10 @@ def find_power_balance(drive: Drive, vehicle: Vehicle) -> PowerBalance | None:
     ----------
     Robust regression: Huber, Robust Statistics, 1981, ch. 7.
     """
-    if drive.missing(("battery_voltage", "battery_current", *source_of(vehicle).signals)):
+    source = source_of(vehicle)
+    if source.gearing is not None or source.lacking(drive):
+        return None
+    if drive.missing(("battery_voltage", "battery_current")):
         return None
     rows = _rows(drive, vehicle)
     if rows is None:

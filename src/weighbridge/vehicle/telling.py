@@ -53,7 +53,8 @@ def can_weigh(vehicle: Vehicle) -> bool:
     if vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None:
         return True
     stated = vehicle.torque.source != "measured" or vehicle.torque != TorqueModel()
-    return bool(vehicle.driveline.gearings) and (stated or by_data_sheet(vehicle))
+    geared = bool(vehicle.driveline.gearings) or source_of(vehicle).gearing is not None
+    return geared and (stated or by_data_sheet(vehicle))
 
 
 def worth(vehicle: Vehicle) -> str:
@@ -86,6 +87,8 @@ def _masses(vehicle: Vehicle) -> str:
 
 def _gears(vehicle: Vehicle) -> str:
     line = vehicle.driveline
+    if source_of(vehicle).gearing is not None:
+        return "not needed: what is read does not depend on them"
     if not line.gearings:
         return "not known; a calibration finds them from engine and vehicle speed"
     last = line.gearings[-1] * _CRUISE

@@ -50,7 +50,7 @@ def source_signal(drive: Drive, vehicle: Vehicle) -> Signal:
         The drive lacks what the vehicle's torque source needs.
     """
     source = source_of(vehicle)
-    missing = drive.missing(source.signals)
+    missing = source.lacking(drive)
     if missing:
         raise DriveError(
             f"{drive.name}: no {' and no '.join(missing)}, which torque source {source.name!r} of "
