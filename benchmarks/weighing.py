@@ -51,9 +51,9 @@ def commands(folder: Path) -> None:
 def calibration() -> None:
     """Time the calibration and its parts beside their peers."""
     from weighbridge.calibration import grid, regression
-    from weighbridge.vehicle.classes import VEHICLE_CLASSES
     from weighbridge.pipeline.calibrating import run_calibration
     from weighbridge.simulation import make_scenario, simulate_car
+    from weighbridge.vehicle.classes import VEHICLE_CLASSES
 
     made = simulate_car(make_scenario("car-calibration", seed=9))
     begin = time.perf_counter()
