@@ -53,6 +53,7 @@ def calibration() -> None:
     from weighbridge.calibration import grid, regression
     from weighbridge.pipeline.calibrating import run_calibration
     from weighbridge.simulation import make_scenario, simulate_car
+    from weighbridge.vehicle.classes import VEHICLE_CLASSES
 
     made = simulate_car(make_scenario("car-calibration", seed=9))
     begin = time.perf_counter()
@@ -83,7 +84,7 @@ def calibration() -> None:
         f"{'  one regression per point (from 81 points)':<44}{whole:8.0f} s, {whole / ours:.0f} x"
     )
 
-    low, high = regression.BOUNDS["car"]
+    low, high = VEHICLE_CLASSES["car"].road_bounds
     begin = time.perf_counter()
     regression.fit(rows, low, high)
     ours = time.perf_counter() - begin

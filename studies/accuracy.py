@@ -80,7 +80,7 @@ def weigh_all(job: tuple[int, int]) -> list[Outcome]:
         motion, begun_motion = (of_vehicle(m, vehicles["joint"]) for m in found)
         for method, vehicle in vehicles.items():
             name = method.split(",")[0]
-            estimator = ESTIMATORS[name]
+            estimator = ESTIMATORS[name].track
             mass = final_mass(made) if name == "joint" else mean_mass(made)
             track = estimator(force_balance(drive, vehicle, motion), vehicle)
             early = estimator(force_balance(begun, vehicle, begun_motion), vehicle)

@@ -42,7 +42,7 @@ from weighbridge.simulation import (
     random_vehicle,
     simulate_car,
 )
-from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import friction_coefficients
 from weighbridge.vehicle.model import (
     Driveline,
@@ -452,7 +452,7 @@ def data_sheet(car: SimulatedCar, rng: np.random.Generator, idle: float | None) 
     idle : reading of the torque at idle, where friction is in it [-]
     """
     single = car.transmission == "single"
-    mean, _ = road_prior(car.kind, single_speed=single)
+    mean, _ = VEHICLE_CLASSES[car.kind].road_prior(single_speed=single)
     radius = car.wheel_radius * float(rng.normal(1.0, 0.01))
     known = car.drag_area * float(rng.normal(1.0, 0.07)), 0.07 * car.drag_area
     drag, drag_std = known if car.kind == "car" else (float(mean[0]), None)

@@ -64,7 +64,7 @@ def urban_table(vehicle: wb.Vehicle, axis: plt.Axes) -> str:
         # A change of load takes many steps of the truth: its first one ends a stretch.
         ends = changes[np.concatenate(([True], np.diff(changes) > 20))]
         for method in paper.METHODS:
-            track = ESTIMATORS[method](result.balance, vehicle)
+            track = ESTIMATORS[method].track(result.balance, vehicle)
             at = np.searchsorted(track.time, truth.time[ends])
             off = track.running_mass[at] / truth.mass[ends] - 1.0
             half = 1.96 * track.running_std[at] / truth.mass[ends]
@@ -104,7 +104,7 @@ def car_table(axis: plt.Axes) -> str:
         made = simulate_car(make_scenario("car", payload=80.0 * k, seed=SEED + 601 + k))
         mass = float(np.mean(made.truth.mass))
         balance = wb.weigh(without_weather(made.drive), vehicle, method="rls").result.balance
-        tracks = {m: ESTIMATORS[m](balance, vehicle) for m in METHODS}
+        tracks = {m: ESTIMATORS[m].track(balance, vehicle) for m in METHODS}
         twice = robust_rls(balance, vehicle, RobustRlsSettings(count_grade_twice=True))
         off = [100.0 * (t.mass / mass - 1.0) for t in (*tracks.values(), twice)]
         lines.append(f"| {k + 1}, {mass:.0f} | " + " | ".join(f"{x:+.1f}" for x in off) + " |")
@@ -129,7 +129,7 @@ def bmw_table(axis: plt.Axes) -> str:
         if weighed.result is None:
             continue
         for method in METHODS:
-            track = ESTIMATORS[method](weighed.result.balance, vehicle)
+            track = ESTIMATORS[method].track(weighed.result.balance, vehicle)
             if track.status == "converged":
                 masses[method].append(track.mass)
             late = track.running_mass[track.time > track.time[0] + 300.0]

@@ -34,9 +34,10 @@ from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Signal
 from weighbridge.signals.alignment import align
-from weighbridge.vehicle.data_sheet import MOTOR_TORQUE_STD, inertia_std
+from weighbridge.vehicle.data_sheet import inertia_std
 from weighbridge.vehicle.gear import detect_gearings
 from weighbridge.vehicle.power_balance import find_power_balance
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "shared" / "data"
@@ -164,7 +165,9 @@ def gain(masses: dict[str, float], bare: tuple[str, ...]) -> tuple[float, float]
 def bmw_loads() -> str:
     """What the noted load comes out as, and what of the model moves it."""
     car = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
-    as_read = replace(car, torque=replace(car.torque, scale_std=MOTOR_TORQUE_STD))
+    as_read = replace(
+        car, torque=replace(car.torque, scale_std=TORQUE_SOURCES["measured"].motor_scale_std)
+    )
     drives = trips()
 
     def with_inertias(view, vehicle, **options):  # type: ignore[no-untyped-def]

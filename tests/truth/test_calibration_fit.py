@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import minimize
 
 from weighbridge.calibration.grid import TABLE_5, grid_search
-from weighbridge.calibration.regression import BOUNDS, TorqueRows, driven_slope, fit
+from weighbridge.calibration.regression import TorqueRows, driven_slope, fit
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 
 TORQUE = np.array([-15.0, 900.0, 0.03])
 ROAD = np.array([0.62, 0.0093, 0.17, 5.0])
@@ -39,7 +40,7 @@ def rows(rng, n=6000, noise=3.0, road=ROAD):
 
 def test_truth_is_found_within_its_standard_deviations():
     made = rows(np.random.default_rng(1))
-    found = fit(made, *BOUNDS["car"])
+    found = fit(made, *VEHICLE_CLASSES["car"].road_bounds)
     both = np.concatenate([found.coefficients, found.road])
     pull = (both - np.concatenate([TORQUE, ROAD])) / np.sqrt(np.diag(found.cov))
     assert np.abs(pull).max() < 4.5
@@ -52,8 +53,11 @@ def test_outliers_do_not_move_the_fit():
     made = rows(rng)
     spoiled = made.target.copy()
     spoiled[rng.random(spoiled.size) < 0.05] += 150.0
-    clean = fit(made, *BOUNDS["car"])
-    robust = fit(TorqueRows(design=made.design, target=spoiled, time=made.time), *BOUNDS["car"])
+    clean = fit(made, *VEHICLE_CLASSES["car"].road_bounds)
+    robust = fit(
+        TorqueRows(design=made.design, target=spoiled, time=made.time),
+        *VEHICLE_CLASSES["car"].road_bounds,
+    )
     plain = np.linalg.lstsq(made.design, spoiled, rcond=None)[0]
     assert abs(robust.coefficients[0] - clean.coefficients[0]) < 1.0
     assert abs(plain[0] - clean.coefficients[0]) > 3.0
@@ -61,7 +65,7 @@ def test_outliers_do_not_move_the_fit():
 
 def test_bounds_hold_and_are_named():
     made = rows(np.random.default_rng(3), road=np.array([0.62, 0.0093, 0.17, 1.0]))
-    found = fit(made, *BOUNDS["car"])
+    found = fit(made, *VEHICLE_CLASSES["car"].road_bounds)
     assert found.road[3] == pytest.approx(2.0)
     assert found.at_bound == ("wheel_inertia",)
     assert found.cov[-1].tolist() == [0.0] * 7
@@ -69,7 +73,7 @@ def test_bounds_hold_and_are_named():
 
 def test_grid_and_bounded_fit_agree_to_the_grid_s_resolution():
     made = rows(np.random.default_rng(4))
-    found = fit(made, *BOUNDS["car"])
+    found = fit(made, *VEHICLE_CLASSES["car"].road_bounds)
     coefficients, road, cost = grid_search(made, found.weight)
     steps = np.array([axis[1] - axis[0] for axis in TABLE_5])
     # Neighbouring points trade one parameter for another, so a point may be two steps off.
@@ -92,7 +96,7 @@ def test_grid_point_equals_a_regression_of_its_own():
 
 def test_huber_optimum_agrees_with_a_general_minimiser():
     made = rows(np.random.default_rng(6), n=1500)
-    found = fit(made, *BOUNDS["car"], iterations=60)
+    found = fit(made, *VEHICLE_CLASSES["car"].road_bounds, iterations=60)
     knee = 1.345 * found.residual_std
 
     def loss(parameters):
@@ -118,11 +122,11 @@ def test_slope_of_the_torque_is_told_where_the_engine_was_driven():
     curved = TorqueRows(
         design=np.column_stack([*columns, made.design[:, 3:]]), target=made.target, time=made.time
     )
-    found = fit(curved, *BOUNDS["car"])
+    found = fit(curved, *VEHICLE_CLASSES["car"].road_bounds)
     alone, std_alone = found.coefficients[1], np.sqrt(found.cov[1, 1])
     assert alone < 3.0 * std_alone
     slope, std = driven_slope(found, curved, curved=True)
     assert slope > 30.0 * std
     assert slope == pytest.approx(np.mean(lean * engine + 2.0 * bend * load), rel=0.1)
-    straight = fit(made, *BOUNDS["car"])
+    straight = fit(made, *VEHICLE_CLASSES["car"].road_bounds)
     assert driven_slope(straight, made, curved=False)[0] == pytest.approx(TORQUE[1], rel=0.02)

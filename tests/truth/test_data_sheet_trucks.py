@@ -5,7 +5,7 @@ import pytest
 
 import weighbridge as wb
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel, Vehicle
 
 SEEDS = (61_001, 61_002, 61_003)
@@ -13,7 +13,7 @@ SEEDS = (61_001, 61_002, 61_003)
 
 def data_sheet(car):
     """Ratios and tyres as they are, everything else as usual for the class."""
-    mean, _ = road_prior("truck", single_speed=False)
+    mean, _ = VEHICLE_CLASSES["truck"].road_prior(single_speed=False)
     return Vehicle(
         kind="truck",
         tare=car.mass,

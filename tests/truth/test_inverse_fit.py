@@ -9,12 +9,12 @@ from weighbridge.balance.force_balance import MergedView
 from weighbridge.calibration.inverse import (
     DriveRows,
     FitSettings,
-    TorquePrior,
     fit,
     fit_with_gusts,
 )
-from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.torque import torque_rows
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueTerms
 
 TRUCK_AREA, TRUCK_ROLLING = 8.0, 0.008
 MASS, DRAG_AREA, ROLLING, ENGINE_INERTIA, WHEEL_INERTIA, RADIUS = 1400.0, 0.62, 0.01, 0.15, 5.0, 0.3
@@ -63,9 +63,9 @@ def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, grade_open=0.008
 
 def settings_of_load(*, knots=(), knot=0.0):
     return FitSettings(
-        source="load", order=2, curved=True, knots=knots, torque_noise=5.0,
-        bounds=TorquePrior(offset=0.5, growth=0.5, lean=1.0, bend=0.5, knot=knot),
-        wheel_radius=RADIUS, prior=road_prior("car", single_speed=False),
+        source=TORQUE_SOURCES["load"], order=2, curved=True, knots=knots, torque_noise=5.0,
+        bounds=TorqueTerms(offset=0.5, growth=0.5, lean=1.0, bend=0.5, knot=knot),
+        wheel_radius=RADIUS, prior=VEHICLE_CLASSES["car"].road_prior(single_speed=False),
     )  # fmt: skip
 
 
@@ -151,9 +151,9 @@ def gusty(rng, mass):
 
 def test_what_gusts_confound_stays_open():
     settings = FitSettings(
-        source="percent", order=0, curved=False, knots=(), torque_noise=5.0,
-        bounds=TorquePrior(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012),
-        wheel_radius=0.5, prior=road_prior("truck", single_speed=False),
+        source=TORQUE_SOURCES["percent"], order=0, curved=False, knots=(), torque_noise=5.0,
+        bounds=TorqueTerms(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012),
+        wheel_radius=0.5, prior=VEHICLE_CLASSES["truck"].road_prior(single_speed=False),
     )  # fmt: skip
     told = {fit: [], fit_with_gusts: []}
     for seed in range(3):

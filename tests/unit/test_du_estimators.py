@@ -66,7 +66,7 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("rate", [4.0, 20.0, 100.0])
 def test_finds_the_mass_at_any_rate(method, rate):
-    track = ESTIMATORS[method](balance(rate=rate), BUS)
+    track = ESTIMATORS[method].track(balance(rate=rate), BUS)
     assert track.method == method
     assert track.status is Status.CONVERGED
     assert track.mass == pytest.approx(10_000.0, rel=0.015)
@@ -83,7 +83,7 @@ def test_finds_the_mass_at_any_rate(method, rate):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_cruise_carries_no_mass(method):
-    track = ESTIMATORS[method](balance(swing=0.0, grade=0.0), BUS)
+    track = ESTIMATORS[method].track(balance(swing=0.0, grade=0.0), BUS)
     assert track.status is Status.NOT_EXCITED
     assert "more starts and hills" in track.why
 
@@ -92,7 +92,7 @@ def test_a_cruise_carries_no_mass(method):
 def test_no_usable_row_is_no_mass_and_no_error(method):
     made = balance(minutes=1.0)
     none = replace(made, merged=replace(made.merged, reason=np.full_like(made.merged.reason, 3)))
-    track = ESTIMATORS[method](none, BUS)
+    track = ESTIMATORS[method].track(none, BUS)
     assert track.status is Status.NOT_EXCITED
     assert np.isnan(track.mass)
 
@@ -107,7 +107,7 @@ def test_missing_numbers_are_left_out(method):
     }
     for k, name in enumerate(broken):
         broken[name][1000 + 150 * k : 1100 + 150 * k] = np.nan
-    track = ESTIMATORS[method](replace(made, merged=replace(view, **broken)), BUS)
+    track = ESTIMATORS[method].track(replace(made, merged=replace(view, **broken)), BUS)
     assert track.status is Status.CONVERGED
     assert track.mass == pytest.approx(10_000.0, rel=0.02)
     assert np.isfinite(track.running_mass[2000:]).all()
@@ -117,7 +117,7 @@ def test_missing_numbers_are_left_out(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_offset_of_the_accelerometer_is_told_from_the_mass(method):
-    found = ESTIMATORS[method](balance(offset=0.04, minutes=10.0), BUS).mass
+    found = ESTIMATORS[method].track(balance(offset=0.04, minutes=10.0), BUS).mass
     assert found == pytest.approx(10_000.0, rel=0.02)
 
 

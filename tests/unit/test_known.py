@@ -3,9 +3,9 @@
 import pytest
 
 from weighbridge.errors import ConfigError
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.file import load_vehicle, save_vehicle
-from weighbridge.vehicle.known import CLASS_TYRE, Known, describe
-from weighbridge.vehicle.model import MASS_RANGE
+from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.telling import can_weigh, tell
 from weighbridge.vehicle.tyre import rolling_radius
 
@@ -35,7 +35,7 @@ def test_what_is_no_tyre_size_is_told(size):
         rolling_radius(size)
 
 
-@pytest.mark.parametrize("kind", MASS_RANGE)
+@pytest.mark.parametrize("kind", VEHICLE_CLASSES)
 def test_a_class_alone_makes_a_file_that_can_be_calibrated(kind, tmp_path):
     made = describe(Known(kind=kind))
     path = tmp_path / "v.toml"
@@ -43,7 +43,7 @@ def test_a_class_alone_makes_a_file_that_can_be_calibrated(kind, tmp_path):
     assert load_vehicle(path) == made.vehicle
     assert not can_weigh(made.vehicle)
     text = path.read_text()
-    assert f"of {CLASS_TYRE[kind]}, usual for a {kind}" in text
+    assert f"of {VEHICLE_CLASSES[kind].tyre}, usual for a {kind}" in text
     assert f"usual for a {kind}, ±" in text
     # What nothing is known of is not written as if it were.
     assert "[torque]" not in text
@@ -78,7 +78,7 @@ def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
     [
         ({"tare": 3483.0, "gross": 2000.0}, "gross of 2000 kg is not above the tare"),
         ({"tare": 50.0}, "tare of 50 kg: a car has 250 to 8000 kg"),
-        ({"kind": "lorry"}, "class must be car, van, bus, truck"),
+        ({"kind": "lorry"}, "class must be car, van, bus or truck"),
         ({"gear_ratios": (1.0, 2.0)}, "must fall"),
         ({"gear_ratios": (2.0, -1.0)}, "must be positive"),
         ({"final_drive": 3.9}, "needs gear ratios"),

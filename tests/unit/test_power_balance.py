@@ -10,17 +10,18 @@ import weighbridge as wb
 from weighbridge.pipeline.inspection import inspect_drive
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import ELECTRIC, make_scenario, simulate_car
-from weighbridge.vehicle.class_values import road_prior
-from weighbridge.vehicle.data_sheet import MOTOR_TORQUE_STD, scale_std
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
+from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 from weighbridge.vehicle.power_balance import METER_STD, by_power, find_power_balance
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 VOLTS = 370.0
 
 
 def sheet(car=ELECTRIC):
     """The vehicle file of a data sheet."""
-    mean, _ = road_prior("car", single_speed=True)
+    mean, _ = VEHICLE_CLASSES["car"].road_prior(single_speed=True)
     return Vehicle(
         name="electric",
         tare=car.mass,
@@ -101,7 +102,7 @@ def test_the_interval_narrows_and_the_torque_moves_within_it(made):
     car = sheet()
     narrowed, notes = by_power(electrified(made, reads=1.02), car)
     assert len(notes) == 1
-    assert narrowed.torque.scale_std < 0.75 * MOTOR_TORQUE_STD
+    assert narrowed.torque.scale_std < 0.75 * TORQUE_SOURCES["measured"].motor_scale_std
     assert scale_std(narrowed) < scale_std(car)
     offset, slope = narrowed.torque.coefficients
     assert offset == 0.0
@@ -123,7 +124,7 @@ def test_a_current_of_something_else_is_not_believed(made):
     # Half the current: far from any data sheet, so the doubt is left in the interval.
     doubted, notes = by_power(electrified(made, power=0.5), car)
     assert "seldom so far off" in notes[0]
-    assert doubted.torque.scale_std > 10.0 * MOTOR_TORQUE_STD
+    assert doubted.torque.scale_std > 10.0 * TORQUE_SOURCES["measured"].motor_scale_std
 
 
 def test_what_was_calibrated_or_stated_is_left_alone(made):

@@ -13,7 +13,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from weighbridge.balance import ForceBalance, ForceSide, MergedView, Reason
-from weighbridge.calibration.regression import BOUNDS, build_rows, fit
+from weighbridge.calibration.regression import build_rows, fit
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import MassTrack, Segment, Status
 from weighbridge.navigation.motion import Motion
@@ -25,6 +25,7 @@ from weighbridge.report.style import REASON_STYLE, Panel, blank
 from weighbridge.report.table import Table
 from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
 from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.gear import detect_gearings
 from weighbridge.vehicle.model import Driveline, RoadLoad, Vehicle
 
@@ -186,7 +187,7 @@ def make_calibration(weighing):
         vehicle=VEHICLE,
         gears=detect_gearings(view.time, balance.force.engine_speed, view.speed, idle_speed=0.0),
         balances=(balance,),
-        fit=fit(rows, *BOUNDS["car"]),
+        fit=fit(rows, *VEHICLE_CLASSES["car"].road_bounds),
         rows=rows,
     )
 
@@ -402,7 +403,9 @@ def test_calibration_without_gears_or_engine_speed_leaves_sentences(tmp_path):
         curved=False,
         rows=view.usable,
     )
-    calibration = replace(calibration, gears=None, rows=rows, fit=fit(rows, *BOUNDS["car"]))
+    calibration = replace(
+        calibration, gears=None, rows=rows, fit=fit(rows, *VEHICLE_CLASSES["car"].road_bounds)
+    )
     page = Elements(written(tmp_path, [], calibration=calibration))
     assert "No distribution of gear ratios: they were given" in page.text
     assert "No torque over engine speed" in page.text

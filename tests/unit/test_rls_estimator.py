@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from weighbridge.estimators.judging import COLD_STD, MOTION_STD, consider_std
+from weighbridge.estimators.judging import MOTION_STD, consider_std
 from weighbridge.estimators.rls import block_jackknife
 from weighbridge.vehicle.model import Provenance, TorqueModel, Vehicle
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 CAR = Vehicle(
     torque=TorqueModel(source="load", coefficients=(0.0, 900.0)),
@@ -27,11 +28,15 @@ def test_a_cold_start_counts_by_its_share_of_the_information():
         brake_hidden=False,
         coarse_std=0.0,
     )
-    assert consider_std(balance, phi, every, CAR) == pytest.approx(share * COLD_STD["load"])
+    assert consider_std(balance, phi, every, CAR) == pytest.approx(
+        share * TORQUE_SOURCES["load"].cold_std
+    )
     first = time < 600.0
-    assert consider_std(balance, phi, first, CAR) == pytest.approx(COLD_STD["load"])
+    assert consider_std(balance, phi, first, CAR) == pytest.approx(TORQUE_SOURCES["load"].cold_std)
     measured = replace(CAR, torque=TorqueModel(source="measured"))
-    assert consider_std(balance, phi, first, measured) == pytest.approx(COLD_STD["measured"])
+    assert consider_std(balance, phi, first, measured) == pytest.approx(
+        TORQUE_SOURCES["measured"].cold_std
+    )
     balance.motion.source = "speed_grade"
     late = time >= 600.0
     assert consider_std(balance, phi, late, measured) > MOTION_STD["speed_grade"]

@@ -23,6 +23,7 @@ from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import with_squat
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 
 K = 0.004
 """Pitch per acceleration [rad per m/s^2]."""
@@ -173,20 +174,24 @@ def moved(squat, *, std=2e-4):
 
 
 def test_drives_of_a_calibration_share_one_squat():
-    squat, std = pooled([moved(0.003), moved(0.005), moved(0.004)], (1500.0,) * 3, "car")
+    squat, std = pooled(
+        [moved(0.003), moved(0.005), moved(0.004)], (1500.0,) * 3, VEHICLE_CLASSES["car"]
+    )
     # Three drives and the usual squat, by their variances.
     drives, usual = 3.0 / (2e-4**2 + DRIVE_STD**2), 1.0 / SQUAT[1] ** 2
     assert squat == pytest.approx((0.004 * drives + SQUAT[0] * usual) / (drives + usual))
     assert std == pytest.approx((drives + usual) ** -0.5)
-    assert pooled([replace(moved(0.003), squat=None)], (1500.0,), "car") is None
+    assert pooled([replace(moved(0.003), squat=None)], (1500.0,), VEHICLE_CLASSES["car"]) is None
 
 
 def test_squat_of_a_truck_grows_with_its_mass():
     masses = (8000.0, 16_000.0)
-    squat, _ = pooled([moved(0.001), moved(0.002)], masses, "truck")
+    squat, _ = pooled([moved(0.001), moved(0.002)], masses, VEHICLE_CLASSES["truck"])
     assert squat == pytest.approx(0.0015, rel=0.2)
-    assert squat_at(squat, 16_000.0, masses, "truck") == pytest.approx(squat * 4.0 / 3.0)
-    assert squat_at(squat, 16_000.0, masses, "car") == squat
+    assert squat_at(squat, 16_000.0, masses, VEHICLE_CLASSES["truck"]) == pytest.approx(
+        squat * 4.0 / 3.0
+    )
+    assert squat_at(squat, 16_000.0, masses, VEHICLE_CLASSES["car"]) == squat
 
 
 def test_another_squat_is_taken_out_of_grade_and_specific_force():

@@ -8,15 +8,14 @@ from weighbridge.errors import ConfigError, DriveError
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque import (
-    air_flow_torque,
     engine_torque,
     knot_parts,
-    lowest_load,
     parameters,
     reading_of,
     rows_of,
     torque_rows,
 )
+from weighbridge.vehicle.torque_sources import air_flow_torque, lowest_load
 
 TIME = np.arange(5.0)
 SPEED = np.array([100.0, 150.0, 200.0, 250.0, 700.0])

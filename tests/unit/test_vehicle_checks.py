@@ -9,7 +9,7 @@ from weighbridge.errors import DriveError
 from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
-from weighbridge.vehicle.torque import regressor
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 SMALL = (42.6, 21.96, 14.04, 9.708, 7.634, 6.315)
 LARGE = (50.5, 25.3, 16.9, 12.7, 9.0, 8.1)
@@ -117,7 +117,7 @@ def test_the_reference_torque_that_is_taken():
 
     def taken(reference, model):
         found = Drive("made", {s.name: s for s in (fraction, reference)})
-        return set(regressor(found, "percent", np.array([0.0, 895.0]), model).tolist())
+        return set(TORQUE_SOURCES["percent"].reading(found, np.array([0.0, 895.0]), model).tolist())
 
     assert taken(one, model) == taken(one, stated) == {750.0}
     assert taken(two, stated) == {1000.0}

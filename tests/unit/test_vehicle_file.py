@@ -284,7 +284,7 @@ DRAGGED = "[dragged]\nengine_speed_rpm = [900, 2000]\nscatter = 0.01\nspan = 0.8
         ("[driveline]\nfinal_drive = 4.0", 2, "needs gear_ratios"),
         ("[driveline]\ngear_ratios = [1, 2]\nwheel_radius_m = 0.3", 2, "must fall"),
         ("[driveline]\nspeed_scale = 2", 2, "must be in [0.8, 1.2]"),
-        ("[torque]\nsource = 'magic'", 2, "load, measured, percent or air_flow"),
+        ("[torque]\nsource = 'magic'", 2, "load, air_flow or battery"),
         ("[torque]\nsource = 'load'", 2, "at least two coefficients"),
         ("[torque]\nload_range_pct = [50, 10]", 2, "the lower first"),
         ("[road_load]\ndrag_coefficient = 0.3", 2, "needs frontal_area_m2"),

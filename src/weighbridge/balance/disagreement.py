@@ -23,7 +23,7 @@ from weighbridge.balance.witness import (
     told_by,
 )
 from weighbridge.signals import Drive
-from weighbridge.vehicle.model import TorqueSource, Vehicle, WitnessRelation
+from weighbridge.vehicle.model import Vehicle, WitnessRelation
 
 DOUBTFUL: Final = 0.05
 """Scale, or level over the reading's range, off by more is doubted [-]."""
@@ -171,7 +171,7 @@ def _part(every: Means, first: int, last: int) -> Means:
 
 
 def _against_before(
-    drive: Drive, source: TorqueSource, relation: WitnessRelation, every: Means, cut: int
+    drive: Drive, source: str, relation: WitnessRelation, every: Means, cut: int
 ) -> Finding:
     """Judge the second part of a drive by how reading and witness went in the first."""
     first, second = _part(every, 0, cut), _part(every, cut, every.time.size)
@@ -317,7 +317,7 @@ def _apart(a: Comparison, b: Comparison, relation: WitnessRelation) -> float:
 
 
 def accepted_scales(
-    source: TorqueSource,
+    source: str,
     relation: WitnessRelation,
     air: tuple[float, float],
     unknown: float | None = None,

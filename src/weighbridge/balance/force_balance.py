@@ -32,8 +32,8 @@ from weighbridge.vehicle.gear import (
     predict_gear,
     shifting,
 )
-from weighbridge.vehicle.model import DraggedReading, Vehicle, VehicleClass
-from weighbridge.vehicle.torque import engine_torque, source_signal
+from weighbridge.vehicle.model import DraggedReading, Vehicle
+from weighbridge.vehicle.torque import engine_torque, source_of, source_signal
 
 
 class Reason(IntEnum):
@@ -86,14 +86,6 @@ WIND_AT_VEHICLE: Final = 0.5
 """Wind at a vehicle over the wind reported at 10 m [-]: logarithmic profile down to 1 m
 over a roughness length of 0.1 m, ln(1 / 0.1) / ln(10 / 0.1) (Stull, An Introduction to
 Boundary Layer Meteorology, 1988, ch. 9)."""
-
-TYPICAL_MASS: Final[dict[VehicleClass, float]] = {
-    "car": 1500.0,
-    "van": 2500.0,
-    "bus": 13_000.0,
-    "truck": 15_000.0,
-}
-"""Mass of a vehicle whose tare is unknown, to tell braking [kg]."""
 
 BRAKING_FORCE: Final = 0.06
 """Braking force over weight that marks unseen braking [-]."""
@@ -301,7 +293,7 @@ def force_balance(
     air_speed = rows["speed"] + headwind(drive, rows["heading"])
     drag = 0.5 * density * vehicle.road_load.drag_area * air_speed * np.abs(air_speed)
 
-    signed = signed and vehicle.torque.source in ("measured", "percent")
+    signed = signed and source_of(vehicle).signed
     needed, weight = _needed_force(vehicle, rows["specific_force"], drag, rotating)
     pressed = brake_pressed(drive, recorded)
     dead = pressed is not None and _misses(pressed, rows, traction, needed, weight)
@@ -514,6 +506,8 @@ def _motion_at(motion: Motion, time: Floats) -> dict[str, Floats]:
 
 def _engine_speed(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Floats) -> Floats:
     """Engine speed at the stamps it was recorded with: it is as late as vehicle speed."""
+    if source_of(vehicle).gearing is not None:
+        return speed * vehicle.driveline.gearings[0]
     signal = drive.get("engine_speed")
     if signal is not None and len(signal):
         near = signal.age(recorded) <= 3.0 * signal.period
@@ -561,7 +555,7 @@ def _needed_force(
     Its sign hangs on the mass through the drag alone. The largest mass known is the
     cautious one: drag explains least of how a heavy vehicle slows down.
     """
-    mass = max(vehicle.provenance.masses, default=vehicle.tare or TYPICAL_MASS[vehicle.kind])
+    mass = max(vehicle.provenance.masses, default=vehicle.tare or vehicle.of_class.typical_mass)
     rolling = vehicle.road_load.rolling_coefficient * GRAVITY
     needed = (mass + np.nan_to_num(rotating)) * specific_force + mass * rolling + drag
     return np.asarray(needed), mass * GRAVITY

@@ -19,8 +19,8 @@ from scipy.signal import lfilter
 from weighbridge.errors import DriveError
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.vehicle.air import standard_pressure
-from weighbridge.vehicle.model import TorqueSource, Vehicle, WitnessRelation
-from weighbridge.vehicle.torque import SIGNALS, regressor
+from weighbridge.vehicle.model import Vehicle, WitnessRelation
+from weighbridge.vehicle.torque import source_of
 
 WINDOW: Final = 3.0
 """Both sides are averaged over so long, at least three periods of the slowest signal [s]."""
@@ -60,7 +60,6 @@ class Witness:
     signal : its name
     needs : signals it is made from
     of : its value at stamps (n,), of drive, vehicle, stamps and engine speed there [SI]
-    not_of : torque sources that are made from it, of which it is no witness
     air : lowest and highest power of the pressure of the air, and of its temperature, to which
         it may go at one charge of the engine
     enriched : more of it than the torque needs is no fault: enrichment, regeneration of a filter
@@ -71,7 +70,6 @@ class Witness:
     signal: str
     needs: tuple[str, ...]
     of: Callable[[Drive, Floats, Floats], Floats]
-    not_of: tuple[TorqueSource, ...] = ()
     air: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
     enriched: bool = False
     per_turn: bool = False
@@ -111,7 +109,6 @@ WITNESSES: Final = (
         "mass_air_flow",
         ("mass_air_flow",),
         _per_turn("mass_air_flow"),
-        not_of=("air_flow",),
         per_turn=True,
     ),
     Witness("absolute_load", ("absolute_load",), _as_it_is("absolute_load")),
@@ -119,7 +116,7 @@ WITNESSES: Final = (
         "intake_pressure", ("intake_pressure",), _as_it_is("intake_pressure"), air=_PRESSURE_AIR
     ),
     Witness("fuel_rate", ("fuel_rate",), _per_turn("fuel_rate"), enriched=True, per_turn=True),
-    Witness("engine_load", ("engine_load",), _as_it_is("engine_load"), ("load",), air=LOAD_AIR),
+    Witness("engine_load", ("engine_load",), _as_it_is("engine_load"), air=LOAD_AIR),
     Witness("demanded_torque", ("demanded_torque",), _as_it_is("demanded_torque")),
     Witness("battery_current", ("battery_voltage", "battery_current"), _battery, battery=True),
 )
@@ -135,7 +132,7 @@ class Rows:
     Attributes
     ----------
     time : (n,) [s]
-    reading : (n,) as `weighbridge.vehicle.torque.regressor` has it
+    reading : (n,) as the torque source reads it
     value : (n,) of the witness [SI]
     turning : (n,) speed of engine or motor [rad/s]
     driving : (n,) all are known, and the vehicle drives
@@ -210,11 +207,13 @@ def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0
     drive, vehicle, witness
     later : by how much the reading is later than the witness, which is moved by it [s]
     """
-    source = vehicle.torque.source
-    name = SIGNALS[source][0]
+    source = source_of(vehicle)
+    made_of = source.found(drive)
     motor = vehicle.driveline.single_speed
-    if source in witness.not_of or motor != witness.battery:
+    # A reading is no witness of itself, and none tells of wheels.
+    if set(made_of) & set(witness.needs) or source.gearing or motor != witness.battery:
         return None
+    name = made_of[0]
     turning_of = drive.get("engine_speed") or (drive.get("vehicle_speed") if motor else None)
     speed = drive.speed
     if drive.missing((name, *witness.needs)) or turning_of is None or speed is None:
@@ -224,7 +223,7 @@ def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0
         return None
     time = drive.signals[name].time
     try:
-        reading = regressor(drive, source, time, vehicle.torque)
+        reading = source.reading(drive, time, vehicle.torque)
     except DriveError:
         return None  # Percent of an unknown torque: weighing says so.
     gearing = vehicle.driveline.gearings[0] if turning_of.name == "vehicle_speed" else 1.0

@@ -24,7 +24,7 @@ from weighbridge.balance.witness import (
 )
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
-from weighbridge.vehicle.torque import SIGNALS
+from weighbridge.vehicle.torque import source_of
 
 CLOSED: Final = 0.15
 """Part of the witness's range, from its low end, where fuel is cut or the throttle closed [-]:
@@ -106,9 +106,10 @@ def contradiction(
             accepted = accepted_scales(source, relation, airs[j])
             finding = judged(part, relation, accepted, (-np.inf, np.inf))
             if finding is not None and finding.verdict == "serious":
+                reading = source_of(vehicle).signals[0]
                 return (
                     f"{drives[i].name} and {drives[j].name} contradict each other: for the same "
-                    f"{witness.signal} {SIGNALS[source][0]} reads {difference(finding)} in the "
+                    f"{witness.signal} {reading} reads {difference(finding)} in the "
                     "second: one of the two signals is wrong in one of them; check units and "
                     "scales, and calibrate without the drive that is wrong"
                 )

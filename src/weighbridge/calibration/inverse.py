@@ -19,7 +19,6 @@ from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.estimators.joint import GATE
 from weighbridge.estimators.slow_errors import (
-    COLD_TORQUE_STD,
     DISTURBANCE_STD,
     RESISTANCE_STD,
     TIME_CONSTANTS,
@@ -31,8 +30,8 @@ from weighbridge.estimators.slow_errors import (
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import TorqueSource
 from weighbridge.vehicle.torque import torque_rows
+from weighbridge.vehicle.torque_sources import TorqueSource, TorqueTerms
 
 
 class TooShort(DriveError):
@@ -84,51 +83,6 @@ class InverseFit:
     windows: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TorquePrior:
-    """Standard deviations of the torque terms, over the highest torque of the drives [-].
-
-    Attributes
-    ----------
-    offset : torque at no reading
-    growth : for each power of engine speed, at `TYPICAL_SPEED`
-    lean : torque at the highest reading that grows with engine speed, at `TYPICAL_SPEED`
-    bend : of the highest reading squared
-    knot : of the smooth correction at the highest reading
-    """
-
-    offset: float
-    growth: float
-    lean: float
-    bend: float
-    knot: float
-
-    def covariance(self, settings: FitSettings, torque: float, reading: float) -> Floats:
-        """Covariance of the terms beside the reading, in the order of `torque_rows`.
-
-        Parameters
-        ----------
-        settings : which terms there are
-        torque, reading : highest of the drives [N m], [unit of the reading]
-
-        References
-        ----------
-        The correction is a Gaussian process over the logarithm of engine speed: Rasmussen and
-        Williams, Gaussian Processes for Machine Learning, 2006, ch. 4.
-        """
-        stds = [self.offset]
-        stds += [self.growth / TYPICAL_SPEED**k for k in range(1, settings.order + 1)]
-        if settings.curved:
-            stds += [self.lean / (TYPICAL_SPEED * reading), self.bend / reading**2]
-        cov = np.diag(np.square(stds))
-        if settings.knots:
-            where = np.log(settings.knots)
-            apart = (where[:, None] - where) / KNOT_LENGTH
-            smooth = (self.knot / reading) ** 2 * np.exp(-0.5 * apart**2)
-            cov = block_diag(cov, smooth)
-        return np.asarray(torque**2 * cov)
-
-
 AROUND: Final = 60.0
 """Pressures are averaged over so long before and after [s]."""
 
@@ -172,13 +126,42 @@ class FitSettings:
     order: int
     curved: bool
     knots: tuple[float, ...]
-    bounds: TorquePrior
+    bounds: TorqueTerms
     torque_noise: float
     wheel_radius: float
     prior: tuple[Floats, Floats]
     lasting_drag: bool = False
     window: float = WINDOW
     rounds: int = 3
+
+
+def terms_covariance(
+    terms: TorqueTerms, settings: FitSettings, torque: float, reading: float
+) -> Floats:
+    """Covariance of the terms beside the reading, in the order of `torque_rows`.
+
+    Parameters
+    ----------
+    terms : standard deviations before any drive
+    settings : which terms there are
+    torque, reading : highest of the drives [N m], [unit of the reading]
+
+    References
+    ----------
+    The correction is a Gaussian process over the logarithm of engine speed: Rasmussen and
+    Williams, Gaussian Processes for Machine Learning, 2006, ch. 4.
+    """
+    stds = [terms.offset]
+    stds += [terms.growth / TYPICAL_SPEED**k for k in range(1, settings.order + 1)]
+    if settings.curved:
+        stds += [terms.lean / (TYPICAL_SPEED * reading), terms.bend / reading**2]
+    cov = np.diag(np.square(stds))
+    if settings.knots:
+        where = np.log(settings.knots)
+        apart = (where[:, None] - where) / KNOT_LENGTH
+        smooth = (terms.knot / reading) ** 2 * np.exp(-0.5 * apart**2)
+        cov = block_diag(cov, smooth)
+    return np.asarray(torque**2 * cov)
 
 
 def lasting_pressure(view: MergedView) -> Floats:
@@ -331,7 +314,7 @@ def _solve(
         [cut.mean(np.nan_to_num(d.view.gearing)) for d, cut in zip(drives, cuts, strict=True)]
     )
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
-    terms = settings.bounds.covariance(settings, torque, torque / scale)
+    terms = terms_covariance(settings.bounds, settings, torque, torque / scale)
     grade = GRAVITY * max(d.motion.grade_open for d in drives)
     fading = np.array(
         [
@@ -339,7 +322,7 @@ def _solve(
             mass * RESISTANCE_STD,
             WIND_STD * 2 * mean[0],
             WIND_STD * 2 * mean[0],
-            COLD_TORQUE_STD[settings.source] * torque,
+            settings.source.cold_torque_std * torque,
         ]
     )
     x0 = np.concatenate(([1.0], mean, np.zeros(extra), np.zeros(fading.size)))

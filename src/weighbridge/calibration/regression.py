@@ -12,20 +12,10 @@ from weighbridge.balance.force_balance import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import VehicleClass
 from weighbridge.vehicle.torque import torque_rows
 
 ROAD_PARAMETERS: Final = ("drag_area", "rolling_coefficient", "engine_inertia", "wheel_inertia")
 """Parameters of the longitudinal model beside the torque, in the order of the columns."""
-
-BOUNDS: Final[dict[VehicleClass, tuple[Floats, Floats]]] = {
-    "car": (np.array([0.30, 0.002, 0.02, 2.0]), np.array([1.00, 0.030, 1.00, 12.0])),
-    "van": (np.array([0.60, 0.004, 0.05, 3.0]), np.array([3.00, 0.030, 1.50, 20.0])),
-    "bus": (np.array([2.50, 0.003, 0.30, 20.0]), np.array([8.00, 0.020, 6.00, 150.0])),
-    "truck": (np.array([2.50, 0.003, 0.30, 20.0]), np.array([10.0, 0.020, 6.00, 300.0])),
-}
-"""Lower and upper bounds of `ROAD_PARAMETERS`: cars from Jensen 2022, Table 5; the
-others spanning the usual values of Gillespie, Fundamentals of Vehicle Dynamics, ch. 4."""
 
 HUBER: Final = 1.345
 """Residual over noise beyond which a row counts less [-] (Huber 1964, 95 % efficiency)."""

@@ -11,6 +11,7 @@ from weighbridge.checks.needed import show
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE, friction_coefficients
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import source_of
 
 # Engine speeds of an idle [rad/s], and coolant of an engine that is warm [K].
 _IDLE: Final = (45.0, 135.0)
@@ -37,7 +38,7 @@ def check_whole_torque(drive: Drive, vehicle: Vehicle | None) -> Iterator[Proble
 def check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find friction of the engine in a torque that is taken for the one at its shaft."""
     torque = drive.get("engine_torque_fraction")
-    if torque is None or (vehicle is not None and vehicle.torque.source != "percent"):
+    if torque is None or (vehicle is not None and not source_of(vehicle).needs_reference):
         return
     if vehicle is not None and vehicle.torque.coefficients and vehicle.torque.coefficients[0] < 0.0:
         return

@@ -8,10 +8,10 @@ import numpy as np
 
 from weighbridge.checks.false_samples import clipped, isolated, repeated
 from weighbridge.checks.frozen import frozen
-from weighbridge.checks.needed import needed, show
+from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.signals import Bools, Drive, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import SIGNALS
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 WIDENED: Final = 1.02
 """Load range of a vehicle file over the highest load its drives had [-]."""
@@ -32,17 +32,16 @@ def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     drive, vehicle : as of `weighbridge.checks.check_drive`
     """
     made_of = needed(drive, vehicle)
-    torque = {name for names in SIGNALS.values() for name in names} - {"engine_speed"}
     names = [
         name
-        for name in ("vehicle_speed", "engine_speed", *sorted(torque & made_of))
+        for name in ("vehicle_speed", "engine_speed", *sorted(of_torque() & made_of))
         if drive.has(name) and len(drive.signals[name]) and name not in drive.info.trusted
     ]
     marks = {name: frozen(drive, name) for name in names}
     for name, marked in marks.items():
         drive = _without_frozen(drive, name, marked)
     for name in names:
-        if name in torque:
+        if name in of_torque():
             drive = _without_false(drive, name)
             drive = _without_ends(drive, name, vehicle)
     return drive.with_problems(*_ends(drive, names))
@@ -90,13 +89,15 @@ def _without_false(drive: Drive, name: str) -> Drive:
 
 def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
     """Leave out what lies at ends of the range that the calibration had wider."""
-    if vehicle is None or name != SIGNALS[vehicle.torque.source][0]:
+    if vehicle is None or name != TORQUE_SOURCES[vehicle.torque.source].signals[0]:
         return drive
     signal, model, dragged = drive.signals[name], vehicle.torque, vehicle.dragged
     told = []
     highest = np.inf
     if model.load_range is not None:
-        highest = model.load_range[1] / WIDENED if model.source == "load" else np.inf
+        # Of other sources the range is not that of the signal.
+        as_read = TORQUE_SOURCES[model.source].needs_map
+        highest = model.load_range[1] / WIDENED if as_read else np.inf
     elif dragged is not None:
         highest = dragged.span + min(dragged.level)
     marked = clipped(signal, highest)

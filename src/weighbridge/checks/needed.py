@@ -11,7 +11,7 @@ from weighbridge.signals import QUANTITIES, Drive
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.model import TorqueModel, Vehicle
-from weighbridge.vehicle.torque import SIGNALS
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 MOTION: Final = frozenset(
     (
@@ -26,8 +26,20 @@ MOTION: Final = frozenset(
     )
 )
 """Signals a mass is made from beside the torque's: what is wrong with them is serious."""
-TORQUE: Final = frozenset(name for names in SIGNALS.values() for name in names) - MOTION
-"""Signals of torque: only what is wrong with those of the source in use is serious."""
+
+
+STEADY: Final = frozenset(("battery_voltage",))
+"""Signals that may stay the same for long, whatever the vehicle does."""
+
+
+def of_torque() -> frozenset[str]:
+    """Signals of torque: only what is wrong with those of the source in use is serious."""
+    return frozenset(
+        name
+        for source in TORQUE_SOURCES.values()
+        for names in (source.signals, *source.others)
+        for name in names
+    ).difference(MOTION, STEADY)
 
 
 def needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
@@ -35,13 +47,13 @@ def needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
 
     The torque is that of the vehicle file; without one, of the source that a calibration takes.
     """
-    sources = [source for source, names in SIGNALS.items() if drive.has(*names)]
+    sources = [source for source in TORQUE_SOURCES.values() if not source.lacking(drive)]
     if vehicle is not None and replace(vehicle.torque, reference_torque=None) != TorqueModel():
-        sources = [vehicle.torque.source]
-    elif "percent" in sources[:1] and len(sources) > 1 and not drive.has("reference_torque"):
+        sources = [TORQUE_SOURCES[vehicle.torque.source]]
+    elif len(sources) > 1 and sources[0].needs_reference and not drive.has("reference_torque"):
         # A vehicle file may yet give the reference torque.
-        return MOTION.union(SIGNALS["percent"], SIGNALS[sources[1]])
-    return MOTION.union(*(SIGNALS[source] for source in sources[:1]))
+        return MOTION.union(sources[0].found(drive), sources[1].found(drive))
+    return MOTION.union(*(source.found(drive) for source in sources[:1]))
 
 
 def show(name: str, value: float) -> str:

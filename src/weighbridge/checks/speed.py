@@ -16,6 +16,7 @@ from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.units import UNITS
+from weighbridge.vehicle.classes import FASTEST, STRONGEST
 from weighbridge.vehicle.model import Vehicle
 
 # Unit the name says, unit the numbers are in, as they occur in practice.
@@ -48,10 +49,6 @@ _WINDOW: Final = 3.0
 _WINDOWS: Final = 3
 # No tyre holds more for so long [m/s^2].
 _GRIP: Final = 10.0
-# Speed [m/s], and acceleration times speed [W/kg], that road vehicles hardly reach: by class, and
-# of others. Recorded cars stay below 41 m/s and 55 W/kg; km/h under m/s multiplies by 3.6 and 13.
-_REACH: Final = {"truck": (45.0, 60.0), "bus": (45.0, 60.0)}
-_REACH_OF_ANY: Final = (72.0, 150.0)
 # Engine over vehicle speed in the longest gears that are built is 4.3 rad/m or more.
 _LONGEST_GEAR: Final = 3.3
 # An engine that turns slower is none, or its speed is in another unit [rad/s].
@@ -110,8 +107,10 @@ def _check_alone(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> Iterat
 
 def _beyond_belief(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> str:
     """Say what no vehicle does; empty where nothing is."""
-    kind = vehicle.kind if vehicle is not None else ""
-    fastest, strongest = _REACH.get(kind, _REACH_OF_ANY)
+    # Recorded cars stay below 41 m/s and 55 W/kg; km/h under m/s multiplies by 3.6 and 13.
+    fastest, strongest = FASTEST, STRONGEST
+    if vehicle is not None:
+        fastest, strongest = vehicle.of_class.fastest, vehicle.of_class.strongest
     at = windows.edges(float(speed.time[0]), float(speed.time[-1]), _WINDOW)
     if at.size < 10:
         return ""

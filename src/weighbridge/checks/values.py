@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.needed import MOTION, TORQUE, moves, needed, show
+from weighbridge.checks.needed import MOTION, moves, needed, of_torque, show
 from weighbridge.checks.speed import SETTLED
 from weighbridge.signals import QUANTITIES, Drive, Problem
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -35,9 +35,9 @@ _LEAST_PERCENT: Final = 0.02
 def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find signals that never change."""
     moving = moves(drive)
-    made_of = needed(drive, vehicle)
+    made_of, judged = needed(drive, vehicle), MOTION | of_torque()
     for s in drive.signals.values():
-        if s.name not in MOTION | TORQUE or s.name == "grade" or len(s) < 50 or s.duration < 20.0:
+        if s.name not in judged or s.name == "grade" or len(s) < 50 or s.duration < 20.0:
             continue
         value = float(s.values[0])
         if bool(np.all(s.values == value)):

@@ -12,7 +12,7 @@ from weighbridge.errors import DriveError
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.vehicle.gear import detect_gearings, effective_gearing, steady
 from weighbridge.vehicle.model import TorqueModel, Vehicle
-from weighbridge.vehicle.torque import reference_torques
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, reference_torques
 
 # Whoever changes vehicles takes longer than this [s], and the vehicle left stands.
 _PAUSE: Final = 5.0
@@ -57,7 +57,8 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
         f"reference_torque is {which}{'' if once else ', in turn'}: it is a constant of an engine"
     )
     unknown = replace(model, reference_torque=None) == TorqueModel()
-    if (unknown or model.source == "percent") and model.reference_torque is not None:
+    of_reference = TORQUE_SOURCES[model.source].needs_reference
+    if (unknown or of_reference) and model.reference_torque is not None:
         yield Problem(
             reference.name,
             f"{said}; the {model.reference_torque:.0f} N m of the vehicle file were taken all the "
@@ -71,7 +72,7 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
         f"{said}, {guess}; {split}state the right one as reference_torque_nm under [torque] of "
         "the vehicle file",
         # In turn it says nothing of two vehicles, and only percent torque needs it.
-        serious=once or unknown or model.source == "percent",
+        serious=once or unknown or of_reference,
     )
 
 

@@ -10,7 +10,7 @@ from weighbridge.balance.disagreement import Finding, difference, findings
 from weighbridge.balance.witness import BY_SIGNAL
 from weighbridge.signals import Drive, Problem
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import SIGNALS
+from weighbridge.vehicle.torque import source_of
 
 
 def check_witnesses(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:
@@ -30,7 +30,7 @@ def check_witnesses(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...
     if vehicle is None or not vehicle.witnesses:
         return ()
     found = findings(drive, vehicle)
-    reading = SIGNALS[vehicle.torque.source][0]
+    reading = source_of(vehicle).found(drive)[0]
     off = [f for f in found if f.verdict != "agrees"]
     agree = [f.signal for f in found if f.verdict == "agrees"]
     if agree:

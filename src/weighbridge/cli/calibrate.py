@@ -81,10 +81,11 @@ def calibrate(
         run_speed_calibration,
     )
     from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
     refuse_overwriting(output, force, "vehicle file")
-    if torque not in (None, "measured", "percent", "load", "air_flow"):
-        raise ConfigError(f"--torque {torque}: must be measured, percent, load or air_flow")
+    if torque is not None and torque not in TORQUE_SOURCES:
+        raise ConfigError(f"--torque {torque}: must be {TORQUE_SOURCES.names}")
     base = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = mapping_for(mapping, base, vehicle)
     read = inputs(drives, vehicle, chosen, dbc)
@@ -92,13 +93,13 @@ def calibrate(
     recorded = [load(path, chosen, dbc) for path in drives]
     settings = CalibrationSettings(
         order=order,
-        source=torque,  # type: ignore[arg-type]
+        source=torque,
         grid=grid,
         curved=not straight,
-        method=method,  # type: ignore[arg-type]
+        method=method,
     )
     masses = mass[0] if mass is not None and len(mass) == 1 else mass
-    if settings.method == "speed-ekf":
+    if not settings.fit.torque:
         _refuse_torque_options(torque, order, grid, straight)
         by_speed = run_speed_calibration(recorded, masses, vehicle=base)
         car, found = by_speed.vehicle, speed_table(by_speed)

@@ -92,14 +92,14 @@ def new(
     made = describe(
         Known(
             name=name,
-            kind=kind,  # type: ignore[arg-type]
+            kind=kind,
             engine=engine,  # type: ignore[arg-type]
             tare=tare,
             gross=gross,
             tyre=tyre,
             gear_ratios=_ratios(gear_ratios),
             final_drive=final_drive,
-            torque=torque,  # type: ignore[arg-type]
+            torque=torque,
             reference_torque=reference_torque,
             drag_coefficient=drag_coefficient,
             frontal_area=frontal_area,

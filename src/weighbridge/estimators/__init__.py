@@ -1,27 +1,89 @@
 """Estimators of the mass, one per file, each with its paper."""
 
 from collections.abc import Callable
-from typing import Final
+from dataclasses import dataclass
+from typing import Any, Final
 
 from weighbridge.balance import ForceBalance
 from weighbridge.estimators import ekf, hybrid, joint, rls, robust_rls, speed_ekf
 from weighbridge.estimators.track import MassTrack, Segment, Status
+from weighbridge.registry import Registry
+from weighbridge.vehicle.fits import JOINT, RLS, SPEED_EKF
 from weighbridge.vehicle.model import Vehicle
 
-Estimator = Callable[[ForceBalance, Vehicle], MassTrack]
 
-ESTIMATORS: Final[dict[str, Estimator]] = {
-    "ekf": ekf.estimate,
-    "hybrid": hybrid.estimate,
-    "joint": joint.estimate,
-    "rls": rls.estimate,
-    "robust-rls": robust_rls.estimate,
-    "speed-ekf": speed_ekf.estimate,
-}
-"""Every method of `weighbridge weigh`, by its name."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimator:
+    """How a mass is estimated, and what is to know of it.
 
-SPEED_ALONE: Final = frozenset({"speed-ekf"})
-"""Methods that need a speed and no torque; they take a balance of
-`weighbridge.balance.speed_balance`."""
+    Attributes
+    ----------
+    name : of the method
+    estimate : makes a track of a balance and a vehicle; takes ``settings`` as third argument,
+        where it has any
+    settings : class of its settings; None where it has none
+    fits : names of the calibrations whose torque it weighs right with, the best first; other
+        torques bias its masses
+    speed_alone : it needs a speed and no torque, and takes a balance of
+        `weighbridge.balance.speed_balance`
+    segments_are_loads : its segments are loads told apart, not just legs of a drive
+    reckons_fuel : its mass is that at the end of the drive, fuel burnt taken off; else that of
+        the whole drive
+    slow_errors : it estimates wind, resistance and their like beside the mass, which its residual
+        still holds
+    """
 
-__all__ = ["ESTIMATORS", "SPEED_ALONE", "Estimator", "MassTrack", "Segment", "Status"]
+    name: str
+    estimate: Callable[..., MassTrack]
+    settings: type[Any] | None = None
+    fits: tuple[str, ...]
+    speed_alone: bool = False
+    segments_are_loads: bool = False
+    reckons_fuel: bool = False
+    slow_errors: bool = False
+
+    def track(self, balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
+        """Estimate with the default settings."""
+        return self.estimate(balance, vehicle)
+
+
+_ANY_TORQUE: Final = (RLS.name, JOINT.name)
+
+ESTIMATORS: Final = Registry(
+    Estimator,
+    "weighbridge.estimators",
+    (
+        Estimator(
+            name="joint",
+            estimate=joint.estimate,
+            fits=(JOINT.name,),
+            segments_are_loads=True,
+            reckons_fuel=True,
+            slow_errors=True,
+        ),
+        Estimator(name="rls", estimate=rls.estimate, settings=rls.RlsSettings, fits=_ANY_TORQUE),
+        Estimator(
+            name="robust-rls",
+            estimate=robust_rls.estimate,
+            settings=robust_rls.RobustRlsSettings,
+            fits=_ANY_TORQUE,
+        ),
+        Estimator(name="ekf", estimate=ekf.estimate, settings=ekf.EkfSettings, fits=_ANY_TORQUE),
+        Estimator(
+            name="hybrid",
+            estimate=hybrid.estimate,
+            settings=hybrid.HybridSettings,
+            fits=_ANY_TORQUE,
+        ),
+        Estimator(
+            name="speed-ekf",
+            estimate=speed_ekf.estimate,
+            settings=speed_ekf.SpeedEkfSettings,
+            fits=(SPEED_EKF.name,),
+            speed_alone=True,
+        ),
+    ),
+)
+"""Every method of `weighbridge weigh`, in the order to show them."""
+
+__all__ = ["ESTIMATORS", "Estimator", "MassTrack", "Segment", "Status"]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
-from weighbridge.balance.force_balance import SLOWEST, TYPICAL_MASS
+from weighbridge.balance.force_balance import SLOWEST
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import robust_rls
@@ -17,7 +17,7 @@ from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import mass_ekf as kernel
 from weighbridge.kernels import robust_rls as rls_kernel
 from weighbridge.signals import Bools
-from weighbridge.vehicle.model import MASS_RANGE, Vehicle
+from weighbridge.vehicle.model import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,8 +83,8 @@ def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Col
 
 def parameters(settings: EkfSettings, vehicle: Vehicle, period: float) -> kernel.MassEkfParams:
     """Make the kernel's parameters for a vehicle and rows ``period`` apart [s]."""
-    lightest, heaviest = MASS_RANGE[vehicle.kind]
-    mass = vehicle.tare or TYPICAL_MASS[vehicle.kind]
+    lightest, heaviest = vehicle.of_class.mass_range
+    mass = vehicle.tare or vehicle.of_class.typical_mass
     return kernel.MassEkfParams(
         gravity=GRAVITY,
         rolling=vehicle.road_load.rolling_coefficient,

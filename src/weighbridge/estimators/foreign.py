@@ -43,7 +43,7 @@ def stretched(track: MassTrack, vehicle: Vehicle) -> float:
 def of_another(vehicle: Vehicle, track: MassTrack) -> tuple[bool, str]:
     """Say why the vehicle file is another vehicle's, in a sentence; nothing if it may be its own.
 
-    Only files of a calibration for ``joint`` can tell: a data sheet leaves more open, and fits
+    Only files of a refined fit can tell: a data sheet leaves more open, and fits
     for others put their road load elsewhere.
 
     Parameters
@@ -56,7 +56,8 @@ def of_another(vehicle: Vehicle, track: MassTrack) -> tuple[bool, str]:
     refused : whether there is no mass for it
     doubt : one sentence; empty where nothing is doubted
     """
-    if vehicle.provenance.method != "joint" or not vehicle.provenance.torque_fitted:
+    fit = vehicle.provenance.fit
+    if fit is None or not fit.refined:
         return False, ""
     far = stretched(track, vehicle)
     if far <= DOUBTFUL:

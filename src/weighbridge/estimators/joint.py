@@ -334,7 +334,7 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
         left = float(np.hypot(left, HIDDEN_BRAKE_STD))
     if lacks_accelerometer(vehicle, balance.motion):
         left = float(np.hypot(left, OTHER_MOTION_STD[balance.motion.source]))
-    if made.method == "rls":
+    if made.fit is not None and made.fit.torque and not made.fit.refined:
         left = float(np.hypot(left, OTHER_METHOD_STD))
     if not mass > 0.0:
         return left

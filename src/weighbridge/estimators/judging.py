@@ -18,24 +18,14 @@ from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
-from weighbridge.vehicle.model import MASS_RANGE, TorqueSource, Vehicle, VehicleClass
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import source_of
 
 STOP: Final = 20.0
 """A standstill this long may change the load [s]."""
 
 WARMING: Final = 600.0
 """Time in which engine and tyres warm [s]."""
-
-COLD_STD: Final[dict[TorqueSource, float]] = {
-    "measured": 0.02,
-    "percent": 0.02,
-    "load": 0.05,
-    "air_flow": 0.05,
-}
-"""Standard deviation of a mass made from the first `WARMING` alone, relative [-]. Load and
-air flow count the friction of a cold engine as traction: simulated cold drives of 13
-minutes came out 5 to 8 % heavy, and right when warm. Measured torque leaves the tyres, a
-fifth more rolling resistance."""
 
 OTHER_METHOD_STD: Final = 0.06
 """Relative standard deviation of masses that the joint estimator makes with a torque that
@@ -53,19 +43,6 @@ whose few starts are all that weighs more."""
 
 LIGHTEST: Final = 0.95
 """Least mass of an empty vehicle over its tare [-]: tank and driver's seat may be empty."""
-
-EMPTIED: Final[dict[VehicleClass, float]] = {
-    "car": 130.0,
-    "van": 160.0,
-    "bus": 350.0,
-    "truck": 400.0,
-}
-"""What may be missing of an empty vehicle [kg]: a driver of 75 kg and a tank of 60, 90, 300 or 400
-litres."""
-
-HEAVIEST: Final[dict[VehicleClass, float]] = {"car": 2.6, "van": 3.2, "bus": 2.6, "truck": 8.0}
-"""Above this multiple of the empty mass neither load nor a trailer explains the mass [-]: cars of
-1.4 t may draw as much again and carry 0.5 t, tractors of 6 t make 40 t and more."""
 
 MOTION_STD: Final[dict[MotionSource, float]] = {
     "inertial": 0.0,
@@ -112,11 +89,11 @@ def consider_std(balance: ForceBalance, phi: Floats, used: Bools, vehicle: Vehic
 
     What the calibration left open, how the motion was found, and the cold
     start: engine and tyres that are not warm yet make a vehicle seem heavy, by
-    as much as `COLD_STD` where all that was learnt is from the first `WARMING`
+    as much as `TorqueSource.cold_std` where all that was learnt is from the first `WARMING`
     of driving.
     """
     share = cold_share(balance.merged.time, phi, used)
-    cold = share * COLD_STD[vehicle.torque.source]
+    cold = share * source_of(vehicle).cold_std
     return float(np.hypot(calibration_std(balance, vehicle), cold))
 
 
@@ -239,7 +216,7 @@ def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
     narrow = np.isfinite(reach) and reach <= 1.96 * WIDEST * abs(mass)
     if narrow and found.drive_std <= WIDEST_OF_DRIVE * abs(mass):
         return _PASSED
-    low, high = MASS_RANGE[vehicle.kind]
+    low, high = vehicle.of_class.mass_range
     if mass + reach < low or mass - reach > high:
         return _possible(found, vehicle)
     by_file = found.left > found.drive_std
@@ -256,7 +233,7 @@ def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
 
 
 def _possible(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
-    low, high = MASS_RANGE[vehicle.kind]
+    low, high = vehicle.of_class.mass_range
     if low < found.mass < high:
         return _PASSED
     return Status.INCONSISTENT, (
@@ -289,15 +266,15 @@ def _plausible(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
     """Whether most of the interval lies between the empty mass and the heaviest load."""
     mass, std = found.mass, found.std
     lightest = vehicle.tare or min(vehicle.provenance.masses, default=None)
-    if lightest is not None and mass - std > HEAVIEST[vehicle.kind] * lightest:
+    if lightest is not None and mass - std > vehicle.of_class.heaviest * lightest:
         return Status.INCONSISTENT, (
-            f"the estimate is {mass:.0f} kg, more than {HEAVIEST[vehicle.kind]:g} times the "
+            f"the estimate is {mass:.0f} kg, more than {vehicle.of_class.heaviest:g} times the "
             f"{lightest:.0f} kg of the empty {vehicle.kind}; check that the vehicle file is this "
             "vehicle's, and the unit and scale of the torque or load"
         )
     if vehicle.tare is None:
         return _PASSED
-    emptied = vehicle.tare - EMPTIED[vehicle.kind]
+    emptied = vehicle.tare - vehicle.of_class.emptied
     if mass + std < LIGHTEST * vehicle.tare or mass + 2.0 * std < emptied:
         return Status.INCONSISTENT, (
             f"the estimate is {mass:.0f} kg, less than the tare of {vehicle.tare:.0f} kg; "
@@ -333,7 +310,7 @@ def segments(
     """
     view = balance.merged
     slow = consider_std(balance, phi, np.zeros_like(used), vehicle)
-    low, high = MASS_RANGE[vehicle.kind]
+    low, high = vehicle.of_class.mass_range
     begin = float(view.time[used][0]) if used.any() else 0.0
     time = view.time
     if time.size < 2:
@@ -352,7 +329,7 @@ def segments(
             continue
         mass, std = weigh_part(part)
         cold = cold_share(time[part], phi[part], used[part], begin)
-        spread = (slow, UNMODELLED_STD, cold * COLD_STD[vehicle.torque.source])
+        spread = (slow, UNMODELLED_STD, cold * source_of(vehicle).cold_std)
         std = float(np.sqrt(std**2 + np.sum(np.square(spread)) * mass**2))
         known = np.isfinite(std) and std < 0.15 * mass and low < mass < high
         found.append(

@@ -14,14 +14,14 @@ from weighbridge.estimators.regression import regression
 from weighbridge.kernels.disturbance import DisturbanceParams
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.data_sheet import (
     USUAL_SPEED,
     by_data_sheet,
     inertia_std,
     offset_std,
 )
-from weighbridge.vehicle.model import TorqueSource, Vehicle
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import source_of
 
 TIME_CONSTANTS: Final = (30.0, 900.0, 600.0, 600.0, 2e4)
 """How long disturbance, resistance, wind north and east and cold torque last [s]: gusts,
@@ -40,18 +40,6 @@ RESISTANCE_STD: Final = 0.017
 
 WIND_STD: Final = 2.0
 """Of each component of the wind at the vehicle [m/s]."""
-
-COLD_TORQUE_STD: Final[dict[TorqueSource, float]] = {
-    "load": 0.04,
-    "air_flow": 0.04,
-    "percent": 0.012,
-    "measured": 0.012,
-}
-"""Of the friction torque that a cold engine or driveline has beside the warm one's, over the
-highest torque of the drive [-]: friction is a tenth of the full load torque of a warm
-engine and half as much again at 20 degC (Heywood, Internal Combustion Engine
-Fundamentals, 1988, ch. 13). Load and air flow count it as torque; of measured torque only
-the gearbox and axle oil takes."""
 
 WARM_UP: Final = 500.0
 """Time constant of engine and oil getting warm [s]."""
@@ -269,7 +257,7 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, grade_open: float
     load = vehicle.road_load
     drag, rolling = load.drag_area_std, load.rolling_coefficient_std
     if vehicle.provenance.mass_scale_std is None:
-        _, std = road_prior(vehicle.kind, single_speed=vehicle.driveline.single_speed)
+        _, std = vehicle.of_class.road_prior(single_speed=vehicle.driveline.single_speed)
         drag = float(std[0]) if drag is None else drag
         rolling = float(std[1]) if rolling is None else rolling
     grade = GRAVITY * grade_open
@@ -280,7 +268,7 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, grade_open: float
         mass * resistance,
         WIND_STD,
         WIND_STD,
-        COLD_TORQUE_STD[vehicle.torque.source] * torque,
+        source_of(vehicle).cold_torque_std * torque,
         drag or 0.0,
     ]
     if by_data_sheet(vehicle):

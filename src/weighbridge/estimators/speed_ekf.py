@@ -18,7 +18,7 @@ from weighbridge.estimators.judging import converged_at
 from weighbridge.estimators.track import MassTrack, Status
 from weighbridge.kernels import speed_ekf as kernel
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import MASS_RANGE, Vehicle
+from weighbridge.vehicle.model import Vehicle
 
 TAIL: Final = 0.75
 """Part of the samples, the last, that counts as converged [-]: the paper's filter settles
@@ -224,7 +224,7 @@ def _judge(
             f"only {count} usable samples of {model.sample_time:g} s, and {FEWEST} are needed: "
             "drive longer, faster than walking pace and without braking"
         )
-    low, high = MASS_RANGE[vehicle.kind]
+    low, high = vehicle.of_class.mass_range
     if not low < mass < high:
         return Status.INCONSISTENT, (
             f"the estimate is {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "

@@ -13,7 +13,8 @@ from weighbridge.balance import ForceBalance
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.model import Vehicle, VehicleClass
+from weighbridge.vehicle.classes import VehicleClass
+from weighbridge.vehicle.model import Vehicle
 
 SQUAT: Final = (0.0035, 0.0025)
 """Pitch of the body per acceleration of a vehicle of which nothing is known, and its standard
@@ -52,11 +53,6 @@ ACCEL_SCALE_STD: Final = 0.01
 """Scale of an accelerometer in a vehicle, relative standard deviation [-]."""
 
 
-GROWTH: Final[dict[VehicleClass, float]] = {"car": 0.0, "van": 1.0, "bus": 1.0, "truck": 1.0}
-"""Power of the mass with which the squat grows [-]: of springs that stay as stiff, 1; those of cars
-are level or progressive."""
-
-
 def squat_at(squat: float, mass: float, masses: Sequence[float], kind: VehicleClass) -> float:
     """Squat at a mass [rad per m/s^2], of a vehicle whose ``squat`` is that of its calibration.
 
@@ -69,7 +65,7 @@ def squat_at(squat: float, mass: float, masses: Sequence[float], kind: VehicleCl
     """
     if not masses or not mass > 0.0:
         return squat
-    return float(squat * (mass / np.mean(masses)) ** GROWTH[kind])
+    return float(squat * (mass / np.mean(masses)) ** kind.squat_growth)
 
 
 def pooled(
@@ -218,10 +214,10 @@ def lean(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Lean:
     if rows_lean == torque_leans:
         if rows_lean or given is None or motion.squat is None or not made.torque_fitted:
             return Lean(0.0, found_std)
-        return Lean(squat_at(given, mass, made.masses, vehicle.kind) - motion.squat, found_std)
+        return Lean(squat_at(given, mass, made.masses, vehicle.of_class) - motion.squat, found_std)
     if rows_lean:
         if given is not None:
-            return Lean(squat_at(given, mass, made.masses, vehicle.kind), given_std)
+            return Lean(squat_at(given, mass, made.masses, vehicle.of_class), given_std)
         seen = squat_by_speed(motion) if motion.source == "longitudinal_accel" else None
         return Lean(*SQUAT) if seen is None else Lean(*_mean(SQUAT, seen))
     if motion.squat is not None:

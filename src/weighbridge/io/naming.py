@@ -51,6 +51,23 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
         "driver s demand engine percent torque", "drivers demand engine percent torque", "demanded torque",
         "driver demand torque", "demand engine torque", "driver s demand engine torque",
     ),
+    "engine_power": (
+        "engine power", "motor power", "power", "leistung", "motorleistung", "puissance", "puissance moteur", "potencia",
+        "potencia motor", "potenza", "potenza motore", "emotor power", "electric motor power", "drive power", "shaft power",
+        "drivetrain power", "powertrain power",
+    ),
+    "wheel_torque": (
+        "wheel torque", "torque at wheels", "total wheel torque", "radmoment", "raddrehmoment", "couple roues", "axle torque",
+    ),
+    "wheel_torque_front": ("wheel torque front", "front axle torque", "front wheel torque", "axle torque front"),
+    "wheel_torque_rear": ("wheel torque rear", "rear axle torque", "rear wheel torque", "axle torque rear"),
+    **{
+        f"wheel_torque_{w}": (f"wheel torque {w}", f"{w} wheel torque", f"wheel torque {where}", f"{where} wheel torque")
+        for w, where in (("fl", "front left"), ("fr", "front right"), ("rl", "rear left"), ("rr", "rear right"))
+    },
+    "traction_force": (
+        "traction force", "tractive force", "tractive effort", "traction effort", "wheel force", "zugkraft", "driving force",
+    ),
     "reference_torque": (
         "engine reference torque", "reference torque", "referenzmoment", "reference engine torque",
     ),
@@ -199,8 +216,17 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
                       "target", "accuracy", "set", "shaft", "output", "input", "turbine", "angular", "idle", "course")),
     "engine_speed": frozenset(("idle", "max", "min", "target", "wheel", "shaft", "turbo", "vehicle", "fan", "limit", "desired", "average")),
     "engine_load": frozenset(("absolute", "sensor", "cpu", "axle", "torque")),
-    "engine_torque": frozenset(("reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder")),
+    "engine_torque": frozenset(("reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder", "axle")),
     "engine_torque_fraction": frozenset(("reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "nominal", "converter")),
+    "engine_power": frozenset(("max", "min", "limit", "available", "charge", "charger", "charging", "battery", "heater", "ac", "steering", "window", "supply", "seat",
+                               "mode", "state", "level", "demand", "demanded", "request", "requested", "target", "regen", "rated", "reference", "accessory", "hvac", "front", "rear", "ecu")),
+    **{
+        f"wheel_torque{ending}": frozenset(("brake", "braking", "max", "min", "limit", "demand", "demanded", "request", "requested", "target", "steering", "reference", *others))
+        for ending, others in (
+            ("", ("front", "rear", "left", "right", "fl", "fr", "rl", "rr")), ("_front", ("left", "right", "rear")), ("_rear", ("left", "right", "front")),
+            *((f"_{w}", ()) for w in ("fl", "fr", "rl", "rr")),
+        )
+    },
     "throttle": frozenset(("relative", "commanded", "b", "c", "pedal", "accelerator", "volts", "voltage")),
     "accelerator_pedal": frozenset(("relative", "e", "f", "brake", "clutch", "x", "y", "z")),
     "fuel_rate": frozenset(("level", "trim", "pressure", "rail", "average")),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from weighbridge.balance.witness_learning import learn_witnesses
 from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.regression import (
-    BOUNDS,
     ROAD_PARAMETERS,
     TorqueFit,
     TorqueRows,
@@ -28,7 +27,7 @@ from weighbridge.calibration.regression import (
 )
 from weighbridge.checks import refuse_serious, settle_drive
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators.judging import COLD_STD, HIDDEN_BRAKE_STD, WIDEST, cold_share
+from weighbridge.estimators.judging import HIDDEN_BRAKE_STD, WIDEST, cold_share
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.rls import block_jackknife
 from weighbridge.estimators.squat import pooled, squat_at
@@ -37,8 +36,10 @@ from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, noted, refine
 from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
-from weighbridge.signals import Bools, Drive, Floats
-from weighbridge.vehicle.class_values import road_prior
+from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.vehicle.as_read import as_read
+from weighbridge.vehicle.classes import VehicleClass
+from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
 from weighbridge.vehicle.gear import GearDetection, detect_gearings
 from weighbridge.vehicle.model import (
     Driveline,
@@ -47,28 +48,16 @@ from weighbridge.vehicle.model import (
     RoadLoad,
     Timing,
     TorqueModel,
-    TorqueSource,
     Vehicle,
-    VehicleClass,
 )
-from weighbridge.vehicle.torque import DRAGGED_TIME, SIGNALS, averaged, lowest_load, regressor
+from weighbridge.vehicle.torque import DRAGGED_TIME, averaged, source_of
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
 FEW_SAMPLES: Final = 2000
 """Fewer usable samples, some twenty minutes of driving, make a poor calibration."""
 
 MASSES_APART: Final = 0.01
 """A mass given and one that a drive states differ by more, and a note says so [-]."""
-
-TRANSFER_STD: Final[dict[TorqueSource, float]] = {
-    "measured": 0.005,
-    "percent": 0.005,
-    "load": 0.010,
-    "air_flow": 0.015,
-}
-"""What a calibration loses on other drives, relative to the mass [-]: the torque model is
-used at other loads and engine speeds than it was made at. Simulated, five calibrations of
-one car each weighed by load on other drives: the five means scattered by 0.9 %; the others
-set in proportion to how direct the torque is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,20 +77,26 @@ class CalibrationSettings:
     """
 
     order: int | None = None
-    source: TorqueSource | None = None
+    source: str | None = None
     grid: bool = False
     curved: bool = True
-    method: Literal["joint", "rls", "speed-ekf"] = "joint"
+    method: str = JOINT.name
 
     def __post_init__(self) -> None:
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
-        if self.source is not None and self.source not in SIGNALS:
-            raise ConfigError(f"source must be one of {', '.join(SIGNALS)}, got {self.source!r}")
-        if self.method not in ("joint", "rls", "speed-ekf"):
-            raise ConfigError(f"method must be joint, rls or speed-ekf, got {self.method!r}")
-        if self.grid and self.method != "rls":
+        if self.source is not None and self.source not in TORQUE_SOURCES:
+            raise ConfigError(f"source must be one of {TORQUE_SOURCES.names}, got {self.source!r}")
+        if self.method not in FITS:
+            *most, last = FITS
+            raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+        if self.grid and self.fit != RLS:
             raise ConfigError("the grid of Jensen 2022 is of method rls; calibrate with that")
+
+    @property
+    def fit(self) -> Fit:
+        """What is fitted."""
+        return FITS[self.method]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,7 +140,7 @@ def calibrate(
     DriveError, ConfigError
         A drive or an argument cannot be used; the sentence says why.
     """
-    if settings is not None and settings.method == "speed-ekf":
+    if settings is not None and not settings.fit.torque:
         return run_speed_calibration(drives, mass, vehicle=vehicle).vehicle
     return run_calibration(drives, mass, vehicle=vehicle, settings=settings).vehicle
 
@@ -165,7 +160,7 @@ def _checked(
     drives: Drive | Sequence[Drive],
     mass: float | Sequence[float] | None,
     vehicle: Vehicle | None,
-    source: TorqueSource | None = None,
+    source: str | None = None,
 ) -> tuple[list[Drive], Vehicle, list[float]]:
     """List the drives, what is known of the vehicle, and the drives' masses; check them."""
     drives = [drives] if isinstance(drives, Drive) else list(drives)
@@ -191,30 +186,34 @@ def run_calibration(
 ) -> Calibration:
     """As `calibrate`, keeping what the report shows."""
     settings = settings or CalibrationSettings()
-    if settings.method == "speed-ekf":
-        raise ConfigError("method speed-ekf has no torque fit; use run_speed_calibration")
+    if not settings.fit.torque:
+        raise ConfigError(f"method {settings.method} has no torque fit; use run_speed_calibration")
     drives, base, masses = _checked(drives, mass, vehicle, settings.source)
-    source = settings.source or best_source(drives, base)
+    source = TORQUE_SOURCES[settings.source] if settings.source else best_source(drives, base)
     for drive in drives:
-        if missing := drive.missing(SIGNALS[source]):
+        if missing := source.lacking(drive):
             raise DriveError(
-                f"{drive.name}: no {' and no '.join(missing)}, which torque source {source!r} needs"
+                f"{drive.name}: no {' and no '.join(missing)}, "
+                f"which torque source {source.name!r} needs"
             )
+        if why := source.refusal(drive, base.driveline.driven):
+            raise DriveError(f"{drive.name}: {why}")
+    given, base = base.driveline, _held(base, source)
     found_motions = [find_motion(drive, base) for drive in drives]
-    motions, squat = _one_squat(found_motions, masses, base.kind)
+    motions, squat = _one_squat(found_motions, masses, base.of_class)
 
     gears, draft = _draft(drives, motions, base, source)
     driveline = draft.driveline
-    modelled = source in ("load", "air_flow")
+    modelled = not source.signed
     order = settings.order if settings.order is not None else (2 if modelled else 0)
     if order and not modelled:
         raise ConfigError(
-            f"order {order}: torque source {source!r} has an offset and a scale only; "
+            f"order {order}: torque source {source.name!r} has an offset and a scale only; "
             "leave --order out"
         )
     curved = settings.curved and modelled
     low, high = _bounds(base, driveline)
-    floors = [_load_floor(drive, source) for drive in drives]
+    floors = [source.floor(source.carrier(drive).values) for drive in drives]
 
     def rows_at(delay: float) -> TorqueRows:
         return join_rows(
@@ -238,7 +237,7 @@ def run_calibration(
     fitted = fit(rows, low, high)
     _refuse_nonsense(drives, fitted, rows, source, curved)
     if settings.grid:
-        if base.kind != "car" or driveline.single_speed:
+        if not base.of_class.jensen_grid or driveline.single_speed:
             raise ConfigError(
                 "the grid of Jensen 2022 is for cars with gears; calibrate without --grid"
             )
@@ -269,7 +268,7 @@ def run_calibration(
             r_squared=fitted.r_squared,
             residual_std=fitted.residual_std,
             samples=int(rows.target.size),
-            method="rls",
+            method=RLS.name,
             motion=motions[0].source if len({m.source for m in motions}) == 1 else None,
             notes=_notes(fitted, low < high, rows.target.size, found),
         ),
@@ -290,12 +289,12 @@ def run_calibration(
             finished.provenance,
             mass_scale_std=float(
                 np.sqrt(
-                    scale_std**2 + TRANSFER_STD[source] ** 2 + _misfit_std(fitted, low < high) ** 2
+                    scale_std**2 + source.transfer_std**2 + _misfit_std(fitted, low < high) ** 2
                 )
             ),
         ),
     )
-    if settings.method == "joint":
+    if settings.fit.refined:
         asked = JointProblem(
             balance_at=_balance_at(
                 drives, motions, replace(draft, dragged=finished.dragged), source, floors
@@ -317,6 +316,8 @@ def run_calibration(
     doubt = scale_doubt(finished, masses, ", ".join(drive.name for drive in drives))
     others = [*_other_masses(drives, masses), *([doubt] if doubt else []), *contradictions]
     finished = _with_doubts(finished, balances, others)
+    if source.gearing is not None:
+        finished = _with_gears(finished, given)
     _refuse_useless(finished)
     return Calibration(vehicle=finished, gears=gears, balances=balances, fit=fitted, rows=rows)
 
@@ -351,6 +352,27 @@ def _refuse_useless(vehicle: Vehicle) -> None:
         )
 
 
+def _held(base: Vehicle, source: TorqueSource) -> Vehicle:
+    """See a vehicle as the source reads it; what turns before the wheels is not fitted there."""
+    if source.gearing is None:
+        return base
+    seen = as_read(base, source)
+    return replace(seen, driveline=replace(seen.driveline, engine_inertia_std=0.0))
+
+
+def _with_gears(vehicle: Vehicle, given: Driveline) -> Vehicle:
+    """Return a vehicle with the gears it has, not those that its torque is read behind."""
+    line = replace(
+        vehicle.driveline,
+        gearings=given.gearings,
+        gearing_stds=given.gearing_stds,
+        engine_inertia=given.engine_inertia,
+        engine_inertia_std=given.engine_inertia_std,
+        idle_speed=given.idle_speed,
+    )
+    return replace(vehicle, driveline=line)
+
+
 def _draft(
     drives: Sequence[Drive], motions: Sequence[Motion], base: Vehicle, source: TorqueSource
 ) -> tuple[GearDetection | None, Vehicle]:
@@ -365,15 +387,15 @@ def _draft(
             gearing_stds=tuple(float(g) for g in gears.stds),
         )
     if driveline.single_speed and driveline.engine_inertia == Driveline().engine_inertia:
-        mean, _ = road_prior(base.kind, single_speed=True)
+        mean, _ = base.of_class.road_prior(single_speed=True)
         driveline = replace(driveline, engine_inertia=float(mean[2]))
     model = TorqueModel(
-        source="measured" if source == "load" else source,
+        source="measured" if source.needs_map else source.name,
         reference_torque=base.torque.reference_torque,
         engine_efficiency=base.torque.engine_efficiency,
     )
     # A floor is told in the unit of its reading, and a witness is one of it.
-    same = base.torque.source == source
+    same = base.torque.source == source.name
     return gears, replace(
         base,
         driveline=driveline,
@@ -385,11 +407,10 @@ def _draft(
 
 def _bounds(base: Vehicle, driveline: Driveline) -> tuple[Floats, Floats]:
     """Bounds of the road parameters; equal where a parameter is known."""
-    low, high = BOUNDS[base.kind]
+    low, high = base.of_class.road_bounds
     if driveline.single_speed:
         # One gear cannot tell the inertias from the mass, nor rolling resistance from an
         # offset of the torque.
-        low, high = low.copy(), high.copy()
         low[1:] = high[1:] = (
             base.road_load.rolling_coefficient,
             driveline.engine_inertia,
@@ -422,12 +443,12 @@ def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
     DriveError
         None of them has any.
     """
-    for source, names in SIGNALS.items():
-        if all(drive.has(*names) for drive in drives):
+    for source in TORQUE_SOURCES.values():
+        if not any(source.lacking(drive) for drive in drives):
             reference = vehicle.torque.reference_torque is not None or all(
                 drive.has("reference_torque") for drive in drives
             )
-            if source != "percent" or reference:
+            if reference or not source.needs_reference:
                 return source
     raise DriveError(
         f"{', '.join(drive.name for drive in drives)}: not every drive has engine_torque, "
@@ -506,12 +527,6 @@ def _other_masses(drives: Sequence[Drive], masses: Sequence[float]) -> list[str]
     ]
 
 
-def _load_floor(drive: Drive, source: TorqueSource) -> float:
-    if source not in ("load", "air_flow"):
-        return -np.inf
-    return lowest_load(drive.signals[SIGNALS[source][0]].values) if source == "load" else 0.0
-
-
 def _finite(balance: ForceBalance, x: Floats, floor: float) -> Bools:
     view = balance.merged
     period = float(np.median(np.diff(view.time)))
@@ -562,14 +577,13 @@ def _draft_balance(
     lag: float = 0.0,
 ) -> tuple[ForceBalance, Floats]:
     """Balance without a torque model yet, and the torque source at its stamps."""
-    stamps = drive.signals[SIGNALS[source][0]].time
-    x = regressor(drive, source, stamps, draft.torque)
+    stamps = source.carrier(drive).time
+    x = source.reading(drive, stamps, draft.torque)
     stand_in = drive
-    if source == "load":
-        load = drive.signals["engine_load"]
-        stand_in = drive.with_signals(replace(load, name="engine_torque"))
-    signed = source in ("measured", "percent")
-    return force_balance(stand_in, draft, motion, delay=delay, lag=lag, signed=signed), x
+    if source.needs_map:
+        stand_in = drive.with_signals(Signal("engine_torque", stamps, x))
+    balance = force_balance(stand_in, draft, motion, delay=delay, lag=lag, signed=source.signed)
+    return balance, x
 
 
 def _ranges(
@@ -581,7 +595,7 @@ def _ranges(
     floors: Sequence[float],
 ) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
     """Engine speeds and loads that the regression has seen, a little widened."""
-    if source not in ("load", "air_flow"):
+    if source.signed:
         return None, None
     speeds, loads = [], []
     for drive, motion, floor in zip(drives, motions, floors, strict=True):
@@ -688,7 +702,7 @@ def _self_weighing(
     found, std, _ = block_jackknife(*joined, np.concatenate(whole), every)
     resisted, _, _ = block_jackknife(*joined, np.concatenate(rest), every)
     weights, shares = np.array(cold).T
-    warming = COLD_STD[vehicle.torque.source] * float(np.average(shares, weights=weights))
+    warming = source_of(vehicle).cold_std * float(np.average(shares, weights=weights))
     return (1.0 + resisted) / (found + resisted), float(np.hypot(std / found, warming))
 
 
@@ -700,7 +714,7 @@ def _refuse_nonsense(
     if not slope > 3.0 * std:
         raise DriveError(
             f"{', '.join(drive.name for drive in drives)}: torque does not rise with its source "
-            f"{SIGNALS[source][0]} ({slope:.3g} ± {std:.2g} N m per unit at the loads and engine "
+            f"{source.signals[0]} ({slope:.3g} ± {std:.2g} N m per unit at the loads and engine "
             "speeds driven); check the signal, its unit and the known mass, or calibrate with "
             "another --torque"
         )
@@ -751,7 +765,7 @@ def _fitted_torque(fitted: TorqueFit, source: TorqueSource, curved: bool) -> Tor
     values = [float(w) for w in fitted.coefficients]
     stds = [float(w) for w in np.sqrt(np.diag(fitted.cov))[: fitted.coefficients.size]]
     return TorqueModel(
-        source=source,
+        source=source.name,
         coefficients=tuple(values[:straight]),
         coefficient_stds=tuple(stds[:straight]),
         curvature=tuple(values[straight:]),

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from weighbridge.errors import WeighbridgeError
-from weighbridge.estimators import SPEED_ALONE, MassTrack
+from weighbridge.estimators import ESTIMATORS, MassTrack
 from weighbridge.pipeline.weighing import (
+    DEFAULT_METHOD,
     Weighing,
     fitted_for_another,
     weigh_balance,
     weigh_checked,
     without_mass,
 )
-
-METHODS: Final = ("joint", "rls", "robust-rls", "ekf", "hybrid", "speed-ekf")
-"""Every method, in the order to show them."""
 
 
 def compare(weighing: Weighing) -> tuple[Weighing, ...]:
@@ -30,21 +26,22 @@ def compare(weighing: Weighing) -> tuple[Weighing, ...]:
 
     Returns
     -------
-    (6,) in the order of `METHODS`; a method that could not be tried says why
+    One by each of `weighbridge.estimators.ESTIMATORS`, in their order; a method that could not be
+    tried says why
     """
     found: dict[str, Weighing] = {weighing.method: weighing}
-    for method in METHODS:
+    for method in ESTIMATORS:
         if method not in found:
-            joint = found.get("joint")
+            joint = found.get(DEFAULT_METHOD)
             found[method] = _by(weighing, method, joint.result if joint is not None else None)
-    return tuple(found[method] for method in METHODS)
+    return tuple(found[method] for method in ESTIMATORS)
 
 
 def _by(weighing: Weighing, method: str, joined: MassTrack | None) -> Weighing:
     """Weigh by another method."""
     drive, vehicle, done = weighing.drive, weighing.vehicle, weighing.result
     try:
-        if done is None or {method, weighing.method} & SPEED_ALONE:
+        if done is None or weighing.estimator.speed_alone or ESTIMATORS[method].speed_alone:
             return weigh_checked(drive, vehicle, method)
         warnings = fitted_for_another(vehicle, method)
         return weigh_balance(drive, vehicle, method, done.balance, warnings, joined)

@@ -51,7 +51,7 @@ from weighbridge.pipeline.ride_checks import (
     ride_samples,
 )
 from weighbridge.signals import Drive, Floats
-from weighbridge.vehicle.model import MASS_RANGE, Ride, Vehicle
+from weighbridge.vehicle.model import Ride, Vehicle
 from weighbridge.visible import visible_json
 
 if TYPE_CHECKING:
@@ -608,7 +608,7 @@ def _status(
             f"may shift it by {100.0 * float(std[0]):.0f} %: a rougher road or quieter sensors "
             "would help"
         )
-    low, high = MASS_RANGE[vehicle.kind]
+    low, high = vehicle.of_class.mass_range
     if not low < mass < high:
         return Status.INCONSISTENT, (
             f"the sprung mass is {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "

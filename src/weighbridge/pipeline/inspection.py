@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import from_si
-from weighbridge.vehicle.model import TorqueSource, Vehicle
+from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import find_power_balance
-from weighbridge.vehicle.torque import SIGNALS
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
 GAP_PERIODS: Final = 5.0
 """A gap is a step of the clock longer than this many median periods."""
@@ -78,7 +78,7 @@ class Way:
     """
 
     motion: MotionSource
-    torque: TorqueSource | Literal["speed"]
+    torque: str
     possible: bool
     needs: tuple[str, ...]
     accuracy: str
@@ -90,7 +90,7 @@ class Way:
         """The way in words."""
         if self.torque == "speed":
             return "speed without torque (speed-ekf)"
-        return f"{_MOTIONS[self.motion]} and {_TORQUES[self.torque]}"
+        return f"{_MOTIONS[self.motion]} and {TORQUE_SOURCES[self.torque].title}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,12 +118,6 @@ _MOTIONS: Final[dict[MotionSource, str]] = {
     "speed_grade": "speed with grade or height",
     "speed": "speed alone",
 }
-_TORQUES: Final[dict[TorqueSource, str]] = {
-    "measured": "torque in N m",
-    "percent": "torque in percent",
-    "load": "engine load",
-    "air_flow": "air flow",
-}
 
 FAST: Final = 2.9
 """Readings of torque or load per second from which they are in time for the motion [1/s]."""
@@ -141,9 +135,6 @@ _EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
 """Standard deviation of a mass, best to worst [%], and what sets it, by motion and whether the
 torque is read at `FAST` or more: the drives of the README's table. Of slow speed alone and of a
 slow longitudinal accelerometer nothing was measured; theirs are graded from the others."""
-
-_AIR_FLOW: Final = (1.0, "air flow says little of efficiency and ignition")
-"""What air flow adds to both [%]; graded, not measured."""
 
 
 def inspect_drive(drive: Drive, vehicle: Vehicle | None = None) -> Inspection:
@@ -238,17 +229,17 @@ def quantisation(values: Floats) -> float | None:
 def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
     ways = []
     for motion in _MOTIONS:
-        for torque in _TORQUES:
+        for torque in TORQUE_SOURCES.values():
             needs = (*_motion_needs(drive, motion), *_torque_needs(drive, torque, vehicle))
             best, worst, reason = _EXPECTED[motion, _is_fast(drive, torque)]
-            if torque == "air_flow":
-                best, worst, reason = best + _AIR_FLOW[0], worst + _AIR_FLOW[0], _AIR_FLOW[1]
+            if torque.expected:
+                best, worst, reason = best + torque.expected, worst + torque.expected, torque.limit
             ways.append(
                 (
                     worst,
                     Way(
                         motion=motion,
-                        torque=torque,
+                        torque=torque.name,
                         possible=not needs,
                         needs=tuple(dict.fromkeys(needs)),
                         accuracy=f"{best:g}–{worst:g} %",
@@ -262,7 +253,7 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
 
 def _is_fast(drive: Drive, torque: TorqueSource) -> bool:
     """Whether the slowest signal of a torque is read at `FAST` or more."""
-    read = [s for name in SIGNALS[torque] if (s := drive.get(name)) is not None and len(s) > 1]
+    read = [s for name in torque.found(drive) if (s := drive.get(name)) is not None and len(s) > 1]
     return all(s.period > 0.0 and 1.0 / s.period >= FAST for s in read)
 
 
@@ -310,12 +301,15 @@ def _motion_needs(drive: Drive, motion: MotionSource) -> list[str]:
 
 
 def _torque_needs(drive: Drive, torque: TorqueSource, vehicle: Vehicle | None) -> list[str]:
-    needs = drive.missing(SIGNALS[torque])
-    if torque == "percent" and not drive.has("reference_torque"):
+    needs = torque.lacking(drive)
+    if torque.needs_reference and not drive.has("reference_torque"):
         known = vehicle is not None and vehicle.torque.reference_torque is not None
         if not known:
             needs.append("reference_torque (or reference_torque_nm in the vehicle file)")
-    fixed_gear = vehicle is not None and vehicle.driveline.single_speed
+    line = vehicle.driveline if vehicle is not None else None
+    if not needs and torque.refusal(drive, line.driven if line is not None else None):
+        needs.append("the torque of every driven axle (or driven in the vehicle file)")
+    fixed_gear = torque.gearing is not None or (line is not None and line.single_speed)
     if not fixed_gear and not drive.has("engine_speed") and "engine_speed" not in needs:
         needs.append("engine_speed (or the one gearing of a single-speed car in the vehicle file)")
     return needs

@@ -17,7 +17,6 @@ from weighbridge.calibration.inverse import (
     FitSettings,
     InverseFit,
     TooShort,
-    TorquePrior,
     fit,
     fit_with_gusts,
 )
@@ -25,8 +24,9 @@ from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.considered import pinned, triangle
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.class_values import road_prior
-from weighbridge.vehicle.model import Driveline, TorqueSource, Vehicle
+from weighbridge.vehicle.fits import JOINT
+from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.vehicle.torque import source_of
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.45)
 """Time constants of the reading's smoothing that are tried [s]. Longer ones pass for the
@@ -51,16 +51,6 @@ TRANSFER_STD: Final = (0.002, 0.003)
 drive of the calibration anew. Simulated, sixteen vehicles, calibrated by one or three
 ordinary drives, six others weighed with each; sensors whose scale is 0.3 % off from drive
 to drive are most of it."""
-
-TORQUE_PRIOR: Final[dict[TorqueSource, TorquePrior]] = {
-    "load": TorquePrior(offset=0.15, growth=0.10, lean=0.30, bend=0.15, knot=0.08),
-    "air_flow": TorquePrior(offset=0.15, growth=0.10, lean=0.30, bend=0.15, knot=0.08),
-    "percent": TorquePrior(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012),
-    "measured": TorquePrior(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012),
-}
-"""What is known of the terms of a torque before any drive: friction and accessories are a tenth
-of the full-load torque and grow with speed (Heywood, 1988, ch. 13); the full-load curve is
-smooth; a torque that is told has been modelled by the maker to a few percent of it."""
 
 FARTHEST: Final = 5.0
 """Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
@@ -130,11 +120,11 @@ def refine(
     """
     line = vehicle.driveline
     settings = FitSettings(
-        source=vehicle.torque.source,
+        source=source_of(vehicle),
         order=problem.order,
         curved=problem.curved,
         knots=problem.knots,
-        bounds=TORQUE_PRIOR[vehicle.torque.source],
+        bounds=source_of(vehicle).terms,
         torque_noise=problem.torque_noise,
         wheel_radius=line.wheel_radius,
         prior=_prior(vehicle, problem.known),
@@ -200,7 +190,7 @@ def refine(
 
 def _as_it_is(vehicle: Vehicle, why: str) -> Vehicle:
     """Keep the torque of eq. 48, to be scaled alone."""
-    made = replace(vehicle, provenance=replace(vehicle.provenance, method="joint"))
+    made = replace(vehicle, provenance=replace(vehicle.provenance, method=JOINT.name))
     return noted(made, f"scaled, not fitted anew: {why}")
 
 
@@ -215,7 +205,7 @@ def noted(vehicle: Vehicle, note: str) -> Vehicle:
 
 def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
     """Road load and inertias of the class, and what the given vehicle file says of them."""
-    mean, std = road_prior(vehicle.kind, single_speed=vehicle.driveline.single_speed)
+    mean, std = vehicle.of_class.road_prior(single_speed=vehicle.driveline.single_speed)
     usual = Driveline()
     for k, name in ((2, "engine_inertia"), (3, "wheel_inertia")):
         given, given_std = getattr(known, name), getattr(known, f"{name}_std")
@@ -296,7 +286,7 @@ def _with(
             wheel_inertia_std=stds[-1],
         ),
         timing=replace(vehicle.timing, torque_delay=delay, torque_lag=lag),
-        provenance=replace(vehicle.provenance, method="joint", mass_scale_std=None),
+        provenance=replace(vehicle.provenance, method=JOINT.name, mass_scale_std=None),
     )
 
 

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators.judging import HEAVIEST
 from weighbridge.signals import Drive
 from weighbridge.vehicle.data_sheet import scale_std, usual_efficiency
-from weighbridge.vehicle.model import MASS_RANGE, Vehicle, VehicleClass
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import source_of
 
 POUND: Final = 0.45359237
 """[kg], by definition."""
@@ -18,15 +18,8 @@ POUND: Final = 0.45359237
 LIGHTEST: Final = 0.9
 """Least mass over the tare [-]: an empty tank, no driver's 75 kg, and what was taken out."""
 
-LOADED: Final[dict[VehicleClass, float]] = {"car": 1.8, "van": 2.2, "bus": 2.2}
-"""Largest mass over the tare where the permitted one is not known [-]: without a trailer cars
-carry half of their tare and vans three quarters. Trucks may carry several times theirs."""
-
 OVERLOAD: Final = 1.25
 """Largest mass over the permitted one [-]."""
-
-UNLADEN_CAR: Final = 3500.0
-"""Permitted mass of cars [kg], by the driving licence; more is a trailer, or pounds."""
 
 SURE: Final = 0.3
 """Scale of a measured torque that is off by more is the mass's fault [-]: makers allow torque
@@ -49,7 +42,7 @@ def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:
     ConfigError
         The sentence says what is plausible, and what the number would be from pounds.
     """
-    low, high = MASS_RANGE[base.kind]
+    (low, high), untowed = base.of_class.mass_range, base.of_class.untowed
     why = f"is no {base.kind}'s, which is between {low:g} and {high:g} kg"
     remedy = "give the mass in kg, and the class under [vehicle] of --vehicle"
     if base.tare is not None or base.gross is not None:
@@ -57,7 +50,7 @@ def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:
         if base.gross is not None:
             high = OVERLOAD * base.gross
         elif base.tare is not None:
-            high = LOADED.get(base.kind, HEAVIEST[base.kind]) * base.tare
+            high = base.of_class.loaded * base.tare
         known = [f"tare {base.tare:g} kg"] if base.tare is not None else []
         known += [f"gross {base.gross:g} kg"] if base.gross is not None else []
         why = f"is not between {low:.0f} and {high:.0f} kg, as {' and '.join(known)} have it"
@@ -65,9 +58,9 @@ def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:
             "give the mass in kg, correct tare_kg, or state gross_kg (of a trailer, too) under "
             "[vehicle] of --vehicle"
         )
-    elif base.kind == "car" and UNLADEN_CAR < kg <= high:
-        high = UNLADEN_CAR
-        why = f"is more than the {high:g} kg a car may have without a trailer"
+    elif untowed is not None and untowed < kg <= high:
+        high = untowed
+        why = f"is more than the {high:g} kg a {base.kind} may have without a trailer"
         remedy = "give the mass in kg, or state tare_kg and gross_kg under [vehicle] of --vehicle"
     if low <= kg <= high:
         return
@@ -97,7 +90,7 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
         No torque is so far off.
     """
     model = vehicle.torque
-    if model.source not in ("measured", "percent") or len(model.coefficients) < 2:
+    if not source_of(vehicle).signed or len(model.coefficients) < 2:
         return ""
     slope = model.coefficients[1] + (float(np.mean(model.knot_slopes)) if model.knots else 0.0)
     ratio = slope / usual_efficiency(vehicle)[0]

@@ -19,6 +19,7 @@ from weighbridge.calibration.speed_fit import (
 from weighbridge.errors import DriveError
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Drive
+from weighbridge.vehicle.fits import SPEED_EKF
 from weighbridge.vehicle.model import Provenance, SpeedModel, Vehicle
 
 SAMPLE_TIME: Final = 7.0
@@ -163,7 +164,7 @@ def calibrate_by_speed(
             drives=tuple(drive.name for drive in drives),
             masses=tuple(masses),
             date=datetime.date.today().isoformat(),
-            method="speed-ekf",
+            method=SPEED_EKF.name,
             mass_scale_std=base.provenance.mass_scale_std,
             notes="speed model alone: nothing of torque or road load was fitted",
         )

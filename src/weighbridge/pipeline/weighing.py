@@ -18,7 +18,7 @@ from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators import ESTIMATORS, SPEED_ALONE, MassTrack, Segment, Status, joint
+from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status, joint
 from weighbridge.estimators.changing import largest
 from weighbridge.estimators.foreign import of_another
 from weighbridge.estimators.judging import lacks_accelerometer, uncalibrated_std
@@ -27,10 +27,12 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
+from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
-from weighbridge.vehicle.torque import SIGNALS
+from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.visible import visible_json
 
 if TYPE_CHECKING:
@@ -66,6 +68,11 @@ class Weighing:
     reason: str
     result: MassTrack | None
     warnings: tuple[str, ...] = ()
+
+    @property
+    def estimator(self) -> Estimator:
+        """What its method is."""
+        return ESTIMATORS[self.method]
 
     @property
     def mass(self) -> float:
@@ -120,9 +127,9 @@ class Weighing:
 
     @property
     def load_changed(self) -> bool:
-        """Whether segments are loads told apart, as joint has them, not just legs of a drive."""
+        """Whether segments are loads told apart, not just legs of a drive."""
         result = self.result
-        return result is not None and result.slow_errors is not None and len(result.segments) > 1
+        return self.estimator.segments_are_loads and result is not None and len(result.segments) > 1
 
     @property
     def track(self) -> pl.DataFrame:
@@ -269,7 +276,9 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
 def weigh_checked(drive: Drive, vehicle: Vehicle, method: str) -> Weighing:
     """Weigh as `weigh` does, from a drive that was checked and a known method."""
     warnings = tuple(p.text for p in drive.problems)
-    alone = method in SPEED_ALONE
+    alone = ESTIMATORS[method].speed_alone
+    if not alone:
+        vehicle = as_read(vehicle)
     lacking = no_speed(drive) if alone else what_is_missing(drive, vehicle)
     if lacking:
         return without_mass(drive, vehicle, method, lacking, warnings)
@@ -301,9 +310,10 @@ def weigh_balance(
     warnings : what is known of the drive
     joined : what ``joint`` makes of the balance, which judges the other methods; None to find it
     """
-    result = ESTIMATORS[method](balance, vehicle)
+    estimator = ESTIMATORS[method]
+    result = estimator.track(balance, vehicle)
     status, reason = result.status, result.why
-    share = None if method in SPEED_ALONE else share_on_gears(balance, vehicle)
+    share = None if estimator.speed_alone else share_on_gears(balance, vehicle)
     if share is not None and share < ENOUGH:
         status = Status.INCONSISTENT
         reason = (
@@ -311,11 +321,11 @@ def weigh_balance(
             f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
             "are wrong; calibrate this vehicle"
         )
-    elif method not in SPEED_ALONE and (
+    elif not estimator.speed_alone and (
         why := scale_contradiction(balance, vehicle) or smoothed_torque(balance, vehicle)
     ):
         status, reason = Status.INCONSISTENT, why
-    if status is Status.CONVERGED and method not in SPEED_ALONE:
+    if status is Status.CONVERGED and not estimator.speed_alone:
         if result.filtered is not None:
             joined = result
         joined = joined or joint.estimate(balance, vehicle)
@@ -385,8 +395,10 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
                 "its clock was moved by that",
             )
     if vehicle.provenance.mass_scale_std is None:
-        by_speed = vehicle.provenance.method == "speed-ekf"
-        made = "calibrated for speed-ekf alone" if by_speed else "not made by a calibration"
+        fit = vehicle.provenance.fit
+        made = "not made by a calibration"
+        if fit is not None and not fit.torque:
+            made = f"calibrated for {fit.name} alone"
         notes += (
             f"the vehicle file of {vehicle.name} was {made}: for errors of its torque, rolling "
             f"radius and efficiency (taken as {wheel_efficiency(vehicle):.2f}) and, where the "
@@ -432,11 +444,13 @@ def _later(by: float) -> str:
 
 def fitted_for_another(vehicle: Vehicle, method: str) -> tuple[str, ...]:
     """Say where the torque was fitted for an estimator that needs another; nothing if not."""
-    if method != "joint" or vehicle.provenance.method != "rls":
+    fit, fits = vehicle.provenance.fit, ESTIMATORS[method].fits
+    if fit is None or not fit.torque or fit.name in fits:
         return ()
     return (
-        f"the vehicle file of {vehicle.name} was calibrated for rls, with which joint masses come "
-        "out several percent light; calibrate again for joint, or weigh with --method rls",
+        f"the vehicle file of {vehicle.name} was calibrated for {fit.name}, with which {method} "
+        f"masses come out several percent light; calibrate again for {fits[0]}, or weigh with "
+        f"--method {fit.name}",
     )
 
 
@@ -483,28 +497,28 @@ def empty_result(drive: str, vehicle: str, method: str, reason: str) -> dict[str
 
 def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
     """Say which signals a drive lacks for this vehicle; empty if none."""
-    source = vehicle.torque.source
-    missing = drive.missing(SIGNALS[source])
-    if source in ("measured", "percent") and vehicle.driveline.single_speed:
-        missing = [name for name in missing if name != "engine_speed"]
+    source = source_of(vehicle)
+    missing = source.lacking(drive)
     if not (drive.has("vehicle_speed") or drive.has("gnss_speed")) and not drive.has("latitude"):
         missing.append("vehicle_speed")
     if not vehicle.driveline.single_speed and not drive.has("engine_speed"):
         missing.append("engine_speed")
     if not missing:
-        return ""
-    if vehicle.provenance.method == "speed-ekf" and not vehicle.driveline.gearings:
+        return source.refusal(drive, vehicle.driveline.driven)
+    fit = vehicle.provenance.fit
+    if fit is not None and not fit.torque and not vehicle.driveline.gearings:
         return (
-            f"the vehicle file of {vehicle.name} was calibrated for speed-ekf alone and knows "
-            "neither gears nor torque: calibrate without --method speed-ekf to weigh by torque"
+            f"the vehicle file of {vehicle.name} was calibrated for {fit.name} alone and knows "
+            f"neither gears nor torque: calibrate without --method {fit.name} to weigh by torque"
         )
     names = " and ".join(dict.fromkeys(missing))
-    sentence = f"the drive has no {names}, which torque source {source!r} needs"
-    others = [s for s, needed in SIGNALS.items() if s != source and drive.has(*needed)]
+    sentence = f"the drive has no {names}, which torque source {source.name!r} needs"
+    others = [s for s in TORQUE_SOURCES.values() if s != source and not s.lacking(drive)]
     if others and drive.has("vehicle_speed"):
         return (
-            f"{sentence}; it has {' and '.join(SIGNALS[others[0]])}: weigh it with a vehicle file "
-            f"of torque source {others[0]!r} (weighbridge calibrate --torque {others[0]})"
+            f"{sentence}; it has {' and '.join(others[0].found(drive))}: weigh it with a vehicle "
+            f"file of torque source {others[0].name!r} "
+            f"(weighbridge calibrate --torque {others[0].name})"
         )
     return f"{sentence}; nothing can be weighed"
 

@@ -12,6 +12,7 @@ from weighbridge.report.style import BLUE, GREY, ORANGE, VERMILLION, Panel, blan
 from weighbridge.report.thinning import single, spread, thin_line
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.calibrating import Calibration
@@ -122,20 +123,14 @@ def torque_panels(calibration: Calibration) -> list[Panel]:
     """Measured and fitted torque over the source and over engine speed (fig. 8)."""
     source, motion = _torques(calibration)
     design = calibration.rows.design
-    kind = calibration.vehicle.torque.source
-    labels = {
-        "load": "Engine load [%]",
-        "air_flow": "Torque from air flow [N m]",
-        "measured": "Recorded torque [N m]",
-        "percent": "Recorded torque [N m]",
-    }
+    read = TORQUE_SOURCES[calibration.vehicle.torque.source]
     regressor = design[:, 1]
-    if kind == "load":
-        regressor = from_si(regressor, "pct")
+    if read.axis_suffix:
+        regressor = from_si(regressor, read.axis_suffix)
     panels = [
         _both(
             regressor,
-            labels[kind],
+            read.axis,
             source,
             motion,
             "The fit should follow the torque over its source",

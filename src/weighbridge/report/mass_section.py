@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from weighbridge.balance import Reason
-from weighbridge.estimators import SPEED_ALONE, MassTrack, Status
+from weighbridge.estimators import MassTrack, Status
 from weighbridge.estimators.regression import regression
 from weighbridge.report.style import (
     BLUE,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 def mass_section(weighing: Weighing, truth: float | None) -> Section:
     """Return the mass over time and what was used for it."""
     panels = [mass_panel(weighing, truth), speed_panel(weighing)]
-    alone = weighing.method in SPEED_ALONE
+    alone = weighing.estimator.speed_alone
     if weighing.result is not None:
         # Without a torque there is no force to draw over the specific force.
         panels += [] if alone else [fit_panel(weighing)]
@@ -156,7 +156,7 @@ def speed_panel(weighing: Weighing) -> Panel:
 
 
 def _sample(weighing: Weighing) -> str:
-    return "mean of the speed" if weighing.method in SPEED_ALONE else "force sample"
+    return "mean of the speed" if weighing.estimator.speed_alone else "force sample"
 
 
 def fit_panel(weighing: Weighing) -> Panel:

@@ -39,8 +39,16 @@ METHOD_STYLE: Final[dict[str, tuple[str, str]]] = {
 }
 """Colour and dash of each method."""
 
+OTHER_STYLE: Final = (GREY, "dot")
+"""Those of a method of another package."""
+
 TRACK_POINTS: Final = 600
 """Points of a line where several are drawn together."""
+
+
+def method_style(method: str) -> tuple[str, str]:
+    """Return colour and dash of a method."""
+    return METHOD_STYLE.get(method, OTHER_STYLE)
 
 
 def methods_section(comparison: Sequence[Weighing], truth: float | None) -> Section:
@@ -92,7 +100,7 @@ def interval_panel(comparison: Sequence[Weighing], truth: float | None) -> Panel
     figure = blank("Mass [kg]", "", height=130 + 42 * len(found))
     for w in reversed(found):
         low, high = w.interval(0.95)
-        colour, _ = METHOD_STYLE[w.method]
+        colour, _ = method_style(w.method)
         figure.add_scatter(
             x=[w.mass], y=[w.method], mode="markers", showlegend=False,
             marker={"color": colour, "size": 11},
@@ -128,7 +136,7 @@ def tracks_panel(comparison: Sequence[Weighing], truth: float | None) -> Panel:
         mass = np.where(begun, result.running_mass, np.nan)
         if not np.isfinite(mass).any():
             continue
-        colour, dash = METHOD_STYLE[w.method]
+        colour, dash = method_style(w.method)
         name = w.method if math.isfinite(w.mass) else f"{w.method} (no mass)"
         x, y = thin_line(minutes(w.drive, result.time), mass, points=TRACK_POINTS)
         line(figure, x, y, name, colour, dash=dash)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 from plotly.offline import get_plotlyjs
 
 from weighbridge.errors import ConfigError
-from weighbridge.estimators import SPEED_ALONE, Status
+from weighbridge.estimators import Status
 from weighbridge.report.calibration_panels import calibration_facts, calibration_panels
 from weighbridge.report.information_section import information_section
 from weighbridge.report.mass_section import mass_section
@@ -215,11 +215,11 @@ def _title(weighings: Sequence[Weighing]) -> str:
 def _truth(weighing: Weighing, truth: Mapping[str, float]) -> float | None:
     """True mass at the end of the drive [kg].
 
-    That of ``drive.toml`` is of its start: the fuel that `joint` reckons with is taken off.
+    That of ``drive.toml`` is of its start: the fuel that some methods reckon with is taken off.
     """
     mass = None if weighing.load_changed else weighing.drive.info.mass
     result = weighing.result
-    if mass is not None and result is not None and result.slow_errors is not None:
+    if mass is not None and result is not None and weighing.estimator.reckons_fuel:
         mass -= float(result.balance.merged.fuel_burnt[-1])
     return truth.get(weighing.drive.name, mass)
 
@@ -307,7 +307,7 @@ def _answer(weighing: Weighing, known: float | None) -> str:
 
 
 def _remedy(weighing: Weighing) -> str:
-    texts = SPEED_REMEDY_TEXT if weighing.method in SPEED_ALONE else REMEDY_TEXT
+    texts = SPEED_REMEDY_TEXT if weighing.estimator.speed_alone else REMEDY_TEXT
     return texts[weighing.status]
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from weighbridge.balance.force_balance import MergedView
-from weighbridge.estimators import SPEED_ALONE, MassTrack
-from weighbridge.report.methods_section import METHOD_STYLE
+from weighbridge.estimators import MassTrack
+from weighbridge.report.methods_section import method_style
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots
 from weighbridge.report.thinning import single, spread
 from weighbridge.signals import Bools, Floats
@@ -109,9 +109,9 @@ def residual_section(weighing: Weighing, comparison: Sequence[Weighing]) -> Sect
     if weighing.result is None:
         return Section(key=key, title=title)
     what = "the measured force less the model's at the final mass"
-    if weighing.method in SPEED_ALONE:
+    if weighing.estimator.speed_alone:
         what = "the change of speed that the filter did not expect, as a force"
-    elif weighing.result.slow_errors is not None:
+    elif weighing.estimator.slow_errors:
         what += ", with disturbance and wind still in it"
     return Section(
         key=key,
@@ -135,11 +135,11 @@ def residual_panel(weighing: Weighing, comparison: Sequence[Weighing], against: 
     index = spread(rows, POINTS)
     figure = blank(
         against.axis,
-        "Innovation times mass [N]" if weighing.method in SPEED_ALONE else "Residual [N]",
+        "Innovation times mass [N]" if weighing.estimator.speed_alone else "Residual [N]",
     )
     dots(figure, single(x[index]), single(result.residual[index]), f"samples, {weighing.method}",
          BLUE, opacity=0.45)  # fmt: skip
-    colour, _ = METHOD_STYLE[weighing.method] if comparison else (VERMILLION, "")
+    colour, _ = method_style(weighing.method) if comparison else (VERMILLION, "")
     centres, mean, std = binned(x[rows], result.residual[rows], width, against.name == "gear")
     figure.add_scatter(
         x=single(centres), y=single(mean), mode="lines+markers",
@@ -153,7 +153,7 @@ def residual_panel(weighing: Weighing, comparison: Sequence[Weighing], against: 
         ox, there = _rows(other.result, against)
         oc, om, _ = binned(ox[there], other.result.residual[there], width, against.name == "gear")
         if oc.size:
-            colour, dash = METHOD_STYLE[other.method]
+            colour, dash = method_style(other.method)
             figure.add_scatter(
                 x=single(oc), y=single(om), mode="lines+markers", name=other.method,
                 line={"color": colour, "width": 1.6, "dash": dash}, marker={"size": 5},
@@ -166,7 +166,7 @@ def residual_panel(weighing: Weighing, comparison: Sequence[Weighing], against: 
     if against.name == "heading":
         figure.update_layout(xaxis_range=[0, 360], xaxis_dtick=90)
     says = against.says
-    if weighing.method in SPEED_ALONE:
+    if weighing.estimator.speed_alone:
         says = "It says how well the speed model tells the next sample; no force was measured."
     return Panel(
         title=f"The residual should not depend on {against.name}",

@@ -60,6 +60,22 @@ _ROWS: Final = (
              "torque of combustion, friction included (SPN 513 without SPN 514)"),
     Quantity("reference_torque", "obd", "reference_torque", "nm", 10.0, 6000.0,
              "reference torque (PID 63, SPN 544)"),
+    Quantity("engine_power", "obd", "engine_power", "kw", -2e6, 2e6,
+             "power at the shaft of engine or motor, negative while it brakes"),
+    Quantity("wheel_torque", "obd", "wheel_torque", "nm", -1e5, 1e5,
+             "torque of the driveline at all driven wheels together"),
+    *(
+        Quantity(f"wheel_torque_{axle}", "obd", f"wheel_torque_{axle}", "nm", -1e5, 1e5,
+                 f"torque of the driveline at both wheels of the {axle} axle")
+        for axle in ("front", "rear")
+    ),
+    *(
+        Quantity(f"wheel_torque_{w}", "obd", f"wheel_torque_{w}", "nm", -1e5, 1e5,
+                 f"torque of the driveline at the wheel {where}")
+        for w, where in _WHEELS.items()
+    ),
+    Quantity("traction_force", "obd", "traction_force", "n", -2e5, 2e5,
+             "force of the driveline at the wheels, positive forward"),
     Quantity("mass_air_flow", "obd", "mass_air_flow", "gps", 0.0, 1.5, "intake air mass flow (PID 10)"),
     Quantity("lambda_1", "obd", "lambda_1", "", 0.4, 20.0, "air-fuel equivalence ratio"),
     Quantity("throttle", "obd", "throttle", "pct", -0.02, 1.02, "throttle or accelerator position"),

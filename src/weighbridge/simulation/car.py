@@ -9,7 +9,6 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.errors import ConfigError
-from weighbridge.vehicle.model import VehicleClass
 
 RPM = math.pi / 30.0
 """One turn per minute [rad/s]."""
@@ -97,7 +96,7 @@ class SimulatedCar:
     """
 
     name: str
-    kind: VehicleClass = "car"
+    kind: str = "car"
     mass: float
     engine: Literal["petrol", "diesel", "electric"] = "petrol"
     transmission: Literal["dual_clutch", "manual", "automatic", "automated", "single"] = (

@@ -14,8 +14,8 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.signals import Floats
-from weighbridge.vehicle.class_values import road_prior
-from weighbridge.vehicle.model import Layout, TorqueSource, Vehicle, VehicleClass
+from weighbridge.vehicle.model import Layout, Vehicle
+from weighbridge.vehicle.torque import source_of
 
 Fuel = Literal["petrol", "diesel"]
 
@@ -34,30 +34,6 @@ with drag and pumps (Joachim et al. 2012), a gear without drag 96 % (standard lo
 Regulation (EU) 2017/2400, Annex VI, App. 8, which is meant to be on the safe side). Lengthwise:
 0.97 in the gearbox, in which some gears are direct, times 0.96 in the hypoid axle: 95.5 %
 (40 CFR 1036.545); a van's lost at least 6 % (Transport Research Laboratory, report RR 10)."""
-
-CLASS_EFFICIENCY: Final[dict[VehicleClass, tuple[float, float]]] = {
-    "car": (0.95, 0.020),
-    "van": (0.945, 0.025),
-    "bus": (0.94, 0.025),
-    "truck": (0.95, 0.020),
-}
-"""Of a class, where the layout is not told, or is always lengthwise [-]. Cars and vans stand
-between both layouts. Trucks: 0.99 in a direct and 0.96 in other gears (Annex VI, as above),
-times 0.98 in a single reduction axle without its drag (Annex VII); buses have automatic
-gearboxes."""
-
-TORQUE_STD: Final[dict[TorqueSource, float]] = {
-    "measured": 0.04,
-    "percent": 0.04,
-    "load": 0.06,
-    "air_flow": 0.06,
-}
-"""Scale of the torque that a control unit tells, relative standard deviation [-]: a maker's
-bus specification grants 10 % or 5 N m, Regulation (EU) 582/2011 7 % of the full load
-torque, and limits are two standard deviations. Load and air flow are only roughly torque."""
-
-MOTOR_TORQUE_STD: Final = 0.03
-"""The same of an electric motor, told from its currents [-]: its limit is 5 %."""
 
 RADIUS_STD: Final = 0.015
 """Rolling radius from the size of the tyre, relative standard deviation [-]: tolerance of the
@@ -105,18 +81,19 @@ MOST_ACCESSORIES: Final = 0.5
 
 def by_data_sheet(vehicle: Vehicle) -> bool:
     """Whether torque is told by the vehicle, and nothing has calibrated it."""
-    told = vehicle.torque.source in ("measured", "percent")
-    return told and not vehicle.provenance.torque_fitted
+    return source_of(vehicle).signed and not vehicle.provenance.torque_fitted
 
 
 def usual_efficiency(vehicle: Vehicle) -> tuple[float, float]:
     """Return the slope of wheel over engine torque of such a vehicle and its standard deviation."""
-    line = vehicle.driveline
+    line, of_source = vehicle.driveline, source_of(vehicle).efficiency
+    if of_source is not None:
+        return of_source
     if line.single_speed:
         return SINGLE_SPEED_EFFICIENCY
-    if vehicle.kind in ("car", "van") and line.layout is not None:
+    if vehicle.of_class.layouts and line.layout is not None:
         return LAYOUT_EFFICIENCY[line.layout]
-    return CLASS_EFFICIENCY[vehicle.kind]
+    return vehicle.of_class.efficiency
 
 
 def wheel_efficiency(vehicle: Vehicle) -> float:
@@ -142,14 +119,16 @@ def torque_std(vehicle: Vehicle) -> float:
     """Relative standard deviation of the torque's scale: as the file says, else as usual."""
     if vehicle.torque.scale_std is not None:
         return vehicle.torque.scale_std
-    if vehicle.driveline.single_speed and vehicle.torque.source == "measured":
-        return MOTOR_TORQUE_STD
-    return TORQUE_STD[vehicle.torque.source]
+    source = source_of(vehicle)
+    if vehicle.driveline.single_speed and source.motor_scale_std is not None:
+        return source.motor_scale_std
+    return source.scale_std
 
 
 def scale_std(vehicle: Vehicle) -> float:
     """Relative standard deviation of a mass by torque, efficiency and rolling radius."""
-    return float(np.linalg.norm([torque_std(vehicle), usual_efficiency(vehicle)[1], RADIUS_STD]))
+    radius = RADIUS_STD if source_of(vehicle).by_radius else 0.0
+    return float(np.linalg.norm([torque_std(vehicle), usual_efficiency(vehicle)[1], radius]))
 
 
 def offset_std(vehicle: Vehicle, torque: float) -> tuple[float, float]:
@@ -181,7 +160,7 @@ def inertia_std(vehicle: Vehicle) -> tuple[float, float]:
     As the vehicle file says, else as those of its class scatter.
     """
     line = vehicle.driveline
-    _, std = road_prior(vehicle.kind, single_speed=line.single_speed)
+    _, std = vehicle.of_class.road_prior(single_speed=line.single_speed)
     engine, wheels = line.engine_inertia_std, line.wheel_inertia_std
     return (
         float(std[2]) if engine is None else engine,

@@ -18,7 +18,6 @@ from tomlkit.items import Table
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals.tomlfile import Section, exact_text, read_toml
-from weighbridge.vehicle.class_values import road_prior
 from weighbridge.vehicle.model import (
     FORMAT_VERSION,
     WITNESS_TERMS,
@@ -63,7 +62,7 @@ _LINE: Final = 90
 
 _VEHICLE: Final = (
     _Key("name", "name", "for people", "text"),
-    _Key("class", "kind", "car, van, bus or truck", "text"),
+    _Key("class", "kind", "such as car, van, bus or truck", "text"),
     _Key("tare", "tare", "mass without payload; the payload is counted from it", suffix="kg"),
     _Key("gross", "gross", "permitted mass", suffix="kg"),
     _Key("mapping", "mapping", "mapping TOML of its logs, seen from this file's folder", "text"),
@@ -117,6 +116,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 suffix="kgm2",
             ),
             _Key("wheel_radius", "wheel_radius", "effective rolling radius", suffix="m"),
+            _Key("driven", "driven", "which axles are: front, rear or all", "text"),
             _Key("layout", "layout", "of a car or van: transverse or longitudinal", "text"),
             _Key(
                 "efficiency",
@@ -130,7 +130,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
     "torque": (
         TorqueModel,
         (
-            _Key("source", "source", "load, measured, percent or air_flow", "text"),
+            _Key("source", "source", "how torque is found, such as load or measured", "text"),
             _Key(
                 "coefficients",
                 "coefficients",
@@ -396,7 +396,7 @@ def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
 def _with_usual_inertias(vehicle: Vehicle, stated: Collection[str]) -> Vehicle:
     """Give the inertias that a file leaves out those of its class."""
     line = vehicle.driveline
-    mean, _ = road_prior(vehicle.kind, single_speed=line.single_speed)
+    mean, _ = vehicle.of_class.road_prior(single_speed=line.single_speed)
     engine = line.engine_inertia if "engine_inertia" in stated else float(mean[2])
     wheels = line.wheel_inertia if "wheel_inertia" in stated else float(mean[3])
     return replace(vehicle, driveline=replace(line, engine_inertia=engine, wheel_inertia=wheels))

@@ -5,33 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, Literal, get_args
+from typing import Literal, get_args
 
 from weighbridge.errors import ConfigError
-from weighbridge.vehicle.class_values import road_prior
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import RADIUS_STD, usual_efficiency
 from weighbridge.vehicle.model import (
-    MASS_RANGE,
     Driveline,
     Layout,
     Provenance,
     RoadLoad,
     TorqueModel,
-    TorqueSource,
     Vehicle,
-    VehicleClass,
 )
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
 
 EngineKind = Literal["petrol", "diesel", "electric"]
-
-CLASS_TYRE: Final[dict[VehicleClass, str]] = {
-    "car": "205/55 R16",
-    "van": "235/65 R16",
-    "bus": "275/70 R22.5",
-    "truck": "315/80 R22.5",
-}
-"""Usual tyre of a class. Those of cars lie within 6 % of its radius, of trucks within 8 %."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +31,7 @@ class Known:
     Attributes
     ----------
     name : for people
-    kind : "car", "van", "bus" or "truck"
+    kind : name of its class
     engine : "petrol", "diesel" or "electric"
     tare : mass of the empty vehicle; of an EU registration document field G, driver of 75 kg and
         fuel included [kg]
@@ -49,21 +39,21 @@ class Known:
     tyre : size as on its side, such as ``205/55 R16``
     gear_ratios : of the gears, falling; of an electric car 1 alone where ``final_drive`` has all
     final_drive : ratio behind the gearbox; 1 when None
-    torque : how the drives tell torque: "measured" in N m, "percent", "load" or "air_flow"
+    torque : how the drives tell torque, by the name of its source
     reference_torque : 100 % of a torque in percent [N m]
     drag_coefficient, frontal_area : [-], [m^2]
     layout : how the engine lies, "transverse" or "longitudinal"
     """
 
     name: str = "vehicle"
-    kind: VehicleClass = "car"
+    kind: str = "car"
     engine: EngineKind | None = None
     tare: float | None = None
     gross: float | None = None
     tyre: str | None = None
     gear_ratios: Sequence[float] = ()
     final_drive: float | None = None
-    torque: TorqueSource | None = None
+    torque: str | None = None
     reference_torque: float | None = None
     drag_coefficient: float | None = None
     frontal_area: float | None = None
@@ -106,7 +96,7 @@ def describe(known: Known) -> Described:
     origins: dict[tuple[str, str], str] = {}
     driveline = _driveline(known, origins)
     torque = TorqueModel()
-    if known.torque in ("measured", "percent"):
+    if known.torque is not None and TORQUE_SOURCES[known.torque].signed:
         torque = TorqueModel(source=known.torque, reference_torque=known.reference_torque)
         origins["torque", "source"] = "given"
     vehicle = Vehicle(
@@ -129,21 +119,21 @@ def _notes(known: Known) -> str:
     told = ["written by weighbridge vehicle new; nothing is calibrated"]
     if known.engine is not None:
         told.append(f"{known.engine} engine" if known.engine != "electric" else "electric motor")
-    if known.torque in ("load", "air_flow"):
+    if known.torque is not None and not TORQUE_SOURCES[known.torque].signed:
         told.append(f"torque by {known.torque.replace('_', ' ')}, which calibrate finds")
     return "; ".join(told)
 
 
 def _refuse(known: Known) -> None:
-    if known.kind not in MASS_RANGE:
-        raise ConfigError(f"class must be {', '.join(MASS_RANGE)}, got {known.kind!r}")
+    if known.kind not in VEHICLE_CLASSES:
+        raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {known.kind!r}")
     for name, value, choice in (
         ("engine", known.engine, get_args(EngineKind)),
-        ("torque", known.torque, get_args(TorqueSource)),
+        ("torque", known.torque, tuple(TORQUE_SOURCES)),
     ):
         if value is not None and value not in choice:
             raise ConfigError(f"{name} must be {', '.join(choice)}, got {value!r}")
-    low, high = MASS_RANGE[known.kind]
+    low, high = VEHICLE_CLASSES[known.kind].mass_range
     for name, mass in (("tare", known.tare), ("gross", known.gross)):
         if mass is not None and not low <= mass <= high:
             raise ConfigError(
@@ -165,12 +155,13 @@ def _refuse(known: Known) -> None:
         raise ConfigError("a final drive needs gear ratios, such as 3.8,2.1,1.4,1.0")
     if (known.drag_coefficient is None) != (known.frontal_area is None):
         raise ConfigError("drag coefficient and frontal area belong together; give both or none")
-    if known.reference_torque is not None and known.torque != "percent":
+    source = TORQUE_SOURCES[known.torque] if known.torque is not None else None
+    if known.reference_torque is not None and not (source and source.needs_reference):
         raise ConfigError("a reference torque is that of a torque in percent; name percent as well")
 
 
 def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
-    tyre = known.tyre or CLASS_TYRE[known.kind]
+    tyre = known.tyre or VEHICLE_CLASSES[known.kind].tyre
     radius = round(rolling_radius(tyre), 4)
     origins["driveline", "wheel_radius"] = (
         f"of {tyre}, ± {100.0 * RADIUS_STD:.1f} %"
@@ -184,7 +175,7 @@ def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
     if ratios:
         origins["driveline", "gearings"] = "of ratios and tyre"
     single = known.engine == "electric" or len(ratios) == 1
-    mean, std = road_prior(known.kind, single_speed=single)
+    mean, std = VEHICLE_CLASSES[known.kind].road_prior(single_speed=single)
     for name, k in (("engine_inertia", 2), ("wheel_inertia", 3)):
         origins["driveline", name] = f"usual for a {known.kind}, ± {std[k]:.2g}"
     return Driveline(
@@ -197,7 +188,7 @@ def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
 
 
 def _road_load(known: Known, origins: dict[tuple[str, str], str]) -> RoadLoad:
-    mean, std = road_prior(known.kind, single_speed=False)
+    mean, std = VEHICLE_CLASSES[known.kind].road_prior(single_speed=False)
     area = float(mean[0])
     origins["road_load", "drag_area"] = f"usual for a {known.kind}, ± {std[0]:.2g}"
     if known.drag_coefficient is not None and known.frontal_area is not None:

@@ -9,24 +9,16 @@ from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.errors import ConfigError
+from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
+from weighbridge.vehicle.fits import FITS, Fit
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.visible import visible
 
 FORMAT_VERSION: Final = 1
 """Version of the vehicle file this program writes and reads."""
 
-TorqueSource = Literal["load", "measured", "percent", "air_flow"]
-VehicleClass = Literal["car", "van", "bus", "truck"]
 Layout = Literal["transverse", "longitudinal"]
-
-
-MASS_RANGE: Final[dict[VehicleClass, tuple[float, float]]] = {
-    "car": (250.0, 8_000.0),
-    "van": (600.0, 15_000.0),
-    "bus": (1_500.0, 45_000.0),
-    "truck": (1_500.0, 80_000.0),
-}
-"""Masses a vehicle of each class can have, from the lightest empty one to an overloaded one
-with a trailer [kg]: outside, data or vehicle file are wrong."""
+Driven = Literal["front", "rear", "all"]
 
 
 # Angles are written from -180 to 180 or from 0 to 360 degrees [rad].
@@ -78,6 +70,7 @@ class Driveline:
     wheel_radius : effective rolling radius [m]
     layout : how the engine of a car or van lies, "transverse" or "longitudinal"; None where
         it is not known
+    driven : which axles are: "front", "rear" or "all"; None where it is not known
     efficiency : wheel over engine power when driving, in (0, 1] [-]; 1 where the
         torque was calibrated at the wheels; None for that of such drivelines, see
         `weighbridge.vehicle.data_sheet.wheel_efficiency`
@@ -93,6 +86,7 @@ class Driveline:
     wheel_inertia_std: float | None = None
     wheel_radius: float = 0.31
     layout: Layout | None = None
+    driven: Driven | None = None
     efficiency: float | None = None
     speed_scale: float = 1.0
     idle_speed: float = 0.0
@@ -107,9 +101,9 @@ class Driveline:
             raise ConfigError("gearing_stds must be as many as gearings")
         _not_negative("engine_inertia", self.engine_inertia)
         _not_negative("wheel_inertia", self.wheel_inertia)
-        _within("engine_inertia", self.engine_inertia, 0.0, 1_000.0, "kg m^2")
+        _within("engine_inertia", self.engine_inertia, 0.0, 10_000.0, "kg m^2")
         _within("wheel_inertia", self.wheel_inertia, 0.0, 10_000.0, "kg m^2")
-        _within("engine_inertia_std", self.engine_inertia_std, 0.0, 1_000.0, "kg m^2")
+        _within("engine_inertia_std", self.engine_inertia_std, 0.0, 10_000.0, "kg m^2")
         _within("wheel_inertia_std", self.wheel_inertia_std, 0.0, 10_000.0, "kg m^2")
         _positive("wheel_radius", self.wheel_radius)
         _within("wheel_radius", self.wheel_radius, 0.05, 3.0, "m")
@@ -117,6 +111,8 @@ class Driveline:
         _within("idle_speed", self.idle_speed, 0.0, 1_000.0, "rad/s")
         if self.layout not in (None, "transverse", "longitudinal"):
             raise ConfigError(f"layout must be transverse or longitudinal, got {self.layout!r}")
+        if self.driven not in (None, "front", "rear", "all"):
+            raise ConfigError(f"driven must be front, rear or all, got {self.driven!r}")
         if self.efficiency is not None and not 0.0 < self.efficiency <= 1.0:
             raise ConfigError(f"efficiency must be in (0, 1], got {self.efficiency}")
         _within("efficiency", self.efficiency, 0.05, 1.0)
@@ -135,8 +131,7 @@ class TorqueModel:
 
     Attributes
     ----------
-    source : "load" (regression, Jensen 2022 eq. 49), "measured" (torque in N m),
-        "percent" (percent of the reference torque) or "air_flow" (eq. 51)
+    source : name of one of `weighbridge.vehicle.torque_sources.TORQUE_SOURCES`
     coefficients : w0, w1 (per unit of load or of air flow torque), then w2, w3 ...
         of rising powers of engine speed in rad/s; for measured and percent
         torque (offset [N m], scale [-]), empty meaning (0, 1), then as well powers of
@@ -157,7 +152,7 @@ class TorqueModel:
         extrapolated and the sample left out ([-], [rad/s])
     """
 
-    source: TorqueSource = "measured"
+    source: str = "measured"
     coefficients: tuple[float, ...] = ()
     coefficient_stds: tuple[float, ...] = ()
     curvature: tuple[float, ...] = ()
@@ -172,15 +167,15 @@ class TorqueModel:
     speed_range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        if self.source not in ("load", "measured", "percent", "air_flow"):
+        source = TORQUE_SOURCES.get(self.source)
+        if source is None:
+            raise ConfigError(f"torque source must be {TORQUE_SOURCES.names}, got {self.source!r}")
+        if source.needs_map and len(self.coefficients) < 2:
             raise ConfigError(
-                f"torque source must be load, measured, percent or air_flow, got {self.source!r}"
+                f"torque source {self.source!r} needs at least two coefficients: "
+                "run weighbridge calibrate"
             )
-        if self.source == "load" and len(self.coefficients) < 2:
-            raise ConfigError(
-                "torque source 'load' needs at least two coefficients: run weighbridge calibrate"
-            )
-        if self.source in ("measured", "percent") and len(self.coefficients) == 1:
+        if source.signed and len(self.coefficients) == 1:
             raise ConfigError(
                 f"torque source {self.source!r} takes two coefficients, offset and scale, and "
                 "powers of engine speed behind them, or none, got 1"
@@ -596,13 +591,19 @@ class Provenance:
                 "fit_cov must be the lower triangle of a square, 1, 3, 6, 10 ... numbers, "
                 f"got {len(self.fit_cov)}"
             )
-        if self.method not in (None, "joint", "rls", "speed-ekf"):
-            raise ConfigError(f"method must be joint, rls or speed-ekf, got {self.method!r}")
+        if self.method is not None and self.method not in FITS:
+            *most, last = FITS
+            raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+
+    @property
+    def fit(self) -> Fit | None:
+        """What was fitted; None where nothing was, or the file does not say it."""
+        return FITS[self.method] if self.method is not None else None
 
     @property
     def torque_fitted(self) -> bool:
         """Whether a calibration has fitted the torque to drives of known mass."""
-        return self.method in ("joint", "rls") or (self.method is None and bool(self.masses))
+        return bool(self.masses) if self.fit is None else self.fit.torque
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -612,7 +613,7 @@ class Vehicle:
     Attributes
     ----------
     name : for people
-    kind : "car", "van", "bus" or "truck"
+    kind : name of one of `weighbridge.vehicle.classes.VEHICLE_CLASSES`
     tare : mass without payload [kg]
     gross : permitted mass [kg]
     mapping : path of a mapping TOML for its logs
@@ -623,7 +624,7 @@ class Vehicle:
     """
 
     name: str = "vehicle"
-    kind: VehicleClass = "car"
+    kind: str = "car"
     tare: float | None = None
     gross: float | None = None
     mapping: str | None = None
@@ -639,8 +640,8 @@ class Vehicle:
     provenance: Provenance = field(default_factory=Provenance)
 
     def __post_init__(self) -> None:
-        if self.kind not in ("car", "van", "bus", "truck"):
-            raise ConfigError(f"class must be car, van, bus or truck, got {self.kind!r}")
+        if self.kind not in VEHICLE_CLASSES:
+            raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {self.kind!r}")
         for name in ("tare", "gross"):
             _positive(name, getattr(self, name))
             _within(name, getattr(self, name), *_MASSES, "kg")
@@ -651,6 +652,11 @@ class Vehicle:
             raise ConfigError(
                 f"mapping must be a path without control characters, got {self.mapping!r}"
             )
+
+    @property
+    def of_class(self) -> VehicleClass:
+        """What vehicles of its class have in common."""
+        return VEHICLE_CLASSES[self.kind]
 
     @classmethod
     def load(cls, path: str | Path) -> Vehicle:

@@ -18,7 +18,7 @@ import numpy as np
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.data_sheet import by_data_sheet, torque_std
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import SIGNALS, engine_torque
+from weighbridge.vehicle.torque import engine_torque, source_of
 
 LEAST_LOSS: Final = 0.01
 """Of inverter and motor in proportion to power, at least [-]: their best efficiency is below
@@ -129,7 +129,10 @@ def find_power_balance(drive: Drive, vehicle: Vehicle) -> PowerBalance | None:
     ----------
     Robust regression: Huber, Robust Statistics, 1981, ch. 7.
     """
-    if drive.missing(("battery_voltage", "battery_current", *SIGNALS[vehicle.torque.source])):
+    source = source_of(vehicle)
+    if source.gearing is not None or source.lacking(drive):
+        return None
+    if drive.missing(("battery_voltage", "battery_current")):
         return None
     rows = _rows(drive, vehicle)
     if rows is None:
@@ -197,7 +200,7 @@ def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
 
 def _rows(drive: Drive, vehicle: Vehicle) -> tuple[Floats, Floats, Floats, Bools] | None:
     """Return means over windows: time, shaft and electric power, and whether it moves."""
-    torque = drive.signals[SIGNALS[vehicle.torque.source][0]]
+    torque = source_of(vehicle).carrier(drive)
     turning = drive.get("engine_speed") or drive.get("vehicle_speed")
     volts, amps = drive.signals["battery_voltage"], drive.signals["battery_current"]
     gearings = vehicle.driveline.gearings

@@ -15,15 +15,9 @@ from weighbridge.constants import (
 )
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std, wheel_efficiency
-from weighbridge.vehicle.model import TorqueModel, TorqueSource, Vehicle
-from weighbridge.vehicle.torque import parameters, rows_of
+from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.torque import parameters, rows_of, source_of
 
-_SOURCES: Final[dict[TorqueSource, str]] = {
-    "load": "engine load (PID 04)",
-    "measured": "torque in N m, as the control unit tells it",
-    "percent": "torque in percent of the reference torque",
-    "air_flow": "air flow and fuel",
-}
 _MOTIONS: Final = {
     "inertial": "inertial sensor with speed or GNSS",
     "longitudinal_accel": "a longitudinal accelerometer and speed",
@@ -56,10 +50,11 @@ def tell(vehicle: Vehicle) -> list[tuple[str, str]]:
 
 def can_weigh(vehicle: Vehicle) -> bool:
     """Whether a drive can be weighed with it: gears are known, and what the torque is worth."""
-    if vehicle.provenance.torque_fitted or vehicle.provenance.method == "speed-ekf":
+    if vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None:
         return True
     stated = vehicle.torque.source != "measured" or vehicle.torque != TorqueModel()
-    return bool(vehicle.driveline.gearings) and (stated or by_data_sheet(vehicle))
+    geared = bool(vehicle.driveline.gearings) or source_of(vehicle).gearing is not None
+    return geared and (stated or by_data_sheet(vehicle))
 
 
 def worth(vehicle: Vehicle) -> str:
@@ -92,6 +87,8 @@ def _masses(vehicle: Vehicle) -> str:
 
 def _gears(vehicle: Vehicle) -> str:
     line = vehicle.driveline
+    if source_of(vehicle).gearing is not None:
+        return "not needed: what is read does not depend on them"
     if not line.gearings:
         return "not known; a calibration finds them from engine and vehicle speed"
     last = line.gearings[-1] * _CRUISE
@@ -106,8 +103,9 @@ def _torque(vehicle: Vehicle) -> str:
     model = vehicle.torque
     if not can_weigh(vehicle):
         return "nothing is known of it; a calibration finds what the reading is worth"
-    text = f"from {_SOURCES[model.source]}"
-    if model.source == "load" and model.speed_range is not None and model.load_range is not None:
+    source = source_of(vehicle)
+    text = f"from {source.words}"
+    if source.axis_suffix == "pct" and model.speed_range and model.load_range:
         low, high = model.speed_range
         turning = np.linspace(low, high, 60)
         most = model.load_range[1]

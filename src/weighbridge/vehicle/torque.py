@@ -9,18 +9,10 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from weighbridge.constants import PETROL_HEATING_VALUE, PETROL_STOICHIOMETRIC_RATIO
 from weighbridge.errors import DriveError
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle.model import TorqueModel, TorqueSource, Vehicle
-
-SIGNALS: dict[TorqueSource, tuple[str, ...]] = {
-    "measured": ("engine_torque",),
-    "percent": ("engine_torque_fraction",),
-    "load": ("engine_load", "engine_speed"),
-    "air_flow": ("mass_air_flow", "engine_speed"),
-}
-"""What each torque source needs of a drive."""
+from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
 DRAGGED_TIME: Final = 0.5
 """Time over which a load tells whether the engine is dragged [s]."""
@@ -44,25 +36,9 @@ class Torque:
     overrun: Bools
 
 
-def air_flow_torque(
-    mass_air_flow: Floats, engine_speed: Floats, lambda_1: Floats, efficiency: float
-) -> Floats:
-    """Torque from intake air flow (Jensen 2022, eq. 51, with the division by engine speed).
-
-    Parameters
-    ----------
-    mass_air_flow : (n,) [kg/s]
-    engine_speed : (n,) [rad/s]
-    lambda_1 : (n,) air-fuel equivalence ratio [-]
-    efficiency : shaft over fuel power [-]
-
-    Returns
-    -------
-    (n,) [N m]
-    """
-    fuel_flow = mass_air_flow / (PETROL_STOICHIOMETRIC_RATIO * lambda_1)
-    power = efficiency * PETROL_HEATING_VALUE * fuel_flow
-    return np.asarray(power / np.maximum(engine_speed, 30.0))
+def source_of(vehicle: Vehicle) -> TorqueSource:
+    """Return the source of the vehicle's torque."""
+    return TORQUE_SOURCES[vehicle.torque.source]
 
 
 def source_signal(drive: Drive, vehicle: Vehicle) -> Signal:
@@ -73,78 +49,14 @@ def source_signal(drive: Drive, vehicle: Vehicle) -> Signal:
     DriveError
         The drive lacks what the vehicle's torque source needs.
     """
-    source = vehicle.torque.source
-    missing = drive.missing(SIGNALS[source])
+    source = source_of(vehicle)
+    missing = source.lacking(drive)
     if missing:
         raise DriveError(
-            f"{drive.name}: no {' and no '.join(missing)}, which torque source {source!r} of "
+            f"{drive.name}: no {' and no '.join(missing)}, which torque source {source.name!r} of "
             f"vehicle {vehicle.name!r} needs; record it, or use a vehicle file with another source"
         )
-    return drive.signals[SIGNALS[source][0]]
-
-
-def regressor(drive: Drive, source: TorqueSource, time: Floats, model: TorqueModel) -> Floats:
-    """Return what torque is (nearly) proportional to, at recorded stamps.
-
-    Load for "load" [-], ideal torque for "air_flow" [N m], torque itself for
-    "measured" and "percent" [N m].
-
-    Raises
-    ------
-    DriveError
-        Percent torque without a reference torque in drive or vehicle.
-    """
-    values = drive.signals[SIGNALS[source][0]].at(time)
-    if source == "percent":
-        return values * _reference(drive, time, model)
-    if source == "air_flow":
-        lambda_1 = drive.get("lambda_1")
-        ratio = lambda_1.at(time) if lambda_1 is not None else np.ones_like(time)
-        speed = drive.signals["engine_speed"].at(time)
-        usable = np.where(np.isfinite(ratio), ratio, 1.0)
-        return air_flow_torque(values, speed, usable, model.engine_efficiency)
-    return values
-
-
-def reference_torques(reference: Signal) -> list[tuple[float, float]]:
-    """Reference torques that a drive tells, each in a tenth of the samples or more.
-
-    Parameters
-    ----------
-    reference : with at least one sample [N m]
-
-    Returns
-    -------
-    Values [N m] with the time each was told first [s], in the order of time
-    """
-    order = np.argsort(reference.values)
-    ascending = reference.values[order]
-    cuts = np.flatnonzero(np.diff(ascending) > 0.02 * np.abs(ascending[:-1])) + 1
-    groups = [g for g in np.split(order, cuts) if g.size >= 0.1 * order.size]
-    found = [
-        (float(np.median(reference.values[g])), float(reference.time[g].min())) for g in groups
-    ]
-    return sorted(found, key=lambda f: f[1])
-
-
-def _reference(drive: Drive, time: Floats, model: TorqueModel) -> Floats:
-    """Return the torque that a percent torque is a part of, at stamps [N m].
-
-    That of the log; where the log tells several, that of the vehicle file, else the one told last.
-    """
-    reference = drive.get("reference_torque")
-    if reference is not None and len(reference):
-        if len(reference_torques(reference)) < 2:
-            return np.full(time.size, np.median(reference.values))
-        if model.reference_torque is None:
-            last = np.searchsorted(reference.time, time, side="right") - 1
-            return np.asarray(reference.values[np.maximum(last, 0)])
-    if model.reference_torque is None:
-        raise DriveError(
-            f"{drive.name}: percent torque without a reference torque; give "
-            "reference_torque_nm in the drive or under [torque] in the vehicle file"
-        )
-    return np.full(time.size, model.reference_torque)
+    return source.carrier(drive)
 
 
 def torque_rows(
@@ -250,14 +162,6 @@ def averaged(values: Floats, period: float, span: float) -> Floats:
     return np.where(share > 0.5 / size, mean / np.maximum(share, 0.5 / size), np.nan)
 
 
-def lowest_load(load: Floats) -> float:
-    """Load below which the engine may be dragged and the load says nothing [-]."""
-    finite = load[np.isfinite(load)]
-    if finite.size == 0:
-        return 0.0
-    return float(np.percentile(finite, 1.0) + 0.01)
-
-
 def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Floats) -> Torque:
     """Return the torque at the recorded stamps ``time``.
 
@@ -273,9 +177,10 @@ def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Fl
     """
     model = vehicle.torque
     period = source_signal(drive, vehicle).period
-    x = regressor(drive, model.source, time, model)
+    source = source_of(vehicle)
+    x = source.reading(drive, time, model)
     nowhere = np.zeros(time.size, dtype=bool)
-    if model.source in ("measured", "percent"):
+    if source.signed:
         torque = _by_map(model, x, engine_speed)
         return Torque(time, torque, nowhere, nowhere)
     dragged = averaged(x, period, DRAGGED_TIME)

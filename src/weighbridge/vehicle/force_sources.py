@@ -1,0 +1,262 @@
+"""Sources of torque beside the engine's own: at wheels and axles, by power, by the battery."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.vehicle.torque_source import TOLD_TERMS, TorqueConstants, TorqueSource
+
+SLOWEST: Final = 1.0
+"""Slower than this a power says nothing of a force [m/s]."""
+
+SLOWEST_SHAFT: Final = 15.0
+"""Slower than this a power says nothing of a torque [rad/s]."""
+
+STANDING: Final = 0.1
+"""Slower than this the vehicle stands [m/s]."""
+
+FEWEST_STANDING: Final = 20
+"""Samples at standstill that tell what a battery gives beside driving."""
+
+ACCESSORIES: Final = 750.0
+"""What it gives where they are fewer [W] (Implementing Decision 2013/341/EU)."""
+
+BATTERY_EFFICIENCY: Final = (0.92, 0.04)
+"""Slope of power at the wheels over power of the battery, driving, and its standard deviation [-]:
+inverter and motor 0.95, near their best efficiency, for what is always lost is no part of the slope
+(Burress, Benchmarking EV and HEV Technologies, Oak Ridge National Laboratory, 2016), gears 0.97
+(`weighbridge.vehicle.data_sheet`). Braking by the motor, its inverse."""
+
+_AXLES: Final = {
+    "front": ("wheel_torque_front", "wheel_torque_fl", "wheel_torque_fr"),
+    "rear": ("wheel_torque_rear", "wheel_torque_rl", "wheel_torque_rr"),
+}
+"""Torque of each axle, and of its wheels."""
+
+
+def _measured_of(drive: Drive, axle: str) -> tuple[str, ...]:
+    """Signals that hold the torque of one axle; empty where it is not, or only partly, measured."""
+    whole, *wheels = _AXLES[axle]
+    if drive.has(whole):
+        return (whole,)
+    return tuple(wheels) if drive.has(*wheels) else ()
+
+
+def _wheel_torque(drive: Drive) -> Signal:
+    """Torque of all wheels that were measured, on the clock of the first [N m]."""
+    names: tuple[str, ...] = ("wheel_torque",)
+    if not drive.has("wheel_torque"):
+        names = tuple(n for axle in _AXLES for n in _measured_of(drive, axle))
+        names = names or tuple(n for parts in _AXLES.values() for n in parts if drive.has(n))
+    first, *others = (drive.signals[name] for name in names)
+    total = first.values + sum(other.at(first.time) for other in others)
+    known = np.isfinite(total)
+    return Signal("wheel_torque", first.time[known], total[known])
+
+
+def _unmeasured(drive: Drive, driven: str | None) -> str:
+    """Say which driven wheels were not measured, in a sentence; empty where all were."""
+    if drive.has("wheel_torque"):
+        return ""
+    measured = [axle for axle in _AXLES if _measured_of(drive, axle)]
+    if len(measured) == len(_AXLES) or measured == [driven]:
+        return ""
+    if not measured:
+        single = [n for parts in _AXLES.values() for n in parts if drive.has(n)]
+        return (
+            f"{' and '.join(single)} alone: the torque of the other wheel of the axle is not "
+            "known, so there is no absolute mass; record both"
+        )
+    axle = measured[0]
+    other = "rear" if axle == "front" else "front"
+    if driven is None:
+        return (
+            f"only the torque of the {axle} axle was recorded, and the vehicle file does not say "
+            f"whether the {other} one is driven, so there is no absolute mass; state driven = "
+            f'"{axle}" under [driveline] if it is not, or record wheel_torque_{other} too'
+        )
+    return (
+        f"only the torque of the {axle} axle was recorded, and "
+        f"{'both axles are' if driven == 'all' else f'the {other} axle is'} driven: what the "
+        f"others push is not known, so there is no absolute mass; record wheel_torque_{other} too"
+    )
+
+
+def _wheels(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
+    return _wheel_torque(drive).at(time)
+
+
+def _force(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
+    return drive.signals["traction_force"].at(time)
+
+
+def _per(power: Floats, speed: Floats, slowest: float) -> Floats:
+    """Power over speed (n,); NaN below the slowest."""
+    fast = np.abs(speed) >= slowest
+    return np.where(fast, power / np.where(fast, speed, 1.0), np.nan)
+
+
+def _power(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
+    speed = drive.signals["engine_speed"].at(time)
+    return _per(drive.signals["engine_power"].at(time), speed, SLOWEST_SHAFT)
+
+
+def _speed_of(drive: Drive) -> Signal:
+    speed = drive.speed
+    assert speed is not None, "the source names it among its signals"
+    return speed
+
+
+def _power_by_speed(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
+    return _per(drive.signals["engine_power"].at(time), _speed_of(drive).at(time), SLOWEST)
+
+
+def _driving_power(drive: Drive) -> Signal:
+    """Power that a battery gives for driving, positive while it gives [W].
+
+    What it gives at standstill goes to heating, pumps and electronics. Its sign is that with which
+    power accelerates.
+    """
+    volts, amps, speed = (drive.signals["battery_voltage"], drive.signals["battery_current"],
+                          _speed_of(drive))  # fmt: skip
+    power = volts.at(amps.time) * amps.values
+    known = np.isfinite(power)
+    time, power = amps.time[known], power[known]
+    v = speed.at(time)
+    around = max(round(1.0 / amps.period), 1) if amps.period > 0.0 else 1
+    smooth = uniform_filter1d(np.nan_to_num(v), around) if time.size else v
+    gained = np.gradient(smooth**2, time) if time.size > 1 else np.zeros(time.size)
+    sign = math.copysign(1.0, float((power - np.mean(power)) @ gained)) if time.size else 1.0
+    standing = np.abs(v) < STANDING
+    rest = ACCESSORIES
+    if np.count_nonzero(standing) >= FEWEST_STANDING:
+        rest = float(np.median(sign * power[standing]))
+    return Signal("battery_power", time, sign * power - rest)
+
+
+def _battery(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
+    force = _per(_driving_power(drive).at(time), _speed_of(drive).at(time), SLOWEST)
+    efficiency = BATTERY_EFFICIENCY[0]
+    return np.asarray(np.where(force >= 0.0, efficiency * force, force / efficiency))
+
+
+def _per_wheel_angle(radius: float) -> float:
+    return 1.0 / radius
+
+
+def _per_distance(radius: float) -> float:
+    return 1.0
+
+
+WHEEL_TORQUE: Final = TorqueSource(
+    name="wheel_torque",
+    signals=("wheel_torque",),
+    others=(
+        ("wheel_torque_front", "wheel_torque_rear"),
+        ("wheel_torque_fl", "wheel_torque_fr", "wheel_torque_rl", "wheel_torque_rr"),
+        ("wheel_torque_front",),
+        ("wheel_torque_rear",),
+        ("wheel_torque_fl", "wheel_torque_fr"),
+        ("wheel_torque_rl", "wheel_torque_rr"),
+        *((name,) for parts in _AXLES.values() for name in parts[1:]),
+    ),
+    combined=_wheel_torque,
+    gearing=_per_wheel_angle,
+    efficiency=(1.0, 0.0),
+    refusal=_unmeasured,
+    reading=_wheels,
+    signed=True,
+    title="torque at the wheels",
+    words="torque at wheels or axles",
+    axis="Torque at the wheels [N m]",
+    terms=TOLD_TERMS,
+    # Told by control units, it is an engine's torque through a gearbox.
+    scale_std=0.04,
+    transfer_std=0.005,
+    cold_std=0.02,
+    cold_torque_std=0.005,
+)
+
+TRACTION_FORCE: Final = TorqueSource(
+    name="traction_force",
+    signals=("traction_force",),
+    gearing=_per_distance,
+    efficiency=(1.0, 0.0),
+    by_radius=False,
+    reading=_force,
+    signed=True,
+    title="traction force",
+    words="traction force at the wheels",
+    axis="Traction force [N]",
+    terms=TOLD_TERMS,
+    scale_std=0.04,
+    transfer_std=0.005,
+    cold_std=0.02,
+    cold_torque_std=0.005,
+)
+
+POWER: Final = TorqueSource(
+    name="power",
+    signals=("engine_power", "engine_speed"),
+    reading=_power,
+    signed=True,
+    title="power and engine speed",
+    words="power of engine or motor over its speed",
+    axis="Torque from power [N m]",
+    terms=TOLD_TERMS,
+    scale_std=0.04,
+    motor_scale_std=0.03,
+    transfer_std=0.005,
+    cold_std=0.02,
+    cold_torque_std=0.012,
+)
+
+POWER_BY_SPEED: Final = TorqueSource(
+    name="power_by_speed",
+    signals=("engine_power", "vehicle_speed"),
+    others=(("engine_power", "gnss_speed"),),
+    gearing=_per_distance,
+    before_motor=True,
+    by_radius=False,
+    reading=_power_by_speed,
+    signed=True,
+    title="power and vehicle speed",
+    words="power of the motor over vehicle speed",
+    axis="Force from power [N]",
+    terms=TOLD_TERMS,
+    scale_std=0.04,
+    motor_scale_std=0.03,
+    transfer_std=0.005,
+    cold_std=0.02,
+    cold_torque_std=0.012,
+)
+
+BATTERY: Final = TorqueSource(
+    name="battery",
+    signals=("battery_current", "battery_voltage", "vehicle_speed"),
+    others=(("battery_current", "battery_voltage", "gnss_speed"),),
+    combined=_driving_power,
+    gearing=_per_distance,
+    before_motor=True,
+    efficiency=(1.0, BATTERY_EFFICIENCY[1]),
+    by_radius=False,
+    reading=_battery,
+    signed=True,
+    title="power of the battery",
+    words="power of the traction battery over vehicle speed",
+    axis="Force from battery power [N]",
+    terms=TOLD_TERMS,
+    # Of the meters; the losses behind them are the efficiency's.
+    scale_std=0.02,
+    transfer_std=0.010,
+    cold_std=0.03,
+    cold_torque_std=0.02,
+    # Graded, not measured.
+    expected=1.0,
+    limit="what heating, cooling and motor take of the battery's power is not measured",
+)

@@ -1,0 +1,147 @@
+"""What there is to say of a source of torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from weighbridge.signals import Drive, Floats, Signal
+
+
+class TorqueConstants(Protocol):
+    """What a vehicle file may say of a reading, see `weighbridge.vehicle.model.TorqueModel`."""
+
+    @property
+    def reference_torque(self) -> float | None:
+        """Torque of 100 % [N m]."""
+        ...
+
+    @property
+    def engine_efficiency(self) -> float:
+        """Shaft over fuel power [-]."""
+        ...
+
+
+Reading = Callable[[Drive, Floats, TorqueConstants], Floats]
+"""What torque is (nearly) proportional to (n,), at recorded stamps (n,) [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TorqueTerms:
+    """Standard deviations of the terms of a torque, over the highest torque of the drives [-].
+
+    Attributes
+    ----------
+    offset : torque at no reading
+    growth : for each power of engine speed, at a typical one
+    lean : torque at the highest reading that grows with engine speed
+    bend : of the highest reading squared
+    knot : of the smooth correction at the highest reading
+    """
+
+    offset: float
+    growth: float
+    lean: float
+    bend: float
+    knot: float
+
+
+def _no_refusal(drive: Drive, driven: str | None) -> str:
+    return ""
+
+
+def _no_floor(values: Floats) -> float:
+    return -np.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TorqueSource:
+    """How torque is found from what a drive recorded, and how well.
+
+    Attributes
+    ----------
+    name : in vehicle files and options
+    signals : what a drive must hold; the first carries the clock
+    others : sets of signals that do instead, the better first
+    combined : makes the signal that carries the torque of several; None where the first of a set
+        does
+    gearing : angle of the reading's shaft per distance travelled [1/m] by rolling radius [m]: what
+        is read behind the gearbox needs none of its gears; None for the engine's shaft
+    before_motor : the reading holds what the motor's own inertia takes, where ``gearing`` is given
+    efficiency : slope of wheel force over reading where nothing was calibrated, and its standard
+        deviation [-]; None for that of the driveline
+    by_radius : the force hangs on the rolling radius
+    refusal : says in a sentence why a drive has no mass by it, of a vehicle whose driven axles are
+        "front", "rear", "all" or unknown; empty where it has one
+    reading : what torque is proportional to [N m], or a share where ``needs_map``
+    signed : the reading is a torque as the vehicle computed it, which tells what a dragged engine
+        takes, and can be weighed by without a calibration; else it is only roughly torque, bends
+        with engine speed and load, and says nothing in overrun
+    needs_map : the reading is no torque, and means nothing without the coefficients of a
+        calibration
+    needs_reference : the reading is a part of a reference torque
+    floor : least reading that says something, from the readings of a drive (n,)
+    title : in a few words, of the ways to weigh a drive
+    words : what a vehicle file that uses it says of it
+    axis, axis_suffix : title of an axis of readings, and the suffix of its unit; empty for SI
+    terms : what is known of its terms before any drive
+    scale_std, motor_scale_std : of the scale of a reading that was never calibrated, and that of
+        an electric motor with one gear where it is another [-]
+    transfer_std : what a calibration by eq. 48 loses on other drives, relative to the mass [-]
+    cold_std : of a mass made from a cold start alone, relative [-]
+    cold_torque_std : of the friction torque of the cold in the reading, over the highest torque [-]
+    expected : what the source adds to the expected error of a mass [%]
+    limit : what limits it, where ``expected`` is not 0
+    """
+
+    name: str
+    signals: tuple[str, ...]
+    others: tuple[tuple[str, ...], ...] = ()
+    combined: Callable[[Drive], Signal] | None = None
+    gearing: Callable[[float], float] | None = None
+    before_motor: bool = False
+    efficiency: tuple[float, float] | None = None
+    by_radius: bool = True
+    refusal: Callable[[Drive, str | None], str] = _no_refusal
+    reading: Reading
+    signed: bool
+    needs_map: bool = False
+    needs_reference: bool = False
+    floor: Callable[[Floats], float] = _no_floor
+    title: str
+    words: str
+    axis: str
+    axis_suffix: str = ""
+    terms: TorqueTerms
+    scale_std: float
+    motor_scale_std: float | None = None
+    transfer_std: float
+    cold_std: float
+    cold_torque_std: float
+    expected: float = 0.0
+    limit: str = ""
+
+    def found(self, drive: Drive) -> tuple[str, ...]:
+        """Signals of a drive that torque is made from; those it should hold where it lacks any."""
+        return next((s for s in (self.signals, *self.others) if drive.has(*s)), self.signals)
+
+    def lacking(self, drive: Drive) -> list[str]:
+        """Name the signals that a drive lacks."""
+        return drive.missing(self.found(drive))
+
+    def carrier(self, drive: Drive) -> Signal:
+        """Signal whose clock carries the torque, of a drive that lacks nothing."""
+        if self.combined is not None:
+            return self.combined(drive)
+        return drive.signals[self.found(drive)[0]]
+
+
+TOLD_TERMS: Final = TorqueTerms(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012)
+"""Of a torque that is told: the maker has modelled it to a few percent of the full-load torque."""
+
+ROUGH_TERMS: Final = TorqueTerms(offset=0.15, growth=0.10, lean=0.30, bend=0.15, knot=0.08)
+"""Of a reading that is only roughly torque: friction and accessories are a tenth of the full-load
+torque and grow with speed (Heywood, 1988, ch. 13); the full-load curve is smooth."""

@@ -1,0 +1,146 @@
+"""Force at wheels, power and battery: readings made of the truth of a simulated drive."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.errors import DriveError
+from weighbridge.papers.jensen2022 import without_weather
+from weighbridge.simulation import make_scenario, random_vehicle, simulate_car, usual_polling
+from weighbridge.vehicle.as_read import as_read
+from weighbridge.vehicle.model import Driveline, TorqueModel
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+LATE = 0.08
+"""Readings are as late as this [s]."""
+
+AUX, LOSS, METER = 700.0, 0.05, 360.0
+"""Of the battery: beside driving [W], in proportion to power [-], and its voltage [V]."""
+
+
+def read(made, rng):
+    """Readings at 10 Hz with 1 % noise, made of the truth."""
+    truth, radius = made.truth, made.scenario.car.wheel_radius
+    time = np.arange(truth.time[0] + 0.2, truth.time[-1], 0.1)
+
+    def signal(name, values):
+        noise = 0.01 * np.percentile(np.abs(values), 99.0)
+        at = np.interp(time - LATE, truth.time, values)
+        return wb.Signal(name, time, at + noise * rng.standard_normal(time.size))
+
+    power = truth.engine_torque * truth.engine_speed
+    battery = power + LOSS * np.abs(power) + AUX
+    found = (
+        signal("traction_force", truth.traction_force),
+        signal("wheel_torque_front", 0.6 * truth.traction_force * radius),
+        signal("wheel_torque_rear", 0.4 * truth.traction_force * radius),
+        signal("engine_power", power),
+        signal("battery_current", -battery / METER),
+        wb.Signal("battery_voltage", time, np.full(time.size, METER)),
+    )
+    return {s.name: s for s in found}
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """Return a car's drives, known and loaded, with their readings, by kind."""
+    found = {}
+    for k, kind in enumerate(("petrol_dct", "electric")):
+        rng = np.random.default_rng([71, k])
+        car = random_vehicle(rng, kind)
+        polling = replace(usual_polling(car), fast=("vehicle_speed", "engine_speed"), rate=5.0)
+        drives = []
+        for j, (name, load) in enumerate((("car-calibration", 0.0), ("car", 300.0))):
+            scenario = make_scenario(name, payload=load, seed=810 + 10 * k + j)
+            sensors = replace(scenario.sensors, imu_rate=100.0)
+            made = simulate_car(
+                replace(scenario, car=car, polling=polling, sensors=sensors, duration=1200.0)
+            )
+            drives.append((made, read(made, rng)))
+        found[kind] = drives
+    return found
+
+
+def drive_of(drive, names, *, engine_speed):
+    made, readings = drive
+    plain = without_weather(made.drive)
+    plain = plain if engine_speed else plain.without("engine_speed")
+    return plain.with_signals(*(readings[name] for name in names))
+
+
+CASES = [
+    ("traction_force", "petrol_dct", ("traction_force",), False),
+    ("wheel_torque", "petrol_dct", ("wheel_torque_front", "wheel_torque_rear"), True),
+    ("power", "petrol_dct", ("engine_power",), True),
+    ("power_by_speed", "electric", ("engine_power",), False),
+    ("battery", "electric", ("battery_current", "battery_voltage"), False),
+]
+
+
+@pytest.mark.parametrize(("source", "kind", "names", "engine_speed"), CASES)
+def test_each_source_weighs(driven, source, kind, names, engine_speed):
+    known, loaded = (drive_of(d, names, engine_speed=engine_speed) for d in driven[kind])
+    car = driven[kind][0][0].scenario.car
+    line = Driveline(wheel_radius=car.wheel_radius)
+    mass, truth = driven[kind][0][0].truth.mass[0], driven[kind][1][0].truth.mass[-1]
+    made = wb.calibrate(known, float(mass), vehicle=wb.Vehicle(driveline=line))
+    assert made.torque.source == source
+    weighed = wb.weigh(loaded, made)
+    assert weighed.mass == pytest.approx(truth, rel=0.03)
+    assert abs(weighed.mass - truth) < 3.0 * weighed.std
+    chosen = [w for w in wb.inspect_drive(loaded, made).ways if w.chosen]
+    assert [w.torque for w in chosen] == [source]
+
+    geared = tuple(car.gearings) if source == "power" else ()
+    sheet = wb.Vehicle(driveline=replace(line, gearings=geared), torque=TorqueModel(source=source))
+    alone = wb.weigh(loaded, sheet)
+    assert abs(alone.mass - truth) < 3.0 * alone.std
+    assert alone.std < 0.07 * truth
+
+
+def test_an_axle_alone_is_weighed_only_where_no_other_is_driven(driven):
+    drive = drive_of(driven["petrol_dct"][1], ("wheel_torque_front",), engine_speed=True)
+    for driven_axle, why in (
+        (None, "does not say whether the rear one is driven"),
+        ("all", "both axles are driven"),
+        ("rear", "the rear axle is driven"),
+    ):
+        line = Driveline(driven=driven_axle)
+        car = wb.Vehicle(driveline=line, torque=TorqueModel(source="wheel_torque"))
+        weighed = wb.weigh(drive, car)
+        assert weighed.status is wb.Status.MISSING_SIGNALS
+        assert why in weighed.reason
+        assert np.isnan(weighed.mass)
+        with pytest.raises(DriveError, match=why):
+            wb.calibrate(drive, 1500.0, vehicle=wb.Vehicle(driveline=line))
+    front = Driveline(driven="front")
+    assert not TORQUE_SOURCES["wheel_torque"].refusal(drive, front.driven)
+
+
+def test_one_wheel_of_an_axle_is_refused(driven):
+    drive = drive_of(driven["petrol_dct"][1], (), engine_speed=True)
+    wheel = driven["petrol_dct"][1][1]["wheel_torque_front"]
+    drive = drive.with_signals(replace(wheel, name="wheel_torque_fl"))
+    assert "other wheel" in TORQUE_SOURCES["wheel_torque"].refusal(drive, "front")
+
+
+def test_a_vehicle_as_read_twice_is_the_same():
+    for source in ("wheel_torque", "battery"):
+        car = wb.Vehicle(torque=TorqueModel(source=source))
+        once = as_read(car)
+        assert as_read(once) == once
+    plain = wb.Vehicle(torque=TorqueModel(source="power"))
+    assert as_read(plain) is plain
+
+
+def test_the_sign_of_the_current_does_not_matter(driven):
+    names = ("battery_current", "battery_voltage")
+    drive = drive_of(driven["electric"][1], names, engine_speed=False)
+    amps = drive.signals["battery_current"]
+    turned = drive.with_signals(replace(amps, values=-amps.values))
+    source, time, model = TORQUE_SOURCES["battery"], amps.time, TorqueModel(source="battery")
+    np.testing.assert_allclose(
+        source.reading(drive, time, model), source.reading(turned, time, model)
+    )
