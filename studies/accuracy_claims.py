@@ -49,7 +49,6 @@ from weighbridge.vehicle.model import (
     Layout,
     RoadLoad,
     TorqueModel,
-    TorqueSource,
     Vehicle,
 )
 
@@ -456,7 +455,7 @@ def data_sheet(car: SimulatedCar, rng: np.random.Generator, idle: float | None) 
     radius = car.wheel_radius * float(rng.normal(1.0, 0.01))
     known = car.drag_area * float(rng.normal(1.0, 0.07)), 0.07 * car.drag_area
     drag, drag_std = known if car.kind == "car" else (float(mean[0]), None)
-    source: TorqueSource = "measured" if car.electric else "percent"
+    source = "measured" if car.electric else "percent"
     friction: tuple[float, ...] = ()
     if idle is not None:
         w0, w2, w3 = friction_coefficients(

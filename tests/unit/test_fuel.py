@@ -111,5 +111,6 @@ def test_the_mass_is_that_at_the_end_of_the_drive(weighed):
     assert_allclose(
         told.running_mass[early], weighing.result.running_mass[early] - tank[early], rtol=1e-3
     )
-    untold = joint.estimate(replace(balance, merged=lighter), car)
+    # Stops would be taken for the places where the tank lost it.
+    untold = joint.estimate(replace(balance, merged=lighter), car, load_changes=False)
     assert untold.mass > told.mass + 40.0

@@ -159,6 +159,7 @@ def test_a_speed_model_leaves_the_torque_of_a_data_sheet_alone(made, car):
     sheet = replace(
         car,
         torque=TorqueModel(source="measured"),
+        witnesses=(),
         mounting=None,
         provenance=wb.Vehicle().provenance,
     )

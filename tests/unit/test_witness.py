@@ -13,7 +13,7 @@ from weighbridge.balance.witness import BY_SIGNAL, compare, rows_of
 from weighbridge.balance.witness_learning import learn_witnesses
 from weighbridge.checks.witnesses import check_witnesses
 from weighbridge.errors import DriveError
-from weighbridge.pipeline.comparing import METHODS
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle, WitnessRelation
 
@@ -157,7 +157,7 @@ def test_a_reading_that_left_its_only_witness_gives_no_mass(fault):
     assert words in problem.text
 
 
-@pytest.mark.parametrize("method", METHODS[:-1])
+@pytest.mark.parametrize("method", [m for m in ESTIMATORS if not ESTIMATORS[m].speed_alone])
 def test_every_method_refuses_it(method):
     made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
     with pytest.raises(

@@ -31,9 +31,10 @@ _YAWS: Final = 0.1
 _MANY: Final = 150
 _SOME: Final = 100
 # Sane drives tie tilt and gravity by 0.3 to 0.8, quiet motorways by 0 to 0.3; a mirrored axis turns
-# the sign. Of n windows that are tied by nothing the correlation scatters by about 1 / sqrt(n).
+# the sign. Of n windows that are tied by nothing the correlation scatters by about 1 / sqrt(n), the
+# mean of two by less.
 _AGAINST: Final = 0.12
-_CHANCE: Final = 3.5
+_CHANCE: Final = 2.4
 
 # Specific force per change of speed above which the speed is in another unit [-].
 _STEEPEST: Final = 1.3
@@ -269,7 +270,7 @@ def _check_axes(
         return
     against = -max(_AGAINST, _CHANCE / math.sqrt(max(int(np.count_nonzero(_inner(full))), 1)))
     felt = _tilt_tie(force @ forward - accel_along, rate @ right, full)
-    if pitch < against or (felt < against and pitch <= 0.0):
+    if (0.5 * (pitch + felt) if pitch else felt) < against:
         yield _mirrored("gyro_y", "nose down", "nose up")
     elif _tilt_tie(v * ((rate - bias) @ down) - force @ right, rate @ forward, full) < against:
         yield _mirrored("gyro_x", "right side down", "right side up")

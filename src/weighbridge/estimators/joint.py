@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -63,6 +63,16 @@ most are at traffic lights."""
 SHORTEST: Final = 8.0
 """In shorter stops no load changes [s]: a parcel is handed out in ten. Of 68 drives of two other
 simulators, without a change of load, one was said to have one, with `STOP` in its place three."""
+
+OPENED: Final = 3.0
+"""Nobody gets on or off so soon after the vehicle stands [s]."""
+
+LOADED: Final = 0.025
+"""Part of the mass that a second beyond `OPENED` loads or unloads at most, in a stop shorter than
+`STOP` [1/s]: 45 kg of a car, two and a half times what buses board."""
+
+MOST_LOADED: Final = 0.3
+"""The same of the whole stop [-]."""
 
 CHANGE_RISE: Final = 1.6
 """Growth of that logarithm with the logarithm of the standstill: at two minutes it is even."""
@@ -239,12 +249,17 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     problem, body, rows, y = problem_of(None)
     problem, body, rows, y = problem_of(_sensible(problem.filtered()))
     fast, slow = problem.likeliest()
-    _, running, running_var, begins = problem.changes(fast, slow)
     start, noise, params = problem.kernel_input(fast, slow)
-    added = np.where(begins[:, None], problem.jump_var, 0.0)
-    x, var, taken, weight = disturbance.smooth(
-        start, time, problem.rows, problem.y, noise, added, params
-    )
+    while True:
+        _, running, running_var, begins = problem.changes(fast, slow)
+        added = np.where(begins[:, None], problem.jump_var, 0.0)
+        x, var, taken, weight = disturbance.smooth(
+            start, time, problem.rows, problem.y, noise, added, params
+        )
+        hasty = too_hasty(begins, stood, x[:, 0])
+        if not hasty.any():
+            break
+        problem = replace(problem, odds=np.where(hasty, np.nan, problem.odds))
     # More noise than usual is more likely the torque's; less is less on both sides.
     shown = np.full(time.size, min(fast, 1.0) ** 2 * motion_variance(balance.motion))
     low = drawn(weight, shown, var[:, 0], begins)
@@ -398,6 +413,20 @@ def change_odds(stood: Floats) -> Floats:
     stops = stood >= SHORTEST
     odds[stops] = CHANGE_ODDS + CHANGE_RISE * np.log(stood[stops] / STOP)
     return odds
+
+
+def too_hasty(begins: Bools, stood: Floats, mass: Floats) -> Bools:
+    """Mark changes of load that are too large for the time the vehicle stood (m,).
+
+    Parameters
+    ----------
+    begins : (m,) windows before which the load changed
+    stood : (m,) how long the vehicle stood before each [s]
+    mass : (m,) of the windows [kg]
+    """
+    change = np.abs(np.diff(mass, prepend=mass[:1])) / np.abs(mass)
+    most = np.minimum(LOADED * np.maximum(stood - OPENED, 0.0), MOST_LOADED)
+    return np.asarray(begins & (stood < STOP) & (change > most))
 
 
 def _segments(

@@ -28,9 +28,8 @@ ACCESSORIES: Final = 750.0
 
 BATTERY_EFFICIENCY: Final = (0.92, 0.04)
 """Slope of power at the wheels over power of the battery, driving, and its standard deviation [-]:
-inverter and motor 0.95, near their best efficiency, for what is always lost is no part of the slope
-(Burress, Benchmarking EV and HEV Technologies, Oak Ridge National Laboratory, 2016), gears 0.97
-(`weighbridge.vehicle.data_sheet`). Braking by the motor, its inverse."""
+0.95 is assumed of inverter and motor, near their best, for what is always lost is no part of the
+slope, and 0.97 of gears (`weighbridge.vehicle.data_sheet`). Braking by the motor, its inverse."""
 
 _AXLES: Final = {
     "front": ("wheel_torque_front", "wheel_torque_fl", "wheel_torque_fr"),
