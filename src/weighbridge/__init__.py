@@ -1,9 +1,8 @@
 """A software weighbridge: the mass of a road vehicle, weighed while it drives.
 
 >>> import weighbridge as wb
->>> drive = wb.read_drive("drive/")
->>> car = wb.calibrate([drive], mass=1580.0)
->>> w = wb.weigh(drive, car)
+>>> car = wb.calibrate("known/", mass=1580.0)
+>>> w = wb.weigh("drive/", car)
 >>> w.mass, w.interval(0.95), w.status
 """
 
@@ -17,7 +16,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from weighbridge.errors import ConfigError, DriveError, MissingExtraError, WeighbridgeError
     from weighbridge.estimators import Segment, Status
-    from weighbridge.io import read_drive
+    from weighbridge.io import read_drive, read_frame, to_frames
     from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
     from weighbridge.pipeline.inertia import Inertia, estimate_inertia
     from weighbridge.pipeline.inspection import inspect_drive
@@ -44,6 +43,8 @@ _HOMES = {
     "estimate_inertia": "weighbridge.pipeline.inertia",
     "inspect_drive": "weighbridge.pipeline.inspection",
     "read_drive": "weighbridge.io",
+    "read_frame": "weighbridge.io",
+    "to_frames": "weighbridge.io",
     "weigh": "weighbridge.pipeline.weighing",
 }
 
@@ -66,6 +67,8 @@ __all__ = [
     "estimate_inertia",
     "inspect_drive",
     "read_drive",
+    "read_frame",
+    "to_frames",
     "weigh",
 ]
 
@@ -79,4 +82,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES])
+    return sorted([*__all__, "__version__"])

@@ -85,13 +85,13 @@ def read_drive(
         if len(paths) > 1:
             name = f"{paths[0].stem}+{len(paths) - 1}"
             logs = _read_files([(p, None) for p in paths], mappings)
-            return _drive(name, logs, info, mappings, databases)
+            return joined_drive(name, logs, info, mappings, databases)
         path = paths[0]
     path = Path(path)
     if is_folder(path):
         logs, info = _read_folder(path, mappings)
-        return _drive(path.resolve().name, logs, info, mappings, databases)
-    return _drive(path.stem, _read_files([(path, None)], mappings), info, mappings, databases)
+        return joined_drive(path.resolve().name, logs, info, mappings, databases)
+    return joined_drive(path.stem, _read_files([(path, None)], mappings), info, mappings, databases)
 
 
 def read_table(path: str | Path) -> dict[str, Floats]:
@@ -265,13 +265,27 @@ def _read_file(
     return log
 
 
-def _drive(
+def joined_drive(
     name: str,
     logs: list[Log],
     info: DriveInfo,
     mappings: tuple[TableMapping, ...],
     databases: tuple[Database, ...],
 ) -> Drive:
+    """Join what several files hold into one drive, on one clock.
+
+    Parameters
+    ----------
+    name : of the drive
+    logs : what was read of each file
+    info : what is known beside the signals
+    mappings, databases : what the files were read with
+
+    Raises
+    ------
+    DriveError
+        They hold no samples.
+    """
     if info == DriveInfo():
         info = next((log.info for log in logs if log.info is not None), info)
     trusted = (s.name for m in mappings for s in m.signals if s.trusted)

@@ -33,16 +33,28 @@ from weighbridge.signals.units import UNITS, to_si
 def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
     """Read separated text; see `weighbridge.io.log.Reader`."""
     raw = read_text(path, mapping.text if mapping else None)
-    return read_mapped(raw, mapping) if mapping and mapping.signals else _canonical(raw, table)
+    return read_mapped(raw, mapping) if mapping and mapping.signals else read_canonical(raw, table)
 
 
 def read_pq(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
     """Read Parquet; see `weighbridge.io.log.Reader`."""
     raw = read_parquet(path)
-    return read_mapped(raw, mapping) if mapping and mapping.signals else _canonical(raw, table)
+    return read_mapped(raw, mapping) if mapping and mapping.signals else read_canonical(raw, table)
 
 
-def _canonical(raw: RawTable, table: str | None) -> Log:
+def read_canonical(raw: RawTable, table: str | None) -> Log:
+    """Take the columns of a table whose names are canonical.
+
+    Parameters
+    ----------
+    raw
+    table : whose short names may be used; None to see it by the columns
+
+    Raises
+    ------
+    DriveError
+        There is no time, or no canonical column.
+    """
     log = Log(raw.path)
     log.problems += [Problem("", f"{raw.path.name}: {note}") for note in raw.notes]
     time_index = next((i for i, n in enumerate(raw.names) if time_unit(n)), None)

@@ -54,14 +54,31 @@ def write_drive(
         The folder cannot be written to.
     """
     with whole_folder(folder, DRIVE_FILES, DriveError) as part:
-        for table in TABLES:
-            signals = [s for s in drive.signals.values() if QUANTITIES[s.name].table == table]
-            if signals:
-                _write_frame(_frame(_columns(signals)), part / f"{table}.{table_format}")
+        for table, frame in to_frames(drive).items():
+            _write_frame(frame, part / f"{table}.{table_format}")
         if truth is not None:
             _write_frame(_frame(truth), part / f"truth.{table_format}")
         if drive.info != DriveInfo():
             (part / INFO_NAME).write_text(info_text(drive.info), encoding="utf-8")
+
+
+def to_frames(drive: Drive) -> dict[str, pl.DataFrame]:
+    """Return the tables of a drive: canonical columns with units, one row per time stamp.
+
+    Parameters
+    ----------
+    drive : what to lay out
+
+    Returns
+    -------
+    By table (``imu``, ``obd``, …), as `write_drive` writes them; ``.to_pandas()`` of one is a data
+    frame of pandas
+    """
+    every = {
+        table: [s for s in drive.signals.values() if QUANTITIES[s.name].table == table]
+        for table in TABLES
+    }
+    return {table: _frame(_columns(signals)) for table, signals in every.items() if signals}
 
 
 def write_mdf(drive: Drive, path: str | Path) -> None:

@@ -33,6 +33,7 @@ from weighbridge.estimators.rls import block_jackknife
 from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion
+from weighbridge.pipeline.given import GivenDrive, GivenVehicle, as_drives, as_vehicle
 from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, noted, refine
 from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
@@ -120,19 +121,21 @@ class Calibration:
 
 
 def calibrate(
-    drives: Drive | Sequence[Drive],
+    drives: GivenDrive | Sequence[GivenDrive],
     mass: float | Sequence[float] | None = None,
     *,
-    vehicle: Vehicle | None = None,
+    vehicle: GivenVehicle | None = None,
     settings: CalibrationSettings | None = None,
 ) -> Vehicle:
     """Calibrate a vehicle from one or more drives of known mass.
 
     Parameters
     ----------
-    drives : recorded drives of one vehicle
+    drives : recorded drives of one vehicle, or the paths or data frames that they are to be read
+        from; one, or a list of them
     mass : of all, or one for each, as the drive begins [kg]; from ``drive.toml`` when None
-    vehicle : what is known already (class, wheel radius, gearings, tare)
+    vehicle : what is known already (class, wheel radius, gearings, tare), or the path of a vehicle
+        file that says it
     settings : see `CalibrationSettings`
 
     Raises
@@ -140,9 +143,11 @@ def calibrate(
     DriveError, ConfigError
         A drive or an argument cannot be used; the sentence says why.
     """
+    known = as_drives(drives)
+    base = as_vehicle(vehicle) if vehicle is not None else None
     if settings is not None and not settings.fit.torque:
-        return run_speed_calibration(drives, mass, vehicle=vehicle).vehicle
-    return run_calibration(drives, mass, vehicle=vehicle, settings=settings).vehicle
+        return run_speed_calibration(known, mass, vehicle=base).vehicle
+    return run_calibration(known, mass, vehicle=base, settings=settings).vehicle
 
 
 def run_speed_calibration(

@@ -39,6 +39,7 @@ from weighbridge.estimators.suspension import (
     static_mass,
 )
 from weighbridge.estimators.track import Status
+from weighbridge.pipeline.given import GivenDrive, GivenVehicle, as_drive, as_vehicle
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.pipeline.ride_checks import (
     LEAST,
@@ -309,8 +310,8 @@ TRACK_COLUMNS: Final = (
 
 
 def estimate_inertia(
-    drive: Drive,
-    vehicle: Vehicle,
+    drive: GivenDrive,
+    vehicle: GivenVehicle,
     method: str = DEFAULT_METHOD,
     *,
     settings: InertiaSettings | None = None,
@@ -320,8 +321,8 @@ def estimate_inertia(
     Parameters
     ----------
     drive : with suspension travel and rate at four wheels, vertical velocity, roll rate
-        and pitch rate
-    vehicle : with its suspension, ``[ride]`` of the vehicle file
+        and pitch rate; or the path or data frame that it is to be read from
+    vehicle : with its suspension, ``[ride]`` of the vehicle file; or the path of that file
     method : name of the filter
     settings : of the filter
 
@@ -340,6 +341,12 @@ def estimate_inertia(
     chosen: Method | None = next((m for m in METHODS if m == method), None)
     if chosen is None:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
+    return _estimate(as_drive(drive), as_vehicle(vehicle), chosen, settings)
+
+
+def _estimate(
+    drive: Drive, vehicle: Vehicle, chosen: Method, settings: InertiaSettings | None
+) -> Inertia:
     ride = vehicle.ride
     if ride is None:
         raise ConfigError(

@@ -11,6 +11,7 @@ import numpy as np
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.checks import settle_drive
 from weighbridge.navigation.motion import MotionSource
+from weighbridge.pipeline.given import GivenDrive, GivenVehicle, as_drive, as_vehicle
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import from_si
@@ -137,18 +138,20 @@ torque is read at `FAST` or more: the drives of the README's table. Of slow spee
 slow longitudinal accelerometer nothing was measured; theirs are graded from the others."""
 
 
-def inspect_drive(drive: Drive, vehicle: Vehicle | None = None) -> Inspection:
+def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Inspection:
     """Describe the signals of a drive, its problems, and the ways to weigh by it.
 
     Parameters
     ----------
-    drive : as of `read_drive`
-    vehicle : the vehicle file, if there is one
+    drive : as of `read_drive`, or the path or data frame that it is to be read from
+    vehicle : the vehicle file, if there is one, or its path
 
     Returns
     -------
     Inspection
     """
+    drive = as_drive(drive)
+    vehicle = as_vehicle(vehicle) if vehicle is not None else None
     order = list(QUANTITIES)
     signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
     settled = settle_drive(drive, vehicle)

@@ -25,8 +25,10 @@ from weighbridge.estimators.judging import lacks_accelerometer, uncalibrated_std
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
+from weighbridge.pipeline.given import GivenDrive, GivenVehicle, as_drive, as_vehicle
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
+from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
@@ -47,7 +49,7 @@ CLOCKS_APART = 0.6
 vehicle it differed by less than 0.1 s, and masses are 8 to 12 % light at 1 s."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Weighing:
     """The mass of one drive, how sure it is, and why.
 
@@ -68,6 +70,24 @@ class Weighing:
     reason: str
     result: MassTrack | None
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return in_lines(self._told())
+
+    def _repr_html_(self) -> str:
+        return in_html(self._told())
+
+    def _told(self) -> tuple[str, str, str]:
+        """What was weighed, the mass or why there is none, rows and warnings."""
+        head = f"Weighing of {self.drive.name!r} by {self.method}, vehicle {self.vehicle.name!r}"
+        low, high = self.interval()
+        mass = f"{self.status}: {self.reason}"
+        if math.isfinite(self.mass):
+            payload = f", payload {self.payload:.0f} kg" if math.isfinite(self.payload) else ""
+            mass = f"{self.mass:.0f} kg, {low:.0f} to {high:.0f} kg with 95 % probability{payload}"
+        used = f"{self.used_time:.0f} of {self.drive.duration:.0f} s used"
+        doubts = plural(len(self.warnings), "warning")
+        return head, mass, f"{used}; {doubts}{': ' + self.warnings[0] if self.warnings else ''}"
 
     @property
     def estimator(self) -> Estimator:
@@ -242,13 +262,13 @@ TRACK_COLUMNS = (
 """Columns of the track, as files carry them."""
 
 
-def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weighing:
+def weigh(drive: GivenDrive, vehicle: GivenVehicle, method: str = DEFAULT_METHOD) -> Weighing:
     """Weigh a vehicle from one drive.
 
     Parameters
     ----------
-    drive : as of `read_drive`
-    vehicle : as of `calibrate` or `Vehicle.load`
+    drive : as of `read_drive`, or the path or data frame that it is to be read from
+    vehicle : as of `calibrate` or `Vehicle.load`, or the path of a vehicle file
     method : name of an estimator in `weighbridge.estimators.ESTIMATORS`
 
     Returns
@@ -268,7 +288,8 @@ def weigh(drive: Drive, vehicle: Vehicle, method: str = DEFAULT_METHOD) -> Weigh
 
     from weighbridge.checks import refuse_serious, settle_drive
 
-    drive = settle_drive(drive, vehicle)
+    vehicle = as_vehicle(vehicle)
+    drive = settle_drive(as_drive(drive), vehicle)
     refuse_serious(drive.name, drive.problems)
     return weigh_checked(drive, vehicle, method)
 

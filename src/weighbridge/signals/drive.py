@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from weighbridge.signals.shown import at_rate, in_html, in_lines, plural
 from weighbridge.signals.signal import Signal
 
 
@@ -52,7 +53,7 @@ class Problem:
     serious: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Drive:
     """One recording of one vehicle: signals, each on its own clock.
 
@@ -82,6 +83,29 @@ class Drive:
     def missing(self, names: Iterable[str]) -> list[str]:
         """Name the signals that are not there."""
         return [name for name in names if name not in self.signals]
+
+    def __repr__(self) -> str:
+        return in_lines(self._told())
+
+    def _repr_html_(self) -> str:
+        return in_html(self._told())
+
+    def _told(self) -> tuple[str, str, str]:
+        """Name and length, signals with their rates, problems."""
+        rates: dict[str, list[str]] = {}
+        for s in self.signals.values():
+            rates.setdefault(at_rate(s.period), []).append(s.name)
+        listed = "; ".join(
+            f"{rate + ': ' if rate else ''}{', '.join(names)}" for rate, names in rates.items()
+        )
+        serious = sum(p.serious for p in self.problems)
+        first = min(self.problems, key=lambda p: not p.serious, default=None)
+        doubts = ""
+        if first is not None:
+            many = f"{plural(len(self.problems), 'problem')}, {serious} serious: "
+            doubts = f"{many}{first.text}"
+        head = f"Drive {self.name!r}: {self.duration:.0f} s, {plural(len(self.signals), 'signal')}"
+        return head, listed, doubts or "no problems"
 
     @property
     def speed(self) -> Signal | None:

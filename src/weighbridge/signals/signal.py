@@ -13,7 +13,7 @@ Bools: TypeAlias = NDArray[np.bool_]
 Ints: TypeAlias = NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Signal:
     """One quantity, sampled on a clock of its own.
 
@@ -27,6 +27,15 @@ class Signal:
     name: str
     time: Floats
     values: Floats
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return f"Signal {self.name!r}: no samples"
+        rate = f" at {1.0 / self.period:.3g} Hz" if self.period > 0.0 else ""
+        return (
+            f"Signal {self.name!r}: {len(self)} samples{rate} from {self.time[0]:.6g} to "
+            f"{self.time[-1]:.6g} s, {self.values.min():.4g} to {self.values.max():.4g} in SI"
+        )
 
     def __len__(self) -> int:
         return int(self.time.size)

@@ -1,0 +1,77 @@
+"""What a caller gives: a drive, a vehicle, or where they lie."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from weighbridge.errors import ConfigError
+from weighbridge.signals import Drive
+from weighbridge.vehicle.model import Vehicle
+
+if TYPE_CHECKING:
+    from weighbridge.io.read_frames import Frame
+
+GivenDrive: TypeAlias = "Drive | str | Path | Frame | Mapping[str, Frame]"
+"""A drive, a path for `read_drive`, or data frames for `read_frame`."""
+
+GivenVehicle: TypeAlias = Vehicle | str | Path
+"""A vehicle, or the path of a vehicle file."""
+
+
+def as_drive(given: GivenDrive) -> Drive:
+    """Return a drive, read where it is a path or a table.
+
+    Raises
+    ------
+    ConfigError
+        It is neither.
+    DriveError
+        It cannot be read.
+    """
+    if isinstance(given, Drive):
+        return given
+    if isinstance(given, str | Path):
+        from weighbridge.io import read_drive
+
+        return read_drive(given)
+    from weighbridge.io.read_frames import is_frame, read_frame
+
+    if is_frame(given) or (
+        isinstance(given, Mapping) and given and all(map(is_frame, given.values()))
+    ):
+        return read_frame(given)
+    raise ConfigError(
+        f"a drive is expected, got {_kind(given)}: give what read_drive returns, the path of a "
+        "folder or file, or data frames with canonical columns"
+    )
+
+
+def as_drives(given: GivenDrive | Sequence[GivenDrive]) -> list[Drive]:
+    """Return one or several drives, as of `as_drive`."""
+    if isinstance(given, list | tuple):
+        return [as_drive(one) for one in given]
+    return [as_drive(given)]
+
+
+def as_vehicle(given: GivenVehicle) -> Vehicle:
+    """Return a vehicle, read where it is a path.
+
+    Raises
+    ------
+    ConfigError
+        It is neither, or the file cannot be used.
+    """
+    if isinstance(given, Vehicle):
+        return given
+    if isinstance(given, str | Path):
+        return Vehicle.load(given)
+    raise ConfigError(
+        f"a vehicle is expected, got {_kind(given)}: give what calibrate returns, or the path of "
+        "a vehicle file"
+    )
+
+
+def _kind(given: object) -> str:
+    return f"{type(given).__module__}.{type(given).__qualname__}".removeprefix("builtins.")

@@ -1,0 +1,131 @@
+"""Drives and vehicles given as objects, paths or data frames, and how they show themselves."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import weighbridge as wb
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.io import to_frames, write_drive
+from weighbridge.signals import Drive, Problem, Signal
+from weighbridge.simulation import make_scenario, simulate_car
+
+
+@pytest.fixture(scope="module")
+def made():
+    return simulate_car(make_scenario("car-short", payload=120.0, seed=61))
+
+
+@pytest.fixture(scope="module")
+def car(made):
+    return wb.calibrate([made.drive], mass=float(made.truth.mass[0]))
+
+
+@pytest.fixture(scope="module")
+def saved(made, car, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("given")
+    write_drive(made.drive, folder / "drive", "parquet")
+    car.save(folder / "car.toml")
+    return folder
+
+
+@pytest.mark.parametrize("of_paths", [str, lambda p: p])
+def test_paths_are_read(saved, of_paths):
+    vehicle, drive = of_paths(saved / "car.toml"), of_paths(saved / "drive")
+    by_hand = wb.weigh(wb.read_drive(drive), wb.Vehicle.load(vehicle))
+    assert wb.weigh(drive, vehicle).mass == by_hand.mass
+    assert wb.inspect_drive(drive, vehicle).drive.name == "drive"
+    again = wb.calibrate(drive, mass=1700.0)
+    assert again == wb.calibrate([wb.read_drive(drive)], mass=1700.0)
+
+
+@pytest.mark.parametrize("library", ["pandas", "polars"])
+def test_data_frames_go_out_and_come_back(made, car, library):
+    frames = to_frames(made.drive)
+    if library == "pandas":
+        frames = {table: frame.to_pandas() for table, frame in frames.items()}
+    back = wb.read_frame(frames, name="back")
+    assert list(back.signals) == list(made.drive.signals)
+    for name, signal in made.drive.signals.items():
+        np.testing.assert_array_equal(back.signals[name].time, signal.time)
+        np.testing.assert_allclose(back.signals[name].values, signal.values, rtol=1e-12)
+    assert wb.weigh(frames, car).mass == wb.weigh(back, car).mass
+
+
+def test_an_index_is_a_column_and_dates_are_the_time():
+    frame = pd.DataFrame({"vehicle_speed_kmh": [36.0, 72.0]})
+    by_name = wb.read_frame(frame.set_index(pd.Index([5.0, 6.0], name="time_s")))
+    assert by_name.signals["vehicle_speed"].time.tolist() == [5.0, 6.0]
+    stamps = pd.to_datetime(["2026-03-01T10:00:00", "2026-03-01T10:00:02"])
+    by_date = wb.read_frame(frame.set_index(stamps))
+    assert by_date.signals["vehicle_speed"].values.tolist() == [10.0, 20.0]
+    assert by_date.duration == 2.0
+    assert by_date.info.start_time.startswith("2026-03-01T10:00:00")
+
+
+def test_a_mapping_names_columns_of_a_data_frame():
+    frame = pd.DataFrame({"t": [0, 500], "Tacho": [36.0, 72.0]})
+    mapping = {
+        "time": {"column": "t", "unit": "ms"},
+        "signals": {"vehicle_speed": {"column": "Tacho", "unit": "kmh"}},
+    }
+    speed = wb.read_frame(frame, mapping).signals["vehicle_speed"]
+    assert speed.time.tolist() == [0.0, 0.5]
+    assert speed.values.tolist() == [10.0, 20.0]
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "words"),
+    [
+        (pd.DataFrame({"speed": [1.0]}), DriveError, "no canonical columns"),
+        (pd.DataFrame({"time_s": [0.0, 1.0], "x": [1.0, 2.0]}), DriveError, "canonical name"),
+        (pd.DataFrame({"time_s": [], "vehicle_speed_kmh": []}), DriveError, "no samples"),
+        (pd.DataFrame([[1.0, 2.0]], columns=["time_s", "time_s"]), ConfigError, "two columns"),
+        ([1.0, 2.0], ConfigError, "got list"),
+    ],
+)
+def test_frames_that_are_no_drive_are_one_sentence(given, error, words):
+    with pytest.raises(error, match=words):
+        wb.read_frame(given)
+
+
+@pytest.mark.parametrize("wrong", [3, None, np.zeros(3), {"a": 1}, b"drive"])
+def test_what_is_neither_is_named(made, car, wrong):
+    with pytest.raises(ConfigError, match="a drive is expected, got"):
+        wb.weigh(wrong, car)
+    with pytest.raises(ConfigError, match="a vehicle is expected, got"):
+        wb.weigh(made.drive, wrong)
+    with pytest.raises(ConfigError, match="a drive is expected, got"):
+        wb.calibrate([made.drive, wrong], mass=1700.0)
+
+
+def test_drives_and_weighings_are_three_lines(made, car):
+    weighing = wb.weigh(made.drive, car)
+    for shown in (made.drive, weighing):
+        lines = repr(shown).splitlines()
+        assert len(lines) == 3
+        assert max(map(len, lines)) <= 102
+        assert shown._repr_html_().startswith("<div><strong>")
+    assert f"{weighing.mass:.0f} kg" in repr(weighing)
+    assert "engine_load" in made.drive._repr_html_()
+
+
+def test_names_and_problems_cannot_act_on_terminal_or_page():
+    drive = Drive(
+        name="<b>\x1b[31m",
+        signals={"vehicle_speed": Signal("vehicle_speed", np.zeros(1), np.ones(1))},
+        problems=(Problem("", "note"), Problem("", "<script>bad</script>", serious=True)),
+    )
+    assert "\x1b" not in repr(drive)
+    assert "2 problems, 1 serious: <script>" in repr(drive)
+    page = drive._repr_html_()
+    assert "<script>" not in page
+    assert "<b>" not in page
+    assert "\x1b" not in page
+
+
+def test_the_public_names_are_all_there_and_nothing_else():
+    assert set(wb.__all__) | {"__version__"} == set(dir(wb))
+    for name in wb.__all__:
+        assert getattr(wb, name).__doc__
+    assert isinstance(to_frames(Drive(name="none", signals={})), dict)
