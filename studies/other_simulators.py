@@ -31,7 +31,7 @@ CALIBRATIONS = {
 }
 DRIVES = ("drive-1", "drive-2", "drive-3", "drive-4")
 
-JUDGED = 9100
+JUDGED = 9200
 KINDS = (
     "small_petrol", "petrol", "petrol_dct", "petrol_automatic", "diesel", "van", "truck", "semi",
     "electric_car", "electric_bus",

@@ -38,3 +38,14 @@ def test_a_mistake_is_one_line(weighbridge, tmp_path):
     assert ran.code == 2
     assert ran.err.count("\n") == 1
     assert "--gear-ratios" in ran.err
+
+
+def test_a_load_means_nothing_before_a_calibration(weighbridge, loaded, tmp_path):
+    path = tmp_path / "car.toml"
+    made = weighbridge("vehicle", "new", "--torque", "load", "--tyre", "205/55 R16", "-o", path)
+    assert made.code == 0
+    ran = weighbridge("weigh", loaded.folder, "--vehicle", path)
+    assert ran.code == 1
+    text = " ".join(ran.out.split())
+    assert "was never calibrated" in text
+    assert "weighbridge calibrate DRIVE --torque load --mass KG" in text

@@ -237,9 +237,11 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
             best, worst, reason = _EXPECTED[motion, _is_fast(drive, torque)]
             if torque.expected:
                 best, worst, reason = best + torque.expected, worst + torque.expected, torque.limit
+            # Nobody records torque at the wheels for want of another signal.
+            rare = bool(needs) and torque.gearing is not None
             ways.append(
                 (
-                    worst,
+                    (bool(needs), rare, len(set(needs)), worst),
                     Way(
                         motion=motion,
                         torque=torque.name,
@@ -250,7 +252,7 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
                     ),
                 )
             )
-    ways.sort(key=lambda w: (not w[1].possible, len(w[1].needs), w[0]))
+    ways.sort(key=lambda w: w[0])
     return _mark_chosen([*(w for _, w in ways), _by_speed_alone(drive)], vehicle)
 
 

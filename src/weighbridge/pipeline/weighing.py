@@ -536,6 +536,12 @@ def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
     sentence = f"the drive has no {names}, which torque source {source.name!r} needs"
     others = [s for s in TORQUE_SOURCES.values() if s != source and not s.lacking(drive)]
     if others and drive.has("vehicle_speed"):
+        if not others[0].signed and not vehicle.provenance.masses:
+            return (
+                f"the vehicle file of {vehicle.name} was never calibrated, and only a drive of "
+                f"known mass tells what {others[0].title} is worth: weighbridge calibrate DRIVE "
+                f"--torque {others[0].name} --mass KG --vehicle FILE -o CALIBRATED"
+            )
         return (
             f"{sentence}; it has {' and '.join(others[0].found(drive))}: weigh it with a vehicle "
             f"file of torque source {others[0].name!r} "
