@@ -98,6 +98,49 @@ def test_a_unit_that_does_not_fit_is_refused(tmp_path):
         read_drive(path, {"signals": {"vehicle_speed": {"column": "Vehicle speed"}}})
 
 
+def rows(values, units="km/h"):
+    units = [units] * len(values) if isinstance(units, str) else units
+    pairs = zip(values, units, strict=True)
+    text = "".join(f'"{k}";"Vehicle speed";"{v}";"{u}"\n' for k, (v, u) in enumerate(pairs))
+    return f'"SECONDS";"PID";"VALUE";"UNITS"\n{text}'
+
+
+def speed(path):
+    mapping = {"signals": {"vehicle_speed": {"column": "Vehicle speed"}}}
+    drive = read_drive(path, mapping)
+    return drive.signals["vehicle_speed"].values * 3.6, " ".join(p.text for p in drive.problems)
+
+
+@pytest.mark.parametrize(
+    ("cells", "numbers", "told"),
+    [
+        (["999", "1,000", "1,001.5", "12"], [999.0, 1000.0, 1001.5, 12.0], True),
+        (["36,5", "37,125", "38"], [36.5, 37.125, 38.0], False),
+        (["0,125", "1,250"], [0.125, 1.25], False),
+        (["1234,567", "1,000"], [1234.567, 1.0], False),
+    ],
+)
+def test_what_a_comma_means_is_settled_once_a_file(tmp_path, cells, numbers, told):
+    path = tmp_path / "trip.csv"
+    path.write_text(rows(cells))
+    values, notes = speed(path)
+    assert_allclose(values, numbers)
+    assert ("part thousands" in notes) == told
+
+
+def test_each_row_counts_in_its_own_unit(tmp_path):
+    path = tmp_path / "trip.csv"
+    path.write_text(rows([36, 36, 36, 10, 10, 36], ["km/h", "km/h", "km/h", "m/s", "m/s", ""]))
+    assert_allclose(speed(path)[0], 36.0)
+    path.write_text(rows([36, 36, 36, 10, 36], ["km/h"] * 3 + ["km", "km/h"]))
+    values, notes = speed(path)
+    assert_allclose(values, [36.0] * 4)
+    assert "left out a row of 'Vehicle speed' with the unit 'km'" in notes
+    path.write_text(rows([36, 36, 36, 10, 10], ["km/h"] * 3 + ["rpm"] * 2))
+    with pytest.raises(DriveError, match=r"is in 'km/h' and in 'rpm', which do not convert"):
+        speed(path)
+
+
 @settings(max_examples=30, deadline=None)
 @given(cut=st.integers(0, 4000), junk=st.binary(max_size=8))
 def test_damage_leaves_signals_or_one_sentence(tmp_path_factory, assert_salvaged, cut, junk):

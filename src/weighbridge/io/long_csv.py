@@ -7,6 +7,7 @@ that of exports which public programs read; no specification is published.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +16,7 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
-from weighbridge.io.columns import bracketed_unit, time_unit
+from weighbridge.io.columns import bracketed_unit, time_unit, unit_suffix
 from weighbridge.io.draft import text_time_format
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.naming import is_time, unit_of
@@ -30,7 +31,7 @@ from weighbridge.io.table import (
     unwrapped,
 )
 from weighbridge.signals import Floats
-from weighbridge.signals.units import UNITS
+from weighbridge.signals.units import UNITS, from_si, to_si
 
 _NAMES: Final = frozenset(
     ("pid", "name", "parameter", "param", "param_name", "signal", "signal_name", "channel",
@@ -42,6 +43,10 @@ _PLACES: Final = {
     "latitude": ("latitude", "lat"),
     "longitude": ("longitude", "longtitude", "lon", "lng"),
 }
+
+# Numbers with commas in them, and those whose commas can part thousands.
+_WITH_COMMA: Final = r"^[-+]?[\d.]*,[\d.,]*$"
+_THOUSANDS: Final = r"^[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
 
 # Columns of a table that is long: what a row says is in a few.
 _MOST: Final = 12
@@ -77,7 +82,8 @@ def open_long(path: Path, time: TimeColumn) -> Recording:
     Raises
     ------
     DriveError
-        It has no rows, no time that can be read, or too many names.
+        It has no rows, no time that can be read, too many names, or a name whose units do not
+        convert into one another.
     """
     raw = read_text(path)
     names = list(raw.names)
@@ -89,11 +95,15 @@ def open_long(path: Path, time: TimeColumn) -> Recording:
     found = Recording([], notes=list(raw.notes))
     seconds = _seconds(raw, names, time, found)
     united = _place(names, _UNITS)
+    numeric = [valued, *(k for k in map(partial(_place, names), _PLACES.values()) if k is not None)]
+    thousands = _have_thousands([raw.column(k) for k in numeric])
+    if thousands:
+        found.notes.append("commas in its numbers part thousands")
     table = pl.DataFrame(
         {
             "time": seconds,
             "name": raw.column(named).cast(pl.String).str.strip_chars(),
-            "value": _numbers(raw.column(valued)),
+            "value": _numbers(raw.column(valued), thousands),
             "unit": pl.lit("", pl.String) if united is None else raw.column(united).cast(pl.String),
         }
     )
@@ -105,17 +115,41 @@ def open_long(path: Path, time: TimeColumn) -> Recording:
     if known["name"].n_unique() > MOST_COLUMNS:
         raise DriveError(f"{path} has {known['name'].n_unique()} names, {MOST_COLUMNS} at most")
     for (name,), rows in known.partition_by("name", as_dict=True, maintain_order=True).items():
-        unit = rows["unit"].drop_nulls().mode().sort()
-        found.channels.append(
-            Channel(
-                str(name),
-                np.array(rows["time"].to_numpy(), dtype=np.float64),
-                np.array(rows["value"].to_numpy(), dtype=np.float64),
-                str(unit[0]).strip() if unit.len() else "",
-            )
-        )
-    found.channels += _position(raw, names, seconds)
+        found.channels.append(_channel(path, str(name), rows, found.notes))
+    found.channels += _position(raw, names, seconds, thousands)
     return found
+
+
+def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[str]) -> Channel:
+    """Values of one name, all in the unit that most of its rows state.
+
+    A unit that stands in one row alone and does not convert is damage; the row is left out.
+    """
+    stated = rows["unit"].fill_null("").str.strip_chars()
+    units = (
+        stated.filter(stated != "")
+        .value_counts(sort=True)
+        .sort("count", "unit", descending=[True, False])
+    )
+    unit = str(units["unit"][0]) if units.height else ""
+    time = np.array(rows["time"].to_numpy(), dtype=np.float64)
+    values = np.array(rows["value"].to_numpy(), dtype=np.float64)
+    common = unit_suffix(unit)
+    kept = np.ones(values.size, dtype=bool)
+    for other, count in units.rows()[1:]:
+        here = (stated == other).to_numpy()
+        suffix = unit_suffix(other)
+        if suffix and common and UNITS[suffix].dimension == UNITS[common].dimension:
+            values[here] = from_si(to_si(values[here], suffix), common)
+        elif count == 1:
+            kept &= ~here
+            notes.append(f"left out a row of {name!r} with the unit {other!r}")
+        else:
+            raise DriveError(
+                f"{path}: {name!r} is in {unit!r} and in {other!r}, which do not convert into one "
+                "another; split the file where the unit changes"
+            )
+    return Channel(name, time[kept], values[kept], unit)
 
 
 def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording) -> Floats:
@@ -147,20 +181,30 @@ def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording
     return seconds if found.absolute else unwrapped(seconds)
 
 
-def _numbers(values: pl.Series) -> pl.Series:
+def _have_thousands(columns: list[pl.Series]) -> bool:
+    """Whether commas part thousands: all that stand in numbers can, else they are decimals."""
+    texts = [c.str.strip_chars() for c in columns if c.dtype == pl.String]
+    found = [t.filter(t.str.contains(_WITH_COMMA).fill_null(False)) for t in texts]
+    return any(t.len() for t in found) and all(t.str.contains(_THOUSANDS).all() for t in found)
+
+
+def _numbers(values: pl.Series, thousands: bool) -> pl.Series:
     """Cells as numbers, with a point or a comma; null where one is none."""
     if values.dtype != pl.String:
         return values.cast(pl.Float64)
     text = values.str.strip_chars()
+    if thousands:
+        text = text.str.replace_all(",", "", literal=True)
     return text.str.replace(",", ".", literal=True).cast(pl.Float64, strict=False)
 
 
-def _position(raw: RawTable, names: list[str], seconds: Floats) -> list[Channel]:
+def _position(raw: RawTable, names: list[str], seconds: Floats, thousands: bool) -> list[Channel]:
     """Position of the rows where it is one and changes."""
     places = {q: _place(names, words) for q, words in _PLACES.items()}
     if None in places.values():
         return []
-    values = [np.array(_numbers(raw.column(k or 0)).fill_null(np.nan)) for k in places.values()]
+    columns = (_numbers(raw.column(k or 0), thousands) for k in places.values())
+    values = [np.array(column.fill_null(np.nan)) for column in columns]
     fixed = np.isfinite(values[0]) & np.isfinite(values[1]) & np.isfinite(seconds)
     fixed &= (values[0] != 0.0) | (values[1] != 0.0)
     rows = np.flatnonzero(fixed)
