@@ -63,6 +63,34 @@ def test_an_index_is_a_column_and_dates_are_the_time():
     assert by_date.info.start_time.startswith("2026-03-01T10:00:00")
 
 
+@pytest.mark.parametrize(
+    "index",
+    [
+        pd.Index([0.0, 1.0], name="time_s"),
+        pd.to_datetime(["2026-03-01T10:00:00", "2026-03-01T10:00:02"]),
+    ],
+)
+def test_an_index_and_a_column_of_one_name_are_refused(index):
+    frame = pd.DataFrame({"time_s": [0.0, 1.0], "vehicle_speed_kmh": [36.0, 72.0]})
+    with pytest.raises(ConfigError, match="index and column would both be 'time_s'"):
+        wb.read_frame(frame.set_index(index))
+
+
+def test_columns_that_are_no_numbers_do_not_stop_the_others():
+    frame = pd.DataFrame(
+        {
+            "time_s": [0.0, 1.0],
+            "vehicle_speed_kmh": [36.0, np.nan],
+            "mixed": pd.Series([1, "a"], dtype=object),
+            "phasor": [1j, 2j],
+            "text": ["a", "b"],
+        }
+    )
+    drive = wb.read_frame(frame)
+    assert drive.signals["vehicle_speed"].values.tolist() == [10.0]
+    assert "left out: 'mixed', 'phasor'" in " ".join(p.text for p in drive.problems)
+
+
 def test_a_mapping_names_columns_of_a_data_frame():
     frame = pd.DataFrame({"t": [0, 500], "Tacho": [36.0, 72.0]})
     mapping = {

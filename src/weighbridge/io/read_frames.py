@@ -10,8 +10,9 @@ import polars as pl
 
 from weighbridge.errors import ConfigError
 from weighbridge.io.mapping import MappingSource, load_mapping, mapping_for
+from weighbridge.io.quiet import PARSE_ERRORS
 from weighbridge.io.read import joined_drive
-from weighbridge.io.table import RawTable
+from weighbridge.io.table import RawTable, column_list
 from weighbridge.io.tabular import read_canonical, read_mapped
 from weighbridge.signals import Drive, DriveInfo
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
@@ -70,16 +71,38 @@ def _raw(name: str, frame: Any, *, mapped: bool) -> RawTable:
     if not is_frame(frame):
         kind = f"{type(frame).__module__}.{type(frame).__qualname__}".removeprefix("builtins.")
         raise ConfigError(f"{name}: a data frame of pandas or polars is expected, got {kind}")
+    notes: list[str] = []
     if not isinstance(frame, pl.DataFrame):
         dates = frame.index.dtype.kind == "M"
         if dates or frame.index.name is not None:
             own = frame.index.name if mapped or not dates else None
-            frame = frame.reset_index(names=own or TIME_COLUMN)
+            index = str(own or TIME_COLUMN)
+            if index in map(str, frame.columns):
+                raise ConfigError(
+                    f"{name}: index and column would both be {index!r}; drop one or rename it"
+                )
+            frame = frame.reset_index(names=index)
         frame = frame.set_axis([str(column) for column in frame.columns], axis=1)
         repeated = sorted({c for c in frame.columns if list(frame.columns).count(c) > 1})
         if repeated:
             raise ConfigError(f"{name}: two columns are called {repeated[0]!r}; rename one")
-        frame = pl.from_pandas(frame, nan_to_null=True)
+        frame, left_out = _converted(frame)
+        notes += [f"columns of no plain numbers, left out: {column_list(left_out)}"] * bool(
+            left_out
+        )
     names = tuple(frame.columns)
     places = {column: str(k) for k, column in enumerate(names)}
-    return RawTable(Path(name), names, frame.rename(places))
+    return RawTable(Path(name), names, frame.rename(places), notes=notes)
+
+
+def _converted(frame: pandas.DataFrame) -> tuple[pl.DataFrame, list[str]]:
+    """Columns of pandas as those of polars, and the names of those that cannot be."""
+    columns: list[pl.Series] = []
+    left_out: list[str] = []
+    for name in frame.columns:
+        try:
+            columns += pl.from_pandas(frame[[name]], nan_to_null=True).get_columns()
+        # Of numbers and texts mixed, complex numbers and objects; Arrow's errors are of these.
+        except (TypeError, ValueError, NotImplementedError, *PARSE_ERRORS):
+            left_out.append(name)
+    return pl.DataFrame(columns), left_out
