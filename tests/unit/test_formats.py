@@ -75,6 +75,13 @@ def test_content_decides_where_the_name_says_nothing(tmp_path):
         read_drive(path)
 
 
+@pytest.mark.parametrize("name", ["rlog", "rlog.bz2", "route--0--rlog.zst", "a_QLOG", "0.rlog"])
+def test_a_name_without_a_dot_is_a_word_of_its_own(tmp_path, name):
+    assert format_of(tmp_path / name).name == "openpilot"
+    (tmp_path / f"ca{name}").write_bytes(b"")
+    assert is_log(tmp_path / f"ca{name}") == ("--" in name or "_" in name or "0." in name)
+
+
 def test_a_suffix_alone_is_no_name(tmp_path):
     assert not is_log(tmp_path / ".csv")
     assert is_log(tmp_path / "A.CSV")

@@ -35,7 +35,7 @@ class Format:
     ----------
     name : short name, for people and messages
     suffixes : ends of the file names it has, in small letters, such as ``.csv``; one without a
-        dot may be a whole name
+        dot is a whole name, or the end of one after a mark such as ``-`` or ``_``
     read : reads one file
     about : what is read of it, one line for people
     takes : what of a mapping it can use
@@ -81,11 +81,14 @@ class Format:
         """Length of the longest of the suffixes that a file's name ends in; 0 for none."""
         name = name.lower()
         fits = (
-            len(s)
-            for s in self.suffixes
-            if name.endswith(s) and (len(name) > len(s) or not s.startswith("."))
+            len(s) for s in self.suffixes if name.endswith(s) and _parted(name.removesuffix(s), s)
         )
         return max(fits, default=0)
+
+
+def _parted(stem: str, suffix: str) -> bool:
+    """Whether a suffix stands for itself: after a name by its dot, or as a word of its own."""
+    return bool(stem) if suffix.startswith(".") else not stem[-1:].isalnum()
 
 
 def starts_with(*marks: bytes) -> Callable[[bytes], bool]:
