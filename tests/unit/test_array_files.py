@@ -10,9 +10,11 @@ from numpy.testing import assert_allclose
 from scipy.io import savemat
 
 from weighbridge.errors import ConfigError, DriveError, MissingExtraError
-from weighbridge.io import read_drive
+from weighbridge.io import channels, read_drive
 from weighbridge.io.formats import format_of
+from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io.matlab import open_mat
 
 h5py = pytest.importorskip("h5py")
 nptdms = pytest.importorskip("nptdms")
@@ -112,6 +114,10 @@ def files(tmp_path_factory):
     return folder
 
 
+def recording(path):
+    return open_mat(path, TimeColumn()).channels
+
+
 def mapped(path, tmp_path):
     mapping = tmp_path / "map.toml"
     mapping.write_text(mapping_text([format_of(path).draft(path)]), encoding="utf-8")
@@ -146,6 +152,13 @@ def test_hdf5_with_columns_tables_and_two_clocks(files, tmp_path):
     assert_allclose(drive.signals["accel_z"].time, FAST, atol=1e-6)
     assert_allclose(drive.signals["vehicle_speed"].values, SPEED)
     assert_allclose(drive.signals["engine_speed"].time, SLOW, atol=1e-5)
+
+
+def test_a_cut_tdms_is_read_without_a_word_on_the_terminal(files, tmp_path, caplog):
+    path = tmp_path / "cut.tdms"
+    path.write_bytes((files / "log.tdms").read_bytes()[:-40])
+    assert read_drive(path).signals
+    assert not [r for r in caplog.records if r.name.startswith("nptdms")]
 
 
 def test_start_of_a_waveform_is_kept(files, tmp_path):
@@ -192,6 +205,33 @@ def test_hdf5_of_other_files_or_more_than_it_can_hold(tmp_path):
         file.create_dataset("speed", (10,), dtype="f8", external=[("/etc/passwd", 0, 80)])
     with pytest.raises(DriveError, match="speed lies in another file"):
         read_drive(tmp_path / "b.h5")
+
+
+def test_what_unpacks_out_of_proportion_is_refused_before(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k in range(80):
+            # Never written: 100 kB of index at most, 16 MB of zeros each.
+            file.create_dataset(f"s{k}", (2 << 20,), chunks=(1 << 16,), dtype="f8")
+        file.create_dataset("own", data=np.zeros(20_000))
+    with pytest.raises(DriveError, match=r"unpacks to 13\d{8}, more than 1 GB"):
+        read_drive(tmp_path / "a.h5")
+    with h5py.File(tmp_path / "b.mat", "w", userblock_size=512) as file:
+        file.create_dataset("x", (1 << 28,), chunks=(1 << 20,), dtype="f8", compression="gzip")
+    with (tmp_path / "b.mat").open("r+b") as file:
+        head = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
+        file.write(head)
+    with pytest.raises(DriveError, match=r"unpacks to 2147483648, more than 1 GB"):
+        read_drive(tmp_path / "b.mat")
+
+
+def test_a_deflated_matrix_is_counted_before_it_is_read(tmp_path, monkeypatch):
+    path = tmp_path / "c.mat"
+    savemat(path, {"time": FAST, "y": ACCEL, "x": np.zeros(1 << 20)}, do_compression=True)
+    assert path.stat().st_size < 1 << 17
+    assert recording(path)
+    monkeypatch.setattr(channels, "_MOST_UNPACKED", 1 << 20)
+    with pytest.raises(DriveError, match="and unpacks to"):
+        recording(path)
 
 
 @pytest.mark.parametrize(

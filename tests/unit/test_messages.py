@@ -198,6 +198,81 @@ def test_json_of_foxglove(tmp_path):
     assert_allclose(drive.signals["altitude"].time, TIME - START, atol=1e-6)
 
 
+def json_and(path, name, text, stamp=None, **how):
+    """Write 100 JSON messages, and before each of them one of a ROS 2 type."""
+    with path.open("wb") as file:
+        writer = mcap.Writer(file, **how)
+        writer.start()
+        other = writer.register_channel(
+            "/other", "cdr", writer.register_schema(name, "ros2msg", text.encode())
+        )
+        car = writer.register_channel("/car", "json", writer.register_schema("Car", "", b""))
+        for k, t in enumerate(TIME):
+            writer.add_message(other, logged(t), b"\0\1\0\0" + bytes(8), logged(t))
+            speed = {"vehicle_speed_mps": 10.0 + k}
+            if stamp is not None:
+                speed["timestamp"] = {"sec": int(t + stamp), "nsec": 0}
+            writer.add_message(car, logged(t), json.dumps(speed).encode(), logged(t))
+        writer.finish()
+
+
+def told(drive):
+    return " ".join(p.text for p in drive.problems)
+
+
+def test_one_definition_that_cannot_be_parsed_costs_its_topic_alone(tmp_path):
+    json_and(tmp_path / "a.mcap", "pkg/msg/Bad", "this is ( no definition\n")
+    drive = read_drive(tmp_path / "a.mcap")
+    assert_allclose(drive.signals["vehicle_speed"].values, 10.0 + np.arange(100))
+    assert "topic '/other' cannot be decoded" in told(drive)
+
+
+@pytest.mark.parametrize("leaf", ["float64 x", "string x"])
+def test_types_nested_deep_do_not_multiply(tmp_path, leaf):
+    parts = ["\n".join(f"T0 f{k}" for k in range(30))]
+    for depth in range(8):
+        below = "\n".join(f"T{depth + 1} f{k}" for k in range(30)) if depth < 7 else leaf
+        parts.append(f"{'=' * 80}\nMSG: pkg/T{depth}\n{below}")
+    json_and(tmp_path / "a.mcap", "pkg/msg/Top", "\n".join(parts) + "\n")
+    drive = read_drive(tmp_path / "a.mcap")
+    assert len(drive.signals["vehicle_speed"]) == 100
+    # 64 fields are the most that are read of a message.
+    assert "/other" not in told(drive)
+
+
+def test_stamps_far_from_the_recorder_are_not_used_and_told(tmp_path):
+    json_and(tmp_path / "near.mcap", "pkg/msg/A", "float64 x\n", stamp=-2.0)
+    assert "stamps of" not in told(read_drive(tmp_path / "near.mcap"))
+    json_and(tmp_path / "far.mcap", "pkg/msg/A", "float64 x\n", stamp=-20.0)
+    drive = read_drive(tmp_path / "far.mcap")
+    assert "stamps of '/car' are not all within 5 s" in told(drive)
+    assert drive.info.start_time == "2026-05-01T10:00:00+00:00"
+
+
+@pytest.mark.parametrize("packing", ["ZSTD", "LZ4", "NONE"])
+def test_chunks_are_unpacked_and_bombs_refused_before(tmp_path, packing):
+    path = tmp_path / "a.mcap"
+    how = getattr(mcap.CompressionType, packing)
+    json_and(path, "pkg/msg/A", "float64 x\n", compression=how, chunk_size=2048)
+    assert len(read_drive(path).signals["vehicle_speed"]) == 100
+    data = bytearray(path.read_bytes())
+    at = 8
+    while data[at] != 6:
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    size = at + 9 + 16
+    honest = int.from_bytes(data[size : size + 8], "little")
+    data[size : size + 8] = (2 << 30).to_bytes(8, "little")
+    path.write_bytes(data)
+    with pytest.raises(DriveError, match="more than 1 GB"):
+        read_drive(path)
+    # A chunk that says less than it has is not unpacked beyond that.
+    data[size : size + 8] = (honest // 2).to_bytes(8, "little")
+    path.write_bytes(data)
+    drive = read_drive(path)
+    assert 2 <= len(drive.signals["vehicle_speed"]) < 100
+    assert "unpacks to another size than it says" in told(drive)
+
+
 def test_a_recording_that_broke_off_is_read_to_there(files, tmp_path):
     whole = (files / "two.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
@@ -207,7 +282,7 @@ def test_a_recording_that_broke_off_is_read_to_there(files, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "package"), [("two.mcap", "mcap.reader"), ("one.bag", "rosbags.rosbag1")]
+    ("name", "package"), [("two.mcap", "mcap"), ("one.bag", "rosbags.rosbag1")]
 )
 def test_missing_package_names_the_extra(files, monkeypatch, name, package):
     monkeypatch.setitem(__import__("sys").modules, package, None)

@@ -33,6 +33,10 @@ _EMPTY_NAMES: Final = frozenset(
 )
 _PARTS: Final = re.compile(r"[/.]")
 
+# Bytes that a file may unpack to: 1 GB, or so many times its own size where that is more.
+_MOST_UNPACKED: Final = 1 << 30
+_MOST_TIMES: Final = 4
+
 
 @dataclass(frozen=True, slots=True)
 class Channel:
@@ -86,6 +90,27 @@ Opener = Callable[[Path, TimeColumn], Recording]
 _Wanted = dict[str, tuple[Channel, str, MappedSignal | None]]
 
 
+def check_unpacked(path: Path, size: int) -> None:
+    """Refuse a file whose packed content is out of proportion, before it is unpacked.
+
+    Parameters
+    ----------
+    path : the file
+    size : what it unpacks to [bytes]
+
+    Raises
+    ------
+    DriveError
+        It is more than 1 GB, and more than four times the file.
+    """
+    own = path.stat().st_size
+    if size > max(_MOST_UNPACKED, _MOST_TIMES * own):
+        raise DriveError(
+            f"{path} has {own} bytes and unpacks to {size}, more than 1 GB; write the signals of "
+            "the drive alone, or split it"
+        )
+
+
 def reader(opener: Opener) -> Reader:
     """Make the reader of a format of channels."""
 
@@ -123,7 +148,8 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
     wanted = _mapped(log, found, mapping) if mapping is not None and mapping.signals else {}
     # What a mapping names and is no channel may be a signal of the frames.
     named = {s.name for s in mapping.signals} if mapping and found.frames is not None else set()
-    for name, entry in _known(log, found, table).items():
+    taken = {channel.name for channel, _, _ in wanted.values()}
+    for name, entry in _known(log, found, table, taken).items():
         if name not in named:
             wanted.setdefault(name, entry)
     if not wanted and (found.frames is None or not len(found.frames)):
@@ -180,7 +206,8 @@ def channel_named(channels: list[Channel], name: str) -> Channel | None:
     return max(alike, key=lambda c: c.time.size, default=None)
 
 
-def _known(log: Log, found: Recording, table: str | None) -> _Wanted:
+def _known(log: Log, found: Recording, table: str | None, taken: set[str]) -> _Wanted:
+    """Channels that the format or a canonical name tells; others that no mapping took are told."""
     wanted: _Wanted = {}
     unknown: list[str] = []
     for channel in found.channels:
@@ -191,10 +218,10 @@ def _known(log: Log, found: Recording, table: str | None) -> _Wanted:
             column = parse_column(_last(channel.name), table, unit_suffix(channel.unit))
         except UnitlessColumnError:
             column = None
-        if column is None:
-            unknown.append(channel.name)
-        else:
+        if column is not None:
             wanted.setdefault(column[0].name, (channel, column[1], None))
+        elif channel.name not in taken:
+            unknown.append(channel.name)
     if wanted and unknown:
         log.problems.append(
             Problem("", f"{log.path.name}: not known and ignored: {column_list(unknown, 6)}")

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io.channels import Recording
+from weighbridge.io.channels import Recording, check_unpacked
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line
 from weighbridge.io.table import MOST_COLUMNS
@@ -24,7 +24,7 @@ def open_hdf5(path: Path, time: TimeColumn) -> Recording:
     Raises
     ------
     DriveError
-        No HDF5 file, cut off, or with data outside it.
+        No HDF5 file, cut off, with data outside it, or with more than it can hold.
     MissingExtraError
         h5py is not installed.
     """
@@ -34,30 +34,33 @@ def open_hdf5(path: Path, time: TimeColumn) -> Recording:
         raise MissingExtraError("h5py", "hdf5", f"reading {path.name}") from None
     size = path.stat().st_size
     root: dict[str, Any] = {}
-    count = 0
+    sets: dict[str, Any] = {}
 
     def take(place: str, node: Any) -> None:
-        nonlocal count
         if not isinstance(node, h5py.Dataset):
             return
-        count += 1
-        if count > MOST_COLUMNS:
+        if len(sets) == MOST_COLUMNS:
             raise DriveError(f"{path} has more than {MOST_COLUMNS} data sets; write those needed")
         if node.is_virtual or node.external:
             raise DriveError(f"{path}: {place} lies in another file; copy it into this one")
         if node.size is not None and node.size > _MOST_PACKED * size:
             raise DriveError(f"{path}: {place} promises {node.size} values in {size} bytes")
+        sets[place] = node
+
+    def read(place: str, node: Any) -> None:
         *groups, name = place.split("/")
         home = root
         for group in groups:
             home = home.setdefault(group, {})
-        leaves = _leaves(name, node)
-        home.update(leaves)
+        home.update(_leaves(name, node))
 
     try:
         with h5py.File(path, "r") as file:
             # Links to other places are not followed.
             file.visititems(take)
+            check_unpacked(path, sum(_bytes(node) for node in sets.values()))
+            for place, node in sets.items():
+                read(place, node)
     except DriveError:
         raise
     # The library's errors on damaged files are of many kinds.
@@ -70,16 +73,24 @@ def open_hdf5(path: Path, time: TimeColumn) -> Recording:
     return recording_of(path, root, time)
 
 
+def _is_read(node: Any) -> bool:
+    numbers = node.dtype.names or node.dtype.kind in "biuf"
+    return node.shape is not None and node.size >= 2 and bool(numbers)
+
+
+def _bytes(node: Any) -> int:
+    """Bytes that a data set takes once it is read."""
+    return int(node.size) * int(node.dtype.itemsize) if _is_read(node) else 0
+
+
 def _leaves(name: str, node: Any) -> dict[str, Tree | Leaf]:
     """Arrays of a data set: itself, or one for each field of a table."""
-    if node.shape is None or node.size < 2:
+    if not _is_read(node):
         return {}
     if node.dtype.names:
         table = node[()]
         fields = {f: table[f] for f in node.dtype.names}
         return {name: {f: Leaf(np.asarray(x)) for f, x in fields.items() if x.dtype.kind in "biuf"}}
-    if node.dtype.kind not in "biuf":
-        return {}
     return {name: Leaf(np.asarray(node[()]), _unit(node.attrs))}
 
 

@@ -7,20 +7,29 @@ publish; `struct` of MATLAB turns them into structures.
 from __future__ import annotations
 
 import warnings
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io.channels import Recording
+from weighbridge.io.channels import Recording, check_unpacked
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line, quietly
 from weighbridge.io.trees import Leaf, Tree, recording_of, unit_beside
 
 # Structures within structures.
 _DEEPEST: Final = 20
+
+# Version 5: a header, then elements of a type and a length; one type holds another, deflated
+# (MathWorks, *MAT-File Format*).
+_HEADER: Final = 128
+_TAG: Final = 8
+_MATRIX: Final = 14
+_DEFLATED: Final = 15
+_BLOCK: Final = 1 << 16
 
 
 def open_mat(path: Path, time: TimeColumn) -> Recording:
@@ -29,20 +38,26 @@ def open_mat(path: Path, time: TimeColumn) -> Recording:
     Raises
     ------
     DriveError
-        No MATLAB file, or cut off.
+        No MATLAB file, cut off, or one that unpacks to far more than it can hold.
     MissingExtraError
         pymatreader or h5py is not installed.
     """
     try:
-        import h5py  # noqa: F401  (what pymatreader reads version 7.3 with)
+        import h5py
         from pymatreader import read_mat
     except ImportError:
         raise MissingExtraError("pymatreader", "mat", f"reading {path.name}") from None
     try:
+        if h5py.is_hdf5(path):
+            with h5py.File(path, "r") as file:
+                _check_sets(path, file, h5py.Dataset)
+        _check_deflated(path)
         with warnings.catch_warnings(), quietly():
             # Of objects that it cannot read the library warns; they are missed by their names.
             warnings.simplefilter("ignore")
             held = read_mat(str(path))
+    except DriveError:
+        raise
     except OSError as e:
         if e.errno is not None and e.filename is not None:
             raise
@@ -57,6 +72,45 @@ def open_mat(path: Path, time: TimeColumn) -> Recording:
             "columns as arrays"
         )
     return found
+
+
+def _check_sets(path: Path, file: Any, kind: type) -> None:
+    """Refuse what version 7.3 unpacks out of proportion."""
+    size = 0
+
+    def add(_: str, node: Any) -> None:
+        nonlocal size
+        if isinstance(node, kind):
+            data: Any = node
+            size += int(data.size or 0) * int(data.dtype.itemsize)
+
+    file.visititems(add)
+    check_unpacked(path, size)
+
+
+def _check_deflated(path: Path) -> None:
+    """Refuse what version 5 unpacks out of proportion: inflate it piece by piece and count."""
+    size = 0
+    with path.open("rb") as file:
+        order: Literal["little", "big"] = "big" if file.read(_HEADER)[-2:] == b"MI" else "little"
+        while len(tag := file.read(_TAG)) == _TAG:
+            kind, length = int.from_bytes(tag[:4], order), int.from_bytes(tag[4:], order)
+            if kind not in (_MATRIX, _DEFLATED):
+                return
+            after = file.tell() + length
+            stream = zlib.decompressobj()
+            while kind == _DEFLATED and length > 0 and not stream.eof:
+                packed = file.read(min(_BLOCK, length))
+                if not packed:
+                    return
+                length -= len(packed)
+                try:
+                    size += len(stream.decompress(packed))
+                except zlib.error:
+                    # What is damaged the library tells in its words.
+                    return
+                check_unpacked(path, size)
+            file.seek(after)
 
 
 def _damaged(path: Path, error: Exception) -> DriveError:

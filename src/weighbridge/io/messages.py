@@ -12,8 +12,10 @@ from __future__ import annotations
 import json
 from array import array
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
+from io import BytesIO
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -21,7 +23,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io.channels import Channel, Recording
+from weighbridge.io.channels import Channel, Recording, check_unpacked
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line
 from weighbridge.io.table import column_list, since_1970
@@ -54,7 +56,14 @@ _MOST_FIELDS: Final = 64
 _DEEPEST: Final = 8
 
 # A header's stamp that is further from the recorder's clock is none [s].
-_NEAR: Final = 3600.0
+_NEAR: Final = 5.0
+
+# Records of MCAP: 8 bytes of magic, then kind and length of each; a chunk tells its unpacked
+# size after two times (the format's specification).
+_MAGIC: Final = 8
+_RECORD: Final = 9
+_CHUNK: Final = 6
+_CHUNK_TIMES: Final = 16
 
 
 @dataclass(slots=True)
@@ -88,8 +97,8 @@ class _Topic:
         self.stamps.append(stamp)
 
 
-_Message: TypeAlias = tuple[int, float, bytes, Callable[[], _Topic | None]]
-"""Key of its topic, when it was logged [s], its bytes, and what makes its topic."""
+_Message: TypeAlias = tuple[int, str, float, bytes, Callable[[], _Topic | None]]
+"""Key and name of its topic, when it was logged [s], its bytes, and what makes its topic."""
 
 
 def open_mcap(path: Path, time: TimeColumn) -> Recording:
@@ -98,27 +107,86 @@ def open_mcap(path: Path, time: TimeColumn) -> Recording:
     Raises
     ------
     DriveError
-        No MCAP file, or without a message that has numbers.
+        No MCAP file, without a message that has numbers, or one that unpacks to far more than
+        it can hold.
     MissingExtraError
         mcap or rosbags is not installed.
     """
     try:
         import rosbags.typesys  # noqa: F401  (what decodes the messages)
-        from mcap.reader import NonSeekingReader
+        from mcap import records
     except ImportError as e:
         raise MissingExtraError(e.name or "mcap", "ros", f"reading {path.name}") from None
 
+    check_unpacked(path, _promised(path))
+
     def messages() -> Iterator[_Message]:
-        with path.open("rb") as file:
-            held = NonSeekingReader(file, record_size_limit=path.stat().st_size)
-            # Read in the order of the file: a recording that broke off has no index.
-            for schema, channel, message in held.iter_messages(log_time_order=False):
-                if schema is None:
-                    continue
-                make = partial(_topic_of_mcap, schema, channel)
-                yield channel.id, message.log_time * 1e-9, message.data, make
+        schemas: dict[int, Any] = {}
+        channels: dict[int, Any] = {}
+        for record in _records(path):
+            if isinstance(record, records.Schema):
+                schemas[record.id] = record
+            elif isinstance(record, records.Channel):
+                channels[record.id] = record
+            elif isinstance(record, records.Message) and record.channel_id in channels:
+                channel = channels[record.channel_id]
+                schema = schemas.get(channel.schema_id)
+                if schema is not None:
+                    make = partial(_topic_of_mcap, schema, channel)
+                    yield channel.id, channel.topic, record.log_time * 1e-9, record.data, make
 
     return _recording(path, messages(), "MCAP")
+
+
+def _promised(path: Path) -> int:
+    """Bytes that the chunks of an MCAP say they unpack to."""
+    size, at = 0, _MAGIC
+    with path.open("rb") as file:
+        file.seek(at)
+        while len(head := file.read(_RECORD)) == _RECORD:
+            if head[0] == _CHUNK:
+                size += int.from_bytes(file.read(_CHUNK_TIMES + 8)[_CHUNK_TIMES:], "little")
+            at += _RECORD + int.from_bytes(head[1:], "little")
+            if at > path.stat().st_size:
+                break
+            file.seek(at)
+    return size
+
+
+def _records(path: Path) -> Iterator[Any]:
+    """Records of an MCAP in the order of the file: one that broke off has no index."""
+    from mcap.exceptions import EndOfFile
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader
+
+    with path.open("rb") as file:
+        size = path.stat().st_size
+        for record in StreamReader(file, emit_chunks=True, record_size_limit=size).records:
+            if not isinstance(record, Chunk):
+                yield record
+                continue
+            data = _unpacked(record)
+            inner = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data))
+            with suppress(EndOfFile):
+                yield from inner.records
+            if len(data) != record.uncompressed_size:
+                raise ValueError("a chunk unpacks to another size than it says")
+
+
+def _unpacked(chunk: Any) -> bytes:
+    """Content of a chunk, a byte more at most than it says it has."""
+    most = chunk.uncompressed_size + 1
+    if chunk.compression == "zstd":
+        import zstandard
+
+        return bytes(zstandard.ZstdDecompressor().stream_reader(chunk.data).read(most))
+    if chunk.compression == "lz4":
+        from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+
+        return bytes(LZ4FrameDecompressor().decompress(chunk.data, max_length=most))
+    if chunk.compression:
+        raise ValueError(f"its compression {chunk.compression!r} is not read")
+    return bytes(chunk.data)
 
 
 def open_bag(path: Path, time: TimeColumn) -> Recording:
@@ -132,6 +200,7 @@ def open_bag(path: Path, time: TimeColumn) -> Recording:
         rosbags is not installed.
     """
     try:
+        from rosbags.interfaces import MessageDefinitionFormat
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.rosbag2 import Reader as Reader2
     except ImportError as e:
@@ -141,9 +210,11 @@ def open_bag(path: Path, time: TimeColumn) -> Recording:
     def messages() -> Iterator[_Message]:
         with (Reader1 if one else Reader2)(path) as bag:
             for connection, logged, data in bag.messages():
-                text = connection.msgdef.data
-                make = partial(_ros_topic, connection.topic, connection.msgtype, text, one)
-                yield connection.id, logged * 1e-9, bytes(data), make
+                name, defined = connection.topic, connection.msgdef
+                make = partial(_ros_topic, name, connection.msgtype, defined.data, one)
+                if defined.format == MessageDefinitionFormat.IDL:
+                    continue
+                yield connection.id, name, logged * 1e-9, bytes(data), make
 
     return _recording(path, messages(), "ROS bag")
 
@@ -159,9 +230,14 @@ def _recording(
     damaged = 0
     reason = ""
     try:
-        for key, logged, data, make in messages:
+        for key, name, logged, data, make in messages:
             if key not in topics:
-                topics[key] = make()
+                try:
+                    topics[key] = make()
+                # Definitions that cannot be parsed raise errors of many kinds.
+                except Exception:
+                    topics[key] = None
+                    found.notes.append(f"topic {column_list([name])} cannot be decoded")
             topic = topics[key]
             if topic is None:
                 continue
@@ -197,7 +273,7 @@ def _channels(topics: list[_Topic], found: Recording) -> None:
         found.notes.append(
             f"of several sensors the one with the most messages is taken, not {column_list(others)}"
         )
-    clocks = [_clock(t) for t in topics]
+    clocks = [_clock(t, found) for t in topics]
     found.absolute = all(since_1970(c) for c in clocks)
     for topic, clock in zip(topics, clocks, strict=True):
         rows = np.frombuffer(topic.rows, dtype=np.float64).reshape(-1, len(topic.fields))
@@ -220,13 +296,20 @@ def _unit(name: str) -> str:
     return _SI.get(parts[-2], "") if len(parts) > 1 else ""
 
 
-def _clock(topic: _Topic) -> Floats:
+def _clock(topic: _Topic, found: Recording) -> Floats:
     """Stamps of the messages' headers where they are near the recorder's clock, else that [s]."""
     logged = np.frombuffer(topic.logged, dtype=np.float64)
     stamps = np.frombuffer(topic.stamps, dtype=np.float64)
     with np.errstate(invalid="ignore"):
         near = np.abs(stamps - logged) < _NEAR
-    return stamps if near.all() else logged
+    if near.all():
+        return stamps
+    if np.isfinite(stamps).any():
+        found.notes.append(
+            f"stamps of {column_list([topic.name])} are not all within {_NEAR:g} s of the "
+            "recorder's clock; its messages count when they were recorded"
+        )
+    return logged
 
 
 def _topic_of_mcap(schema: Any, channel: Any) -> _Topic | None:
@@ -252,7 +335,7 @@ def _ros_topic(name: str, kind: str, text: str, one: bool) -> _Topic | None:
         store.register({k: v for k, v in types.items() if k not in store.fielddefs})
     if kind not in store.fielddefs:
         return None
-    fields = _fields(store.fielddefs, kind, "", 0)
+    fields = _fields(store.fielddefs, kind, 0, {})
     if not fields or len(fields) > _MOST_FIELDS:
         return None
     whole: Callable[[Any], Any] = attrgetter(*fields)
@@ -269,19 +352,30 @@ def _ros_topic(name: str, kind: str, text: str, one: bool) -> _Topic | None:
     )
 
 
-def _fields(defined: Any, kind: str, prefix: str, depth: int) -> tuple[str, ...]:
-    """Numbers in a message, nested ones as well; none where an array of any length is in it."""
+def _fields(
+    defined: Any, kind: str, depth: int, known: dict[tuple[str, int], tuple[str, ...]]
+) -> tuple[str, ...]:
+    """Numbers in a message, nested ones as well; none where an array of any length is in it.
+
+    One more than the most that are read, so that few types nested deep cannot stand for millions;
+    ``known`` has those of types and depths that were met.
+    """
     from rosbags.interfaces import Nodetype
 
+    if (kind, depth) in known:
+        return known[kind, depth]
     found: list[str] = []
     for name, (node, what) in defined[kind][1]:
         if node == Nodetype.SEQUENCE:
-            return ()
+            found = []
+            break
         if node == Nodetype.BASE and what[0] not in ("string", "wstring", "char", "wchar"):
-            found.append(f"{prefix}{name}")
+            found.append(name)
         elif node == Nodetype.NAME and what not in (_HEADER, *_TIMES) and depth < _DEEPEST:
-            found += _fields(defined, what, f"{prefix}{name}.", depth + 1)
-    return tuple(found)
+            found += [f"{name}.{below}" for below in _fields(defined, what, depth + 1, known)]
+        del found[_MOST_FIELDS + 1 :]
+    known[kind, depth] = tuple(found)
+    return known[kind, depth]
 
 
 def _header_stamp(message: Any) -> float:

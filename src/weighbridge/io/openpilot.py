@@ -30,7 +30,7 @@ _ZSTANDARD: Final = b"\x28\xb5\x2f\xfd"
 _BLOCK: Final = 1 << 12
 
 # A segment is a minute, of 100 MB at most.
-_MOST_BYTES: Final = 2 << 30
+_MOST_BYTES: Final = 1 << 30
 
 # More than the library itself takes.
 _MOST_SEGMENTS: Final = 512
@@ -173,7 +173,7 @@ def _decompressed(path: Path, data: bytes, opener: Callable[[], Any]) -> tuple[b
             at += _BLOCK
             size += len(parts[-1])
             if size > _MOST_BYTES:
-                raise DriveError(f"{path} unpacks to more than 2 GB; a segment is a minute")
+                raise DriveError(f"{path} unpacks to more than 1 GB; a segment is a minute")
             if stream.eof:
                 at = min(at, len(data)) - len(stream.unused_data)
                 stream = opener()

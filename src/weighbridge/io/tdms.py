@@ -6,6 +6,7 @@ those that LabVIEW writes.
 
 from __future__ import annotations
 
+import logging
 import warnings
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,10 @@ def open_tdms(path: Path, time: TimeColumn) -> Recording:
     """
     try:
         from nptdms import TdmsFile
+        from nptdms.log import log_manager
     except ImportError:
         raise MissingExtraError("npTDMS", "tdms", f"reading {path.name}") from None
+    log_manager.set_level(logging.CRITICAL)
     starts: set[bool] = set()
     clocks: dict[tuple[float, float, int], Floats] = {}
     tree: dict[str, Any] = {}
