@@ -84,6 +84,24 @@ def test_a_long_first_record_is_recognised(tmp_path):
     assert read_drive(path, MAPPING).has("vehicle_speed")
 
 
+def test_of_a_location_only_the_position_is_a_quantity(tmp_path):
+    path = tmp_path / "a.jsonl"
+
+    def strange(k):
+        record = payload(k)
+        record["data"].append({"key": "Location.foo", "value": {"doubleValue": 1.0}})
+        return record
+
+    path.write_text(lines(strange))
+    drive = read_drive(path, MAPPING)
+    assert drive.has("vehicle_speed", "latitude", "longitude")
+    assert "foo" not in drive.signals
+    # A channel that the mapping takes is not told as one that is ignored.
+    ignored = " ".join(p.text for p in drive.problems if "not known and ignored" in p.text)
+    assert "'Location.foo'" in ignored
+    assert "VehicleSpeed" not in ignored
+
+
 def test_two_vehicles_are_refused(tmp_path):
     path = tmp_path / "a.jsonl"
     path.write_text(lines(payload) + json.dumps(payload(21, "7SAY")) + "\n")

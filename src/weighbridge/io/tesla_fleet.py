@@ -27,6 +27,7 @@ from weighbridge.signals import Floats
 _BEGIN: Final = re.compile(rb'(?:\xef\xbb\xbf)?\s*\[?\s*\{\s*"data"\s*:\s*\[\s*\{\s*"key"\s*:')
 _LOGGED: Final = re.compile(rb'(?:\xef\xbb\xbf)?\s*\[?\s*\{.{0,4000}?"CreatedAt"\s*:', re.DOTALL)
 _PLACE: Final = ("latitude", "longitude")
+_PLACES: Final = {f"Location.{axis}": axis for axis in _PLACE}
 _OTHERS: Final = frozenset(("Vin", "CreatedAt", "IsResend"))
 
 
@@ -76,7 +77,7 @@ def open_fleet_telemetry(path: Path, time: TimeColumn) -> Recording:
     for name in rows:
         which = np.frombuffer(rows[name], dtype=np.float64).astype(np.intp)
         clock = clocks.setdefault(which.tobytes(), seconds[which])
-        quantity = name.removeprefix("Location.") if name.startswith("Location.") else ""
+        quantity = _PLACES.get(name, "")
         unit = "deg" if quantity else ""
         numbers = np.frombuffer(cells[name], dtype=np.float64)
         found.channels.append(Channel(name, clock, numbers, unit, quantity))
