@@ -36,6 +36,9 @@ THERE: Final = 0.6
 BLOCK: Final = 60.0
 """Blocks left out in turn tell how the ratio scatters [s]."""
 
+FEWEST_BLOCKS: Final = 5
+"""Fewer blocks tell no standard deviation."""
+
 SLOWEST: Final = 0.6
 """Torque that comes less often does not show `FAST` [s]."""
 
@@ -64,6 +67,8 @@ def smoothed_torque(balance: ForceBalance, vehicle: Vehicle) -> str:
     for span in SLOW:
         slow = slow or _slopes(view.time, use, force, view.specific_force, span)
     if fast is None or slow is None:
+        return ""
+    if min(np.count_nonzero(fast[1]), np.count_nonzero(slow[1])) < FEWEST_BLOCKS:
         return ""
     ratio, std = _ratio(fast, slow)
     if not ratio + SURE * std < SMOOTHED:

@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.balance.witness import (
     BY_SIGNAL,
+    DELAYS,
     FEWEST,
     LOAD_AIR,
     Comparison,
@@ -135,6 +136,8 @@ def _finding(drive: Drive, vehicle: Vehicle, relation: WitnessRelation) -> Findi
     following = follow(rows, witness, relation)
     if following is not None and _smoothed(following, relation):
         return Finding(relation.signal, "serious", 1.0, 0.0, blur=following.blur)
+    if following is not None and following.lag in (DELAYS[0], DELAYS[-1]):
+        return None  # It is on another clock, further away than was tried.
     if following is not None and abs(later := following.lag - (relation.lag or 0.0)) >= LATER:
         rows = rows_of(drive, vehicle, witness, later) or rows
     every = means(rows, witness, ranges_of(relation))
@@ -227,6 +230,8 @@ def judged(
         None where the part is not off and cannot tell that it is right either.
     """
     found = compare(part.reading, told_by(relation, part))
+    if found.scale <= 0.0:
+        return None  # The two have nothing to do with each other.
     stds = (
         float(np.hypot(found.scale_std, relation.scale_std)),
         float(np.hypot(found.level_std, LEVEL_STD * relation.span)),
@@ -274,7 +279,8 @@ def _judged(
         offset=(found.level - found.told) / relation.span,
         scaled=_ORDER.index(by_scale) >= _ORDER.index(by_level),
     )
-    if verdict == "serious" and witness.enriched and finding.sign < 0:
+    # Of what a battery gives, heating takes a part that may change on the way.
+    if verdict == "serious" and (witness.battery or (witness.enriched and finding.sign < 0)):
         verdict = "doubtful"
     return replace(finding, verdict=verdict)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
-from weighbridge.balance.disagreement import Finding, difference, findings
+from weighbridge.balance.disagreement import DOUBTFUL, Finding, difference, findings
 from weighbridge.balance.witness import BY_SIGNAL
-from weighbridge.signals import Drive, Problem
+from weighbridge.checks.frozen import frozen
+from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -29,11 +31,12 @@ def check_witnesses(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...
     """
     if vehicle is None or not vehicle.witnesses:
         return ()
-    found = findings(drive, vehicle)
+    found = findings(_thawed(drive, vehicle), vehicle)
     reading = source_of(vehicle).found(drive)[0]
     off = [f for f in found if f.verdict != "agrees"]
-    agree = [f.signal for f in found if f.verdict == "agrees"]
-    if agree:
+    # What only the unknown air makes agree clears nothing.
+    agree = [f.signal for f in found if f.verdict == "agrees" and abs(f.scale - 1.0) <= DOUBTFUL]
+    if agree and not _outvoted(off):
         return tuple(_witness_off(reading, f, agree) for f in off)
     if not off:
         return ()
@@ -45,6 +48,23 @@ def check_witnesses(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...
             reading, _reading_off(reading, vehicle, worst, together, len(off)), serious=serious
         ),
     )
+
+
+def _thawed(drive: Drive, vehicle: Vehicle) -> Drive:
+    """Leave out where a witness froze: it tells nothing there."""
+    for name in {n for relation in vehicle.witnesses for n in BY_SIGNAL[relation.signal].needs}:
+        signal = drive.get(name)
+        marked = frozen(drive, name) if signal is not None else None
+        if signal is not None and marked is not None and marked.any() and not marked.all():
+            kept = Signal(name, signal.time[~marked], signal.values[~marked])
+            drive = drive.with_signals(kept)
+    return drive
+
+
+def _outvoted(off: Sequence[Finding]) -> bool:
+    """Tell whether two witnesses are off by the same: then it is the reading."""
+    scales = sorted(f.scale for f in off if f.scaled and f.blur == 0.0 and not _part(f))
+    return any(b - a < DOUBTFUL for a, b in pairwise(scales))
 
 
 def _reading_off(

@@ -39,10 +39,9 @@ DbcPaths = Annotated[
 
 def mapping_for(mapping: Path | None, vehicle: Vehicle | None, home: Path | None) -> Path | None:
     """Return the mapping asked for, else the one the vehicle file names beside itself."""
-    if mapping is not None or vehicle is None or vehicle.mapping is None:
-        return mapping
-    named = Path(vehicle.mapping)
-    return named if named.is_absolute() or home is None else home.parent / named
+    from weighbridge.pipeline.given import mapping_of
+
+    return mapping if mapping is not None else mapping_of(vehicle, home)
 
 
 def load(path: Path, mapping: Path | None, dbc: list[str] | None = None) -> Drive:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -55,8 +55,14 @@ _BY_SQUAT: Final = 0.08
 passed for up to 0.067 in 90 undamaged drives of ten vehicles of the second model. It is believed
 where gravity, which the same sensor reads, shows it too."""
 
-_GRAVITY_OFF: Final = 0.025
-"""Gravity is read so much off by a scale; biases of 0.15 m/s^2 make 0.015 of it [-]."""
+_GRAVITY_OFF: Final = 0.045
+"""Gravity is read so much off by a scale [-]; biases of 0.15 m/s^2 make 0.015 of it, and a large
+one beside an error of the squat would pass for a scale."""
+
+_VARIES: Final = 0.02
+_GRAVITY_VARYING: Final = 0.025
+"""Where what is read of gravity varies by so much over the drive [-], it is no bias, and the smaller
+error tells."""
 
 _SHARE: Final = (0.35, 2.0)
 """Share of gravity's error that the speed shows [-]: 0.5 to 0.9 where it is the scale, for the
@@ -90,11 +96,19 @@ class Gain:
     ----------
     time, value : (k,) instants [s] and gain at them [-]; linear between them, even outside
     std : standard deviation of its mean [-]
+    sure : it is the sensor's scale; else it may be an error of the squat, or a speed that is
+        smoothed
     """
 
     time: Floats
     value: Floats
     std: float
+    sure: bool = True
+
+    @property
+    def off(self) -> float:
+        """Largest distance from 1 [-]."""
+        return float(np.max(np.abs(self.value - 1.0)))
 
     def at(self, time: Floats) -> Floats:
         """Return the gain (n,) at the instants [-]."""
@@ -124,7 +138,7 @@ def gravity_read(time: Floats, accel: Floats) -> tuple[Floats, Floats]:
 def find_gain(
     motion: Motion, speed: Signal, gravity: tuple[Floats, Floats], *, again: bool = False
 ) -> Gain | None:
-    """Find the scale of the accelerometer along the vehicle where it is off for sure.
+    """Find the scale of the accelerometer along the vehicle where it is off.
 
     Changes of the speed are regressed on the integral of the acceleration over the same time.
     The integral has next to no noise, the speed that of its rounding.
@@ -179,7 +193,9 @@ def find_gain(
         return None
     if again or upheld:
         return found
-    return found if float(np.max(off)) > _BY_SQUAT and not _smoothed(motion, speed) else None
+    if _smoothed(motion, speed):
+        return None
+    return replace(found, sure=float(np.max(off)) > _BY_SQUAT)
 
 
 def _upheld(gain: Gain, gravity: tuple[Floats, Floats]) -> bool:
@@ -191,7 +207,11 @@ def _upheld(gain: Gain, gravity: tuple[Floats, Floats]) -> bool:
     worst = int(np.argmax(np.abs(gain.value - 1.0)))
     felt = float(np.median(part[sides[worst]])) - 1.0
     low, high = _SHARE
-    return abs(felt) > _GRAVITY_OFF and low < float(gain.value[worst] - 1.0) / felt < high
+    varies = float(np.ptp(np.percentile(part, [10.0, 90.0]))) > _VARIES
+    return (
+        abs(felt) > (_GRAVITY_VARYING if varies else _GRAVITY_OFF)
+        and low < float(gain.value[worst] - 1.0) / felt < high
+    )
 
 
 def _smoothed(motion: Motion, speed: Signal) -> bool:

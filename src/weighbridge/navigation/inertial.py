@@ -53,7 +53,7 @@ from weighbridge.navigation.aiding import (
     still_state,
 )
 from weighbridge.navigation.even import Even, coarsely, evenly
-from weighbridge.navigation.gain import find_gain, gravity_read
+from weighbridge.navigation.gain import Gain, find_gain, gravity_read
 from weighbridge.navigation.motion import Motion, bridged, noise_level
 from weighbridge.navigation.mounting import TooLittleMotionError, coarse_mounting
 from weighbridge.navigation.remounting import Change, find_changes, loosened, told, undo, unsure
@@ -79,6 +79,9 @@ _SQUAT_TIME = 60.0
 
 _SCALE_ROUNDS = 4
 """A wrong scale also bends the attitude: each round finds most of what is left."""
+
+_OPEN = 0.4
+"""Part of a gain that may be scale or squat that is left open in the mass [-]."""
 
 _CLOSER = 0.6
 """A round that finds more than so much of what the one before found leads nowhere [-]."""
@@ -189,10 +192,11 @@ def inertial_motion(
         gain = find_gain(motion, reference, gravity, again=scale_std > 0.0)
         if gain is None or motion.mounting is None:
             break
-        off = float(np.max(np.abs(gain.value - 1.0)))
-        if off > _CLOSER * before:
+        if not gain.sure:
+            return _doubted(motion, gain)
+        if gain.off > _CLOSER * before:
             break
-        before = off
+        before = gain.off
         scale /= gain.at(imu.time)
         scale_std = gain.std
         scaled = _scaled(imu, euler_to_matrix(*motion.mounting)[0], scale)
@@ -204,6 +208,19 @@ def inertial_motion(
         specific_force_scale_std=scale_std,
         notes=(*motion.notes, _scale_note(1.0 / scale)),
     )
+
+
+def _doubted(motion: Motion, gain: Gain) -> Motion:
+    """Tell of a gain that may be the sensor's scale or the squat, and widen by a part of it."""
+    mean = float(np.mean(gain.value))
+    note = (
+        f"the accelerometer reads {mean:.3f} times what the speed changes by along the vehicle, "
+        "and gravity does not show it: the scale of that axis is off, or the lean of the body is "
+        f"not known so well; {100.0 * _OPEN * gain.off:.1f} % of the mass, as standard deviation, "
+        "are in the interval for it"
+    )
+    std = _OPEN * gain.off
+    return replace(motion, specific_force_scale_std=std, notes=(*motion.notes, note))
 
 
 def _scaled(imu: Imu, forward: Floats, scale: Floats) -> Imu:

@@ -33,7 +33,14 @@ from weighbridge.estimators.rls import block_jackknife
 from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion
-from weighbridge.pipeline.given import GivenDrive, GivenVehicle, as_drives, as_vehicle
+from weighbridge.pipeline.given import (
+    GivenDrive,
+    GivenVehicle,
+    as_drives,
+    as_vehicle,
+    home_of,
+    mapping_of,
+)
 from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, noted, refine
 from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
@@ -143,8 +150,8 @@ def calibrate(
     DriveError, ConfigError
         A drive or an argument cannot be used; the sentence says why.
     """
-    known = as_drives(drives)
     base = as_vehicle(vehicle) if vehicle is not None else None
+    known = as_drives(drives, mapping_of(base, home_of(vehicle)))
     if settings is not None and not settings.fit.torque:
         return run_speed_calibration(known, mass, vehicle=base).vehicle
     return run_calibration(known, mass, vehicle=base, settings=settings).vehicle

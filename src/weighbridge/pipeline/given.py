@@ -20,8 +20,32 @@ GivenVehicle: TypeAlias = Vehicle | str | Path
 """A vehicle, or the path of a vehicle file."""
 
 
-def as_drive(given: GivenDrive) -> Drive:
+def mapping_of(vehicle: Vehicle | None, home: Path | None) -> Path | None:
+    """Return the mapping that a vehicle file names, beside itself where its path is known.
+
+    Parameters
+    ----------
+    vehicle : None where there is none
+    home : path of its file; None where it is not known
+    """
+    if vehicle is None or vehicle.mapping is None:
+        return None
+    named = Path(vehicle.mapping)
+    return named if named.is_absolute() or home is None else home.parent / named
+
+
+def home_of(given: GivenVehicle | None) -> Path | None:
+    """Return the path of a vehicle file that was given by it."""
+    return Path(given) if isinstance(given, str | Path) else None
+
+
+def as_drive(given: GivenDrive, mapping: Path | None = None) -> Drive:
     """Return a drive, read where it is a path or a table.
+
+    Parameters
+    ----------
+    given
+    mapping : for a path, what its files are read with
 
     Raises
     ------
@@ -35,7 +59,7 @@ def as_drive(given: GivenDrive) -> Drive:
     if isinstance(given, str | Path):
         from weighbridge.io import read_drive
 
-        return read_drive(given)
+        return read_drive(given, mapping)
     from weighbridge.io.read_frames import is_frame, read_frame
 
     if is_frame(given) or (
@@ -48,11 +72,11 @@ def as_drive(given: GivenDrive) -> Drive:
     )
 
 
-def as_drives(given: GivenDrive | Sequence[GivenDrive]) -> list[Drive]:
+def as_drives(given: GivenDrive | Sequence[GivenDrive], mapping: Path | None = None) -> list[Drive]:
     """Return one or several drives, as of `as_drive`."""
     if isinstance(given, list | tuple):
-        return [as_drive(one) for one in given]
-    return [as_drive(given)]
+        return [as_drive(one, mapping) for one in given]
+    return [as_drive(given, mapping)]
 
 
 def as_vehicle(given: GivenVehicle) -> Vehicle:

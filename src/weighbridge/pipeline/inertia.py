@@ -39,7 +39,14 @@ from weighbridge.estimators.suspension import (
     static_mass,
 )
 from weighbridge.estimators.track import Status
-from weighbridge.pipeline.given import GivenDrive, GivenVehicle, as_drive, as_vehicle
+from weighbridge.pipeline.given import (
+    GivenDrive,
+    GivenVehicle,
+    as_drive,
+    as_vehicle,
+    home_of,
+    mapping_of,
+)
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.pipeline.ride_checks import (
     LEAST,
@@ -341,7 +348,8 @@ def estimate_inertia(
     chosen: Method | None = next((m for m in METHODS if m == method), None)
     if chosen is None:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
-    return _estimate(as_drive(drive), as_vehicle(vehicle), chosen, settings)
+    home, vehicle = home_of(vehicle), as_vehicle(vehicle)
+    return _estimate(as_drive(drive, mapping_of(vehicle, home)), vehicle, chosen, settings)
 
 
 def _estimate(

@@ -11,7 +11,14 @@ import numpy as np
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.checks import settle_drive
 from weighbridge.navigation.motion import MotionSource
-from weighbridge.pipeline.given import GivenDrive, GivenVehicle, as_drive, as_vehicle
+from weighbridge.pipeline.given import (
+    GivenDrive,
+    GivenVehicle,
+    as_drive,
+    as_vehicle,
+    home_of,
+    mapping_of,
+)
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import from_si
@@ -150,8 +157,9 @@ def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Ins
     -------
     Inspection
     """
-    drive = as_drive(drive)
+    home = home_of(vehicle)
     vehicle = as_vehicle(vehicle) if vehicle is not None else None
+    drive = as_drive(drive, mapping_of(vehicle, home))
     order = list(QUANTITIES)
     signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
     settled = settle_drive(drive, vehicle)

@@ -25,7 +25,14 @@ from weighbridge.estimators.judging import lacks_accelerometer, uncalibrated_std
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
-from weighbridge.pipeline.given import GivenDrive, GivenVehicle, as_drive, as_vehicle
+from weighbridge.pipeline.given import (
+    GivenDrive,
+    GivenVehicle,
+    as_drive,
+    as_vehicle,
+    home_of,
+    mapping_of,
+)
 from weighbridge.pipeline.results import check_level, number, write_track
 from weighbridge.signals import Drive
 from weighbridge.signals.shown import in_html, in_lines, plural
@@ -267,7 +274,8 @@ def weigh(drive: GivenDrive, vehicle: GivenVehicle, method: str = DEFAULT_METHOD
 
     Parameters
     ----------
-    drive : as of `read_drive`, or the path or data frame that it is to be read from
+    drive : as of `read_drive`, or the path or data frame that it is to be read from; a path
+        with the mapping that the vehicle file names
     vehicle : as of `calibrate` or `Vehicle.load`, or the path of a vehicle file
     method : name of an estimator in `weighbridge.estimators.ESTIMATORS`
 
@@ -288,8 +296,8 @@ def weigh(drive: GivenDrive, vehicle: GivenVehicle, method: str = DEFAULT_METHOD
 
     from weighbridge.checks import refuse_serious, settle_drive
 
-    vehicle = as_vehicle(vehicle)
-    drive = settle_drive(as_drive(drive), vehicle)
+    home, vehicle = home_of(vehicle), as_vehicle(vehicle)
+    drive = settle_drive(as_drive(drive, mapping_of(vehicle, home)), vehicle)
     refuse_serious(drive.name, drive.problems)
     return weigh_checked(drive, vehicle, method)
 
@@ -343,7 +351,7 @@ def weigh_balance(
             "are wrong; calibrate this vehicle"
         )
     elif not estimator.speed_alone and (
-        why := scale_contradiction(balance, vehicle) or smoothed_torque(balance, vehicle)
+        why := scale_contradiction(balance, vehicle) or _smoothed(drive, vehicle, balance)
     ):
         status, reason = Status.INCONSISTENT, why
     if status is Status.CONVERGED and not estimator.speed_alone:
@@ -367,6 +375,12 @@ def weigh_balance(
         result=result,
         warnings=warnings + overload(vehicle, result) + below_tare(vehicle, result),
     )
+
+
+def _smoothed(drive: Drive, vehicle: Vehicle, balance: ForceBalance) -> str:
+    """Say that the torque was smoothed, unless a person vouches for it."""
+    trusted = set(source_of(vehicle).found(drive)) & set(drive.info.trusted)
+    return "" if trusted else smoothed_torque(balance, vehicle)
 
 
 def without_mass(

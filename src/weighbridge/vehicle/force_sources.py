@@ -23,6 +23,12 @@ STANDING: Final = 0.1
 FEWEST_STANDING: Final = 20
 """Samples at standstill that tell what a battery gives beside driving."""
 
+NEAR: Final = 60.0
+"""Standstill so near driving tells what the battery gives beside it [s]."""
+
+OLDEST: Final = 3.0
+"""Periods of a signal within which a value of it holds [-]."""
+
 ACCESSORIES: Final = 750.0
 """What it gives where they are fewer [W] (Implementing Decision 2013/341/EU)."""
 
@@ -53,9 +59,14 @@ def _wheel_torque(drive: Drive) -> Signal:
         names = tuple(n for axle in _AXLES for n in _measured_of(drive, axle))
         names = names or tuple(n for parts in _AXLES.values() for n in parts if drive.has(n))
     first, *others = (drive.signals[name] for name in names)
-    total = first.values + sum(other.at(first.time) for other in others)
+    total = first.values + sum(_fresh(other, first.time) for other in others)
     known = np.isfinite(total)
     return Signal("wheel_torque", first.time[known], total[known])
+
+
+def _fresh(signal: Signal, time: Floats) -> Floats:
+    """Values at stamps (n,); NaN in the gaps of the signal."""
+    return np.where(signal.age(time) <= OLDEST * signal.period, signal.at(time), np.nan)
 
 
 def _unmeasured(drive: Drive, driven: str | None) -> str:
@@ -101,7 +112,7 @@ def _per(power: Floats, speed: Floats, slowest: float) -> Floats:
 
 
 def _power(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
-    speed = drive.signals["engine_speed"].at(time)
+    speed = _fresh(drive.signals["engine_speed"], time)
     return _per(drive.signals["engine_power"].at(time), speed, SLOWEST_SHAFT)
 
 
@@ -112,7 +123,7 @@ def _speed_of(drive: Drive) -> Signal:
 
 
 def _power_by_speed(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
-    return _per(drive.signals["engine_power"].at(time), _speed_of(drive).at(time), SLOWEST)
+    return _per(drive.signals["engine_power"].at(time), _fresh(_speed_of(drive), time), SLOWEST)
 
 
 def _driving_power(drive: Drive) -> Signal:
@@ -123,7 +134,7 @@ def _driving_power(drive: Drive) -> Signal:
     """
     volts, amps, speed = (drive.signals["battery_voltage"], drive.signals["battery_current"],
                           _speed_of(drive))  # fmt: skip
-    power = volts.at(amps.time) * amps.values
+    power = _fresh(volts, amps.time) * amps.values
     known = np.isfinite(power)
     time, power = amps.time[known], power[known]
     v = speed.at(time)
@@ -131,7 +142,10 @@ def _driving_power(drive: Drive) -> Signal:
     smooth = uniform_filter1d(np.nan_to_num(v), around) if time.size else v
     gained = np.gradient(smooth**2, time) if time.size > 1 else np.zeros(time.size)
     sign = math.copysign(1.0, float((power - np.mean(power)) @ gained)) if time.size else 1.0
-    standing = np.abs(v) < STANDING
+    moves = time[np.abs(v) >= SLOWEST]
+    near = np.searchsorted(moves, time + NEAR) > np.searchsorted(moves, time - NEAR)
+    # Long after or before driving it may charge or heat.
+    standing = (np.abs(v) < STANDING) & near & (sign * power >= 0.0)
     rest = ACCESSORIES
     if np.count_nonzero(standing) >= FEWEST_STANDING:
         rest = float(np.median(sign * power[standing]))
@@ -139,7 +153,8 @@ def _driving_power(drive: Drive) -> Signal:
 
 
 def _battery(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
-    force = _per(_driving_power(drive).at(time), _speed_of(drive).at(time), SLOWEST)
+    power = _fresh(_driving_power(drive), time)
+    force = _per(power, _fresh(_speed_of(drive), time), SLOWEST)
     efficiency = BATTERY_EFFICIENCY[0]
     return np.asarray(np.where(force >= 0.0, efficiency * force, force / efficiency))
 

@@ -1,0 +1,31 @@
+"""Paths are read as the vehicle file says."""
+
+from dataclasses import replace
+
+import weighbridge as wb
+from weighbridge.io import to_frames
+from weighbridge.simulation import make_scenario, simulate_car
+
+
+def test_a_path_is_read_with_the_mapping_that_the_vehicle_file_names(tmp_path):
+    made = simulate_car(make_scenario("car-short", payload=120.0, seed=61))
+    car = wb.calibrate([made.drive], mass=float(made.truth.mass[0]))
+    frames = to_frames(made.drive)
+    own = frames["obd"].rename({"vehicle_speed_kmh": "Tacho"})
+    folder = tmp_path / "own"
+    folder.mkdir()
+    own.write_parquet(folder / "obd.parquet")
+    for table in ("imu", "gnss"):
+        frames[table].write_parquet(folder / f"{table}.parquet")
+    columns = ["engine_speed_rpm", "engine_load_pct"]
+    lines = ["[tables.obd]", 'files = "obd.parquet"', "[tables.obd.signals]"]
+    lines += ['vehicle_speed = { column = "Tacho", unit = "kmh" }']
+    for column in columns:
+        name, _, unit = column.rpartition("_")
+        lines.append(f'{name} = {{ column = "{column}", unit = "{unit}" }}')
+    (tmp_path / "map.toml").write_text("\n".join(lines))
+    replace(car, mapping="map.toml").save(tmp_path / "car.toml")
+    by_hand = wb.weigh(wb.read_drive(folder, tmp_path / "map.toml"), car)
+    weighed = wb.weigh(folder, tmp_path / "car.toml")
+    assert weighed.mass == by_hand.mass
+    assert wb.inspect_drive(folder, tmp_path / "car.toml").drive.has("vehicle_speed")
