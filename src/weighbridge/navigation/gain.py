@@ -61,7 +61,7 @@ one beside an error of the squat would pass for a scale."""
 
 _VARIES: Final = 0.02
 _GRAVITY_VARYING: Final = 0.025
-"""Where what is read of gravity varies by so much over the drive [-], it is no bias, and the smaller
+"""Where what is read of gravity varies by so much over the drive [-], it is no bias, and a smaller
 error tells."""
 
 _SHARE: Final = (0.35, 2.0)
