@@ -524,17 +524,20 @@ def canedge() -> str:
             wb.weigh(drive, other, method="rls").mass / small,
         ]
         table.append((drive.duration, *row))
+        of_small = f"{row[3]:.2f}" if np.isfinite(row[3]) else "none"
         lines.append(
             f"| {name} | {drive.duration:.0f} | {w.used_time:.0f} | {row[0]:.2f} "
             f"| {w.std / reference:.2f} | {row[1]:.2f} | {joint.std / reference:.2f} "
-            f"| {row[2]:.2f} | {row[3]:.2f} | {forward} | {sd} |"
+            f"| {row[2]:.2f} | {of_small} | {forward} | {sd} |"
         )
     rows = np.array(table)
     full = rows[rows[:, 0] > 500.0]
 
     def agreement(values: np.ndarray) -> str:
-        spread = 100.0 * np.std(values, ddof=1) / np.mean(values)
-        return f"{np.mean(values):.2f} kg per N m, sd {spread:.1f} %"
+        known = values[np.isfinite(values)]
+        spread = 100.0 * np.std(known, ddof=1) / np.mean(known)
+        less = "" if known.size == values.size else f" ({known.size} files)"
+        return f"{np.mean(known):.2f} kg per N m, sd {spread:.1f} %{less}"
 
     lines += [
         "",

@@ -11,6 +11,7 @@ from weighbridge.io import read_drive
 from weighbridge.io.draft import Draft
 from weighbridge.io.formats import format_of
 from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io.quiet import first_line
 
 HEAD = '"SECONDS";"PID";"VALUE";"UNITS";"LATITUDE";"LONGTITUDE";'
 
@@ -147,3 +148,7 @@ def test_damage_leaves_signals_or_one_sentence(tmp_path_factory, assert_salvaged
     path = tmp_path_factory.mktemp("cut") / "trip.csv"
     path.write_bytes(scanner().encode()[:cut] + junk)
     assert_salvaged(path)
+
+
+def test_a_vertical_tab_stays_out_of_the_sentence():
+    assert first_line(ValueError("could not parse \x0b here\nmore")) == r"could not parse \x0b here"

@@ -11,6 +11,8 @@ from typing import Final
 
 import polars as pl
 
+from weighbridge.visible import visible
+
 PARSE_ERRORS: Final = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 """What polars raises for a file that it cannot read: panics are no subclass of its errors, nor
 of Exception."""
@@ -48,4 +50,4 @@ def quietly() -> Iterator[None]:
 
 def first_line(error: BaseException) -> str:
     """First line of a library's message, as much of it as helps."""
-    return str(error).strip().split("\n", 1)[0][:_LONGEST]
+    return visible(str(error).strip().split("\n", 1)[0])[:_LONGEST]
