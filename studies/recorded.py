@@ -34,7 +34,6 @@ from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Signal
 from weighbridge.signals.alignment import align
-from weighbridge.vehicle.data_sheet import inertia_std
 from weighbridge.vehicle.gear import detect_gearings
 from weighbridge.vehicle.power_balance import find_power_balance
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -176,7 +175,8 @@ def bmw_loads() -> str:
         return np.column_stack([rows, view.gearing**2 * view.accel, wheels]), y
 
     def their_std(vehicle, *given, **options):  # type: ignore[no-untyped-def]
-        return np.append(prior_std(vehicle, *given, **options), inertia_std(vehicle))
+        inertias = vehicle.road.engine_inertia.std, vehicle.road.wheel_inertia.std
+        return np.append(prior_std(vehicle, *given, **options), inertias)
 
     def usual_lean(*_):  # type: ignore[no-untyped-def]
         return Lean(*SQUAT)

@@ -18,7 +18,6 @@ from weighbridge.vehicle.data_sheet import (
     ACCESSORY_POWER,
     by_data_sheet,
     friction_coefficients,
-    inertia_std,
     scale_std,
     wheel_efficiency,
 )
@@ -165,7 +164,8 @@ def test_with_one_gear_inertias_are_considered_not_estimated():
     assert states.size == len(NAMES) + 2
     accel = np.sin(np.arange(200.0))
     used = np.ones(200, dtype=bool)
-    engine, wheels = inertia_std(electric)
+    engine, wheels = electric.road.engine_inertia.std, electric.road.wheel_inertia.std
+    assert (engine, wheels) == (0.02, 0.7)
     expected = np.hypot(engine * 30.0**2, wheels / 0.33**2) / 1500.0
     assert_allclose(inertia_relative_std(electric, 1500.0, accel, accel, used), expected)
     # Where all that weighs is hills, the inertias do not matter.

@@ -229,7 +229,7 @@ def test_data_sheet_values_are_accepted(tmp_path):
 
 
 def test_empty_file_is_a_vehicle_of_defaults(tmp_path):
-    assert load(tmp_path, "") == Vehicle(driveline=Driveline(wheel_inertia=5.0))
+    assert load(tmp_path, "") == Vehicle()
 
 
 @pytest.mark.parametrize(
@@ -242,8 +242,8 @@ def test_empty_file_is_a_vehicle_of_defaults(tmp_path):
     ],
 )
 def test_inertias_left_out_are_those_of_the_class(tmp_path, text, engine, wheels):
-    line = load(tmp_path, text).driveline
-    assert (line.engine_inertia, line.wheel_inertia) == (engine, wheels)
+    road = load(tmp_path, text).road
+    assert (road.engine_inertia.value, road.wheel_inertia.value) == (engine, wheels)
 
 
 SPEED_MODEL = """[speed_model]

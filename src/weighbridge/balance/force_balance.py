@@ -280,7 +280,7 @@ def force_balance(
     time = recorded - delay
     lag = vehicle.timing.torque_lag if lag is None else lag
     rows = _motion_at(smoothed(motion, lag), time)
-    driveline = vehicle.driveline
+    driveline, road = vehicle.driveline, vehicle.road
 
     engine_speed = _engine_speed(drive, vehicle, time + motion.speed_delay, rows["speed"])
     gear, gearing, slipping = _gears(drive, vehicle, recorded, engine_speed, rows["speed"])
@@ -288,10 +288,11 @@ def force_balance(
     traction = wheel_share(vehicle, torque.torque) * torque.torque * gearing
     density = air_density(drive, time, rows["altitude"])
     rotating = (
-        driveline.wheel_inertia / driveline.wheel_radius**2 + driveline.engine_inertia * gearing**2
+        road.wheel_inertia.value / driveline.wheel_radius**2
+        + road.engine_inertia.value * gearing**2
     )
     air_speed = rows["speed"] + headwind(drive, rows["heading"])
-    drag = 0.5 * density * vehicle.road_load.drag_area * air_speed * np.abs(air_speed)
+    drag = 0.5 * density * vehicle.road.drag_area.value * air_speed * np.abs(air_speed)
 
     signed = signed and source_of(vehicle).signed
     needed, weight = _needed_force(vehicle, rows["specific_force"], drag, rotating)
@@ -389,7 +390,7 @@ def dragged_reading(
         time = source.time - (vehicle.timing.torque_delay or 0.0)
         rows = _motion_at(smoothed(motion, vehicle.timing.torque_lag), time)
         density = air_density(drive, time, rows["altitude"])
-        drag = 0.5 * density * vehicle.road_load.drag_area * rows["speed"] ** 2
+        drag = 0.5 * density * vehicle.road.drag_area.value * rows["speed"] ** 2
         needed, weight = _needed_force(vehicle, rows["specific_force"], drag)
         sources.append(source)
         needs.append(np.full_like(needed, np.nan) if motion.source in BY_SPEED else needed / weight)
@@ -556,7 +557,7 @@ def _needed_force(
     cautious one: drag explains least of how a heavy vehicle slows down.
     """
     mass = max(vehicle.provenance.masses, default=vehicle.tare or vehicle.of_class.typical_mass)
-    rolling = vehicle.road_load.rolling_coefficient * GRAVITY
+    rolling = vehicle.road.rolling_coefficient.value * GRAVITY
     needed = (mass + np.nan_to_num(rotating)) * specific_force + mass * rolling + drag
     return np.asarray(needed), mass * GRAVITY
 
@@ -583,7 +584,7 @@ def _trailing(
         return np.zeros(time.size, dtype=bool)
     nearest = np.clip(np.searchsorted(time, motion.time), 0, time.size - 1)
     density = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)
-    drag = 0.5 * density * vehicle.road_load.drag_area * motion.speed**2
+    drag = 0.5 * density * vehicle.road.drag_area.value * motion.speed**2
     needed, weight = _needed_force(vehicle, motion.specific_force, drag)
     dragged = np.minimum(np.nan_to_num(traction), 0.0)[nearest] if traction is not None else 0.0
     brake = np.where(slowed[nearest], np.maximum(dragged - np.nan_to_num(needed), 0.0), 0.0)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from weighbridge.estimators.squat import share_of_accel
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.data_sheet import by_data_sheet, inertia_std
+from weighbridge.vehicle.data_sheet import by_data_sheet
 from weighbridge.vehicle.model import Vehicle
 
 
@@ -30,6 +30,6 @@ def inertia_relative_std(
     line = vehicle.driveline
     if not (by_data_sheet(vehicle) and line.single_speed) or not mass > 0.0:
         return 0.0
-    engine, wheels = inertia_std(vehicle)
-    rotating = float(np.hypot(engine * line.gearings[0] ** 2, wheels / line.wheel_radius**2))
+    engine, wheels = vehicle.road.engine_inertia, vehicle.road.wheel_inertia
+    rotating = math.hypot(engine.std * line.gearings[0] ** 2, wheels.std / line.wheel_radius**2)
     return rotating / mass * share_of_accel(accel, phi, used)

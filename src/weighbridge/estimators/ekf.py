@@ -71,7 +71,7 @@ def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Col
     return kernel.Columns(
         time=view.time,
         traction=view.traction_force,
-        drag=0.5 * view.air_density * vehicle.road_load.drag_area,
+        drag=0.5 * view.air_density * vehicle.road.drag_area.value,
         headwind=view.air_speed - view.speed,
         rotating=view.rotating_mass,
         speed=view.speed,
@@ -87,7 +87,7 @@ def parameters(settings: EkfSettings, vehicle: Vehicle, period: float) -> kernel
     mass = vehicle.tare or vehicle.of_class.typical_mass
     return kernel.MassEkfParams(
         gravity=GRAVITY,
-        rolling=vehicle.road_load.rolling_coefficient,
+        rolling=vehicle.road.rolling_coefficient.value,
         rolling_speed=vehicle.road_load.rolling_speed_coefficient,
         speed_density=settings.speed_noise**2,
         grade_density=settings.grade_noise**2,

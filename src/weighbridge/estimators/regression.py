@@ -21,8 +21,10 @@ def regression(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
     phi : (n,) [m/s^2]
     y : (n,) [N]
     """
-    load = vehicle.road_load
-    rolling = load.rolling_coefficient + load.rolling_speed_coefficient * view.speed
+    rolling = (
+        vehicle.road.rolling_coefficient.value
+        + vehicle.road_load.rolling_speed_coefficient * view.speed
+    )
     phi = view.specific_force + GRAVITY * rolling * np.cos(view.grade)
     y = view.traction_force - view.drag_force - view.rotating_mass * view.accel
     return phi, y

@@ -17,7 +17,6 @@ from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import (
     USUAL_SPEED,
     by_data_sheet,
-    inertia_std,
     offset_std,
 )
 from weighbridge.vehicle.model import Vehicle
@@ -187,7 +186,7 @@ def design(
     phi, y = regression(view, vehicle)
     if leaned is not None:
         phi = phi - leaned
-    slope = view.air_density * vehicle.road_load.drag_area * view.speed
+    slope = view.air_density * vehicle.road.drag_area.value * view.speed
     north, east = view.direction
     one = np.ones_like(phi)
     cold = coldness(view) * np.nan_to_num(view.gearing)
@@ -248,20 +247,14 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, grade_open: float
 
     Parameters
     ----------
-    vehicle : its drag area and rolling resistance are as uncertain as their standard
-        deviations say; where there are none and it was not calibrated, as those of its class
+    vehicle : its drag area, rolling resistance and inertias are as uncertain as its ``road`` says
     mass : rough [kg]; its own standard deviation is as large
     torque : highest of the drive [N m]
     grade_open : what of the grade nothing has measured; the disturbance takes it [rad]
     """
-    load = vehicle.road_load
-    drag, rolling = load.drag_area_std, load.rolling_coefficient_std
-    if vehicle.provenance.mass_scale_std is None:
-        _, std = vehicle.of_class.road_prior(single_speed=vehicle.driveline.single_speed)
-        drag = float(std[0]) if drag is None else drag
-        rolling = float(std[1]) if rolling is None else rolling
+    road = vehicle.road
     grade = GRAVITY * grade_open
-    resistance = float(np.hypot(RESISTANCE_STD, GRAVITY * (rolling or 0.0)))
+    resistance = float(np.hypot(RESISTANCE_STD, GRAVITY * road.rolling_coefficient.std))
     states = [
         mass,
         mass * float(np.hypot(DISTURBANCE_STD, grade)),
@@ -269,12 +262,12 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, grade_open: float
         WIND_STD,
         WIND_STD,
         source_of(vehicle).cold_torque_std * torque,
-        drag or 0.0,
+        road.drag_area.std,
     ]
     if by_data_sheet(vehicle):
         states += offset_std(vehicle, torque)
         if not vehicle.driveline.single_speed:
-            states += inertia_std(vehicle)
+            states += [road.engine_inertia.std, road.wheel_inertia.std]
     return np.array(states)
 
 

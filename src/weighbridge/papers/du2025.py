@@ -429,11 +429,12 @@ def _vehicle_table(done: Reproduction) -> Table:
         (
             ("torque offset N m", "0", f"{offset:.1f}"),
             ("torque scale, efficiency in it", f"{wheel_efficiency(sheet):.3f}", f"{scale:.3f}"),
-            ("engine inertia kg m²", f"{sheet.driveline.engine_inertia:.2f}",
-             f"{car.driveline.engine_inertia:.2f}"),
-            ("drag area m²", f"{sheet.road_load.drag_area:.2f}", f"{car.road_load.drag_area:.2f}"),
-            ("rolling coefficient", f"{sheet.road_load.rolling_coefficient:.4f}",
-             f"{car.road_load.rolling_coefficient:.4f}"),
+            ("engine inertia kg m²", f"{sheet.road.engine_inertia.value:.2f}",
+             f"{car.road.engine_inertia.value:.2f}"),
+            ("drag area m²", f"{sheet.road.drag_area.value:.2f}",
+             f"{car.road.drag_area.value:.2f}"),
+            ("rolling coefficient", f"{sheet.road.rolling_coefficient.value:.4f}",
+             f"{car.road.rolling_coefficient.value:.4f}"),
         ),
     )  # fmt: skip
 

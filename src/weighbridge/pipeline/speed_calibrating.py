@@ -75,13 +75,14 @@ def nominal_of(vehicle: Vehicle) -> Nominal:
 
     The corrections make up for what is only roughly so.
     """
-    line = vehicle.driveline
+    line, road = vehicle.driveline, vehicle.road
     gearing = float(np.median(line.gearings)) if line.gearings else GEARING
     return Nominal(
         force_gain=(line.efficiency or 1.0) * gearing,
-        drag=AIR_DENSITY * vehicle.road_load.drag_area,
-        rolling_coefficient=vehicle.road_load.rolling_coefficient,
-        rotating_mass=line.wheel_inertia / line.wheel_radius**2 + line.engine_inertia * gearing**2,
+        drag=AIR_DENSITY * road.drag_area.value,
+        rolling_coefficient=road.rolling_coefficient.value,
+        rotating_mass=road.wheel_inertia.value / line.wheel_radius**2
+        + road.engine_inertia.value * gearing**2,
     )
 
 

@@ -28,12 +28,12 @@ def as_read(vehicle: Vehicle, source: TorqueSource | None = None) -> Vehicle:
     gearing = source.gearing(line.wheel_radius)
     inertia, std = 0.0, 0.0
     if source.before_motor:
+        turns = USUAL_MOTOR_GEARING
         usual, spread = vehicle.of_class.road_prior(single_speed=True)
         inertia, std = float(usual[2]), float(spread[2])
-        turns = USUAL_MOTOR_GEARING
         if line.single_speed:
-            turns, inertia = line.gearings[0], line.engine_inertia
-            std = line.engine_inertia_std if line.engine_inertia_std is not None else std
+            motor = vehicle.road.engine_inertia
+            turns, inertia, std = line.gearings[0], motor.value, motor.std
         share = (turns / gearing) ** 2
         inertia, std = share * inertia, share * std
     return replace(

@@ -55,10 +55,6 @@ FRICTION_STD: Final = 0.3
 """Friction that a vehicle file states, relative standard deviation [-]: read at idle it holds
 alternator and pumps, and in gear the converter of an automatic."""
 
-WHEEL_INERTIA_STD: Final = 0.25
-"""Inertia of the wheels of a class, relative standard deviation [-]: wheels of small cars have
-0.9 kg m^2, of large ones 1.7."""
-
 FRICTION_PRESSURE: Final[dict[Fuel, tuple[float, float, float]]] = {
     "petrol": (0.97, 0.15, 0.05),
     "diesel": (0.75, 0.48, 0.036),
@@ -151,20 +147,6 @@ def offset_std(vehicle: Vehicle, torque: float) -> tuple[float, float]:
     return (
         float(np.hypot(OFFSET_STD * torque, FRICTION_STD * offset)),
         float(np.hypot(GROWTH_STD * torque, FRICTION_STD * growth)),
-    )
-
-
-def inertia_std(vehicle: Vehicle) -> tuple[float, float]:
-    """Return the standard deviations of engine and wheel inertia [kg m^2].
-
-    As the vehicle file says, else as those of its class scatter.
-    """
-    line = vehicle.driveline
-    _, std = vehicle.of_class.road_prior(single_speed=line.single_speed)
-    engine, wheels = line.engine_inertia_std, line.wheel_inertia_std
-    return (
-        float(std[2]) if engine is None else engine,
-        WHEEL_INERTIA_STD * line.wheel_inertia if wheels is None else wheels,
     )
 
 

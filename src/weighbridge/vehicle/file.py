@@ -7,8 +7,8 @@ it fills; loading, saving and the comments all follow it.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import MISSING, dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -347,7 +347,6 @@ def load_vehicle(path: str | Path) -> Vehicle:
     root = read_toml(path)
     _check_version(root)
     sections: dict[str, Any] = {}
-    stated: Collection[str] = ()
     for name, (build, keys) in _SECTIONS.items():
         section = root.section(name)
         if section is None:
@@ -355,7 +354,6 @@ def load_vehicle(path: str | Path) -> Vehicle:
         values = {key.field: value for key in keys if (value := _value(section, key)) is not None}
         if name == "driveline":
             _alternative_gearings(section, values)
-            stated = set(values)
         elif name == "road_load":
             _alternative_drag(section, values)
         elif name == "provenance":
@@ -369,7 +367,7 @@ def load_vehicle(path: str | Path) -> Vehicle:
     section.done()
     root.done()
     vehicle: Vehicle = _built(Vehicle, section, {**values, **sections})
-    return _with_usual_inertias(vehicle, stated)
+    return vehicle
 
 
 def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
@@ -391,15 +389,6 @@ def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
         found.append(_built(WitnessRelation, section, values))
     every.done()
     return tuple(found)
-
-
-def _with_usual_inertias(vehicle: Vehicle, stated: Collection[str]) -> Vehicle:
-    """Give the inertias that a file leaves out those of its class."""
-    line = vehicle.driveline
-    mean, _ = vehicle.of_class.road_prior(single_speed=line.single_speed)
-    engine = line.engine_inertia if "engine_inertia" in stated else float(mean[2])
-    wheels = line.wheel_inertia if "wheel_inertia" in stated else float(mean[3])
-    return replace(vehicle, driveline=replace(line, engine_inertia=engine, wheel_inertia=wheels))
 
 
 def save_vehicle(

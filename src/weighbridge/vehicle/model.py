@@ -11,6 +11,7 @@ from typing import Final, Literal
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
 from weighbridge.vehicle.fits import FITS, Fit
+from weighbridge.vehicle.road import Road, known_value
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.visible import visible
 
@@ -65,8 +66,8 @@ class Driveline:
         per distance travelled; one value for a single-speed vehicle [1/m]
     gearing_stds : standard deviations of the gearings, same length or empty [1/m]
     engine_inertia, engine_inertia_std : all that turns with the engine or motor
-        and its standard deviation [kg m^2]; None where it was not fitted
-    wheel_inertia, wheel_inertia_std : all wheels and what turns with them [kg m^2]
+        and its standard deviation [kg m^2]; None where it is not stated, see `Vehicle.road`
+    wheel_inertia, wheel_inertia_std : all wheels and what turns with them [kg m^2], likewise
     wheel_radius : effective rolling radius [m]
     layout : how the engine of a car or van lies, "transverse" or "longitudinal"; None where
         it is not known
@@ -80,9 +81,9 @@ class Driveline:
 
     gearings: tuple[float, ...] = ()
     gearing_stds: tuple[float, ...] = ()
-    engine_inertia: float = 0.15
+    engine_inertia: float | None = None
     engine_inertia_std: float | None = None
-    wheel_inertia: float = 6.0
+    wheel_inertia: float | None = None
     wheel_inertia_std: float | None = None
     wheel_radius: float = 0.31
     layout: Layout | None = None
@@ -220,26 +221,26 @@ class RoadLoad:
 
     Attributes
     ----------
-    drag_area : drag coefficient times frontal area C_d A [m^2]
-    rolling_coefficient : rolling resistance coefficient C_r [-]; at standstill
+    drag_area : drag coefficient times frontal area C_d A [m^2]; None where it is not stated, see
+        `Vehicle.road`
+    rolling_coefficient : rolling resistance coefficient C_r [-], likewise; at standstill
         where it grows with speed
     rolling_speed_coefficient : its growth with speed [s/m]
-    drag_area_std, rolling_coefficient_std : their standard deviations
+    drag_area_std, rolling_coefficient_std : their standard deviations; None where not stated
     """
 
-    drag_area: float = 0.70
-    rolling_coefficient: float = 0.010
+    drag_area: float | None = None
+    rolling_coefficient: float | None = None
     rolling_speed_coefficient: float = 0.0
     drag_area_std: float | None = None
     rolling_coefficient_std: float | None = None
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.drag_area < 20.0:
+        if self.drag_area is not None and not 0.0 <= self.drag_area < 20.0:
             raise ConfigError(f"drag_area must be in [0, 20) m^2, got {self.drag_area}")
-        if not 0.0 <= self.rolling_coefficient < 0.1:
-            raise ConfigError(
-                f"rolling_coefficient must be in [0, 0.1), got {self.rolling_coefficient}"
-            )
+        rolling = self.rolling_coefficient
+        if rolling is not None and not 0.0 <= rolling < 0.1:
+            raise ConfigError(f"rolling_coefficient must be in [0, 0.1), got {rolling}")
         if not 0.0 <= self.rolling_speed_coefficient < 0.002:
             raise ConfigError(
                 "rolling_speed_coefficient must be in [0, 0.002) s/m, "
@@ -657,6 +658,25 @@ class Vehicle:
     def of_class(self) -> VehicleClass:
         """What vehicles of its class have in common."""
         return VEHICLE_CLASSES[self.kind]
+
+    @property
+    def road(self) -> Road:
+        """Road load and inertias it is weighed with: as stated, else as usual for its class."""
+        line, load = self.driveline, self.road_load
+        stated = (
+            (load.drag_area, load.drag_area_std),
+            (load.rolling_coefficient, load.rolling_coefficient_std),
+            (line.engine_inertia, line.engine_inertia_std),
+            (line.wheel_inertia, line.wheel_inertia_std),
+        )
+        mean, std = self.of_class.road_prior(single_speed=line.single_speed)
+        calibrated = self.provenance.mass_scale_std is not None
+        return Road(
+            *(
+                known_value(*said, (float(m), float(s)), calibrated=calibrated)
+                for said, m, s in zip(stated, mean, std, strict=True)
+            )
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> Vehicle:

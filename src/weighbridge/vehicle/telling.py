@@ -16,6 +16,7 @@ from weighbridge.constants import (
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std, wheel_efficiency
 from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.road import Origin, Value
 from weighbridge.vehicle.torque import parameters, rows_of, source_of
 
 _MOTIONS: Final = {
@@ -124,19 +125,18 @@ def _torque(vehicle: Vehicle) -> str:
     return text
 
 
-def _plus_minus(value: float, std: float | None, digits: int) -> str:
-    return f"{value:.{digits}f}" + (f" ± {std:.{digits}f}" if std else "")
+def _plus_minus(known: Value, digits: int) -> str:
+    text = f"{known.value:.{digits}f}" + (f" ± {known.std:.{digits}f}" if known.std else "")
+    return f"{text} (usual for its class)" if known.origin is Origin.CLASS else text
 
 
 def _road(vehicle: Vehicle) -> str:
-    load = vehicle.road_load
+    drag_area, rolling = vehicle.road.drag_area, vehicle.road.rolling_coefficient
     density = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)
-    drag = 0.5 * density * load.drag_area * _CRUISE**2
-    area = _plus_minus(load.drag_area, load.drag_area_std, 2)
-    rolling = _plus_minus(load.rolling_coefficient, load.rolling_coefficient_std, 4)
-    text = f"C_d A {area} m², C_r {rolling}"
+    drag = 0.5 * density * drag_area.value * _CRUISE**2
+    text = f"C_d A {_plus_minus(drag_area, 2)} m², C_r {_plus_minus(rolling, 4)}"
     if vehicle.tare is not None:
-        force = drag + load.rolling_coefficient * vehicle.tare * GRAVITY
+        force = drag + rolling.value * vehicle.tare * GRAVITY
         text += f"; empty at 100 km/h on the flat {force * _CRUISE / 1000.0:.0f} kW"
     return text
 
