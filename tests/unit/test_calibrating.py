@@ -224,9 +224,18 @@ def test_rolling_resistance_of_a_single_gear_is_not_fitted(electric):
     )
     found = calibrate(electric, vehicle=base, settings=CalibrationSettings(method="rls"))
     assert found.road_load.rolling_coefficient == pytest.approx(
-        base.road_load.rolling_coefficient, rel=1e-3
+        base.road.rolling_coefficient.value, rel=1e-3
     )
     assert found.driveline.engine_inertia_std is None
+
+
+@pytest.mark.parametrize("method", ["joint", "rls"])
+def test_an_inertia_stated_counts_though_engines_of_cars_have_it(electric, method):
+    gearings = make_scenario("electric").car.gearings
+    known = Vehicle(driveline=Driveline(gearings=gearings, engine_inertia=0.15))
+    found = calibrate(electric, vehicle=known, settings=CalibrationSettings(method=method))
+    # One gear tells nothing of it, so that it stays what was stated, within its class.
+    assert found.driveline.engine_inertia == pytest.approx(0.15, abs=0.02)
 
 
 def test_joint_calibration_weighs_its_own_drive(empty):

@@ -398,9 +398,6 @@ def _draft(
             gearings=tuple(float(g) for g in gears.gearings),
             gearing_stds=tuple(float(g) for g in gears.stds),
         )
-    if driveline.single_speed and driveline.engine_inertia == Driveline().engine_inertia:
-        mean, _ = base.of_class.road_prior(single_speed=True)
-        driveline = replace(driveline, engine_inertia=float(mean[2]))
     model = TorqueModel(
         source="measured" if source.needs_map else source.name,
         reference_torque=base.torque.reference_torque,
@@ -423,10 +420,11 @@ def _bounds(base: Vehicle, driveline: Driveline) -> tuple[Floats, Floats]:
     if driveline.single_speed:
         # One gear cannot tell the inertias from the mass, nor rolling resistance from an
         # offset of the torque.
+        road = replace(base, driveline=driveline).road
         low[1:] = high[1:] = (
-            base.road_load.rolling_coefficient,
-            driveline.engine_inertia,
-            driveline.wheel_inertia,
+            road.rolling_coefficient.value,
+            road.engine_inertia.value,
+            road.wheel_inertia.value,
         )
     return low, high
 

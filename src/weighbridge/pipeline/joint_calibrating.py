@@ -206,12 +206,12 @@ def noted(vehicle: Vehicle, note: str) -> Vehicle:
 def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
     """Road load and inertias of the class, and what the given vehicle file says of them."""
     mean, std = vehicle.of_class.road_prior(single_speed=vehicle.driveline.single_speed)
-    usual = Driveline()
-    for k, name in ((2, "engine_inertia"), (3, "wheel_inertia")):
-        given, given_std = getattr(known, name), getattr(known, f"{name}_std")
-        if given_std is not None or given not in (getattr(usual, name), float(mean[k])):
-            mean[k] = given
-            std[k] = given_std if given_std is not None else 0.15 * given
+    for k, given, given_std in (
+        (2, known.engine_inertia, known.engine_inertia_std),
+        (3, known.wheel_inertia, known.wheel_inertia_std),
+    ):
+        mean[k] = mean[k] if given is None else given
+        std[k] = std[k] if given_std is None else given_std
     return mean, std
 
 
