@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -181,11 +182,31 @@ def test_method_and_serious_problems_are_refused():
         weigh(stuck, CAR)
 
 
-def test_a_vehicle_that_was_not_calibrated_is_told():
+def geared():
     turning = 10.0 * (15.0 + 3.0 * np.sin(0.2 * STAMPS))
-    recorded = drive(torque=weighable(), engine_speed=turning).with_signals(
+    return drive(torque=weighable(), engine_speed=turning).with_signals(
         Signal("vehicle_speed", STAMPS, turning / 10.0)
     )
+
+
+@pytest.mark.parametrize("method", ["joint", "rls", "robust-rls"])
+def test_the_spread_that_a_warning_quotes_is_in_the_interval(method):
+    recorded, found = geared(), []
+    for scale in (0.0, 0.08):
+        car = replace(CAR, torque=replace(CAR.torque, scale_std=scale))
+        w = weigh(recorded, car, method)
+        [said] = [text for text in w.warnings if "not made by a calibration" in text]
+        quoted = re.search(r"([\d.]+) % of the mass", said)
+        found.append((float(quoted[1]), 100.0 * w.std / w.mass))
+    (low, exact), (high, open_) = found
+    assert low < exact
+    assert high < open_
+    assert high**2 - low**2 == pytest.approx(8.0**2, rel=0.02)
+    assert open_**2 - exact**2 == pytest.approx(8.0**2, rel=0.02)
+
+
+def test_a_vehicle_that_was_not_calibrated_is_told():
+    recorded = geared()
     found = weigh(recorded, CAR)
     assert any("not made by a calibration" in w for w in found.warnings)
     assert found.mass == pytest.approx(MASS, rel=0.05)

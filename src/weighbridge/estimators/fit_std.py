@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.signal import lfilter
@@ -137,6 +137,23 @@ def honest_std(scatter: float, blocks: int, slow: float, left: float) -> tuple[f
     return std, freedom * (std / scatter) ** 4
 
 
+class Judged(NamedTuple):
+    """How sure a fit is, and whether it carries a mass.
+
+    Attributes
+    ----------
+    std, degrees_of_freedom : as of `honest_std`
+    left : part of ``std`` that vehicle file and equipment leave, whatever the drive [kg]
+    status, why : as of `weighbridge.estimators.judging.judge`
+    """
+
+    std: float
+    degrees_of_freedom: float
+    left: float
+    status: Status
+    why: str
+
+
 def judged(
     balance: ForceBalance,
     vehicle: Vehicle,
@@ -144,7 +161,7 @@ def judged(
     phi: Floats,
     fitted: Fitted,
     slow: float,
-) -> tuple[float, float, Status, str]:
+) -> Judged:
     """Find how sure a fit of a published method is, and whether it carries a mass.
 
     Parameters
@@ -154,11 +171,6 @@ def judged(
     phi : (n,) regressor of the mass [m/s^2]
     fitted
     slow : `weighbridge.estimators.judging.consider_std` [-]
-
-    Returns
-    -------
-    std, degrees_of_freedom : as of `honest_std`
-    status, why : as of `weighbridge.estimators.judging.judge`
     """
     passing, lasting = slow_std(balance, vehicle, fitted.index, fitted.influence, fitted.mass)
     left = float(np.hypot(fitted.mass * slow, lasting))
@@ -173,7 +185,7 @@ def judged(
         left=left,
         degrees_of_freedom=freedom,
     )
-    return std, freedom, *judge(evidence, vehicle)
+    return Judged(std, freedom, left, *judge(evidence, vehicle))
 
 
 def _known_road_load(vehicle: Vehicle) -> Vehicle:

@@ -305,6 +305,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
         reason=reason,
         mass=mass,
         std=std,
+        left_std=mass * left,
         degrees_of_freedom=float("inf"),
         bound_std=bound,
         sensitivity=moved,

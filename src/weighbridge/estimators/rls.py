@@ -115,7 +115,7 @@ def estimate(
         index=np.flatnonzero(used),
         influence=phi[used] / np.sum(phi[used] ** 2),
     )
-    std, freedom, status, why = judged(balance, vehicle, used, phi, fitted, slow)
+    found = judged(balance, vehicle, used, phi, fitted, slow)
     residual = np.where(used, y - phi * mass, np.nan)
     # Before the first row there is a start value, but no measurement.
     running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)
@@ -131,12 +131,13 @@ def estimate(
         residual=residual,
         reason=reason,
         mass=mass,
-        std=std,
-        degrees_of_freedom=freedom,
+        std=found.std,
+        left_std=found.left,
+        degrees_of_freedom=found.degrees_of_freedom,
         bound_std=_bound(phi, residual, used),
         converged_at=converged_at(view.time, running, mass, used),
-        status=status,
-        why=why,
+        status=found.status,
+        why=found.why,
         segments=segments(balance, vehicle, phi, used, part),
     )
 

@@ -329,7 +329,7 @@ def finish(
     # What holds an offset of the force knows it; a filter without one takes it for mass.
     influence = fit.influence if final is None else fit.phi / np.sum(fit.phi**2)
     weighed = Fitted(mass=mass, scatter=scatter, blocks=blocks, index=index, influence=influence)
-    std, freedom, status, why = judged(balance, vehicle, used, phi, weighed, slow)
+    found = judged(balance, vehicle, used, phi, weighed, slow)
     # A running mass that forgets is that of a stretch of time.
     passing = np.hypot(slow, UNMODELLED_STD)
 
@@ -346,11 +346,12 @@ def finish(
         residual=np.where(used, y - phi * mass, np.nan),
         reason=reason,
         mass=mass,
-        std=std,
-        degrees_of_freedom=freedom,
+        std=found.std,
+        left_std=found.left,
+        degrees_of_freedom=found.degrees_of_freedom,
         bound_std=fit.bound,
         converged_at=converged_at(view.time, running, mass, used),
-        status=status,
-        why=why,
+        status=found.status,
+        why=found.why,
         segments=segments(balance, vehicle, phi, used, part),
     )

@@ -206,6 +206,7 @@ def estimate(
         reason=view.reason,
         mass=mass,
         std=std,
+        left_std=model.scale_std * mass,
         degrees_of_freedom=float("inf"),
         bound_std=bound,
         converged_at=converged_at(view.time, running, mass, used),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -82,6 +83,8 @@ class MassTrack:
         NaN where a row was not used
     reason : (n,) `Reason` why a row was not used
     mass, std : final answer and its standard deviation [kg]
+    left_std : part of ``std`` that vehicle file and equipment leave, whatever the drive [kg]; NaN
+        where a method does not say
     degrees_of_freedom : behind ``std``, for the interval; infinite if known
     bound_std : Cramér-Rao bound of this drive [kg]
     converged_at : when the running mass stays within 5 % of the final answer
@@ -108,6 +111,7 @@ class MassTrack:
     status: Status
     why: str
     segments: tuple[Segment, ...]
+    left_std: float = math.nan
     sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
     filtered: FilterInput | None = None

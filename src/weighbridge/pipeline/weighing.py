@@ -21,7 +21,7 @@ from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status, joint
 from weighbridge.estimators.changing import largest
 from weighbridge.estimators.foreign import of_another
-from weighbridge.estimators.judging import lacks_accelerometer, uncalibrated_std
+from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
@@ -341,6 +341,8 @@ def weigh_balance(
     """
     estimator = ESTIMATORS[method]
     result = estimator.track(balance, vehicle)
+    if not estimator.speed_alone:
+        warnings += uncalibrated(vehicle, result)
     status, reason = result.status, result.why
     share = None if estimator.speed_alone else share_on_gears(balance, vehicle)
     if share is not None and share < ENOUGH:
@@ -429,20 +431,27 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
                 f"torque is {_later(later)} against the motion than in the calibration; "
                 "its clock was moved by that",
             )
-    if vehicle.provenance.mass_scale_std is None:
-        fit = vehicle.provenance.fit
-        made = "not made by a calibration"
-        if fit is not None and not fit.torque:
-            made = f"calibrated for {fit.name} alone"
-        notes += (
-            f"the vehicle file of {vehicle.name} was {made}: for errors of its torque, rolling "
-            f"radius and efficiency (taken as {wheel_efficiency(vehicle):.2f}) and, where the "
-            "drive does not show it, the lean of the body "
-            f"{100.0 * uncalibrated_std(vehicle, motion):.1f} % of the mass, "
-            "as standard deviation, are in the interval",
-        )
     balance = force_balance(drive, vehicle, motion, delay=delay)
     return balance, notes + other_equipment(vehicle, motion) + balance.notes
+
+
+def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
+    """Say what a file that no calibration made leaves open in the interval; nothing if one did."""
+    if vehicle.provenance.mass_scale_std is not None:
+        return ()
+    fit = vehicle.provenance.fit
+    made = "not made by a calibration"
+    if fit is not None and not fit.torque:
+        made = f"calibrated for {fit.name} alone"
+    text = f"the vehicle file of {vehicle.name} was {made}"
+    if not (math.isfinite(result.left_std) and result.mass > 0.0):
+        return (text,)
+    return (
+        f"{text}: for errors of its torque, rolling radius, efficiency (taken as "
+        f"{wheel_efficiency(vehicle):.2f}) and inertias, and of the equipment, such as the lean of "
+        f"the body, {100.0 * result.left_std / result.mass:.1f} % of the mass, as standard "
+        "deviation, are in the interval",
+    )
 
 
 def other_equipment(vehicle: Vehicle, motion: Motion) -> tuple[str, ...]:
