@@ -24,6 +24,7 @@ import weighbridge as wb
 from weighbridge.balance import force_balance
 from weighbridge.balance.averaging import windows
 from weighbridge.balance.delay import estimate_torque_delay
+from weighbridge.balance.law import force_on_mass
 from weighbridge.estimators import joint
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.slow_errors import design, prior_std
@@ -233,7 +234,7 @@ def bmw_regressions() -> str:
         view, motion = balance.merged, balance.motion
         rate = np.gradient(motion.speed, motion.time)
         rolled = np.interp(view.time, motion.time, rate)
-        force = view.traction_force - view.drag_force - view.rotating_mass * view.accel
+        force = force_on_mass(view, car)
         known = view.usable & np.isfinite(force) & np.isfinite(view.specific_force)
         for kind in kinds:
             driven = np.sign(view.traction_force)
@@ -357,7 +358,7 @@ def j1939_truck() -> str:
     w = wb.weigh(wb.read_drive(path), car)
     view = w.result.balance.merged
     rows = view.usable
-    force = (view.traction_force - view.drag_force - view.rotating_mass * view.accel)[rows]
+    force = force_on_mass(view, car)[rows]
     design = np.column_stack([view.accel[rows], np.ones(force.size)])
     fit = np.linalg.lstsq(design, force, rcond=None)[0]
     # Six stretches of the log, each left out in turn: their spread is what the grade may do.

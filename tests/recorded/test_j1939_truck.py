@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import weighbridge as wb
+from weighbridge.balance.law import force_on_mass
 from weighbridge.errors import DriveError
 from weighbridge.io.candump import read_candump
 from weighbridge.io.frames import Frames
@@ -109,7 +110,7 @@ def test_the_force_grows_with_acceleration_as_with_a_truck_of_some_tonnes(truck)
     car = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
     view = wb.weigh(wb.read_drive(truck), car, "rls").result.balance.merged
     rows = view.usable
-    force = (view.traction_force - view.drag_force - view.rotating_mass * view.accel)[rows]
+    force = force_on_mass(view, car)[rows]
     design = np.column_stack([view.accel[rows], np.ones(force.size)])
     (mass, rest), *_ = np.linalg.lstsq(design, force, rcond=None)
     assert 4000.0 < mass < 12000.0

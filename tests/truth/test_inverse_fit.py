@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.calibration.inverse import (
     DriveRows,
     FitSettings,
@@ -46,10 +46,10 @@ def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, grade_open=0.008
     force = (mass + rotating) * accel + mass * 9.80665 * ROLLING + 0.6 * DRAG_AREA * speed**2
     load = (force / gearing - OFFSET) / full(engine) + rng.normal(0.0, 0.03, n)
     view = MergedView(
-        time=time, traction_force=force, speed=speed, accel=found, specific_force=found, grade=zero,
+        time=time, traction_force=force, force_std=zero, torque=force / gearing,
+        engine_speed=engine, speed=speed, accel=found, specific_force=found, grade=zero,
         pitch=zero, heading=zero, gear=np.ones(n, dtype=np.int64), gearing=gearing,
-        rotating_mass=rotating, air_speed=speed, drag_force=0.6 * DRAG_AREA * speed**2,
-        air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
+        air_speed=speed, air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
     )  # fmt: skip
     motion = SimpleNamespace(
         source="speed", specific_force_std=motion_noise, grade_open=grade_open,
@@ -135,10 +135,10 @@ def gusty(rng, mass):
     force = power / speed
     zero, one = np.zeros(n), np.ones(n)
     view = MergedView(
-        time=time, traction_force=force, speed=speed, accel=accel, specific_force=accel, grade=zero,
+        time=time, traction_force=force, force_std=zero, torque=force / gearing,
+        engine_speed=gearing * speed, speed=speed, accel=accel, specific_force=accel, grade=zero,
         pitch=zero, heading=zero, gear=np.ones(n, dtype=np.int64), gearing=gearing * one,
-        rotating_mass=zero, air_speed=speed, drag_force=0.6 * TRUCK_AREA * speed**2,
-        air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
+        air_speed=speed, air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
     )  # fmt: skip
     motion = SimpleNamespace(
         source="inertial", specific_force_std=0.01, grade_open=0.0, mean_accel_std=lambda _: 0.0

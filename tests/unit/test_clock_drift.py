@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import weighbridge as wb
-from weighbridge.balance.force_balance import smoothed
+from weighbridge.balance.instants import smoothed
 from weighbridge.checks import settle_drive
 from weighbridge.errors import DriveError
 from weighbridge.navigation.clock_drift import mend_clocks

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.balance import Reason
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.confounded import inertia_relative_std
 from weighbridge.estimators.judging import LEAN_STD, uncalibrated_std
@@ -123,14 +123,14 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
     line = vehicle.driveline
     gearing, accel, speed = rng.choice(GEARS, n), rng.normal(0, 1, n), rng.uniform(5, 20, n)
 
-    def view(offset, growth, engine, wheels):
+    def view(offset, growth):
         torque = 100.0 - offset - growth * gearing * speed / 200.0
-        rotating = (line.wheel_inertia - wheels) / 0.3**2 + (
-            line.engine_inertia - engine
-        ) * gearing**2
         return MergedView(
             time=np.arange(float(n)),
             traction_force=torque * gearing,
+            force_std=np.ones(n),
+            torque=torque,
+            engine_speed=gearing * speed,
             speed=speed,
             accel=accel,
             specific_force=accel,
@@ -139,19 +139,25 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
             heading=np.zeros(n),
             gear=np.ones(n, dtype=np.int64),
             gearing=gearing,
-            rotating_mass=rotating,
             air_speed=speed,
-            drag_force=np.zeros(n),
             air_density=np.full(n, 1.2),
             fuel_burnt=np.zeros(n),
             reason=np.full(n, Reason.USED, dtype=np.uint8),
         )
 
-    rows, right = design(view(0.0, 0.0, 0.0, 0.0), vehicle)
+    rows, right = design(view(0.0, 0.0), vehicle)
     assert rows.shape[1] == len(NAMES) + len(DATA_SHEET_NAMES)
     assert prior_std(vehicle, 1500.0, 200.0).size == rows.shape[1]
     errors = np.array([3.0, 2.0, 0.05, 0.5])
-    _, wrong = design(view(*errors), vehicle)
+    lighter = replace(
+        vehicle,
+        driveline=replace(
+            line,
+            engine_inertia=line.engine_inertia - errors[2],
+            wheel_inertia=line.wheel_inertia - errors[3],
+        ),
+    )
+    _, wrong = design(view(*errors[:2]), lighter)
     k = len(NAMES)
     made = rows[:, k : k + 2] @ -errors[:2] + rows[:, k + 2 :] @ errors[2:]
     assert_allclose(wrong - right, made, atol=1e-9)

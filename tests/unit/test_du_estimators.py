@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, ekf, hybrid, robust_rls
 from weighbridge.kernels import mass_ekf as kernel
@@ -18,7 +18,15 @@ METHODS = ("robust-rls", "ekf", "hybrid")
 BUS = Vehicle(
     kind="bus",
     tare=7000.0,
-    driveline=Driveline(gearings=(10.0,)),
+    # Rotating parts that act like 300 kg, known to some 30 kg.
+    driveline=Driveline(
+        gearings=(10.0,),
+        wheel_radius=0.5,
+        wheel_inertia=75.0,
+        wheel_inertia_std=4.0,
+        engine_inertia=0.0,
+        engine_inertia_std=0.25,
+    ),
     torque=TorqueModel(source="measured"),
     road_load=RoadLoad(drag_area=5.4, rolling_coefficient=0.0075, rolling_speed_coefficient=4e-5),
     provenance=Provenance(mass_scale_std=0.01),
@@ -44,6 +52,9 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
     view = MergedView(
         time=time,
         traction_force=force + rng.normal(0.0, 200.0, n),
+        force_std=np.full(n, 200.0),
+        torque=force / 10.0,
+        engine_speed=10.0 * speed,
         speed=speed + rng.normal(0.0, 0.01, n),
         accel=accel,
         specific_force=accel + 9.81 * np.sin(slope) + offset + noise,
@@ -52,15 +63,13 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
         heading=np.zeros(n),
         gear=np.ones(n, dtype=np.int64),
         gearing=np.full(n, 10.0),
-        rotating_mass=rotating,
         air_speed=speed,
-        drag_force=drag,
         air_density=np.full(n, 1.2),
         fuel_burnt=np.zeros(n),
         reason=reason,
     )
     motion = SimpleNamespace(source="inertial", grade_open=0.0)
-    return ForceBalance(force=None, motion=motion, merged=view)
+    return ForceBalance(motion=motion, merged=view)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -9,7 +9,7 @@ import pytest
 import weighbridge as wb
 from weighbridge.balance import ForceBalance, Reason, force_balance
 from weighbridge.balance.cornering import HARD_CORNERING, cornering, lateral_acceleration
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.estimators import ESTIMATORS, Status, fit_std, foreign, judging
 from weighbridge.estimators.fit_std import honest_std, slow_std
 from weighbridge.pipeline.weighing import weigh_balance
@@ -21,7 +21,15 @@ MASS = 10_000.0
 BUS = Vehicle(
     kind="bus",
     tare=8000.0,
-    driveline=Driveline(gearings=(10.0,)),
+    # Rotating parts that act like 300 kg, known to some 30 kg.
+    driveline=Driveline(
+        gearings=(10.0,),
+        wheel_radius=0.5,
+        wheel_inertia=75.0,
+        wheel_inertia_std=4.0,
+        engine_inertia=0.0,
+        engine_inertia_std=0.25,
+    ),
     torque=TorqueModel(source="measured"),
     road_load=RoadLoad(drag_area=5.4, rolling_coefficient=0.0075),
     provenance=Provenance(mass_scale_std=0.01),
@@ -43,6 +51,9 @@ def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
     view = MergedView(
         time=time,
         traction_force=force + rng.normal(0.0, 100.0, n),
+        force_std=np.full(n, 0.03 * np.percentile(np.abs(force), 98.0)),
+        torque=force / 10.0,
+        engine_speed=10.0 * speed,
         speed=speed,
         accel=accel,
         specific_force=accel + rng.normal(0.0, 0.02, n),
@@ -51,14 +62,11 @@ def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
         heading=np.zeros(n),
         gear=np.ones(n, dtype=np.int64),
         gearing=np.full(n, 10.0),
-        rotating_mass=rotating,
         air_speed=speed,
-        drag_force=drag,
         air_density=np.full(n, 1.2),
         fuel_burnt=np.zeros(n),
         reason=np.zeros(n, dtype=np.uint8),
     )
-    side = SimpleNamespace(torque=force / 10.0, engine_speed=10.0 * speed)
     motion = SimpleNamespace(
         source="inertial",
         squat=0.003,
@@ -68,7 +76,7 @@ def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
         specific_force_scale_std=0.0,
         mean_accel_std=lambda _: 0.0,
     )
-    return ForceBalance(force=side, motion=motion, merged=view)
+    return ForceBalance(motion=motion, merged=view)
 
 
 @pytest.fixture(scope="module")

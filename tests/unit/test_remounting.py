@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from weighbridge.balance import force_balance
+from weighbridge.balance.law import drag_force
 from weighbridge.calibration.regression import build_rows
 from weighbridge.navigation.aiding import read_imu
 from weighbridge.navigation.inertial import inertial_motion
@@ -81,11 +82,11 @@ def test_calibration_sees_the_reported_wind(made):
     for speed in (0.0, 10.0):
         told = replace(drive, info=replace(drive.info, wind_speed=speed, wind_from=3.0))
         balance = force_balance(told, car, motion)
-        rows = balance.merged.usable & np.isfinite(balance.force.engine_speed)
+        rows = balance.merged.usable & np.isfinite(balance.merged.engine_speed)
         made_rows = build_rows(
             balance.merged,
             drive.signals["engine_load"].values,
-            balance.force.engine_speed,
+            balance.merged.engine_speed,
             mass=1580.0,
             wheel_radius=0.319,
             order=1,
@@ -93,7 +94,7 @@ def test_calibration_sees_the_reported_wind(made):
             rows=rows,
         )
         columns.append(made_rows.design[:, -4])
-        drag = balance.merged.drag_force[rows] / balance.merged.gearing[rows]
-        assert made_rows.design[:, -4] * car.road_load.drag_area == pytest.approx(-drag)
+        drag = drag_force(balance.merged, car)[rows] / balance.merged.gearing[rows]
+        assert made_rows.design[:, -4] * car.road.drag_area.value == pytest.approx(-drag)
     calm, windy = columns
     assert abs(calm.mean() - windy.mean()) > 0.05 * abs(calm.mean())

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from weighbridge.balance import ForceBalance, ForceSide, MergedView, Reason
+from weighbridge.balance import ForceBalance, MergedView, Reason
 from weighbridge.calibration.regression import build_rows, fit
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import MassTrack, Segment, Status
@@ -110,6 +110,9 @@ def make_weighing(
     merged = MergedView(
         time=time,
         traction_force=traction,
+        force_std=np.full(n, 60.0),
+        torque=traction / gearing,
+        engine_speed=gearing * speed,
         speed=speed,
         accel=accel,
         specific_force=motion.specific_force,
@@ -118,27 +121,14 @@ def make_weighing(
         heading=nowhere,
         gear=gear,
         gearing=gearing,
-        rotating_mass=rotating,
         air_speed=speed,
-        drag_force=drag,
         air_density=np.full(n, 1.2),
         fuel_burnt=np.zeros(n),
         reason=reason,
     )
-    force = ForceSide(
-        time=time,
-        traction_force=traction,
-        torque=traction / gearing,
-        engine_speed=gearing * speed,
-        gear=gear,
-        gearing=gearing,
-        reason=reason,
-        delay=0.0,
-        noise_std=60.0,
-    )
     result = MassTrack(
         method="rls",
-        balance=ForceBalance(force=force, motion=motion, merged=merged),
+        balance=ForceBalance(motion=motion, merged=merged),
         running_mass=MASS + 300.0 * np.exp(-(time - 50.0) / 100.0),
         running_std=np.full(n, 12.0),
         residual=np.where(reason == Reason.USED, noise, np.nan),
@@ -171,12 +161,12 @@ def make_calibration(weighing):
     view = balance.merged
     rng = np.random.default_rng(4)
     # 210 Nm at full load, less friction that grows with speed.
-    torque = balance.force.torque + rng.normal(scale=2.0, size=view.time.size)
-    load = (torque + 10.0 + 0.02 * balance.force.engine_speed) / 210.0
+    torque = balance.merged.torque + rng.normal(scale=2.0, size=view.time.size)
+    load = (torque + 10.0 + 0.02 * balance.merged.engine_speed) / 210.0
     rows = build_rows(
         view,
         load,
-        balance.force.engine_speed,
+        balance.merged.engine_speed,
         mass=MASS,
         wheel_radius=VEHICLE.driveline.wheel_radius,
         order=1,
@@ -185,7 +175,7 @@ def make_calibration(weighing):
     )
     return Calibration(
         vehicle=VEHICLE,
-        gears=detect_gearings(view.time, balance.force.engine_speed, view.speed, idle_speed=0.0),
+        gears=detect_gearings(view.time, balance.merged.engine_speed, view.speed, idle_speed=0.0),
         balances=(balance,),
         fit=fit(rows, *VEHICLE_CLASSES["car"].road_bounds),
         rows=rows,
@@ -392,11 +382,11 @@ def test_calibration_shows_the_gears_found(tmp_path):
 
 def test_calibration_without_gears_or_engine_speed_leaves_sentences(tmp_path):
     calibration = make_calibration(make_weighing())
-    view, force = calibration.balances[0].merged, calibration.balances[0].force
+    view = calibration.balances[0].merged
     rows = build_rows(
         view,
-        force.torque,
-        force.engine_speed,
+        view.torque,
+        view.engine_speed,
         mass=MASS,
         wheel_radius=VEHICLE.driveline.wheel_radius,
         order=0,

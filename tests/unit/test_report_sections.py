@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.unit.test_report import GEARINGS, VEHICLE, Elements, figures, make_weighing, numbers
 from tests.unit.test_weighing import weighing as weighed_by_rls
 
-from weighbridge.balance import ForceBalance, ForceSide, MergedView, Reason
+from weighbridge.balance import ForceBalance, MergedView, Reason
 from weighbridge.balance.force_balance import WIND_AT_VEHICLE
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, joint
@@ -95,6 +95,9 @@ def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0
     merged = MergedView(
         time=time,
         traction_force=traction,
+        force_std=np.full(n, 40.0),
+        torque=traction / gearing,
+        engine_speed=gearing * speed,
         speed=speed,
         accel=accel,
         specific_force=specific,
@@ -103,25 +106,12 @@ def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0
         heading=heading,
         gear=gear,
         gearing=gearing,
-        rotating_mass=rotating,
         air_speed=against(reported),
-        drag_force=drag(reported),
         air_density=np.full(n, 1.2),
         fuel_burnt=np.zeros(n),
         reason=reason,
     )
-    force = ForceSide(
-        time=time,
-        traction_force=traction,
-        torque=traction / gearing,
-        engine_speed=gearing * speed,
-        gear=gear,
-        gearing=gearing,
-        reason=reason,
-        delay=0.0,
-        noise_std=40.0,
-    )
-    track = joint.estimate(ForceBalance(force=force, motion=motion, merged=merged), CAR)
+    track = joint.estimate(ForceBalance(motion=motion, merged=merged), CAR)
     told = np.hypot(*reported) / WIND_AT_VEHICLE
     info = DriveInfo(wind_speed=told or None, wind_from=np.arctan2(reported[1], reported[0]))
     drive = Drive("driven", {"vehicle_speed": Signal("vehicle_speed", time, speed)}, info=info)

@@ -1,18 +1,11 @@
 """Forces against motion: where every torque source and every motion source ends."""
 
-from weighbridge.balance.force_balance import (
-    REASON_TEXT,
-    ForceBalance,
-    ForceSide,
-    MergedView,
-    Reason,
-    force_balance,
-)
+from weighbridge.balance.force_balance import force_balance
+from weighbridge.balance.table import REASON_TEXT, ForceBalance, MergedView, Reason
 
 __all__ = [
     "REASON_TEXT",
     "ForceBalance",
-    "ForceSide",
     "MergedView",
     "Reason",
     "force_balance",

@@ -6,7 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import ForceBalance
+from weighbridge.balance.law import force_on_mass
+from weighbridge.balance.table import ForceBalance
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
 
@@ -60,7 +61,7 @@ def smoothed_torque(balance: ForceBalance, vehicle: Vehicle) -> str:
         return ""
     if not float(np.median(np.diff(view.time))) <= SLOWEST:
         return ""
-    force = view.traction_force - view.rotating_mass * view.accel - view.drag_force
+    force = force_on_mass(view, vehicle)
     use = view.usable & np.isfinite(force) & np.isfinite(view.specific_force)
     fast = _slopes(view.time, use, force, view.specific_force, FAST)
     slow = None

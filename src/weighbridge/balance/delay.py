@@ -7,7 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import MergedView, force_balance
+from weighbridge.balance.force_balance import force_balance
+from weighbridge.balance.law import force_on_mass
+from weighbridge.balance.table import MergedView
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Vehicle
@@ -186,8 +188,7 @@ def _misfit(
         rows = common & np.isfinite(view.traction_force) & np.isfinite(view.specific_force)
         if np.count_nonzero(rows) < 100:
             return float("nan")
-        force = view.traction_force - view.drag_force - view.rotating_mass * view.accel
-        return 1.0 - _correlation(force[rows], view.specific_force[rows])
+        return 1.0 - _correlation(force_on_mass(view, vehicle)[rows], view.specific_force[rows])
 
     return misfit
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import ForceBalance
+from weighbridge.balance.table import ForceBalance
 from weighbridge.signals import Floats
 from weighbridge.vehicle.gear import steady
 from weighbridge.vehicle.model import Vehicle
@@ -60,7 +60,7 @@ def held_ratios(balance: ForceBalance) -> tuple[Floats, Floats]:
     time : (n,) [s]
     ratio : (n,) of ratios in 1/m
     """
-    view, engine_speed = balance.merged, balance.force.engine_speed
+    view, engine_speed = balance.merged, balance.merged.engine_speed
     pulling = (view.speed > SLOWEST) & (view.accel > 0.0) & (engine_speed > 0.0)
     ratio = np.where(pulling, engine_speed / np.where(pulling, view.speed, 1.0), 0.0)
     held = pulling & steady(view.time, ratio, np.full(ratio.size, 0.02))

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import ForceBalance
 from weighbridge.balance.gear_fit import FEWEST, held_ratios
+from weighbridge.balance.table import ForceBalance
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import ForceBalance, ForceSide, MergedView, Reason
+from weighbridge.balance.table import ForceBalance, MergedView, Reason
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.kernels import speed_ekf as kernel
@@ -154,36 +154,23 @@ def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
         reason[(reason == 0) & flag] = why
     nowhere = np.full(speed.size, np.nan)
     accel = np.concatenate(([np.nan], np.diff(speed))) / length
-    drag = 0.5 * (model.drag + model.corrections[2] + model.corrections[3] * speed) * speed**2
-    torque = model.corrections[6] * speed
-    gear = np.zeros(speed.size, dtype=np.int64)
     return ForceBalance(
-        force=ForceSide(
-            time=time,
-            traction_force=traction,
-            torque=torque,
-            engine_speed=nowhere,
-            gear=gear,
-            gearing=nowhere,
-            reason=reason,
-            delay=0.0,
-            noise_std=math.nan,
-        ),
         motion=motion,
         merged=MergedView(
             time=time,
             traction_force=traction,
+            force_std=nowhere,
+            torque=model.corrections[6] * speed,
+            engine_speed=nowhere,
             speed=speed,
             accel=accel,
             specific_force=nowhere,
             grade=nowhere,
             pitch=nowhere,
             heading=nowhere,
-            gear=gear,
+            gear=np.zeros(speed.size, dtype=np.int64),
             gearing=nowhere,
-            rotating_mass=np.full(speed.size, model.rotating_mass),
             air_speed=speed,
-            drag_force=drag,
             air_density=nowhere,
             fuel_burnt=np.zeros(speed.size),
             reason=reason,

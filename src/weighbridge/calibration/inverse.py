@@ -13,24 +13,22 @@ from typing import Final
 import numpy as np
 from scipy.linalg import block_diag
 
+from weighbridge.balance import law
 from weighbridge.balance.averaging import WINDOW, Windows, windows
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.law import DISTURBANCE_STD
+from weighbridge.balance.table import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.estimators.joint import GATE
 from weighbridge.estimators.slow_errors import (
-    DISTURBANCE_STD,
     RESISTANCE_STD,
     TIME_CONSTANTS,
     WIND_STD,
-    coldness,
-    gustiness,
     noise_variance,
 )
 from weighbridge.kernels import disturbance as kernel
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.torque import torque_rows
 from weighbridge.vehicle.torque_sources import TorqueSource, TorqueTerms
 
 
@@ -253,31 +251,28 @@ def _torque_per_reading(drives: list[DriveRows]) -> float:
 def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
     """Columns of one drive: motion, road load, torque terms, disturbances."""
     view = d.view
-    gearing = np.nan_to_num(view.gearing)
-    north, east = view.direction
-    push = view.air_density * 0.5 * view.speed
-    # The reading itself stands on the left; the other torque terms stand here.
-    offset, _, *terms = torque_rows(
-        reading, d.engine_speed, settings.order, curved=settings.curved, knots=settings.knots
-    ).T
-    one = np.ones_like(gearing)
+    north, east = law.wind_columns(view)
     mass = d.mass - view.fuel_burnt
-    pushed, pressure = mass * view.specific_force, view.dynamic_pressure
+    pushed = mass * view.specific_force
+    road = law.road_columns(view, mass, settings.wheel_radius)
     if settings.lasting_drag:
         lasting = lasting_pressure(view)
-        pushed, pressure = pushed + settings.prior[0][0] * (pressure - lasting), lasting
+        pushed = pushed + settings.prior[0][0] * (law.drag_column(view) - lasting)
+        road[:, 0] = lasting
+    terms = law.reading_columns(
+        np.nan_to_num(view.gearing), reading, d.engine_speed,
+        order=settings.order, curved=settings.curved, knots=settings.knots,
+    )  # fmt: skip
     columns = [
         pushed,
-        pressure,
-        mass * GRAVITY * np.cos(view.grade),
-        gearing**2 * view.accel,
-        view.accel / settings.wheel_radius**2,
-        *(-gearing * term for term in (offset, *terms)),
-        gustiness(view, d.motion.grade_open),
-        one,
-        push * north,
-        push * east,
-        gearing * coldness(view),
+        *road.T,
+        # The reading itself stands on the left; the other torque terms stand here.
+        *-np.delete(terms, 1, axis=1).T,
+        law.gust_column(view, d.motion.grade_open),
+        law.resistance_column(view),
+        north,
+        east,
+        law.cold_torque_column(view),
     ]
     return np.asarray(np.nan_to_num(np.column_stack(columns)))
 
@@ -303,9 +298,8 @@ def _solve(
         clock = float(times[-1][-1]) + 1e5
         rows.append(cut.mean(columns))
         targets.append(cut.mean(scale * gearing * np.nan_to_num(d.regressor)))
-        variances.append(
-            noise_variance(d.view, cut, settings.torque_noise, mass, d.motion, settings.window)
-        )
+        noisy = replace(d.view, force_std=settings.torque_noise * gearing)
+        variances.append(noise_variance(noisy, cut, mass, d.motion, settings.window))
         parts.append(columns)
     stacked = np.ascontiguousarray(np.vstack(rows))
     extra = _extra(settings)
@@ -320,8 +314,8 @@ def _solve(
         [
             mass * float(np.hypot(DISTURBANCE_STD, grade)),
             mass * RESISTANCE_STD,
-            WIND_STD * 2 * mean[0],
-            WIND_STD * 2 * mean[0],
+            WIND_STD * mean[0],
+            WIND_STD * mean[0],
             settings.source.cold_torque_std * torque,
         ]
     )

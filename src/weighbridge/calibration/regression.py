@@ -8,14 +8,10 @@ from typing import Final
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from weighbridge.balance.force_balance import MergedView
-from weighbridge.constants import GRAVITY
+from weighbridge.balance.law import ROAD_PARAMETERS, reading_columns, road_columns
+from weighbridge.balance.table import MergedView
 from weighbridge.errors import DriveError
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.torque import torque_rows
-
-ROAD_PARAMETERS: Final = ("drag_area", "rolling_coefficient", "engine_inertia", "wheel_inertia")
-"""Parameters of the longitudinal model beside the torque, in the order of the columns."""
 
 HUBER: Final = 1.345
 """Residual over noise beyond which a row counts less [-] (Huber 1964, 95 % efficiency)."""
@@ -104,21 +100,13 @@ def build_rows(
     Jensen et al. 2022, eqs. 3, 48, 49, with the drivetrain efficiency at one.
     """
     gearing = view.gearing[rows]
-    accel = view.accel[rows]
-    torque = torque_rows(regressor[rows], engine_speed[rows], order, curved=curved)
-    road = np.column_stack(
-        [
-            -0.5
-            * view.air_density[rows]
-            * (view.air_speed * np.abs(view.air_speed))[rows]
-            / gearing,
-            -mass * GRAVITY * np.cos(view.grade[rows]) / gearing,
-            -gearing * accel,
-            -accel / (wheel_radius**2 * gearing),
-        ]
+    torque = reading_columns(
+        np.ones(gearing.size), regressor[rows], engine_speed[rows], order=order, curved=curved
     )
+    # Eq. 48 is the law over the gearing: torque on the left, what it moves on the right.
+    road = road_columns(view, mass, wheel_radius)[rows] / gearing[:, None]
     return TorqueRows(
-        design=np.hstack([torque, road]),
+        design=np.hstack([torque, -road]),
         target=mass * view.specific_force[rows] / gearing,
         time=view.time[rows],
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from weighbridge.balance.law import engine_inertia_column, wheel_inertia_column
 from weighbridge.estimators.squat import share_of_accel
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import by_data_sheet
@@ -31,5 +32,7 @@ def inertia_relative_std(
     if not (by_data_sheet(vehicle) and line.single_speed) or not mass > 0.0:
         return 0.0
     engine, wheels = vehicle.road.engine_inertia, vehicle.road.wheel_inertia
-    rotating = math.hypot(engine.std * line.gearings[0] ** 2, wheels.std / line.wheel_radius**2)
+    turns = float(engine_inertia_column(line.gearings[0], 1.0))
+    rolls = float(wheel_inertia_column(1.0, line.wheel_radius))
+    rotating = math.hypot(engine.std * turns, wheels.std * rolls)
     return rotating / mass * share_of_accel(accel, phi, used)

@@ -7,12 +7,10 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance
-from weighbridge.constants import GRAVITY
+from weighbridge.balance.law import road_columns, torque_columns
 from weighbridge.kernels import disturbance
 from weighbridge.signals import Bools, Floats
-from weighbridge.vehicle.data_sheet import wheel_share
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import reading_of, rows_of
 
 UNSEEN: Final = 1e12
 """Factor on the noise of a row that the filter had left out [-]."""
@@ -31,18 +29,9 @@ def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Float
     (n, p + 4) for the torque coefficients, their curvature, slopes at the knots, C_d A, C_r,
     I_e, I_w, as `weighbridge.vehicle.model.Provenance.fit_cov` has them
     """
-    view, model, line = balance.merged, vehicle.torque, vehicle.driveline
-    gearing = np.nan_to_num(view.gearing)
-    torque, speed = np.nan_to_num(balance.force.torque), np.nan_to_num(balance.force.engine_speed)
-    gain = wheel_share(vehicle, torque) * gearing
-    terms = rows_of(model, reading_of(torque, speed, model), speed)
-    road = (
-        -view.dynamic_pressure,
-        -(mass - view.fuel_burnt) * GRAVITY * np.cos(view.grade),
-        -(gearing**2) * view.accel,
-        -view.accel / line.wheel_radius**2,
-    )
-    return np.asarray(np.nan_to_num(np.column_stack([terms * gain[:, None], *road])))
+    view = balance.merged
+    road = road_columns(view, mass - view.fuel_burnt, vehicle.driveline.wheel_radius)
+    return np.asarray(np.nan_to_num(np.hstack([torque_columns(view, vehicle), -road])))
 
 
 def sensitivity(

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
-from weighbridge.balance.force_balance import SLOWEST
+from weighbridge.balance.instants import SLOWEST
+from weighbridge.balance.law import drag_factor, rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import robust_rls
@@ -71,9 +72,9 @@ def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Col
     return kernel.Columns(
         time=view.time,
         traction=view.traction_force,
-        drag=0.5 * view.air_density * vehicle.road.drag_area.value,
+        drag=drag_factor(view, vehicle),
         headwind=view.air_speed - view.speed,
-        rotating=view.rotating_mass,
+        rotating=rotating_mass(vehicle, view.gearing),
         speed=view.speed,
         grade=view.grade,
         driven=valid & np.isfinite(view.grade),

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from weighbridge.balance import ForceBalance
+from weighbridge.balance.force_balance import highest_torque
 from weighbridge.estimators.considered import force_columns, open_std
 from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.estimators.slow_errors import (
@@ -82,7 +83,7 @@ def slow_std(
     if not (index.size and np.isfinite(mass) and mass > 0.0):
         return float("inf"), 0.0
     rows, _ = design(view, vehicle, grade_open=balance.motion.grade_open)
-    highest = _highest_torque(balance, index)
+    highest = highest_torque(view.torque[index])
     std = prior_std(_known_road_load(vehicle), mass, highest)
     # The methods that ask have `weighbridge.estimators.judging.consider_std` for the cold.
     std[COLD] = 0.0
@@ -105,14 +106,6 @@ def slow_std(
     stays = np.sqrt(np.maximum(open_**2 - std**2, 0.0)) * whole
     stays[len(NAMES) :] = open_[len(NAMES) :] * whole[len(NAMES) :]
     return float(np.sqrt(passing)), float(np.linalg.norm(stays[1:]))
-
-
-def _highest_torque(balance: ForceBalance, index: Ints) -> float:
-    view = balance.merged
-    with np.errstate(invalid="ignore", divide="ignore"):
-        torque = np.abs(view.traction_force / view.gearing)[index]
-    known = torque[np.isfinite(torque)]
-    return float(np.percentile(known, 98.0)) if known.size else 0.0
 
 
 def honest_std(scatter: float, blocks: int, slow: float, left: float) -> tuple[float, float]:

@@ -11,7 +11,8 @@ from scipy.optimize import minimize
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import Windows, windows
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.force_balance import highest_torque
+from weighbridge.balance.table import MergedView
 from weighbridge.estimators.confounded import inertia_relative_std
 from weighbridge.estimators.considered import force_columns, open_std, sensitivity
 from weighbridge.estimators.judging import (
@@ -367,10 +368,9 @@ def _sizes(
     balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float
 ) -> dict[str, Floats]:
     """What of a problem is told in terms of a rough mass [kg]: noise and states."""
-    torque = float(np.percentile(np.abs(balance.force.torque[cut.index]), 98.0))
-    noise = vehicle.torque.noise or 0.03 * torque
+    torque = highest_torque(balance.merged.torque[cut.index])
     return {
-        "variance": noise_variance(balance.merged, cut, noise, guess, balance.motion),
+        "variance": noise_variance(balance.merged, cut, guess, balance.motion),
         "std": prior_std(vehicle, guess, torque, grade_open=balance.motion.grade_open),
     }
 

@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import windows
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged

@@ -7,15 +7,16 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.balance import law
 from weighbridge.balance.averaging import WINDOW, Windows
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.law import DISTURBANCE_STD
+from weighbridge.balance.table import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.regression import regression
 from weighbridge.kernels.disturbance import DisturbanceParams
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import (
-    USUAL_SPEED,
     by_data_sheet,
     offset_std,
 )
@@ -27,21 +28,11 @@ TIME_CONSTANTS: Final = (30.0, 900.0, 600.0, 600.0, 2e4)
 grade and torque errors half a minute, rolling resistance and offsets a quarter of an
 hour, mean wind ten minutes; how cold a drive began stays the same all along."""
 
-DISTURBANCE_STD: Final = 0.04
-"""Standard deviation of the disturbance before the drive has told, over mass [m/s^2]."""
-
-GUST_SPEED: Final = 15.0
-"""Speed at which gusts are half of the disturbance [m/s]: so the likelihood of 82 drives of two
-other simulators is highest."""
-
 RESISTANCE_STD: Final = 0.017
 """Of the slow resistance, over mass [m/s^2]: a fifth of the rolling resistance of a car."""
 
 WIND_STD: Final = 2.0
 """Of each component of the wind at the vehicle [m/s]."""
-
-WARM_UP: Final = 500.0
-"""Time constant of engine and oil getting warm [s]."""
 
 MOTION_STD: Final = 0.03
 """Noise of one sample of a specific force that no accelerometer measured [m/s^2]."""
@@ -115,7 +106,8 @@ class SlowErrors:
         time : (m,) of the windows [s]
         x, var : (m, k) smoothed states in the order of `NAMES`, and their variances
         mass_var : (m,) variance of the mass as known at each window [kg^2]
-        gusts : (m,) `gustiness` of each window, by which the disturbance is a force
+        gusts : (m,) `weighbridge.balance.law.gust_column` of each window, by which the disturbance
+            is a force
         """
         return cls(
             time=time,
@@ -135,29 +127,6 @@ class SlowErrors:
         )
 
 
-def coldness(view: MergedView) -> Floats:
-    """How much of the cold of the start is left at each row (n,) [-]."""
-    moving = np.flatnonzero(np.nan_to_num(view.speed) > 0.5)
-    start = view.time[moving[0]] if moving.size else view.time[0]
-    return np.asarray(np.exp(-np.maximum(view.time - start, 0.0) / WARM_UP))
-
-
-def gustiness(view: MergedView, grade_open: float = 0.0) -> Floats:
-    """How large the fast disturbance is at each row over its usual size (n,) [-].
-
-    Half of it are errors of grade and torque, the other half gusts, whose force grows with the
-    speed. A grade that nothing has measured comes beside them.
-
-    Parameters
-    ----------
-    view
-    grade_open : what of the grade nothing has measured [rad]
-    """
-    gusts = 0.5 * (1.0 + (np.nan_to_num(view.speed) / GUST_SPEED) ** 2)
-    grade = (GRAVITY * grade_open / DISTURBANCE_STD) ** 2
-    return np.asarray(np.sqrt((gusts + grade) / (1.0 + grade)))
-
-
 def design(
     view: MergedView,
     vehicle: Vehicle,
@@ -167,8 +136,7 @@ def design(
 ) -> tuple[Floats, Floats]:
     """Rows of the model ``y = phi m + d + c + wind + cold torque + drag``.
 
-    The drag of a wind small against the speed is linear in it:
-    ``rho C_d A v`` times its component along the road.
+    Each column is that of `weighbridge.balance.law`.
 
     Parameters
     ----------
@@ -186,19 +154,25 @@ def design(
     phi, y = regression(view, vehicle)
     if leaned is not None:
         phi = phi - leaned
-    slope = view.air_density * vehicle.road.drag_area.value * view.speed
-    north, east = view.direction
-    one = np.ones_like(phi)
-    cold = coldness(view) * np.nan_to_num(view.gearing)
-    gusts = gustiness(view, grade_open)
-    columns = [phi, gusts, one, slope * north, slope * east, cold, view.dynamic_pressure]
+    area = vehicle.road.drag_area.value
+    north, east = law.wind_columns(view)
+    columns = [
+        phi,
+        law.gust_column(view, grade_open),
+        law.resistance_column(view),
+        area * north,
+        area * east,
+        law.cold_torque_column(view),
+        law.drag_column(view),
+    ]
     if by_data_sheet(vehicle):
-        gearing = np.nan_to_num(view.gearing)
-        wheels = view.accel / vehicle.driveline.wheel_radius**2
-        turning = gearing * view.speed / USUAL_SPEED
-        columns += [gearing, gearing * turning]
-        if not vehicle.driveline.single_speed:
-            columns += [gearing**2 * view.accel, wheels]
+        line = vehicle.driveline
+        columns += [law.torque_offset_column(view), law.torque_growth_column(view)]
+        if not line.single_speed:
+            columns += [
+                law.engine_inertia_column(np.nan_to_num(view.gearing), view.accel),
+                law.wheel_inertia_column(view.accel, line.wheel_radius),
+            ]
     return np.column_stack(columns), y + phi * view.fuel_burnt
 
 
@@ -208,26 +182,20 @@ def usable_rows(view: MergedView, rows: Floats, y: Floats) -> Bools:
 
 
 def noise_variance(
-    view: MergedView,
-    cut: Windows,
-    torque_noise: float,
-    mass: float,
-    motion: Motion,
-    length: float = WINDOW,
+    view: MergedView, cut: Windows, mass: float, motion: Motion, length: float = WINDOW
 ) -> Floats:
     """Variance of the fast noise of each window's mean force (m,) [N^2], both sides.
 
     Parameters
     ----------
     view, cut
-    torque_noise : of one reading [N m]
     mass : [kg]
     motion
     length : of a window [s]
     """
-    torque = cut.mean((torque_noise * np.nan_to_num(view.gearing)) ** 2)
+    force = cut.mean(view.force_std**2)
     moved = motion_variance(motion, length) + motion.mean_accel_std(length) ** 2
-    return np.asarray(torque / cut.count + mass**2 * moved)
+    return np.asarray(force / cut.count + mass**2 * moved)
 
 
 def motion_variance(motion: Motion, length: float = WINDOW) -> float:

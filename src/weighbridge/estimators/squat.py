@@ -10,6 +10,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.balance import ForceBalance
+from weighbridge.balance.law import lean_column
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
@@ -118,7 +119,7 @@ class Lean:
 
     def leaned(self, accel: Floats) -> Floats:
         """Specific force that the lean adds to an acceleration (n,) [m/s^2]."""
-        return GRAVITY * self.squat * accel
+        return np.asarray(self.squat * lean_column(accel))
 
     def relative_std(self, accel: Floats, phi: Floats, used: Bools) -> float:
         """Relative standard deviation of the mass [-]; hills, which do not lean, weigh without.

@@ -539,7 +539,7 @@ def motion_panels(balance: ForceBalance) -> list[Panel]:
     rows = slice(None, None, max(1, view.time.size // 1500))
     drawn = []
     for letter, name, unit, values in (
-        ("b", "Engine torque", "N m", balance.force.torque),
+        ("b", "Engine torque", "N m", view.torque),
         ("c", "Speed", "km/h", from_si(view.speed, "kmh")),
         ("d", "Acceleration", "m/s²", view.accel),
     ):

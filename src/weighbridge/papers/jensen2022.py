@@ -342,12 +342,12 @@ def sensitivity(
     view = balance.merged
     heading = np.where(np.isfinite(view.heading), view.heading, 0.0)
     along = view.speed + wind_speed * np.cos(wind_from - heading)
-    area = drag * vehicle.road.drag_area.value
-    changed = replace(view, drag_force=0.5 * view.air_density * area * along * np.abs(along))
+    changed = replace(view, air_speed=along)
     car = replace(
         vehicle,
         road_load=replace(
             vehicle.road_load,
+            drag_area=drag * vehicle.road.drag_area.value,
             rolling_coefficient=rolling * vehicle.road.rolling_coefficient.value,
         ),
     )

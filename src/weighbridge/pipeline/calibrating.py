@@ -11,12 +11,13 @@ import numpy as np
 
 from weighbridge.balance import Reason, force_balance
 from weighbridge.balance.delay import best_delay, delay_std
-from weighbridge.balance.force_balance import ForceBalance, dragged_reading
+from weighbridge.balance.force_balance import dragged_reading
+from weighbridge.balance.law import ROAD_PARAMETERS
+from weighbridge.balance.table import ForceBalance
 from weighbridge.balance.witness_learning import learn_witnesses
 from weighbridge.calibration.grid import grid_search
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.regression import (
-    ROAD_PARAMETERS,
     TorqueFit,
     TorqueRows,
     at_point,
@@ -546,7 +547,7 @@ def _finite(balance: ForceBalance, x: Floats, floor: float) -> Bools:
         & np.isfinite(view.specific_force)
         & np.isfinite(view.gearing)
         & np.isfinite(x)
-        & np.isfinite(balance.force.engine_speed)
+        & np.isfinite(balance.merged.engine_speed)
     )
 
 
@@ -569,7 +570,7 @@ def _drive_rows(
     return build_rows(
         balance.merged,
         x,
-        balance.force.engine_speed,
+        balance.merged.engine_speed,
         mass=mass,
         wheel_radius=draft.driveline.wheel_radius,
         order=order,
@@ -611,7 +612,7 @@ def _ranges(
     for drive, motion, floor in zip(drives, motions, floors, strict=True):
         balance, x = _draft_balance(drive, motion, draft, source, delay)
         rows = _usable(balance, x, floor)
-        speeds.append(balance.force.engine_speed[rows])
+        speeds.append(balance.merged.engine_speed[rows])
         loads.append(x[rows])
     speed, load = np.concatenate(speeds), np.concatenate(loads)
     slow, fast = np.percentile(speed, [0.1, 99.9])
@@ -630,7 +631,7 @@ def _knots(
     turned = []
     for drive, motion in zip(drives, motions, strict=True):
         balance, x = _draft_balance(drive, motion, draft, source, delay)
-        turned.append(balance.force.engine_speed[_finite(balance, x, -np.inf)])
+        turned.append(balance.merged.engine_speed[_finite(balance, x, -np.inf)])
     speed = np.concatenate(turned)
     if speed.size < FEW_SAMPLES // 10:
         return ()

@@ -11,7 +11,7 @@ import numpy as np
 
 from weighbridge.balance.delay import FARTHEST as FARTHEST_DELAY
 from weighbridge.balance.delay import beyond, vertex
-from weighbridge.balance.force_balance import ForceBalance
+from weighbridge.balance.table import ForceBalance
 from weighbridge.calibration.inverse import (
     DriveRows,
     FitSettings,
@@ -139,7 +139,7 @@ def refine(
                 DriveRows(
                     view=balance.merged,
                     regressor=reading,
-                    engine_speed=balance.force.engine_speed,
+                    engine_speed=balance.merged.engine_speed,
                     usable=usable,
                     mass=mass,
                     motion=balance.motion,

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.balance.law import rotating_mass
 from weighbridge.balance.speed_balance import SPEEDS, running, speed_motion_of, window_means
 from weighbridge.calibration.speed_fit import (
     Nominal,
@@ -81,8 +82,7 @@ def nominal_of(vehicle: Vehicle) -> Nominal:
         force_gain=(line.efficiency or 1.0) * gearing,
         drag=AIR_DENSITY * road.drag_area.value,
         rolling_coefficient=road.rolling_coefficient.value,
-        rotating_mass=road.wheel_inertia.value / line.wheel_radius**2
-        + road.engine_inertia.value * gearing**2,
+        rotating_mass=float(rotating_mass(vehicle, gearing)),
     )
 
 

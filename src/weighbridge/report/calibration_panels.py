@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from weighbridge.balance import Reason
-from weighbridge.calibration.regression import ROAD_PARAMETERS
+from weighbridge.balance.law import ROAD_PARAMETERS
 from weighbridge.report.style import BLUE, GREY, ORANGE, VERMILLION, Panel, blank, dots, line
 from weighbridge.report.thinning import single, spread, thin_line
 from weighbridge.signals import Floats
@@ -78,8 +78,8 @@ def ratio_panel(calibration: Calibration) -> Panel:
 def gear_panel(calibration: Calibration) -> Panel:
     """Engine speed over vehicle speed with the gears' lines (fig. 7)."""
     speed = np.concatenate([b.merged.speed for b in calibration.balances])
-    engine = np.concatenate([b.force.engine_speed for b in calibration.balances])
-    gear = np.concatenate([b.force.gear for b in calibration.balances])
+    engine = np.concatenate([b.merged.engine_speed for b in calibration.balances])
+    gear = np.concatenate([b.merged.gear for b in calibration.balances])
     reason = np.concatenate([b.merged.reason for b in calibration.balances])
     known = np.isfinite(speed) & np.isfinite(engine)
     if not known.any():

@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.balance import Reason
 from weighbridge.balance.averaging import windows
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.estimators import MassTrack
 from weighbridge.report.style import (
     AXIS,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.estimators import MassTrack
 from weighbridge.report.methods_section import method_style
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots

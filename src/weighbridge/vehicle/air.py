@@ -1,4 +1,4 @@
-"""Density of the air a vehicle drives through."""
+"""Density and pressure of the air a vehicle drives through."""
 
 from __future__ import annotations
 
@@ -52,3 +52,14 @@ def air_density(drive: Drive, time: Floats, altitude: Floats) -> Floats:
     if temperature is None:
         temperature = STANDARD_TEMPERATURE - TEMPERATURE_LAPSE * float(np.median(height))
     return np.asarray(pressure / (GAS_CONSTANT_DRY_AIR * temperature))
+
+
+def dynamic_pressure(density: Floats | float, air_speed: Floats) -> Floats:
+    """Pressure of the air against a vehicle ``rho v |v| / 2`` (n,) [Pa].
+
+    Parameters
+    ----------
+    density : of the air, one or (n,) [kg/m^3]
+    air_speed : (n,) against the air, negative where it blows from behind [m/s]
+    """
+    return np.asarray(0.5 * density * air_speed * np.abs(air_speed))

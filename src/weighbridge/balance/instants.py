@@ -1,0 +1,115 @@
+"""Motion, engine speed and gear at the instants of the force samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from scipy.signal import lfilter
+
+from weighbridge.navigation.motion import Motion
+from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.signals.runs import marked_runs
+from weighbridge.vehicle.gear import effective_gearing, number_told_gears, predict_gear
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import source_of
+
+SLOWEST: Final = 1.5
+"""Below this speed gears, slip and torque are not told apart [m/s]."""
+
+_FORGOTTEN: Final = 2.0
+"""Time constants after which a first-order lag has forgotten a gap that a line bridges [-]."""
+
+_LONG_GAP: Final = 0.5
+"""Across less a line is near to what was not seen [s]."""
+
+
+def smoothed(motion: Motion, lag: float) -> Motion:
+    """Pass what the force side is compared with through a first-order lag [s]."""
+    if lag <= 0.0:
+        return motion
+    return replace(
+        motion,
+        valid=_settled(motion.valid, motion.rate, lag),
+        specific_force=behind(motion.specific_force, motion.rate, lag),
+        accel=behind(motion.accel, motion.rate, lag),
+        grade=behind(motion.grade, motion.rate, lag),
+    )
+
+
+def _settled(valid: Bools, rate: float, lag: float) -> Bools:
+    """Take out what follows long gaps, too, as long as a lag passes on what was not seen there."""
+    starts, ends = marked_runs(~valid)
+    long = ends - starts > _LONG_GAP * rate
+    change = np.zeros(valid.size + 1, dtype=np.int64)
+    np.add.at(change, ends[long], 1)
+    np.add.at(change, np.minimum(ends[long] + round(_FORGOTTEN * lag * rate), valid.size), -1)
+    return np.asarray(valid & (np.cumsum(change)[:-1] == 0))
+
+
+def behind(values: Floats, rate: float, lag: float) -> Floats:
+    """Pass even samples (n,) at ``rate`` [Hz] through a first-order lag [s]."""
+    keep = float(np.exp(-1.0 / (rate * lag)))
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0])
+
+
+def motion_at(motion: Motion, time: Floats) -> dict[str, Floats]:
+    """Interpolate the motion to the instants ``time``; NaN outside."""
+    rate = motion.rate
+    position = (time - motion.time[0]) * rate
+    inside = (position >= 0.0) & (position <= motion.time.size - 1)
+    index = np.clip(position.astype(np.int64), 0, motion.time.size - 2)
+    part = np.clip(position - index, 0.0, 1.0)
+    rows: dict[str, Floats] = {}
+    for name in ("speed", "accel", "specific_force", "grade", "pitch", "altitude", "valid"):
+        values = np.asarray(getattr(motion, name), dtype=np.float64)
+        mixed = values[index] + part * (values[index + 1] - values[index])
+        rows[name] = np.where(inside, mixed, np.nan)
+    rows["valid"] = np.where(inside, rows["valid"], 0.0)
+    nearest = np.clip(np.rint(position).astype(np.int64), 0, motion.time.size - 1)
+    rows["heading"] = np.where(inside, motion.heading[nearest], np.nan)
+    return rows
+
+
+def engine_speed_at(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Floats) -> Floats:
+    """Engine speed at the stamps it was recorded with: it is as late as vehicle speed."""
+    if source_of(vehicle).gearing is not None:
+        return speed * vehicle.driveline.gearings[0]
+    signal = drive.get("engine_speed")
+    if signal is not None and len(signal):
+        near = signal.age(recorded) <= 3.0 * signal.period
+        return np.where(near, signal.at(recorded), np.nan)
+    if vehicle.driveline.single_speed:
+        return speed * vehicle.driveline.gearings[0]
+    return np.full(speed.size, np.nan)
+
+
+def gears_at(
+    drive: Drive, vehicle: Vehicle, recorded: Floats, engine_speed: Floats, speed: Floats
+) -> tuple[Ints, Floats, Bools]:
+    """Gear, gearing and whether the clutch slips, from the best source there is."""
+    gearings = np.array(vehicle.driveline.gearings)
+    if gearings.size == 1:
+        gear = np.ones(recorded.size, dtype=np.int64)
+        return gear, np.full(recorded.size, gearings[0]), np.zeros(recorded.size, dtype=bool)
+    if gearings.size == 0:
+        # Without known ratios the ratio of the moment is the best there is.
+        moving = speed > SLOWEST
+        ratio = np.where(moving, engine_speed / np.where(moving, speed, 1.0), np.nan)
+        return np.zeros(recorded.size, dtype=np.int64), ratio, np.zeros(recorded.size, dtype=bool)
+    gear, mismatch = predict_gear(engine_speed, speed, gearings)
+    measured: Signal | None = drive.get("gear")
+    if measured is not None and len(measured):
+        told = np.nan_to_num(measured.held(recorded)).astype(np.int64)
+        gear = number_told_gears(told, effective_gearing(engine_speed, speed), gearings)
+        mismatch = np.where(
+            gear > 0,
+            engine_speed / np.maximum(speed, SLOWEST) / gearings[np.maximum(gear, 1) - 1] - 1.0,
+            mismatch,
+        )
+    clutch = drive.get("clutch_switch")
+    pressed = clutch.held(recorded) > 0.5 if clutch is not None else np.zeros(gear.size, bool)
+    slipping = (gear == 0) | pressed | (np.abs(np.nan_to_num(mismatch)) > 0.06)
+    gearing = np.where(gear > 0, gearings[np.maximum(gear, 1) - 1], np.nan)
+    return gear, gearing, slipping

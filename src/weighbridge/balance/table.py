@@ -1,0 +1,154 @@
+"""The table that every estimator reads: forces and motion, one row per force sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.balance.coarse import coarse_note
+from weighbridge.navigation.motion import Motion
+from weighbridge.signals import Bools, Floats, Ints
+from weighbridge.vehicle.air import dynamic_pressure
+
+
+class Reason(IntEnum):
+    """Why a sample is not usable; 0 where it is."""
+
+    USED = 0
+    STANDING = 1
+    NO_MOTION = 2
+    NO_TORQUE = 3
+    BRAKING = 4
+    SHIFTING = 5
+    CLUTCH_SLIPPING = 6
+    OVERRUN = 7
+    EXTRAPOLATED = 8
+    NOT_ACCELERATING = 9
+    BAD_FIT = 10
+    TOO_SHORT = 11
+    CORNERING = 12
+
+    @property
+    def text(self) -> str:
+        """The reason in words."""
+        return REASON_TEXT[self]
+
+
+REASON_TEXT: Final[dict[Reason, str]] = {
+    Reason.USED: "",
+    Reason.STANDING: "standing",
+    Reason.NO_MOTION: "no motion data",
+    Reason.NO_TORQUE: "no torque data",
+    Reason.BRAKING: "braking",
+    Reason.SHIFTING: "shifting",
+    Reason.CLUTCH_SLIPPING: "clutch slipping",
+    Reason.OVERRUN: "overrun",
+    Reason.EXTRAPOLATED: "outside torque model",
+    Reason.NOT_ACCELERATING: "not accelerating",
+    Reason.BAD_FIT: "bad fit",
+    Reason.TOO_SHORT: "too short a stretch",
+    Reason.CORNERING: "cornering hard",
+}
+"""Every reason as tables and reports print it."""
+
+BRAKE_HIDDEN: Final = (
+    "nothing tells when the brake is on: there is no brake switch and no accelerator position, "
+    "and the torque source never rests on the lowest reading of a dragged engine; light "
+    "braking then counts as load, and the mass may be some percent off; record brake switch or "
+    "accelerator position"
+)
+
+SWITCH_DEAD: Final = (
+    "the brake switch is off in much of the hard braking: it is not connected, late or of another "
+    "drive, and is not used; check brake_switch, or leave its column out"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MergedView:
+    """Forces at the instants they were computed in the vehicle, and the motion there.
+
+    What follows from it by the parameters of a vehicle is in `weighbridge.balance.law`.
+
+    Attributes
+    ----------
+    time : (n,) instants, delay taken off, rising [s]
+    traction_force : (n,) at the wheels, before the rotating parts are accelerated [N]; NaN
+        without torque
+    force_std : (n,) noise of one traction force, as standard deviation [N]
+    torque : (n,) of engine or motor [N m]
+    engine_speed : (n,) [rad/s]
+    speed, accel, specific_force, grade, pitch, heading : (n,) of `Motion`, whose noise is its
+        ``specific_force_std``
+    gear : (n,) 1..n, 0 for none
+    gearing : (n,) [1/m]; NaN without a gear
+    air_speed : (n,) against the air, with the reported wind [m/s]
+    air_density : (n,) [kg/m^3]
+    fuel_burnt : (n,) since the first row, as far as the drive tells [kg]
+    reason : (n,) `Reason` why a sample is not usable
+    """
+
+    time: Floats
+    traction_force: Floats
+    force_std: Floats
+    torque: Floats
+    engine_speed: Floats
+    speed: Floats
+    accel: Floats
+    specific_force: Floats
+    grade: Floats
+    pitch: Floats
+    heading: Floats
+    gear: Ints
+    gearing: Floats
+    air_speed: Floats
+    air_density: Floats
+    fuel_burnt: Floats
+    reason: NDArray[np.uint8]
+
+    @property
+    def usable(self) -> Bools:
+        """Rows without a reason against them."""
+        return np.asarray(self.reason == Reason.USED)
+
+    @property
+    def dynamic_pressure(self) -> Floats:
+        """Of the air against the vehicle (n,) [Pa]; negative where it blows from behind."""
+        return dynamic_pressure(self.air_density, self.air_speed)
+
+    @property
+    def direction(self) -> tuple[Floats, Floats]:
+        """North and east part of the direction driven (n,) [-]; zero where it is unknown."""
+        known = np.isfinite(self.heading)
+        heading = np.where(known, self.heading, 0.0)
+        return np.where(known, np.cos(heading), 0.0), np.where(known, np.sin(heading), 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceBalance:
+    """Newton's law along the road: the table, and the motion it was read from.
+
+    Attributes
+    ----------
+    merged, motion
+    brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading tells
+        where it is braked
+    switch_dead : the brake switch contradicts the motion and is not used
+    coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
+    """
+
+    merged: MergedView
+    motion: Motion
+    brake_hidden: bool = False
+    switch_dead: bool = False
+    coarse_std: float = 0.0
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is doubted, one sentence each."""
+        told = ((BRAKE_HIDDEN, self.brake_hidden), (SWITCH_DEAD, self.switch_dead))
+        return tuple(text for text, so in told if so) + coarse_note(self.coarse_std)
