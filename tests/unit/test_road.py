@@ -2,9 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Vehicle
+from weighbridge.checks.needed import needed
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 from weighbridge.vehicle.road import Origin, Value
 
 VAN = Vehicle(kind="van")
@@ -49,3 +52,26 @@ def test_a_file_says_what_is_stated_and_no_more(tmp_path):
     assert "wheel_inertia" not in text
     assert "drag_area" not in text
     assert Vehicle.load(path) == stated
+
+
+def test_a_torque_source_that_is_stated_counts_though_it_is_the_usual_one(tmp_path):
+    assert not TorqueModel().stated
+    assert not TorqueModel(reference_torque=300.0).stated
+    stated = replace(VAN, torque=TorqueModel(source="measured"))
+    assert stated.torque.stated
+    assert stated.torque.of_source == VAN.torque.of_source
+    path = tmp_path / "van.toml"
+    stated.save(path)
+    assert Vehicle.load(path).torque.stated
+    VAN.save(path)
+    assert not Vehicle.load(path).torque.stated
+
+
+def test_a_measured_torque_that_is_stated_is_the_one_needed():
+    """Without a word in the file the better source of the drive would be taken, with one not."""
+    clock = np.arange(0.0, 60.0)
+    names = ("engine_torque_fraction", "reference_torque", "engine_speed", "vehicle_speed")
+    drive = Drive("d", {name: Signal(name, clock, np.ones(60)) for name in names})
+    assert "engine_torque_fraction" in needed(drive, VAN)
+    stated = replace(VAN, torque=TorqueModel(source="measured"))
+    assert "engine_torque_fraction" not in needed(drive, stated)

@@ -75,7 +75,7 @@ def smoothed_torque(balance: ForceBalance, vehicle: Vehicle) -> str:
     if not ratio + SURE * std < SMOOTHED:
         return ""
     quick, lasting = float(fast[0].sum() / fast[1].sum()), float(slow[0].sum() / slow[1].sum())
-    name = vehicle.torque.source
+    name = vehicle.torque.of_source.name
     return (
         f"quick changes of the force, within {2.0 * FAST:g} s, are those of {max(quick, 0.0):.0f} "
         f"kg, and slow ones those of {lasting:.0f} kg: the torque ({name}) was smoothed, or the "

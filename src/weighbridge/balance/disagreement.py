@@ -143,7 +143,7 @@ def _finding(drive: Drive, vehicle: Vehicle, relation: WitnessRelation) -> Findi
     every = means(rows, witness, ranges_of(relation))
     if every.time.size < FEWEST:
         return None
-    source, many = vehicle.torque.source, every.time.size
+    source, many = vehicle.torque.of_source.name, every.time.size
 
     def of(first: int, last: int) -> Finding | None:
         part = _part(every, first, last)

@@ -94,7 +94,7 @@ def contradiction(
     rows, airs : of each, as of `learn`
     witness, vehicle
     """
-    source = vehicle.torque.source
+    source = vehicle.torque.of_source.name
     for i, first in enumerate(rows):
         relation = learn([first], [airs[i]], witness)
         if relation is None:

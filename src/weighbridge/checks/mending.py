@@ -11,7 +11,6 @@ from weighbridge.checks.frozen import frozen
 from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.signals import Bools, Drive, Problem, Signal
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 WIDENED: Final = 1.02
 """Load range of a vehicle file over the highest load its drives had [-]."""
@@ -89,14 +88,14 @@ def _without_false(drive: Drive, name: str) -> Drive:
 
 def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
     """Leave out what lies at ends of the range that the calibration had wider."""
-    if vehicle is None or name != TORQUE_SOURCES[vehicle.torque.source].signals[0]:
+    if vehicle is None or name != vehicle.torque.of_source.signals[0]:
         return drive
     signal, model, dragged = drive.signals[name], vehicle.torque, vehicle.dragged
     told = []
     highest = np.inf
     if model.load_range is not None:
         # Of other sources the range is not that of the signal.
-        as_read = TORQUE_SOURCES[model.source].needs_map
+        as_read = model.of_source.needs_map
         highest = model.load_range[1] / WIDENED if as_read else np.inf
     elif dragged is not None:
         highest = dragged.span + min(dragged.level)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from weighbridge.signals import QUANTITIES, Drive
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import scalar_from_si
-from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 MOTION: Final = frozenset(
@@ -48,8 +47,8 @@ def needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:
     The torque is that of the vehicle file; without one, of the source that a calibration takes.
     """
     sources = [source for source in TORQUE_SOURCES.values() if not source.lacking(drive)]
-    if vehicle is not None and replace(vehicle.torque, reference_torque=None) != TorqueModel():
-        sources = [TORQUE_SOURCES[vehicle.torque.source]]
+    if vehicle is not None and vehicle.torque.stated:
+        sources = [vehicle.torque.of_source]
     elif len(sources) > 1 and sources[0].needs_reference and not drive.has("reference_torque"):
         # A vehicle file may yet give the reference torque.
         return MOTION.union(sources[0].found(drive), sources[1].found(drive))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,7 +11,7 @@ from weighbridge.errors import DriveError
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.vehicle.gear import detect_gearings, effective_gearing, steady
 from weighbridge.vehicle.model import TorqueModel, Vehicle
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, reference_torques
+from weighbridge.vehicle.torque_sources import reference_torques
 
 # Whoever changes vehicles takes longer than this [s], and the vehicle left stands.
 _PAUSE: Final = 5.0
@@ -56,8 +55,8 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     said = (
         f"reference_torque is {which}{'' if once else ', in turn'}: it is a constant of an engine"
     )
-    unknown = replace(model, reference_torque=None) == TorqueModel()
-    of_reference = TORQUE_SOURCES[model.source].needs_reference
+    unknown = not model.stated
+    of_reference = model.of_source.needs_reference
     if (unknown or of_reference) and model.reference_torque is not None:
         yield Problem(
             reference.name,

@@ -285,7 +285,7 @@ def _by_speed_alone(drive: Drive) -> Way:
 
 def _mark_chosen(ways: list[Way], vehicle: Vehicle | None) -> tuple[Way, ...]:
     """Mark the way that `weigh` goes: the vehicle file's torque, the best motion."""
-    source = vehicle.torque.source if vehicle is not None else None
+    source = vehicle.torque.of_source.name if vehicle is not None else None
     order = list(_MOTIONS)
     possible = [w for w in ways if w.possible and w.torque == source]
     best = min(possible, key=lambda w: order.index(w.motion), default=None)

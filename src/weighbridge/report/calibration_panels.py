@@ -12,7 +12,6 @@ from weighbridge.report.style import BLUE, GREY, ORANGE, VERMILLION, Panel, blan
 from weighbridge.report.thinning import single, spread, thin_line
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.calibrating import Calibration
@@ -123,7 +122,7 @@ def torque_panels(calibration: Calibration) -> list[Panel]:
     """Measured and fitted torque over the source and over engine speed (fig. 8)."""
     source, motion = _torques(calibration)
     design = calibration.rows.design
-    read = TORQUE_SOURCES[calibration.vehicle.torque.source]
+    read = calibration.vehicle.torque.of_source
     regressor = design[:, 1]
     if read.axis_suffix:
         regressor = from_si(regressor, read.axis_suffix)
@@ -201,7 +200,7 @@ def calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
     fit = calibration.fit
     stds = np.sqrt(np.diag(calibration.fit.cov))
     facts = [
-        ("torque source", calibration.vehicle.torque.source.replace("_", " ")),
+        ("torque source", calibration.vehicle.torque.of_source.name.replace("_", " ")),
         ("drives", ", ".join(calibration.vehicle.provenance.drives)),
         ("samples", f"{calibration.rows.target.size}"),
         ("R² of the torque", f"{fit.r_squared:.3f}"),

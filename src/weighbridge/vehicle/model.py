@@ -12,7 +12,8 @@ from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
 from weighbridge.vehicle.fits import FITS, Fit
 from weighbridge.vehicle.road import Road, known_value
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+from weighbridge.vehicle.torque_source import TorqueSource
+from weighbridge.vehicle.torque_sources import MEASURED, TORQUE_SOURCES
 from weighbridge.visible import visible
 
 FORMAT_VERSION: Final = 1
@@ -132,7 +133,8 @@ class TorqueModel:
 
     Attributes
     ----------
-    source : name of one of `weighbridge.vehicle.torque_sources.TORQUE_SOURCES`
+    source : name of one of `weighbridge.vehicle.torque_sources.TORQUE_SOURCES`; None where it is
+        not stated, and a measured torque is read
     coefficients : w0, w1 (per unit of load or of air flow torque), then w2, w3 ...
         of rising powers of engine speed in rad/s; for measured and percent
         torque (offset [N m], scale [-]), empty meaning (0, 1), then as well powers of
@@ -153,7 +155,7 @@ class TorqueModel:
         extrapolated and the sample left out ([-], [rad/s])
     """
 
-    source: str = "measured"
+    source: str | None = None
     coefficients: tuple[float, ...] = ()
     coefficient_stds: tuple[float, ...] = ()
     curvature: tuple[float, ...] = ()
@@ -168,9 +170,9 @@ class TorqueModel:
     speed_range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        source = TORQUE_SOURCES.get(self.source)
-        if source is None:
+        if self.source is not None and self.source not in TORQUE_SOURCES:
             raise ConfigError(f"torque source must be {TORQUE_SOURCES.names}, got {self.source!r}")
+        source = self.of_source
         if source.needs_map and len(self.coefficients) < 2:
             raise ConfigError(
                 f"torque source {self.source!r} needs at least two coefficients: "
@@ -202,6 +204,16 @@ class TorqueModel:
         if not 0.0 < self.engine_efficiency <= 1.0:
             raise ConfigError(f"engine_efficiency must be in (0, 1], got {self.engine_efficiency}")
         _within("engine_efficiency", self.engine_efficiency, 0.01, 1.0)
+
+    @property
+    def of_source(self) -> TorqueSource:
+        """What its source is: that of a measured torque where none is stated."""
+        return TORQUE_SOURCES[self.source or MEASURED]
+
+    @property
+    def stated(self) -> bool:
+        """Whether anything is said of the torque beside what 100 % of it are."""
+        return replace(self, reference_torque=None) != TorqueModel()
 
     def scaled(self, scale: float) -> TorqueModel:
         """Return the model that gives ``scale`` times the torque."""

@@ -15,7 +15,7 @@ from weighbridge.constants import (
 )
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std, wheel_efficiency
-from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.road import Origin, Value
 from weighbridge.vehicle.torque import parameters, rows_of, source_of
 
@@ -53,9 +53,8 @@ def can_weigh(vehicle: Vehicle) -> bool:
     """Whether a drive can be weighed with it: gears are known, and what the torque is worth."""
     if vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None:
         return True
-    stated = vehicle.torque.source != "measured" or vehicle.torque != TorqueModel()
     geared = bool(vehicle.driveline.gearings) or source_of(vehicle).gearing is not None
-    return geared and (stated or by_data_sheet(vehicle))
+    return geared and (vehicle.torque.stated or by_data_sheet(vehicle))
 
 
 def worth(vehicle: Vehicle) -> str:

@@ -12,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from weighbridge.errors import DriveError
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.model import TorqueModel, Vehicle
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
+from weighbridge.vehicle.torque_sources import TorqueSource
 
 DRAGGED_TIME: Final = 0.5
 """Time over which a load tells whether the engine is dragged [s]."""
@@ -38,7 +38,7 @@ class Torque:
 
 def source_of(vehicle: Vehicle) -> TorqueSource:
     """Return the source of the vehicle's torque."""
-    return TORQUE_SOURCES[vehicle.torque.source]
+    return vehicle.torque.of_source
 
 
 def source_signal(drive: Drive, vehicle: Vehicle) -> Signal:

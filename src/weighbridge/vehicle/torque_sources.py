@@ -132,8 +132,11 @@ def lowest_load(load: Floats) -> float:
     return float(np.percentile(finite, 1.0) + 0.01)
 
 
+MEASURED: Final = "measured"
+"""Name of the source that is read where a vehicle file states none."""
+
 _MEASURED: Final = TorqueSource(
-    name="measured",
+    name=MEASURED,
     signals=("engine_torque",),
     reading=_torque,
     signed=True,
