@@ -45,3 +45,20 @@ def assert_salvaged() -> Callable[[Path], None]:
             assert (np.diff(signal.time) > 0.0).all()
 
     return check
+
+
+@pytest.fixture(scope="session")
+def assert_damage_is_told(
+    tmp_path_factory, assert_salvaged
+) -> Callable[[str, bytes, float, float, bytes], None]:
+    """Cut a log off, write junk over a part of what is left, and check how it is read."""
+
+    def check(name: str, whole: bytes, part: float, at: float, junk: bytes) -> None:
+        cut = bytearray(whole[: int(part * len(whole))])
+        place = int(at * len(cut))
+        cut[place : place + len(junk)] = junk
+        path = tmp_path_factory.mktemp("cut") / name
+        path.write_bytes(cut)
+        assert_salvaged(path)
+
+    return check

@@ -110,10 +110,5 @@ def test_no_log_is_one_sentence(tmp_path, data):
     max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(part=st.floats(0.0, 1.0), at=st.floats(0.0, 1.0), junk=st.binary(min_size=0, max_size=16))
-def test_damage_leaves_signals_or_one_sentence(tmp_path_factory, assert_salvaged, part, at, junk):
-    cut = bytearray(PLAIN[: int(part * len(PLAIN))])
-    place = int(at * len(cut))
-    cut[place : place + len(junk)] = junk
-    path = tmp_path_factory.mktemp("cut") / "rlog"
-    path.write_bytes(cut)
-    assert_salvaged(path)
+def test_damage_leaves_signals_or_one_sentence(assert_damage_is_told, part, at, junk):
+    assert_damage_is_told("rlog", PLAIN, part, at, junk)

@@ -118,13 +118,5 @@ def test_no_frame_is_one_sentence(tmp_path, sent, name):
 @pytest.mark.parametrize("name", ["gvret.csv", "drive.crtd"])
 @settings(max_examples=40, deadline=None)
 @given(part=st.floats(0.0, 1.0), at=st.floats(0.0, 1.0), junk=st.binary(max_size=16))
-def test_damage_leaves_signals_or_one_sentence(
-    sent, tmp_path_factory, assert_salvaged, name, part, at, junk
-):
-    whole = WRITTEN[name](sent).encode()
-    cut = bytearray(whole[: int(part * len(whole))])
-    place = int(at * len(cut))
-    cut[place : place + len(junk)] = junk
-    path = tmp_path_factory.mktemp("cut") / name
-    path.write_bytes(cut)
-    assert_salvaged(path)
+def test_damage_leaves_signals_or_one_sentence(sent, assert_damage_is_told, name, part, at, junk):
+    assert_damage_is_told(name, WRITTEN[name](sent).encode(), part, at, junk)

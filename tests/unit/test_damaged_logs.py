@@ -22,18 +22,22 @@ TABLES = {
 NAMING = ({"signals": {"altitude": {"column": "Height"}}}, GOLDEN / "golden.dbc")
 
 
-def read(path, *naming):
+def fault(path, *naming):
+    """Say what is wrong with how a file is read; empty where it gives signals or one sentence."""
     began = time.process_time()
     told, drive = "", None
     try:
         drive = read_drive(path, *naming)
     except WeighbridgeError as error:
         told = str(error)
-    assert drive.signals if drive else 10 < len(told) < 1000
-    assert "\n" not in told
     # No limit of speed: a reader that is led to read far more than is there. Time of this process,
     # as the machine may be busy with others.
-    assert time.process_time() - began < 60.0
+    if time.process_time() - began > 60.0:
+        return "it took more than a minute"
+    if drive is not None:
+        return "" if drive.signals else "a drive without signals"
+    clear = 10 < len(told) < 1000 and "\n" not in told
+    return "" if clear else f"not one sentence: {told!r}"
 
 
 @st.composite
@@ -73,7 +77,7 @@ class Child:
     CODE = """
 import pathlib, sys
 sys.path.insert(0, sys.argv[1])
-from test_damaged_logs import NAMING, read
+from test_damaged_logs import NAMING, fault
 try:
     import resource
     taken = int(pathlib.Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
@@ -84,8 +88,7 @@ print("ready", flush=True)
 for line in sys.stdin:
     try:
         count, _, path = line[:-1].partition(" ")
-        read(pathlib.Path(path), *NAMING[: int(count)])
-        print("read", flush=True)
+        print(repr(fault(pathlib.Path(path), *NAMING[: int(count)])), flush=True)
     except BaseException as error:
         print(repr(error).replace(chr(10), " "), flush=True)
 """
@@ -93,7 +96,8 @@ for line in sys.stdin:
     def __init__(self):
         self.process = None
 
-    def read(self, path, *naming):
+    def fault(self, path, *naming):
+        """Return `fault` as the process found it, or how the process ended."""
         assert naming in ((), NAMING)
         if self.process is None or self.process.poll() is not None:
             self.process = subprocess.Popen(
@@ -108,8 +112,9 @@ for line in sys.stdin:
             told = self.process.stdout.readline()
         finally:
             hang.cancel()
-        assert told, f"the process ended with {self.process.wait()}"
-        assert told == "read\n", told
+        if not told:
+            return f"the process ended with {self.process.wait()}"
+        return "" if told == "''\n" else told
 
     def end(self):
         if self.process is not None:
@@ -125,9 +130,9 @@ def child():
 
 
 @pytest.fixture
-def reader(child):
+def fault_of(child):
     """MF4 is read by compiled code that is not ours and was not made for damaged files."""
-    return lambda path: child.read if path.suffix == ".mf4" else read
+    return lambda path, *naming: (child.fault if path.suffix == ".mf4" else fault)(path, *naming)
 
 
 @pytest.mark.parametrize("suffix", LOGS)
@@ -138,10 +143,10 @@ def reader(child):
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(damage=damages())
-def test_damaged_files(suffix, reader, tmp_path, damage):
+def test_damaged_files(suffix, fault_of, tmp_path, damage):
     path = tmp_path / f"log.{suffix}"
     path.write_bytes(damaged(LOGS[suffix], damage))
-    reader(path)(path, *NAMING)
+    assert fault_of(path, *NAMING) == ""
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -152,10 +157,10 @@ def test_damaged_files(suffix, reader, tmp_path, damage):
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(damage=damages())
-def test_damaged_tables(name, reader, tmp_path, damage):
+def test_damaged_tables(name, fault_of, tmp_path, damage):
     path = tmp_path / name
     path.write_bytes(damaged(TABLES[name], damage))
-    reader(path)(path)
+    assert fault_of(path) == ""
 
 
 @pytest.mark.parametrize("suffix", LOGS)
@@ -166,10 +171,10 @@ def test_damaged_tables(name, reader, tmp_path, damage):
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(content=st.one_of(st.binary(max_size=300), st.text(max_size=200).map(str.encode)))
-def test_files_of_anything(suffix, reader, tmp_path, content):
+def test_files_of_anything(suffix, fault_of, tmp_path, content):
     path = tmp_path / f"log.{suffix}"
     path.write_bytes(content)
-    reader(path)(path, *NAMING)
+    assert fault_of(path, *NAMING) == ""
 
 
 def test_object_of_no_size_does_not_hang(tmp_path):
@@ -177,7 +182,7 @@ def test_object_of_no_size_does_not_hang(tmp_path):
     raw[144 + 8 : 144 + 12] = bytes(4)
     path = tmp_path / "log.blf"
     path.write_bytes(raw)
-    read(path, *NAMING)
+    assert fault(path, *NAMING) == ""
 
 
 def test_container_that_claims_much_takes_no_memory(tmp_path):
@@ -186,7 +191,7 @@ def test_container_that_claims_much_takes_no_memory(tmp_path):
     raw[at + 24 : at + 28] = b"\xff" * 4
     path = tmp_path / "log.blf"
     path.write_bytes(raw)
-    read(path, *NAMING)
+    assert fault(path, *NAMING) == ""
 
 
 def test_channels_outside_their_records_do_not_end_the_process(tmp_path):

@@ -302,13 +302,5 @@ def test_no_recording_is_one_sentence(tmp_path, name):
     max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(part=st.floats(0.0, 1.0), at=st.floats(0.0, 1.0), junk=st.binary(min_size=0, max_size=16))
-def test_damage_leaves_signals_or_one_sentence(
-    files, tmp_path_factory, assert_salvaged, name, part, at, junk
-):
-    whole = (files / name).read_bytes()
-    cut = bytearray(whole[: int(part * len(whole))])
-    place = int(at * len(cut))
-    cut[place : place + len(junk)] = junk
-    path = tmp_path_factory.mktemp("cut") / name
-    path.write_bytes(cut)
-    assert_salvaged(path)
+def test_damage_leaves_signals_or_one_sentence(files, assert_damage_is_told, name, part, at, junk):
+    assert_damage_is_told(name, (files / name).read_bytes(), part, at, junk)
