@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.signals import Drive, Floats, Signal
-from weighbridge.vehicle.torque_source import TOLD_TERMS, TorqueConstants, TorqueSource
+from weighbridge.vehicle.torque_source import TOLD, TorqueConstants
 
 SLOWEST: Final = 1.0
 """Slower than this a power says nothing of a force [m/s]."""
@@ -167,7 +167,7 @@ def _per_distance(radius: float) -> float:
     return 1.0
 
 
-WHEEL_TORQUE: Final = TorqueSource(
+WHEEL_TORQUE: Final = TOLD(
     name="wheel_torque",
     signals=("wheel_torque",),
     others=(
@@ -184,53 +184,36 @@ WHEEL_TORQUE: Final = TorqueSource(
     efficiency=(1.0, 0.0),
     refusal=_unmeasured,
     reading=_wheels,
-    signed=True,
     title="torque at the wheels",
     words="torque at wheels or axles",
     axis="Torque at the wheels [N m]",
-    terms=TOLD_TERMS,
-    # Told by control units, it is an engine's torque through a gearbox.
-    scale_std=0.04,
-    transfer_std=0.005,
-    cold_std=0.02,
     cold_torque_std=0.005,
 )
 
-TRACTION_FORCE: Final = TorqueSource(
+TRACTION_FORCE: Final = TOLD(
     name="traction_force",
     signals=("traction_force",),
     gearing=_per_distance,
     efficiency=(1.0, 0.0),
     by_radius=False,
     reading=_force,
-    signed=True,
     title="traction force",
     words="traction force at the wheels",
     axis="Traction force [N]",
-    terms=TOLD_TERMS,
-    scale_std=0.04,
-    transfer_std=0.005,
-    cold_std=0.02,
     cold_torque_std=0.005,
 )
 
-POWER: Final = TorqueSource(
+POWER: Final = TOLD(
     name="power",
     signals=("engine_power", "engine_speed"),
     reading=_power,
-    signed=True,
     title="power and engine speed",
     words="power of engine or motor over its speed",
     axis="Torque from power [N m]",
-    terms=TOLD_TERMS,
-    scale_std=0.04,
     motor_scale_std=0.03,
-    transfer_std=0.005,
-    cold_std=0.02,
-    cold_torque_std=0.012,
 )
 
-POWER_BY_SPEED: Final = TorqueSource(
+POWER_BY_SPEED: Final = TOLD(
     name="power_by_speed",
     signals=("engine_power", "vehicle_speed"),
     others=(("engine_power", "gnss_speed"),),
@@ -238,19 +221,13 @@ POWER_BY_SPEED: Final = TorqueSource(
     before_motor=True,
     by_radius=False,
     reading=_power_by_speed,
-    signed=True,
     title="power and vehicle speed",
     words="power of the motor over vehicle speed",
     axis="Force from power [N]",
-    terms=TOLD_TERMS,
-    scale_std=0.04,
     motor_scale_std=0.03,
-    transfer_std=0.005,
-    cold_std=0.02,
-    cold_torque_std=0.012,
 )
 
-BATTERY: Final = TorqueSource(
+BATTERY: Final = TOLD(
     name="battery",
     signals=("battery_current", "battery_voltage", "vehicle_speed"),
     others=(("battery_current", "battery_voltage", "gnss_speed"),),
@@ -260,11 +237,9 @@ BATTERY: Final = TorqueSource(
     efficiency=(1.0, BATTERY_EFFICIENCY[1]),
     by_radius=False,
     reading=_battery,
-    signed=True,
     title="power of the battery",
     words="power of the traction battery over vehicle speed",
     axis="Force from battery power [N]",
-    terms=TOLD_TERMS,
     # Of the meters; the losses behind them are the efficiency's.
     scale_std=0.02,
     transfer_std=0.010,

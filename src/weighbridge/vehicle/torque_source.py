@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Protocol
 
 import numpy as np
@@ -145,3 +146,24 @@ TOLD_TERMS: Final = TorqueTerms(offset=0.05, growth=0.02, lean=0.03, bend=0.05, 
 ROUGH_TERMS: Final = TorqueTerms(offset=0.15, growth=0.10, lean=0.30, bend=0.15, knot=0.08)
 """Of a reading that is only roughly torque: friction and accessories are a tenth of the full-load
 torque and grow with speed (Heywood, 1988, ch. 13); the full-load curve is smooth."""
+
+TOLD: Final = partial(
+    TorqueSource,
+    signed=True,
+    terms=TOLD_TERMS,
+    scale_std=0.04,
+    transfer_std=0.005,
+    cold_std=0.02,
+    cold_torque_std=0.012,
+)
+"""A source of torque that a control unit tells; what differs is given with its name."""
+
+ROUGH: Final = partial(
+    TorqueSource,
+    signed=False,
+    terms=ROUGH_TERMS,
+    scale_std=0.06,
+    cold_std=0.05,
+    cold_torque_std=0.04,
+)
+"""A source whose reading is only roughly torque; what differs is given with its name."""

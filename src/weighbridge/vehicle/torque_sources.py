@@ -22,7 +22,9 @@ from weighbridge.vehicle.force_sources import (
     WHEEL_TORQUE,
 )
 from weighbridge.vehicle.torque_source import (
+    ROUGH,
     ROUGH_TERMS,
+    TOLD,
     TOLD_TERMS,
     TorqueConstants,
     TorqueSource,
@@ -30,7 +32,9 @@ from weighbridge.vehicle.torque_source import (
 )
 
 __all__ = [
+    "ROUGH",
     "ROUGH_TERMS",
+    "TOLD",
     "TOLD_TERMS",
     "TORQUE_SOURCES",
     "TorqueSource",
@@ -135,71 +139,49 @@ def lowest_load(load: Floats) -> float:
 MEASURED: Final = "measured"
 """Name of the source that is read where a vehicle file states none."""
 
-_MEASURED: Final = TorqueSource(
+_MEASURED: Final = TOLD(
     name=MEASURED,
     signals=("engine_torque",),
     reading=_torque,
-    signed=True,
     title="torque in N m",
     words="torque in N m, as the control unit tells it",
     axis="Recorded torque [N m]",
-    terms=TOLD_TERMS,
-    scale_std=0.04,
     # Told from the currents of a motor; its limit is 5 %.
     motor_scale_std=0.03,
-    transfer_std=0.005,
-    cold_std=0.02,
-    cold_torque_std=0.012,
 )
 
-_PERCENT: Final = TorqueSource(
+_PERCENT: Final = TOLD(
     name="percent",
     signals=("engine_torque_fraction",),
     reading=_percent,
-    signed=True,
     needs_reference=True,
     title="torque in percent",
     words="torque in percent of the reference torque",
     axis="Recorded torque [N m]",
-    terms=TOLD_TERMS,
-    scale_std=0.04,
-    transfer_std=0.005,
-    cold_std=0.02,
-    cold_torque_std=0.012,
 )
 
-_LOAD: Final = TorqueSource(
+_LOAD: Final = ROUGH(
     name="load",
     signals=("engine_load", "engine_speed"),
     reading=_load,
-    signed=False,
     needs_map=True,
     floor=lowest_load,
     title="engine load",
     words="engine load (PID 04)",
     axis="Engine load [%]",
     axis_suffix="pct",
-    terms=ROUGH_TERMS,
-    scale_std=0.06,
     transfer_std=0.010,
-    cold_std=0.05,
-    cold_torque_std=0.04,
 )
 
-_AIR_FLOW: Final = TorqueSource(
+_AIR_FLOW: Final = ROUGH(
     name="air_flow",
     signals=("mass_air_flow", "engine_speed"),
     reading=_air_flow,
-    signed=False,
     floor=lambda _: 0.0,
     title="air flow",
     words="air flow and fuel",
     axis="Torque from air flow [N m]",
-    terms=ROUGH_TERMS,
-    scale_std=0.06,
     transfer_std=0.015,
-    cold_std=0.05,
-    cold_torque_std=0.04,
     # Graded, not measured.
     expected=1.0,
     limit="air flow says little of efficiency and ignition",
