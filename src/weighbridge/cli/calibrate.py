@@ -12,7 +12,6 @@ from weighbridge.cli.options import (
     DrivePaths,
     MappingPath,
     load,
-    mapping_for,
 )
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say
@@ -80,6 +79,7 @@ def calibrate(
         run_calibration,
         run_speed_calibration,
     )
+    from weighbridge.pipeline.given import mapping_of
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -87,7 +87,7 @@ def calibrate(
     if torque is not None and torque not in TORQUE_SOURCES:
         raise ConfigError(f"--torque {torque}: must be {TORQUE_SOURCES.names}")
     base = Vehicle.load(vehicle) if vehicle is not None else None
-    chosen = mapping_for(mapping, base, vehicle)
+    chosen = mapping_of(base, vehicle, mapping)
     read = inputs(drives, vehicle, chosen, dbc)
     refuse_results(read, [Result("--output", output, "vehicle file")])
     recorded = [load(path, chosen, dbc) for path in drives]

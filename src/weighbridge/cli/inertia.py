@@ -12,7 +12,6 @@ from weighbridge.cli.options import (
     MappingPath,
     ReportPath,
     load,
-    mapping_for,
 )
 from weighbridge.cli.results import asked_for, inputs, refuse_results
 from weighbridge.cli.terminal import say, say_json
@@ -55,12 +54,13 @@ def inertia(
 
     Example: weighbridge inertia ride/ --vehicle truck.toml --report ride.html
     """
+    from weighbridge.pipeline.given import mapping_of
     from weighbridge.pipeline.inertia import estimate_inertia
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.whole import write_whole
 
     car = Vehicle.load(vehicle)
-    chosen = mapping_for(mapping, car, vehicle)
+    chosen = mapping_of(car, vehicle, mapping)
     refuse_results(
         inputs([drive], vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
     )

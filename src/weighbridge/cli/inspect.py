@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.options import DbcPaths, DrivePaths, MappingPath, load, mapping_for
+from weighbridge.cli.options import DbcPaths, DrivePaths, MappingPath, load
 from weighbridge.cli.terminal import console, say, shown
 
 if TYPE_CHECKING:
@@ -39,11 +39,12 @@ def inspect(
 
     Example: weighbridge inspect drive/ --vehicle car.toml
     """
+    from weighbridge.pipeline.given import mapping_of
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.vehicle.model import Vehicle
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
-    chosen = mapping_for(mapping, car, vehicle)
+    chosen = mapping_of(car, vehicle, mapping)
     screen = console(highlight=False)
     if not screen.is_terminal:
         screen.width = _WIDTH

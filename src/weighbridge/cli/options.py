@@ -9,7 +9,6 @@ import typer
 
 if TYPE_CHECKING:
     from weighbridge.signals import Drive
-    from weighbridge.vehicle.model import Vehicle
 
 DrivePaths = Annotated[
     list[Path],
@@ -35,13 +34,6 @@ DbcPaths = Annotated[
         metavar="FILE",
     ),
 ]
-
-
-def mapping_for(mapping: Path | None, vehicle: Vehicle | None, home: Path | None) -> Path | None:
-    """Return the mapping asked for, else the one the vehicle file names beside itself."""
-    from weighbridge.pipeline.given import mapping_of
-
-    return mapping if mapping is not None else mapping_of(vehicle, home)
 
 
 def load(path: Path, mapping: Path | None, dbc: list[str] | None = None) -> Drive:

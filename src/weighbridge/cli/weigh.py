@@ -14,7 +14,6 @@ from weighbridge.cli.options import (
     MappingPath,
     ReportPath,
     load,
-    mapping_for,
 )
 from weighbridge.cli.results import asked_for, inputs, refuse_results
 from weighbridge.cli.terminal import console, say, say_json, shown
@@ -62,13 +61,14 @@ def weigh(
     Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
     """
     from weighbridge.errors import ConfigError, WeighbridgeError
+    from weighbridge.pipeline.given import mapping_of
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.whole import write_whole
 
     if track is not None and len(drives) > 1:
         raise ConfigError("--track takes one drive; weigh them one by one, or use --json")
     car = Vehicle.load(vehicle)
-    chosen = mapping_for(mapping, car, vehicle)
+    chosen = mapping_of(car, vehicle, mapping)
     refuse_results(
         inputs(drives, vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
     )

@@ -16,6 +16,7 @@ from weighbridge.io.table import RawTable, column_list
 from weighbridge.io.tabular import read_canonical, read_mapped
 from weighbridge.signals import Drive, DriveInfo
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
+from weighbridge.signals.shown import type_name
 
 if TYPE_CHECKING:
     import pandas
@@ -69,8 +70,9 @@ def read_frame(
 def _raw(name: str, frame: Any, *, mapped: bool) -> RawTable:
     """Lay a data frame out as a table that was read."""
     if not is_frame(frame):
-        kind = f"{type(frame).__module__}.{type(frame).__qualname__}".removeprefix("builtins.")
-        raise ConfigError(f"{name}: a data frame of pandas or polars is expected, got {kind}")
+        raise ConfigError(
+            f"{name}: a data frame of pandas or polars is expected, got {type_name(frame)}"
+        )
     notes: list[str] = []
     if not isinstance(frame, pl.DataFrame):
         dates = frame.index.dtype.kind == "M"

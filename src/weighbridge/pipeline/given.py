@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals import Drive
+from weighbridge.signals.shown import type_name
 from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
@@ -20,14 +21,19 @@ GivenVehicle: TypeAlias = Vehicle | str | Path
 """A vehicle, or the path of a vehicle file."""
 
 
-def mapping_of(vehicle: Vehicle | None, home: Path | None) -> Path | None:
-    """Return the mapping that a vehicle file names, beside itself where its path is known.
+def mapping_of(
+    vehicle: Vehicle | None, home: Path | None, asked: Path | None = None
+) -> Path | None:
+    """Return the mapping asked for, else the one that a vehicle file names, beside itself.
 
     Parameters
     ----------
     vehicle : None where there is none
-    home : path of its file; None where it is not known
+    home : path of its file; None where it is not known, and the name stays as it is
+    asked : None where no mapping was
     """
+    if asked is not None:
+        return asked
     if vehicle is None or vehicle.mapping is None:
         return None
     named = Path(vehicle.mapping)
@@ -67,7 +73,7 @@ def as_drive(given: GivenDrive, mapping: Path | None = None) -> Drive:
     ):
         return read_frame(given)
     raise ConfigError(
-        f"a drive is expected, got {_kind(given)}: give what read_drive returns, the path of a "
+        f"a drive is expected, got {type_name(given)}: give what read_drive returns, the path of a "
         "folder or file, or data frames with canonical columns"
     )
 
@@ -92,10 +98,6 @@ def as_vehicle(given: GivenVehicle) -> Vehicle:
     if isinstance(given, str | Path):
         return Vehicle.load(given)
     raise ConfigError(
-        f"a vehicle is expected, got {_kind(given)}: give what calibrate returns, or the path of "
-        "a vehicle file"
+        f"a vehicle is expected, got {type_name(given)}: give what calibrate returns, or the path "
+        "of a vehicle file"
     )
-
-
-def _kind(given: object) -> str:
-    return f"{type(given).__module__}.{type(given).__qualname__}".removeprefix("builtins.")
