@@ -356,13 +356,13 @@ def test_a_full_disk_loses_nothing(tmp_path, out):
 KERNEL = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from weighbridge.kernels import _jit, rotation
-assert _jit.INSTALLED
+from weighbridge.kernels import rotation
 print(rotation.product(1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 0.5))
 """
 
 
-def test_a_kernel_cache_that_is_cut_off_is_made_again(tmp_path):
+def test_a_kernel_cache_that_is_cut_off_is_made_again(tmp_path, monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     site = tmp_path / "site-packages"
     source = Path(sys.modules["weighbridge"].__file__).parent
     shutil.copytree(source, site / "weighbridge", ignore=shutil.ignore_patterns("__pycache__"))

@@ -1,18 +1,37 @@
 """The one decorator of all compiled kernels."""
 
 import contextlib
+import hashlib
 from pathlib import Path
 
 from numba import njit
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-# Numba does not notice edits in other files, so a disk cache would go stale
-# while the package is developed in place; an installed package never changes.
-INSTALLED = "site-packages" in Path(__file__).parts
+
+def _sources() -> str:
+    """Digest of all that kernels are made of: they call each other, and no other module's code."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in (*sorted(here.glob("*.py")), here.parent / "constants.py"):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+SOURCES = _sources()
+"""Kernels in the disk cache that were made of other sources are compiled again: numba alone
+notices edits of a function's own file, and not of those it calls."""
 
 
 class _Cache(FunctionCache):
     """Disk cache whose damage, or a full disk, costs a compilation and no more."""
+
+    def __init__(self, function):
+        super().__init__(function)
+        self._cache_file = IndexDataCacheFile(
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=SOURCES,
+        )
 
     def load_overload(self, sig, target_context):
         """Load a compiled kernel; None where its file cannot be read."""
@@ -36,7 +55,7 @@ def _decorator(**options):
 
     def decorate(function):
         dispatcher = compiled(function)
-        if INSTALLED and hasattr(dispatcher, "enable_caching"):
+        if hasattr(dispatcher, "enable_caching"):
             # No folder that can be written to: compile each time.
             with contextlib.suppress(RuntimeError, OSError):
                 dispatcher._cache = _Cache(function)
