@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
     from weighbridge.pipeline.inertia import Inertia, estimate_inertia
     from weighbridge.pipeline.inspection import inspect_drive
-    from weighbridge.pipeline.weighing import Weighing, weigh
+    from weighbridge.pipeline.weighing import Weighing, compare, weigh
+    from weighbridge.results.row import WeighingRow
     from weighbridge.signals import Drive, DriveInfo, Problem, Signal
     from weighbridge.vehicle.model import Vehicle
 
@@ -40,11 +41,13 @@ _HOMES = {
     "Weighing": "weighbridge.pipeline.weighing",
     "WeighbridgeError": "weighbridge.errors",
     "calibrate": "weighbridge.pipeline.calibrating",
+    "compare": "weighbridge.pipeline.weighing",
     "estimate_inertia": "weighbridge.pipeline.inertia",
     "inspect_drive": "weighbridge.pipeline.inspection",
     "read_drive": "weighbridge.io",
     "read_frame": "weighbridge.io",
     "to_frames": "weighbridge.io",
+    "WeighingRow": "weighbridge.results.row",
     "weigh": "weighbridge.pipeline.weighing",
 }
 
@@ -63,7 +66,9 @@ __all__ = [
     "Vehicle",
     "WeighbridgeError",
     "Weighing",
+    "WeighingRow",
     "calibrate",
+    "compare",
     "estimate_inertia",
     "inspect_drive",
     "read_drive",

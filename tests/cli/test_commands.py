@@ -10,7 +10,7 @@ import pytest
 
 from weighbridge import Vehicle, __version__
 from weighbridge.papers import jensen2022
-from weighbridge.pipeline.weighing import TRACK_COLUMNS
+from weighbridge.results.weighing import TRACK_COLUMNS
 from weighbridge.vehicle.model import Driveline
 
 COMMANDS = ("demo", "inspect", "calibrate", "weigh", "simulate", "reproduce")

@@ -17,13 +17,13 @@ from weighbridge.calibration.regression import build_rows, fit
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import MassTrack, Segment, Status
 from weighbridge.navigation.motion import Motion
-from weighbridge.pipeline.calibrating import Calibration
 from weighbridge.pipeline.weighing import Weighing
 from weighbridge.report import mass_figure, write_report
 from weighbridge.report.page import Page
 from weighbridge.report.style import REASON_STYLE, Panel, blank
 from weighbridge.report.table import Table
 from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
+from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.gear import detect_gearings

@@ -14,8 +14,7 @@ from weighbridge.balance.force_balance import WIND_AT_VEHICLE
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, joint
 from weighbridge.navigation.motion import Motion
-from weighbridge.pipeline.comparing import compare
-from weighbridge.pipeline.weighing import Weighing
+from weighbridge.pipeline.weighing import Weighing, compare
 from weighbridge.report import write_report
 from weighbridge.report.information_section import (
     Manoeuvre,

@@ -16,7 +16,9 @@ from weighbridge.balance import force_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import uncalibrated_std
 from weighbridge.estimators.rls import estimate
-from weighbridge.pipeline.weighing import TRACK_COLUMNS, Weighing, empty_result, overload
+from weighbridge.pipeline.weighing import Weighing, overload
+from weighbridge.results.row import unread_row
+from weighbridge.results.weighing import TRACK_COLUMNS
 from weighbridge.signals import Signal
 from weighbridge.vehicle.model import Provenance
 
@@ -64,7 +66,7 @@ def test_fields_of_the_json(good):
 
 
 def test_a_failed_drive_has_the_same_fields():
-    failed = empty_result("d", "car", "rls", "why")
+    failed = unread_row("d", "car", "rls", "why").to_dict()
     assert set(failed) == FIELDS
     assert failed["status"] in set(Status)
 

@@ -20,8 +20,8 @@ from weighbridge.cli.terminal import shown as _shown
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from weighbridge.pipeline.calibrating import Calibration
     from weighbridge.pipeline.speed_calibrating import SpeedCalibration
+    from weighbridge.results.calibration import Calibration
 
 
 def calibrate(

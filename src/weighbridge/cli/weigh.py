@@ -36,6 +36,14 @@ def weigh(
         Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
     ],
     method: Annotated[str, typer.Option("--method", help=_METHODS)] = "joint",
+    changes: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            "--set",
+            help="Change a setting of the estimator, such as forgetting=0.999; repeat it for more.",
+            metavar="NAME=VALUE",
+        ),
+    ] = None,
     json_path: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option("--json", help="Write one JSON object per drive to a file, or - for here."),
@@ -61,6 +69,7 @@ def weigh(
     Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
     """
     from weighbridge.errors import ConfigError, WeighbridgeError
+    from weighbridge.estimators.settings import parsed
     from weighbridge.pipeline.given import mapping_of
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.whole import write_whole
@@ -72,11 +81,12 @@ def weigh(
     refuse_results(
         inputs(drives, vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
     )
+    settings = parsed(changes or [])
     weighed: list[Weighing] = []
     failed: list[tuple[Path, str]] = []
     for path in _progress(drives):
         try:
-            weighed.append(_weigh_one(path, chosen, dbc, car, method))
+            weighed.append(_weigh_one(path, chosen, dbc, car, method, settings))
         except WeighbridgeError as error:
             if len(drives) == 1:
                 raise
@@ -107,11 +117,16 @@ def weigh(
 
 
 def _weigh_one(
-    path: Path, mapping: Path | None, dbc: list[str] | None, car: Vehicle, method: str
+    path: Path,
+    mapping: Path | None,
+    dbc: list[str] | None,
+    car: Vehicle,
+    method: str,
+    settings: dict[str, object],
 ) -> Weighing:
     from weighbridge.pipeline.weighing import weigh as weigh_drive
 
-    return weigh_drive(load(path, mapping, dbc), car, method)
+    return weigh_drive(load(path, mapping, dbc), car, method, settings=settings)
 
 
 def _progress(drives: list[Path]) -> Any:
@@ -125,13 +140,10 @@ def _progress(drives: list[Path]) -> Any:
 
 def _failure(path: Path, why: str, car: Vehicle, method: str) -> str:
     """Write the JSON object of a drive that could not be read, with the fields of the others."""
-    import json
+    from weighbridge.results.row import unread_row
+    from weighbridge.visible import visible
 
-    from weighbridge.pipeline.weighing import empty_result
-    from weighbridge.visible import visible, visible_json
-
-    failed = empty_result(visible(path.name), car.name, method, why)
-    return visible_json(json.dumps(failed, ensure_ascii=False))
+    return unread_row(visible(path.name), car.name, method, why).to_json()
 
 
 def _show(

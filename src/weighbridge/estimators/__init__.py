@@ -1,11 +1,13 @@
 """Estimators of the mass, one per file, each with its paper."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 from weighbridge.balance import ForceBalance
+from weighbridge.errors import ConfigError
 from weighbridge.estimators import ekf, hybrid, joint, rls, robust_rls, speed_ekf
+from weighbridge.estimators.settings import changed
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.registry import Registry
 from weighbridge.vehicle.fits import JOINT, RLS, SPEED_EKF
@@ -42,9 +44,23 @@ class Estimator:
     reckons_fuel: bool = False
     slow_errors: bool = False
 
-    def track(self, balance: ForceBalance, vehicle: Vehicle) -> MassTrack:
-        """Estimate with the default settings."""
-        return self.estimate(balance, vehicle)
+    def settings_of(self, given: Mapping[str, object]) -> Any:
+        """Return settings with some values changed, see `weighbridge.estimators.settings.changed`.
+
+        Raises
+        ------
+        ConfigError
+            The method has no settings, a name is unknown or a value cannot be used.
+        """
+        if self.settings is None:
+            raise ConfigError(f"method {self.name} has no settings, got {', '.join(given)}")
+        return changed(self.settings(), given)
+
+    def track(self, balance: ForceBalance, vehicle: Vehicle, settings: Any = None) -> MassTrack:
+        """Estimate, with the default settings when None."""
+        if settings is None:
+            return self.estimate(balance, vehicle)
+        return self.estimate(balance, vehicle, settings)
 
 
 _ANY_TORQUE: Final = (RLS.name, JOINT.name)

@@ -17,9 +17,10 @@ import numpy as np
 from weighbridge.estimators.rls import estimate
 from weighbridge.navigation.select import find_motion
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
-from weighbridge.pipeline.calibrating import Calibration, CalibrationSettings, run_calibration
+from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
 from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.report.table import Table
+from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.units import scalar_from_si, scalar_to_si
 from weighbridge.simulation import MIDSIZE, make_scenario, simulate_car

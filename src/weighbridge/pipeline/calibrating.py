@@ -45,6 +45,7 @@ from weighbridge.pipeline.given import (
 from weighbridge.pipeline.joint_calibrating import NOT_TOLD, BalanceAt, JointProblem, noted, refine
 from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.pipeline.speed_calibrating import SpeedCalibration, calibrate_by_speed
+from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.classes import VehicleClass
@@ -106,26 +107,6 @@ class CalibrationSettings:
     def fit(self) -> Fit:
         """What is fitted."""
         return FITS[self.method]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Calibration:
-    """A calibrated vehicle and what it was made from, for the report.
-
-    Attributes
-    ----------
-    vehicle : the result
-    gears : ratios found; None where they were given
-    balances : of each drive, with the calibrated vehicle
-    fit : of the torque
-    rows : what was fitted
-    """
-
-    vehicle: Vehicle
-    gears: GearDetection | None
-    balances: tuple[ForceBalance, ...]
-    fit: TorqueFit
-    rows: TorqueRows
 
 
 def calibrate(

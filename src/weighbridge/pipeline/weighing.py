@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-from scipy.stats import t as student
-
-from weighbridge.balance import REASON_TEXT, ForceBalance, Reason, force_balance
+from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
 from weighbridge.balance.delay import clock_shift, estimate_torque_delay
 from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
-from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status, joint
+from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
+from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
 from weighbridge.estimators.changing import largest
 from weighbridge.estimators.foreign import of_another
 from weighbridge.estimators.judging import lacks_accelerometer
+from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
@@ -33,19 +31,14 @@ from weighbridge.pipeline.given import (
     home_of,
     mapping_of,
 )
-from weighbridge.pipeline.results import check_level, number, write_track
+from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
-from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
 from weighbridge.vehicle.torque import source_of
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
-from weighbridge.visible import visible_json
-
-if TYPE_CHECKING:
-    import polars as pl
 
 DEFAULT_METHOD = "joint"
 """Estimator used unless one is named."""
@@ -57,180 +50,11 @@ vehicle it differed by less than 0.1 s, and masses are 8 to 12 % light at 1 s.""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Weighing:
-    """The mass of one drive, how sure it is, and why.
-
-    Attributes
-    ----------
-    drive, vehicle : what it was made from
-    method : name of the estimator
-    status : `Status`
-    reason : why there is no mass, one sentence; empty where there is
-    result : the estimator's track; None where nothing could be estimated
-    warnings : what was mended or doubted, one sentence each
-    """
-
-    drive: Drive
-    vehicle: Vehicle
-    method: str
-    status: Status
-    reason: str
-    result: MassTrack | None
-    warnings: tuple[str, ...] = ()
-
-    def __repr__(self) -> str:
-        return in_lines(self._told())
-
-    def _repr_html_(self) -> str:
-        return in_html(self._told())
-
-    def _told(self) -> tuple[str, str, str]:
-        """What was weighed, the mass or why there is none, rows and warnings."""
-        head = f"Weighing of {self.drive.name!r} by {self.method}, vehicle {self.vehicle.name!r}"
-        low, high = self.interval()
-        mass = f"{self.status}: {self.reason}"
-        if math.isfinite(self.mass):
-            payload = f", payload {self.payload:.0f} kg" if math.isfinite(self.payload) else ""
-            mass = f"{self.mass:.0f} kg, {low:.0f} to {high:.0f} kg with 95 % probability{payload}"
-        used = f"{self.used_time:.0f} of {self.drive.duration:.0f} s used"
-        doubts = plural(len(self.warnings), "warning")
-        return head, mass, f"{used}; {doubts}{': ' + self.warnings[0] if self.warnings else ''}"
-
-    @property
-    def estimator(self) -> Estimator:
-        """What its method is."""
-        return ESTIMATORS[self.method]
-
-    @property
-    def mass(self) -> float:
-        """Mass [kg]; NaN where there is none."""
-        return self.result.mass if self.result and self.status is Status.CONVERGED else math.nan
-
-    @property
-    def std(self) -> float:
-        """Standard deviation of the mass [kg]; NaN where there is none."""
-        return self.result.std if self.result and self.status is Status.CONVERGED else math.nan
-
-    @property
-    def payload(self) -> float:
-        """Mass minus the vehicle's tare [kg]; NaN where either is unknown."""
-        return self.mass - self.vehicle.tare if self.vehicle.tare is not None else math.nan
-
-    def interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Interval that holds the mass with the probability ``level`` [kg].
-
-        Raises
-        ------
-        ConfigError
-            The level is not between 0 and 1.
-        """
-        check_level(level)
-        if self.result is None or not math.isfinite(self.mass):
-            return math.nan, math.nan
-        reach = float(student.ppf(0.5 + 0.5 * level, self.result.degrees_of_freedom)) * self.std
-        return self.mass - reach, self.mass + reach
-
-    @property
-    def used_time(self) -> float:
-        """Time of the rows the mass was made from [s]."""
-        if self.result is None or self.result.time.size < 2:
-            return 0.0
-        return float(np.count_nonzero(self.result.used) * np.median(np.diff(self.result.time)))
-
-    @property
-    def converged_at(self) -> float:
-        """Time from the start until the running mass stays at the result [s]; NaN if never."""
-        if self.result is None or self.status is not Status.CONVERGED:
-            return math.nan
-        return self.result.converged_at - self.drive.start
-
-    @property
-    def segments(self) -> tuple[Segment, ...]:
-        """Mass between stops, where load can change; NaN where the drive carries no mass."""
-        found = self.result.segments if self.result else ()
-        if self.status is not Status.CONVERGED:
-            return tuple(replace(s, mass=math.nan, std=math.nan) for s in found)
-        return found
-
-    @property
-    def load_changed(self) -> bool:
-        """Whether segments are loads told apart, not just legs of a drive."""
-        result = self.result
-        return self.estimator.segments_are_loads and result is not None and len(result.segments) > 1
-
-    @property
-    def track(self) -> pl.DataFrame:
-        """The mass over time with what it was made from, one row per force sample."""
-        import polars as pl
-
-        if self.result is None:
-            return pl.DataFrame(schema=dict.fromkeys(TRACK_COLUMNS, pl.Float64))
-        r, view = self.result, self.result.balance.merged
-        texts = np.array([REASON_TEXT[Reason(k)] for k in range(len(Reason))])
-        columns = (
-            r.time,
-            r.running_mass,
-            r.running_std,
-            r.used,
-            view.speed,
-            view.accel,
-            view.specific_force,
-            view.grade,
-            view.pitch,
-            view.gear,
-            view.traction_force,
-            texts[r.reason],
-        )
-        return pl.DataFrame(dict(zip(TRACK_COLUMNS, columns, strict=True)), nan_to_null=True)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what ``weigh --json`` prints: numbers, None where there is no mass."""
-        low, high = self.interval(0.95)
-        r = self.result
-        return {
-            "drive": self.drive.name,
-            "vehicle": self.vehicle.name,
-            "method": self.method,
-            "status": str(self.status),
-            "reason": self.reason,
-            "mass_kg": number(self.mass),
-            "std_kg": number(self.std),
-            "interval95_kg": [number(low), number(high)],
-            "payload_kg": number(self.payload),
-            "duration_s": number(self.drive.duration),
-            "used_s": number(self.used_time),
-            "converged_at_s": number(self.converged_at),
-            "bound_std_kg": number(r.bound_std) if r else None,
-            "segments": [
-                {
-                    "start_s": number(s.start),
-                    "end_s": number(s.end),
-                    "mass_kg": number(s.mass),
-                    "std_kg": number(s.std),
-                }
-                for s in self.segments
-            ],
-            "warnings": list(self.warnings),
-        }
-
-    def to_json(self) -> str:
-        """Return `to_dict` as one line of JSON."""
-        return visible_json(json.dumps(self.to_dict(), ensure_ascii=False))
-
-    def write_track(self, path: str | Path) -> None:
-        """Write the track as CSV or Parquet, by the suffix of ``path``.
-
-        Raises
-        ------
-        ConfigError
-            The suffix is neither.
-        """
-        write_track(self.track, path)
+class Weighing(MassResult):
+    """The mass of one drive, how sure it is, and why; shows itself, and other methods beside it."""
 
     def compare(self) -> tuple[Weighing, ...]:
-        """Weigh the same drive by every method, this one included."""
-        from weighbridge.pipeline.comparing import compare
-
+        """Weigh the same drive by every method, this one included, see `compare`."""
         return compare(self)
 
     def report(self, path: str | Path, *, compare: bool = False) -> None:
@@ -252,24 +76,13 @@ class Weighing:
         return mass_figure(self)
 
 
-TRACK_COLUMNS = (
-    "time_s",
-    "mass_kg",
-    "std_kg",
-    "used",
-    "speed_mps",
-    "accel_mps2",
-    "specific_force_mps2",
-    "grade_rad",
-    "pitch_rad",
-    "gear",
-    "traction_force_n",
-    "reason",
-)
-"""Columns of the track, as files carry them."""
-
-
-def weigh(drive: GivenDrive, vehicle: GivenVehicle, method: str = DEFAULT_METHOD) -> Weighing:
+def weigh(
+    drive: GivenDrive,
+    vehicle: GivenVehicle,
+    method: str = DEFAULT_METHOD,
+    *,
+    settings: Mapping[str, object] | None = None,
+) -> Weighing:
     """Weigh a vehicle from one drive.
 
     Parameters
@@ -278,6 +91,8 @@ def weigh(drive: GivenDrive, vehicle: GivenVehicle, method: str = DEFAULT_METHOD
         with the mapping that the vehicle file names
     vehicle : as of `calibrate` or `Vehicle.load`, or the path of a vehicle file
     method : name of an estimator in `weighbridge.estimators.ESTIMATORS`
+    settings : values of its settings that differ from their defaults, by name, such as
+        ``{"forgetting": 0.999}``; the settings class of the estimator lists them
 
     Returns
     -------
@@ -287,23 +102,27 @@ def weigh(drive: GivenDrive, vehicle: GivenVehicle, method: str = DEFAULT_METHOD
     Raises
     ------
     ConfigError
-        The method is not known.
+        The method is not known, or has no such setting.
     DriveError
         What the drive says cannot be so, such as a wrong unit.
     """
     if method not in ESTIMATORS:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
+    chosen = ESTIMATORS[method].settings_of(settings) if settings else None
 
     from weighbridge.checks import refuse_serious, settle_drive
 
     home, vehicle = home_of(vehicle), as_vehicle(vehicle)
     drive = settle_drive(as_drive(drive, mapping_of(vehicle, home)), vehicle)
     refuse_serious(drive.name, drive.problems)
-    return weigh_checked(drive, vehicle, method)
+    return weigh_checked(drive, vehicle, method, chosen)
 
 
-def weigh_checked(drive: Drive, vehicle: Vehicle, method: str) -> Weighing:
-    """Weigh as `weigh` does, from a drive that was checked and a known method."""
+def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = None) -> Weighing:
+    """Weigh as `weigh` does, from a drive that was checked and a known method.
+
+    ``settings`` are those of the estimator; its defaults when None.
+    """
     warnings = tuple(p.text for p in drive.problems)
     alone = ESTIMATORS[method].speed_alone
     if not alone:
@@ -319,7 +138,7 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str) -> Weighing:
         balance, notes = torque_balance(drive, vehicle)
         warnings += found + notes
         warnings += fitted_for_another(vehicle, method)
-    return weigh_balance(drive, vehicle, method, balance, warnings)
+    return weigh_balance(drive, vehicle, method, balance, warnings, settings=settings)
 
 
 def weigh_balance(
@@ -329,6 +148,7 @@ def weigh_balance(
     balance: ForceBalance,
     warnings: tuple[str, ...] = (),
     joined: MassTrack | None = None,
+    settings: Any = None,
 ) -> Weighing:
     """Weigh from forces and motion that are found already.
 
@@ -338,9 +158,12 @@ def weigh_balance(
     balance : forces and motion
     warnings : what is known of the drive
     joined : what ``joint`` makes of the balance, which judges the other methods; None to find it
+    settings : of the estimator; its defaults when None
     """
     estimator = ESTIMATORS[method]
-    result = estimator.track(balance, vehicle)
+    result = estimator.track(balance, vehicle, settings)
+    if settings is not None and (own := differences(settings)):
+        warnings += (f"{method} was run with {own}, not with its defaults",)
     if not estimator.speed_alone:
         warnings += uncalibrated(vehicle, result)
     status, reason = result.status, result.why
@@ -376,6 +199,7 @@ def weigh_balance(
         reason=reason,
         result=result,
         warnings=warnings + overload(vehicle, result) + below_tare(vehicle, result),
+        settings=settings,
     )
 
 
@@ -398,6 +222,41 @@ def without_mass(
         result=None,
         warnings=warnings,
     )
+
+
+def compare(weighing: Weighing) -> tuple[Weighing, ...]:
+    """Weigh a drive that has been weighed by one method by all the others too.
+
+    The drive is not checked again, and forces and motion, which cost most, are
+    taken over.
+
+    Parameters
+    ----------
+    weighing : of the drive, by any method
+
+    Returns
+    -------
+    One by each of `weighbridge.estimators.ESTIMATORS`, in their order; a method that could not be
+    tried says why
+    """
+    found: dict[str, Weighing] = {weighing.method: weighing}
+    for method in ESTIMATORS:
+        if method not in found:
+            joint = found.get(DEFAULT_METHOD)
+            found[method] = _by(weighing, method, joint.result if joint is not None else None)
+    return tuple(found[method] for method in ESTIMATORS)
+
+
+def _by(weighing: Weighing, method: str, joined: MassTrack | None) -> Weighing:
+    """Weigh by another method."""
+    drive, vehicle, done = weighing.drive, weighing.vehicle, weighing.result
+    try:
+        if done is None or weighing.estimator.speed_alone or ESTIMATORS[method].speed_alone:
+            return weigh_checked(drive, vehicle, method)
+        warnings = fitted_for_another(vehicle, method)
+        return weigh_balance(drive, vehicle, method, done.balance, warnings, joined)
+    except WeighbridgeError as error:
+        return without_mass(drive, vehicle, method, str(error))
 
 
 def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[str, ...]]:
@@ -516,27 +375,6 @@ def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
         f"the payload is {result.mass - tare:.0f} kg, which is below nothing: tank and driver's "
         f"seat are empty, or the tare of {tare:.0f} kg, the vehicle file or the torque is wrong",
     )
-
-
-def empty_result(drive: str, vehicle: str, method: str, reason: str) -> dict[str, Any]:
-    """Return `Weighing.to_dict` of a drive that could not be used at all."""
-    return {
-        "drive": drive,
-        "vehicle": vehicle,
-        "method": method,
-        "status": str(Status.INCONSISTENT),
-        "reason": reason,
-        "mass_kg": None,
-        "std_kg": None,
-        "interval95_kg": [None, None],
-        "payload_kg": None,
-        "duration_s": None,
-        "used_s": None,
-        "converged_at_s": None,
-        "bound_std_kg": None,
-        "segments": [],
-        "warnings": [],
-    }
 
 
 def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:

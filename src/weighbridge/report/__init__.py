@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-    from weighbridge.pipeline.calibrating import Calibration
-    from weighbridge.pipeline.weighing import Weighing
     from weighbridge.report.table import Table
+    from weighbridge.results.calibration import Calibration
+    from weighbridge.results.weighing import MassResult
 
 __all__ = ["mass_figure", "write_report"]
 
 
 def write_report(
-    weighings: Sequence[Weighing],
+    weighings: Sequence[MassResult],
     path: str | Path,
     *,
     calibration: Calibration | None = None,
     truth: Mapping[str, float] | None = None,
     title: str | None = None,
-    comparisons: Sequence[Sequence[Weighing]] | None = None,
+    comparisons: Sequence[Sequence[MassResult]] | None = None,
     tables: Sequence[Table] = (),
 ) -> None:
     """Write one self-contained HTML page for one or many drives.
@@ -37,7 +37,7 @@ def write_report(
         mass of its ``drive.toml`` serves
     title : heading of the page; made from the drives when None
     comparisons : for each of ``weighings`` the same drive by every method, as of
-        `Weighing.compare`, to show side by side; none when None
+        `weighbridge.compare`, to show side by side; none when None
     tables : to begin the page with
 
     Raises
@@ -59,7 +59,7 @@ def write_report(
     )
 
 
-def mass_figure(weighing: Weighing, *, truth: float | None = None) -> go.Figure:
+def mass_figure(weighing: MassResult, *, truth: float | None = None) -> go.Figure:
     """Return the mass with its band over time as a plotly figure.
 
     Parameters

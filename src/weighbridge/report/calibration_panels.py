@@ -14,7 +14,7 @@ from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.calibrating import Calibration
+    from weighbridge.results.calibration import Calibration
 
 GEAR_COLOURS = (BLUE, ORANGE, "#009e73", "#b0679b", VERMILLION, "#56b4e9", "#b3a24d", "#6b7a99")
 

@@ -18,7 +18,7 @@ from weighbridge.report.thinning import thin_line
 from weighbridge.signals import Floats
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.inertia import Inertia
+    from weighbridge.results.inertia import InertiaResult
 
 UNITS = ("kg", "kg m²", "kg m²")
 VELOCITIES = ("vertical velocity", "roll rate, right side down", "pitch rate, nose up")
@@ -139,7 +139,7 @@ def suspension_panel(check: SuspensionCheck | None) -> Panel:
     )
 
 
-def write_inertia(result: Inertia, path: Path) -> None:
+def write_inertia(result: InertiaResult, path: Path) -> None:
     """Write the page of one drive.
 
     Raises
@@ -164,7 +164,7 @@ def write_inertia(result: Inertia, path: Path) -> None:
     write_study(f"weighbridge: ride of {result.drive.name}", _tables(result), panels, path)
 
 
-def _tables(result: Inertia) -> list[Table]:
+def _tables(result: InertiaResult) -> list[Table]:
     found = result.status == "converged"
     low, high = result.intervals()
     ride = result.ride

@@ -33,7 +33,7 @@ from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.signals.units import scalar_from_si, scalar_to_si
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.weighing import MassResult
 
 SPEEDING_UP: Final = 0.15
 """Acceleration that counts as speeding up, and with a minus as slowing down [m/s^2]."""
@@ -198,7 +198,7 @@ def shift_times(view: MergedView) -> Floats:
     return np.asarray(view.time[known[1:]][np.diff(view.gear[known]) != 0])
 
 
-def information_section(weighing: Weighing) -> Section:
+def information_section(weighing: MassResult) -> Section:
     """Return which part of the drive told the mass."""
     key, title = "information", "What weighed this vehicle"
     result = weighing.result
@@ -240,7 +240,7 @@ def information_section(weighing: Weighing) -> Section:
     )
 
 
-def gain_panel(weighing: Weighing, result: MassTrack, gained: Gained) -> Panel:
+def gain_panel(weighing: MassResult, result: MassTrack, gained: Gained) -> Panel:
     """Information gained over time by manoeuvre, under what was known of the mass."""
     time = minutes(weighing.drive, gained.time)
     # Bars of whole minutes, so that the axis can be read.

@@ -16,7 +16,7 @@ from weighbridge.signals import Bools, Floats
 from weighbridge.signals.units import from_si
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.weighing import MassResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Positions:
         return Positions(time, east, north, speed)
 
 
-def positions(weighing: Weighing) -> Positions | None:
+def positions(weighing: MassResult) -> Positions | None:
     """Find where the vehicle was, from the motion or the recorded fixes; None if unknown."""
     if weighing.result is not None:
         motion = weighing.result.balance.motion

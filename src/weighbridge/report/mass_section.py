@@ -31,10 +31,10 @@ from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.weighing import MassResult
 
 
-def mass_section(weighing: Weighing, truth: float | None) -> Section:
+def mass_section(weighing: MassResult, truth: float | None) -> Section:
     """Return the mass over time and what was used for it."""
     panels = [mass_panel(weighing, truth), speed_panel(weighing)]
     alone = weighing.estimator.speed_alone
@@ -55,7 +55,7 @@ def mass_section(weighing: Weighing, truth: float | None) -> Section:
     return Section(key="mass", title="Mass over time", lead=lead, panels=tuple(panels))
 
 
-def mass_panel(weighing: Weighing, truth: float | None) -> Panel:
+def mass_panel(weighing: MassResult, truth: float | None) -> Panel:
     """Mass with its band over time."""
     result = weighing.result
     if result is None or not (result.used & np.isfinite(result.running_mass)).any():
@@ -107,7 +107,7 @@ def mass_panel(weighing: Weighing, truth: float | None) -> Panel:
     return Panel(title=title, caption=caption, figure=figure, wide=True)
 
 
-def speed_panel(weighing: Weighing) -> Panel:
+def speed_panel(weighing: MassResult) -> Panel:
     """Speed over time with used and excluded samples."""
     result = weighing.result
     figure = blank(TIME_AXIS, "Speed [km/h]", height=420)
@@ -155,11 +155,11 @@ def speed_panel(weighing: Weighing) -> Panel:
     )
 
 
-def _sample(weighing: Weighing) -> str:
+def _sample(weighing: MassResult) -> str:
     return "mean of the speed" if weighing.estimator.speed_alone else "force sample"
 
 
-def fit_panel(weighing: Weighing) -> Panel:
+def fit_panel(weighing: MassResult) -> Panel:
     """Force left for the mass against specific force, with the line of the answer."""
     title = "Force against specific force"
     result = weighing.result

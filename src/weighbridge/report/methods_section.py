@@ -27,7 +27,7 @@ from weighbridge.report.text import error, interval, kg, signed_kg
 from weighbridge.report.thinning import thin_line
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.weighing import MassResult
 
 METHOD_STYLE: Final[dict[str, tuple[str, str]]] = {
     "joint": (BLUE, "solid"),
@@ -51,7 +51,7 @@ def method_style(method: str) -> tuple[str, str]:
     return METHOD_STYLE.get(method, OTHER_STYLE)
 
 
-def methods_section(comparison: Sequence[Weighing], truth: float | None) -> Section:
+def methods_section(comparison: Sequence[MassResult], truth: float | None) -> Section:
     """Return every method's mass side by side.
 
     Parameters
@@ -78,7 +78,7 @@ def methods_section(comparison: Sequence[Weighing], truth: float | None) -> Sect
     )
 
 
-def _table(comparison: Sequence[Weighing], truth: float | None) -> Table:
+def _table(comparison: Sequence[MassResult], truth: float | None) -> Table:
     judged = truth is not None
     columns = ("method", "mass", "95 % interval", "payload", *(("error",) if judged else ()),
                "used", "why there is no mass")  # fmt: skip
@@ -92,7 +92,7 @@ def _table(comparison: Sequence[Weighing], truth: float | None) -> Table:
     return Table("", columns, tuple(rows))
 
 
-def interval_panel(comparison: Sequence[Weighing], truth: float | None) -> Panel:
+def interval_panel(comparison: Sequence[MassResult], truth: float | None) -> Panel:
     """Mass and 95 % interval of each method."""
     found = [w for w in comparison if math.isfinite(w.mass)]
     if not found:
@@ -124,7 +124,7 @@ def interval_panel(comparison: Sequence[Weighing], truth: float | None) -> Panel
     )
 
 
-def tracks_panel(comparison: Sequence[Weighing], truth: float | None) -> Panel:
+def tracks_panel(comparison: Sequence[MassResult], truth: float | None) -> Panel:
     """Running mass of each method over time."""
     figure = blank(TIME_AXIS, "Running mass [kg]", height=380)
     late: list[float] = []

@@ -38,8 +38,8 @@ from weighbridge.visible import shown_json, visible, visible_text
 from weighbridge.whole import write_whole
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.calibrating import Calibration
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.calibration import Calibration
+    from weighbridge.results.weighing import MassResult
 
 log = logging.getLogger(__name__)
 
@@ -135,13 +135,13 @@ class Page:
 
 
 def write_page(
-    weighings: Sequence[Weighing],
+    weighings: Sequence[MassResult],
     path: Path,
     *,
     calibration: Calibration | None,
     truth: Mapping[str, float],
     title: str | None,
-    comparisons: Sequence[Sequence[Weighing]],
+    comparisons: Sequence[Sequence[MassResult]],
     tables: Sequence[Table],
 ) -> None:
     """Write the page; see `weighbridge.report.write_report`."""
@@ -204,7 +204,7 @@ def write_document(heading: str, parts: Sequence[str], page: Page, path: Path) -
     write_whole(path, html)
 
 
-def _title(weighings: Sequence[Weighing]) -> str:
+def _title(weighings: Sequence[MassResult]) -> str:
     if not weighings:
         return "weighbridge: calibration"
     if len(weighings) == 1:
@@ -212,7 +212,7 @@ def _title(weighings: Sequence[Weighing]) -> str:
     return f"weighbridge: {len(weighings)} drives"
 
 
-def _truth(weighing: Weighing, truth: Mapping[str, float]) -> float | None:
+def _truth(weighing: MassResult, truth: Mapping[str, float]) -> float | None:
     """True mass at the end of the drive [kg].
 
     That of ``drive.toml`` is of its start: the fuel that some methods reckon with is taken off.
@@ -224,7 +224,7 @@ def _truth(weighing: Weighing, truth: Mapping[str, float]) -> float | None:
     return truth.get(weighing.drive.name, mass)
 
 
-def _summary(weighings: Sequence[Weighing], truth: Mapping[str, float]) -> str:
+def _summary(weighings: Sequence[MassResult], truth: Mapping[str, float]) -> str:
     """Table of all drives, with errors where any truth is known."""
     truths = [_truth(w, truth) for w in weighings]
     judged = any(t is not None for t in truths)
@@ -248,7 +248,7 @@ def _summary(weighings: Sequence[Weighing], truth: Mapping[str, float]) -> str:
 
 
 def drive_sections(
-    weighing: Weighing, known: float | None, comparison: Sequence[Weighing]
+    weighing: MassResult, known: float | None, comparison: Sequence[MassResult]
 ) -> tuple[Section, ...]:
     """Return the parts of a drive's report, in the order to show them.
 
@@ -268,7 +268,7 @@ def drive_sections(
     )
 
 
-def _drive(weighing: Weighing, known: float | None) -> str:
+def _drive(weighing: MassResult, known: float | None) -> str:
     """Answer, facts, warnings and segments of one drive."""
     body = _answer(weighing, known) + _facts(weighing, known)
     if weighing.warnings:
@@ -277,7 +277,7 @@ def _drive(weighing: Weighing, known: float | None) -> str:
     return body + _segments(weighing)
 
 
-def _folded(weighing: Weighing, body: str, *, opened: bool) -> str:
+def _folded(weighing: MassResult, body: str, *, opened: bool) -> str:
     """Put a drive of several under a heading that opens it."""
     brief = plus_minus(weighing) if _found(weighing) else STATUS_TEXT[weighing.status]
     return (
@@ -286,7 +286,7 @@ def _folded(weighing: Weighing, body: str, *, opened: bool) -> str:
     )
 
 
-def _answer(weighing: Weighing, known: float | None) -> str:
+def _answer(weighing: MassResult, known: float | None) -> str:
     if _found(weighing):
         html = (
             f'<p class="answer good">{plus_minus(weighing)} <small>95 % interval '
@@ -306,12 +306,12 @@ def _answer(weighing: Weighing, known: float | None) -> str:
     )
 
 
-def _remedy(weighing: Weighing) -> str:
+def _remedy(weighing: MassResult) -> str:
     texts = SPEED_REMEDY_TEXT if weighing.estimator.speed_alone else REMEDY_TEXT
     return texts[weighing.status]
 
 
-def _facts(weighing: Weighing, known: float | None) -> str:
+def _facts(weighing: MassResult, known: float | None) -> str:
     result = weighing.result
     unladen = weighing.vehicle.tare
     facts = [
@@ -335,7 +335,7 @@ def _facts(weighing: Weighing, known: float | None) -> str:
     return _list(facts)
 
 
-def _segments(weighing: Weighing) -> str:
+def _segments(weighing: MassResult) -> str:
     if len(weighing.segments) < 2:
         return ""
     start = weighing.drive.start
@@ -415,10 +415,10 @@ def _list(facts: Sequence[tuple[str, str]]) -> str:
     return f"<dl>{items}</dl>"
 
 
-def _found(weighing: Weighing) -> bool:
+def _found(weighing: MassResult) -> bool:
     return weighing.status is Status.CONVERGED and math.isfinite(weighing.mass)
 
 
-def _outcome(weighing: Weighing) -> str:
+def _outcome(weighing: MassResult) -> str:
     text = STATUS_TEXT[weighing.status]
     return f"{text} ({weighing.reason})" if weighing.reason else text

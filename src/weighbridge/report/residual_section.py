@@ -17,7 +17,7 @@ from weighbridge.signals import Bools, Floats
 from weighbridge.signals.units import from_si
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.weighing import MassResult
 
 POINTS: Final = 900
 """Points of each cloud."""
@@ -97,7 +97,7 @@ _AXES: Final = (
 )
 
 
-def residual_section(weighing: Weighing, comparison: Sequence[Weighing]) -> Section:
+def residual_section(weighing: MassResult, comparison: Sequence[MassResult]) -> Section:
     """Return residuals against speed, force, gear and heading.
 
     Parameters
@@ -121,7 +121,9 @@ def residual_section(weighing: Weighing, comparison: Sequence[Weighing]) -> Sect
     )
 
 
-def residual_panel(weighing: Weighing, comparison: Sequence[Weighing], against: _Against) -> Panel:
+def residual_panel(
+    weighing: MassResult, comparison: Sequence[MassResult], against: _Against
+) -> Panel:
     """Draw the cloud of one method with its mean and spread, and the means of the others."""
     title = f"Residual over {against.name}"
     result = weighing.result

@@ -25,13 +25,13 @@ from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.weighing import MassResult
 
 SLOPE_BASE = 200.0
 """Length over which the slope of the recorded altitude is taken [m]."""
 
 
-def road_section(weighing: Weighing) -> Section:
+def road_section(weighing: MassResult) -> Section:
     """Return map, grade and altitude."""
     panels = [map_panel(weighing)]
     if weighing.result is not None:
@@ -45,7 +45,7 @@ def road_section(weighing: Weighing) -> Section:
     )
 
 
-def map_panel(weighing: Weighing) -> Panel:
+def map_panel(weighing: MassResult) -> Panel:
     """Track of the drive in local kilometres, coloured by speed."""
     title = "Map of the drive"
     found = positions(weighing)
@@ -99,7 +99,7 @@ def grade_panel(result: MassTrack) -> Panel:
     )
 
 
-def pitch_panel(weighing: Weighing, result: MassTrack) -> Panel:
+def pitch_panel(weighing: MassResult, result: MassTrack) -> Panel:
     """Pitch of the body and grade against the altitude profile."""
     title = "Pitch against altitude"
     motion = result.balance.motion

@@ -30,7 +30,7 @@ from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.signals.units import from_si, scalar_from_si
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.weighing import MassResult
 
 ARROWS: Final = 26
 """Arrows of wind along a drive."""
@@ -100,7 +100,7 @@ def wind_at_vehicle(slow: SlowErrors, drive: Drive) -> Wind:
     )
 
 
-def slow_section(weighing: Weighing) -> Section:
+def slow_section(weighing: MassResult) -> Section:
     """Return disturbance, slow resistance and wind, over time and on the map."""
     key, title = "slow", "Disturbance and wind"
     result = weighing.result
@@ -163,7 +163,7 @@ def constants_table(slow: SlowErrors) -> Table | None:
     return Table("", ("The same all along", "found", "± standard deviation", "unit"), rows)
 
 
-def force_panel(weighing: Weighing, what: str, causes: str, force: Floats, std: Floats) -> Panel:
+def force_panel(weighing: MassResult, what: str, causes: str, force: Floats, std: Floats) -> Panel:
     """Draw a force over time with its band."""
     assert weighing.result is not None
     assert weighing.result.slow_errors is not None
@@ -183,7 +183,7 @@ def force_panel(weighing: Weighing, what: str, causes: str, force: Floats, std: 
     )
 
 
-def wind_panel(weighing: Weighing, wind: Wind, blind: bool) -> Panel:
+def wind_panel(weighing: MassResult, wind: Wind, blind: bool) -> Panel:
     """Draw both components of the wind over time with their bands."""
     if blind:
         return Panel(
@@ -217,7 +217,7 @@ def wind_panel(weighing: Weighing, wind: Wind, blind: bool) -> Panel:
     )
 
 
-def disturbance_map(weighing: Weighing, slow: SlowErrors) -> Panel:
+def disturbance_map(weighing: MassResult, slow: SlowErrors) -> Panel:
     """Draw where the disturbance was."""
     track = positions(weighing)
     if track is None:
@@ -238,7 +238,7 @@ def disturbance_map(weighing: Weighing, slow: SlowErrors) -> Panel:
     )
 
 
-def wind_map(weighing: Weighing, wind: Wind, blind: bool) -> Panel:
+def wind_map(weighing: MassResult, wind: Wind, blind: bool) -> Panel:
     """Draw the wind where the drive told it."""
     title = "Wind on the map"
     track = positions(weighing)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from weighbridge.signals.units import scalar_from_si
 
 if TYPE_CHECKING:
-    from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.weighing import MassResult
 
 NOTHING: Final = "–"
 """Where there is no number."""
@@ -24,13 +24,13 @@ def signed_kg(mass: float) -> str:
     return f"{mass:+.0f} kg".replace("-", "−") if math.isfinite(mass) else NOTHING
 
 
-def interval(weighing: Weighing) -> str:
+def interval(weighing: MassResult) -> str:
     """Print the 95 % interval."""
     low, high = weighing.interval(0.95)
     return f"{low:.0f} to {high:.0f} kg" if math.isfinite(high - low) else NOTHING
 
 
-def plus_minus(weighing: Weighing) -> str:
+def plus_minus(weighing: MassResult) -> str:
     """Print the mass with half its 95 % interval."""
     low, high = weighing.interval(0.95)
     if not math.isfinite(high - low):

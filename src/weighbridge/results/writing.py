@@ -1,4 +1,4 @@
-"""How results leave the pipeline: numbers for JSON, tables for files."""
+"""How results are written: numbers for JSON, tables for files."""
 
 from __future__ import annotations
 

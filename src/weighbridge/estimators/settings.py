@@ -1,0 +1,110 @@
+"""Settings of an estimator by their names: from a keyword, a text or a command's option."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from weighbridge.errors import ConfigError
+from weighbridge.signals.shown import type_name
+
+
+def changed(settings: Any, given: Mapping[str, object]) -> Any:
+    """Return settings with some values changed; they check themselves.
+
+    Parameters
+    ----------
+    settings : a frozen dataclass of numbers, switches, tuples of numbers and settings within
+    given : new values by name; ``ekf.start.threshold`` names one of settings within
+
+    Raises
+    ------
+    ConfigError
+        A name is unknown, or a value is of another type or out of its range.
+    """
+    for name, value in given.items():
+        settings = _with(settings, name, name.split("."), value)
+    return settings
+
+
+def differences(settings: Any) -> str:
+    """Name what differs from the defaults: ``forgetting = 0.999``; empty where nothing does."""
+    usual = _values(type(settings)())
+    return ", ".join(f"{k} = {v}" for k, v in _values(settings).items() if v != usual[k])
+
+
+def parsed(texts: Sequence[str]) -> dict[str, object]:
+    """Read values as a command has them: ``name=value``, the value as in TOML.
+
+    Raises
+    ------
+    ConfigError
+        A text is not of that form, or a name stands twice.
+    """
+    found: dict[str, object] = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value) or "\n" in value:
+            raise ConfigError(f"{text!r}: write NAME=VALUE, such as forgetting=0.999")
+        if name in found:
+            raise ConfigError(f"{name} is set twice; give it once")
+        try:
+            found[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            raise ConfigError(
+                f"{text!r}: a number, true, false or [numbers] is expected after ="
+            ) from None
+    return found
+
+
+def _with(settings: Any, whole: str, path: list[str], value: object) -> Any:
+    first, *rest = path
+    known = [f.name for f in dataclasses.fields(settings)]
+    if first not in known:
+        raise ConfigError(
+            f"there is no setting {whole!r}; known are {', '.join(_values(settings))}"
+        )
+    old = getattr(settings, first)
+    if dataclasses.is_dataclass(old) and rest:
+        return dataclasses.replace(settings, **{first: _with(old, whole, rest, value)})
+    if rest:
+        raise ConfigError(f"setting {first} has none within, got {whole!r}")
+    return dataclasses.replace(settings, **{first: _like(old, whole, value)})
+
+
+def _values(settings: Any, before: str = "") -> dict[str, Any]:
+    """Every setting by its whole name, those within settings too."""
+    found: dict[str, Any] = {}
+    for field in dataclasses.fields(settings):
+        value = getattr(settings, field.name)
+        if dataclasses.is_dataclass(value):
+            found |= _values(value, f"{before}{field.name}.")
+        else:
+            found[before + field.name] = value
+    return found
+
+
+def _like(old: Any, name: str, value: Any) -> Any:
+    """Return a value of the type of the one it replaces."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if isinstance(old, bool):
+        fits, wanted = isinstance(value, bool), "true or false"
+    elif isinstance(old, int):
+        fits, wanted = number and value == int(value), "a whole number"
+        value = int(value) if fits else value
+    elif isinstance(old, tuple):
+        fits = isinstance(value, list | tuple) and len(value) == len(old)
+        fits = fits and all(isinstance(v, int | float) for v in value)
+        wanted = f"{len(old)} numbers in brackets"
+        value = tuple(map(float, value)) if fits else value
+    elif dataclasses.is_dataclass(old):
+        fits, wanted = isinstance(value, type(old)), f"one of {', '.join(_values(old, f'{name}.'))}"
+    else:
+        fits, wanted = number, "a number"
+        value = float(value) if fits else value
+    if not fits:
+        got = repr(value) if isinstance(value, int | float | str) else type_name(value)
+        raise ConfigError(f"setting {name} takes {wanted}, got {got}")
+    return value

@@ -1,0 +1,1 @@
+"""What comes out: masses, inertias and calibrations, and how they are written."""

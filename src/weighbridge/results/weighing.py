@@ -1,0 +1,207 @@
+"""The mass of one drive, as data: what report, tables and commands read."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from scipy.stats import t as student
+
+from weighbridge.balance import REASON_TEXT, Reason
+from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status
+from weighbridge.results.row import WeighingRow
+from weighbridge.results.writing import check_level, write_track
+from weighbridge.signals import Drive
+from weighbridge.signals.shown import in_html, in_lines, plural
+from weighbridge.vehicle.model import Vehicle
+
+if TYPE_CHECKING:
+    import polars as pl
+
+TRACK_COLUMNS: Final = (
+    "time_s",
+    "mass_kg",
+    "std_kg",
+    "used",
+    "speed_mps",
+    "accel_mps2",
+    "specific_force_mps2",
+    "grade_rad",
+    "pitch_rad",
+    "gear",
+    "traction_force_n",
+    "reason",
+)
+"""Columns of the track, as files carry them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class MassResult:
+    """The mass of one drive, how sure it is, and why.
+
+    Attributes
+    ----------
+    drive, vehicle : what it was made from
+    method : name of the estimator
+    status : `Status`
+    reason : why there is no mass, one sentence; empty where there is
+    result : the estimator's track; None where nothing could be estimated
+    warnings : what was mended or doubted, one sentence each
+    settings : of the estimator; None for its defaults
+    """
+
+    drive: Drive
+    vehicle: Vehicle
+    method: str
+    status: Status
+    reason: str
+    result: MassTrack | None
+    warnings: tuple[str, ...] = ()
+    settings: object | None = None
+
+    def __repr__(self) -> str:
+        return in_lines(self._told())
+
+    def _repr_html_(self) -> str:
+        return in_html(self._told())
+
+    def _told(self) -> tuple[str, str, str]:
+        """What was weighed, the mass or why there is none, rows and warnings."""
+        head = f"Weighing of {self.drive.name!r} by {self.method}, vehicle {self.vehicle.name!r}"
+        low, high = self.interval()
+        mass = f"{self.status}: {self.reason}"
+        if math.isfinite(self.mass):
+            payload = f", payload {self.payload:.0f} kg" if math.isfinite(self.payload) else ""
+            mass = f"{self.mass:.0f} kg, {low:.0f} to {high:.0f} kg with 95 % probability{payload}"
+        used = f"{self.used_time:.0f} of {self.drive.duration:.0f} s used"
+        doubts = plural(len(self.warnings), "warning")
+        return head, mass, f"{used}; {doubts}{': ' + self.warnings[0] if self.warnings else ''}"
+
+    @property
+    def estimator(self) -> Estimator:
+        """What its method is."""
+        return ESTIMATORS[self.method]
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]; NaN where there is none."""
+        return self.result.mass if self.result and self.status is Status.CONVERGED else math.nan
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the mass [kg]; NaN where there is none."""
+        return self.result.std if self.result and self.status is Status.CONVERGED else math.nan
+
+    @property
+    def payload(self) -> float:
+        """Mass minus the vehicle's tare [kg]; NaN where either is unknown."""
+        return self.mass - self.vehicle.tare if self.vehicle.tare is not None else math.nan
+
+    def interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Interval that holds the mass with the probability ``level`` [kg].
+
+        Raises
+        ------
+        ConfigError
+            The level is not between 0 and 1.
+        """
+        check_level(level)
+        if self.result is None or not math.isfinite(self.mass):
+            return math.nan, math.nan
+        reach = float(student.ppf(0.5 + 0.5 * level, self.result.degrees_of_freedom)) * self.std
+        return self.mass - reach, self.mass + reach
+
+    @property
+    def used_time(self) -> float:
+        """Time of the rows the mass was made from [s]."""
+        if self.result is None or self.result.time.size < 2:
+            return 0.0
+        return float(np.count_nonzero(self.result.used) * np.median(np.diff(self.result.time)))
+
+    @property
+    def converged_at(self) -> float:
+        """Time from the start until the running mass stays at the result [s]; NaN if never."""
+        if self.result is None or self.status is not Status.CONVERGED:
+            return math.nan
+        return self.result.converged_at - self.drive.start
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """Mass between stops, where load can change; NaN where the drive carries no mass."""
+        found = self.result.segments if self.result else ()
+        if self.status is not Status.CONVERGED:
+            return tuple(replace(s, mass=math.nan, std=math.nan) for s in found)
+        return found
+
+    @property
+    def load_changed(self) -> bool:
+        """Whether segments are loads told apart, not just legs of a drive."""
+        result = self.result
+        return self.estimator.segments_are_loads and result is not None and len(result.segments) > 1
+
+    @property
+    def track(self) -> pl.DataFrame:
+        """The mass over time with what it was made from, one row per force sample."""
+        import polars as pl
+
+        if self.result is None:
+            return pl.DataFrame(schema=dict.fromkeys(TRACK_COLUMNS, pl.Float64))
+        r, view = self.result, self.result.balance.merged
+        texts = np.array([REASON_TEXT[Reason(k)] for k in range(len(Reason))])
+        columns = (
+            r.time,
+            r.running_mass,
+            r.running_std,
+            r.used,
+            view.speed,
+            view.accel,
+            view.specific_force,
+            view.grade,
+            view.pitch,
+            view.gear,
+            view.traction_force,
+            texts[r.reason],
+        )
+        return pl.DataFrame(dict(zip(TRACK_COLUMNS, columns, strict=True)), nan_to_null=True)
+
+    @property
+    def row(self) -> WeighingRow:
+        """The answer without arrays: to keep, to send, to collect by the thousand."""
+        return WeighingRow(
+            drive=self.drive.name,
+            vehicle=self.vehicle.name,
+            method=self.method,
+            status=self.status,
+            reason=self.reason,
+            mass=self.mass,
+            std=self.std,
+            interval=self.interval(0.95),
+            payload=self.payload,
+            duration=self.drive.duration,
+            used_time=self.used_time,
+            converged_at=self.converged_at,
+            bound_std=self.result.bound_std if self.result else math.nan,
+            segments=self.segments,
+            warnings=self.warnings,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what ``weigh --json`` prints: numbers, None where there is no mass."""
+        return self.row.to_dict()
+
+    def to_json(self) -> str:
+        """Return `to_dict` as one line of JSON."""
+        return self.row.to_json()
+
+    def write_track(self, path: str | Path) -> None:
+        """Write the track as CSV or Parquet, by the suffix of ``path``.
+
+        Raises
+        ------
+        ConfigError
+            The suffix is neither.
+        """
+        write_track(self.track, path)

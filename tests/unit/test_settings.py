@@ -1,0 +1,77 @@
+"""Settings of estimators by name: in Python, as text, in a weighing."""
+
+import pytest
+
+import weighbridge as wb
+from weighbridge.errors import ConfigError
+from weighbridge.estimators import ESTIMATORS
+from weighbridge.estimators.settings import differences, parsed
+from weighbridge.simulation import make_scenario, simulate_car
+
+
+def test_settings_within_settings_are_reached_by_dots():
+    hybrid = ESTIMATORS["hybrid"].settings_of(
+        {"blend_speed": 8, "ekf.gate": 4.0, "ekf.start.count_grade_twice": True}
+    )
+    assert (hybrid.blend_speed, hybrid.ekf.gate) == (8.0, 4.0)
+    assert isinstance(hybrid.blend_speed, float)
+    assert hybrid.ekf.start.count_grade_twice is True
+    assert hybrid.blend_width == 1.0
+    assert differences(hybrid) == (
+        "ekf.start.count_grade_twice = True, ekf.gate = 4.0, blend_speed = 8.0"
+    )
+    assert differences(ESTIMATORS["rls"].settings_of({})) == ""
+
+
+@pytest.mark.parametrize(
+    ("method", "given", "said"),
+    [
+        ("joint", {"gate": 5.0}, "method joint has no settings, got gate"),
+        ("rls", {"lambda": 0.99}, "no setting 'lambda'; known are forgetting, initial_mass"),
+        ("rls", {"forgetting": 0.5}, r"forgetting must be in \(0.9, 1\], got 0.5"),
+        ("rls", {"forgetting": "fast"}, "forgetting takes a number, got 'fast'"),
+        ("rls", {"settle_rows": 1.5}, "settle_rows takes a whole number, got 1.5"),
+        ("rls", {"gate.inner": 1.0}, "setting gate has none within"),
+        ("hybrid", {"ekf": 3.0}, "ekf takes one of ekf.start.window"),
+        ("hybrid", {"ekf.start.count_grade_twice": 1}, "takes true or false, got 1"),
+        ("speed-ekf", {"process_var": [1.0, 2.0]}, "takes 3 numbers in brackets, got list"),
+    ],
+)
+def test_what_cannot_be_set_is_one_sentence(method, given, said):
+    with pytest.raises(ConfigError, match=said):
+        ESTIMATORS[method].settings_of(given)
+
+
+def test_texts_are_read_as_toml():
+    assert parsed(["forgetting=0.999", "a.b = true", "process_var=[0.1, 1e-12, 5e-3]"]) == {
+        "forgetting": 0.999,
+        "a.b": True,
+        "process_var": [0.1, 1e-12, 5e-3],
+    }
+
+
+@pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=five", "gate=1\nmass=2"])
+def test_a_text_of_another_form_is_one_sentence(text):
+    with pytest.raises(ConfigError, match=r"write NAME=VALUE|is expected after =") as refused:
+        parsed([text])
+    assert "\n" not in str(refused.value)
+
+
+def test_a_name_twice_is_refused():
+    with pytest.raises(ConfigError, match="gate is set twice"):
+        parsed(["gate=1", "gate=2"])
+
+
+def test_a_weighing_uses_them_and_says_so():
+    known = simulate_car(make_scenario("car-calibration", seed=71, without=("warm_up",)))
+    loaded = simulate_car(make_scenario("car-short", payload=200.0, seed=72, without=("warm_up",)))
+    car = wb.calibrate(known.drive, float(known.truth.mass[0]))
+    usual = wb.weigh(loaded.drive, car, "rls")
+    quick = wb.weigh(loaded.drive, car, "rls", settings={"forgetting": 0.99})
+    assert usual.settings is None
+    assert quick.settings.forgetting == 0.99
+    assert "rls was run with forgetting = 0.99, not with its defaults" in quick.warnings
+    assert not any("defaults" in text for text in usual.warnings)
+    # A shorter memory follows noise: the running mass moves more.
+    moved = [w.track["mass_kg"].drop_nulls().diff().abs().mean() for w in (usual, quick)]
+    assert moved[1] > 2.0 * moved[0]
