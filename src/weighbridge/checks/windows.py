@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
+from weighbridge.constants import EARTH_RADIUS
 from weighbridge.signals import Bools, Drive, Floats, Signal
-
-EARTH_RADIUS: Final = 6_371_000.0
-"""Mean radius [m]; good to 0.5 %, enough to tell units apart."""
 
 
 def edges(start: float, end: float, length: float) -> Floats:

@@ -6,19 +6,16 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.constants import PETROL_STOICHIOMETRIC_RATIO
+from weighbridge.constants import PETROL_HEATING_VALUE, PETROL_STOICHIOMETRIC_RATIO
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.model import Vehicle
 
 DENSITY: Final = 790.0
 """Of fuel [kg/m^3]: the middle of petrol, 720 to 775 (EN 228), and diesel, 820 to 845 (EN 590)."""
 
-HEATING_VALUE: Final = 43.0e6
-"""Lower heating value of petrol and diesel [J/kg] (Heywood, Internal Combustion Engine
-Fundamentals, 1988, app. D)."""
-
-INDICATED_EFFICIENCY: Final = 0.38
-"""Work on the pistons over the energy of the fuel [-] (Heywood 1988, ch. 5 and 15)."""
+INDICATED_EFFICIENCY: Final = 0.36
+"""Work on the pistons over the energy of the fuel by `PETROL_HEATING_VALUE` [-]: 0.38 (Heywood,
+Internal Combustion Engine Fundamentals, 1988, ch. 5 and 15) by the lower 43 MJ/kg of his app. D."""
 
 FRICTION: Final = 0.1
 """Friction torque of a warm engine over its torque at full load [-] (Heywood 1988, ch. 13)."""
@@ -74,4 +71,4 @@ def _by_work(torque: Floats, engine_speed: Floats) -> Floats:
     full = max(float(np.percentile(known, 98.0)), 0.0)
     indicated = np.nan_to_num(torque) + FRICTION * full
     power = np.maximum(indicated, 0.0) * np.maximum(np.nan_to_num(engine_speed), 0.0)
-    return np.asarray(power / (INDICATED_EFFICIENCY * HEATING_VALUE))
+    return np.asarray(power / (INDICATED_EFFICIENCY * PETROL_HEATING_VALUE))
