@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from tests.recipes import code, entry_points
 
 import weighbridge as wb
 from weighbridge.errors import ConfigError
@@ -10,34 +11,6 @@ from weighbridge.estimators import ESTIMATORS
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
-
-SOURCE = '''
-"""Torque from the fuel rate."""
-
-from weighbridge.vehicle.torque_sources import ROUGH_TERMS, TorqueSource
-
-
-def reading(drive, time, _):
-    speed = drive.signals["engine_speed"].at(time)
-    return 43.0e6 * 745.0 * drive.signals["fuel_rate"].at(time) * 0.35 / speed.clip(min=50.0)
-
-
-fuel = TorqueSource(
-    name="fuel",
-    signals=("fuel_rate", "engine_speed"),
-    reading=reading,
-    signed=False,
-    floor=lambda _: 1.0,
-    title="fuel rate",
-    words="fuel rate and a usual efficiency",
-    axis="Torque from fuel [N m]",
-    terms=ROUGH_TERMS,
-    scale_std=0.1,
-    transfer_std=0.02,
-    cold_std=0.05,
-    cold_torque_std=0.04,
-)
-'''
 
 CLASS = '''
 """Three-wheeled goods carriers."""
@@ -66,47 +39,15 @@ rickshaw = VehicleClass(
 )
 '''
 
-ESTIMATOR = '''
-"""Median of force over specific force."""
-
-import numpy as np
-
-from weighbridge.estimators import Estimator, MassTrack, Status
-from weighbridge.estimators.regression import regression
-
-
-def estimate(balance, vehicle):
-    phi, y = regression(balance.merged, vehicle)
-    used = balance.merged.usable & np.isfinite(phi) & np.isfinite(y) & (phi > 0.5)
-    ratio = y[used] / phi[used]
-    mass = float(np.median(ratio))
-    many = max(np.count_nonzero(used) / 100.0, 1.0)
-    std = float(1.48 * np.median(np.abs(ratio - mass)) / np.sqrt(many))
-    reason = balance.merged.reason.copy()
-    reason[(reason == 0) & ~used] = 9
-    every = np.full(used.size, mass)
-    return MassTrack(
-        method="median", balance=balance, running_mass=every, running_std=0.0 * every + std,
-        residual=np.where(used, y - phi * mass, np.nan), reason=reason, mass=mass, std=std,
-        degrees_of_freedom=float("inf"), bound_std=std, converged_at=float("nan"),
-        status=Status.CONVERGED, why="", segments=(),
-    )
-
-
-median = Estimator(name="median", estimate=estimate, fits=("rls", "joint"))
-'''
-
-POINTS = """
-[weighbridge.torque_sources]
-fuel = fuel_source:fuel
-[weighbridge.vehicle_classes]
-rickshaw = rickshaw_class:rickshaw
-[weighbridge.estimators]
-median = median_estimator:median
-"""
-
-FILES = {"fuel_source": SOURCE, "rickshaw_class": CLASS, "median_estimator": ESTIMATOR}
-
+FILES = {
+    "fuel_source": code("fuel_source.py"),
+    "rickshaw_class": CLASS,
+    "median_estimator": code("median_estimator.py"),
+}
+POINTS = {
+    **entry_points(),
+    "weighbridge.vehicle_classes": "rickshaw = rickshaw_class:rickshaw",
+}
 
 TABLES = (TORQUE_SOURCES, VEHICLE_CLASSES, ESTIMATORS)
 
@@ -114,12 +55,14 @@ TABLES = (TORQUE_SOURCES, VEHICLE_CLASSES, ESTIMATORS)
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """Install a distribution: three modules, one line each."""
-    for name, code in FILES.items():
-        (tmp_path / f"{name}.py").write_text(code)
+    for name, text in FILES.items():
+        (tmp_path / f"{name}.py").write_text(text)
     info = tmp_path / "weighbridge_more-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: weighbridge-more\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(POINTS)
+    (info / "entry_points.txt").write_text(
+        "".join(f"[{group}]\n{line}\n" for group, line in POINTS.items() if "formats" not in group)
+    )
     monkeypatch.syspath_prepend(tmp_path)
     for table in TABLES:
         monkeypatch.setattr(table, "_all", None)
@@ -157,7 +100,9 @@ def test_a_package_adds_source_class_and_estimator(package, tmp_path):
     alone = wb.weigh(loaded.drive, cart, method="median")
     # It knows nothing of wind and of the errors of the grade.
     assert alone.mass == pytest.approx(truth, rel=0.08)
-    every = {w.method: w for w in weighed.compare()}
+    few = wb.weigh(loaded.drive, cart, method="median", settings={"least": 1.0})
+    assert few.result.used.sum() < alone.result.used.sum()
+    every = {w.method: w for w in wb.compare(weighed)}
     assert list(every)[-1] == "median"
     assert every["median"].mass == alone.mass
     weighed.report(tmp_path / "report.html", compare=True)

@@ -4,37 +4,14 @@ import sys
 
 import pytest
 from numpy.testing import assert_allclose
+from tests.recipes import code, entry_points
 
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.io.formats import formats
 
-READER = """
-import numpy as np
-
-from weighbridge.io import Format, Takes
-from weighbridge.io.log import Log
-from weighbridge.signals.cleaning import clean_columns
-
-
-def read(path, table, mapping):
-    rows = np.array([line.split("!") for line in path.read_text().split()], float)
-    log = Log(path)
-    log.signals, log.problems = clean_columns(
-        rows[:, 0], [("vehicle_speed", rows[:, 1])], path.name
-    )
-    return log
-
-
-FORMAT = Format(
-    name="Bang",
-    suffixes=(".bang",),
-    read=read,
-    about="the speed, after an exclamation mark",
-    takes=Takes.CLOCK,
-)
-"""
-LINE = "bang = bang_logs:{name}\n"
+READER = code("bang_logs.py")
+LINE = entry_points()["weighbridge.formats"].replace("FORMAT", "{name}")
 
 
 @pytest.fixture
