@@ -63,12 +63,12 @@ class MassResult:
     settings: object | None = None
 
     def __repr__(self) -> str:
-        return in_lines(self._told())
+        return in_lines(self._summary())
 
     def _repr_html_(self) -> str:
-        return in_html(self._told())
+        return in_html(self._summary())
 
-    def _told(self) -> tuple[str, str, str]:
+    def _summary(self) -> tuple[str, str, str]:
         """What was weighed, the mass or why there is none, rows and warnings."""
         head = f"Weighing of {self.drive.name!r} by {self.method}, vehicle {self.vehicle.name!r}"
         low, high = self.interval()

@@ -85,12 +85,12 @@ class Drive:
         return [name for name in names if name not in self.signals]
 
     def __repr__(self) -> str:
-        return in_lines(self._told())
+        return in_lines(self._summary())
 
     def _repr_html_(self) -> str:
-        return in_html(self._told())
+        return in_html(self._summary())
 
-    def _told(self) -> tuple[str, str, str]:
+    def _summary(self) -> tuple[str, str, str]:
         """Name and length, signals with their rates, problems."""
         rates: dict[str, list[str]] = {}
         for s in self.signals.values():

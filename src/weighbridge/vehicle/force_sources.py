@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.signals import Drive, Floats, Signal
-from weighbridge.vehicle.torque_source import TOLD, TorqueConstants
+from weighbridge.vehicle.torque_source import REPORTED, TorqueConstants
 
 SLOWEST: Final = 1.0
 """Slower than this a power says nothing of a force [m/s]."""
@@ -167,7 +167,7 @@ def _per_distance(radius: float) -> float:
     return 1.0
 
 
-WHEEL_TORQUE: Final = TOLD(
+WHEEL_TORQUE: Final = REPORTED(
     name="wheel_torque",
     signals=("wheel_torque",),
     others=(
@@ -190,7 +190,7 @@ WHEEL_TORQUE: Final = TOLD(
     cold_torque_std=0.005,
 )
 
-TRACTION_FORCE: Final = TOLD(
+TRACTION_FORCE: Final = REPORTED(
     name="traction_force",
     signals=("traction_force",),
     gearing=_per_distance,
@@ -203,7 +203,7 @@ TRACTION_FORCE: Final = TOLD(
     cold_torque_std=0.005,
 )
 
-POWER: Final = TOLD(
+POWER: Final = REPORTED(
     name="power",
     signals=("engine_power", "engine_speed"),
     reading=_power,
@@ -213,7 +213,7 @@ POWER: Final = TOLD(
     motor_scale_std=0.03,
 )
 
-POWER_BY_SPEED: Final = TOLD(
+POWER_BY_SPEED: Final = REPORTED(
     name="power_by_speed",
     signals=("engine_power", "vehicle_speed"),
     others=(("engine_power", "gnss_speed"),),
@@ -227,7 +227,7 @@ POWER_BY_SPEED: Final = TOLD(
     motor_scale_std=0.03,
 )
 
-BATTERY: Final = TOLD(
+BATTERY: Final = REPORTED(
     name="battery",
     signals=("battery_current", "battery_voltage", "vehicle_speed"),
     others=(("battery_current", "battery_voltage", "gnss_speed"),),

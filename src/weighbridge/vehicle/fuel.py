@@ -50,8 +50,8 @@ def fuel_burnt(
     if rate is not None and len(rate):
         flow = DENSITY * _near(rate, time)
     elif air is not None and len(air) and ratio is not None and len(ratio):
-        lean = np.maximum(_near(ratio, time), 0.5)
-        flow = _near(air, time) / (PETROL_STOICHIOMETRIC_RATIO * lean)
+        equivalence_ratio = np.maximum(_near(ratio, time), 0.5)
+        flow = _near(air, time) / (PETROL_STOICHIOMETRIC_RATIO * equivalence_ratio)
     flow = np.where(np.isfinite(flow), flow, _by_work(torque, engine_speed))
     span = np.clip(np.diff(time), 0.0, SEEN)
     middle = 0.5 * (flow[1:] + flow[:-1])

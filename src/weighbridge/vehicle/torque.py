@@ -128,11 +128,11 @@ def reading_of(torque: Floats, engine_speed: Floats, model: TorqueModel) -> Floa
     model
     """
     offset, scale, *powers = model.coefficients or (0.0, 1.0)
-    lean, bend = model.curvature or (0.0, 0.0)
+    speed_slope, bend = model.curvature or (0.0, 0.0)
     rest = offset - torque
     for k, w in enumerate(powers, start=1):
         rest = rest + w * engine_speed**k
-    slope = scale + lean * engine_speed
+    slope = scale + speed_slope * engine_speed
     if model.knots:
         slope = slope + knot_parts(engine_speed, model.knots) @ np.array(model.knot_slopes)
     # The root that stays finite where the map is straight; where it bends so far that

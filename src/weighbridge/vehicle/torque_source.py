@@ -140,17 +140,17 @@ class TorqueSource:
         return drive.signals[self.found(drive)[0]]
 
 
-TOLD_TERMS: Final = TorqueTerms(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012)
+REPORTED_TERMS: Final = TorqueTerms(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012)
 """Of a torque that is told: the maker has modelled it to a few percent of the full-load torque."""
 
 ROUGH_TERMS: Final = TorqueTerms(offset=0.15, growth=0.10, lean=0.30, bend=0.15, knot=0.08)
 """Of a reading that is only roughly torque: friction and accessories are a tenth of the full-load
 torque and grow with speed (Heywood, 1988, ch. 13); the full-load curve is smooth."""
 
-TOLD: Final = partial(
+REPORTED: Final = partial(
     TorqueSource,
     signed=True,
-    terms=TOLD_TERMS,
+    terms=REPORTED_TERMS,
     scale_std=0.04,
     transfer_std=0.005,
     cold_std=0.02,

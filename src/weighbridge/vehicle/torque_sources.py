@@ -22,20 +22,20 @@ from weighbridge.vehicle.force_sources import (
     WHEEL_TORQUE,
 )
 from weighbridge.vehicle.torque_source import (
+    REPORTED,
+    REPORTED_TERMS,
     ROUGH,
     ROUGH_TERMS,
-    TOLD,
-    TOLD_TERMS,
     TorqueConstants,
     TorqueSource,
     TorqueTerms,
 )
 
 __all__ = [
+    "REPORTED",
+    "REPORTED_TERMS",
     "ROUGH",
     "ROUGH_TERMS",
-    "TOLD",
-    "TOLD_TERMS",
     "TORQUE_SOURCES",
     "TorqueSource",
     "TorqueTerms",
@@ -139,7 +139,7 @@ def lowest_load(load: Floats) -> float:
 MEASURED: Final = "measured"
 """Name of the source that is read where a vehicle file states none."""
 
-_MEASURED: Final = TOLD(
+_MEASURED: Final = REPORTED(
     name=MEASURED,
     signals=("engine_torque",),
     reading=_torque,
@@ -150,7 +150,7 @@ _MEASURED: Final = TOLD(
     motor_scale_std=0.03,
 )
 
-_PERCENT: Final = TOLD(
+_PERCENT: Final = REPORTED(
     name="percent",
     signals=("engine_torque_fraction",),
     reading=_percent,
