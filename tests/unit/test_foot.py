@@ -7,14 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.balance import Reason, force_balance
-from weighbridge.balance.foot import (
-    Floor,
-    find_floor,
-    find_foot,
-    learn_dragged,
-    near,
-    unsmoothed,
-)
+from weighbridge.balance.floor import Floor, find_floor
+from weighbridge.balance.foot import find_foot, unsmoothed
+from weighbridge.balance.foot_setup import learn_dragged, near
 from weighbridge.constants import GRAVITY
 from weighbridge.kernels import two_states
 from weighbridge.navigation.motion import Motion
@@ -295,7 +290,7 @@ def test_an_engine_brake_does_not_hide_a_dragged_engine():
 def test_unsmoothed_undoes_a_first_order_lag():
     time = np.arange(0.0, 3.0, 0.25)
     read = 0.4 * np.exp(-time / 0.3)
-    sharp, gain = unsmoothed(Signal("engine_load", time, read))
+    sharp, gain = unsmoothed(Signal("engine_load", time, read), 0.25)
     assert_allclose(sharp[1:], 0.0, atol=1e-12)
     assert np.all(gain[1:] > 1.0)
     assert np.isnan(sharp[0])

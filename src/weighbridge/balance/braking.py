@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.foot import find_foot, near
+from weighbridge.balance.foot import find_foot
+from weighbridge.balance.foot_setup import near
 from weighbridge.balance.instants import SLOWEST, behind
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
 from weighbridge.balance.table import MergedView

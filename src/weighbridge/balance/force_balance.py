@@ -13,7 +13,7 @@ from weighbridge.balance.braking import Brakes, find_brakes
 from weighbridge.balance.coarse import coarse_std
 from weighbridge.balance.cornering import cornering
 from weighbridge.balance.filled import filled
-from weighbridge.balance.foot import learn_dragged
+from weighbridge.balance.foot_setup import learn_dragged
 from weighbridge.balance.instants import (
     SLOWEST,
     engine_speed_at,
