@@ -18,6 +18,7 @@ from weighbridge.balance.instants import (
     SLOWEST,
     engine_speed_at,
     gears_at,
+    identify_told_gears,
     motion_at,
     smoothed,
 )
@@ -76,7 +77,10 @@ def force_balance(
     lag = vehicle.timing.torque_lag if lag is None else lag
     rows = motion_at(smoothed(motion, lag), time)
     engine_speed = engine_speed_at(drive, vehicle, time + motion.speed_delay, rows["speed"])
-    gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, rows["speed"])
+    numbers = identify_told_gears(drive, vehicle, recorded, engine_speed, rows["speed"])
+    gear, gearing, slipping = gears_at(
+        drive, vehicle, recorded, engine_speed, rows["speed"], numbers
+    )
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
     view = MergedView(
         time=time,
@@ -93,7 +97,7 @@ def force_balance(
         gear=gear,
         gearing=gearing,
         air_speed=rows["speed"] + headwind(drive, rows["heading"]),
-        air_density=air_density(drive, time, rows["altitude"]),
+        air_density=air_density(drive, rows["altitude"]),
         fuel_burnt=fuel_burnt(drive, vehicle, recorded, torque.torque, engine_speed),
         reason=np.zeros(time.size, dtype=np.uint8),
     )
@@ -191,7 +195,7 @@ def dragged_reading(
         source = source_signal(drive, vehicle)
         time = source.time - (vehicle.timing.torque_delay or 0.0)
         rows = motion_at(smoothed(motion, vehicle.timing.torque_lag), time)
-        pressure = dynamic_pressure(air_density(drive, time, rows["altitude"]), rows["speed"])
+        pressure = dynamic_pressure(air_density(drive, rows["altitude"]), rows["speed"])
         needed, weight = needed_force(vehicle, rows["specific_force"], pressure)
         sources.append(source)
         needs.append(np.full_like(needed, np.nan) if motion.source in BY_SPEED else needed / weight)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -11,7 +12,12 @@ from scipy.signal import lfilter
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
-from weighbridge.vehicle.gear import effective_gearing, number_told_gears, predict_gear
+from weighbridge.vehicle.gear import (
+    effective_gearing,
+    number_told_gears,
+    predict_gear,
+    told_gear_numbers,
+)
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -85,10 +91,30 @@ def engine_speed_at(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Flo
     return np.full(speed.size, np.nan)
 
 
-def gears_at(
+def identify_told_gears(
     drive: Drive, vehicle: Vehicle, recorded: Floats, engine_speed: Floats, speed: Floats
+) -> Mapping[int, int]:
+    """Find which gears of the vehicle file are those that the gearbox tells on a whole drive."""
+    measured = drive.get("gear")
+    if measured is None or not len(measured) or len(vehicle.driveline.gearings) < 2:
+        return {}
+    told = np.nan_to_num(measured.held(recorded)).astype(np.int64)
+    ratio = effective_gearing(engine_speed, speed)
+    return told_gear_numbers(told, ratio, np.array(vehicle.driveline.gearings))
+
+
+def gears_at(
+    drive: Drive,
+    vehicle: Vehicle,
+    recorded: Floats,
+    engine_speed: Floats,
+    speed: Floats,
+    numbers: Mapping[int, int],
 ) -> tuple[Ints, Floats, Bools]:
-    """Gear, gearing and whether the clutch slips, from the best source there is."""
+    """Gear, gearing and whether the clutch slips, from the best source there is.
+
+    ``numbers`` are those of `identify_told_gears`.
+    """
     gearings = np.array(vehicle.driveline.gearings)
     if gearings.size == 1:
         gear = np.ones(recorded.size, dtype=np.int64)
@@ -102,7 +128,7 @@ def gears_at(
     measured: Signal | None = drive.get("gear")
     if measured is not None and len(measured):
         told = np.nan_to_num(measured.held(recorded)).astype(np.int64)
-        gear = number_told_gears(told, effective_gearing(engine_speed, speed), gearings)
+        gear = number_told_gears(told, numbers)
         mismatch = np.where(
             gear > 0,
             engine_speed / np.maximum(speed, SLOWEST) / gearings[np.maximum(gear, 1) - 1] - 1.0,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from weighbridge.constants import (
@@ -22,36 +24,56 @@ def standard_pressure(altitude: Floats) -> Floats:
     return np.asarray(STANDARD_PRESSURE * ratio**_EXPONENT)
 
 
-def air_density(drive: Drive, time: Floats, altitude: Floats) -> Floats:
-    """Density from what the drive knows, else from the standard atmosphere.
+@dataclass(frozen=True, slots=True)
+class Air:
+    """What a whole drive tells of the air.
+
+    Attributes
+    ----------
+    temperature : [K]
+    pressure_ratio : pressure over that of the standard atmosphere [-]
+    """
+
+    temperature: float
+    pressure_ratio: float
+
+    def density(self, altitude: Floats) -> Floats:
+        """Density [kg/m^3] at altitudes (n,) [m]; where they are NaN, at sea level."""
+        pressure = standard_pressure(_height(altitude)) * self.pressure_ratio
+        return np.asarray(pressure / (GAS_CONSTANT_DRY_AIR * self.temperature))
+
+
+def identify_air(drive: Drive, altitude: Floats) -> Air:
+    """Find the air from what the drive knows, else take the standard atmosphere.
 
     Temperature and pressure come from the drive's signals, then from
     ``drive.toml``; pressure then follows the altitude.
 
     Parameters
     ----------
-    time : (n,) [s]
-    altitude : (n,) [m]; may be NaN
-
-    Returns
-    -------
-    (n,) [kg/m^3]
+    drive
+    altitude : (n,) of its rows [m]; may be NaN
     """
     temperature = drive.info.ambient_temperature
     signal = drive.get("ambient_temperature")
     if signal is not None and len(signal):
         temperature = float(np.median(signal.values))
-    height = np.where(np.isfinite(altitude), altitude, 0.0)
-    pressure = standard_pressure(height)
+    height = _height(altitude)
     barometer = drive.get("barometric_pressure")
     known = drive.info.barometric_pressure
     if barometer is not None and len(barometer):
         known = float(np.median(barometer.values))
+    ratio = 1.0
     if known is not None:
-        pressure = pressure * (known / float(np.median(pressure)))
+        ratio = known / float(np.median(standard_pressure(height)))
     if temperature is None:
         temperature = STANDARD_TEMPERATURE - TEMPERATURE_LAPSE * float(np.median(height))
-    return np.asarray(pressure / (GAS_CONSTANT_DRY_AIR * temperature))
+    return Air(temperature, ratio)
+
+
+def air_density(drive: Drive, altitude: Floats) -> Floats:
+    """Density (n,) [kg/m^3] on a drive at altitudes (n,) [m]."""
+    return identify_air(drive, altitude).density(altitude)
 
 
 def dynamic_pressure(density: Floats | float, air_speed: Floats) -> Floats:
@@ -63,3 +85,7 @@ def dynamic_pressure(density: Floats | float, air_speed: Floats) -> Floats:
     air_speed : (n,) against the air, negative where it blows from behind [m/s]
     """
     return np.asarray(0.5 * density * air_speed * np.abs(air_speed))
+
+
+def _height(altitude: Floats) -> Floats:
+    return np.where(np.isfinite(altitude), altitude, 0.0)

@@ -28,7 +28,12 @@ SEEN: Final = 10.0
 
 
 def fuel_burnt(
-    drive: Drive, vehicle: Vehicle, time: Floats, torque: Floats, engine_speed: Floats
+    drive: Drive,
+    vehicle: Vehicle,
+    time: Floats,
+    torque: Floats,
+    engine_speed: Floats,
+    full_torque: float | None = None,
 ) -> Floats:
     """Mass of the fuel burnt since the first row (n,) [kg].
 
@@ -42,6 +47,7 @@ def fuel_burnt(
     time : (n,) stamps as recorded, not falling [s]
     torque : (n,) at the engine's shaft [N m]; NaN where unknown
     engine_speed : (n,) [rad/s]; NaN where unknown
+    full_torque : of the engine, whose friction is a part of it; that of the rows when None [N m]
     """
     if vehicle.driveline.single_speed or time.size < 2:
         return np.zeros(time.size)
@@ -52,7 +58,8 @@ def fuel_burnt(
     elif air is not None and len(air) and ratio is not None and len(ratio):
         equivalence_ratio = np.maximum(_near(ratio, time), 0.5)
         flow = _near(air, time) / (PETROL_STOICHIOMETRIC_RATIO * equivalence_ratio)
-    flow = np.where(np.isfinite(flow), flow, _by_work(torque, engine_speed))
+    full = highest_torque(torque) if full_torque is None else full_torque
+    flow = np.where(np.isfinite(flow), flow, _by_work(torque, engine_speed, full))
     span = np.clip(np.diff(time), 0.0, SEEN)
     middle = 0.5 * (flow[1:] + flow[:-1])
     return np.concatenate(([0.0], np.cumsum(span * np.maximum(middle, 0.0))))
@@ -63,12 +70,16 @@ def _near(signal: Signal, time: Floats) -> Floats:
     return np.where(signal.age(time) <= SEEN, signal.at(time), np.nan)
 
 
-def _by_work(torque: Floats, engine_speed: Floats) -> Floats:
-    """Fuel flow of an engine by its work and its friction (n,) [kg/s]."""
+def highest_torque(torque: Floats) -> float:
+    """Torque (n,) that a drive hardly exceeds [N m]; 0 where none is known."""
     known = torque[np.isfinite(torque)]
-    if not known.size:
+    return max(float(np.percentile(known, 98.0)), 0.0) if known.size else 0.0
+
+
+def _by_work(torque: Floats, engine_speed: Floats, full: float) -> Floats:
+    """Fuel flow of an engine by its work and its friction (n,) [kg/s]."""
+    if not np.isfinite(torque).any():
         return np.zeros(torque.size)
-    full = max(float(np.percentile(known, 98.0)), 0.0)
     indicated = np.nan_to_num(torque) + FRICTION * full
     power = np.maximum(indicated, 0.0) * np.maximum(np.nan_to_num(engine_speed), 0.0)
     return np.asarray(power / (INDICATED_EFFICIENCY * PETROL_HEATING_VALUE))

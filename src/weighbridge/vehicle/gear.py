@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -207,8 +208,8 @@ def predict_gear(
     return np.where(engaged, gearings.size - nearest, 0).astype(np.int64), mismatch
 
 
-def number_told_gears(told: Ints, gearing: Floats, gearings: Floats) -> Ints:
-    """Number the gears a gearbox tells by the gearings of the vehicle file.
+def told_gear_numbers(told: Ints, gearing: Floats, gearings: Floats) -> dict[int, int]:
+    """Find which gears of the vehicle file the gears are that a gearbox tells.
 
     A file fitted to drives that never used the first gears counts from the
     lowest one used, and a gearbox from its own first gear. Each gear told is
@@ -223,19 +224,25 @@ def number_told_gears(told: Ints, gearing: Floats, gearings: Floats) -> Ints:
 
     Returns
     -------
-    (n,) 1..m; 0 where none
+    Number 1..m of each gear told; 0 where it is none of the file's
     """
-    gear = np.zeros(told.size, dtype=np.int64)
+    numbers = {}
     for k in np.unique(told[told >= 1]).tolist():
-        rows = told == k
-        ratio = gearing[rows & np.isfinite(gearing) & (gearing > 0.0)]
-        number = k if k <= gearings.size else 0
+        ratio = gearing[(told == k) & np.isfinite(gearing) & (gearing > 0.0)]
+        numbers[k] = k if k <= gearings.size else 0
         if ratio.size >= 5:
             distance = np.abs(np.log(np.median(ratio) / gearings))
             best = int(np.argmin(distance))
             if distance[best] < TOLD_NEAR:
-                number = best + 1
-        gear[rows] = number
+                numbers[k] = best + 1
+    return numbers
+
+
+def number_told_gears(told: Ints, numbers: Mapping[int, int]) -> Ints:
+    """Number the gears a gearbox tells (n,) by those of the vehicle file; 0 where none."""
+    gear = np.zeros(told.size, dtype=np.int64)
+    for k, number in numbers.items():
+        gear[told == k] = number
     return gear
 
 
