@@ -9,7 +9,7 @@ from numba import config
 
 import weighbridge as wb
 from weighbridge.estimators import Status
-from weighbridge.estimators.joint import change_odds, stood_before
+from weighbridge.estimators.load_stops import change_odds, stood_before
 from weighbridge.kernels import disturbance
 from weighbridge.kernels import load_change as kernel
 from weighbridge.simulation import Loading, make_scenario, simulate_car

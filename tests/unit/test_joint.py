@@ -10,7 +10,8 @@ import weighbridge as wb
 from weighbridge.balance import Reason
 from weighbridge.balance.averaging import windows
 from weighbridge.errors import DriveError
-from weighbridge.estimators import joint
+from weighbridge.estimators import joint, joint_forward, joint_problem
+from weighbridge.estimators.joint_problem import UNMODELLED
 from weighbridge.estimators.slow_errors import DATA_SHEET_NAMES, design, usable_rows
 from weighbridge.report.slow_section import constants_table
 from weighbridge.signals import Signal
@@ -83,7 +84,7 @@ def test_a_body_that_leans_with_its_load_costs_little(balance, car, monkeypatch)
         return abs(joint.estimate(leaning, car).mass / upright - 1.0)
 
     allowed = off()
-    monkeypatch.setattr(joint, "LOAD_LEAN_STD", 0.0)
+    monkeypatch.setattr(joint_problem, "LOAD_LEAN_STD", 0.0)
     assert allowed < 0.7 * off()
 
 
@@ -140,7 +141,7 @@ def test_what_the_fit_left_open_reaches_the_interval(balance, car, monkeypatch):
     monkeypatch.setattr(joint, "open_std", lambda *_: 0.05)
     wide = joint.estimate(balance, car)
     assert wide.mass == real.mass
-    assert wide.std > joint.UNMODELLED * 0.05 * wide.mass
+    assert wide.std > UNMODELLED * 0.05 * wide.mass
 
 
 def test_rows_that_are_no_numbers_are_left_out(balance, car):
@@ -192,3 +193,36 @@ def test_torque_on_another_clock_is_refused(made, car, late):
     }
     with pytest.raises(DriveError, match=r"[0-2]\.[0-9] s (later|earlier) .*offset_s"):
         wb.weigh(made.drive.with_signals(*recorded.values()), car)
+
+
+def forward(track, stops=1.0):
+    """Fold the windows of a track into the forward filter, standing so many times as long."""
+    given, setup = track.filtered, track.setup
+    state = joint_forward.JointState()
+    torque_var = given.noise / setup.fast**2 - setup.mass**2 * setup.motion_var
+    for k, time in enumerate(given.time):
+        state = joint_forward.step(
+            state,
+            joint_forward.Window(
+                time, given.rows[k], given.y[k], torque_var[k], stops * given.stood[k]
+            ),
+            setup,
+        )
+    return state
+
+
+def test_forward_ends_where_the_smoother_does(balance, car):
+    track = joint.estimate(balance, car, load_changes=False)
+    state = forward(track, stops=0.0)
+    end = track.mass + balance.merged.fuel_burnt[-1]
+    assert state.mass == pytest.approx(end, rel=1e-9)
+    assert state.std(track.setup) == pytest.approx(track.std, rel=1e-3)
+    assert state.windows == track.filtered.time.size
+
+
+def test_forward_follows_a_load_that_changes_at_a_stop(balance, car):
+    loaded = with_stops(balance, car, load=LOADED)
+    track = joint.estimate(loaded, car)
+    assert len(track.segments) > 1
+    state = forward(track)
+    assert state.mass == pytest.approx(track.mass + balance.merged.fuel_burnt[-1], rel=0.003)

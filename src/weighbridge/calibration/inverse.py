@@ -19,7 +19,7 @@ from weighbridge.balance.law import DISTURBANCE_STD
 from weighbridge.balance.table import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
-from weighbridge.estimators.joint import GATE
+from weighbridge.estimators.joint_problem import GATE
 from weighbridge.estimators.slow_errors import (
     RESISTANCE_STD,
     TIME_CONSTANTS,

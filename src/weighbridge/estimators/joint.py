@@ -7,30 +7,31 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize
+from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.averaging import Windows, windows
+from weighbridge.balance.averaging import WINDOW, Windows, windows
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.table import MergedView
 from weighbridge.estimators.confounded import inertia_relative_std
 from weighbridge.estimators.considered import force_columns, open_std, sensitivity
+from weighbridge.estimators.joint_forward import JointSetup
+from weighbridge.estimators.joint_problem import FEWEST_WINDOWS, UNMODELLED, Problem
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
     OTHER_METHOD_STD,
-    STOP,
     Evidence,
     converged_at,
     judge,
     lacks_accelerometer,
     nothing,
 )
+from weighbridge.estimators.load_stops import change_odds, stood_before, too_hasty
 from weighbridge.estimators.noisy_motion import LEVEL_STD, drawn
 from weighbridge.estimators.slow_errors import (
     LASTING,
     SlowErrors,
     design,
-    filter_params,
     motion_variance,
     noise_variance,
     prior_std,
@@ -38,50 +39,12 @@ from weighbridge.estimators.slow_errors import (
 )
 from weighbridge.estimators.squat import Lean, lean
 from weighbridge.estimators.track import FilterInput, MassTrack, Segment
-from weighbridge.kernels import disturbance, load_change
+from weighbridge.kernels import disturbance
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.fuel import FUEL_STD
 from weighbridge.vehicle.model import Vehicle
-
-GATE: Final = 5.0
-"""Windows with a larger normalised innovation are left out [-]."""
-
-FEWEST_WINDOWS: Final = 8
-"""Fewer usable windows carry no mass, after a stop no change of it."""
-
-SETTLE: Final = 40
-"""Windows before the gate closes."""
-
-CHANGE_STD: Final = 0.25
-"""Standard deviation of a change of load at a stop, over mass [-]."""
-
-CHANGE_ODDS: Final = -3.0
-"""Logarithm of the odds that the load changes at a stop of `STOP`: one stop in twenty, for
-most are at traffic lights."""
-
-SHORTEST: Final = 8.0
-"""In shorter stops no load changes [s]: a parcel is handed out in ten. Of 68 drives of two other
-simulators, without a change of load, one was said to have one, with `STOP` in its place three."""
-
-OPENED: Final = 3.0
-"""Nobody gets on or off so soon after the vehicle stands [s]."""
-
-LOADED: Final = 0.025
-"""Part of the mass that a second beyond `OPENED` loads or unloads at most, in a stop shorter than
-`STOP` [1/s]: 45 kg of a car, two and a half times what buses board."""
-
-MOST_LOADED: Final = 0.3
-"""The same of the whole stop [-]."""
-
-CHANGE_RISE: Final = 1.6
-"""Growth of that logarithm with the logarithm of the standstill: at two minutes it is even."""
-
-LOAD_LEAN_STD: Final = 0.03
-"""Standard deviation of what a change of load adds to the slow resistance, over mass [m/s^2]:
-the body leans with its load, and the accelerometer with it; 240 kg in the boot of a simulated car
-make 0.27 deg, 0.046 m/s^2."""
 
 BEYOND_STD: Final = 0.015
 """Relative standard deviation of a mass per unit of the logarithm by which it lies beyond
@@ -100,10 +63,6 @@ OTHER_MOTION_STD: Final[dict[MotionSource, float]] = {"speed_grade": 0.04, "spee
 """The same where the vehicle file was made with an accelerometer [-]: eight drives of another
 simulator came out 3.4 % (RMS) light with heights, and 10 % without."""
 
-UNMODELLED: Final = 1.6
-"""Errors of the mass over what the filter says of them [-]: simulated drives of one
-calibration scatter so around their mean, after five minutes as after an hour."""
-
 
 def first_guess(phi: Floats, y: Floats) -> float:
     """Robust slope of force on specific force: where the filter starts [kg].
@@ -116,85 +75,6 @@ def first_guess(phi: Floats, y: Floats) -> float:
 
 def _sensible(mass: float) -> float:
     return float(np.clip(mass, 200.0, 60_000.0)) if np.isfinite(mass) else 2000.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Problem:
-    """What the kernels need, one row per window."""
-
-    time: Floats
-    rows: Floats
-    y: Floats
-    odds: Floats
-    variance: Floats
-    std: Floats
-
-    @property
-    def guess(self) -> float:
-        return float(self.std[0])
-
-    def kernel_input(
-        self, fast: float, slow: float
-    ) -> tuple[disturbance.DisturbanceState, Floats, disturbance.DisturbanceParams]:
-        """State to start from, noise variance and parameters at a level of noise."""
-        std = self.std.copy()
-        std[1] *= slow
-        begin = np.zeros(std.size)
-        begin[0] = self.guess
-        start = disturbance.initial_state(  # type: ignore[no-untyped-call]
-            begin, np.diag(std**2), self.time[0]
-        )
-        return start, fast**2 * self.variance, filter_params(std, GATE, SETTLE)
-
-    @property
-    def jump_var(self) -> Floats:
-        """Variance (n,) by which each state may jump where the load changes."""
-        std = np.zeros(self.std.size)
-        std[0] = CHANGE_STD * self.guess
-        std[2] = LOAD_LEAN_STD * self.guess
-        return std**2
-
-    def likeliest(self) -> tuple[float, float]:
-        """Levels of fast noise and of the disturbance, over their usual sizes [-].
-
-        A weak prior keeps them within a factor of about three.
-        """
-
-        def misfit(level: Floats) -> float:
-            fast, slow = np.exp(level)
-            state, *_ = self.changes(float(fast), float(slow))
-            return float(-state.same.log_likelihood + 0.5 * np.sum(level**2))
-
-        found = minimize(misfit, np.zeros(2), method="Nelder-Mead", options={"maxiter": 40})
-        fast, slow = np.exp(found.x)
-        return float(fast), float(slow)
-
-    def filtered(self) -> float:
-        """Mass after all windows, as if the load had never changed [kg]."""
-        start, noise, params = self.kernel_input(1.0, 1.0)
-        none = np.zeros(self.rows.shape)
-        state, *_ = disturbance.run(start, self.time, self.rows, self.y, noise, none, params)
-        return float(state.x[0])
-
-    def changes(
-        self, fast: float, slow: float
-    ) -> tuple[load_change.LoadState, Floats, Floats, Bools]:
-        """Run both hypotheses of the load over the drive."""
-        start, noise, params = self.kernel_input(fast, slow)
-        return load_change.run(  # type: ignore[no-any-return]
-            load_change.initial_state(start),  # type: ignore[no-untyped-call]
-            self.time,
-            self.rows,
-            self.y,
-            noise,
-            self.odds,
-            load_change.LoadParams(
-                filter=params,
-                jump_var=self.jump_var,
-                temper=1.0 / UNMODELLED**2,
-                fewest=FEWEST_WINDOWS,
-            ),
-        )
 
 
 def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = True) -> MassTrack:
@@ -231,78 +111,169 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     reason[cut.index] = Reason.USED
     if cut.count.size < FEWEST_WINDOWS:
         return nothing("joint", balance, vehicle, reason, int(cut.count.size))
+    asked = _ask(balance, vehicle, cut, first_guess(cut.mean(rows[:, 0]), cut.mean(y)))
+    if not load_changes:
+        problem = replace(asked.problem, odds=np.full(asked.stood.size, np.nan))
+        asked = replace(asked, problem=problem)
+    return _track(balance, vehicle, cut, reason, asked, _solve(asked))
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """The problem of a drive and what it was made from.
+
+    Attributes
+    ----------
+    problem
+    body : squat that rows and torque do not have in common
+    rows, y : (n, k), (n,) of `weighbridge.estimators.slow_errors.design`
+    stood : (m,) how long the vehicle stood before each window [s]
+    """
+
+    problem: Problem
+    body: Lean
+    rows: Floats
+    y: Floats
+    stood: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Solved:
+    """What the filter and its smoother found, one row per window.
+
+    Attributes
+    ----------
+    fast, slow : levels of the noise over their usual sizes [-]
+    start, noise, params, added : what they were given
+    running, running_var : (m,) mass by the windows until then, and its variance
+    begins : (m,) windows from which the load is another
+    x, var, taken, weight : of `weighbridge.kernels.disturbance.smooth`
+    """
+
+    fast: float
+    slow: float
+    start: disturbance.DisturbanceState
+    noise: Floats
+    params: disturbance.DisturbanceParams
+    added: Floats
+    running: Floats
+    running_var: Floats
+    begins: Bools
+    x: Floats
+    var: Floats
+    taken: Bools
+    weight: Floats
+
+
+def _ask(balance: ForceBalance, vehicle: Vehicle, cut: Windows, rough: float) -> _Asked:
+    """State the problem of a drive whose mass is ``rough`` [kg]."""
+    view = balance.merged
     time = cut.mean(view.time)
     stood = stood_before(view, time)
-    odds = change_odds(stood) if load_changes else np.full(time.size, np.nan)
-    rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
 
-    def problem_of(mass: float | None) -> tuple[_Problem, Lean, Floats, Floats]:
-        """State the problem; squat and levels of noise are told in terms of a mass [kg]."""
+    def of(mass: float | None) -> _Asked:
+        """Squat and levels of noise are told in terms of a mass [kg]."""
         body = lean(balance, vehicle, mass or rough)
         leaned = body.leaned(view.accel)
         rows, y = design(view, vehicle, leaned=leaned, grade_open=balance.motion.grade_open)
         means, sums = np.ascontiguousarray(cut.mean(rows)), cut.mean(y)
-        sizes = _sizes(balance, vehicle, cut, mass or first_guess(means[:, 0], sums))
-        return _Problem(time=time, rows=means, y=sums, odds=odds, **sizes), body, rows, y
+        guess = mass or first_guess(means[:, 0], sums)
+        problem = Problem(
+            time=time,
+            rows=means,
+            y=sums,
+            odds=change_odds(stood),
+            variance=noise_variance(view, cut, guess, balance.motion),
+            std=_prior(balance, vehicle, cut, guess),
+        )
+        return _Asked(problem=problem, body=body, rows=rows, y=y, stood=stood)
 
     # They should not hang on the guess.
-    problem, body, rows, y = problem_of(None)
-    problem, body, rows, y = problem_of(_sensible(problem.filtered()))
+    return of(_sensible(of(None).problem.filtered()))
+
+
+def _solve(asked: _Asked) -> _Solved:
+    """Find the levels of noise, the changes of load and the smoothed states."""
+    problem = asked.problem
     fast, slow = problem.likeliest()
     start, noise, params = problem.kernel_input(fast, slow)
     while True:
         _, running, running_var, begins = problem.changes(fast, slow)
         added = np.where(begins[:, None], problem.jump_var, 0.0)
         x, var, taken, weight = disturbance.smooth(
-            start, time, problem.rows, problem.y, noise, added, params
+            start, problem.time, problem.rows, problem.y, noise, added, params
         )
-        hasty = too_hasty(begins, stood, x[:, 0])
+        hasty = too_hasty(begins, asked.stood, x[:, 0])
         if not hasty.any():
             break
         problem = replace(problem, odds=np.where(hasty, np.nan, problem.odds))
+    return _Solved(
+        fast=fast,
+        slow=slow,
+        start=start,
+        noise=noise,
+        params=params,
+        added=added,
+        running=running,
+        running_var=running_var,
+        begins=begins,
+        x=x,
+        var=var,
+        taken=taken,
+        weight=weight,
+    )
+
+
+def _track(
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    cut: Windows,
+    reason: NDArray[np.uint8],
+    asked: _Asked,
+    solved: _Solved,
+) -> MassTrack:
+    """Lay out the running mass and judge the final one."""
+    view, problem, time = balance.merged, asked.problem, asked.problem.time
     # More noise than usual is more likely the torque's; less is less on both sides.
-    shown = np.full(time.size, min(fast, 1.0) ** 2 * motion_variance(balance.motion))
-    low = drawn(weight, shown, var[:, 0], begins)
+    shown = min(solved.fast, 1.0) ** 2 * motion_variance(balance.motion)
+    low = drawn(solved.weight, np.full(time.size, shown), solved.var[:, 0], solved.begins)
 
     left_out = np.zeros(view.time.size, dtype=bool)
-    left_out[cut.index] = ~taken[cut.window]
+    left_out[cut.index] = ~solved.taken[cut.window]
     reason[left_out] = Reason.BAD_FIT
     used = reason == Reason.USED
     burnt = view.fuel_burnt
-    smoothed, running = x[:, 0] * (1.0 + low), running * (1.0 + low)
-    mass, bound = float(smoothed[-1] - burnt[-1]), float(np.sqrt(var[-1, 0]))
+    smoothed, running = solved.x[:, 0] * (1.0 + low), solved.running * (1.0 + low)
+    mass, bound = float(smoothed[-1] - burnt[-1]), float(np.sqrt(solved.var[-1, 0]))
     columns = cut.mean(force_columns(balance, vehicle, float(smoothed[-1])))
-    moved = sensitivity(columns, time, problem.rows, noise, added, taken, start, params)
+    moved = sensitivity(
+        columns, time, problem.rows, solved.noise, solved.added, solved.taken, solved.start,
+        solved.params,
+    )  # fmt: skip
+    phi = asked.rows[:, 0]
     left = math.hypot(
         _left_open(balance, vehicle, mass),
-        body.relative_std(view.accel, rows[:, 0], used),
-        inertia_relative_std(vehicle, mass, view.accel, rows[:, 0], used),
+        asked.body.relative_std(view.accel, phi, used),
+        inertia_relative_std(vehicle, mass, view.accel, phi, used),
         UNMODELLED * open_std(vehicle, moved, mass),
         LEVEL_STD * float(low[-1]),
     )
     std = float(np.hypot(UNMODELLED * bound, mass * left))
     last = np.searchsorted(time, view.time, side="right") - 1
-    track = np.where(last >= 0, running[np.maximum(last, 0)] - burnt, np.nan)
-    track_std = UNMODELLED * np.sqrt(running_var)[np.maximum(last, 0)]
-    status, why = judge(
-        Evidence(
-            view=view,
-            used=used,
-            phi=rows[:, 0],
-            mass=mass,
-            std=std,
-            blocks=cut.count.size,
-            left=mass * left,
-        ),
-        vehicle,
+    seen = np.maximum(last, 0)
+    track = np.where(last >= 0, running[seen] - burnt, np.nan)
+    track_std = UNMODELLED * np.sqrt(solved.running_var)[seen]
+    evidence = Evidence(
+        view=view, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size, left=mass * left
     )
+    status, why = judge(evidence, vehicle)
+    stds = np.sqrt(solved.var[:, 0])
     return MassTrack(
         method="joint",
         balance=balance,
         running_mass=track,
         running_std=np.where(last >= 0, np.hypot(track_std, track * left), np.nan),
-        residual=np.where(used, y - _explained(rows, x[np.maximum(last, 0)]), np.nan),
+        residual=np.where(used, asked.y - _explained(asked.rows, solved.x[seen]), np.nan),
         reason=reason,
         mass=mass,
         std=std,
@@ -313,19 +284,43 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
         converged_at=converged_at(view.time, track, mass, used),
         status=status,
         why=why,
-        segments=_segments(view, time, begins, smoothed, np.sqrt(var[:, 0]), left),
-        slow_errors=SlowErrors.from_states(time, x, var, running_var, problem.rows[:, 1]),
+        segments=_segments(view, time, solved.begins, smoothed, stds, left),
+        slow_errors=SlowErrors.from_states(
+            time, solved.x, solved.var, solved.running_var, problem.rows[:, 1]
+        ),
         filtered=FilterInput(
-            start=start,
-            params=params,
+            start=solved.start,
+            params=solved.params,
             time=time,
             rows=problem.rows,
             y=problem.y,
-            noise=noise,
-            added=added,
-            stood=stood,
-            traction=problem.rows[:, 0] * x[:, 0] + cut.mean(view.traction_force - y),
+            noise=solved.noise,
+            added=solved.added,
+            stood=asked.stood,
+            traction=problem.rows[:, 0] * solved.x[:, 0] + cut.mean(view.traction_force - asked.y),
         ),
+        setup=_setup(balance, asked, solved, shown, left),
+    )
+
+
+def _setup(
+    balance: ForceBalance, asked: _Asked, solved: _Solved, shown: float, left: float
+) -> JointSetup:
+    """What of a whole drive the forward filter needs; ``shown`` is noise of the motion."""
+    problem = asked.problem
+    before = disturbance.weights(
+        solved.start, problem.time, problem.rows, problem.y, solved.noise, solved.added,
+        solved.params,
+    )  # fmt: skip
+    moved = motion_variance(balance.motion) + balance.motion.mean_accel_std(WINDOW) ** 2
+    return JointSetup(
+        std=problem.std,
+        fast=solved.fast,
+        slow=solved.slow,
+        body=asked.body,
+        motion_var=moved,
+        attenuating_var=shown * float(np.sum(solved.weight)) / before,
+        left=left,
     )
 
 
@@ -364,70 +359,10 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     return left
 
 
-def _sizes(
-    balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float
-) -> dict[str, Floats]:
-    """What of a problem is told in terms of a rough mass [kg]: noise and states."""
+def _prior(balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float) -> Floats:
+    """Standard deviations of the states before the drive has told, of a rough mass [kg]."""
     torque = highest_torque(balance.merged.torque[cut.index])
-    return {
-        "variance": noise_variance(balance.merged, cut, guess, balance.motion),
-        "std": prior_std(vehicle, guess, torque, grade_open=balance.motion.grade_open),
-    }
-
-
-def stood_before(view: MergedView, time: Floats) -> Floats:
-    """How long the vehicle stood between each window and the one before it (m,) [s].
-
-    A gap in the log counts as standing: what happened in it is not known. Of several stops
-    between two windows the longest tells.
-
-    Parameters
-    ----------
-    view
-    time : (m,) instants of the windows [s]
-    """
-    standing = ~(np.nan_to_num(view.speed) > 0.5)
-    gap = np.diff(view.time, append=view.time[-1])
-    # Rows near in time stand for the time until the next; a long gap stands for itself.
-    still = np.cumsum(np.where(standing | (gap > STOP), gap, 0.0))
-    moved = np.flatnonzero(~standing)
-    stood = np.zeros(time.size)
-    if moved.size < 2:
-        return stood
-    rest = still[moved[1:] - 1] - np.where(moved[:-1] > 0, still[moved[:-1] - 1], 0.0)
-    at = np.searchsorted(time, view.time[moved[1:]])
-    within = (at > 0) & (at < time.size) & (rest > 0.0)
-    np.maximum.at(stood, at[within], rest[within])
-    return stood
-
-
-def change_odds(stood: Floats) -> Floats:
-    """Logarithm of the odds that the load changed between each window and the one before it.
-
-    NaN where the vehicle did not stand for `SHORTEST` between them.
-
-    Parameters
-    ----------
-    stood : (m,) how long it stood there [s]
-    """
-    odds = np.full(stood.size, np.nan)
-    stops = stood >= SHORTEST
-    odds[stops] = CHANGE_ODDS + CHANGE_RISE * np.log(stood[stops] / STOP)
-    return odds
-
-
-def too_hasty(begins: Bools, stood: Floats, mass: Floats) -> Bools:
-    """Mark changes of load that are too large for the time the vehicle stood (m,).
-
-    Parameters
-    ----------
-    begins : (m,) windows before which the load changed
-    stood : (m,) how long the vehicle stood before each [s]
-    mass : (m,) of the windows [kg]
-    """
-    change = np.abs(np.diff(mass, prepend=mass[:1])) / np.abs(mass)
-    most = np.minimum(LOADED * np.maximum(stood - OPENED, 0.0), MOST_LOADED)
-    return np.asarray(begins & (stood < STOP) & (change > most))
+    return prior_std(vehicle, guess, torque, grade_open=balance.motion.grade_open)
 
 
 def _segments(

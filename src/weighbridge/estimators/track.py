@@ -14,6 +14,7 @@ from weighbridge.balance import ForceBalance, Reason
 from weighbridge.signals import Bools, Floats
 
 if TYPE_CHECKING:
+    from weighbridge.estimators.joint_forward import JointSetup
     from weighbridge.estimators.slow_errors import SlowErrors
     from weighbridge.kernels import disturbance
 
@@ -95,6 +96,7 @@ class MassTrack:
         [kg per unit]; None where a method does not say
     slow_errors : what was estimated beside the mass; None where a method does not
     filtered : what the filter of the joint estimator was given; None of other methods
+    setup : what a forward run of the joint estimator takes from this drive; None of other methods
     """
 
     method: str
@@ -115,6 +117,7 @@ class MassTrack:
     sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
     filtered: FilterInput | None = None
+    setup: JointSetup | None = None
 
     @property
     def time(self) -> Floats:

@@ -155,6 +155,25 @@ def loosened(state, variance):
 
 
 @kernel
+def weight(state, time, row, noise_var, params):
+    """Inverse variance of a measurement given all before it; parameters as of ``step``."""
+    _, cov, _ = _faded(state, time, params)
+    return 1.0 / (row @ (cov @ row) + noise_var)
+
+
+@kernel
+def weights(state, time, rows, y, noise_var, added, params):
+    """Sum of `weight` over all rows; parameters as of ``run``."""
+    total = 0.0
+    for k in range(y.size):
+        if np.any(added[k] > 0.0):
+            state = loosened(state, added[k])
+        total += weight(state, time[k], rows[k], noise_var[k], params)
+        state, _, _ = step(state, time[k], rows[k], y[k], noise_var[k], params)
+    return total
+
+
+@kernel
 def smooth(state, time, rows, y, noise_var, added, params):
     """Estimate every state at every row from all rows, before and after.
 

@@ -23,6 +23,7 @@ from weighbridge.calibration.inverse import (
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.considered import pinned, triangle
+from weighbridge.estimators.joint_problem import UNMODELLED
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.fits import JOINT
 from weighbridge.vehicle.model import Driveline, Vehicle
@@ -338,7 +339,7 @@ def _self_weighed(
         # Levels of noise may fall into another optimum, and the mass jump with them.
         slope = float(np.clip((tried[-1][1] - ratio) / (scale - before), *SLOPES))
     scale, ratio, bound, direction, count = min(tried, key=lambda t: abs(t[1] - 1.0))
-    each = float(np.hypot(TRANSFER_STD[1], joint.UNMODELLED * bound))
+    each = float(np.hypot(TRANSFER_STD[1], UNMODELLED * bound))
     # Where the torque could not be fitted anew, what its own fit left open stays.
     known = math.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0, ratio - 1.0)
     open_cov: tuple[float, ...] = ()

@@ -1,0 +1,136 @@
+"""The joint estimator run forward: one window after another, by sizes known beforehand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from weighbridge.estimators.joint_problem import UNMODELLED, first_state, load_params
+from weighbridge.estimators.judging import STOP
+from weighbridge.estimators.load_stops import change_odds
+from weighbridge.estimators.squat import Lean
+from weighbridge.kernels import disturbance, load_change
+from weighbridge.signals import Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointSetup:
+    """What a whole drive or a vehicle file tells before the filter runs.
+
+    Attributes
+    ----------
+    std : (k,) of the states; that of the mass is its guess as well
+    fast, slow : levels of the noise over their usual sizes [-]
+    body : squat that rows and torque do not have in common
+    motion_var : variance of the specific force of a window [m^2/s^4]
+    attenuating_var : of it what draws the mass down, per weight that the filter gives a window
+        before it is seen [m^2/s^4]
+    left : relative standard deviation of the mass that no row takes away [-]
+    """
+
+    std: Floats
+    fast: float
+    slow: float
+    body: Lean
+    motion_var: float
+    attenuating_var: float
+    left: float
+
+    @property
+    def mass(self) -> float:
+        """Guess of the mass [kg]."""
+        return float(self.std[0])
+
+
+class JointState(NamedTuple):
+    """Filter after some windows.
+
+    Attributes
+    ----------
+    load : both hypotheses of the load; None before the first window
+    total : weight of all windows so far [1/N^2]
+    begun : the same until the load of the mass began
+    tried : the same until the change of load that is tried began
+    windows : seen
+    mass : running, the fuel burnt since the first row not taken off; NaN before the first [kg]
+    var : variance of the filter [kg^2]
+    """
+
+    load: load_change.LoadState | None = None
+    total: float = 0.0
+    begun: float = 0.0
+    tried: float = 0.0
+    windows: int = 0
+    mass: float = np.nan
+    var: float = np.nan
+
+    def std(self, setup: JointSetup) -> float:
+        """Standard deviation of the running mass [kg]."""
+        return float(np.hypot(UNMODELLED * np.sqrt(self.var), self.mass * setup.left))
+
+
+class Window(NamedTuple):
+    """Means of the rows of one window.
+
+    Attributes
+    ----------
+    time : [s]
+    row : (k,) of the states
+    y : force that is left for them [N]
+    torque_var : variance of its noise that is the torque's [N^2]
+    stood : how long the vehicle stood before it [s]
+    """
+
+    time: float
+    row: Floats
+    y: float
+    torque_var: float
+    stood: float
+
+
+def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
+    """Fold in one window.
+
+    The load may change at stops of `STOP` and longer. The mass is raised by what noise of the
+    motion draws it down, as far as the windows until then can.
+
+    Parameters
+    ----------
+    state : before it
+    window
+    setup
+
+    References
+    ----------
+    As of `weighbridge.estimators.joint.estimate`; attenuation: Fuller, Measurement Error
+    Models, 1987, ch. 1, 2.
+    """
+    start, params = first_state(setup.std, setup.slow, window.time)
+    load, begun, tried = state.load, state.begun, state.tried
+    if load is None:
+        load = load_change.initial_state(start)  # type: ignore[no-untyped-call]
+    noise = setup.fast**2 * (window.torque_var + setup.mass**2 * setup.motion_var)
+    long = state.windows > 0 and window.stood >= STOP
+    odds = float(change_odds(np.array([window.stood]))[0]) if long else np.nan
+    weight = disturbance.weight(load.same, window.time, window.row, noise, params)
+    opened = load.begun
+    load, mass, var, changed = load_change.step(
+        load, window.time, window.row, window.y, noise, odds, load_params(params, setup.std)
+    )
+    if changed >= 0:
+        begun = tried
+    if load.open and load.begun != opened:
+        tried = state.total
+    total = state.total + weight
+    low = var * setup.attenuating_var * (total - begun)
+    return JointState(
+        load=load,
+        total=total,
+        begun=begun,
+        tried=tried,
+        windows=state.windows + 1,
+        mass=float(mass * (1.0 + low)),
+        var=float(var),
+    )

@@ -1,0 +1,144 @@
+"""What the filter of the joint estimator is asked, and with which sizes of its states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.optimize import minimize
+
+from weighbridge.estimators.slow_errors import filter_params
+from weighbridge.kernels import disturbance, load_change
+from weighbridge.signals import Bools, Floats
+
+GATE: Final = 5.0
+"""Windows with a larger normalised innovation are left out [-]."""
+
+FEWEST_WINDOWS: Final = 8
+"""Fewer usable windows carry no mass, after a stop no change of it."""
+
+SETTLE: Final = 40
+"""Windows before the gate closes."""
+
+CHANGE_STD: Final = 0.25
+"""Standard deviation of a change of load at a stop, over mass [-]."""
+
+LOAD_LEAN_STD: Final = 0.03
+"""Standard deviation of what a change of load adds to the slow resistance, over mass [m/s^2]:
+the body leans with its load, and the accelerometer with it; 240 kg in the boot of a simulated car
+make 0.27 deg, 0.046 m/s^2."""
+
+UNMODELLED: Final = 1.6
+"""Errors of the mass over what the filter says of them [-]: simulated drives of one
+calibration scatter so around their mean, after five minutes as after an hour."""
+
+
+def first_state(
+    std: Floats, slow: float, time: float
+) -> tuple[disturbance.DisturbanceState, disturbance.DisturbanceParams]:
+    """State to start from and parameters of the filter.
+
+    Parameters
+    ----------
+    std : (k,) of the states before the drive has told; that of the mass is its guess as well
+    slow : level of the disturbance over its usual size [-]
+    time : of the first window [s]
+    """
+    std = std.copy()
+    std[1] *= slow
+    begin = np.zeros(std.size)
+    begin[0] = std[0]
+    start = disturbance.initial_state(  # type: ignore[no-untyped-call]
+        begin, np.diag(std**2), time
+    )
+    return start, filter_params(std, GATE, SETTLE)
+
+
+def jump_variance(std: Floats) -> Floats:
+    """Variance (k,) by which each state of ``std`` may jump where the load changes."""
+    jump = np.zeros(std.size)
+    jump[0] = CHANGE_STD * std[0]
+    jump[2] = LOAD_LEAN_STD * std[0]
+    return jump**2
+
+
+def load_params(params: disturbance.DisturbanceParams, std: Floats) -> load_change.LoadParams:
+    """How the hypotheses of the load are weighed, by the sizes of the states (k,)."""
+    return load_change.LoadParams(
+        filter=params,
+        jump_var=jump_variance(std),
+        temper=1.0 / UNMODELLED**2,
+        fewest=FEWEST_WINDOWS,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """What the kernels need, one row per window.
+
+    Attributes
+    ----------
+    time : (m,) [s]
+    rows : (m, k) of the states
+    y : (m,) force that is left for them [N]
+    odds : (m,) logarithm of the odds that the load changed before a window; NaN where it cannot
+    variance : (m,) of the usual fast noise of ``y`` [N^2]
+    std : (k,) of the states before the drive has told; that of the mass is its guess as well
+    """
+
+    time: Floats
+    rows: Floats
+    y: Floats
+    odds: Floats
+    variance: Floats
+    std: Floats
+
+    def kernel_input(
+        self, fast: float, slow: float
+    ) -> tuple[disturbance.DisturbanceState, Floats, disturbance.DisturbanceParams]:
+        """State to start from, noise variance and parameters at a level of noise."""
+        start, params = first_state(self.std, slow, float(self.time[0]))
+        return start, fast**2 * self.variance, params
+
+    @property
+    def jump_var(self) -> Floats:
+        """Variance (n,) by which each state may jump where the load changes."""
+        return jump_variance(self.std)
+
+    def likeliest(self) -> tuple[float, float]:
+        """Levels of fast noise and of the disturbance, over their usual sizes [-].
+
+        A weak prior keeps them within a factor of about three.
+        """
+
+        def misfit(level: Floats) -> float:
+            fast, slow = np.exp(level)
+            state, *_ = self.changes(float(fast), float(slow))
+            return float(-state.same.log_likelihood + 0.5 * np.sum(level**2))
+
+        found = minimize(misfit, np.zeros(2), method="Nelder-Mead", options={"maxiter": 40})
+        fast, slow = np.exp(found.x)
+        return float(fast), float(slow)
+
+    def filtered(self) -> float:
+        """Mass after all windows, as if the load had never changed [kg]."""
+        start, noise, params = self.kernel_input(1.0, 1.0)
+        none = np.zeros(self.rows.shape)
+        state, *_ = disturbance.run(start, self.time, self.rows, self.y, noise, none, params)
+        return float(state.x[0])
+
+    def changes(
+        self, fast: float, slow: float
+    ) -> tuple[load_change.LoadState, Floats, Floats, Bools]:
+        """Run both hypotheses of the load over the drive."""
+        start, noise, params = self.kernel_input(fast, slow)
+        return load_change.run(  # type: ignore[no-any-return]
+            load_change.initial_state(start),  # type: ignore[no-untyped-call]
+            self.time,
+            self.rows,
+            self.y,
+            noise,
+            self.odds,
+            load_params(params, self.std),
+        )
