@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.foot import find_foot
-from weighbridge.balance.foot_setup import near
+from weighbridge.balance.foot_setup import FootSetup, identify_foot, near
 from weighbridge.balance.instants import SLOWEST, behind
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceSetup, MergedView
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import dynamic_pressure
@@ -57,12 +57,14 @@ class Brakes:
     overrun : (n,) the foot may be on the brake, or smoothing still holds what it did
     hidden : nothing tells where the brake is on
     switch_dead : the brake switch contradicts the motion
+    foot : what holds all along the drive
     """
 
     braked: Bools
     overrun: Bools
     hidden: bool
     switch_dead: bool
+    foot: FootSetup
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,7 @@ def find_brakes(
     known: Bools,
     lag: float,
     signed: bool,
+    setup: ForceSetup | None = None,
 ) -> Brakes:
     """Find where brakes may work.
 
@@ -104,6 +107,7 @@ def find_brakes(
     known : (n,) the motion is known there
     lag : time constant of the smoothing [s]
     signed : the torque tells what a dragged engine takes
+    setup : what holds all along the drive; found from this drive when None
     """
     recorded, traction = source.time, view.traction_force
     rotating = rotating_mass(vehicle, view.gearing)
@@ -115,10 +119,15 @@ def find_brakes(
         moving=np.asarray(view.speed > SLOWEST),
     )
     pressed = brake_pressed(drive, recorded)
-    dead = pressed is not None and _misses(pressed, slowing, known)
+    if setup is not None:
+        dead = setup.switch_dead
+    else:
+        dead = pressed is not None and _misses(pressed, slowing, known)
     pressed = None if dead else pressed
     told = np.nan if motion.source in BY_SPEED else 1.0
-    foot = find_foot(drive, vehicle, source, told * needed / weight, told * needed / view.gearing)
+    need, torque = told * needed / weight, told * needed / view.gearing
+    by = setup.foot if setup is not None else identify_foot(drive, vehicle, source, need, torque)
+    foot = find_foot(drive, vehicle, source, need, torque, by)
     # What a dragged engine takes is told by a torque alone, and by none where a foot may brake.
     overrun = np.zeros_like(foot.off) if signed and pressed is not None else foot.off
     slowed = foot.off if pressed is None else pressed
@@ -130,6 +139,7 @@ def find_brakes(
         overrun=overrun | held,
         hidden=bool(hidden),
         switch_dead=dead,
+        foot=by,
     )
 
 

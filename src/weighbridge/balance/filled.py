@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -19,36 +20,64 @@ FILLED_RATE: Final = 5.0
 """Slower readings may well be constant for long [Hz]."""
 
 
-def filled(signal: Signal, time: Floats) -> Bools:
+@dataclass(frozen=True, slots=True)
+class Fill:
+    """How a reading that was filled in would look on a drive.
+
+    Attributes
+    ----------
+    least : samples that run straight from which on they were filled in
+    tolerance : by which a straight line bends by rounding
+    resting : readings that are constant for long: zero of idling, limit of recuperation
+    """
+
+    least: int
+    tolerance: float
+    resting: tuple[float, float]
+
+
+def identify_fill(signal: Signal) -> Fill | None:
+    """Find from a whole drive how filled readings would look; None where they cannot be told.
+
+    Parameters
+    ----------
+    signal : sampled faster than `FILLED_RATE` and in steps below `FINE`, else nothing is said
+    """
+    values = signal.values
+    if len(signal) < 3 or signal.period > 1.0 / FILLED_RATE:
+        return None
+    least = int(FILLED_TIME / signal.period)
+    steps = np.abs(np.diff(values))
+    step = float(steps[steps > 0.0].min(initial=np.inf))
+    if values.size <= least or not step < FINE * float(np.ptp(values)):
+        return None
+    # Rounding lets a straight line bend by one step of the reading.
+    return Fill(least, 1.01 * step, (0.0, float(np.nanmin(values))))
+
+
+def filled(signal: Signal, time: Floats, fill: Fill | None) -> Bools:
     """Where a signal holds one value or runs straight for longer than a real one does.
 
     Loggers and makers of data sets fill gaps so, and the fill looks like data.
 
     Parameters
     ----------
-    signal : sampled faster than `FILLED_RATE` and in steps below `FINE`, else nothing is said
+    signal
     time : (n,) instants asked about [s]
+    fill : of `identify_fill`
 
     Returns
     -------
     (n,)
     """
     values = signal.values
-    least = int(FILLED_TIME / signal.period) if len(signal) > 2 else 0
-    if len(signal) < 3 or signal.period > 1.0 / FILLED_RATE or values.size <= least:
+    if fill is None or values.size <= fill.least:
         return np.zeros(time.size, dtype=bool)
-    steps = np.abs(np.diff(values))
-    step = float(steps[steps > 0.0].min(initial=np.inf))
-    if not step < FINE * float(np.ptp(values)):
-        return np.zeros(time.size, dtype=bool)
-    # Rounding lets a straight line bend by one step of the reading.
-    tolerance = 1.01 * step
-    straight = np.concatenate(([False], np.abs(np.diff(values, 2)) <= tolerance, [False]))
-    # Idling and coasting read a constant zero for long, recuperation its limit.
-    straight &= ~np.isin(values, (0.0, np.nanmin(values)))
+    straight = np.concatenate(([False], np.abs(np.diff(values, 2)) <= fill.tolerance, [False]))
+    straight &= ~np.isin(values, fill.resting)
     runs = np.zeros(values.size, dtype=bool)
     for begin, end in zip(*marked_runs(straight), strict=True):
-        if end - begin >= least:
+        if end - begin >= fill.least:
             runs[begin:end] = True
     index = np.clip(np.searchsorted(signal.time, time), 0, values.size - 1)
     return np.asarray(runs[index])

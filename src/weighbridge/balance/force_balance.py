@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from weighbridge.balance.braking import Brakes, find_brakes
 from weighbridge.balance.coarse import coarse_std
 from weighbridge.balance.cornering import cornering
-from weighbridge.balance.filled import filled
+from weighbridge.balance.filled import Fill, filled, identify_fill
 from weighbridge.balance.foot_setup import learn_dragged
 from weighbridge.balance.instants import (
     SLOWEST,
@@ -23,11 +23,11 @@ from weighbridge.balance.instants import (
     smoothed,
 )
 from weighbridge.balance.law import needed_force, traction_gain
-from weighbridge.balance.table import ForceBalance, MergedView, Reason
+from weighbridge.balance.table import ForceBalance, ForceSetup, MergedView, Reason
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle.air import air_density, dynamic_pressure
-from weighbridge.vehicle.fuel import fuel_burnt
+from weighbridge.vehicle.air import air_density, dynamic_pressure, identify_air
+from weighbridge.vehicle.fuel import fuel_burnt, full_load_torque
 from weighbridge.vehicle.gear import shifting
 from weighbridge.vehicle.model import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import Torque, engine_torque, source_of, source_signal
@@ -52,6 +52,7 @@ def force_balance(
     delay: float | None = None,
     lag: float | None = None,
     signed: bool = True,
+    setup: ForceSetup | None = None,
 ) -> ForceBalance:
     """Bring the force and the motion of a drive together.
 
@@ -65,6 +66,7 @@ def force_balance(
     lag : time constant of its first-order smoothing; the vehicle's when None [s]
     signed : whether the torque tells what a dragged engine takes; a load that stands for it
         does not
+    setup : what a whole drive tells of its force side; found from this drive when None
 
     Raises
     ------
@@ -77,11 +79,12 @@ def force_balance(
     lag = vehicle.timing.torque_lag if lag is None else lag
     rows = motion_at(smoothed(motion, lag), time)
     engine_speed = engine_speed_at(drive, vehicle, time + motion.speed_delay, rows["speed"])
-    numbers = identify_told_gears(drive, vehicle, recorded, engine_speed, rows["speed"])
-    gear, gearing, slipping = gears_at(
-        drive, vehicle, recorded, engine_speed, rows["speed"], numbers
-    )
+    told = (drive, vehicle, recorded, engine_speed, rows["speed"])
+    numbers = setup.gears if setup is not None else identify_told_gears(*told)
+    gear, gearing, slipping = gears_at(*told, numbers)
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
+    full = setup.full_torque if setup is not None else full_load_torque(torque.torque)
+    air = setup.air if setup is not None else identify_air(drive, rows["altitude"])
     view = MergedView(
         time=time,
         traction_force=traction_gain(vehicle, torque.torque, gearing) * torque.torque,
@@ -97,24 +100,35 @@ def force_balance(
         gear=gear,
         gearing=gearing,
         air_speed=rows["speed"] + headwind(drive, rows["heading"]),
-        air_density=air_density(drive, rows["altitude"]),
-        fuel_burnt=fuel_burnt(drive, vehicle, recorded, torque.torque, engine_speed),
+        air_density=air.density(rows["altitude"]),
+        fuel_burnt=fuel_burnt(drive, vehicle, recorded, torque.torque, engine_speed, full),
         reason=np.zeros(time.size, dtype=np.uint8),
     )
     known = rows["valid"] > 0.99
     brakes = find_brakes(
         drive, vehicle, motion, source, view,
-        known=known, lag=lag, signed=signed and source_of(vehicle).signed,
+        known=known, lag=lag, signed=signed and source_of(vehicle).signed, setup=setup,
     )  # fmt: skip
-    reason = _reasons(vehicle, motion, source, view, torque, brakes, known, slipping)
+    fill = setup.fill if setup is not None else identify_fill(source)
+    reason = _reasons(vehicle, motion, source, view, torque, brakes, known, slipping, fill)
     view = replace(view, reason=reason)
-    view = replace(view, force_std=_force_std(vehicle, view))
+    if setup is None:
+        setup = ForceSetup(
+            foot=brakes.foot,
+            switch_dead=brakes.switch_dead,
+            gears=numbers,
+            air=air,
+            full_torque=full,
+            torque_noise=_torque_noise(vehicle, view),
+            fill=fill,
+        )
     return ForceBalance(
-        merged=view,
+        merged=replace(view, force_std=setup.torque_noise * np.nan_to_num(gearing)),
         motion=motion,
         brake_hidden=brakes.hidden,
         switch_dead=brakes.switch_dead,
         coarse_std=coarse_std(source, source.at(recorded), reason == Reason.USED),
+        setup=setup,
     )
 
 
@@ -127,6 +141,7 @@ def _reasons(
     brakes: Brakes,
     known: Bools,
     slipping: Bools,
+    fill: Fill | None,
 ) -> NDArray[np.uint8]:
     """Why a row is not usable (n,); the first reason that applies is told, so the order matters.
 
@@ -138,6 +153,7 @@ def _reasons(
     torque, brakes : of the rows
     known : (n,) the motion is known
     slipping : (n,) the clutch slips
+    fill : how readings that a logger filled in would look
     """
     recorded = source.time
     fresh = source.age(recorded) <= 3.0 * source.period
@@ -145,7 +161,7 @@ def _reasons(
     if vehicle.driveline.single_speed:
         changing[:] = False
     reason = np.zeros(view.time.size, dtype=np.uint8)
-    told = np.isfinite(view.traction_force) & fresh & ~filled(source, recorded)
+    told = np.isfinite(view.traction_force) & fresh & ~filled(source, recorded, fill)
     for flag, why in (
         (~known | ~np.isfinite(view.speed), Reason.NO_MOTION),
         (view.speed < SLOWEST, Reason.STANDING),
@@ -167,10 +183,9 @@ def highest_torque(torque: Floats) -> float:
     return float(np.percentile(known, 98.0)) if known.size else 0.0
 
 
-def _force_std(vehicle: Vehicle, view: MergedView) -> Floats:
-    """Noise of each traction force (n,) [N]: that of the torque's reading, through the gear."""
-    noise = vehicle.torque.noise or ROUGH_NOISE * highest_torque(view.torque[view.usable])
-    return np.asarray(noise * np.nan_to_num(view.gearing))
+def _torque_noise(vehicle: Vehicle, view: MergedView) -> float:
+    """Noise of one torque [N m]: the vehicle's, else a part of the highest of the drive."""
+    return vehicle.torque.noise or ROUGH_NOISE * highest_torque(view.torque[view.usable])
 
 
 def dragged_reading(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
@@ -10,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.balance.coarse import coarse_note
+from weighbridge.balance.filled import Fill
+from weighbridge.balance.foot_setup import FootSetup
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats, Ints
-from weighbridge.vehicle.air import dynamic_pressure
+from weighbridge.vehicle.air import Air, dynamic_pressure
 
 
 class Reason(IntEnum):
@@ -129,6 +132,30 @@ class MergedView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ForceSetup:
+    """What a whole drive tells of its force side, by which each row can be found alone.
+
+    Attributes
+    ----------
+    foot : accelerator and floor of the reading
+    switch_dead : the brake switch contradicts the motion and is not used
+    gears : number of the vehicle file's gear by what the gearbox tells
+    air : temperature and pressure
+    full_torque : torque of the engine that the drive hardly exceeds [N m]
+    torque_noise : of one torque [N m]
+    fill : how readings that a logger filled in would look; None where they cannot be told
+    """
+
+    foot: FootSetup
+    switch_dead: bool
+    gears: Mapping[int, int]
+    air: Air
+    full_torque: float
+    torque_noise: float
+    fill: Fill | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ForceBalance:
     """Newton's law along the road: the table, and the motion it was read from.
 
@@ -139,6 +166,7 @@ class ForceBalance:
         where it is braked
     switch_dead : the brake switch contradicts the motion and is not used
     coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
+    setup : what a whole drive tells of its force side; None where it was not looked for
     """
 
     merged: MergedView
@@ -146,6 +174,7 @@ class ForceBalance:
     brake_hidden: bool = False
     switch_dead: bool = False
     coarse_std: float = 0.0
+    setup: ForceSetup | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:

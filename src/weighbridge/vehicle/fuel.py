@@ -58,7 +58,7 @@ def fuel_burnt(
     elif air is not None and len(air) and ratio is not None and len(ratio):
         equivalence_ratio = np.maximum(_near(ratio, time), 0.5)
         flow = _near(air, time) / (PETROL_STOICHIOMETRIC_RATIO * equivalence_ratio)
-    full = highest_torque(torque) if full_torque is None else full_torque
+    full = full_load_torque(torque) if full_torque is None else full_torque
     flow = np.where(np.isfinite(flow), flow, _by_work(torque, engine_speed, full))
     span = np.clip(np.diff(time), 0.0, SEEN)
     middle = 0.5 * (flow[1:] + flow[:-1])
@@ -70,7 +70,7 @@ def _near(signal: Signal, time: Floats) -> Floats:
     return np.where(signal.age(time) <= SEEN, signal.at(time), np.nan)
 
 
-def highest_torque(torque: Floats) -> float:
+def full_load_torque(torque: Floats) -> float:
     """Torque (n,) that a drive hardly exceeds [N m]; 0 where none is known."""
     known = torque[np.isfinite(torque)]
     return max(float(np.percentile(known, 98.0)), 0.0) if known.size else 0.0
