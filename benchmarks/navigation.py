@@ -12,20 +12,22 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from weighbridge.constants import GRAVITY
-from weighbridge.kernels.ins import (
+from weighbridge.kernels.ins import run
+from weighbridge.kernels.ins_model import (
     ERRORS,
     MEASUREMENTS,
     SCALE,
     SHOWN,
     STATES,
+    STDS,
+    TIME,
     Z_SPEED,
     Z_SPEED_VAR,
     Z_STILL,
     Q,
+    Samples,
     V,
-    new_log,
-    new_work,
-    run,
+    new_rows,
 )
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.settings import NavigationSettings
@@ -52,17 +54,15 @@ def kernel_rate(samples: int = 400_000) -> float:
     z[:, Z_STILL] = 0.0
     z[:, Z_SPEED] = 20.0
     z[:, Z_SPEED_VAR] = 0.25
-    nodes = np.arange(samples)
-    states, stds = np.empty((samples, SHOWN)), np.empty(samples)
+    block = Samples(stamps, accel, gyro, np.arange(samples), z)
+    states, stds = np.empty((samples, SHOWN)), np.empty((samples, STDS))
     noise = NavigationSettings().noise()
 
     def go() -> None:
         x = np.zeros(STATES)
-        x[V], x[Q], x[SCALE] = 20.0, 1.0, 1.0
-        run(
-            x, np.eye(ERRORS) * 1e-2, new_work(), stamps, accel, gyro, np.eye(3), nodes, 0,
-            samples, z, noise, new_log(0), states, stds,
-        )  # fmt: skip
+        x[V], x[Q], x[SCALE], x[TIME] = 20.0, 1.0, 1.0, np.nan
+        cov = (np.eye(ERRORS) * 1e-2).ravel()
+        run(x, cov, block, np.eye(3), noise, new_rows(), states, stds)
 
     go()
     return samples / best_of(5, go)

@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from weighbridge.kernels.ins import (
+from weighbridge.kernels.ins import propagate, propagate_covariance
+from weighbridge.kernels.ins_model import (
     ACCEL,
     BA,
     BG,
@@ -13,9 +14,11 @@ from weighbridge.kernels.ins import (
     LEVER,
     MEASUREMENTS,
     PITCH0,
+    RATE,
     SCALE,
     SQUAT,
     STATES,
+    TRANSITION,
     YAW0,
     Z_D,
     Z_E,
@@ -27,14 +30,10 @@ from weighbridge.kernels.ins import (
     Z_VVAR,
     Q,
     V,
-    correct,
-    new_log,
-    new_work,
-    propagate,
-    propagate_covariance,
-    smooth,
-    update,
+    new_rows,
 )
+from weighbridge.kernels.ins_rows import correct, update
+from weighbridge.kernels.ins_smoother import smooth
 from weighbridge.kernels.rotation import euler_to_quaternion
 from weighbridge.navigation.settings import NavigationSettings
 
@@ -79,31 +78,31 @@ def _moved(x, place, size):
 
 
 def _propagated(x):
-    y, work = x.copy(), new_work()
+    y = x.copy()
     rng = np.random.default_rng(1)
     for _ in range(10):
         f = rng.normal([0.7, 1.2, -9.6], 0.5)
         w = rng.normal([0.02, -0.03, 0.1], 0.02)
-        propagate(y, work, *f, *w, 0.005, QUIET)
-    return y, work
+        propagate(y, tuple(f), tuple(w), 0.005, QUIET)
+    return y
 
 
 @pytest.mark.parametrize("correlated", [False, True])
 def test_covariance_follows_the_nonlinear_propagation(correlated):
     x = _state()
-    end, work = _propagated(x)
+    end = _propagated(x)
     jacobian = np.empty((ERRORS, ERRORS))
     for i in range(ERRORS):
         h = 1e-4
-        up, _ = _propagated(_moved(x, i, h))
-        down, _ = _propagated(_moved(x, i, -h))
+        up, down = _propagated(_moved(x, i, h)), _propagated(_moved(x, i, -h))
         jacobian[:, i] = (_difference(up, end) - _difference(down, end)) / (2.0 * h)
     cov = np.diag(np.linspace(0.5, 2.0, ERRORS))
     if correlated:
         root = np.random.default_rng(2).normal(size=(ERRORS, ERRORS))
         cov = root @ root.T
-    ours = cov.copy()
-    propagate_covariance(end, ours, work, QUIET)
+    flat = cov.ravel().copy()
+    propagate_covariance(end, flat, QUIET)
+    ours = flat.reshape(cov.shape)
     # blocks of the transition are of first order over the 50 ms of a node
     assert_allclose(ours, jacobian @ cov @ jacobian.T, atol=0.02 * np.abs(cov).max())
     assert_allclose(ours, ours.T, atol=0.0)
@@ -127,23 +126,22 @@ def _predicted(x, rate):
 def test_rows_of_speed_and_constraints_are_the_derivatives():
     x = _state()
     rate = np.array([0.01, 0.02, 0.15])
-    work, log = new_work(), new_log(1)
-    work.rate[:] = rate
-    work.transition[0] = 1.0
-    z = np.full(MEASUREMENTS, np.nan)
-    z[Z_STILL], z[Z_SPEED], z[Z_SPEED_VAR] = 0.0, 16.0, 0.1
+    rows = new_rows()
+    x[RATE : RATE + 3], x[TRANSITION] = rate, 1.0
+    z = np.full((1, MEASUREMENTS), np.nan)
+    z[0, [Z_STILL, Z_SPEED, Z_SPEED_VAR]] = 0.0, 16.0, 0.1
     # so small a covariance that the rows do not move the state between them
-    update(x.copy(), np.eye(ERRORS) * 1e-16, work, z, QUIET, log, 0)
-    assert log.row_count[0] == 3
+    update(x.copy(), (np.eye(ERRORS) * 1e-16).ravel(), z, 0, QUIET, rows, 0)
+    assert rows.row_count[0] == 3
     expected = np.empty((3, ERRORS))
     for i in range(ERRORS):
         h = 1e-5
         up, down = _predicted(_moved(x, i, h), rate), _predicted(_moved(x, i, -h), rate)
         expected[:, i] = (up - down) / (2.0 * h)
-    assert_allclose(log.h[0, :3], expected, atol=1e-6)
+    assert_allclose(rows.h[0].reshape(-1, ERRORS)[:3], expected, atol=1e-6)
     # the term eq. 46 leaves out is there: attitude moves the constraint rows by the speed
     assert np.abs(expected[1:, 6:9]).max() > 10.0
-    assert_allclose(log.innovation[0, :3], [16.0, 0.0, 0.0] - _predicted(x, rate), atol=1e-9)
+    assert_allclose(rows.innovation[0, :3], [16.0, 0.0, 0.0] - _predicted(x, rate), atol=1e-9)
 
 
 def test_scalar_rows_equal_the_joint_update():
@@ -152,19 +150,20 @@ def test_scalar_rows_equal_the_joint_update():
     x[Q], x[SCALE] = 1.0, 1.0
     root = rng.normal(size=(ERRORS, ERRORS)) * 1e-3
     cov = root @ root.T + 1e-6 * np.eye(ERRORS)
-    z = np.full(MEASUREMENTS, np.nan)
-    z[Z_STILL] = 0.0
-    z[Z_N : Z_D + 1] = [1e-3, -2e-3, 1.5e-3]
-    z[Z_HVAR], z[Z_VVAR] = 1e-6, 4e-6
+    z = np.full((1, MEASUREMENTS), np.nan)
+    z[0, Z_STILL] = 0.0
+    z[0, Z_N : Z_D + 1] = [1e-3, -2e-3, 1.5e-3]
+    z[0, Z_HVAR], z[0, Z_VVAR] = 1e-6, 4e-6
     noise = QUIET._replace(constraints=0.0)
-    ours, ours_cov = x.copy(), cov.copy()
-    update(ours, ours_cov, new_work(), z, noise, new_log(0), 0)
+    ours, flat = x.copy(), cov.ravel().copy()
+    update(ours, flat, z, 0, noise, new_rows(), 0)
+    ours_cov = flat.reshape(cov.shape)
     h = np.eye(3, ERRORS)
     s = h @ cov @ h.T + np.diag([1e-6, 1e-6, 4e-6])
     gain = cov @ h.T @ np.linalg.inv(s)
-    assert_allclose(_difference(ours, x), gain @ z[Z_N : Z_D + 1], rtol=1e-3, atol=1e-8)
+    assert_allclose(_difference(ours, x), gain @ z[0, Z_N : Z_D + 1], rtol=1e-3, atol=1e-8)
     assert_allclose(ours_cov, (np.eye(ERRORS) - gain @ h) @ cov, atol=1e-12)
-    assert_allclose(z[Z_E], -2e-3)
+    assert_allclose(z[0, Z_E], -2e-3)
 
 
 def test_smoother_equals_least_squares_over_all_epochs():
@@ -176,23 +175,23 @@ def test_smoother_equals_least_squares_over_all_epochs():
     x[Q], x[SCALE] = 1.0, 1.0
     prior = np.full(ERRORS, 1e-10)
     prior[0:3], prior[3:6] = 4.0, 1.0
-    cov = np.diag(prior)
-    work, log = new_work(), new_log(nodes)
+    cov = np.diag(prior).ravel().copy()
+    log = new_rows(nodes)
     states = np.empty((nodes, 24))
     z_all = rng.normal(scale=1.0, size=nodes)
     for k in range(nodes):
         for _ in range(10):
-            propagate(x, work, 0.0, 0.0, -noise.gravity, 0.0, 0.0, 0.0, 0.01, noise)
-        propagate_covariance(x, cov, work, noise)
-        log.transition[k] = work.transition
-        z = np.full(MEASUREMENTS, np.nan)
-        z[Z_STILL] = 0.0
-        z[Z_N], z[Z_E], z[Z_D] = z_all[k], 0.0, 0.0
-        z[Z_HVAR], z[Z_VVAR] = 0.25, 0.25
-        update(x, cov, work, z, noise, log, k)
+            propagate(x, (0.0, 0.0, -noise.gravity), (0.0, 0.0, 0.0), 0.01, noise)
+        propagate_covariance(x, cov, noise)
+        log.transition[k] = x[TRANSITION : TRANSITION + 13]
+        z = np.full((1, MEASUREMENTS), np.nan)
+        z[0, Z_STILL] = 0.0
+        z[0, [Z_N, Z_E, Z_D]] = z_all[k], 0.0, 0.0
+        z[0, [Z_HVAR, Z_VVAR]] = 0.25, 0.25
+        update(x, cov, z, 0, noise, log, k)
         log.cov[k] = cov
         states[k] = x[:24]
-        work.transition[:] = 0.0
+        x[TRANSITION : TRANSITION + 13] = 0.0
     smooth(log, nodes, np.zeros(ERRORS), states, 0)
 
     # one axis: p0, v0 and the velocity kicks of each node, which follow the move

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from weighbridge.checks import check_drive
 from weighbridge.errors import DriveError
 from weighbridge.navigation.aiding import read_imu
-from weighbridge.navigation.gain import find_gain
+from weighbridge.navigation.identify.gain import find_gain
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car

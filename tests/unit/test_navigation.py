@@ -7,38 +7,19 @@ import numpy as np
 import pymap3d
 import pytest
 from numba import config
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.kernels.ins import (
-    ERRORS,
-    MEASUREMENTS,
-    SCALE,
-    SHOWN,
-    STATES,
-    Z_D,
-    Z_HVAR,
-    Z_N,
-    Z_SPEED,
-    Z_SPEED_VAR,
-    Z_STILL,
-    Z_VVAR,
-    P,
-    Q,
-    V,
-    lowpass_resample,
-    new_log,
-    new_work,
-    run,
-    step,
-)
-from weighbridge.navigation.aiding import place_nodes, resolution
+from weighbridge.kernels.ins_model import P
+from weighbridge.kernels.lowpass import lowpass_resample
+from weighbridge.navigation.aiding import resolution
 from weighbridge.navigation.geodesy import LocalFrame
+from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.inertial import inertial_motion
+from weighbridge.navigation.rows import place_nodes
 from weighbridge.navigation.settings import NavigationSettings
-from weighbridge.navigation.timing import estimate_speed_delay
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Mounting
 
@@ -336,52 +317,6 @@ def test_jitter_of_the_inertial_clock(hills):
              for k in ("accel", "gyro") for a in "xyz"]  # fmt: skip
     m = inertial_motion(drive.with_signals(*moved))
     assert np.degrees(np.std(_error(m, truth, "grade"))) < 0.25
-
-
-def test_batch_equals_sample_by_sample():
-    rng = np.random.default_rng(8)
-    n = 4000
-    time = np.cumsum(rng.uniform(0.004, 0.006, n))
-    time[2500:] += 2.0
-    accel = np.array([0.1, 0.2, -GRAVITY]) + rng.normal(scale=0.2, size=(n, 3))
-    gyro = rng.normal(scale=0.01, size=(n, 3))
-    nodes = place_nodes(time, time[::203], 20.0, 0.5)
-    z = np.full((nodes.size, MEASUREMENTS), np.nan)
-    z[:, Z_STILL] = (np.arange(nodes.size) % 100 > 90) * 2.0
-    z[:, Z_SPEED] = 15.0 + rng.normal(scale=0.3, size=nodes.size)
-    z[:, Z_SPEED_VAR] = 0.3
-    z[::17, Z_N : Z_D + 1] = rng.normal(scale=3.0, size=(z[::17].shape[0], 3))
-    z[::17, Z_HVAR], z[::17, Z_VVAR] = 4.0, 25.0
-    noise = NavigationSettings().noise()
-    turn = np.eye(3)
-
-    def fresh():
-        x = np.zeros(STATES)
-        x[V], x[Q], x[SCALE] = 15.0, 1.0, 1.0
-        return x, np.eye(ERRORS) * 1e-2, new_work()
-
-    x, cov, work = fresh()
-    states = np.empty((nodes.size, SHOWN))
-    stds = np.empty(nodes.size)
-    half = nodes.size // 2
-    for a, b in ((0, half), (half, nodes.size)):
-        run(x, cov, work, time, accel, gyro, turn, nodes, a, b, z, noise, new_log(0), states, stds)
-
-    y, cov_y, work_y = fresh()
-    log, nothing = new_log(0), np.full(MEASUREMENTS, np.nan)
-    k = 0
-    for i in range(n):
-        dt = time[i] - time[i - 1] if i else 0.0
-        node = k < nodes.size and nodes[k] == i
-        step(
-            y, cov_y, work_y, accel[i], gyro[i], dt, node, z[k] if node else nothing, noise, log, 0
-        )
-        if node:
-            assert_array_equal(y[:SHOWN], states[k])
-            k += 1
-    assert_array_equal(x, y)
-    assert_array_equal(cov, cov_y)
-    assert_array_equal(cov, cov.T)
 
 
 def test_delay_of_the_speed_is_found():

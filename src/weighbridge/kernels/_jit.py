@@ -67,9 +67,17 @@ def _decorator(**options):
 kernel = _decorator()
 """Compile; division by zero gives ``inf`` compiled or not; threads may share."""
 
-fast_kernel = _decorator(fastmath={"reassoc", "contract", "arcp", "nsz"})
+contracted_kernel = _decorator(fastmath={"contract"})
+"""As `kernel`, with products and sums fused; the same expression gives the same bits."""
+
+_FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+fast_kernel = _decorator(fastmath=_FAST)
 """As `kernel`, with sums free to be reordered; NaN keeps its meaning."""
 
 inlined_kernel = _decorator(forceinline=True)
 """As `kernel`, put in the place of its call: for small steps of a loop whose arguments
 hold many arrays, which a call would count references of."""
+
+inlined_fast_kernel = _decorator(fastmath=_FAST, forceinline=True)
+"""As `fast_kernel`, put in the place of its call."""

@@ -1,4 +1,4 @@
-"""The measurements of a drive, laid out for the filter."""
+"""Inertial samples, fixes and speeds of a drive, as the filter takes them."""
 
 from __future__ import annotations
 
@@ -7,25 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.kernels.ins import (
-    MEASUREMENTS,
-    Z_D,
-    Z_HVAR,
-    Z_N,
-    Z_SPEED,
-    Z_SPEED_VAR,
-    Z_STILL,
-    Z_VE,
-    Z_VEL_VAR,
-    Z_VN,
-    Z_VVAR,
-    lowpass_resample,
-)
+from weighbridge.kernels.lowpass import lowpass_resample
 from weighbridge.navigation.dropouts import false_rows, repeated_rows
 from weighbridge.navigation.frozen import thawed
 from weighbridge.navigation.geodesy import LocalFrame
-from weighbridge.navigation.settings import NavigationSettings
-from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 
 _AXES = ("x", "y", "z")
@@ -41,9 +27,6 @@ _MOVES = 1.0
 
 _SLOWEST = 0.11
 """Inertial samples further apart lose what happens between them [s]."""
-
-_HEIGHT_PERIOD, _HEIGHT_TIME = 10.0, 300.0
-"""Without heights, distance of the pseudo-heights and how long hills last [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,146 +196,3 @@ def interpolated(signal: Signal, time: Floats, longest: float) -> Floats:
     right = np.clip(np.searchsorted(signal.time, time), 1, signal.time.size - 1)
     gap = signal.time[right] - signal.time[right - 1]
     return np.where(gap <= longest, signal.at(time), np.nan)
-
-
-def place_nodes(time: Floats, fixes: Floats, rate: float, max_gap: float) -> Ints:
-    """Choose the samples at which covariance and measurements are processed.
-
-    An even ``rate``, and the sample nearest to each GNSS fix, so that no fix is
-    used at another instant than its own; both sides of each gap.
-    """
-    slots = np.floor((time - time[0]) * rate + 1e-6).astype(np.int64)
-    even = np.flatnonzero(np.diff(slots, prepend=-1) > 0)
-    right = np.clip(np.searchsorted(time, fixes), 1, time.size - 1)
-    nearest = np.where(fixes - time[right - 1] < time[right] - fixes, right - 1, right)
-    nearest = nearest[np.abs(time[nearest] - fixes) < 0.1]
-    after = np.flatnonzero(np.diff(time) > max_gap)
-    return np.unique(np.concatenate([even, nearest, after, after + 1, [0, time.size - 1]]))
-
-
-def still_state(
-    node_time: Floats, speed: Signal | None, grid_time: Floats, accel: Floats, gyro: Floats,
-    slow: Bools,
-) -> Floats:  # fmt: skip
-    """Tell standing from moving: 0 moving, 1 wheels stand, 2 the body rests too.
-
-    Parameters
-    ----------
-    node_time : (m,) [s]
-    speed : speed of the wheels, which shows standing as zero; None without
-    grid_time, accel, gyro : (k,), (k, 3), (k, 3) low-passed inertial samples
-    slow : (k,) other sources do not show movement
-    """
-    period = float(grid_time[1] - grid_time[0])
-    half = max(1, round(0.5 / period))
-
-    def spread(y: Floats) -> Floats:
-        z = np.nan_to_num(y, nan=1e3)
-        top = np.full(y.shape[0], 0.0)
-        for c in range(3):
-            pad = np.pad(z[:, c], half, mode="edge")
-            s1 = np.concatenate([[0.0], np.cumsum(pad)])
-            s2 = np.concatenate([[0.0], np.cumsum(pad**2)])
-            n = 2 * half + 1
-            mean = (s1[n:] - s1[:-n]) / n
-            top = np.maximum(top, np.sqrt(np.maximum((s2[n:] - s2[:-n]) / n - mean**2, 0.0)))
-        return top
-
-    quiet = (spread(accel) < 0.12) & (spread(gyro) < 0.008)
-    index = np.clip(np.round((node_time - grid_time[0]) / period), 0, quiet.size - 1)
-    at = index.astype(np.int64)
-    still = np.zeros(node_time.size)
-    if speed is not None and len(speed):
-        zero = np.abs(speed.values) < 0.05
-        moving = speed.time[~zero]
-        stands = np.ones(node_time.size, dtype=bool)
-        if moving.size:
-            right = np.clip(np.searchsorted(moving, node_time), 0, moving.size - 1)
-            left = np.maximum(right - 1, 0)
-            away = np.minimum(np.abs(moving[right] - node_time), np.abs(node_time - moving[left]))
-            stands = away > max(0.4, 1.1 * speed.period)
-        stands &= speed.age(node_time) < max(1.0, 1.5 * speed.period)
-        still[stands] = 1.0
-        still[stands & quiet[at]] = 2.0
-    else:
-        calm = quiet & (spread(accel) < 0.05) & (spread(gyro) < 0.004) & slow
-        still[calm[at]] = 2.0
-    return still
-
-
-def measurements(
-    node_time: Floats,
-    settings: NavigationSettings,
-    *,
-    speed: Signal | None,
-    fixes: Fixes | None,
-    drive: Drive,
-    gnss_delay: float,
-    still: Floats,
-) -> Floats:
-    """Lay all measurements out, one row (11,) per node, NaN where there is none."""
-    z = np.full((node_time.size, MEASUREMENTS), np.nan)
-    z[:, Z_STILL] = still
-    if speed is not None and len(speed) > 1:
-        values = interpolated(speed, node_time, max(1.6, 3.0 * speed.period))
-        # one row per sample received: interpolating makes no information
-        seen = np.searchsorted(speed.time, node_time)
-        fresh = np.diff(seen, prepend=seen[0] - 1) > 0
-        values[~fresh] = np.nan
-        step = resolution(speed.values)
-        rate = 1.0 / max(speed.period, float(np.median(np.diff(node_time))))
-        var = settings.speed_std**2 + step**2 / 12.0 + (settings.speed_slip_std * values) ** 2
-        z[:, Z_SPEED] = values
-        z[:, Z_SPEED_VAR] = var * max(1.0, 2.0 * settings.constraint_time * rate)
-    if fixes is not None:
-        time = fixes.time - gnss_delay
-        right = np.clip(np.searchsorted(node_time, time), 1, node_time.size - 1)
-        node = np.where(time - node_time[right - 1] < node_time[right] - time, right - 1, right)
-        near = np.abs(node_time[node] - time) < 0.1
-        node = node[near]
-        z[node, Z_N : Z_D + 1] = fixes.ned[near]
-        rate = 1.0 / float(np.median(np.diff(fixes.time)))
-        inflate = max(1.0, rate * settings.gnss_time)
-        horizontal = np.full(node.size, settings.gnss_horizontal_std)
-        accuracy, hdop = drive.get("gnss_accuracy"), drive.get("hdop")
-        if accuracy is not None and len(accuracy):
-            horizontal = np.clip(accuracy.held(fixes.time[near]), 1.0, 1e3)
-        elif hdop is not None and len(hdop):
-            horizontal = settings.gnss_horizontal_std * np.clip(hdop.held(fixes.time[near]), 1, 50)
-        horizontal = np.where(np.isfinite(horizontal), horizontal, settings.gnss_horizontal_std)
-        ratio = settings.gnss_vertical_std / settings.gnss_horizontal_std
-        z[node, Z_HVAR] = horizontal**2 * inflate
-        z[node, Z_VVAR] = (horizontal * ratio) ** 2 * inflate
-        _gnss_velocity(z, node_time, settings, drive, gnss_delay)
-    if fixes is None or not fixes.has_height:
-        # nobody drives far up or down for long: without heights this alone keeps
-        # a bias of the accelerometer from being taken for an endless hill
-        every = np.flatnonzero(np.diff(np.floor(node_time / _HEIGHT_PERIOD), prepend=-1.0) > 0)
-        z[every, Z_D] = 0.0
-        z[every, Z_VVAR] = settings.height_range**2 * _HEIGHT_TIME / _HEIGHT_PERIOD
-    return z
-
-
-def _gnss_velocity(
-    z: Floats, node_time: Floats, settings: NavigationSettings, drive: Drive, delay: float
-) -> None:
-    """Add velocity over ground where the receiver gives speed and course."""
-    over_ground, course = drive.get("gnss_speed"), drive.get("gnss_course")
-    if over_ground is None or course is None or len(over_ground) < 2 or len(course) < 2:
-        return
-    time = over_ground.time - delay
-    good = (over_ground.values > 2.0) & (course.age(over_ground.time) < 0.05)
-    right = np.clip(np.searchsorted(node_time, time), 1, node_time.size - 1)
-    node = np.where(time - node_time[right - 1] < node_time[right] - time, right - 1, right)
-    good &= np.abs(node_time[node] - time) < 0.05
-    node = node[good]
-    angle = course.values[
-        np.clip(np.searchsorted(course.time, over_ground.time[good] - 0.05), 0, len(course) - 1)
-    ]
-    inflate = max(1.0, settings.gnss_time / over_ground.period)
-    z[node, Z_VN] = over_ground.values[good] * np.cos(angle)
-    z[node, Z_VE] = over_ground.values[good] * np.sin(angle)
-    # a course is worse the slower the vehicle: its error across grows as 1 degree of speed
-    z[node, Z_VEL_VAR] = (
-        settings.gnss_velocity_std**2 + (0.02 * over_ground.values[good]) ** 2
-    ) * inflate

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
-from weighbridge.kernels.ins import Noise
+from weighbridge.kernels.ins_model import Noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,8 +11,8 @@ from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.aiding import resolution
+from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
-from weighbridge.navigation.steps import fitted
 from weighbridge.signals import Floats, Signal
 
 _STEP: Final = 0.25

@@ -8,6 +8,7 @@ right. A mounting that changes shows as a step or ramp of what differs from that
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.even import Even
-from weighbridge.navigation.steps import SIDE, Step, fitted
+from weighbridge.navigation.identify.steps import SIDE, Step, fitted
 from weighbridge.signals import Bools, Floats, Signal
 
 _SPAN: Final = 4
@@ -92,7 +93,7 @@ class Change:
         """Turn vectors (n, 3) in sensor axes back into the axes before the change."""
         angle = (self.angle * self.share(time))[:, None]
         u = self.axis
-        along = (vectors @ u)[:, None] * u
+        along = (vectors[:, 0] * u[0] + vectors[:, 1] * u[1] + vectors[:, 2] * u[2])[:, None] * u
         return np.asarray(
             along + np.cos(angle) * (vectors - along) + np.sin(angle) * np.cross(u, vectors)
         )
@@ -148,14 +149,14 @@ def find_changes(
     return changes
 
 
-def undo(time: Floats, values: Floats, changes: list[Change]) -> Floats:
+def undo(time: Floats, values: Floats, changes: Sequence[Change]) -> Floats:
     """Turn inertial samples (n, 6) back into the axes before the changes."""
     for change in changes:
         values = np.hstack([change.undone(time, values[:, :3]), change.undone(time, values[:, 3:])])
     return values
 
 
-def unsure(time: Floats, changes: list[Change]) -> Bools:
+def unsure(time: Floats, changes: Sequence[Change]) -> Bools:
     """Mark the instants (n,) at which a step may or may not have happened."""
     marked = np.zeros(time.size, dtype=bool)
     for change in changes:
@@ -164,7 +165,7 @@ def unsure(time: Floats, changes: list[Change]) -> Bools:
     return marked
 
 
-def loosened(time: Floats, changes: list[Change]) -> tuple[Floats, Floats]:
+def openings(time: Floats, changes: Sequence[Change]) -> tuple[Floats, Floats]:
     """Instants (k,) at which the mounting is open again, and variances (k, 2) of pitch and yaw.
 
     Parameters
@@ -187,7 +188,7 @@ def loosened(time: Floats, changes: list[Change]) -> tuple[Floats, Floats]:
     return instants[order][within], variances[order][within]
 
 
-def told(changes: list[Change], start: float, end: float) -> list[str]:
+def told(changes: Sequence[Change], start: float, end: float) -> list[str]:
     """Say in sentences what changed when in a drive from ``start`` to ``end`` [s]."""
     texts = []
     for change in sorted(changes, key=lambda c: c.start):

@@ -1,0 +1,68 @@
+"""Low-pass and resampling of unevenly sampled channels."""
+
+import math
+
+import numpy as np
+
+from weighbridge.kernels._jit import fast_kernel
+
+
+@fast_kernel
+def lowpass_resample(time, values, start, period, count, reach, out, weight):
+    """Low-pass unevenly sampled channels and take them to an even clock, without delay.
+
+    Each output is the weighted mean of the samples within ``reach`` output
+    periods, with the weights ``sinc(0.8 u) cos^2(pi u / (2 reach))`` of a Hann-windowed
+    ideal low-pass at 0.4 of the output rate: beyond 0.6 of it, what would
+    fold stays below 1 % for ``reach = 3``.
+
+    Parameters
+    ----------
+    time : (n,) float64
+        Rising [s].
+    values : (n, c) float64
+    start, period : float
+        First output instant and distance of outputs [s].
+    count : int
+    reach : float
+        [-]
+    out : (count, c) float64
+        Filled; NaN where too few samples are near.
+    weight : (count,) float64
+        Filled: sum of the weights, about samples per output period.
+    """
+    channels = values.shape[1]
+    fine = 256
+    size = int(reach * fine)
+    window = np.empty(size + 2)
+    for i in range(size + 2):
+        u = i / fine
+        angle = math.pi * 0.8 * u
+        window[i] = math.sin(angle) / angle if i > 0 else 1.0
+        window[i] *= math.cos(0.5 * math.pi * min(u, reach) / reach) ** 2
+    out[:] = 0.0
+    weight[:] = 0.0
+    nearest = np.zeros(count)
+    for i in range(time.size):
+        # each sample stands for the time to its neighbours, so that jitter and
+        # bursts do not weigh more
+        left = time[i] - time[i - 1] if i > 0 else time[i + 1] - time[i]
+        right = time[i + 1] - time[i] if i + 1 < time.size else left
+        share = 0.5 * (min(left, 2.0 * period) + min(right, 2.0 * period)) / period
+        place = (time[i] - start) / period
+        low = max(0, math.ceil(place - reach))
+        high = min(count - 1, math.floor(place + reach))
+        for k in range(low, high + 1):
+            u = place - k
+            cell = abs(u) * fine
+            at = int(cell)
+            w = share * (window[at] + (cell - at) * (window[at + 1] - window[at]))
+            weight[k] += w
+            if abs(u) <= 1.0:
+                nearest[k] += 1.0
+            for c in range(channels):
+                out[k, c] += w * values[i, c]
+    for k in range(count):
+        good = nearest[k] > 0.0 and weight[k] > 0.5
+        for c in range(channels):
+            out[k, c] = out[k, c] / weight[k] if good else np.nan

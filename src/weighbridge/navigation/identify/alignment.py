@@ -1,0 +1,162 @@
+"""Sensor to body axes, and how late speed and GNSS are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import DriveError
+from weighbridge.kernels.rotation import euler_to_matrix
+from weighbridge.navigation.aiding import Fixes, interpolated, resample, speed_from_fixes
+from weighbridge.navigation.even import Even, coarsely
+from weighbridge.navigation.identify.mounting import (
+    CoarseMounting,
+    TooLittleMotionError,
+    coarse_mounting,
+)
+from weighbridge.navigation.identify.timing import estimate_speed_delay
+from weighbridge.navigation.sources import undelayed, usable
+from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.vehicle.model import Mounting
+
+COARSE_PERIOD: Final = 0.5
+"""Clock of the coarse alignment [s]."""
+
+FINE_RATE: Final = 20.0
+"""Clock of the delays [Hz]."""
+
+MOST_MOVED: Final = 0.2
+"""A mounting further from the one given is another one [rad],"""
+
+_MOVED_SURE: Final = 4.0
+"""if it is by so many standard deviations: a steady drive hardly shows where ahead is [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """How the sensor sits and how late the speed is.
+
+    Attributes
+    ----------
+    rot_bs : (3, 3) sensor to body axes
+    tilt_std, yaw_std : its standard deviations [rad]
+    yaw_rate_bias : of the gyro [rad/s]; NaN where not found
+    speed_delay : stamp minus the instant the speed was true [s]
+    given : the mounting given; None where the sensor was moved since
+    """
+
+    rot_bs: Floats
+    tilt_std: float
+    yaw_std: float
+    yaw_rate_bias: float
+    speed_delay: float
+    given: Mounting | None
+
+
+def align(
+    fine: Even, reference: Signal, mounting: Mounting | None
+) -> tuple[Alignment, tuple[str, ...]]:
+    """Find how the sensor sits and how late the speed is, from a whole drive.
+
+    Returns
+    -------
+    alignment
+    notes : sentences on what was not found
+
+    Raises
+    ------
+    DriveError
+        The drive is too quiet, or units or axes do not fit together.
+    """
+    coarse_imu = coarsely(fine, COARSE_PERIOD)
+    found, notes = _prior(mounting), []
+    coarse = None
+    for _ in range(2):
+        shifted = undelayed(reference, found.speed_delay)
+        try:
+            coarse = _coarse(coarse_imu, shifted)
+        except TooLittleMotionError:
+            if found.given is None:
+                raise
+            coarse = None
+        if coarse is not None:
+            found, moved = _merged(found, coarse)
+            if moved:
+                notes.append(moved)
+        forward = fine.values[:, :3] @ found.rot_bs[0]
+        delay, std = estimate_speed_delay(fine.time, forward, reference)
+        found = replace(found, speed_delay=delay if std < 0.1 else 0.0)
+    if coarse is not None and reference.name == "vehicle_speed":
+        _check_speed_unit(coarse, reference)
+    if found.speed_delay == 0.0:
+        notes.append("the drive does not show how late its vehicle speed is; taken as 0 s")
+    return found, tuple(notes)
+
+
+def _prior(mounting: Mounting | None) -> Alignment:
+    """Take what is known before the drive."""
+    if mounting is None:
+        return Alignment(np.eye(3), 0.01, 0.02, math.nan, 0.0, None)
+    tilt_std, yaw_std = 0.01, 0.02
+    if mounting.std is not None:
+        tilt_std = max(mounting.std[0], mounting.std[1], 0.003)
+        yaw_std = max(mounting.std[2], 0.005)
+    rot = euler_to_matrix(mounting.roll, mounting.pitch, mounting.yaw)
+    return Alignment(rot, tilt_std, yaw_std, math.nan, 0.0, mounting)
+
+
+def _coarse(imu: Even, speed: Signal) -> CoarseMounting:
+    at = _coarse_speed(speed, imu.time)
+    return coarse_mounting(imu.values[:, :3], imu.values[:, 3:], at, COARSE_PERIOD, at < 0.05)
+
+
+def _merged(found: Alignment, coarse: CoarseMounting) -> tuple[Alignment, str]:
+    """Take the coarse mounting where none is known, or where it is surely another one."""
+    bias = coarse.yaw_rate_bias
+    own = Alignment(coarse.rot_bs, coarse.tilt_std, coarse.yaw_std, bias, found.speed_delay, None)
+    if found.given is None:
+        return own, ""
+    angle = math.acos(np.clip(0.5 * (np.trace(found.rot_bs @ coarse.rot_bs.T) - 1.0), -1, 1))
+    unsure = math.hypot(coarse.yaw_std, coarse.tilt_std, found.tilt_std, found.yaw_std)
+    if angle <= max(MOST_MOVED, _MOVED_SURE * unsure):
+        return replace(found, yaw_rate_bias=bias), ""
+    return own, (
+        f"the sensor sits {math.degrees(angle):.0f} deg from the mounting given: "
+        "it was moved, and its mounting is found from this drive alone"
+    )
+
+
+def _check_speed_unit(coarse: CoarseMounting, reference: Signal) -> None:
+    """Refuse a speed whose changes are not those of the accelerometer."""
+    margin = 4.0 * coarse.forward_gain_std
+    low = max(coarse.forward_gain + margin, coarse.forward_gain_most) < 0.75
+    if coarse.forward_gain - margin > 1.3 or low:
+        raise DriveError(
+            f"{reference.name} changes by {1.0 / coarse.forward_gain:.2f} of what the "
+            "accelerometer shows: set its unit (kmh, mph or mps) in the mapping"
+        )
+
+
+def gnss_delay(drive: Drive, fine: Even, fixes: Fixes | None, rot_bs: Floats) -> float:
+    """Find how late GNSS is, from its speed or that between fixes; 0 where not shown [s]."""
+    if fixes is None:
+        return 0.0
+    start, end = float(fine.time[0]), float(fine.time[-1])
+    speed = usable(drive.get("gnss_speed"), start, end) or speed_from_fixes(fixes)
+    delay, std = estimate_speed_delay(fine.time, fine.values[:, :3] @ rot_bs[0], speed)
+    return delay if std < 0.05 else 0.0
+
+
+def _coarse_speed(speed: Signal, grid: Floats) -> Floats:
+    """Take the speed to the coarse clock in the band of the coarse inertial samples."""
+    longest = max(2.0, 3.0 * speed.period)
+    at = interpolated(speed, grid, longest)
+    if speed.period < 0.3 * COARSE_PERIOD:
+        smooth_speed = resample(
+            speed.time, speed.values[:, None], float(grid[0]), COARSE_PERIOD, grid.size
+        )[:, 0]
+        return np.where(np.isfinite(at) & (at > 0.05), smooth_speed, at)
+    return at

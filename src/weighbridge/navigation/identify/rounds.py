@@ -1,0 +1,258 @@
+"""Identification of a drive in rounds: the motion shows the accelerometer's scale."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.kernels.ins_model import Z_STILL
+from weighbridge.kernels.rotation import euler_to_matrix
+from weighbridge.navigation.aiding import Imu, interpolated
+from weighbridge.navigation.even import Even, coarsely, evenly
+from weighbridge.navigation.filter import Block, run
+from weighbridge.navigation.identify.alignment import (
+    COARSE_PERIOD,
+    FINE_RATE,
+    Alignment,
+    align,
+    gnss_delay,
+)
+from weighbridge.navigation.identify.gain import Gain, find_gain, gravity_read
+from weighbridge.navigation.identify.remounting import (
+    Change,
+    find_changes,
+    openings,
+    told,
+    undo,
+    unsure,
+)
+from weighbridge.navigation.identify.setup import Setup, scaled
+from weighbridge.navigation.identify.start import Begin, first_state, restarted
+from weighbridge.navigation.layout import Found, smoothed_motion
+from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.rows import (
+    find_clocks,
+    measurements,
+    open_mounting,
+    place_nodes,
+    still_state,
+)
+from weighbridge.navigation.settings import NavigationSettings
+from weighbridge.navigation.sources import Sources, undelayed
+from weighbridge.vehicle.model import Mounting
+
+_LOG = logging.getLogger(__name__)
+
+_FIRST_PASS: Final = 900.0
+"""The first pass, which only finds the constants, ends after so long [s]."""
+
+_SCALE_ROUNDS: Final = 4
+"""A wrong scale also bends the attitude: each round finds most of what is left."""
+
+_OPEN: Final = 0.4
+"""Part of a gain that may be scale or squat that is left open in the mass [-]."""
+
+_CLOSER: Final = 0.6
+"""A round that finds more than so much of what the one before found leads nowhere [-]."""
+
+_FALSE_TOLD: Final = 1e-3
+"""A smaller part of false samples is left out without a word [-]."""
+
+
+def settle(
+    sources: Sources, mounting: Mounting | None, settings: NavigationSettings, rate: float
+) -> tuple[Setup, Motion]:
+    """Identify a drive; its smoothed motion, which shows the accelerometer's scale, comes with it.
+
+    Parameters
+    ----------
+    sources : of the whole drive
+    mounting : known mounting and squat
+    settings : noise levels and priors
+    rate : of nodes and motion [Hz]
+    """
+    found = _identified(sources, mounting, settings, rate, _Scale())
+    gravity = gravity_read(sources.imu.time, sources.imu.accel)
+    before = math.inf
+    for _ in range(_SCALE_ROUNDS if sources.wheel is not None else 0):
+        setup, motion = found
+        gain = find_gain(motion, sources.reference, gravity, again=setup.scale_std > 0.0)
+        if gain is None or motion.mounting is None:
+            break
+        if not gain.sure:
+            return _doubted(setup, motion, gain)
+        if gain.off > _CLOSER * before:
+            break
+        before = gain.off
+        scale = _Scale((*setup.gains, gain), euler_to_matrix(*motion.mounting)[0].copy(), gain.std)
+        found = _identified(sources, mounting, settings, rate, scale)
+    setup, motion = found
+    if setup.scale_std == 0.0:
+        return found
+    scale_note = _scale_note(setup, sources)
+    motion = replace(
+        motion,
+        specific_force_scale_std=setup.scale_std,
+        notes=(*motion.notes, scale_note),
+    )
+    return replace(setup, notes=motion.notes), motion
+
+
+@dataclass(frozen=True, slots=True)
+class _Scale:
+    """Errors of the accelerometer's scale found so far, as in `Setup`."""
+
+    gains: tuple[Gain, ...] = ()
+    axis: np.ndarray | None = None
+    std: float = 0.0
+
+
+def _doubted(setup: Setup, motion: Motion, gain: Gain) -> tuple[Setup, Motion]:
+    """Tell of a gain that may be the sensor's scale or the squat, and widen by a part of it."""
+    mean = float(np.mean(gain.value))
+    note = (
+        f"the accelerometer reads {mean:.3f} times what the speed changes by along the vehicle, "
+        "and gravity does not show it: the scale of that axis is off, or the lean of the body is "
+        f"not known so well; {100.0 * _OPEN * gain.off:.1f} % of the mass, as standard deviation, "
+        "are in the interval for it"
+    )
+    std = _OPEN * gain.off
+    notes = (*motion.notes, note)
+    return (
+        replace(setup, scale_std=std, notes=notes),
+        replace(motion, specific_force_scale_std=std, notes=notes),
+    )
+
+
+def _scale_note(setup: Setup, sources: Sources) -> str:
+    """Say how far the accelerometer's scale was off."""
+    gain = np.ones(sources.imu.time.size)
+    for part in setup.gains:
+        gain = gain * part.at(sources.imu.time)
+    low, high = float(np.min(gain)), float(np.max(gain))
+    size = f"{high:.3f}" if high - low < 0.005 else f"{gain[0]:.3f} to {gain[-1]:.3f}"
+    return (
+        f"the accelerometer reads {size} times what the speed changes by along the vehicle: its "
+        "scale is off, and was corrected"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Settled:
+    """Sensor in one mounting, aligned."""
+
+    imu: Imu
+    fine: Even
+    aligned: Alignment
+    changes: tuple[Change, ...]
+    notes: tuple[str, ...]
+
+
+def _settled(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Settled:
+    """Align the sensor; where it was moved on the way, turn its later samples back first.
+
+    Samples during which it may or may not have been moved are left out.
+    """
+    imu = sources.imu
+    notes: tuple[str, ...] = ()
+    if imu.false > _FALSE_TOLD:
+        notes = (
+            f"{100.0 * imu.false:.1f} % of the inertial samples are zeros, spikes or at a limit "
+            "of the sensor, and were left out",
+        )
+    if scale.axis is not None:
+        accel = scaled(imu.time, imu.accel, scale.gains, scale.axis)
+        imu = replace(imu, accel=np.ascontiguousarray(accel))
+    fine = evenly(imu, FINE_RATE)
+    aligned, align_notes = align(fine, sources.reference, mounting)
+    shifted = undelayed(sources.reference, aligned.speed_delay)
+    altitude = sources.drive.get("altitude")
+    changes = find_changes(coarsely(fine, COARSE_PERIOD), shifted, aligned.rot_bs, altitude)
+    if not changes:
+        return _Settled(imu, fine, aligned, (), (*notes, *align_notes))
+    keep = ~unsure(imu.time, changes)
+    time = imu.time[keep]
+    values = undo(time, np.hstack([imu.accel[keep], imu.gyro[keep]]), changes)
+    imu = Imu(
+        time,
+        np.ascontiguousarray(values[:, :3]),
+        np.ascontiguousarray(values[:, 3:]),
+        imu.period,
+    )
+    fine = evenly(imu, FINE_RATE)
+    aligned, align_notes = align(fine, sources.reference, mounting)
+    moved = told(changes, float(time[0]), float(time[-1]))
+    return _Settled(imu, fine, aligned, tuple(changes), (*notes, *moved, *align_notes))
+
+
+def _identified(
+    sources: Sources, mounting: Mounting | None, settings: NavigationSettings, rate: float,
+    scale: _Scale,
+) -> tuple[Setup, Motion]:  # fmt: skip
+    """Align, find the start, let a first pass find the constants; then smooth the drive."""
+    settled = _settled(sources, mounting, scale)
+    imu, aligned, fixes = settled.imu, settled.aligned, sources.fixes
+    delay = aligned.speed_delay
+    late = delay
+    if sources.wheel is not None:
+        late = gnss_delay(sources.drive, settled.fine, fixes, aligned.rot_bs)
+    _LOG.debug("vehicle speed late by %.3f s, GNSS by %.3f s", delay, late)
+    grid = settled.fine if rate == FINE_RATE else evenly(imu, rate)
+    reference = undelayed(sources.reference, delay)
+    fix_times = fixes.time - late if fixes is not None else np.empty(0)
+    nodes = place_nodes(imu.time, fix_times, rate, settings.max_gap)
+    node_time = imu.time[nodes]
+    wheel = reference if sources.wheel is not None else None
+    speed = None if sources.speed is None else reference
+    clocks = find_clocks(sources.drive, speed, fixes, (delay, late), node_time)
+    still = still_state(node_time, grid, aligned.rot_bs, wheel, reference)
+    z = measurements(node_time, sources.drive, speed, fixes, clocks, settings)
+    z[:, Z_STILL] = still
+    moved_time, moved_var = openings(imu.time, settled.changes)
+    open_mounting(z, node_time, moved_time, moved_var)
+    block = Block(imu.time, imu.accel, imu.gyro, nodes, z)
+    begin = Begin(
+        grid.time,
+        grid.values[:, :3] @ aligned.rot_bs.T,
+        grid.values[:, 3:] @ aligned.rot_bs.T,
+        interpolated(reference, grid.time, 3.0),
+        np.interp(grid.time, node_time, still) > 1.9,
+    )
+    free_scale = sources.wheel is not None and fixes is not None
+    setup = Setup(
+        settings=settings,
+        rate=rate,
+        rot_bs=aligned.rot_bs,
+        clocks=clocks,
+        noise=settings.noise(),
+        start=first_state(begin, aligned, fixes, settings, free_scale),
+        given=aligned.given,
+        changes=settled.changes,
+        moved_time=moved_time,
+        moved_var=moved_var,
+        gains=scale.gains,
+        gain_axis=scale.axis,
+        scale_std=scale.std,
+        origin=fixes.frame if fixes is not None else None,
+        has_height=fixes is not None and fixes.has_height,
+        has_wheel=sources.wheel is not None,
+        notes=settled.notes,
+    )
+    cut = int(np.searchsorted(node_time, float(sources.imu.time[0]) + _FIRST_PASS)) + 1
+    end, _ = run(setup.start, block.part(0, int(nodes[min(nodes.size, cut) - 1]) + 1), setup)
+    rot_bs, start = restarted(setup.rot_bs, setup.start, end)
+    setup = replace(setup, rot_bs=rot_bs, start=start)
+    motion = smoothed_motion(Found(block, grid, reference, fixes), setup)
+    return (
+        replace(
+            setup,
+            use_squat=motion.squat is not None,
+            specific_force_std=motion.specific_force_std,
+            notes=motion.notes,
+        ),
+        motion,
+    )
