@@ -9,12 +9,16 @@ from scipy.signal import lfilter
 
 import weighbridge as wb
 from weighbridge.balance.gear_fit import share_on_gears
+from weighbridge.balance.torque_drift import steadied
 from weighbridge.checks import check_drive
 from weighbridge.checks.false_samples import clipped, isolated, repeated
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.mending import mended
+from weighbridge.errors import DriveError
 from weighbridge.estimators import Status, changing, joint
+from weighbridge.estimators.contradicted import contradicted
 from weighbridge.estimators.judging import Evidence, judge
+from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.weighing import below_tare, weigh_balance
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import simulate_car
@@ -415,3 +419,70 @@ def test_coarse_steps_widen_the_interval(fleet, kind):
     if found.status is Status.CONVERGED:
         assert found.std > 1.5 * own.std
         assert abs(found.mass - fleet.mass(kind)) < 2.6 * found.std
+
+
+def later_and_later(drive, name, seconds):
+    s = drive.signals[name]
+    grown = seconds * (s.time - drive.start) / drive.duration
+    return drive.with_signals(Signal(name, s.time + grown, s.values))
+
+
+@pytest.mark.parametrize("kind", ["car", "electric"])
+def test_torque_that_comes_later_and_later_is_brought_back(fleet, kind):
+    drive = later_and_later(fleet.drive(kind), SOURCE[kind], 3.0)
+
+    weighing = fleet.weigh_alone(kind, drive)
+
+    right(fleet, kind, weighing)
+    assert any("later and later" in text for text in weighing.warnings)
+
+
+@pytest.mark.parametrize("kind", ["car", "truck", "electric"])
+def test_torque_that_keeps_its_lag_is_left_alone(fleet, kind):
+    drive = fleet.drive(kind)
+    motion = find_motion(drive, fleet.files[kind])
+
+    kept, notes = steadied(drive, fleet.files[kind], motion, 0.0)
+
+    assert kept is drive
+    assert notes == ()
+
+
+def test_torque_whose_lag_wanders_is_refused(fleet):
+    drive = fleet.drive("electric")
+    s = drive.signals["engine_torque"]
+    late = np.interp(
+        s.time - drive.start, [0, 300, 310, 600, 610, 900, 910, 1200], [0, 0, 2, 2] * 2
+    )
+    order = np.argsort(s.time + late, kind="stable")
+    wandering = drive.with_signals(Signal(s.name, (s.time + late)[order], s.values[order]))
+
+    with pytest.raises(DriveError, match="late against the motion by"):
+        fleet.weigh("electric", wandering)
+
+
+def test_method_that_joint_contradicts_gives_no_mass(fleet):
+    rows = wb.weigh(fleet.drive("electric"), fleet.files["electric"], "rls").result
+    joined = wb.weigh(fleet.drive("electric"), fleet.files["electric"]).result
+
+    assert contradicted(rows, joined) == ""
+    heavier = replace(rows, mass=1.3 * joined.mass)
+    assert "weigh by joint" in contradicted(heavier, joined)
+    impossible = replace(joined, status=Status.INCONSISTENT, why="it is no car's")
+    assert "it is no car's" in contradicted(rows, impossible)
+    vague = replace(joined, std=0.4 * joined.mass)
+    assert contradicted(heavier, vague) == ""
+
+
+@pytest.mark.parametrize(("method", "noise"), [("rls", 2.0), ("robust-rls", 2.0)])
+def test_rows_that_are_mostly_noise_carry_no_mass(fleet, method, noise):
+    rng = np.random.default_rng(5)
+    drive = with_signal(
+        fleet.drive("car"), "accel_x", lambda t, x: x + noise * rng.standard_normal(x.size)
+    )
+
+    assert fleet.weigh_alone("car", fleet.drive("car"), method).status is Status.CONVERGED
+    weighing = fleet.weigh_alone("car", drive, method)
+
+    assert weighing.status is not Status.CONVERGED
+    assert "nois" in weighing.reason

@@ -12,6 +12,7 @@ from weighbridge.balance import ForceBalance
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.estimators.considered import force_columns, open_std
 from weighbridge.estimators.judging import Evidence, judge
+from weighbridge.estimators.noisy_motion import row_noise_std, too_noisy
 from weighbridge.estimators.slow_errors import (
     LASTING,
     NAMES,
@@ -154,6 +155,7 @@ def judged(
     phi: Floats,
     fitted: Fitted,
     slow: float,
+    method: str,
 ) -> Judged:
     """Find how sure a fit of a published method is, and whether it carries a mass.
 
@@ -164,8 +166,12 @@ def judged(
     phi : (n,) regressor of the mass [m/s^2]
     fitted
     slow : `weighbridge.estimators.judging.consider_std` [-]
+    method : name of the estimator, which takes the motion as exact
     """
     passing, lasting = slow_std(balance, vehicle, fitted.index, fitted.influence, fitted.mass)
+    inertial = balance.motion.source == "inertial"
+    noisy = row_noise_std(balance.merged, phi, used, method) if inertial else 0.0
+    passing = float(np.hypot(passing, fitted.mass * noisy))
     left = float(np.hypot(fitted.mass * slow, lasting))
     std, freedom = honest_std(fitted.scatter, fitted.blocks, passing, left)
     evidence = Evidence(
@@ -178,7 +184,10 @@ def judged(
         left=left,
         degrees_of_freedom=freedom,
     )
-    return Judged(std, freedom, left, *judge(evidence, vehicle))
+    status, why = judge(evidence, vehicle)
+    if noise := too_noisy(noisy):
+        status, why = Status.INCONSISTENT, noise
+    return Judged(std, freedom, left, status, why)
 
 
 def _known_road_load(vehicle: Vehicle) -> Vehicle:

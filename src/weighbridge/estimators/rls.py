@@ -115,7 +115,7 @@ def estimate(
         index=np.flatnonzero(used),
         influence=phi[used] / np.sum(phi[used] ** 2),
     )
-    found = judged(balance, vehicle, used, phi, fitted, slow)
+    found = judged(balance, vehicle, used, phi, fitted, slow, "rls")
     residual = np.where(used, y - phi * mass, np.nan)
     # Before the first row there is a start value, but no measurement.
     running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)

@@ -329,7 +329,7 @@ def finish(
     # What holds an offset of the force knows it; a filter without one takes it for mass.
     influence = fit.influence if final is None else fit.phi / np.sum(fit.phi**2)
     weighed = Fitted(mass=mass, scatter=scatter, blocks=blocks, index=index, influence=influence)
-    found = judged(balance, vehicle, used, phi, weighed, slow)
+    found = judged(balance, vehicle, used, phi, weighed, slow, method)
     # A running mass that forgets is that of a stretch of time.
     passing = np.hypot(slow, UNMODELLED_STD)
 

@@ -14,9 +14,11 @@ from weighbridge.balance.delay import clock_shift, estimate_torque_delay
 from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
+from weighbridge.balance.torque_drift import steadied
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
 from weighbridge.estimators.changing import largest
+from weighbridge.estimators.contradicted import contradicted
 from weighbridge.estimators.foreign import of_another
 from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.settings import differences
@@ -189,6 +191,8 @@ def weigh_balance(
             status, reason = Status.INCONSISTENT, change.text
         elif refused:
             status, reason = Status.INCONSISTENT, doubt
+        elif why := contradicted(result, joined):
+            status, reason = Status.INCONSISTENT, why
         elif doubt:
             warnings += (doubt,)
     return Weighing(
@@ -273,8 +277,9 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
         Torque and motion are on clocks that differ.
     """
     motion = of_vehicle(find_motion(drive, vehicle), vehicle)
-    notes = motion.notes
     delay = vehicle.timing.torque_delay
+    drive, drifted = steadied(drive, vehicle, motion, delay or 0.0)
+    notes = motion.notes + drifted
     if delay is None:
         delay = estimate_torque_delay(drive, vehicle, motion)
         if math.isfinite(delay):
