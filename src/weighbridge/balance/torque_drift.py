@@ -147,8 +147,8 @@ def _wanders(drive: Drive, carrier: Signal, found: ForceLags) -> DriveError:
     low, high = float(found.lag.min()), float(found.lag.max())
     return DriveError(
         f"{drive.name}: {carrier.name} is late against the motion by {low:+.1f} to {high:+.1f} s "
-        "in turn, and a mass from it would be wrong; stamp each value when it is received, or cut the "
-        "recording where the lag stays the same"
+        "in turn, and a mass from it would be wrong; stamp each value when it is received, or cut "
+        "the recording where the lag stays the same"
     )
 
 

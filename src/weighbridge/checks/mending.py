@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.false_samples import clipped, isolated, repeated
+from weighbridge.checks.false_samples import clipped, isolated, piled, repeated
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.signals import Bools, Drive, Problem, Signal
@@ -106,6 +106,9 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
             f"{np.count_nonzero(marked)} of {len(signal)} samples read, and the calibration's went "
             f"up to {show(name, highest)}: it is cut off there, and those rows are left out"
         )
+    if not np.isfinite(highest) and TORQUE_SOURCES[model.source].signed:
+        marked, more = _piled(signal, vehicle)
+        told += more
     if dragged is not None and len(signal) > 200:
         floor = min(dragged.level) + 3.0 * dragged.scatter
         if floor < 0.0 <= float(signal.values.min()):
@@ -122,6 +125,27 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
     return drive.with_signals(_without(signal, marked)).with_problems(
         *(Problem(name, text) for text in told)
     )
+
+
+def _piled(signal: Signal, vehicle: Vehicle) -> tuple[Bools, list[str]]:
+    """Mark a torque's samples at ends at which it is cut off, and say so.
+
+    At a motor's own limit they tell nothing wrong; the rest weighs without them as well. The lowest
+    is looked at of motors alone: an engine that is dragged reads the same for long.
+    """
+    marked, told = np.zeros(len(signal), dtype=bool), []
+    for lowest in (False, True)[: 1 + vehicle.driveline.single_speed]:
+        found = piled(signal, lowest=lowest)
+        if found.any():
+            marked |= found
+            end = float(signal.values[found][0])
+            told.append(
+                f"{signal.name} {'falls below' if lowest else 'exceeds'} "
+                f"{show(signal.name, end)} never, which {np.count_nonzero(found)} of "
+                f"{len(signal)} samples read: it is cut off there, or the motor is at its limit, "
+                "and those rows are left out"
+            )
+    return marked, told
 
 
 def _without(signal: Signal, marked: Bools) -> Signal:
