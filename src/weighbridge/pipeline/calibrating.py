@@ -34,6 +34,7 @@ from weighbridge.estimators.rls import block_jackknife
 from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion
+from weighbridge.pipeline.doubted_masses import doubted_masses, unbacked_scale, with_doubts
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -308,8 +309,10 @@ def run_calibration(
         )
     balances = tuple(force_balance(d, finished, m) for d, m in zip(drives, motions, strict=True))
     doubt = scale_doubt(finished, masses, ", ".join(drive.name for drive in drives))
-    others = [*_other_masses(drives, masses), *([doubt] if doubt else []), *contradictions]
-    finished = _with_doubts(finished, balances, others)
+    doubts = [*([doubt] if doubt else []), *doubted_masses(finished, balances, masses)]
+    others = [*_other_masses(drives, masses), *doubts, *contradictions]
+    finished = _with_doubts(finished, balances, [*others, *unbacked_scale(finished)])
+    finished = with_doubts(finished, doubts)
     if source.gearing is not None:
         finished = _with_gears(finished, given)
     _refuse_useless(finished)

@@ -138,7 +138,7 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     else:
         vehicle, found = by_power(drive, vehicle)
         balance, notes = torque_balance(drive, vehicle)
-        warnings += found + notes
+        warnings += found + notes + vehicle.provenance.doubts
         warnings += fitted_for_another(vehicle, method)
     return weigh_balance(drive, vehicle, method, balance, warnings, settings=settings)
 

@@ -321,6 +321,7 @@ _SECTIONS: Final[dict[str, tuple[type[Any], tuple[_Key, ...]]]] = {
                 "numbers",
             ),
             _Key("notes", "notes", "free text", "text"),
+            _Key("doubts", "doubts", "of its masses, told at each weighing", "texts"),
         ),
     ),
 }

@@ -579,6 +579,7 @@ class Provenance:
         triangle, row by row, of torque coefficients, curvature, slopes at the knots, drag area,
         rolling coefficient, engine and wheel inertia; empty where it is not known
     notes : free text
+    doubts : of the masses of the calibration, told at each weighing
     """
 
     drives: tuple[str, ...] = ()
@@ -592,6 +593,7 @@ class Provenance:
     mass_scale_std: float | None = None
     fit_cov: tuple[float, ...] = ()
     notes: str | None = None
+    doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _not_negative("mass_scale_std", self.mass_scale_std)

@@ -1,0 +1,53 @@
+"""Masses of a calibration that contradict each other, or that nothing backs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weighbridge.errors import DriveError
+from weighbridge.pipeline.doubted_masses import contradicting, unbacked_scale, with_doubts
+from weighbridge.vehicle.model import TorqueModel, Vehicle
+
+NAMES, MASSES = ("a", "b", "c"), (1600.0, 1800.0, 2000.0)
+STDS = np.full(3, 0.006)
+
+
+def test_masses_that_go_together_are_not_doubted():
+    assert contradicting(NAMES, MASSES, np.array([1.02, 0.99, 0.98]), STDS) == []
+
+
+def test_a_mass_far_off_the_others_ends_the_calibration():
+    # What a file made of all weighs, with the second mass a fifth too low.
+    with pytest.raises(DriveError, match=r"b weighs \+2[0-9] % against its 1800 kg"):
+        contradicting(NAMES, MASSES, np.array([0.95, 1.18, 0.95]), STDS)
+
+
+def test_a_mass_somewhat_off_is_told():
+    (text,) = contradicting(NAMES, MASSES, np.array([0.975, 1.05, 0.975]), STDS)
+    assert "b weighs" in text
+    assert "its mass, or another's, is wrong" in text
+
+
+def test_what_scatters_is_no_contradiction():
+    assert contradicting(NAMES, MASSES, np.array([0.975, 1.05, 0.975]), 5.0 * STDS) == []
+
+
+def test_a_drive_that_was_not_weighed_is_left_out():
+    ratios = np.array([0.99, np.nan, 1.01])
+    assert contradicting(NAMES, MASSES, ratios, STDS) == []
+
+
+def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():
+    loads = Vehicle(torque=TorqueModel(source="load", coefficients=(0.0, 250.0)))
+    (text,) = unbacked_scale(loads)
+    assert "tare_kg and gross_kg" in text
+    assert unbacked_scale(replace(loads, tare=1500.0)) == []
+    told = Vehicle(torque=TorqueModel(source="measured", coefficients=(0.0, 0.95)))
+    assert unbacked_scale(told) == []
+
+
+def test_doubts_survive_the_vehicle_file(tmp_path):
+    path = tmp_path / "car.toml"
+    with_doubts(Vehicle(), ["a weighs +8 % against its 1600 kg"]).save(path)
+    assert Vehicle.load(path).provenance.doubts == ("a weighs +8 % against its 1600 kg",)
