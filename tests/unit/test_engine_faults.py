@@ -11,7 +11,7 @@ import weighbridge as wb
 from weighbridge.balance.gear_fit import share_on_gears
 from weighbridge.balance.torque_drift import steadied
 from weighbridge.checks import check_drive
-from weighbridge.checks.false_samples import clipped, isolated, repeated
+from weighbridge.checks.false_samples import clipped, isolated, piled, repeated
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.mending import mended
 from weighbridge.errors import DriveError
@@ -486,3 +486,19 @@ def test_rows_that_are_mostly_noise_carry_no_mass(fleet, method, noise):
 
     assert weighing.status is not Status.CONVERGED
     assert "nois" in weighing.reason
+
+
+def test_a_motor_torque_cut_off_at_either_end_is_weighed_by_the_rest(fleet):
+    torque = fleet.drive("electric").signals["engine_torque"].values
+    assert not piled(fleet.drive("electric").signals["engine_torque"]).any()
+    for cut in ((-np.inf, 0.4), (0.1, np.inf)):
+        low, high = (part * torque.max() for part in cut)
+        damaged = with_signal(
+            fleet.drive("electric"), "engine_torque", lambda t, x, a=low, b=high: np.clip(x, a, b)
+        )
+        found = fleet.weigh_alone("electric", damaged)
+        assert any("it is cut off there" in text for text in found.warnings)
+        assert (
+            found.status is not Status.CONVERGED
+            or abs(found.mass / fleet.mass("electric") - 1.0) < 0.03
+        )

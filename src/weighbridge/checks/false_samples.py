@@ -48,9 +48,6 @@ simulated vehicles had 0.002 at most at the top, electric ones 0.0015 at the bot
 BESIDE: Final = 0.1
 """They are more than all samples within this part of the range beside it [-]."""
 
-OFTEN: Final = 5
-"""Stretches at the end, at least: one that repeats its value is another fault."""
-
 PILED: Final = 0.005
 """Part of the samples that repeat the highest reading where it is cut off [-]."""
 
@@ -167,7 +164,7 @@ def piled(signal: Signal, *, lowest: bool = False) -> Bools:
     count = np.count_nonzero(at_end)
     runs = runs_of(signal)
     often = np.count_nonzero((values[runs.first] == end) & (runs.length > 1))
-    if count < MUCH * values.size or count < beside or often < OFTEN:
+    if count < MUCH * values.size or count < beside or often < FEWEST:
         return nothing
     return np.asarray(at_end)
 

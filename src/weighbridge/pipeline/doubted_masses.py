@@ -48,7 +48,7 @@ def doubted_masses(
     """
     names, gross = vehicle.provenance.drives, vehicle.gross
     told = [
-        f"{name} was calibrated with {kg:.0f} kg, above the permitted mass of {gross:.0f} kg: if "
+        f"{name} has {kg:.0f} kg by the calibration, above the permitted mass of {gross:.0f} kg: if "
         "that was not so, every mass is too heavy by as much; weigh it again"
         for name, kg in zip(names, masses, strict=True)
         if gross is not None and kg > OVER * gross
