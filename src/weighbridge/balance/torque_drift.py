@@ -12,7 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import MergedView, force_balance
+from weighbridge.balance.force_balance import force_balance
+from weighbridge.balance.law import drag_force
+from weighbridge.balance.table import MergedView
 from weighbridge.errors import DriveError
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
@@ -60,10 +62,10 @@ class ForceLags:
     lag: Floats
 
 
-def force_lags(view: MergedView, motion: Motion) -> ForceLags:
+def force_lags(view: MergedView, vehicle: Vehicle, motion: Motion) -> ForceLags:
     """Find the lag of best correlation in each piece; pieces that show none are left out."""
     specific = np.where(motion.valid, motion.specific_force, np.nan)
-    force = view.traction_force - view.drag_force
+    force = view.traction_force - drag_force(view, vehicle)
     usable = view.usable & np.isfinite(force)
     found: list[tuple[float, float]] = []
     if not view.time.size:
@@ -122,7 +124,7 @@ def steadied(
     if motion.source in BY_SPEED or drive.info.trusted or source.combined is not None:
         return drive, ()
     carrier = source.carrier(drive)
-    before = force_lags(force_balance(drive, vehicle, motion, delay=delay).merged, motion)
+    before = force_lags(force_balance(drive, vehicle, motion, delay=delay).merged, vehicle, motion)
     slope, scatter = _line(before)
     reach = float(np.ptp(before.time)) if before.time.size else 0.0
     if abs(slope) * reach <= max(DRIFTS, SURE * scatter):
@@ -132,7 +134,7 @@ def steadied(
     moved = carrier.time - slope * (carrier.time - before.time[0])
     rising = np.concatenate(([True], np.diff(np.maximum.accumulate(moved)) > 0.0))
     mended = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
-    after = force_lags(force_balance(mended, vehicle, motion, delay=delay).merged, motion)
+    after = force_lags(force_balance(mended, vehicle, motion, delay=delay).merged, vehicle, motion)
     if after.lag.size >= FEWEST and np.ptp(_median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)
     grows = "later and later" if slope > 0.0 else "earlier and earlier"

@@ -106,7 +106,7 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
             f"{np.count_nonzero(marked)} of {len(signal)} samples read, and the calibration's went "
             f"up to {show(name, highest)}: it is cut off there, and those rows are left out"
         )
-    if not np.isfinite(highest) and TORQUE_SOURCES[model.source].signed:
+    if not np.isfinite(highest) and model.of_source.signed:
         marked, more = _piled(signal, vehicle)
         told += more
     if dragged is not None and len(signal) > 200:

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.estimators.considered import force_columns, open_std
-from weighbridge.estimators.judging import Evidence, judge
+from weighbridge.estimators.judging import LEAST_SPREAD, Evidence, judge
 from weighbridge.estimators.noisy_motion import row_noise_std, too_noisy
 from weighbridge.estimators.slow_errors import (
     LASTING,
@@ -185,7 +185,8 @@ def judged(
         degrees_of_freedom=freedom,
     )
     status, why = judge(evidence, vehicle)
-    if noise := too_noisy(noisy):
+    # Of a cruise the noise is not the first thing to say.
+    if evidence.spread >= LEAST_SPREAD and (noise := too_noisy(noisy)):
         status, why = Status.INCONSISTENT, noise
     return Judged(std, freedom, left, status, why)
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import MergedView
+from weighbridge.balance.table import MergedView
 from weighbridge.navigation.motion import noise_level
 from weighbridge.signals import Bools, Floats
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import ForceBalance
+from weighbridge.balance import ForceBalance
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.signals import Floats
@@ -48,8 +48,8 @@ def doubted_masses(
     """
     names, gross = vehicle.provenance.drives, vehicle.gross
     told = [
-        f"{name} has {kg:.0f} kg by the calibration, above the permitted mass of {gross:.0f} kg: if "
-        "that was not so, every mass is too heavy by as much; weigh it again"
+        f"{name} has {kg:.0f} kg by the calibration, above the permitted mass of {gross:.0f} kg: "
+        "if that was not so, every mass is too heavy by as much; weigh it again"
         for name, kg in zip(names, masses, strict=True)
         if gross is not None and kg > OVER * gross
     ]
