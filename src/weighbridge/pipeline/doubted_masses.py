@@ -11,6 +11,7 @@ import numpy as np
 from weighbridge.balance import ForceBalance
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
+from weighbridge.estimators.joint_problem import UNMODELLED
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
@@ -59,7 +60,7 @@ def doubted_masses(
     tracks = [joint.estimate(b, vehicle, load_changes=False) for b in balances]
     left = np.array(masses) - np.array([float(b.merged.fuel_burnt[-1]) for b in balances])
     ratios = np.array([t.mass for t in tracks]) / left
-    stds = joint.UNMODELLED * np.array([t.bound_std for t in tracks]) / left
+    stds = UNMODELLED * np.array([t.bound_std for t in tracks]) / left
     return told + contradicting(names, masses, ratios, stds)
 
 
