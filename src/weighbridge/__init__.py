@@ -16,7 +16,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from weighbridge.errors import ConfigError, DriveError, MissingExtraError, WeighbridgeError
     from weighbridge.estimators import Segment, Status
-    from weighbridge.io import read_drive, read_frame, to_frames
+    from weighbridge.io import read_drive, read_drives, read_frame, to_frames
     from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
     from weighbridge.pipeline.inertia import Inertia, estimate_inertia
     from weighbridge.pipeline.inspection import inspect_drive
@@ -45,6 +45,7 @@ _HOMES = {
     "estimate_inertia": "weighbridge.pipeline.inertia",
     "inspect_drive": "weighbridge.pipeline.inspection",
     "read_drive": "weighbridge.io",
+    "read_drives": "weighbridge.io",
     "read_frame": "weighbridge.io",
     "to_frames": "weighbridge.io",
     "WeighingRow": "weighbridge.results.row",
@@ -72,6 +73,7 @@ __all__ = [
     "estimate_inertia",
     "inspect_drive",
     "read_drive",
+    "read_drives",
     "read_frame",
     "to_frames",
     "weigh",

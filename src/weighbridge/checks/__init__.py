@@ -11,13 +11,14 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates
+from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates, check_splices
 from weighbridge.checks.engine import check_engine_speed, check_friction, check_whole_torque
 from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
 from weighbridge.checks.mending import mended
 from weighbridge.checks.ranges import check_range, within_ranges, without_strays
 from weighbridge.checks.speed import check_scales
+from weighbridge.checks.spikes import without_spikes
 from weighbridge.checks.travel import check_sign, check_standstill
 from weighbridge.checks.values import check_load, check_pressure, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
@@ -34,6 +35,7 @@ _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
 _CHECKS: Final[tuple[_Check, ...]] = (
     check_pauses,
+    check_splices,
     check_stuck,
     check_frozen,
     check_limit,
@@ -77,7 +79,7 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     found = tuple(check_overlap(drive, vehicle))
     if any(p.serious for p in found):
         return drive.with_problems(*found)
-    drive = without_strays(drive, vehicle)
+    drive = without_spikes(without_strays(drive, vehicle))
     if not any(p.serious for p in check_range(drive, vehicle)):
         drive = mend_clocks(drive)
     problems = [*drive.problems[len(told) :], *found]

@@ -11,6 +11,7 @@ import numpy as np
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
+from weighbridge.signals.parts import find_splices
 from weighbridge.vehicle.model import Vehicle
 
 # A pause in which nothing was recorded is told [s].
@@ -106,6 +107,17 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 f"{table} pauses {several}for {length:.0f} s from {start:.6g} s while the rest "
                 "goes on; if its clock was set there, cut the recording",
             )
+
+
+def check_splices(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Tell of recordings that were put one behind another on one clock."""
+    if found := find_splices(drive):
+        times = f"{len(found)} times, first" if len(found) > 1 else "once,"
+        yield Problem(
+            "",
+            f"there are {found[0].why}, {times} at {found[0].end:.6g} s, as where recordings are "
+            "put one behind another: weighbridge weigh parts them, and read_drives in Python",
+        )
 
 
 def _pauses(time: Floats) -> list[tuple[float, float]]:

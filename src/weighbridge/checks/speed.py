@@ -15,6 +15,7 @@ import numpy as np
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals.parts import find_splices
 from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.classes import FASTEST, STRONGEST
 from weighbridge.vehicle.model import Vehicle
@@ -95,7 +96,16 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 def _check_alone(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Doubt a speed that nothing else of the drive can be compared with."""
-    if why := _beyond_belief(drive, speed, vehicle):
+    why = _beyond_belief(drive, speed, vehicle)
+    if why and (jumps := find_splices(drive)):
+        yield Problem(
+            speed.name,
+            f"{speed.name} {why}; {len(jumps)} times, first at {jumps[0].end:.6g} s, the recording "
+            "jumps as several do that were put one behind another: weighbridge weigh parts it, "
+            "and so does read_drives in Python",
+            serious=True,
+        )
+    elif why:
         stem = "speed" if speed.name == "gnss_speed" else speed.name
         yield Problem(
             speed.name,

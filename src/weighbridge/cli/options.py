@@ -41,3 +41,12 @@ def load(path: Path, mapping: Path | None, dbc: list[str] | None = None) -> Driv
     from weighbridge.io import read_drive
 
     return read_drive(path, mapping, dbc or ())
+
+
+def load_parts(
+    path: Path, mapping: Path | None, dbc: list[str] | None, *, whole: bool
+) -> list[Drive]:
+    """Read the drives of one recording; one where it is to be taken as a whole."""
+    from weighbridge.io import read_drives
+
+    return [load(path, mapping, dbc)] if whole else read_drives(path, mapping, dbc or ())

@@ -13,7 +13,7 @@ from weighbridge.cli.options import (
     DrivePaths,
     MappingPath,
     ReportPath,
-    load,
+    load_parts,
 )
 from weighbridge.cli.results import asked_for, inputs, refuse_results
 from weighbridge.cli.terminal import console, say, say_json, shown
@@ -59,11 +59,17 @@ def weigh(
             "--compare", help="Weigh by every method; show them side by side, in the report too."
         ),
     ] = False,
+    whole: Annotated[
+        bool,
+        typer.Option("--whole", help="Take each recording as one drive, whatever it holds."),
+    ] = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
     """Weigh a vehicle from one or more drives.
 
+    A recording of several drives (a day's file, a splice) is parted, and each is weighed: it
+    parts at pauses of 5 minutes, stops of 10, and jumps.
     Exits with 0 where every drive gave a mass, with 1 where one could not.
 
     Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
@@ -71,6 +77,7 @@ def weigh(
     from weighbridge.errors import ConfigError, WeighbridgeError
     from weighbridge.estimators.settings import parsed
     from weighbridge.pipeline.given import mapping_of
+    from weighbridge.pipeline.weighing import weigh as weigh_drive
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.whole import write_whole
 
@@ -83,14 +90,27 @@ def weigh(
     )
     settings = parsed(changes or [])
     weighed: list[Weighing] = []
-    failed: list[tuple[Path, str]] = []
+    failed: list[tuple[str, str]] = []
     for path in _progress(drives):
         try:
-            weighed.append(_weigh_one(path, chosen, dbc, car, method, settings))
+            parts = load_parts(path, chosen, dbc, whole=whole)
         except WeighbridgeError as error:
             if len(drives) == 1:
                 raise
-            failed.append((path, str(error)))
+            failed.append((path.name, str(error)))
+            continue
+        if track is not None and len(parts) > 1:
+            raise ConfigError(
+                f"--track takes one drive, and {path} holds {len(parts)}: use --json, or --whole "
+                "to take them as one"
+            )
+        for drive in parts:
+            try:
+                weighed.append(weigh_drive(drive, car, method, settings=settings))
+            except WeighbridgeError as error:
+                if len(drives) == len(parts) == 1:
+                    raise
+                failed.append((drive.name if len(parts) > 1 else path.name, str(error)))
 
     compared = [w.compare() for w in weighed] if compare else []
     if track is not None:
@@ -102,7 +122,7 @@ def weigh(
             raise ConfigError(f"--report {report}: none of the drives could be read")
         write_report(weighed, report, comparisons=compared)
     lines = [w.to_json() for w in weighed] + [
-        _failure(path, why, car, method) for path, why in failed
+        _failure(name, why, car, method) for name, why in failed
     ]
     if json_path == "-":
         say_json("\n".join(lines))
@@ -116,19 +136,6 @@ def weigh(
         raise typer.Exit(1)
 
 
-def _weigh_one(
-    path: Path,
-    mapping: Path | None,
-    dbc: list[str] | None,
-    car: Vehicle,
-    method: str,
-    settings: dict[str, object],
-) -> Weighing:
-    from weighbridge.pipeline.weighing import weigh as weigh_drive
-
-    return weigh_drive(load(path, mapping, dbc), car, method, settings=settings)
-
-
 def _progress(drives: list[Path]) -> Any:
     """Show a bar on a terminal while several drives are weighed."""
     if len(drives) == 1 or not sys.stderr.isatty():
@@ -138,17 +145,17 @@ def _progress(drives: list[Path]) -> Any:
     return track(drives, description="weighing", console=console(stderr=True), transient=True)
 
 
-def _failure(path: Path, why: str, car: Vehicle, method: str) -> str:
+def _failure(name: str, why: str, car: Vehicle, method: str) -> str:
     """Write the JSON object of a drive that could not be read, with the fields of the others."""
     from weighbridge.results.row import unread_row
     from weighbridge.visible import visible
 
-    return unread_row(visible(path.name), car.name, method, why).to_json()
+    return unread_row(visible(name), car.name, method, why).to_json()
 
 
 def _show(
     weighed: list[Weighing],
-    failed: list[tuple[Path, str]],
+    failed: list[tuple[str, str]],
     compared: list[tuple[Weighing, ...]],
 ) -> None:
     screen = console()
@@ -202,7 +209,7 @@ def _outcome(w: Weighing) -> str:
     return str(w.status) if w.status == "converged" else shown(f"{w.status}: {w.reason}")
 
 
-def result_table(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> Table:
+def result_table(weighed: list[Weighing], failed: list[tuple[str, str]]) -> Table:
     """One row a drive: its mass, or why there is none."""
     from rich.table import Table
 
@@ -221,6 +228,6 @@ def result_table(weighed: list[Weighing], failed: list[tuple[Path, str]]) -> Tab
             *_numbers(w),
             _outcome(w),
         )
-    for path, why in failed:
-        table.add_row(shown(path.name), "", "", "", "", "", "", shown(f"unreadable: {why}"))
+    for name, why in failed:
+        table.add_row(shown(name), "", "", "", "", "", "", shown(f"unreadable: {why}"))
     return table

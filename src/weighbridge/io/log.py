@@ -28,6 +28,8 @@ class Log:
     align : whether a mapping asks to align its clock with the drive's other files
     frames : raw bus traffic, decoded once all files of a drive are read
     info : what the file knows of the drive beside its signals
+    pieces : the recordings of the file, where its clock begins anew in places; ``signals`` are
+        then of the longest that rises
     """
 
     path: Path
@@ -39,6 +41,7 @@ class Log:
     align: bool = False
     frames: Frames | None = None
     info: DriveInfo | None = None
+    pieces: list[Log] = field(default_factory=list)
 
 
 Reader = Callable[[Path, "str | None", "TableMapping | None"], Log]

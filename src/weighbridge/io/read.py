@@ -30,6 +30,7 @@ from weighbridge.io.table import read_parquet, read_text, start_text
 from weighbridge.signals import Drive, DriveInfo, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
+from weighbridge.signals.parts import numbered, parted
 from weighbridge.visible import visible
 from weighbridge.whole import REPLACING
 
@@ -75,6 +76,49 @@ def read_drive(
     ConfigError
         The mapping cannot be used.
     """
+    name, logs, info, mappings, databases = _opened(path, mapping, dbc)
+    return joined_drive(name, logs, info, mappings, databases)
+
+
+def read_drives(
+    path: DrivePath,
+    mapping: MappingSource | None = None,
+    dbc: DbcSource | Sequence[DbcSource] = (),
+) -> list[Drive]:
+    """Read the drives that a recording holds: a day's file, or several put one behind another.
+
+    A drive ends where nothing is recorded for 5 minutes, where the vehicle stands for 10, where
+    speed, position or coolant jump as no vehicle's do, and where a table's clock begins anew.
+
+    Parameters
+    ----------
+    path, mapping, dbc : as of `read_drive`
+
+    Returns
+    -------
+    In order; one where there is one alone. Of several each is named ``NAME part 1 of 3``, and
+    parts in which the vehicle hardly moves are left out.
+
+    Raises
+    ------
+    DriveError, ConfigError
+        As of `read_drive`.
+    """
+    name, logs, info, mappings, databases = _opened(path, mapping, dbc)
+    if len(logs) == 1 and logs[0].pieces:
+        pieces = [joined_drive(name, [log], info, mappings, databases) for log in logs[0].pieces]
+        parts = [part for piece in pieces for part in parted(piece)]
+        return list(numbered(visible(name), parts, "clocks that begin anew"))
+    return list(parted(joined_drive(name, logs, info, mappings, databases)))
+
+
+_Opened = tuple[str, list[Log], DriveInfo, tuple[TableMapping, ...], tuple[Database, ...]]
+
+
+def _opened(
+    path: DrivePath, mapping: MappingSource | None, dbc: DbcSource | Sequence[DbcSource]
+) -> _Opened:
+    """Name of a drive, its files, and what they are read with."""
     mappings = load_mapping(mapping) if mapping is not None else ()
     databases = load_dbcs([dbc] if isinstance(dbc, str | Path) else list(dbc))
     info = DriveInfo()
@@ -85,13 +129,13 @@ def read_drive(
         if len(paths) > 1:
             name = f"{paths[0].stem}+{len(paths) - 1}"
             logs = _read_files([(p, None) for p in paths], mappings)
-            return joined_drive(name, logs, info, mappings, databases)
+            return name, logs, info, mappings, databases
         path = paths[0]
     path = Path(path)
     if is_folder(path):
         logs, info = _read_folder(path, mappings)
-        return joined_drive(path.resolve().name, logs, info, mappings, databases)
-    return joined_drive(path.stem, _read_files([(path, None)], mappings), info, mappings, databases)
+        return path.resolve().name, logs, info, mappings, databases
+    return path.stem, _read_files([(path, None)], mappings), info, mappings, databases
 
 
 def read_table(path: str | Path) -> dict[str, Floats]:

@@ -27,6 +27,7 @@ from weighbridge.io.table import (
 from weighbridge.signals import Floats, Problem
 from weighbridge.signals.catalogue import TIME_COLUMN
 from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.units import UNITS, to_si
 
 
@@ -172,9 +173,17 @@ def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floa
     if raw.rows == 0:
         log.problems.append(Problem("", f"{raw.path.name} has a header and no rows"))
         return
+    told = list(log.problems)
     signals, problems = clean_columns(time, columns, raw.path.name)
     log.signals += signals
     log.problems += problems
+    for rows in find_restarts(time):
+        signals, problems = clean_columns(
+            time[rows], [(name, values[rows]) for name, values in columns], raw.path.name
+        )
+        log.pieces.append(
+            Log(raw.path, signals, [*told, *problems], list(log.lacking), log.absolute)
+        )
 
 
 def _no_time(raw: RawTable, known: bool) -> str:

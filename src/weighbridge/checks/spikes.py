@@ -1,0 +1,101 @@
+"""Leave out the few samples that leap away and return at once, as no vehicle does."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from weighbridge.checks.needed import show
+from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+
+FEW: Final = 0.01
+"""Part of the samples up to which spikes are few; at least one [-]."""
+
+LONGEST: Final = 3
+"""Samples of a spike at most."""
+
+_LASTS: Final = 2.0
+"""Time between its neighbours at most, or four periods of a slow signal [s]."""
+
+
+class _Limit(NamedTuple):
+    """How fast a signal changes at most [per s], and by how much it may jump beside that."""
+
+    rate: float
+    jump: float
+
+
+# Tyres hold 10 m/s^2; a free engine gains 3000 rad/s^2 at most, and shifts within 0.2 s.
+_LIMITS: Final = {
+    "vehicle_speed": _Limit(25.0, 4.0),
+    "gnss_speed": _Limit(25.0, 4.0),
+    "engine_speed": _Limit(1500.0, 150.0),
+}
+
+
+def without_spikes(drive: Drive) -> Drive:
+    """Leave out spikes of speed and engine speed where they are few.
+
+    Both neighbours of a spike are alike, and further from it than the quantity can change.
+
+    Returns
+    -------
+    Drive
+        With what was left out in its ``problems``; itself where nothing was.
+    """
+    for name, limit in _LIMITS.items():
+        signal = drive.get(name)
+        if signal is None or len(signal) < 20 or name in drive.info.trusted:
+            continue
+        marked = spikes(signal.time, signal.values, limit.rate, limit.jump)
+        count = int(np.count_nonzero(marked))
+        if not count or count > max(1.0, FEW * len(signal)):
+            continue
+        worst = int(np.flatnonzero(marked)[np.argmax(np.abs(signal.values[marked]))])
+        drive = drive.with_signals(
+            Signal(name, signal.time[~marked], signal.values[~marked])
+        ).with_problems(
+            Problem(
+                name,
+                f"{count} of {len(signal)} samples of {name} leap away and return at once, such "
+                f"as {show(name, float(signal.values[worst]))} at {signal.time[worst]:.6g} s: they "
+                "are left out",
+            )
+        )
+    return drive
+
+
+def spikes(time: Floats, values: Floats, rate: float, jump: float) -> Bools:
+    """Mark samples that stand alone, up to `LONGEST` in a row.
+
+    Parameters
+    ----------
+    time : (n,) rising [s]
+    values : (n,)
+    rate : largest change of the quantity per second
+    jump : what it may leap beside that
+
+    Returns
+    -------
+    (n,) bool
+    """
+    marked = np.zeros(values.size, dtype=bool)
+    period = float(np.median(np.diff(time)))
+    for length in range(1, LONGEST + 1):
+        if values.size < length + 2:
+            break
+        first = np.arange(1, values.size - length)
+        last = first + length - 1
+        before, after = values[first - 1], values[last + 1]
+        inside = np.stack([values[first + k] for k in range(length)])
+        away = np.minimum(np.abs(inside - before), np.abs(inside - after)).min(axis=0)
+        lasts = time[last + 1] - time[first - 1]
+        alone = away > jump + rate * np.maximum(lasts, period)
+        # To one side only, and the neighbours alike.
+        alone &= (inside > before).all(axis=0) == (inside > after).all(axis=0)
+        alone &= np.abs(after - before) < 0.25 * away
+        alone &= lasts <= max(_LASTS, 4.0 * period)
+        for k in range(length):
+            marked[first[alone] + k] = True
+    return marked

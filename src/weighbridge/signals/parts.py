@@ -1,0 +1,281 @@
+"""Several drives in one recording: parted where it pauses, stands long, or was spliced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weighbridge.constants import EARTH_RADIUS
+from weighbridge.signals.drive import Drive, Problem
+from weighbridge.signals.signal import Floats, Signal
+
+PAUSE: Final = 300.0
+"""Where nothing is recorded for so long a drive ends, unless the vehicle moves on after it [s]."""
+
+STANDING: Final = 600.0
+"""Where the vehicle stands for so long a drive ends [s]."""
+
+KEPT: Final = 60.0
+"""Of such a stop the drives to both sides keep so much at most [s]."""
+
+DRIVEN: Final = 30.0
+"""A part in which the vehicle moves for less is no drive [s]."""
+
+_STILL: Final = 0.5  # slower, the vehicle stands [m/s]
+_MOVING: Final = 3.0  # faster, it moves [m/s]
+_AS_BEFORE: Final = 3.0  # speeds to both sides of a clock that was set [m/s]
+_STANDS_FOR: Final = 2.0  # a sample stands for so long at most [s]
+
+# A splice: samples so near in time that differ as no vehicle's do, and so do those around them.
+_NEAR: Final = 5.0  # [s]
+_AROUND: Final = 5  # samples compared to each side
+_CHANGE: Final = 12.0  # of speed [m/s^2]
+_STEP: Final = 3.0  # of speed, beside that [m/s]
+_FASTEST: Final = 100.0  # between two positions [m/s]
+_FAR: Final = 300.0  # beside that [m]
+_COOLED: Final = 10.0  # of the coolant: the engine was parked [K]
+_RARELY: Final = 10.0  # period of signals that are sent now and then [s]
+
+
+class Cut(NamedTuple):
+    """Where one drive ends and the next begins [s], and why."""
+
+    end: float
+    begin: float
+    why: str
+
+
+def find_cuts(drive: Drive) -> list[Cut]:
+    """Find where a recording holds the end of one drive and the begin of the next, in order.
+
+    Parameters
+    ----------
+    drive : as read; empty where it has no speed
+    """
+    speed = drive.speed
+    if speed is None or len(speed) < 2 * _AROUND:
+        return []
+    found = [*_pauses(drive, speed), *_stops(speed), *find_splices(drive)]
+    cuts: list[Cut] = []
+    for cut in sorted(found):
+        if not cuts or cut.end >= cuts[-1].begin:
+            cuts.append(cut)
+    return cuts
+
+
+def parted(drive: Drive) -> tuple[Drive, ...]:
+    """Part a recording into its drives; the drive itself where it is one.
+
+    Parameters
+    ----------
+    drive : as read
+
+    Returns
+    -------
+    In order, named ``NAME part 1 of 3``, each with a note in its ``problems``. Parts in which
+    the vehicle hardly moves are left out.
+    """
+    cuts = find_cuts(drive)
+    if not cuts:
+        return (drive,)
+    starts = [-np.inf, *(c.begin for c in cuts)]
+    ends = [*(c.end for c in cuts), np.inf]
+    parts = [_between(drive, a, b) for a, b in zip(starts, ends, strict=True)]
+    driven = [part for part in parts if _driven(part)]
+    if len(driven) < 2:
+        return (drive,)
+    why = " and ".join(dict.fromkeys(c.why for c in cuts))
+    return numbered(drive.name, driven, why, len(parts) - len(driven))
+
+
+def numbered(name: str, parts: Sequence[Drive], why: str, idle: int = 0) -> tuple[Drive, ...]:
+    """Name the drives of one recording, and tell of it in each.
+
+    Parameters
+    ----------
+    name : of the recording
+    parts : its drives
+    why : by what they are parted
+    idle : parts left out
+    """
+    left = f"; {idle} part(s) in which the vehicle hardly moves are left out" if idle else ""
+    return tuple(
+        replace(part, name=f"{name} part {k} of {len(parts)}").with_problems(
+            Problem(
+                "",
+                f"{name} holds {len(parts)} drives, parted by {why}; this is drive {k}, from "
+                f"{part.start:.0f} to {part.end:.0f} s{left}",
+            )
+        )
+        for k, part in enumerate(parts, start=1)
+    )
+
+
+def find_splices(drive: Drive) -> list[Cut]:
+    """Find where speed, position or coolant jump as no vehicle's do, and stay where they are.
+
+    That is how recordings look that were put one behind another on one clock.
+    """
+    found: list[Cut] = []
+    speed = drive.speed
+    if speed is not None and len(speed) > 2 * _AROUND:
+        found += _speed_jumps(speed)
+    lat, lon = drive.get("latitude"), drive.get("longitude")
+    if lat is not None and lon is not None and len(lat) > 2 * _AROUND:
+        found += _position_jumps(lat, lon.at(lat.time))
+    coolant = drive.get("coolant_temperature")
+    if coolant is not None and len(coolant) > 2 * _AROUND:
+        found += _coolant_jumps(coolant)
+    found.sort()
+    # What several signals show at once is one splice.
+    return [c for k, c in enumerate(found) if k == 0 or c.end > found[k - 1].begin + _NEAR]
+
+
+def _speed_jumps(speed: Signal) -> list[Cut]:
+    step, change = np.diff(speed.time), np.abs(np.diff(speed.values))
+    places = np.flatnonzero((step < _NEAR) & (change > _STEP + _CHANGE * step))
+    before, after = (np.abs(w) for w in _windows(speed.values, places))
+    stays = np.abs(_rise(before, after)) > 0.6 * change[places]
+    # A source that freezes, or reads zero for a while, jumps as well.
+    for side in (before, after):
+        stays &= (np.nanmin(side, axis=1) > _STILL) & (np.nanmax(side, axis=1) > side[:, -1])
+    return _told(speed.time, places[stays], "jumps of the speed")
+
+
+def _position_jumps(lat: Signal, longitude: Floats) -> list[Cut]:
+    step = np.diff(lat.time)
+    east_per_angle = np.cos(lat.values[:-1])
+    way = EARTH_RADIUS * np.hypot(np.diff(lat.values), np.diff(longitude) * east_per_angle)
+    with np.errstate(invalid="ignore"):
+        places = np.flatnonzero((step < _NEAR) & (way > _FAR + _FASTEST * step))
+    north = _rise(*_windows(lat.values, places))
+    east = _rise(*_windows(longitude, places)) * east_per_angle[places]
+    stays = EARTH_RADIUS * np.hypot(north, east) > 0.6 * way[places]
+    return _told(lat.time, places[stays], "jumps of the position")
+
+
+def _coolant_jumps(coolant: Signal) -> list[Cut]:
+    places = np.flatnonzero((np.diff(coolant.time) < _NEAR) & (np.diff(coolant.values) < -_COOLED))
+    stays = _rise(*_windows(coolant.values, places)) < -_COOLED
+    return _told(coolant.time, places[stays], "jumps of the coolant's temperature")
+
+
+def _told(time: Floats, places: NDArray[np.intp], why: str) -> list[Cut]:
+    return [Cut(float(time[k]), float(time[k + 1]), why) for k in places]
+
+
+def _windows(values: Floats, places: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Samples to both sides of steps, (m, k) each; NaN beyond the ends.
+
+    Parameters
+    ----------
+    values : (n,)
+    places : (m,) of the last sample before each step
+    """
+    beyond = np.full(_AROUND, np.nan)
+    padded = np.concatenate((beyond, values, beyond))
+    after = places[:, None] + 1 + np.arange(_AROUND)
+    return padded[after], padded[after + _AROUND]
+
+
+def _rise(before: Floats, after: Floats) -> Floats:
+    """Median after each step minus that before it (m,)."""
+    return np.asarray(np.nanmedian(after, axis=1) - np.nanmedian(before, axis=1))
+
+
+def _pauses(drive: Drive, speed: Signal) -> list[Cut]:
+    """Times in which no signal has a sample."""
+    clocks = {id(s.time): s.time for s in drive.signals.values() if len(s)}
+    found = []
+    for k in np.flatnonzero(np.diff(speed.time) > PAUSE):
+        begin, end = float(speed.time[k]), float(speed.time[k + 1])
+        stamps = [np.array([begin, end])]
+        stamps += [
+            t[np.searchsorted(t, begin) : np.searchsorted(t, end, side="right")]
+            for t in clocks.values()
+        ]
+        seen = np.unique(np.concatenate(stamps))
+        step = np.diff(seen)
+        at = int(np.argmax(step))
+        before, after = float(speed.values[k]), float(speed.values[k + 1])
+        # The clock was set while the vehicle moved on: one drive.
+        on = min(before, after) > _MOVING and abs(after - before) < _AS_BEFORE
+        if step[at] > PAUSE and not on:
+            why = f"times of {PAUSE / 60.0:.0f} min or more in which nothing was recorded"
+            found.append(Cut(float(seen[at]), float(seen[at + 1]), why))
+    return found
+
+
+def _stops(speed: Signal) -> list[Cut]:
+    """Stops of `STANDING` or more."""
+    still = np.abs(speed.values) < _STILL
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], still.view(np.int8), [0]))))
+    first, last = speed.time[edges[0::2]], speed.time[edges[1::2] - 1]
+    why = f"stops of {STANDING / 60.0:.0f} min or more"
+    return [
+        Cut(float(a) + KEPT, float(b) - KEPT, why)
+        for a, b in zip(first, last, strict=True)
+        if b - a >= STANDING
+    ]
+
+
+def _between(drive: Drive, start: float, end: float) -> Drive:
+    """Samples from one instant to another; what is sent rarely goes on to hold."""
+    clocks: dict[int, tuple[slice, Floats]] = {}
+    signals = {}
+    for name, s in drive.signals.items():
+        if id(s.time) not in clocks:
+            a, b = np.searchsorted(s.time, start), np.searchsorted(s.time, end, side="right")
+            clocks[id(s.time)] = slice(int(a), int(b)), s.time[a:b].copy()
+        rows, time = clocks[id(s.time)]
+        if time.size:
+            signals[name] = Signal(name, time, s.values[rows].copy())
+    begin = min((float(s.time[0]) for s in signals.values()), default=start)
+    for name, s in drive.signals.items():
+        rows, time = clocks[id(s.time)]
+        rare = len(s) < _AROUND or s.period > _RARELY
+        if not time.size and rows.start > 0 and rare:
+            signals[name] = Signal(name, np.array([begin]), s.values[rows.start - 1 : rows.start])
+    return replace(drive, signals=signals)
+
+
+def _driven(drive: Drive) -> bool:
+    speed = drive.speed
+    if speed is None or len(speed) < 2:
+        return False
+    step = np.minimum(np.diff(speed.time), _STANDS_FOR)
+    return bool(np.sum(step[np.abs(speed.values[1:]) > _MOVING]) >= DRIVEN)
+
+
+def find_restarts(time: Floats) -> list[slice]:
+    """Find the recordings of a table whose clock begins anew in places.
+
+    Parameters
+    ----------
+    time : (n,) as recorded; NaN where missing [s]
+
+    Returns
+    -------
+    Rows of each recording; empty where there is one alone
+    """
+    places = np.flatnonzero(np.isfinite(time))
+    known = time[places]
+    if known.size < 4 * _AROUND:
+        return []
+    back = np.flatnonzero(np.diff(known) < -_NEAR)
+    back = back[_rise(*_windows(known, back)) < -_NEAR]
+    if not back.size:
+        return []
+    # Where rows are out of order for a while, the clock comes back to where it had been.
+    begins = np.concatenate(([0], back + 1, [known.size]))
+    usual = [float(np.median(known[a:b])) for a, b in pairwise(begins)]
+    back = back[known[back + 1] < np.array(usual[:-1])]
+    edges = [0, *places[back + 1].tolist(), time.size]
+    rows = [slice(a, b) for a, b in pairwise(edges)]
+    long = [r for r in rows if np.nansum(np.clip(np.diff(time[r]), 0.0, _STANDS_FOR)) >= DRIVEN]
+    return long if len(long) > 1 and len(long) >= 0.5 * len(rows) else []

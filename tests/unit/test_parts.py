@@ -1,0 +1,176 @@
+"""Several drives in one recording: where it is parted, and where it is not."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.checks import check_drive
+from weighbridge.io import read_drives, write_table
+from weighbridge.signals import Signal
+from weighbridge.signals.parts import KEPT, PAUSE, STANDING, find_cuts, find_splices, parted
+from weighbridge.simulation import make_scenario, simulate_car
+
+LONG = 400.0
+
+
+@pytest.fixture(scope="module")
+def trips():
+    """Three drives, cut out of simulated ones while the vehicle moves or stands."""
+    found = []
+    for seed in (21, 22, 23):
+        scenario = replace(make_scenario("car-short", seed=seed), duration=LONG)
+        found.append(simulate_car(scenario).drive)
+    return found
+
+
+def behind(trips, gap):
+    """Put drives one behind another, ``gap`` seconds apart; names of all signals."""
+    at, parts = 0.0, {}
+    for trip in trips:
+        for name, s in trip.signals.items():
+            parts.setdefault(name, []).append((s.time - trip.start + at, s.values))
+        at += trip.duration + gap
+    signals = {
+        name: Signal(name, *(np.concatenate(x) for x in zip(*pieces, strict=True)))
+        for name, pieces in parts.items()
+    }
+    return wb.Drive("day", signals)
+
+
+def test_pauses_part_a_day(trips):
+    day = behind(trips, PAUSE + 60.0)
+    parts = parted(day)
+    assert [p.name for p in parts] == [f"day part {k} of 3" for k in (1, 2, 3)]
+    for part, trip in zip(parts, trips, strict=True):
+        assert part.duration == pytest.approx(trip.duration, abs=0.1)
+        assert part.signals.keys() == trip.signals.keys()
+        np.testing.assert_array_equal(
+            part.signals["vehicle_speed"].values, trip.signals["vehicle_speed"].values
+        )
+        assert "holds 3 drives" in part.problems[-1].text
+    assert parted(parts[0])[0] is parts[0]
+    assert not find_cuts(behind(trips, PAUSE - 60.0))
+
+
+def test_a_long_stop_parts_a_day_and_a_short_one_does_not(trips):
+    trip = trips[0]
+    speed = trip.signals["vehicle_speed"]
+    for stands, many in ((STANDING - 60.0, 1), (STANDING + 300.0, 2)):
+        at = np.arange(0.0, stands, 0.5)
+        end = speed.time[-1] + 1.0
+        time = np.concatenate([speed.time, end + at, speed.time + end + at[-1] + 1.0])
+        still = np.zeros(at.size)
+        values = np.concatenate([speed.values, still, speed.values])
+        day = wb.Drive("day", {"vehicle_speed": Signal("vehicle_speed", time, values)})
+        parts = parted(day)
+        assert len(parts) == many
+        for a, b in pairwise(parts):
+            assert b.start - a.end == pytest.approx(stands - 2.0 * KEPT, abs=40.0)
+
+
+def test_a_clock_set_while_moving_on_parts_nothing(trips):
+    trip = trips[0]
+    speed = trip.signals["vehicle_speed"].values
+    k = int(np.argmax(speed))
+    at = trip.signals["vehicle_speed"].time[k]
+    later = [
+        Signal(s.name, np.where(s.time > at, s.time + 7200.0, s.time), s.values)
+        for s in trip.signals.values()
+    ]
+    assert not find_cuts(trip.with_signals(*later))
+
+
+def test_a_splice_on_one_clock_is_found(trips):
+    # Each trip ends and begins on the road, at speeds and places of its own.
+    cut = []
+    for trip, shift in zip(trips, (0.0, 0.1, 0.2), strict=True):
+        begin, end = trip.start + 100.0, trip.start + 300.0
+        signals = {}
+        for name, s in trip.signals.items():
+            rows = (s.time >= begin) & (s.time < end)
+            values = s.values[rows] + (shift if name == "latitude" else 0.0)
+            signals[name] = Signal(name, s.time[rows], values)
+        cut.append(replace(trip, signals=signals))
+    day = behind(cut, 0.05)
+    parts = parted(day)
+    assert len(parts) == 3
+    assert [p.duration for p in parts] == pytest.approx([200.0] * 3, abs=1.5)
+    assert not any(find_splices(p) for p in parts)
+    assert not any(find_splices(t) for t in trips)
+
+
+def test_speed_that_freezes_or_drops_out_is_no_splice(trips):
+    speed = trips[0].signals["vehicle_speed"]
+    top = int(np.argmax(speed.values))
+    for held in (0.0, float(speed.values[top])):
+        rows = slice(top, top + 40)
+        values = speed.values.copy()
+        values[rows] = held
+        drive = trips[0].with_signals(replace(speed, values=values))
+        assert not find_splices(drive)
+
+
+def test_what_is_sent_rarely_goes_on_to_hold(trips):
+    once = Signal("reference_torque", np.array([5.0]), np.array([250.0]))
+    day = behind(trips, 2.0 * PAUSE).with_signals(once)
+    for part in parted(day):
+        assert part.signals["reference_torque"].values.tolist() == [250.0]
+        assert part.start <= part.signals["reference_torque"].time[0] <= part.end
+
+
+def test_a_table_whose_clock_begins_anew_holds_several_drives(trips, tmp_path):
+    columns = {"time_s": [], "vehicle_speed_kmh": [], "engine_speed_rpm": []}
+    for trip in trips:
+        speed = trip.signals["vehicle_speed"]
+        columns["time_s"].append(speed.time - speed.time[0])
+        columns["vehicle_speed_kmh"].append(3.6 * speed.values)
+        columns["engine_speed_rpm"].append(1000.0 + 50.0 * speed.values)
+    path = tmp_path / "day.csv"
+    write_table({k: np.concatenate(v) for k, v in columns.items()}, path)
+    parts = read_drives(path)
+    assert [p.name for p in parts] == [f"day part {k} of 3" for k in (1, 2, 3)]
+    for part, trip in zip(parts, trips, strict=True):
+        assert part.duration == pytest.approx(trip.signals["vehicle_speed"].duration, abs=0.1)
+        assert not any("backwards" in p.text for p in part.problems)
+    assert any("backwards" in p.text for p in wb.read_drive(path).problems)
+
+
+def test_rows_out_of_order_are_no_drives(trips, tmp_path):
+    speed = trips[0].signals["vehicle_speed"]
+    time = speed.time.copy()
+    time[50:60] += 200.0
+    path = tmp_path / "trip.csv"
+    write_table({"time_s": time, "vehicle_speed_kmh": 3.6 * speed.values}, path)
+    assert len(read_drives(path)) == 1
+
+
+def test_a_few_spikes_are_left_out_and_told(trips):
+    trip = trips[0]
+    speed = trip.signals["vehicle_speed"]
+    places = np.linspace(50, len(speed) - 50, 4).astype(int)
+    values = speed.values.copy()
+    values[places] = np.where(values[places] < 20.0, 55.0, 1.0)
+    bad = trip.with_signals(replace(speed, values=values))
+    told = check_drive(bad)
+    assert not any(p.serious for p in told)
+    assert any("leap away and return" in p.text and "4 of" in p.text for p in told)
+    assert not any("leap away" in p.text for p in check_drive(trip))
+    # What stays is a step, and no spike.
+    values = speed.values + np.where(np.arange(len(speed)) > len(speed) // 2, 20.0, 0.0)
+    assert not any(
+        "leap away" in p.text for p in check_drive(trip.with_signals(replace(speed, values=values)))
+    )
+
+
+def test_a_splice_is_refused_by_its_name(trips):
+    speed = trips[0].signals["vehicle_speed"]
+    rng = np.random.default_rng(4)
+    pieces = [5.0 + 38.0 * (k % 2) + rng.normal(0.0, 0.3, 40) for k in range(30)]
+    values = np.concatenate(pieces)
+    time = speed.time[0] + np.arange(values.size)
+    drive = wb.Drive("d", {"vehicle_speed": Signal("vehicle_speed", time, values)})
+    serious = [p.text for p in check_drive(drive) if p.serious]
+    assert "put one behind another" in serious[0]
