@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numba import config
 
+import weighbridge as wb
 from weighbridge import calibrate, weigh
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.pipeline import joint_calibrating
@@ -303,3 +304,12 @@ def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monke
     lost = joint_calibrating._self_weighed(base, problem, lambda car: [burnt], None)
     # What the scale cannot mend is in the interval.
     assert lost.provenance.mass_scale_std > 0.15
+
+
+def test_a_saved_file_weighs_as_the_fit_does(car, loaded, tmp_path):
+    car.save(tmp_path / "car.toml")
+    told = wb.Vehicle.load(tmp_path / "car.toml")
+    assert told.torque.coefficients != car.torque.coefficients
+    exact, rounded = (wb.weigh(loaded.drive, c) for c in (car, told))
+    assert abs(rounded.mass - exact.mass) < 0.1 * exact.std
+    assert rounded.std == pytest.approx(exact.std, rel=0.01)

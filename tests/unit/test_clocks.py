@@ -175,3 +175,58 @@ def test_a_mapping_without_signals_and_clock_is_refused(tmp_path, time):
     gnss(tmp_path)
     with pytest.raises(ConfigError, match="is missing: name at least one column"):
         read_drive(tmp_path / "fixes.csv", {"tables": {"gps": {"files": "*.csv", "time": time}}})
+
+
+CLOCK_MAP = """
+[tables.obd]
+files = "obd.csv"
+[tables.obd.time]
+column = "time"
+format = "clock"
+[tables.obd.signals.engine_load]
+column = "load"
+unit = "pct"
+
+[tables.gps]
+files = "gps.csv"
+[tables.gps.time]
+column = "t"
+unit = "s"
+[tables.gps.signals.latitude]
+column = "lat"
+unit = "deg"
+[tables.gps.signals.longitude]
+column = "lon"
+unit = "deg"
+"""
+
+
+def on_the_clock(folder, zone, minutes):
+    """A table of clock times of a zone [h] beside one with epoch stamps, both of one drive."""
+    start = 1_700_000_000.0
+    time = np.arange(0.0, 60.0 * minutes, 0.5)
+    day = (start + 12.0 + time + 3600.0 * zone) % 86_400.0
+    stamps = [f"{int(s // 3600):02d}:{int(s // 60 % 60):02d}:{s % 60.0:06.3f}" for s in day]
+    rows = [f"{s},{50 + k % 20}" for k, s in enumerate(stamps)]
+    (folder / "obd.csv").write_text("time,load\n" + "\n".join(rows) + "\n")
+    rows = [f"{start + t:.1f},{47 + 1e-5 * t:.6f},{8 + 1e-5 * t:.6f}" for t in time]
+    (folder / "gps.csv").write_text("t,lat,lon\n" + "\n".join(rows) + "\n")
+    (folder / "map.toml").write_text(CLOCK_MAP)
+    return [folder / "obd.csv", folder / "gps.csv"], folder / "map.toml"
+
+
+@pytest.mark.parametrize("zone", [0.0, 2.0, -7.0, 5.5, 13.0])
+def test_times_of_day_are_put_on_the_day_of_dates(tmp_path, zone):
+    drive = read_drive(*on_the_clock(tmp_path, zone, 20.0))
+    shift = drive.signals["engine_load"].time[0] - drive.signals["latitude"].time[0]
+    assert shift == pytest.approx(12.0, abs=0.01)
+    note = next(p.text for p in drive.problems if "from UTC" in p.text)
+    assert "2023-11-1" in note
+    assert not any(p.serious for p in drive.problems)
+
+
+def test_times_of_day_that_fit_twice_are_refused(tmp_path):
+    with pytest.raises(DriveError, match="at several half hours of the day") as caught:
+        read_drive(*on_the_clock(tmp_path, 1.0, 120.0))
+    assert "offset_s" in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1

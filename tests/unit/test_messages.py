@@ -11,6 +11,8 @@ from numpy.testing import assert_allclose
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io import read_drive
 from weighbridge.io.formats import format_of
+from weighbridge.io.mapping import TimeColumn
+from weighbridge.io.messages import open_bag
 
 mcap = pytest.importorskip("mcap.writer")
 rosbag1 = pytest.importorskip("rosbags.rosbag1")
@@ -304,3 +306,20 @@ def test_no_recording_is_one_sentence(tmp_path, name):
 @given(part=st.floats(0.0, 1.0), at=st.floats(0.0, 1.0), junk=st.binary(min_size=0, max_size=16))
 def test_damage_leaves_signals_or_one_sentence(files, assert_damage_is_told, name, part, at, junk):
     assert_damage_is_told(name, (files / name).read_bytes(), part, at, junk)
+
+
+@pytest.mark.parametrize("packing", ["BZ2", "LZ4"])
+def test_packed_bags_have_a_budget(tmp_path, monkeypatch, packing):
+    path, kind, store = tmp_path / "one.bag", "std_msgs/msg/Float64", STORE[1]
+    bag = rosbag1.Writer(path)
+    bag.set_compression(bag.CompressionFormat[packing])
+    data = store.serialize_ros1(store.types[kind](0.5), kind)
+    with bag:
+        link = bag.add_connection("/speed", kind, typestore=store)
+        for k in range(2000):
+            bag.write(link, 1_700_000_000_000_000_000 + k * 10_000_000, data)
+    assert [c.name for c in open_bag(path, TimeColumn()).channels] == ["/speed.data"]
+    monkeypatch.setattr("weighbridge.io.channels._MOST_UNPACKED", 8_000)
+    monkeypatch.setattr("weighbridge.io.channels._MOST_TIMES", 0)
+    with pytest.raises(DriveError, match="more than 1 GB"):
+        open_bag(path, TimeColumn())

@@ -4,6 +4,7 @@ import math
 import tomllib
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -168,8 +169,64 @@ vehicles = st.builds(
 @given(vehicles)
 def test_saved_vehicle_is_loaded_to_the_last_bit(tmp_path_factory, vehicle):
     path = tmp_path_factory.mktemp("vehicle") / "car.toml"
-    vehicle.save(path)
+    save_vehicle(vehicle, path, exact=True)
     assert Vehicle.load(path) == vehicle
+
+
+def test_numbers_are_rounded_to_their_uncertainty(tmp_path):
+    correlated = np.array([[4.0, 1.9999999, 0.0], [1.9999999, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    car = Vehicle(
+        tare=1580.123456789,
+        driveline=Driveline(
+            gearings=(28.123456789, 11.0),
+            gearing_stds=(0.0123456, 0.001),
+            engine_inertia=1.0 / 3.0,
+            engine_inertia_std=0.0,
+        ),
+        torque=TorqueModel(
+            source="measured",
+            coefficients=(-3.987654321, 1.0123456789),
+            coefficient_stds=(2.345678, 0.00123456),
+        ),
+        mounting=Mounting(
+            roll=math.radians(1.23456789), std=(math.radians(0.02),) * 3, squat=math.radians(0.2)
+        ),
+        witnesses=(
+            WitnessRelation(
+                signal="mass_air_flow",
+                coefficients=(1.0 / 3.0, 0.0, 2.0, 1e-9 / 3.0),
+                scatter=0.01,
+                span=0.5,
+                scale_std=0.03,
+                value_range=(0.1, 1.0),
+                speed_range=(100.0, 400.0),
+            ),
+        ),
+        provenance=Provenance(notes="n", fit_cov=tuple(correlated[np.tril_indices(3)])),
+    )
+    path = tmp_path / "car.toml"
+    car.save(path)
+    text = path.read_text(encoding="utf-8")
+    data = tomllib.loads(text)
+    assert data["vehicle"]["tare_kg"] == 1580.123456789
+    assert data["driveline"]["gearings_per_m"] == [28.12346, 11.0]
+    assert data["driveline"]["gearing_stds_per_m"] == [0.01235, 0.001]
+    assert data["driveline"]["engine_inertia_kgm2"] == 0.333333
+    assert data["torque"]["coefficients"] == [-3.988, 1.012346]
+    assert data["mounting"]["roll_deg"] == 1.23457
+    assert data["mounting"]["squat_deg_per_mps2"] == 0.2
+    # The covariance is one block at the end, and stays one.
+    keys = [line.split(" = ")[0] for line in text.splitlines() if " = " in line]
+    assert keys[-1] == "fit_cov"
+    loaded = Vehicle.load(path)
+    again = np.zeros((3, 3))
+    again[np.tril_indices(3)] = loaded.provenance.fit_cov
+    again += np.tril(again, -1).T
+    assert np.linalg.eigvalsh(again[:2, :2])[0] > 0.0
+    assert again[0, 1] == pytest.approx(1.9999999, rel=1e-9)
+    # Once rounded, it is written as it is.
+    loaded.save(tmp_path / "again.toml")
+    assert (tmp_path / "again.toml").read_text(encoding="utf-8") == text
 
 
 def test_file_speaks_the_units_of_people(tmp_path):

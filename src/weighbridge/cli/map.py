@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
+from weighbridge.cli.options import DbcPaths
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import complain, console, say, shown
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from weighbridge.io.dbc import Database
     from weighbridge.io.draft import Draft, DraftColumn
 
 _SHOWN = 12
@@ -39,8 +41,11 @@ def map_log(
         bool, typer.Option("--ask", help="Ask for each unit that the log does not state.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    dbc: DbcPaths = None,
 ) -> None:
     """Draft the mapping of a log: its separator, its time, its columns and their units.
+
+    Of raw CAN logs it finds which signals of a DBC mean what.
 
     Example: weighbridge map trip.csv -o map.toml
     """
@@ -49,11 +54,11 @@ def map_log(
     from weighbridge.whole import whole_file
 
     if output is not None:
-        refuse_results(inputs(logs), [Result("--output", output, "mapping")])
+        refuse_results(inputs(logs, dbc=dbc), [Result("--output", output, "mapping")])
         refuse_overwriting(output, force, "mapping")
     drafts: list[Draft] = []
     refused: list[str] = []
-    for path, draft in _files(logs):
+    for path, draft in _files(logs, dbc or []):
         try:
             found = draft(path)
         except DriveError as error:
@@ -74,11 +79,15 @@ def map_log(
     with whole_file(output) as part:
         part.write_text(text, encoding="utf-8")
     say(f"written: {output}")
-    say(f"next: weighbridge inspect {_drive(logs)} --mapping {output}")
+    more = "".join(f" --dbc {d}" for d in dbc or ())
+    say(f"next: weighbridge inspect {_drive(logs)} --mapping {output}{more}")
 
 
-def _files(logs: list[Path]) -> list[tuple[Path, Callable[[Path], Draft]]]:
+def _files(logs: list[Path], dbc: list[str]) -> list[tuple[Path, Callable[[Path], Draft]]]:
     """Files named, those of folders included, each with what drafts its mapping."""
+    from weighbridge.io.dbc import load_dbcs
+
+    databases = load_dbcs(list(dbc))
     from weighbridge.errors import DriveError
     from weighbridge.io.formats import formats, is_log
 
@@ -87,31 +96,38 @@ def _files(logs: list[Path]) -> list[tuple[Path, Callable[[Path], Draft]]]:
     for path in logs:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.is_file() and is_log(p))
-            there = [(p, draft) for p in inside if (draft := _draft(p)) is not None]
+            there = [(p, draft) for p in inside if (draft := _draft(p, databases)) is not None]
             if not there:
                 raise DriveError(f"{path}: holds no table ({', '.join(drafted)})")
             found += there
         elif not path.is_file():
             raise DriveError(f"{path}: {'no plain file' if path.exists() else 'no such file'}")
-        elif (draft := _draft(path)) is None:
+        elif (draft := _draft(path, databases)) is None:
             raise DriveError(
-                f"{path}: map drafts mappings of tables ({', '.join(drafted)}); other logs are "
-                "read as they are: weighbridge inspect tells what they hold"
+                f"{path}: map drafts mappings of tables ({', '.join(drafted)}), and of CAN logs "
+                "by their DBC (--dbc FILE); other logs are read as they are: weighbridge inspect "
+                "tells what they hold"
             )
         else:
             found.append((path, draft))
     return found
 
 
-def _draft(path: Path) -> Callable[[Path], Draft] | None:
+def _draft(path: Path, databases: tuple[Database, ...]) -> Callable[[Path], Draft] | None:
+    """What drafts the mapping of a file; None where it is read as it is."""
     from weighbridge.errors import DriveError
+    from weighbridge.io.bus_draft import draft_bus
     from weighbridge.io.formats import format_of
 
     try:
         form = format_of(path)
     except OSError as error:
         raise DriveError(f"{path} cannot be read: {error.strerror or error}") from None
-    return form.draft if form is not None else None
+    if form is None:
+        return None
+    if databases and form.holds_frames:
+        return lambda log: draft_bus(log, databases)
+    return form.draft
 
 
 def _drive(logs: list[Path]) -> Path:
@@ -130,7 +146,7 @@ def _show(found: Draft, screen: Console) -> None:
         title_justify="left",
     )
     for heading in ("column", "is", "unit"):
-        table.add_column(heading)
+        table.add_column(heading, overflow="fold")
     for heading in ("lowest", "median", "highest", "values"):
         table.add_column(heading, justify="right")
     for column in found.known:

@@ -103,12 +103,16 @@ def check_unpacked(path: Path, size: int) -> None:
     DriveError
         It is more than 1 GB, and more than four times the file.
     """
-    own = path.stat().st_size
-    if size > max(_MOST_UNPACKED, _MOST_TIMES * own):
+    if size > most_unpacked(path):
         raise DriveError(
-            f"{path} has {own} bytes and unpacks to {size}, more than 1 GB; write the signals of "
-            "the drive alone, or split it"
+            f"{path} has {path.stat().st_size} bytes and unpacks to {size}, more than 1 GB; write "
+            "the signals of the drive alone, or split it"
         )
+
+
+def most_unpacked(path: Path) -> int:
+    """Bytes that a file may unpack to: 1 GB, or four times its size where that is more."""
+    return max(_MOST_UNPACKED, _MOST_TIMES * path.stat().st_size)
 
 
 def reader(opener: Opener) -> Reader:
@@ -273,7 +277,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
             "write [signals] of a mapping by hand"
         )
     ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in channels]
-    rates = [c.time.size / max(b - a, 1e-9) for c, (a, b) in zip(channels, ends, strict=True)]
+    rates = [(c.time.size - 1) / (b - a) for c, (a, b) in zip(channels, ends, strict=True) if b > a]
     doubts = [*found.notes]
     doubts += [
         f"{n!r} is there {k} times; the longest is taken" for n, k in counted.items() if k > 1
@@ -283,7 +287,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
         time=found.time,
         time_unit=found.time_unit,
         time_format=found.time_format,
-        rate=float(np.median(rates)),
+        rate=float(np.median(rates)) if rates else float("nan"),
         duration=max(b for _, b in ends) - min(a for a, _ in ends),
         columns=columns,
         doubts=tuple(doubts),

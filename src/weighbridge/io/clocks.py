@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import math
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -28,6 +29,10 @@ _LATE: Final = 1.5
 # How late one sensor may be beside another, as a standard deviation: two recorded loggers, which
 # stamp both by one clock, have GNSS 0.17 and 0.36 s behind the wheels (studies/recorded.md) [s].
 _LATENESS: Final = 0.3
+
+# Zones are whole or half hours from UTC [s]; so much of the shorter recording lies in the other.
+_ZONE: Final = 1800.0
+_SHARED: Final = 0.7
 
 _REMEDY: Final = "give offset_s under [time] of the file's table in a mapping"
 
@@ -63,9 +68,10 @@ def settle_clocks(logs: Sequence[Log]) -> list[Problem]:
     dated = [log for log in fixed if log.absolute]
     if dated and len(dated) < len(fixed):
         counted = [log for log in fixed if not log.absolute]
-        problems.append(
-            _move(dated, counted, f"{_names(dated)} has dates and {_names(counted)} counts seconds")
-        )
+        of_day = all(log.of_day for log in counted)
+        how = "times of day without a date" if of_day else "seconds"
+        why = f"{_names(dated)} has dates and {_names(counted)} counts {how}"
+        problems.append(_onto_day(dated, counted, why) if of_day else _move(dated, counted, why))
     for log in moved:
         problems.append(_move(fixed, [log], f"{log.path.name} is to be aligned"))
         fixed.append(log)
@@ -147,6 +153,44 @@ def _move(fixed: Sequence[Log], group: Sequence[Log], why: str) -> Problem:
         "",
         f"{_names(group)}: the clock was moved by {_told(found)} onto that of {_names(fixed)}, by "
         f"{what} (correlation {abs(found.correlation):.3f} over {found.overlap:.0f} s)",
+    )
+
+
+def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem:
+    """Put times of day on the day of files with dates, by what they share or by the hour.
+
+    The times of day may be those of any zone, whole or half hours from UTC.
+
+    Raises
+    ------
+    DriveError
+        Several hours of it would fit, or none.
+    """
+    try:
+        return _move(dated, counted, why)
+    except DriveError:
+        if _offset(dated, counted)[0] is not None:
+            raise
+    (a0, a1), (b0, b1) = _span(dated), _span(counted)
+    shorter = min(a1 - a0, b1 - b0)
+    first = _ZONE * math.floor((a0 - b1) / _ZONE)
+    offsets = first + _ZONE * np.arange(math.ceil((a1 - a0 + b1 - b0) / _ZONE) + 2)
+    shared = np.minimum(a1, b1 + offsets) - np.maximum(a0, b0 + offsets)
+    fits = shared >= _SHARED * shorter
+    if np.count_nonzero(fits) != 1:
+        many = "at several half hours" if fits.any() else "at no half hour"
+        raise DriveError(f"{why}, which overlap {many} of the day for certain; {_REMEDY}")
+    offset = float(offsets[int(np.argmax(fits))])
+    for log in counted:
+        shift_clock(log, offset)
+        log.absolute = True
+    middle = 0.5 * (a0 + a1)
+    zone = math.remainder(-offset, 86_400.0) / 3600.0
+    return Problem(
+        "",
+        f"{why}: they were put on {dt.datetime.fromtimestamp(middle, dt.UTC):%Y-%m-%d}, "
+        f"{zone:+.1f} h from UTC, where alone both overlap; if their clocks differ by seconds, "
+        f"{_REMEDY}",
     )
 
 

@@ -78,6 +78,7 @@ class DraftColumn:
     low, usual, high : lowest, median and highest value in that unit; NaN where there is none
     count : cells with a number
     doubt : what is not sure, one sentence; empty where it is
+    valid : signal of the same message that says whether it counts; empty for none
     """
 
     name: str
@@ -89,6 +90,7 @@ class DraftColumn:
     high: float
     count: int
     doubt: str = ""
+    valid: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

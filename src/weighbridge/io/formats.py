@@ -139,6 +139,7 @@ FORMATS: Final[tuple[Format, ...]] = (
         magic=True,
         about="measurement channels, and CAN frames of bus logging",
         takes=Takes.CHANNELS,
+        draft=mdf.draft,
         package="asammdf",
         extra="mdf",
     ),

@@ -25,6 +25,7 @@ class Log:
     absolute : whether the clock counts from 1970
     start : where the clock begins [s since 1970], if it does not count from there
         and the file tells; None otherwise
+    of_day : whether the clock counts from midnight, of a day that the file does not tell
     align : whether a mapping asks to align its clock with the drive's other files
     frames : raw bus traffic, decoded once all files of a drive are read
     info : what the file knows of the drive beside its signals
@@ -38,6 +39,7 @@ class Log:
     lacking: list[Problem] = field(default_factory=list)
     absolute: bool = False
     start: float | None = None
+    of_day: bool = False
     align: bool = False
     frames: Frames | None = None
     info: DriveInfo | None = None

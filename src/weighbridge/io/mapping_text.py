@@ -85,4 +85,6 @@ def _signal(column: DraftColumn) -> Table:
     table.add("column", column.name)
     if column.unit:
         table.add("unit", column.unit)
+    if column.valid:
+        table.add("valid", column.valid)
     return table

@@ -12,14 +12,17 @@ import logging
 import sys
 import tempfile
 import warnings
-from contextlib import redirect_stdout
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.io.channels import Channel, Recording, draft_of
 from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
+from weighbridge.io.draft import Draft
 from weighbridge.io.frames import Frames
 from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.log import Log
@@ -27,6 +30,7 @@ from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved
 from weighbridge.io.mdf_bus import bus_frames, check_places
 from weighbridge.io.mdf_check import check_links, guard, settle
 from weighbridge.io.mdf_salvage import Salvaged, salvage
+from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import column_list
 from weighbridge.signals import DriveInfo, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
@@ -51,6 +55,62 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     MissingExtraError
         asammdf is not installed.
     """
+    with _file(path) as (file, saved):
+        log = _read(file, path, table, mapping)
+    if saved is not None:
+        log.problems.insert(0, Problem("", _told(log, saved)))
+    return log
+
+
+def recording_of(path: Path) -> Recording:
+    """Hand over the channels of an MDF file and its CAN frames, to draft a mapping.
+
+    Only channels whose name is that of a quantity are read; of the others the name alone.
+
+    Raises
+    ------
+    DriveError, MissingExtraError
+        As of `read_mdf`.
+    """
+    with _file(path) as (file, saved):
+        every, raw_bus = _channels(file)
+        channels = {n: p for n, p in every.items() if not n.startswith(_BUS_PREFIXES)}
+        found = Recording([], start=_start(file))
+        if saved is not None:
+            found.notes.append("the file ends early; what could be read of it counts")
+        found.frames = _frames(file, path) if raw_bus else None
+        places = [_longest(file, places) for places in channels.values()]
+        units = [_unit_text(file, place) for place in places]
+        named = recognise_all(list(channels), [unit_suffix(u) for u in units])
+        for name, place, unit, known in zip(channels, places, units, named, strict=True):
+            time, values = np.zeros(1), None
+            if known.quantity:
+                time, values = _samples(file, path, place)
+            values = np.full(time.size, np.nan) if values is None else values
+            found.channels.append(Channel(name, time, values, unit))
+    return found
+
+
+def draft(path: Path) -> Draft:
+    """Draft the mapping of the measurement channels.
+
+    Raises
+    ------
+    DriveError
+        It has none, or none that is known by its name.
+    """
+    found = recording_of(path)
+    if not found.channels and found.frames is not None:
+        raise DriveError(
+            f"{path} holds CAN frames only: give the DBC of their signals with --dbc; OBD-II and "
+            "J1939 are read without one (weighbridge inspect tells)"
+        )
+    return draft_of(path, found)
+
+
+@contextmanager
+def _file(path: Path) -> Iterator[tuple[Any, Salvaged | None]]:
+    """Open an MDF file, and what could be salvaged of one that was cut off."""
     try:
         from asammdf import MDF
     except ImportError:
@@ -69,10 +129,7 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     ):
         warnings.simplefilter("ignore")
         with _open(MDF, path, saved, folder) as file:
-            log = _read(file, path, table, mapping)
-    if saved is not None:
-        log.problems.insert(0, Problem("", _told(log, saved)))
-    return log
+            yield file, saved
 
 
 def _told(log: Log, saved: Salvaged) -> str:

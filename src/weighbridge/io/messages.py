@@ -23,6 +23,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.io.bag_budget import bound_chunks
 from weighbridge.io.channels import Channel, Recording, check_unpacked
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line
@@ -195,7 +196,8 @@ def open_bag(path: Path, time: TimeColumn) -> Recording:
     Raises
     ------
     DriveError
-        No bag, or without a message that has numbers.
+        No bag, without a message that has numbers, or one that unpacks to far more than it can
+        hold.
     MissingExtraError
         rosbags is not installed.
     """
@@ -209,6 +211,8 @@ def open_bag(path: Path, time: TimeColumn) -> Recording:
 
     def messages() -> Iterator[_Message]:
         with (Reader1 if one else Reader2)(path) as bag:
+            if one:
+                bound_chunks(path, bag)
             for connection, logged, data in bag.messages():
                 name, defined = connection.topic, connection.msgdef
                 make = partial(_ros_topic, name, connection.msgtype, defined.data, one)
@@ -246,6 +250,8 @@ def _recording(
             # Messages that do not fit their definition raise errors of many kinds.
             except Exception:
                 damaged += 1
+    except DriveError:
+        raise
     # So do the libraries on damaged files.
     except Exception as e:
         reason = first_line(e) or type(e).__name__

@@ -17,14 +17,14 @@ from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
 PHRASES: Final[dict[str, tuple[str, ...]]] = {
-    "vehicle_speed": ("veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph",
+    "vehicle_speed": ("v fzg", "vfzg", "v veh", "vveh", "v vehicle", "veh v", "veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph",
         "vehicle speed", "speed", "obd speed", "speed obd", "car speed", "wheel speed", "wheel based vehicle speed",
         "ground speed can", "velocity", "geschwindigkeit", "fahrgeschwindigkeit", "fahrzeuggeschwindigkeit",
         "vitesse", "vitesse vehicule", "velocidad", "velocidad vehiculo", "velocita", "velocita veicolo",
         "velocidade", "velocidade veiculo", "snelheid", "vss", "vspeed", "speedometer", "speed sensor",
         "vehicle speed sensor", "v ego", "vego", "esp speed",
     ),
-    "engine_speed": ("eng rpm", "eng spd", "nmot", "n mot",
+    "engine_speed": ("n eng", "neng", "n mot ist", "n em", "emot spd", "em spd", "em speed", "eng n", "eng rpm", "eng spd", "nmot", "n mot",
         "engine speed", "engine rpm", "rpm", "rpms", "engine rpms", "revs", "motor speed", "motor rpm", "motordrehzahl",
         "drehzahl", "regime moteur", "regime", "regimen motor", "revoluciones", "revoluciones motor",
         "giri motore", "giri", "regime motore", "rotacao", "rotacao motor", "toerental", "engine revolutions",
@@ -37,7 +37,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
         "eng load",
     ),
     "absolute_load": ("absolute engine load", "absolute load", "absolute load value", "absolute throttle load"),
-    "engine_torque": ("trq", "eng trq", "engine trq", "eng torque",
+    "engine_torque": ("m mot", "m mot ist", "m em", "m em ist", "em trq", "em torque", "emot trq", "mot trq", "eng m", "trq", "eng trq", "engine trq", "eng torque",
         "engine torque", "torque", "motor torque", "drehmoment", "motordrehmoment", "couple", "couple moteur",
         "par motor", "coppia", "coppia motore", "torque motor", "actual engine torque", "net torque",
         "emotor torque", "electric motor torque", "flywheel torque",
@@ -167,7 +167,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "gnss_course": ("course", "heading", "bearing", "gps course", "gps bearing", "gps heading", "course over ground", "cog", "kurs", "cap", "rumbo", "track angle", "location course", "direction", "gps direction", "location bearing"),
     "hdop": ("hdop", "horizontal dilution of precision", "dop", "gps hdop"),
     "gnss_accuracy": ("horizontal accu", "accuracy", "gps accuracy", "horizontal accuracy", "genauigkeit", "precision", "location accuracy", "location horizontal accuracy", "position accuracy", "h accuracy", "gps horizontal accuracy"),
-    "longitudinal_accel": ("longitudinal acceleration", "longitudinal accel", "long accel", "langsbeschleunigung", "acceleration longitudinale", "ax vehicle", "long acceleration", "lon acceleration", "longitudinal acc", "inline acc", "inline acceleration"),
+    "longitudinal_accel": ("a x veh", "ax veh", "a long", "along", "veh ax", "longitudinal acceleration", "longitudinal accel", "long accel", "langsbeschleunigung", "acceleration longitudinale", "ax vehicle", "long acceleration", "lon acceleration", "longitudinal acc", "inline acc", "inline acceleration"),
     "grade": ("grade", "road grade", "slope", "steigung", "road slope", "pente", "gradient", "pendiente", "pendenza", "inclination road"),
     **{
         f"accel_{a}": (

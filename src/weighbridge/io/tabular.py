@@ -152,6 +152,7 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
     suffix = mapping.time.unit or time_unit(name) or bracketed_unit(name) or "s"
     factor = UNITS[suffix].factor if UNITS[suffix].dimension == "s" else 1.0
     time, log.absolute, notes = time_seconds(raw, index, factor, mapping.time.format)
+    log.of_day = mapping.time.format == "clock"
     if mapping.time.offset:
         time = time + mapping.time.offset
     log.problems += [Problem("", f"{raw.path.name}: {note}") for note in notes]

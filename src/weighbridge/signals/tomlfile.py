@@ -290,6 +290,30 @@ def exact_text(value: float, suffix: str) -> str:
     return _decimal(outside, 40)
 
 
+def rounded_text(
+    value: float, suffix: str, *, digits: int | None = None, step: float | None = None
+) -> str:
+    """Write an SI value in a file's unit, rounded; no longer than `exact_text`.
+
+    Parameters
+    ----------
+    value : in SI
+    suffix : of the unit
+    digits : significant ones to keep
+    step : power of ten to round to instead, in the file's unit
+    """
+    exact = exact_text(value, suffix)
+    number = Decimal(exact)
+    place = math.floor(math.log10(step)) if step is not None else number.adjusted() + 1
+    if digits is not None:
+        place -= digits
+    exponent = number.as_tuple().exponent
+    if number == 0 or (isinstance(exponent, int) and exponent >= place):
+        return exact
+    rounded = number.quantize(Decimal(1).scaleb(place), context=Context(prec=60))
+    return _decimal(Fraction(rounded), max(rounded.adjusted() - place + 1, 1))
+
+
 def _decimal(value: Fraction, digits: int) -> str:
     """Round to significant digits, as a TOML float."""
     context = Context(prec=digits)

@@ -1,0 +1,95 @@
+"""A mapping drafted from bus traffic: which signals of a DBC are which quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from weighbridge.errors import DriveError
+from weighbridge.io import mdf
+from weighbridge.io.channels import Channel, Recording, draft_of
+from weighbridge.io.columns import unit_suffix
+from weighbridge.io.dbc import Database, Found, is_readable, message_frames, physical
+from weighbridge.io.draft import Draft
+from weighbridge.io.formats import format_of
+from weighbridge.io.frames import Frames
+from weighbridge.io.naming import recognise_all
+
+
+def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
+    """Look at the frames of a log, and at its channels if it has any, and draft their mapping.
+
+    Parameters
+    ----------
+    path : MDF, BLF, ASC, TRC, candump or another log of CAN frames
+    databases : as of `weighbridge.io.dbc.load_dbcs`
+
+    Raises
+    ------
+    DriveError
+        It has no frames, none of the databases' messages, or no signal that is known.
+    """
+    form = format_of(path)
+    if form is None:
+        raise DriveError(f"{path}: logs of kind {path.suffix!r} cannot be read")
+    if form.read is mdf.read_mdf:
+        found = mdf.recording_of(path)
+    else:
+        found = Recording([], frames=form.read(path, None, None).frames)
+    frames = found.frames
+    if frames is None or not len(frames):
+        raise DriveError(f"{path} has no CAN frames; leave --dbc out")
+    signals = bus_channels(frames, databases)
+    if not signals:
+        names = " and ".join(d.path.name for d in databases)
+        raise DriveError(
+            f"{path}: none of its frames is a message of {names}; it may be the DBC of another "
+            "vehicle or bus"
+        )
+    found.channels += signals
+    drafted = draft_of(path, found)
+    flags = _flags(databases)
+    columns = (replace(c, valid=flags.get(c.name.partition(".")[0], "")) for c in drafted.columns)
+    return replace(drafted, columns=tuple(columns))
+
+
+def _flags(databases: Sequence[Database]) -> dict[str, str]:
+    """Name the flag of each message that has one of its own, such as ``SpeedValid``."""
+    found = {}
+    for message in (m for d in databases for m in d.messages):
+        named = [s.name for s in message.signals if s.length == 1 and "valid" in s.name.lower()]
+        if len(named) == 1:
+            found[message.name] = named[0]
+    return found
+
+
+def bus_channels(frames: Frames, databases: Sequence[Database]) -> list[Channel]:
+    """Take the signals of the databases' messages that are in the traffic.
+
+    Signals whose name is that of no quantity come without values.
+    """
+    entries = [
+        Found(message, signal, at[message.name])
+        for database in databases
+        for at in (message_frames(frames, database),)
+        for message in database.messages
+        if message.name in at
+        for signal in message.signals
+        if is_readable(signal)
+    ]
+    units = [str(found.signal.unit or "") for found in entries]
+    names = [found.signal.name for found in entries]
+    channels = []
+    for found, unit, known in zip(
+        entries, units, recognise_all(names, [unit_suffix(u) for u in units]), strict=True
+    ):
+        name = f"{found.message.name}.{found.signal.name}"
+        time, values = np.zeros(1), np.full(1, np.nan)
+        if known.quantity:
+            values, at = physical(frames, found)
+            time = frames.time[at]
+        channels.append(Channel(name, time, values, unit))
+    return channels

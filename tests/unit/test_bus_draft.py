@@ -1,0 +1,99 @@
+"""Mappings drafted from MDF channels and from bus traffic by its DBC."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from weighbridge.errors import DriveError
+from weighbridge.io import read_drive
+from weighbridge.io.bus_draft import draft_bus
+from weighbridge.io.dbc import load_dbcs
+from weighbridge.io.formats import format_of
+from weighbridge.io.mapping_text import mapping_text
+
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: A
+BO_ 256 Motion: 8 A
+ SG_ VehSpd : 0|16@1+ (0.01,0) [0|655] "km/h" A
+ SG_ SpeedValid : 16|1@1+ (1,0) [0|1] "" A
+BO_ 512 Engine: 8 A
+ SG_ EngineSpeed : 0|16@1+ (0.25,0) [0|16000] "rpm" A
+ SG_ EngineTorque : 16|16@1- (0.1,0) [-3000|3000] "Nm" A
+ SG_ Secret : 32|8@1+ (1,0) [0|255] "" A
+"""
+
+
+@pytest.fixture
+def logged(tmp_path):
+    """Twenty seconds of two messages at 10 Hz as candump text, and their DBC."""
+    lines = []
+    for k in range(200):
+        t = 1_700_000_000.0 + 0.1 * k
+        speed, flag = 100 * k, int(k >= 20)
+        torque = 10 * (k - 50)
+        motion = speed.to_bytes(2, "little") + bytes([flag]) + bytes(5)
+        engine = (4000 + 4 * k).to_bytes(2, "little") + torque.to_bytes(2, "little", signed=True)
+        lines.append(f"({t:.6f}) can0 100#{motion.hex().upper()}")
+        lines.append(f"({t + 0.01:.6f}) can0 200#{(engine + bytes(4)).hex().upper()}")
+    log, dbc = tmp_path / "trip.log", tmp_path / "car.dbc"
+    log.write_text("\n".join(lines) + "\n")
+    dbc.write_text(DBC)
+    return log, dbc
+
+
+def test_signals_of_a_dbc_are_recognised_and_read_back(logged, tmp_path):
+    log, dbc = logged
+    draft = draft_bus(log, load_dbcs([str(dbc)]))
+    taken = {c.quantity: (c.name, c.unit, c.valid) for c in draft.known}
+    assert taken == {
+        "vehicle_speed": ("Motion.VehSpd", "kmh", "SpeedValid"),
+        "engine_speed": ("Engine.EngineSpeed", "rpm", ""),
+        "engine_torque": ("Engine.EngineTorque", "nm", ""),
+    }
+    assert draft.rate == pytest.approx(10.0, rel=0.01)
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(mapping_text([draft]), encoding="utf-8")
+    assert tomllib.loads(mapping.read_text())["signals"]["vehicle_speed"]["valid"] == "SpeedValid"
+    drive = read_drive(log, mapping, str(dbc))
+    speed = drive.signals["vehicle_speed"]
+    # The first two seconds are marked invalid.
+    assert len(speed) == 180
+    np.testing.assert_allclose(speed.values[[0, -1]], [20.0 / 3.6, 199.0 / 3.6])
+    torque = drive.signals["engine_torque"].values
+    np.testing.assert_allclose(torque[[0, -1]], [-50.0, 149.0])
+
+
+def test_a_dbc_of_another_vehicle_is_told(logged):
+    log, dbc = logged
+    dbc.write_text(DBC.replace("256", "257").replace("512", "513"))
+    with pytest.raises(DriveError, match="another vehicle"):
+        draft_bus(log, load_dbcs([str(dbc)]))
+    dbc.write_text(DBC.replace("VehSpd", "Q1").replace("EngineSpeed", "Q2").replace("Torque", "Q"))
+    with pytest.raises(DriveError, match="none of its channels is known"):
+        draft_bus(log, load_dbcs([str(dbc)]))
+
+
+def test_channels_of_an_mdf_are_drafted(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    time = np.arange(0.0, 30.0, 0.1)
+    signals = [
+        asammdf.Signal(20.0 + time, time, name="v_Fzg", unit="km/h"),
+        asammdf.Signal(1000.0 + 10.0 * time, time, name="nMot", unit="1/min"),
+        asammdf.Signal(time, time, name="Foo"),
+    ]
+    path = tmp_path / "trip.mf4"
+    with asammdf.MDF() as file:
+        file.append(signals)
+        file.save(path)
+    draft = format_of(path).draft(path)
+    assert {c.quantity: c.unit for c in draft.known} == {
+        "vehicle_speed": "kmh",
+        "engine_speed": "rpm",
+    }
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(mapping_text([draft]), encoding="utf-8")
+    speed = read_drive(path, mapping).signals["vehicle_speed"]
+    np.testing.assert_allclose(speed.values, (20.0 + time) / 3.6)
