@@ -8,7 +8,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.io.draft import HEAD_LINES, draft
 from weighbridge.io.mapping import load_mapping
-from weighbridge.io.mapping_text import mapping_text
+from weighbridge.io.mapping_text import file_patterns, mapping_text
 from weighbridge.io.table import head
 
 ROWS = 400
@@ -197,3 +197,27 @@ def test_a_name_with_a_line_end_stays_in_its_comment(tmp_path):
     (tmp_path / "map.toml").write_text(text)
     drive = read_drive(tmp_path / "log.parquet", tmp_path / "map.toml")
     np.testing.assert_allclose(drive.signals["vehicle_speed"].values, SPEED / 3.6)
+
+
+@pytest.mark.parametrize(
+    ("names", "patterns"),
+    [
+        (["known_gps.csv", "known_obd.csv"], ["*gps.csv", "*obd.csv"]),
+        (["gps_2025-03-04.csv", "obd_2025-03-04.csv"], ["gps*.csv", "obd*.csv"]),
+        (["a.csv", "b.csv"], ["a.csv", "b.csv"]),
+        (["trip1.csv", "trip1_imu.csv"], ["trip1.csv", "trip1_imu.csv"]),
+        (["x [1] a.csv", "x [1] b.csv"], ["*a.csv", "*b.csv"]),
+    ],
+)
+def test_patterns_fit_the_files_of_other_drives(names, patterns):
+    assert file_patterns(names) == patterns
+
+
+def test_decimal_commas_in_a_sparse_table(tmp_path):
+    path = tmp_path / "obd.csv"
+    rows = [f"13:45:{k:02d}.0;" + (f"{k},5;;;" if k % 2 else f";{800 + k},5;;") for k in range(50)]
+    header = "Zeit;Geschwindigkeit (OBD) (km/h);Motordrehzahl (U/min);Last;Öl"
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    found = draft(path)
+    assert found.text.decimal == ","
+    assert {c.quantity for c in found.known} == {"vehicle_speed", "engine_speed"}

@@ -139,7 +139,7 @@ def _show(found: Draft, screen: Console) -> None:
     from rich.table import Table
 
     taken = found.time_format or found.time_unit or "date"
-    clock = f"time {shown(found.time)!r} ({taken})" if found.time else "a clock of its own"
+    clock = f"time '{shown(found.time)}' ({taken})" if found.time else "a clock of its own"
     table = Table(
         title=f"{shown(found.path.name)}: {clock}, "
         f"{found.rate:.3g} rows per second for {found.duration:.0f} s",

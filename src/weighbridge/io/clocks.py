@@ -166,11 +166,12 @@ def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem
     DriveError
         Several hours of it would fit, or none.
     """
-    try:
-        return _move(dated, counted, why)
-    except DriveError:
-        if _offset(dated, counted)[0] is not None:
-            raise
+    shared_motion, what = _offset(dated, counted)
+    if shared_motion is not None:
+        zone = _ZONE * round(shared_motion.offset / _ZONE)
+        if not shared_motion.found or abs(shared_motion.offset - zone) > 2.0 * _LATENESS:
+            return _move(dated, counted, why)
+        return _put(counted, zone, dated, f"{why}, which by {what} are {_told(shared_motion)} off")
     (a0, a1), (b0, b1) = _span(dated), _span(counted)
     shorter = min(a1 - a0, b1 - b0)
     first = _ZONE * math.floor((a0 - b1) / _ZONE)
@@ -181,16 +182,20 @@ def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem
         many = "at several half hours" if fits.any() else "at no half hour"
         raise DriveError(f"{why}, which overlap {many} of the day for certain; {_REMEDY}")
     offset = float(offsets[int(np.argmax(fits))])
+    return _put(counted, offset, dated, f"{why}, which overlap nowhere else")
+
+
+def _put(counted: Sequence[Log], offset: float, dated: Sequence[Log], why: str) -> Problem:
+    """Move times of day onto a day, by whole half hours [s]."""
     for log in counted:
         shift_clock(log, offset)
         log.absolute = True
-    middle = 0.5 * (a0 + a1)
+    day = dt.datetime.fromtimestamp(_span(dated)[0], dt.UTC)
     zone = math.remainder(-offset, 86_400.0) / 3600.0
     return Problem(
         "",
-        f"{why}: they were put on {dt.datetime.fromtimestamp(middle, dt.UTC):%Y-%m-%d}, "
-        f"{zone:+.1f} h from UTC, where alone both overlap; if their clocks differ by seconds, "
-        f"{_REMEDY}",
+        f"{why}: they were put on {day:%Y-%m-%d}, {zone:+.1f} h from UTC; if the clocks differ by "
+        f"seconds, {_REMEDY}",
     )
 
 

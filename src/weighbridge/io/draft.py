@@ -170,6 +170,8 @@ def draft(path: Path) -> Draft:
     )
     columns = gravity_checked(columns)
     if not any(c.quantity for c in columns):
+        if doubts := [f"{c.name!r} is {c.doubt}" for c in columns if c.doubt]:
+            raise DriveError(f"{path}: none of its columns can be taken: {'; '.join(doubts[:3])}")
         raise DriveError(
             f"{path}: none of its columns is known by its name; it has {column_list(raw.names)}: "
             "write [signals] of a mapping by hand"
@@ -228,7 +230,7 @@ def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
         units = {n: u for n, u in stated.items() if u is not None}
         after = 1 if len(units) >= 0.3 * len(header) else 0
         units = units if after else {}
-    body = [c for r in rows[first + 1 + after :] for c in r]
+    body = [c for r in rows[first + 1 + after :] for c in r if c]
     commas = sum(_COMMA.match(c) is not None for c in body)
     decimal = "," if separator != "," and commas > 0.2 * max(len(body), 1) else "."
     skipped = found.index(lines[first])
