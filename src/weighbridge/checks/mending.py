@@ -140,8 +140,8 @@ def _piled(signal: Signal, vehicle: Vehicle) -> tuple[Bools, list[str]]:
             marked |= found
             end = float(signal.values[found][0])
             told.append(
-                f"{signal.name} {'falls below' if lowest else 'exceeds'} "
-                f"{show(signal.name, end)} never, which {np.count_nonzero(found)} of "
+                f"{signal.name} never {'falls below' if lowest else 'exceeds'} "
+                f"{show(signal.name, end)}, which {np.count_nonzero(found)} of "
                 f"{len(signal)} samples read: it is cut off there, or the motor is at its limit, "
                 "and those rows are left out"
             )
