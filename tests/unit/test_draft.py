@@ -221,3 +221,15 @@ def test_decimal_commas_in_a_sparse_table(tmp_path):
     found = draft(path)
     assert found.text.decimal == ","
     assert {c.quantity for c in found.known} == {"vehicle_speed", "engine_speed"}
+
+
+@pytest.mark.parametrize("name", ["event_time", "ts_ecu", "EventTs", "x"])
+def test_a_time_of_another_name_is_found(tmp_path, name):
+    path = tmp_path / "trip.parquet"
+    stamps = 1_741_000_000_000 + 200 * np.arange(100)
+    columns = {"speed_kmh": np.arange(100.0), name: stamps, "count": np.arange(100) % 7}
+    pl.DataFrame(columns).write_parquet(path)
+    found = draft(path)
+    assert (found.time, found.time_unit) == (name, "ms")
+    assert found.rate == pytest.approx(5.0)
+    assert any("rises as one" in d for d in found.doubts)

@@ -17,7 +17,14 @@ import polars as pl
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import dimension_of, suffixes_of, unit_suffix
-from weighbridge.io.naming import Named, is_time, recognise_all, unit_of
+from weighbridge.io.naming import (
+    TIME_WORDS,
+    Named,
+    is_time,
+    recognise_all,
+    unit_of,
+    words_of,
+)
 from weighbridge.io.table import (
     SEPARATORS,
     RawTable,
@@ -27,6 +34,7 @@ from weighbridge.io.table import (
     head,
     read_parquet,
     read_text,
+    since_1970,
     time_seconds,
 )
 from weighbridge.signals import QUANTITIES, Floats
@@ -259,6 +267,7 @@ def _find_time(raw: RawTable) -> _Time:
         k for k in range(len(raw.names)) if raw.column(k).dtype.is_temporal() and k not in places
     ]
     found = [t for k in places if (t := _as_time(raw, k)) is not None]
+    found = found or [t for k in range(len(raw.names)) if (t := _likely_time(raw, k)) is not None]
     if not found:
         raise DriveError(
             f"{raw.path} has no column that can be its time; it has {column_list(raw.names)}: name "
@@ -270,6 +279,19 @@ def _find_time(raw: RawTable) -> _Time:
     if others:
         best.doubts.append(f"{best.column!r} is taken for the time, not {column_list(others)}")
     return best
+
+
+def _likely_time(raw: RawTable, index: int) -> _Time | None:
+    """Read a column that rises as a time where part of its name, or its size, says so."""
+    named = bool(TIME_WORDS & set(words_of(raw.names[index])))
+    found = _as_time(raw, index)
+    if found is None or not (named or since_1970(found.seconds)):
+        return None
+    steps = np.diff(found.seconds[np.isfinite(found.seconds)])
+    if np.mean(steps >= 0.0) < EVEN:
+        return None
+    found.doubts.append(f"{found.column!r} is taken for the time, for it rises as one")
+    return found
 
 
 def _resolution(seconds: Floats) -> float:

@@ -205,6 +205,25 @@ TIME_PHRASES: Final = frozenset(
 )  # fmt: skip
 """What loggers call their time, likewise."""
 
+TIME_WORDS: Final = frozenset(
+    [
+        "time",
+        "timestamp",
+        "datetime",
+        "date",
+        "zeit",
+        "zeitstempel",
+        "temps",
+        "tiempo",
+        "hora",
+        "ts",
+        "epoch",
+        "stamp",
+        "utc",
+    ]
+)
+"""Words that make a name likely to be that of a time."""
+
 _NOISE: Final = frozenset(
     ("obd", "ii", "obd2", "obdii", "pid", "sensor", "value", "avg", "raw", "data", "signal", "bank", "of", "the", "in",
      "can", "ecu", "location", "txt", "wgs", "der", "des", "du", "de", "la", "le", "el", "del", "della", "di", "do", "da", "from", "as")
