@@ -6,10 +6,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import weighbridge as wb
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
+from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation.simulate import SimulatedDrive
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def short_drive() -> SimulatedDrive:
+    """Return a short drive of a petrol car with 120 kg on board."""
+    return simulate_car(make_scenario("car-short", payload=120.0, seed=61))
+
+
+@pytest.fixture(scope="session")
+def short_car(short_drive) -> wb.Vehicle:
+    """Return the car as the short drive calibrates it."""
+    return wb.calibrate([short_drive.drive], mass=float(short_drive.truth.mass[0]))
 
 
 @pytest.fixture(scope="session")

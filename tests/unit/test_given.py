@@ -8,24 +8,13 @@ import weighbridge as wb
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import to_frames, write_drive
 from weighbridge.signals import Drive, Problem, Signal
-from weighbridge.simulation import make_scenario, simulate_car
 
 
 @pytest.fixture(scope="module")
-def made():
-    return simulate_car(make_scenario("car-short", payload=120.0, seed=61))
-
-
-@pytest.fixture(scope="module")
-def car(made):
-    return wb.calibrate([made.drive], mass=float(made.truth.mass[0]))
-
-
-@pytest.fixture(scope="module")
-def saved(made, car, tmp_path_factory):
+def saved(short_drive, short_car, tmp_path_factory):
     folder = tmp_path_factory.mktemp("given")
-    write_drive(made.drive, folder / "drive", "parquet")
-    car.save(folder / "car.toml")
+    write_drive(short_drive.drive, folder / "drive", "parquet")
+    short_car.save(folder / "car.toml")
     return folder
 
 
@@ -35,21 +24,24 @@ def test_paths_are_read(saved, of_paths):
     by_hand = wb.weigh(wb.read_drive(drive), wb.Vehicle.load(vehicle))
     assert wb.weigh(drive, vehicle).mass == by_hand.mass
     assert wb.inspect_drive(drive, vehicle).drive.name == "drive"
-    again = wb.calibrate(drive, mass=1700.0)
-    assert again == wb.calibrate([wb.read_drive(drive)], mass=1700.0)
+
+
+def test_a_path_is_calibrated_on(saved):
+    path = saved / "drive"
+    assert wb.calibrate(str(path), mass=1700.0) == wb.calibrate([wb.read_drive(path)], mass=1700.0)
 
 
 @pytest.mark.parametrize("library", ["pandas", "polars"])
-def test_data_frames_go_out_and_come_back(made, car, library):
-    frames = to_frames(made.drive)
+def test_data_frames_go_out_and_come_back(short_drive, short_car, library):
+    frames = to_frames(short_drive.drive)
     if library == "pandas":
         frames = {table: frame.to_pandas() for table, frame in frames.items()}
     back = wb.read_frame(frames, name="back")
-    assert list(back.signals) == list(made.drive.signals)
-    for name, signal in made.drive.signals.items():
+    assert list(back.signals) == list(short_drive.drive.signals)
+    for name, signal in short_drive.drive.signals.items():
         np.testing.assert_array_equal(back.signals[name].time, signal.time)
         np.testing.assert_allclose(back.signals[name].values, signal.values, rtol=1e-12)
-    assert wb.weigh(frames, car).mass == wb.weigh(back, car).mass
+    assert wb.weigh(frames, short_car).mass == wb.weigh(back, short_car).mass
 
 
 def test_an_index_is_a_column_and_dates_are_the_time():
@@ -118,24 +110,24 @@ def test_frames_that_are_no_drive_are_one_sentence(given, error, words):
 
 
 @pytest.mark.parametrize("wrong", [3, None, np.zeros(3), {"a": 1}, b"drive"])
-def test_what_is_neither_is_named(made, car, wrong):
+def test_what_is_neither_is_named(short_drive, short_car, wrong):
     with pytest.raises(ConfigError, match="a drive is expected, got"):
-        wb.weigh(wrong, car)
+        wb.weigh(wrong, short_car)
     with pytest.raises(ConfigError, match="a vehicle is expected, got"):
-        wb.weigh(made.drive, wrong)
+        wb.weigh(short_drive.drive, wrong)
     with pytest.raises(ConfigError, match="a drive is expected, got"):
-        wb.calibrate([made.drive, wrong], mass=1700.0)
+        wb.calibrate([short_drive.drive, wrong], mass=1700.0)
 
 
-def test_drives_and_weighings_are_three_lines(made, car):
-    weighing = wb.weigh(made.drive, car)
-    for shown in (made.drive, weighing):
+def test_drives_and_weighings_are_three_lines(short_drive, short_car):
+    weighing = wb.weigh(short_drive.drive, short_car)
+    for shown in (short_drive.drive, weighing):
         lines = repr(shown).splitlines()
         assert len(lines) == 3
         assert max(map(len, lines)) <= 102
         assert shown._repr_html_().startswith("<div><strong>")
     assert f"{weighing.mass:.0f} kg" in repr(weighing)
-    assert "engine_load" in made.drive._repr_html_()
+    assert "engine_load" in short_drive.drive._repr_html_()
 
 
 def test_names_and_problems_cannot_act_on_terminal_or_page():

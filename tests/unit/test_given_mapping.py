@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import weighbridge as wb
 from weighbridge.io import to_frames
-from weighbridge.simulation import make_scenario, simulate_car
 
 
-def test_a_path_is_read_with_the_mapping_that_the_vehicle_file_names(tmp_path):
-    made = simulate_car(make_scenario("car-short", payload=120.0, seed=61))
-    car = wb.calibrate([made.drive], mass=float(made.truth.mass[0]))
-    frames = to_frames(made.drive)
+def test_a_path_is_read_with_the_mapping_that_the_vehicle_file_names(
+    tmp_path, short_drive, short_car
+):
+    frames = to_frames(short_drive.drive)
     own = frames["obd"].rename({"vehicle_speed_kmh": "Tacho"})
     folder = tmp_path / "own"
     folder.mkdir()
@@ -24,8 +23,8 @@ def test_a_path_is_read_with_the_mapping_that_the_vehicle_file_names(tmp_path):
         name, _, unit = column.rpartition("_")
         lines.append(f'{name} = {{ column = "{column}", unit = "{unit}" }}')
     (tmp_path / "map.toml").write_text("\n".join(lines))
-    replace(car, mapping="map.toml").save(tmp_path / "car.toml")
-    by_hand = wb.weigh(wb.read_drive(folder, tmp_path / "map.toml"), car)
+    replace(short_car, mapping="map.toml").save(tmp_path / "car.toml")
+    by_hand = wb.weigh(wb.read_drive(folder, tmp_path / "map.toml"), short_car)
     weighed = wb.weigh(folder, tmp_path / "car.toml")
     assert weighed.mass == by_hand.mass
     assert wb.inspect_drive(folder, tmp_path / "car.toml").drive.has("vehicle_speed")
