@@ -12,8 +12,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.calibration.run import run_calibration
+from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.papers.jensen2022 import without_weather
-from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.simulation import (
     Polling,

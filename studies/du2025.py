@@ -15,12 +15,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 import weighbridge as wb
+from weighbridge.calibration.run import run_calibration
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.robust_rls import RobustRlsSettings
 from weighbridge.estimators.robust_rls import estimate as robust_rls
 from weighbridge.papers import du2025 as paper
 from weighbridge.papers.jensen2022 import without_weather
-from weighbridge.pipeline.calibrating import run_calibration
 from weighbridge.simulation import make_scenario, simulate_car
 
 HERE = Path(__file__).parent

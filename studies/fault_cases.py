@@ -17,10 +17,10 @@ import numpy as np
 from fault_kinds import FAULTS, USUAL, Fault
 from fault_subjects import METHODS, Subject, weigh_by_all, without_numbers
 
+from weighbridge.calibration.run import calibrate
 from weighbridge.errors import WeighbridgeError
 from weighbridge.io import read_drive
 from weighbridge.io.write import write_drive
-from weighbridge.pipeline.calibrating import calibrate
 from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle

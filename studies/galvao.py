@@ -20,10 +20,10 @@ import matplotlib.pyplot as plt
 
 import weighbridge as wb
 from weighbridge.balance.speed_balance import speed_balance, window_means
+from weighbridge.calibration.speed import calibrate_by_speed, speed_rows
 from weighbridge.calibration.speed_fit import SpeedRows
 from weighbridge.estimators.speed_ekf import SpeedEkfSettings, mean_mass, run_filter, start_share
 from weighbridge.papers import galvao as paper
-from weighbridge.pipeline.speed_calibrating import calibrate_by_speed, speed_rows
 from weighbridge.report.table import Table
 from weighbridge.simulation import Route, jensen_route, mixed_route, random_car, simulate_car
 from weighbridge.vehicle.model import Vehicle

@@ -18,8 +18,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import navigation as recorded
 
+from weighbridge.calibration.run import run_calibration
+from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.papers import jensen2022 as paper
-from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.simulation import MIDSIZE, make_scenario, random_car, simulate_car
 
@@ -80,7 +81,7 @@ def targets_table(done: paper.Reproduction, straight: paper.Reproduction) -> str
         ("95 % intervals that hold the truth, wind unknown", "",
          f"{sum(d.covered for d in done.drives)} of {count}"),
         ("gear ratios", "≤ 1 %", f"worst {100 * np.max(np.abs(done.ratio_errors)):.2f} %"),
-        ("torque fit R²", "≥ 0.95 (paper 0.972)", f"{done.calibration.fit.r_squared:.3f}"),
+        ("torque fit R²", "≥ 0.95 (paper 0.972)", f"{done.calibration.rows.r_squared:.3f}"),
         ("road grade RMS error, squat found and taken out", "≤ 0.35°",
          f"worst {degrees(largest('grade_rms'))}"),
         ("body pitch RMS error", "≤ 0.25°",
@@ -96,8 +97,10 @@ def targets_table(done: paper.Reproduction, straight: paper.Reproduction) -> str
 
 def parameters_table(done: paper.Reproduction) -> str:
     car = done.calibration.vehicle
-    road = done.calibration.fit.road
-    std = np.sqrt(np.diag(done.calibration.fit.cov))[-4:]
+    load, line = car.road_load, car.driveline
+    road = (load.drag_area, load.rolling_coefficient, line.engine_inertia, line.wheel_inertia)
+    std = (load.drag_area_std, load.rolling_coefficient_std, line.engine_inertia_std,
+           line.wheel_inertia_std)  # fmt: skip
     rows = (
         ("C_d A [m²]", 0, MIDSIZE.drag_area, "0.70"),
         ("C_r [-]", 1, MIDSIZE.rolling_coefficient, "0.008"),
@@ -106,7 +109,7 @@ def parameters_table(done: paper.Reproduction) -> str:
     )
     lines = ["| parameter | found | std | simulated car | paper's car |", "|---|---|---|---|---|"]
     for name, k, true, theirs in rows:
-        held = "bound" if std[k] == 0.0 else f"{std[k]:.2g}"
+        held = f"{std[k]:.2g}" if std[k] else "bound"
         lines.append(f"| {name} | {road[k]:.4g} | {held} | {true:.4g} | {theirs} |")
     gears = ", ".join(
         f"{found * 30 / math.pi:.1f} ({100 * error:+.2f} %)"

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from weighbridge.calibration.run import calibrate
+    from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError, DriveError, MissingExtraError, WeighbridgeError
     from weighbridge.estimators import Segment, Status
     from weighbridge.io import read_drive, read_drives, read_frame, to_frames
-    from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
     from weighbridge.pipeline.inertia import Inertia, estimate_inertia
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.pipeline.weighing import Weighing, compare, weigh
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
 
 _HOMES = {
-    "CalibrationSettings": "weighbridge.pipeline.calibrating",
+    "CalibrationSettings": "weighbridge.calibration.settings",
     "ConfigError": "weighbridge.errors",
     "Drive": "weighbridge.signals",
     "DriveError": "weighbridge.errors",
@@ -40,7 +41,7 @@ _HOMES = {
     "Vehicle": "weighbridge.vehicle.model",
     "Weighing": "weighbridge.pipeline.weighing",
     "WeighbridgeError": "weighbridge.errors",
-    "calibrate": "weighbridge.pipeline.calibrating",
+    "calibrate": "weighbridge.calibration.run",
     "compare": "weighbridge.pipeline.weighing",
     "estimate_inertia": "weighbridge.pipeline.inertia",
     "inspect_drive": "weighbridge.pipeline.inspection",

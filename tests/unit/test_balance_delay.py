@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge.balance.delay import FARTHEST, best_delay
-from weighbridge.pipeline.joint_calibrating import USUAL_DELAY, _timing
+from weighbridge.calibration.joint import USUAL_DELAY, find_timing
 
 
 def test_the_lowest_point_is_found_between_grid_points():
@@ -33,13 +33,13 @@ def test_delay_and_lag_are_found_far_off_too(delay, lag):
     def misfits(pairs):
         return np.array([(d + x - delay - lag) ** 2 + 0.5 * (x - lag) ** 2 for d, x in pairs])
 
-    found, found_lag, told = _timing(misfits)
+    found, found_lag, told, _ = find_timing(misfits)
     assert told
     assert found_lag == lag
     assert found == pytest.approx(delay, abs=0.01)
 
 
 def test_a_search_that_ends_at_its_end_says_so():
-    found, lag, told = _timing(lambda pairs: np.array([d + x for d, x in pairs]))
+    found, lag, told, _ = find_timing(lambda pairs: np.array([d + x for d, x in pairs]))
     assert not told
     assert found + lag < USUAL_DELAY

@@ -1,5 +1,6 @@
 """Calibration on simulated drives: what it finds, what it refuses."""
 
+import tomllib
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -7,14 +8,17 @@ import numpy as np
 import pytest
 from numba import config
 
-import weighbridge as wb
-from weighbridge import calibrate, weigh
+from weighbridge import CalibrationSettings, Vehicle, calibrate, weigh
+from weighbridge.balance import force_balance
+from weighbridge.calibration import joint as joint_fit
+from weighbridge.calibration.run import run_calibration, run_speed_calibration
+from weighbridge.cli.calibrate import speed_table, table
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.pipeline import joint_calibrating
-from weighbridge.pipeline.calibrating import CalibrationSettings
+from weighbridge.estimators.regression import regression
+from weighbridge.report.calibration_panels import calibration_facts
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
-from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, TorqueModel
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="a whole drive takes minutes without the compiler"
@@ -257,7 +261,7 @@ def test_joint_finds_a_load_in_unknown_wind(empty, loaded):
 
 
 def test_a_calibration_with_which_nothing_could_be_weighed_is_refused(empty, monkeypatch):
-    monkeypatch.setattr(joint_calibrating, "TRANSFER_STD", (0.3, 0.003))
+    monkeypatch.setattr(joint_fit, "TRANSFER_STD", (0.3, 0.003))
     with pytest.raises(DriveError, match="would leave 30 % in every mass"):
         calibrate(empty.drive)
 
@@ -290,26 +294,101 @@ def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monke
         mass = 6800.0 + 1.3 * 6800.0 * (scale - 1.0) - jump
         return SimpleNamespace(mass=mass, bound_std=30.0, sensitivity=np.zeros(1))
 
-    monkeypatch.setattr(joint_calibrating.joint, "estimate", estimate)
+    monkeypatch.setattr(joint_fit.joint, "estimate", estimate)
     burnt = SimpleNamespace(merged=SimpleNamespace(fuel_burnt=np.zeros(2)))
     problem = SimpleNamespace(masses=[8400.0])
-    scaled = joint_calibrating._self_weighed(base, problem, lambda car: [burnt], None)
+    monkeypatch.setattr(joint_fit, "rebalanced", lambda problem, car: [burnt])
+    scaled = joint_fit.self_weighed(problem, base, None)
     assert estimate(None, scaled, False).mass == pytest.approx(8400.0, rel=1e-3)
     assert scaled.provenance.mass_scale_std < 0.015
 
     def stuck(_, car, load_changes):
         return SimpleNamespace(mass=6800.0, bound_std=30.0, sensitivity=np.zeros(1))
 
-    monkeypatch.setattr(joint_calibrating.joint, "estimate", stuck)
-    lost = joint_calibrating._self_weighed(base, problem, lambda car: [burnt], None)
+    monkeypatch.setattr(joint_fit.joint, "estimate", stuck)
+    lost = joint_fit.self_weighed(problem, base, None)
     # What the scale cannot mend is in the interval.
     assert lost.provenance.mass_scale_std > 0.15
 
 
 def test_a_saved_file_weighs_as_the_fit_does(car, loaded, tmp_path):
     car.save(tmp_path / "car.toml")
-    told = wb.Vehicle.load(tmp_path / "car.toml")
+    told = Vehicle.load(tmp_path / "car.toml")
     assert told.torque.coefficients != car.torque.coefficients
-    exact, rounded = (wb.weigh(loaded.drive, c) for c in (car, told))
+    exact, rounded = (weigh(loaded.drive, c) for c in (car, told))
     assert abs(rounded.mass - exact.mass) < 0.1 * exact.std
     assert rounded.std == pytest.approx(exact.std, rel=0.01)
+
+
+def cells(shown):
+    return list(zip(*(column._cells for column in shown.columns), strict=True))
+
+
+FILE_KEYS = {
+    "drag area C_d A (m²)": ("road_load", "drag_area_m2", "drag_area_std_m2"),
+    "rolling coefficient C_r": ("road_load", "rolling_coefficient", "rolling_coefficient_std"),
+    "engine inertia (kg m²)": ("driveline", "engine_inertia_kgm2", "engine_inertia_std_kgm2"),
+    "wheel inertia (kg m²)": ("driveline", "wheel_inertia_kgm2", "wheel_inertia_std_kgm2"),
+    "torque delay (s)": ("timing", "torque_delay_s", "torque_delay_std_s"),
+    "torque noise (N m)": ("torque", "noise_nm", None),
+    "torque fit R²": ("provenance", "r_squared", None),
+    "torque fit residual (N m)": ("provenance", "residual_std_nm", None),
+    "samples": ("provenance", "samples", None),
+}
+
+
+@pytest.mark.parametrize("method", ["joint", "rls"])
+def test_report_terminal_and_file_tell_the_same(empty, tmp_path, method):
+    done = run_calibration(empty.drive, settings=CalibrationSettings(method=method))
+    done.vehicle.save(tmp_path / "car.toml")
+    saved = tomllib.loads((tmp_path / "car.toml").read_text(encoding="utf-8"))
+    report = dict(calibration_facts(done))
+    shown = {name: (value, std) for name, value, std in cells(table(done))}
+    told = {**{k: v for k, v in saved["torque"].items() if k == "coefficients"}}
+    for name, (section, key, std_key) in FILE_KEYS.items():
+        value, std = shown[name]
+        last_digit = 10.0 ** -len(value.partition(".")[2])
+        assert float(value) == pytest.approx(saved[section][key], abs=0.51 * last_digit), name
+        if std[:1].isdigit():
+            stated = saved[section][std_key]
+            assert float(std) == pytest.approx(stated, abs=0.51 * last_digit), name
+        else:
+            assert not saved[section].get(std_key), name
+        assert report[name].startswith(value)
+        assert std in report[name]
+    for k, w in enumerate(told["coefficients"]):
+        value, std = shown[f"torque w{k}"]
+        assert float(value) == pytest.approx(w, rel=1e-4)
+        assert report[f"torque w{k}"] == f"{value} ± {std}"
+    scale = 100.0 * saved["provenance"]["mass_scale_std"]
+    assert float(shown["left in every mass (%)"][0]) == pytest.approx(scale, abs=0.0051)
+
+
+@pytest.mark.parametrize("method", ["joint", "rls"])
+def test_the_rows_shown_are_those_of_the_vehicle_saved(empty, tmp_path, method):
+    done = run_calibration(empty.drive, settings=CalibrationSettings(method=method))
+    done.vehicle.save(tmp_path / "car.toml")
+    balance = force_balance(
+        empty.drive, Vehicle.load(tmp_path / "car.toml"), done.balances[0].motion
+    )
+    view = balance.merged
+    index = np.searchsorted(view.time - view.time[0], done.rows.time - 1e-6)
+    np.testing.assert_allclose(done.rows.source_torque, balance.merged.torque[index], rtol=1e-6)
+    phi, rest = regression(view, Vehicle.load(tmp_path / "car.toml"))
+    mass = empty.drive.info.mass - view.fuel_burnt
+    taken = (mass * phi + view.traction_force - rest) / view.gearing
+    np.testing.assert_allclose(done.rows.motion_torque, taken[index], rtol=1e-5, atol=0.01)
+    residual = taken[index] - balance.merged.torque[index]
+    std = 1.4826 * np.median(np.abs(residual))
+    assert done.vehicle.provenance.residual_std == pytest.approx(std, rel=1e-3)
+
+
+def test_terminal_and_file_tell_the_same_speed_model(empty, tmp_path):
+    done = run_speed_calibration(empty.drive)
+    done.vehicle.save(tmp_path / "car.toml")
+    saved = tomllib.loads((tmp_path / "car.toml").read_text(encoding="utf-8"))["speed_model"]
+    shown = dict(cells(speed_table(done)))
+    for k, p in enumerate(saved["corrections"], 1):
+        assert float(shown[f"correction p{k}"]) == pytest.approx(p, rel=1e-4)
+    assert float(shown["R² of the change of speed"]) == pytest.approx(saved["r_squared"], abs=6e-4)
+    assert shown["steps of 7 s"] == str(saved["samples"])

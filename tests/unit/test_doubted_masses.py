@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from weighbridge.calibration.doubted_masses import contradicting, unbacked_scale, with_doubts
 from weighbridge.errors import DriveError
-from weighbridge.pipeline.doubted_masses import contradicting, unbacked_scale, with_doubts
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 
 NAMES, MASSES = ("a", "b", "c"), (1600.0, 1800.0, 2000.0)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from weighbridge.calibration.known_mass import check_mass, scale_doubt
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.pipeline.known_mass import check_mass, scale_doubt
 from weighbridge.signals import Drive
 from weighbridge.signals.drive import DriveInfo
 from weighbridge.vehicle.model import TorqueModel, Vehicle

@@ -13,7 +13,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from weighbridge.balance import ForceBalance, MergedView, Reason
-from weighbridge.calibration.regression import build_rows, fit
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import MassTrack, Segment, Status
 from weighbridge.navigation.motion import Motion
@@ -23,11 +22,10 @@ from weighbridge.report.page import Page
 from weighbridge.report.style import REASON_STYLE, Panel, blank
 from weighbridge.report.table import Table
 from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
-from weighbridge.results.calibration import Calibration
+from weighbridge.results.calibration import Calibration, DelaySearch, FittedRows
 from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.gear import detect_gearings
-from weighbridge.vehicle.model import Driveline, RoadLoad, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 
 MASS = 1500.0
 GEARINGS = (40.0, 25.0, 16.0)
@@ -160,25 +158,39 @@ def make_calibration(weighing):
     balance = weighing.result.balance
     view = balance.merged
     rng = np.random.default_rng(4)
-    # 210 Nm at full load, less friction that grows with speed.
-    torque = balance.merged.torque + rng.normal(scale=2.0, size=view.time.size)
-    load = (torque + 10.0 + 0.02 * balance.merged.engine_speed) / 210.0
-    rows = build_rows(
-        view,
-        load,
-        balance.merged.engine_speed,
-        mass=MASS,
-        wheel_radius=VEHICLE.driveline.wheel_radius,
-        order=1,
-        curved=False,
-        rows=view.usable,
+    torque = balance.merged.torque[view.usable]
+    turning = balance.merged.engine_speed[view.usable]
+    rows = FittedRows(
+        time=view.time[view.usable],
+        drive=np.zeros(torque.size, dtype=np.int64),
+        # 210 Nm at full load, less friction that grows with speed.
+        reading=(torque + 10.0 + 0.02 * turning) / 210.0,
+        engine_speed=turning,
+        source_torque=torque,
+        motion_torque=torque + rng.normal(scale=2.0, size=torque.size),
+    )
+    vehicle = replace(
+        VEHICLE,
+        torque=TorqueModel(
+            source="load",
+            coefficients=(-10.0, 210.0, -0.02),
+            coefficient_stds=(0.5, 1.0, 0.001),
+        ),
+        provenance=Provenance(
+            drives=("known drive",),
+            masses=(MASS,),
+            r_squared=rows.r_squared,
+            residual_std=rows.residual_std,
+            samples=torque.size,
+        ),
     )
     return Calibration(
-        vehicle=VEHICLE,
+        vehicle=vehicle,
         gears=detect_gearings(view.time, balance.merged.engine_speed, view.speed, idle_speed=0.0),
         balances=(balance,),
-        fit=fit(rows, *VEHICLE_CLASSES["car"].road_bounds),
         rows=rows,
+        search=DelaySearch(delay=np.array([0.0, 0.1, 0.2]), misfit=np.array([9.0, 0.0, 4.0])),
+        held=(),
     )
 
 
@@ -358,7 +370,7 @@ def test_every_figure_has_title_units_and_caption(tmp_path):
     weighing = make_weighing()
     html = written(tmp_path, [weighing], calibration=make_calibration(weighing))
     drawn = figures(html)
-    assert len(titles(html)) == len(drawn) == 16
+    assert len(titles(html)) == len(drawn) == 17
     assert len(re.findall(r"<figcaption>[^<]+\.</figcaption>", html)) == len(drawn)
     for figure in drawn.values():
         axes = [v for k, v in figure["layout"].items() if re.fullmatch(r"[xy]axis\d?", k)]
@@ -377,25 +389,16 @@ def test_calibration_shows_the_gears_found(tmp_path):
     marks = sorted(shape["x0"] for shape in histogram["shapes"])
     assert_allclose(marks, sorted(GEARINGS), rtol=1e-3)
     r_squared = re.search(r"R² = (0\.\d+)", html).group(1)
-    assert float(r_squared) == pytest.approx(calibration.fit.r_squared, abs=5e-4)
+    assert float(r_squared) == pytest.approx(calibration.rows.r_squared, abs=5e-4)
 
 
 def test_calibration_without_gears_or_engine_speed_leaves_sentences(tmp_path):
     calibration = make_calibration(make_weighing())
-    view = calibration.balances[0].merged
-    rows = build_rows(
-        view,
-        view.torque,
-        view.engine_speed,
-        mass=MASS,
-        wheel_radius=VEHICLE.driveline.wheel_radius,
-        order=0,
-        curved=False,
-        rows=view.usable,
+    car = replace(
+        calibration.vehicle,
+        torque=TorqueModel(coefficients=(0.0, 1.0), coefficient_stds=(1.0, 0.1)),
     )
-    calibration = replace(
-        calibration, gears=None, rows=rows, fit=fit(rows, *VEHICLE_CLASSES["car"].road_bounds)
-    )
+    calibration = replace(calibration, gears=None, vehicle=car)
     page = Elements(written(tmp_path, [], calibration=calibration))
     assert "No distribution of gear ratios: they were given" in page.text
     assert "No torque over engine speed" in page.text

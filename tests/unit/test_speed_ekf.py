@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 import weighbridge as wb
 from weighbridge.balance import Reason
 from weighbridge.balance.speed_balance import running, speed_balance, window_means
+from weighbridge.calibration.speed import nominal_of
 from weighbridge.calibration.speed_fit import Nominal, SpeedRows, fit_speed_model, model_speed
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.speed_ekf import (
@@ -20,7 +21,6 @@ from weighbridge.estimators.speed_ekf import (
     start_share,
 )
 from weighbridge.navigation.speed import speed_motion
-from weighbridge.pipeline.speed_calibrating import nominal_of
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Driveline, Provenance, SpeedModel, Vehicle
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from weighbridge import CalibrationSettings, calibrate
 from weighbridge.checks import check_drive
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.errors import DriveError
-from weighbridge.pipeline.calibrating import CalibrationSettings, calibrate
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES

@@ -163,7 +163,8 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
     parameters = np.zeros(width)
     for _ in range(iterations):
         root = np.sqrt(weight)
-        _, r = np.linalg.qr(np.column_stack([design, rows.target]) * root[:, None])
+        weighted = np.column_stack([design, rows.target]) * root[:, None]
+        r = np.asarray(np.linalg.qr(weighted, mode="r"))
         solved = lsq_linear(r[:, :width], r[:, width], bounds=(lower, upper), method="bvls").x
         residual = rows.target - design @ solved
         noise = 1.4826 * float(np.median(np.abs(residual)))

@@ -20,7 +20,7 @@ from weighbridge.cli.terminal import shown as _shown
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from weighbridge.pipeline.speed_calibrating import SpeedCalibration
+    from weighbridge.calibration.speed import SpeedCalibration
     from weighbridge.results.calibration import Calibration
 
 
@@ -73,12 +73,9 @@ def calibrate(
     """
     from dataclasses import replace
 
+    from weighbridge.calibration.run import run_calibration, run_speed_calibration
+    from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError
-    from weighbridge.pipeline.calibrating import (
-        CalibrationSettings,
-        run_calibration,
-        run_speed_calibration,
-    )
     from weighbridge.pipeline.given import mapping_of
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -157,61 +154,16 @@ def speed_table(done: SpeedCalibration) -> Table:
 
 
 def table(done: Calibration) -> Table:
-    """Show what was found, with its standard deviation."""
+    """Show what was found, with its standard deviation: the numbers of the vehicle file."""
     from rich.table import Table
 
-    from weighbridge.signals.units import scalar_from_si
-
-    vehicle, p = done.vehicle, done.vehicle.provenance
+    vehicle = done.vehicle
     shown = Table(title=f"calibration of {_shown(vehicle.name)}", title_justify="left")
     shown.add_column("parameter")
     shown.add_column("value", justify="right")
     shown.add_column("std", justify="right")
-
-    shown.add_row("known mass (kg)", ", ".join(f"{kg:.0f}" for kg in p.masses), "")
-
-    def row(name: str, value: float | None, std: float | None, digits: int) -> None:
-        if value is not None:
-            shown.add_row(
-                name,
-                f"{value:.{digits}f}",
-                "" if std is None or std == 0.0 else f"{std:.{digits}f}",
-            )
-
-    gearings = vehicle.driveline.gearings
-    stds = vehicle.driveline.gearing_stds or (None,) * len(gearings)
-    for k, (gearing, std) in enumerate(zip(gearings, stds, strict=True), 1):
-        row(f"gearing {k} (rad/m)", gearing, std, 3)
-    road, line = vehicle.road_load, vehicle.driveline
-    row("drag area C_d A (m²)", road.drag_area, road.drag_area_std, 3)
-    row("rolling coefficient C_r", road.rolling_coefficient, road.rolling_coefficient_std, 4)
-    row("engine inertia (kg m²)", line.engine_inertia, line.engine_inertia_std, 3)
-    row("wheel inertia (kg m²)", line.wheel_inertia, line.wheel_inertia_std, 2)
-    torque = vehicle.torque
-    for k, (w, std) in enumerate(zip(torque.coefficients, torque.coefficient_stds, strict=True)):
-        shown.add_row(f"torque w{k}", f"{w:.5g}", f"{std:.2g}")
-    names = ("torque of load times engine speed", "torque of load squared")
-    for name, w, std in zip(names, torque.curvature, torque.curvature_stds, strict=False):
-        shown.add_row(name, f"{w:.5g}", f"{std:.2g}")
-    row(
-        "torque delay (s)",
-        vehicle.timing.torque_delay,
-        vehicle.timing.torque_delay_std,
-        3,
-    )
-    row("speed scale, indicated / true", line.speed_scale, None, 4)
-    if vehicle.mounting is not None and vehicle.mounting.squat is not None:
-        row(
-            "squat (° per m/s²)",
-            scalar_from_si(vehicle.mounting.squat, "deg"),
-            scalar_from_si(vehicle.mounting.squat_std or 0.0, "deg"),
-            3,
-        )
-    row("torque fit R²", p.r_squared, None, 4)
-    row("torque fit residual (N m)", p.residual_std, None, 1)
-    shown.add_row("samples", str(p.samples), "")
-    if p.mass_scale_std is not None:
-        row("left in every mass (%)", 100.0 * p.mass_scale_std, None, 2)
-    if p.notes:
-        shown.caption = _shown(p.notes)
+    for figure in done.figures:
+        shown.add_row(figure.name, figure.value, figure.std)
+    if vehicle.provenance.notes:
+        shown.caption = _shown(vehicle.provenance.notes)
     return shown

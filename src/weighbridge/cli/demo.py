@@ -33,7 +33,7 @@ def demo(
     """
     from dataclasses import replace
 
-    from weighbridge.pipeline.calibrating import run_calibration
+    from weighbridge.calibration.run import run_calibration
     from weighbridge.pipeline.weighing import weigh
     from weighbridge.report import write_report
     from weighbridge.simulation import make_scenario, simulate_car

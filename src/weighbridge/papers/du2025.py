@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance
+from weighbridge.calibration.run import run_calibration
 from weighbridge.estimators import MassTrack, ekf, hybrid, robust_rls
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
-from weighbridge.pipeline.calibrating import run_calibration
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, Panel, blank, line
 from weighbridge.report.table import Table

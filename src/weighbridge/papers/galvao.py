@@ -15,6 +15,12 @@ from scipy.stats import spearmanr
 
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.speed_balance import speed_balance
+from weighbridge.calibration.speed import (
+    SAMPLE_TIME,
+    SpeedCalibration,
+    calibrate_by_speed,
+    speed_rows,
+)
 from weighbridge.calibration.speed_fit import Nominal, SpeedRows, model_speed
 from weighbridge.estimators.speed_ekf import (
     PRINTED,
@@ -24,12 +30,6 @@ from weighbridge.estimators.speed_ekf import (
     run_filter,
 )
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
-from weighbridge.pipeline.speed_calibrating import (
-    SAMPLE_TIME,
-    SpeedCalibration,
-    calibrate_by_speed,
-    speed_rows,
-)
 from weighbridge.report.study import write_study
 from weighbridge.report.style import (
     BAND,

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from weighbridge.calibration.run import run_calibration
+from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.estimators.rls import estimate
 from weighbridge.navigation.select import find_motion
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
-from weighbridge.pipeline.calibrating import CalibrationSettings, run_calibration
 from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.report.table import Table
 from weighbridge.results.calibration import Calibration
@@ -411,7 +412,7 @@ def _comparisons(done: Reproduction) -> tuple[Comparison, ...]:
     grade = max(d.grade_rms for d in done.drives)
     pitch = max(d.pitch_std for d in done.drives)
     ratio = float(max(abs(done.ratio_errors)))
-    r_squared = done.calibration.fit.r_squared
+    r_squared = done.calibration.rows.r_squared
     inside, informed = within(done.drives), within(done.informed)
     total = len(done.drives)
     covered = sum(d.covered for d in done.drives)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from weighbridge.balance import Reason
-from weighbridge.balance.law import ROAD_PARAMETERS
 from weighbridge.report.style import BLUE, GREY, ORANGE, VERMILLION, Panel, blank, dots, line
 from weighbridge.report.thinning import single, spread, thin_line
 from weighbridge.signals import Floats
@@ -29,6 +28,7 @@ def calibration_panels(calibration: Calibration) -> list[Panel]:
         *torque_panels(calibration),
         agreement_panel(calibration),
         sequence_panel(calibration),
+        delay_panel(calibration),
     ]
 
 
@@ -120,10 +120,11 @@ def gear_panel(calibration: Calibration) -> Panel:
 
 def torque_panels(calibration: Calibration) -> list[Panel]:
     """Measured and fitted torque over the source and over engine speed (fig. 8)."""
-    source, motion = _torques(calibration)
-    design = calibration.rows.design
-    read = calibration.vehicle.torque.of_source
-    regressor = design[:, 1]
+    rows = calibration.rows
+    source, motion = rows.source_torque, rows.motion_torque
+    model = calibration.vehicle.torque
+    read = model.of_source
+    regressor = rows.reading
     if read.axis_suffix:
         regressor = from_si(regressor, read.axis_suffix)
     panels = [
@@ -135,8 +136,8 @@ def torque_panels(calibration: Calibration) -> list[Panel]:
             "The fit should follow the torque over its source",
         )
     ]
-    if calibration.fit.coefficients.size > 2:
-        rpm = from_si(design[:, 2], "rpm")
+    if len(model.coefficients) > 2 or model.curvature or model.knots:
+        rpm = from_si(rows.engine_speed, "rpm")
         panels.append(
             _both(
                 rpm,
@@ -158,16 +159,16 @@ def torque_panels(calibration: Calibration) -> list[Panel]:
 
 def agreement_panel(calibration: Calibration) -> Panel:
     """Torque of the source against torque of the motion."""
-    source, motion = _torques(calibration)
+    rows = calibration.rows
+    source, motion = rows.source_torque, rows.motion_torque
     index = spread(np.ones(source.size, dtype=bool))
     figure = blank("Torque from the motion [N m]", "Torque from the source [N m]")
     dots(figure, single(motion[index]), single(source[index]), "samples", BLUE)
     low, high = np.percentile(motion, [0.1, 99.9])
     line(figure, [low, high], [low, high], "equal", VERMILLION)
-    fit = calibration.fit
     return Panel(
-        title=f"Torque from the source against torque from the motion: R² = {fit.r_squared:.3f}",
-        caption=f"Robust standard deviation of the difference: {fit.residual_std:.1f} N m over "
+        title=f"Torque from the source against torque from the motion: R² = {rows.r_squared:.3f}",
+        caption=f"Robust standard deviation of the difference: {rows.residual_std:.1f} N m over "
         f"{source.size} samples.",
         figure=figure,
     )
@@ -175,7 +176,7 @@ def agreement_panel(calibration: Calibration) -> Panel:
 
 def sequence_panel(calibration: Calibration) -> Panel:
     """Torque of the motion and of the source one after another (fig. 9)."""
-    source, motion = _torques(calibration)
+    source, motion = calibration.rows.source_torque, calibration.rows.motion_torque
     minutes = from_si(calibration.rows.time, "min")
     # A line across minutes without samples would show what nobody measured.
     pause = np.flatnonzero(np.diff(minutes) > 0.1) + 1
@@ -195,40 +196,35 @@ def sequence_panel(calibration: Calibration) -> Panel:
     )
 
 
-def calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
-    """Fitted parameters with their standard deviations, for a table."""
-    fit = calibration.fit
-    stds = np.sqrt(np.diag(calibration.fit.cov))
-    facts = [
-        ("torque source", calibration.vehicle.torque.of_source.name.replace("_", " ")),
-        ("drives", ", ".join(calibration.vehicle.provenance.drives)),
-        ("samples", f"{calibration.rows.target.size}"),
-        ("R² of the torque", f"{fit.r_squared:.3f}"),
-        ("torque noise", f"{fit.residual_std:.1f} N m"),
-        ("torque delay", f"{calibration.vehicle.timing.torque_delay or 0.0:+.2f} s"),
-    ]
-    names = {
-        "drag_area": ("C_d A", "m²", 3),
-        "rolling_coefficient": ("C_r", "", 4),
-        "engine_inertia": ("engine inertia", "kg m²", 3),
-        "wheel_inertia": ("wheel inertia", "kg m²", 2),
-    }
-    for key, value, std in zip(ROAD_PARAMETERS, fit.road, stds[-4:], strict=True):
-        name, unit, digits = names[key]
-        spread_text = "held by a bound" if key in fit.at_bound else f"± {std:.{digits}f}"
-        facts.append((name, f"{value:.{digits}f} {unit} ({spread_text})".replace("  ", " ")))
-    scale = calibration.vehicle.provenance.mass_scale_std
-    if scale is not None and np.isfinite(scale):
-        facts.append(
-            ("uncertainty left in every mass", f"± {100.0 * scale:.1f} % (one standard deviation)")
+def delay_panel(calibration: Calibration) -> Panel:
+    """Misfit over the delays that were tried."""
+    search = calibration.search
+    if search.delay.size < 2:
+        return Panel(
+            title="Misfit over the delay",
+            absent="no misfit over the delay: too few rows are usable at other delays.",
         )
+    figure = blank("Delay and lag of the torque [s]", "Misfit above the least [-]")
+    line(figure, search.delay.tolist(), search.misfit.tolist(), "misfit", BLUE)
+    return Panel(
+        title="The drives should fit best at one delay",
+        caption="Negative logarithm of the likelihood, that of the best delay taken off.",
+        figure=figure,
+    )
+
+
+def calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
+    """What was found, with standard deviations, for a table: the numbers of the vehicle file."""
+    vehicle = calibration.vehicle
+    facts = [
+        ("torque source", vehicle.torque.of_source.name.replace("_", " ")),
+        ("drives", ", ".join(vehicle.provenance.drives)),
+    ]
+    for figure in calibration.figures:
+        std = f" ± {figure.std}" if figure.std[:1].isdigit() else ""
+        said = f" ({figure.std})" if figure.std and not std else ""
+        facts.append((figure.name, figure.value + std + said))
     return facts
-
-
-def _torques(calibration: Calibration) -> tuple[Floats, Floats]:
-    """Torque of the source as fitted and torque that the motion needs [N m]."""
-    source = calibration.rows.design[:, :-4] @ calibration.fit.coefficients
-    return source, source + calibration.fit.residual
 
 
 def _both(x: Floats, label: str, source: Floats, motion: Floats, title: str) -> Panel:

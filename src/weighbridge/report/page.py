@@ -360,7 +360,7 @@ def _calibration(page: Page, calibration: Calibration, *, opened: bool) -> str:
     name = calibration.vehicle.name
     return (
         f"<details{' open' if opened else ''}><summary><h2>Calibration of {escape(name)}</h2>"
-        f'<span class="brief">R² {calibration.fit.r_squared:.3f}</span></summary>'
+        f'<span class="brief">R² {calibration.rows.r_squared:.3f}</span></summary>'
         f"{_list(calibration_facts(calibration))}"
         f"{page.place(calibration_panels(calibration))}</details>"
     )

@@ -1,0 +1,431 @@
+"""Torque model and road load by likelihood, as the joint estimator weighs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance.delay import FARTHEST as FARTHEST_DELAY
+from weighbridge.balance.delay import beyond, vertex
+from weighbridge.calibration.fitted import (
+    NOT_TOLD,
+    Fitted,
+    fitted_rows,
+    learnt_dragged,
+    noted,
+    ranges,
+    rebalanced,
+)
+from weighbridge.calibration.inverse import (
+    DriveRows,
+    FitSettings,
+    InverseFit,
+    TooShort,
+    fit,
+    fit_with_gusts,
+)
+from weighbridge.calibration.problem import Problem
+from weighbridge.calibration.recording import DelayedRows
+from weighbridge.calibration.rls import fit_rls, refuse_nonsense
+from weighbridge.errors import DriveError
+from weighbridge.estimators import joint
+from weighbridge.estimators.considered import pinned, triangle
+from weighbridge.estimators.joint_problem import UNMODELLED
+from weighbridge.results.calibration import DelaySearch
+from weighbridge.signals import Floats
+from weighbridge.vehicle.fits import JOINT
+from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Timing, Vehicle
+
+LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.45)
+"""Time constants of the reading's smoothing that are tried [s]. Longer ones pass for the
+smoothness of a polled speed: with up to 1.25 s, 2 Hz without an accelerometer went from 3 to
+13 % RMS."""
+
+DELAYS: Final = tuple(0.2 * k for k in range(-2, 7))
+"""Sums of delay and lag among which the search begins [s]; it goes on beyond an end that fits
+best."""
+
+USUAL_DELAY: Final = 0.3
+"""Sum of delay and lag where the drives do not show it [s]."""
+
+TIMING_WINDOW: Final = 1.2
+"""Windows of the search [s]: shorter than those of the fit, for delay shows in what is fast."""
+
+TRANSFER_STD: Final = (0.002, 0.003)
+"""What a joint calibration loses on other drives, relative [-]: always, and from each
+drive of the calibration anew. Simulated, sixteen vehicles, calibrated by one or three
+ordinary drives, six others weighed with each; sensors whose scale is 0.3 % off from drive
+to drive are most of it."""
+
+FARTHEST: Final = 5.0
+"""Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
+seen without an accelerometer, where hills and torque noise pass for drag."""
+
+USUAL_SLOPE: Final = 1.2
+"""Relative change of a mass per relative change of its torque [-]: what road loads take is not
+scaled."""
+
+SLOPES: Final = (0.8, 2.5)
+"""The same at least and at most [-]."""
+
+SCALES: Final = (0.5, 2.0)
+"""A torque that was fitted is scaled by so much at least and at most [-]."""
+
+SELF_CLOSE: Final = 5e-4
+"""The calibration's own drives are weighed so near to their masses, in the mean [-]."""
+
+SELF_ROUNDS: Final = 4
+
+ROUGH_NOISE: Final = 0.05
+"""Noise of the torque over the highest of the motion, until a fit has told it [-]."""
+
+
+def fit_joint(problem: Problem) -> Fitted:
+    """Fit torque, road load, delay and lag by likelihood, then scale by weighing the drives.
+
+    Where the drives are too short for it, or say of the road load what no vehicle has, the torque
+    of eq. 48 is scaled in its place.
+
+    Raises
+    ------
+    DriveError
+        The drives cannot be weighed, or torque does not rise with its source.
+    """
+    try:
+        fitted, cov = _likeliest(problem)
+    except TooShort as short:
+        return _as_it_is(problem, str(short))
+    except _NoRoadLoad as strange:
+        if problem.by_speed:
+            # The torque of eq. 48 is worse still: noise of the motion and hills draw it.
+            raise DriveError(
+                f"without an accelerometer {strange}: hills and braking pass for resistance; "
+                "calibrate with an inertial sensor or GNSS heights, on more or longer drives, or "
+                "with a brake switch"
+            ) from None
+        return _as_it_is(problem, str(strange))
+    return replace(fitted, vehicle=self_weighed(problem, fitted.vehicle, cov))
+
+
+class _NoRoadLoad(Exception):
+    """The fit makes a road load that no vehicle of the class has."""
+
+
+def _as_it_is(problem: Problem, why: str) -> Fitted:
+    """Fit by eq. 48, and scale the torque alone."""
+    fitted = fit_rls(problem)
+    made = replace(fitted.vehicle.provenance, method=JOINT.name)
+    vehicle = noted(replace(fitted.vehicle, provenance=made), f"scaled, not fitted anew: {why}")
+    return replace(fitted, vehicle=self_weighed(problem, vehicle, None))
+
+
+def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
+    """Fit all but the last scale; the second value is the covariance of the fit."""
+    middle = LAGS[len(LAGS) // 2]
+    rough = _rows(problem, USUAL_DELAY - middle, middle)
+    settings = _settings(problem, _rough_noise(problem, rough))
+    quick = replace(settings, window=TIMING_WINDOW, rounds=1)
+    quick = replace(quick, torque_noise=_noise(problem, rough, quick))
+    delay, lag, told, search = find_timing(_Misfits(problem, quick, middle))
+
+    timing = Timing(torque_delay=delay, torque_lag=lag)
+    problem = _with_dragged(problem, timing, settings.prior[0])
+    rows = _rows(problem, delay, lag)
+    turning = np.concatenate([part.engine_speed[part.usable] for part in rows])
+    noise = _noise(problem, rows, replace(settings, torque_noise=quick.torque_noise))
+    settings = replace(settings, torque_noise=noise, knots=problem.knots(turning))
+    found = fit_with_gusts(_drive_rows(problem, rows), settings)
+    refuse_nonsense(problem, *_driven_slope(problem, found, rows))
+    mean, std = settings.prior
+    if np.any(np.abs(found.road - mean)[:2] > FARTHEST * std[:2]):
+        raise _NoRoadLoad(
+            f"the drives make its drag area {found.road[0]:.1f} m^2 and its rolling coefficient "
+            f"{found.road[1]:.3f}, which no {problem.draft.kind} has"
+        )
+    vehicle = _with(problem.draft, found, settings)
+    speeds, loads = ranges(problem, rows)
+    vehicle = replace(
+        vehicle,
+        torque=replace(vehicle.torque, noise=noise, load_range=loads, speed_range=speeds),
+        timing=replace(timing, torque_delay_std=search.std),
+        provenance=Provenance(masses=tuple(problem.masses), method=JOINT.name),
+    )
+    if not told:
+        vehicle = noted(vehicle, NOT_TOLD)
+    held = ("drag_area",) if found.road[0] < 0.0 else ()
+    return Fitted(vehicle=vehicle, rows=rows, search=search, held=held), found.cov
+
+
+def _rows(problem: Problem, delay: float, lag: float) -> tuple[DelayedRows, ...]:
+    """Return the rows of whole balances at a delay and a lag [s]."""
+    return tuple(r.rows(delay, lag) for r in problem.recordings)
+
+
+def _drive_rows(problem: Problem, rows: Sequence[DelayedRows]) -> list[DriveRows]:
+    """See rows as the fit reads them."""
+    return [
+        DriveRows(
+            view=part.view,
+            regressor=recording.reading,
+            engine_speed=part.engine_speed,
+            usable=part.usable,
+            mass=recording.mass,
+            motion=recording.motion,
+        )
+        for recording, part in zip(problem.recordings, rows, strict=True)
+    ]
+
+
+def _settings(problem: Problem, noise: float) -> FitSettings:
+    """State what is fitted and what is known before, with a noise of the torque [N m]."""
+    return FitSettings(
+        source=problem.source,
+        order=problem.order,
+        curved=problem.curved,
+        knots=(),
+        bounds=problem.source.terms,
+        torque_noise=noise,
+        wheel_radius=problem.draft.driveline.wheel_radius,
+        prior=_prior(problem.draft, problem.base.driveline),
+    )
+
+
+def _rough_noise(problem: Problem, rows: Sequence[DelayedRows]) -> float:
+    """Guess the noise of the torque from the torque that the motion takes [N m]."""
+    taken = np.concatenate(
+        [
+            recording.mass * np.abs(part.view.specific_force / part.view.gearing)[part.usable]
+            for recording, part in zip(problem.recordings, rows, strict=True)
+        ]
+    )
+    if not taken.size:
+        raise TooShort("no usable stretches of time; drive longer, with more starts")
+    return ROUGH_NOISE * float(np.percentile(taken, 98.0))
+
+
+def _noise(problem: Problem, rows: Sequence[DelayedRows], settings: FitSettings) -> float:
+    """Find the noise of the torque by a quick fit [N m]."""
+    quick = replace(settings, rounds=1, knots=())
+    found = fit(_drive_rows(problem, rows), quick)
+    return fitted_rows(_with(problem.draft, found, quick), problem, rows).residual_std
+
+
+def _with_dragged(problem: Problem, timing: Timing, road: Floats) -> Problem:
+    """Learn the reading of a dragged engine at the timing found, and let the drives know it."""
+    seen = replace(
+        problem.draft,
+        torque=replace(problem.draft.torque, source=problem.source.name, coefficients=(0.0, 1.0)),
+        road_load=RoadLoad(drag_area=float(road[0]), rolling_coefficient=float(road[1])),
+        timing=timing,
+        provenance=Provenance(masses=tuple(problem.masses)),
+    )
+    draft = replace(problem.draft, dragged=learnt_dragged(problem, seen))
+    drives = tuple(r.with_draft(draft) for r in problem.recordings)
+    return replace(problem, draft=draft, recordings=drives)
+
+
+def _driven_slope(
+    problem: Problem, found: InverseFit, rows: Sequence[DelayedRows]
+) -> tuple[float, float]:
+    """Slope of the torque over its reading at the mean reading and speed, and its std."""
+    reading = np.concatenate(
+        [r.reading[part.usable] for r, part in zip(problem.recordings, rows, strict=True)]
+    )
+    turning = np.concatenate([part.engine_speed[part.usable] for part in rows])
+    slope = np.zeros(found.coefficients.size)
+    slope[1] = 1.0
+    if problem.curved:
+        bent = 2 + problem.order
+        slope[bent], slope[bent + 1] = np.mean(turning), 2.0 * np.mean(reading)
+    cov = found.cov[: slope.size, : slope.size]
+    return float(slope @ found.coefficients), float(np.sqrt(slope @ cov @ slope))
+
+
+@dataclass(frozen=True, slots=True)
+class _Misfits:
+    """Negative log-likelihood of pairs of delay and lag, all by the same rows.
+
+    Other rows would make other likelihoods: only those count that are usable at all.
+
+    Attributes
+    ----------
+    problem, settings
+    lag : of the balances that tell brakes and overrun [s]
+    """
+
+    problem: Problem
+    settings: FitSettings
+    lag: float
+
+    def __call__(self, pairs: Sequence[tuple[float, float]]) -> Floats:
+        drives = [list(r.search(pairs, self.lag)) for r in self.problem.recordings]
+        shared = [np.logical_and.reduce([rows.usable for rows in tried]) for tried in drives]
+        misfits = []
+        for k in range(len(pairs)):
+            rows = [
+                replace(tried[k], usable=use) for tried, use in zip(drives, shared, strict=True)
+            ]
+            misfits.append(-fit(_drive_rows(self.problem, rows), self.settings).log_likelihood)
+        return np.array(misfits)
+
+
+def _prior(vehicle: Vehicle, known: Driveline) -> tuple[Floats, Floats]:
+    """Road load and inertias of the class, and what the given vehicle file says of them."""
+    mean, std = vehicle.of_class.road_prior(single_speed=vehicle.driveline.single_speed)
+    for k, given, given_std in (
+        (2, known.engine_inertia, known.engine_inertia_std),
+        (3, known.wheel_inertia, known.wheel_inertia_std),
+    ):
+        mean[k] = mean[k] if given is None else given
+        std[k] = std[k] if given_std is None else given_std
+    return mean, std
+
+
+def find_timing(
+    misfits: Callable[[Sequence[tuple[float, float]]], Floats],
+) -> tuple[float, float, bool, DelaySearch]:
+    """Find delay and lag of least misfit: their sum first, then both, then the delay finely.
+
+    Parameters
+    ----------
+    misfits : of pairs of delay and lag [s], all by the same rows
+
+    Returns
+    -------
+    delay, lag : [s]
+    told : whether the drives show them
+    search : what was tried of their sum, and the standard deviation of the delay
+    """
+    middle = LAGS[len(LAGS) // 2]
+    totals = np.array(DELAYS)
+    scores = misfits([(float(t) - middle, middle) for t in totals])
+    while int(np.argmin(scores)) in (0, totals.size - 1):
+        more = beyond(totals, scores, DELAYS[1] - DELAYS[0], FARTHEST_DELAY)
+        if not more.size:
+            break
+        totals = np.sort(np.concatenate([totals, more]))
+        scores = misfits([(float(t) - middle, middle) for t in totals])
+    # At the ends both sides have little in common, and little to disagree about.
+    lowest = [k for k in range(1, totals.size - 1) if scores[k] <= min(scores[k - 1 : k + 2])]
+    coarse = scores
+    total = float(totals[min(lowest, key=lambda k: scores[k])]) if lowest else USUAL_DELAY
+
+    pairs = [(total - x + shift, x) for x in LAGS for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
+    delay, lag = pairs[int(np.argmin(misfits(pairs)))]
+    delays = np.asarray(delay + 0.03 * np.arange(-4, 5), dtype=np.float64)
+    scores = misfits([(float(d), lag) for d in delays])
+    best = int(np.clip(np.argmin(scores), 1, delays.size - 2))
+    around = slice(best - 1, best + 2)
+    delay = vertex(delays[around], scores[around])
+    search = DelaySearch(
+        delay=totals, misfit=coarse - coarse.min(), std=_delay_std(delays[around], scores[around])
+    )
+    return delay, lag, bool(lowest), search
+
+
+def _delay_std(delays: Floats, misfits: Floats) -> float | None:
+    """Standard deviation of a delay by the curvature of its likelihood [s]; None if flat."""
+    step = delays[1] - delays[0]
+    curvature = (misfits[0] - 2.0 * misfits[1] + misfits[2]) / step**2
+    return float(UNMODELLED / np.sqrt(curvature)) if curvature > 0.0 else None
+
+
+def _with(draft: Vehicle, found: InverseFit, settings: FitSettings) -> Vehicle:
+    """Return the draft with what was fitted."""
+    bent = found.coefficients.size - len(settings.knots)
+    straight = bent - 2 * settings.curved
+    values = [float(w) for w in found.coefficients]
+    stds = [float(s) for s in found.stds]
+    road = np.maximum(found.road, 0.0)
+    return replace(
+        draft,
+        torque=replace(
+            draft.torque,
+            source=settings.source.name,
+            coefficients=tuple(values[:straight]),
+            coefficient_stds=tuple(stds[:straight]),
+            curvature=tuple(values[straight:bent]),
+            curvature_stds=tuple(stds[straight:bent]),
+            knots=settings.knots,
+            knot_slopes=tuple(values[bent:]),
+        ),
+        road_load=RoadLoad(
+            drag_area=float(road[0]),
+            rolling_coefficient=float(road[1]),
+            drag_area_std=stds[-4],
+            rolling_coefficient_std=stds[-3],
+        ),
+        driveline=replace(
+            draft.driveline,
+            engine_inertia=float(road[2]),
+            engine_inertia_std=stds[-2],
+            wheel_inertia=float(road[3]),
+            wheel_inertia_std=stds[-1],
+        ),
+    )
+
+
+def self_weighed(problem: Problem, vehicle: Vehicle, cov: Floats | None) -> Vehicle:
+    """Scale the torque so that the drives weigh what they are known to.
+
+    ``cov`` is that of the fit, if there was one. The scale pins what the drives weigh in the
+    mean; what is left open moves drives that use the torque otherwise.
+    """
+
+    def found(scale: float) -> tuple[float, float, Floats, int]:
+        tried = replace(vehicle, torque=vehicle.torque.scaled(scale))
+        ratios, stds = [], []
+        moved: list[Floats] = []
+        for balance, mass in zip(rebalanced(problem, tried), problem.masses, strict=True):
+            track = joint.estimate(balance, tried, load_changes=False)
+            if np.isfinite(track.mass) and track.sensitivity is not None:
+                left = mass - float(balance.merged.fuel_burnt[-1])
+                ratios.append(track.mass / left)
+                stds.append(track.bound_std / left)
+                moved.append(track.sensitivity / left)
+        if not ratios:
+            raise DriveError(
+                "the drives of the calibration cannot be weighed: drive longer, with more starts"
+            )
+        weight = 1.0 / np.square(stds)
+        return (
+            float(np.average(ratios, weights=weight)),
+            float(1.0 / np.sqrt(np.mean(weight))),
+            np.average(np.array(moved), axis=0, weights=weight),
+            len(ratios),
+        )
+
+    scale, slope = 1.0, USUAL_SLOPE
+    tried = [(scale, *found(scale))]
+    for _ in range(SELF_ROUNDS):
+        before, ratio = scale, tried[-1][1]
+        if abs(ratio - 1.0) < SELF_CLOSE:
+            break
+        scale = float(np.clip(scale + (1.0 - ratio) / slope, *SCALES))
+        if scale == before:
+            break
+        tried.append((scale, *found(scale)))
+        # Levels of noise may fall into another optimum, and the mass jump with them.
+        slope = float(np.clip((tried[-1][1] - ratio) / (scale - before), *SLOPES))
+    scale, ratio, bound, direction, count = min(tried, key=lambda t: abs(t[1] - 1.0))
+    each = float(np.hypot(TRANSFER_STD[1], UNMODELLED * bound))
+    # Where the torque could not be fitted anew, what its own fit left open stays.
+    known = math.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0, ratio - 1.0)
+    open_cov: tuple[float, ...] = ()
+    if cov is not None:
+        # The torque coefficients are scaled, and their errors with them.
+        units = np.concatenate((np.full(len(cov) - 4, scale), np.ones(4)))
+        open_cov = triangle(pinned(cov * np.outer(units, units), direction))
+    return replace(
+        vehicle,
+        torque=vehicle.torque.scaled(scale),
+        provenance=replace(
+            vehicle.provenance,
+            fit_cov=open_cov,
+            mass_scale_std=float(np.hypot(known, each / np.sqrt(count))),
+        ),
+    )

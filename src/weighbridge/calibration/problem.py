@@ -1,0 +1,316 @@
+"""From drives and masses as given to one problem that every fit of the torque reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.calibration.inverse import knots_between
+from weighbridge.calibration.known_mass import check_mass
+from weighbridge.calibration.recording import Recording
+from weighbridge.calibration.settings import CalibrationSettings
+from weighbridge.checks import refuse_serious, settle_drive
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.squat import pooled, squat_at
+from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
+from weighbridge.navigation.select import find_motion
+from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle.as_read import as_read
+from weighbridge.vehicle.classes import VehicleClass
+from weighbridge.vehicle.gear import GearDetection, detect_gearings
+from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
+
+FEW_READINGS: Final = 200
+"""Fewer readings of engine speed show no curve of the torque over it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """What is fitted, and to what.
+
+    Attributes
+    ----------
+    recordings : the drives of known mass
+    base : what is known of the vehicle, as its torque source sees it
+    draft : the same with gears, source, witnesses and mounting found, without a torque model
+    given : driveline of the vehicle file given to the calibration
+    gears : ratios found; None where they were given
+    source : of the torque
+    order, curved : of the torque regression
+    grid : search the grid of Jensen 2022
+    """
+
+    recordings: tuple[Recording, ...]
+    base: Vehicle
+    draft: Vehicle
+    given: Driveline
+    gears: GearDetection | None
+    source: TorqueSource
+    order: int
+    curved: bool
+    grid: bool
+
+    @property
+    def masses(self) -> list[float]:
+        """Known mass of each drive as it begins [kg]."""
+        return [r.mass for r in self.recordings]
+
+    @property
+    def names(self) -> str:
+        """Names of the drives, for messages."""
+        return ", ".join(r.drive.name for r in self.recordings)
+
+    @property
+    def by_speed(self) -> bool:
+        """Whether a drive has no accelerometer."""
+        return any(r.motion.source in BY_SPEED for r in self.recordings)
+
+    def knots(self, turning: Floats) -> tuple[float, ...]:
+        """Engine speeds at which the torque per reading may leave a straight line [rad/s].
+
+        Parameters
+        ----------
+        turning : (n,) engine speeds of the usable rows [rad/s]
+        """
+        if self.draft.driveline.single_speed or turning.size < FEW_READINGS:
+            return ()
+        slow, fast = np.percentile(turning, [1.0, 99.0])
+        return knots_between(float(slow), float(fast))
+
+
+def checked(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None,
+    vehicle: Vehicle | None,
+    source: str | None = None,
+) -> tuple[list[Drive], Vehicle, list[float]]:
+    """List the drives, what is known of the vehicle, and the drives' masses; check them."""
+    drives = [drives] if isinstance(drives, Drive) else list(drives)
+    base = vehicle or Vehicle(name=_name(drives))
+    masses = _masses(drives, mass, base)
+    model = TorqueModel(reference_torque=base.torque.reference_torque)
+    if source is not None:
+        # Friction in the torque is no fault here: the fit finds it as an offset.
+        model = replace(model, source=source, coefficients=(-1.0, 1.0))
+    known = replace(base, torque=model, witnesses=())
+    settled = [settle_drive(drive, known) for drive in drives]
+    for drive in settled:
+        refuse_serious(drive.name, drive.problems)
+    return settled, base, masses
+
+
+def problem_of(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None,
+    vehicle: Vehicle | None,
+    settings: CalibrationSettings,
+) -> Problem:
+    """Check what was given, and find motion, gears and torque source of the drives.
+
+    Raises
+    ------
+    DriveError, ConfigError
+        A drive or a setting cannot be used.
+    """
+    drives, base, masses = checked(drives, mass, vehicle, settings.source)
+    source = TORQUE_SOURCES[settings.source] if settings.source else best_source(drives, base)
+    for drive in drives:
+        if missing := source.lacking(drive):
+            raise DriveError(
+                f"{drive.name}: no {' and no '.join(missing)}, "
+                f"which torque source {source.name!r} needs"
+            )
+        if why := source.refusal(drive, base.driveline.driven):
+            raise DriveError(f"{drive.name}: {why}")
+    given, base = base.driveline, _held(base, source)
+    found = [find_motion(drive, base) for drive in drives]
+    motions, squat = _one_squat(found, masses, base.of_class)
+    gears, draft = _draft(drives, motions, base, source)
+    draft = replace(draft, mounting=_mounting(motions, base.mounting, squat))
+    modelled = not source.signed
+    order = settings.order if settings.order is not None else (2 if modelled else 0)
+    if order and not modelled:
+        raise ConfigError(
+            f"order {order}: torque source {source.name!r} has an offset and a scale only; "
+            "leave --order out"
+        )
+    return Problem(
+        recordings=tuple(
+            Recording.of(*one, draft, source) for one in zip(drives, motions, masses, strict=True)
+        ),
+        base=base,
+        draft=draft,
+        given=given,
+        gears=gears,
+        source=source,
+        order=order,
+        curved=settings.curved and modelled,
+        grid=settings.grid,
+    )
+
+
+def _held(base: Vehicle, source: TorqueSource) -> Vehicle:
+    """See a vehicle as the source reads it; what turns before the wheels is not fitted there."""
+    if source.gearing is None:
+        return base
+    seen = as_read(base, source)
+    return replace(seen, driveline=replace(seen.driveline, engine_inertia_std=0.0))
+
+
+def _draft(
+    drives: Sequence[Drive], motions: Sequence[Motion], base: Vehicle, source: TorqueSource
+) -> tuple[GearDetection | None, Vehicle]:
+    """Find the gears, where they are not known, and let the source stand for the torque."""
+    gears = None
+    driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions, base))
+    if not driveline.gearings:
+        gears = find_gears(drives, motions, idle_speed=base.driveline.idle_speed or None)
+        driveline = replace(
+            driveline,
+            gearings=tuple(float(g) for g in gears.gearings),
+            gearing_stds=tuple(float(g) for g in gears.stds),
+        )
+    model = TorqueModel(
+        source="measured" if source.needs_map else source.name,
+        reference_torque=base.torque.reference_torque,
+        engine_efficiency=base.torque.engine_efficiency,
+    )
+    # A floor is told in the unit of its reading, and a witness is one of it.
+    same = base.torque.source == source.name
+    return gears, replace(
+        base,
+        driveline=driveline,
+        torque=model,
+        dragged=base.dragged if same else None,
+        witnesses=base.witnesses if same else (),
+    )
+
+
+def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
+    """Choose the torque source that all the drives have, the most direct first.
+
+    Raises
+    ------
+    DriveError
+        None of them has any.
+    """
+    for source in TORQUE_SOURCES.values():
+        if not any(source.lacking(drive) for drive in drives):
+            reference = vehicle.torque.reference_torque is not None or all(
+                drive.has("reference_torque") for drive in drives
+            )
+            if reference or not source.needs_reference:
+                return source
+    raise DriveError(
+        f"{', '.join(drive.name for drive in drives)}: not every drive has engine_torque, "
+        "engine_torque_fraction, engine_load or mass_air_flow; a calibration needs "
+        "one of them and engine_speed"
+    )
+
+
+def find_gears(
+    drives: Sequence[Drive], motions: Sequence[Motion], *, idle_speed: float | None = None
+) -> GearDetection:
+    """Find the gearings from all the drives together.
+
+    Raises
+    ------
+    DriveError
+        No engine speed, or no ratio stands out.
+    """
+    times, engine, speeds = [], [], []
+    offset = 0.0
+    for drive, motion in zip(drives, motions, strict=True):
+        signal = drive.get("engine_speed")
+        if signal is None or len(signal) < 30:
+            raise DriveError(
+                f"{drive.name}: no engine_speed, so no gear can be found; give gearings in the "
+                "vehicle file"
+            )
+        instants = signal.time - motion.speed_delay
+        inside = (instants >= motion.time[0]) & (instants <= motion.time[-1])
+        times.append(instants[inside] + offset)
+        engine.append(signal.values[inside])
+        speeds.append(np.interp(instants[inside], motion.time, motion.speed))
+        offset += float(signal.time[-1]) + 100.0
+    return detect_gearings(
+        np.concatenate(times),
+        np.concatenate(engine),
+        np.concatenate(speeds),
+        idle_speed=idle_speed,
+    )
+
+
+def _name(drives: Sequence[Drive]) -> str:
+    """Take the vehicle's name from the first drive that tells it."""
+    return next((drive.info.vehicle for drive in drives if drive.info.vehicle), "vehicle")
+
+
+def _masses(
+    drives: Sequence[Drive], mass: float | Sequence[float] | None, base: Vehicle
+) -> list[float]:
+    if not drives:
+        raise ConfigError("no drive to calibrate with")
+    if mass is None:
+        known = [drive.info.mass for drive in drives]
+    elif isinstance(mass, Sequence):
+        known = list(mass)
+        if len(known) != len(drives):
+            raise ConfigError(f"{len(known)} masses for {len(drives)} drives; give one for each")
+    else:
+        known = [mass] * len(drives)
+    for drive, kg in zip(drives, known, strict=True):
+        if kg is None:
+            raise ConfigError(
+                f"{drive.name}: its mass is not known; give --mass, or mass_kg in its drive.toml"
+            )
+        check_mass(drive, kg, base)
+    return [float(kg) for kg in known if kg is not None]
+
+
+def _speed_scale(motions: Sequence[Motion], base: Vehicle) -> float:
+    known = [
+        (m.speed_scale, m.speed_scale_std)
+        for m in motions
+        if m.speed_scale is not None and m.speed_scale_std is not None
+    ]
+    if not known:
+        return base.driveline.speed_scale
+    weight = np.array([1.0 / std**2 for _, std in known])
+    return float(np.average([scale for scale, _ in known], weights=weight))
+
+
+def _one_squat(
+    motions: list[Motion], masses: Sequence[float], kind: VehicleClass
+) -> tuple[list[Motion], tuple[float, float] | None]:
+    """Take the same squat out of all drives: that of the vehicle, with its standard deviation."""
+    found = pooled(motions, masses, kind)
+    if found is None:
+        return motions, None
+    squat, std = found
+    held = [
+        with_squat(motion, squat_at(squat, mass, masses, kind), std)
+        for motion, mass in zip(motions, masses, strict=True)
+    ]
+    return held, found
+
+
+def _mounting(
+    motions: Sequence[Motion], known: Mounting | None, squat: tuple[float, float] | None
+) -> Mounting | None:
+    for motion in motions:
+        if motion.mounting is not None:
+            roll, pitch, yaw = motion.mounting
+            return Mounting(
+                roll=roll,
+                pitch=pitch,
+                yaw=yaw,
+                std=motion.mounting_std,
+                squat=squat[0] if squat else None,
+                squat_std=squat[1] if squat else None,
+            )
+    return known

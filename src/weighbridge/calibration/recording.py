@@ -1,0 +1,187 @@
+"""Rows of one drive of known mass, at any delay and lag of its torque."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance import ForceBalance, force_balance
+from weighbridge.balance.force_balance import SHIFT_MARGIN, headwind
+from weighbridge.balance.instants import (
+    SLOWEST,
+    engine_speed_at,
+    gears_at,
+    motion_at,
+    smoothed,
+)
+from weighbridge.balance.table import MergedView
+from weighbridge.navigation.motion import Motion
+from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.vehicle.air import air_density
+from weighbridge.vehicle.gear import shifting
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import DRAGGED_TIME, averaged
+from weighbridge.vehicle.torque_sources import TorqueSource
+
+ANCHORS: Final = 0.4
+"""Delays so far apart have a whole balance each [s]; those between take over what it says of
+brakes, overrun and cornering, which last longer than half of it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DelayedRows:
+    """Rows of a drive at one delay and lag.
+
+    Attributes
+    ----------
+    view : (n,) rows; no vehicle is fitted yet, so its torque and traction are NaN
+    engine_speed : (n,) [rad/s]
+    usable : (n,) rows that a fit may take
+    """
+
+    view: MergedView
+    engine_speed: Floats
+    usable: Bools
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """A drive of known mass as a calibration sees it.
+
+    Attributes
+    ----------
+    drive, motion
+    mass : known, as the drive begins [kg]
+    draft : vehicle with gears and source, without a torque model
+    reading : (n,) of the torque source at its stamps
+    driven : (n,) where the reading is above that of a dragged engine
+    source : of the torque
+    anchors : balances made so far, by delay and lag
+    """
+
+    drive: Drive
+    motion: Motion
+    mass: float
+    draft: Vehicle
+    source: TorqueSource
+    reading: Floats
+    driven: Bools
+    anchors: dict[tuple[float, float], ForceBalance] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, drive: Drive, motion: Motion, mass: float, draft: Vehicle, source: TorqueSource
+    ) -> Recording:
+        """See a drive by its torque source."""
+        carrier = source.carrier(drive)
+        stamps = carrier.time
+        reading = source.reading(drive, stamps, draft.torque)
+        floor = source.floor(carrier.values)
+        period = float(np.median(np.diff(stamps)))
+        return cls(
+            drive=drive,
+            motion=motion,
+            mass=mass,
+            draft=draft,
+            source=source,
+            reading=reading,
+            driven=averaged(reading, period, DRAGGED_TIME) >= floor,
+        )
+
+    @property
+    def floor(self) -> float:
+        """Reading below which the engine may be dragged."""
+        return self.source.floor(self.source.carrier(self.drive).values)
+
+    def with_draft(self, draft: Vehicle) -> Recording:
+        """Return the same drive with another draft of the vehicle."""
+        return replace(self, draft=draft, anchors={})
+
+    def balance(self, delay: float, lag: float = 0.0) -> ForceBalance:
+        """Balance the drive without a torque model, at a delay and a lag [s]."""
+        stand_in = self.drive
+        if self.source.needs_map:
+            stamps = self.source.carrier(self.drive).time
+            stand_in = stand_in.with_signals(Signal("engine_torque", stamps, self.reading))
+        return force_balance(
+            stand_in, self.draft, self.motion, delay=delay, lag=lag, signed=self.source.signed
+        )
+
+    def rows(self, delay: float, lag: float = 0.0) -> DelayedRows:
+        """Return the rows of a whole balance at a delay and a lag [s]."""
+        balance = self.balance(delay, lag)
+        view, engine_speed = balance.merged, balance.merged.engine_speed
+        return DelayedRows(
+            view=view, engine_speed=engine_speed, usable=self._complete(view, engine_speed)
+        )
+
+    def search(
+        self, pairs: Sequence[tuple[float, float]], anchor_lag: float
+    ) -> Iterator[DelayedRows]:
+        """Return rows at many delays and lags: only motion, engine speed and gear are read anew.
+
+        Parameters
+        ----------
+        pairs : delays and lags [s]
+        anchor_lag : lag of the balances that tell brakes and overrun [s]
+        """
+        motion, last = self.motion, 0.0
+        for delay, lag in pairs:
+            if lag != last:
+                motion, last = smoothed(self.motion, lag), lag
+            yield self._moved(self._anchor(delay, anchor_lag), motion, delay)
+
+    def _anchor(self, delay: float, lag: float) -> ForceBalance:
+        """Return the balance at the nearest anchor of a delay [s]."""
+        key = (ANCHORS * round(delay / ANCHORS), lag)
+        if key not in self.anchors:
+            self.anchors[key] = self.balance(*key)
+        return self.anchors[key]
+
+    def _moved(self, anchor: ForceBalance, motion: Motion, delay: float) -> DelayedRows:
+        """Read motion, engine speed and gear where a delay puts the force samples."""
+        drive, draft = self.drive, self.draft
+        recorded = self.source.carrier(drive).time
+        time = recorded - delay
+        rows = motion_at(motion, time)
+        engine_speed = engine_speed_at(drive, draft, time + motion.speed_delay, rows["speed"])
+        gear, gearing, slipping = gears_at(drive, draft, recorded, engine_speed, rows["speed"])
+        changing = shifting(time, gear, margin=SHIFT_MARGIN)
+        if draft.driveline.single_speed:
+            changing[:] = False
+        nothing = np.full(time.size, np.nan)
+        view = replace(
+            anchor.merged,
+            time=time,
+            traction_force=nothing,
+            force_std=nothing,
+            torque=nothing,
+            engine_speed=engine_speed,
+            speed=rows["speed"],
+            accel=rows["accel"],
+            specific_force=rows["specific_force"],
+            grade=rows["grade"],
+            pitch=rows["pitch"],
+            heading=rows["heading"],
+            gear=gear,
+            gearing=gearing,
+            air_speed=rows["speed"] + headwind(drive, rows["heading"]),
+            air_density=air_density(drive, time, rows["altitude"]),
+        )
+        usable = self._complete(view, engine_speed) & ~changing & ~slipping
+        usable &= (rows["valid"] > 0.99) & (rows["speed"] >= SLOWEST)
+        return DelayedRows(view=view, engine_speed=engine_speed, usable=usable)
+
+    def _complete(self, view: MergedView, engine_speed: Floats) -> Bools:
+        """Rows that nothing speaks against and that have all numbers."""
+        return np.asarray(
+            view.usable
+            & self.driven
+            & np.isfinite(view.specific_force)
+            & np.isfinite(view.gearing)
+            & np.isfinite(self.reading)
+            & np.isfinite(engine_speed)
+        )

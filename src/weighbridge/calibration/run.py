@@ -1,0 +1,196 @@
+"""From drives of known mass to a vehicle file."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance import ForceBalance
+from weighbridge.balance.witness_learning import learn_witnesses
+from weighbridge.calibration.doubted_masses import doubted_masses, unbacked_scale, with_doubts
+from weighbridge.calibration.fitted import Fitted, fitted_rows, noted, rebalanced
+from weighbridge.calibration.joint import fit_joint
+from weighbridge.calibration.known_mass import scale_doubt
+from weighbridge.calibration.problem import Problem, checked, problem_of
+from weighbridge.calibration.rls import fit_rls
+from weighbridge.calibration.settings import CalibrationSettings
+from weighbridge.calibration.speed import SpeedCalibration, calibrate_by_speed
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.judging import HIDDEN_BRAKE_STD, WIDEST
+from weighbridge.pipeline.given import (
+    GivenDrive,
+    GivenVehicle,
+    as_drives,
+    as_vehicle,
+    home_of,
+    mapping_of,
+)
+from weighbridge.results.calibration import Calibration
+from weighbridge.signals import Drive
+from weighbridge.vehicle.fits import JOINT, RLS
+from weighbridge.vehicle.model import Driveline, Vehicle
+
+FITTERS: Final[dict[str, Callable[[Problem], Fitted]]] = {
+    JOINT.name: fit_joint,
+    RLS.name: fit_rls,
+}
+"""What fits the torque for each method."""
+
+FEW_SAMPLES: Final = 2000
+"""Fewer usable samples, some twenty minutes of driving, make a poor calibration."""
+
+MASSES_APART: Final = 0.01
+"""A mass given and one that a drive states differ by more, and a note says so [-]."""
+
+
+def calibrate(
+    drives: GivenDrive | Sequence[GivenDrive],
+    mass: float | Sequence[float] | None = None,
+    *,
+    vehicle: GivenVehicle | None = None,
+    settings: CalibrationSettings | None = None,
+) -> Vehicle:
+    """Calibrate a vehicle from one or more drives of known mass.
+
+    Parameters
+    ----------
+    drives : recorded drives of one vehicle, or the paths or data frames that they are to be read
+        from; one, or a list of them
+    mass : of all, or one for each, as the drive begins [kg]; from ``drive.toml`` when None
+    vehicle : what is known already (class, wheel radius, gearings, tare), or the path of a vehicle
+        file that says it
+    settings : see `CalibrationSettings`
+
+    Raises
+    ------
+    DriveError, ConfigError
+        A drive or an argument cannot be used; the sentence says why.
+    """
+    base = as_vehicle(vehicle) if vehicle is not None else None
+    known = as_drives(drives, mapping_of(base, home_of(vehicle)))
+    if settings is not None and not settings.fit.torque:
+        return run_speed_calibration(known, mass, vehicle=base).vehicle
+    return run_calibration(known, mass, vehicle=base, settings=settings).vehicle
+
+
+def run_speed_calibration(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None = None,
+    *,
+    vehicle: Vehicle | None = None,
+) -> SpeedCalibration:
+    """As `calibrate` for the method "speed-ekf", keeping what was fitted."""
+    drives, base, masses = checked(drives, mass, vehicle)
+    return calibrate_by_speed(drives, masses, base)
+
+
+def run_calibration(
+    drives: Drive | Sequence[Drive],
+    mass: float | Sequence[float] | None = None,
+    *,
+    vehicle: Vehicle | None = None,
+    settings: CalibrationSettings | None = None,
+) -> Calibration:
+    """As `calibrate`, keeping what the report shows."""
+    settings = settings or CalibrationSettings()
+    if not settings.fit.torque:
+        raise ConfigError(f"method {settings.method} has no torque fit; use run_speed_calibration")
+    problem = problem_of(drives, mass, vehicle, settings)
+    fitted = FITTERS[settings.method](problem)
+    rows = fitted_rows(fitted.vehicle, problem, fitted.rows)
+    recorded = [r.drive for r in problem.recordings]
+    motions = {r.motion.source for r in problem.recordings}
+    witnesses, contradictions = learn_witnesses(recorded, fitted.vehicle)
+    done = replace(
+        fitted.vehicle,
+        witnesses=witnesses or fitted.vehicle.witnesses,
+        provenance=replace(
+            fitted.vehicle.provenance,
+            drives=tuple(drive.name for drive in recorded),
+            date=datetime.date.today().isoformat(),
+            r_squared=rows.r_squared,
+            residual_std=rows.residual_std,
+            samples=int(rows.time.size),
+            motion=motions.pop() if len(motions) == 1 else None,
+        ),
+    )
+    balances = tuple(rebalanced(problem, done))
+    doubt = scale_doubt(done, problem.masses, problem.names)
+    few = f"made from {rows.time.size} samples only; poll faster, or drive longer"
+    doubts = [*([doubt] if doubt else []), *doubted_masses(done, balances, problem.masses)]
+    others = [
+        *([few] if rows.time.size < FEW_SAMPLES else []),
+        *_other_masses(recorded, problem.masses),
+        *doubts,
+        *contradictions,
+    ]
+    done = _with_doubts(done, balances, [*others, *unbacked_scale(done)])
+    done = with_doubts(done, doubts)
+    if problem.source.gearing is not None:
+        done = _with_gears(done, problem.given)
+    _refuse_useless(done)
+    return Calibration(
+        vehicle=done,
+        gears=problem.gears,
+        balances=balances,
+        rows=rows,
+        search=fitted.search,
+        held=fitted.held,
+    )
+
+
+def _with_doubts(
+    vehicle: Vehicle, balances: Sequence[ForceBalance], notes: Sequence[str]
+) -> Vehicle:
+    """Note what is doubted of a calibration's drives, and count what is hidden in them."""
+    for note in dict.fromkeys([*(n for balance in balances for n in balance.notes), *notes]):
+        vehicle = noted(vehicle, note)
+    if not any(balance.brake_hidden for balance in balances):
+        return vehicle
+    made = vehicle.provenance
+    std = float(np.hypot(made.mass_scale_std or 0.0, HIDDEN_BRAKE_STD))
+    return replace(vehicle, provenance=replace(made, mass_scale_std=std))
+
+
+def _refuse_useless(vehicle: Vehicle) -> None:
+    """Refuse a calibration with which no drive could be weighed.
+
+    Raises
+    ------
+    DriveError
+        It leaves more than `WIDEST` in every mass.
+    """
+    made = vehicle.provenance
+    if made.mass_scale_std is not None and made.mass_scale_std > WIDEST:
+        raise DriveError(
+            f"the calibration would leave {100.0 * made.mass_scale_std:.0f} % in every mass, as "
+            f"standard deviation, with which no drive can be weighed ({made.notes or 'no notes'}); "
+            "check that every sample was recorded, and calibrate on other or longer drives"
+        )
+
+
+def _with_gears(vehicle: Vehicle, given: Driveline) -> Vehicle:
+    """Return a vehicle with the gears it has, not those that its torque is read behind."""
+    line = replace(
+        vehicle.driveline,
+        gearings=given.gearings,
+        gearing_stds=given.gearing_stds,
+        engine_inertia=given.engine_inertia,
+        engine_inertia_std=given.engine_inertia_std,
+        idle_speed=given.idle_speed,
+    )
+    return replace(vehicle, driveline=line)
+
+
+def _other_masses(drives: Sequence[Drive], masses: Sequence[float]) -> list[str]:
+    """Say where a mass that was given differs from the one its drive states."""
+    return [
+        f"{drive.name} states a mass of {drive.info.mass:.0f} kg and was calibrated with the "
+        f"{kg:.0f} kg given"
+        for drive, kg in zip(drives, masses, strict=True)
+        if drive.info.mass is not None and abs(kg / drive.info.mass - 1.0) > MASSES_APART
+    ]

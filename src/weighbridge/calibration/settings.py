@@ -1,0 +1,48 @@
+"""How a calibration is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from weighbridge.errors import ConfigError
+from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationSettings:
+    """How a calibration is made.
+
+    Attributes
+    ----------
+    order : highest power of engine speed in the torque regression; 2 for load
+        and air flow, 0 for measured torque when None
+    source : torque source; the best the drives have when None
+    grid : solve on the grid of Jensen 2022, Table 5, in place of the bounds
+    curved : let the torque per load change with engine speed and load; off for
+        the regression of eq. 49 as printed
+    method : estimator the vehicle is calibrated for: "joint", "rls" by eq. 48, or
+        "speed-ekf", which fits a model of the speed alone
+    """
+
+    order: int | None = None
+    source: str | None = None
+    grid: bool = False
+    curved: bool = True
+    method: str = JOINT.name
+
+    def __post_init__(self) -> None:
+        if self.order is not None and not 0 <= self.order <= 4:
+            raise ConfigError(f"order must be between 0 and 4, got {self.order}")
+        if self.source is not None and self.source not in TORQUE_SOURCES:
+            raise ConfigError(f"source must be one of {TORQUE_SOURCES.names}, got {self.source!r}")
+        if self.method not in FITS:
+            *most, last = FITS
+            raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+        if self.grid and self.fit != RLS:
+            raise ConfigError("the grid of Jensen 2022 is of method rls; calibrate with that")
+
+    @property
+    def fit(self) -> Fit:
+        """What is fitted."""
+        return FITS[self.method]
