@@ -189,8 +189,44 @@ def fit_with_gusts(drives: list[DriveRows], settings: FitSettings) -> InverseFit
     plain = fit(drives, settings)
     other = fit(drives, replace(settings, lasting_drag=True))
     apart = np.concatenate((other.coefficients - plain.coefficients, other.road - plain.road))
+    mean, std = settings.prior
+    return _confounded(plain, apart, float(mean[0]), float(std[0]))
+
+
+def _confounded(plain: InverseFit, apart: Floats, mean: float, std: float) -> InverseFit:
+    """Add what gusts leave confounded to a fit, and let the prior drag area count against it.
+
+    The prior has been weighed against the noise alone. Beside a confounded drag area it weighs
+    more: the likelihood is taken out of the posterior, widened, and met with the prior again. The
+    other parameters follow by their covariance with the drag area, which stays at zero or above.
+
+    Parameters
+    ----------
+    plain : fit to be completed
+    apart : (p + 4,) what the other fit finds more
+    mean, std : of the drag area before any drive [m^2]
+    """
+    drag = plain.coefficients.size
     cov = plain.cov + np.outer(apart, apart)
-    return replace(plain, cov=cov, stds=np.sqrt(np.maximum(np.diag(cov), 0.0)))
+    x = np.concatenate((plain.coefficients, plain.road))
+    var, before = float(plain.cov[drag, drag]), std**2
+    if not 0.0 < var < before:
+        return replace(plain, cov=cov, stds=np.sqrt(np.maximum(np.diag(cov), 0.0)))
+    alone = 1.0 / (1.0 / var - 1.0 / before)
+    told = alone * (float(x[drag]) / var - mean / before)
+    widened = alone + (float(apart[drag]) * alone / var) ** 2
+    after = 1.0 / (1.0 / before + 1.0 / widened)
+    wanted = max(after * (mean / before + told / widened), 0.0)
+    gain = cov[:, drag] / cov[drag, drag]
+    x = x + gain * (wanted - x[drag])
+    cov = cov - np.outer(gain, gain) * (cov[drag, drag] - after)
+    return replace(
+        plain,
+        coefficients=x[:drag],
+        road=x[drag:],
+        cov=cov,
+        stds=np.sqrt(np.maximum(np.diag(cov), 0.0)),
+    )
 
 
 def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:

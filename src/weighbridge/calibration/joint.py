@@ -156,7 +156,7 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     )
     if not told:
         vehicle = noted(vehicle, NOT_TOLD)
-    held = ("drag_area",) if found.road[0] < 0.0 else ()
+    held = ("drag_area",) if found.road[0] <= 0.0 else ()
     return Fitted(vehicle=vehicle, rows=rows, search=search, held=held), found.cov
 
 
