@@ -392,3 +392,10 @@ def test_terminal_and_file_tell_the_same_speed_model(empty, tmp_path):
         assert float(shown[f"correction p{k}"]) == pytest.approx(p, rel=1e-4)
     assert float(shown["R² of the change of speed"]) == pytest.approx(saved["r_squared"], abs=6e-4)
     assert shown["steps of 7 s"] == str(saved["samples"])
+
+
+def test_torque_on_another_clock_is_refused_with_what_to_add(empty):
+    load = empty.drive.signals["engine_load"]
+    early = empty.drive.with_signals(Signal("engine_load", load.time - 1.8, load.values))
+    with pytest.raises(DriveError, match=r"engine_load fits .* 1\.[6-9] s early.*add \+1\.[6-9] s"):
+        calibrate(early)

@@ -13,6 +13,7 @@ from weighbridge.balance.force_balance import dragged_reading
 from weighbridge.balance.law import drag_force, mass_column, rotating_mass
 from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows, Recording
+from weighbridge.errors import DriveError
 from weighbridge.results.calibration import DelaySearch, FittedRows
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import DraggedReading, Vehicle
@@ -20,6 +21,13 @@ from weighbridge.vehicle.torque import parameters, rows_of
 
 NOT_TOLD: Final = "the drives do not show how late the torque is"
 """What is noted where the search for the delay ends at its end."""
+
+
+EARLIEST: Final = -1.0
+"""Delay of the torque below which a vehicle file takes none [s]."""
+
+LATEST: Final = 3.0
+"""The same above [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +55,26 @@ def noted(vehicle: Vehicle, note: str) -> Vehicle:
         return vehicle
     notes = f"{notes}; {note}" if notes else note
     return replace(vehicle, provenance=replace(vehicle.provenance, notes=notes))
+
+
+def check_delay(problem: Problem, delay: float) -> None:
+    """Refuse a delay of the torque that no logger has, and say how to mend it.
+
+    Raises
+    ------
+    DriveError
+        It is not between `EARLIEST` and `LATEST`: torque and motion are on two clocks.
+    """
+    if EARLIEST <= delay <= LATEST:
+        return
+    signal = problem.source.signals[0]
+    side = "early" if delay < 0.0 else "late"
+    raise DriveError(
+        f"{problem.names}: {signal} fits the motion best where its stamps are {abs(delay):.1f} s "
+        f"{side}, and one logger stamps from {-EARLIEST:g} s early to {LATEST:g} s late: it is on "
+        f"another clock, or says nothing of the torque; add {-delay:+.1f} s to its time_s "
+        "(offset_s in the mapping), or calibrate with another --torque"
+    )
 
 
 def known_std(std: float) -> float | None:

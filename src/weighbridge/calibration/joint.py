@@ -14,6 +14,7 @@ from weighbridge.balance.delay import beyond, vertex
 from weighbridge.calibration.fitted import (
     NOT_TOLD,
     Fitted,
+    check_delay,
     fitted_rows,
     learnt_dragged,
     noted,
@@ -132,6 +133,7 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     quick = replace(quick, torque_noise=_noise(problem, rough, quick))
     delay, lag, told, search = find_timing(_Misfits(problem, quick, middle))
 
+    check_delay(problem, delay)
     timing = Timing(torque_delay=delay, torque_lag=lag)
     problem = _with_dragged(problem, timing, settings.prior[0])
     rows = _rows(problem, delay, lag)

@@ -13,6 +13,7 @@ from weighbridge.balance.law import ROAD_PARAMETERS
 from weighbridge.calibration.fitted import (
     NOT_TOLD,
     Fitted,
+    check_delay,
     known_std,
     learnt_dragged,
     noted,
@@ -57,6 +58,7 @@ def fit_rls(problem: Problem) -> Fitted:
     found = bool(np.isfinite(delay))
     if not found:
         delay = problem.base.timing.torque_delay or 0.0
+    check_delay(problem, delay)
     rows = tuple(_pulling(r.rows(delay)) for r in problem.recordings)
     joined = torque_rows_of(problem, rows)
     fitted = fit(joined, low, high)

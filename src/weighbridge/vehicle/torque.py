@@ -138,7 +138,9 @@ def reading_of(torque: Floats, engine_speed: Floats, model: TorqueModel) -> Floa
     # The root that stays finite where the map is straight; where it bends so far that
     # there is none, its turning point.
     root = np.sqrt(np.maximum(slope**2 - 4.0 * bend * rest, 0.0))
-    return np.asarray(-2.0 * rest / (slope + root))
+    # A map that does not rise there has no reading for the torque.
+    steep = slope + root
+    return np.asarray(-2.0 * rest / np.where(steep > 0.0, steep, np.nan))
 
 
 def averaged(values: Floats, period: float, span: float) -> Floats:
