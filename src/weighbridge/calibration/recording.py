@@ -14,6 +14,7 @@ from weighbridge.balance.instants import (
     SLOWEST,
     engine_speed_at,
     gears_at,
+    identify_told_gears,
     motion_at,
     smoothed,
 )
@@ -148,7 +149,8 @@ class Recording:
         time = recorded - delay
         rows = motion_at(motion, time)
         engine_speed = engine_speed_at(drive, draft, time + motion.speed_delay, rows["speed"])
-        gear, gearing, slipping = gears_at(drive, draft, recorded, engine_speed, rows["speed"])
+        told = (drive, draft, recorded, engine_speed, rows["speed"])
+        gear, gearing, slipping = gears_at(*told, identify_told_gears(*told))
         changing = shifting(time, gear, margin=SHIFT_MARGIN)
         if draft.driveline.single_speed:
             changing[:] = False
@@ -169,7 +171,7 @@ class Recording:
             gear=gear,
             gearing=gearing,
             air_speed=rows["speed"] + headwind(drive, rows["heading"]),
-            air_density=air_density(drive, time, rows["altitude"]),
+            air_density=air_density(drive, rows["altitude"]),
         )
         usable = self._complete(view, engine_speed) & ~changing & ~slipping
         usable &= (rows["valid"] > 0.99) & (rows["speed"] >= SLOWEST)

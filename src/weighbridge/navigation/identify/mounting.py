@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -87,45 +88,10 @@ def coarse_mounting(
     rest_gyro = np.median(gyro[resting & ok], axis=0) if (resting & ok).sum() >= 4 else None
     bias = rest_gyro if rest_gyro is not None else np.zeros(3)
 
-    # speed change over two periods against the force averaged over the same time
-    smooth_accel = (accel[:-2] + 2.0 * accel[1:-1] + accel[2:]) / 4.0
-    smooth_gyro = (gyro[:-2] + 2.0 * gyro[1:-1] + gyro[2:]) / 4.0 - bias
-    rate = (speed[2:] - speed[:-2]) / (2.0 * period)
-    v = (speed[:-2] + 2.0 * speed[1:-1] + speed[2:]) / 4.0
-    rows = (
-        np.isfinite(smooth_accel).all(axis=1)
-        & np.isfinite(smooth_gyro).all(axis=1)
-        & np.isfinite(rate)
-        & (np.abs(rate) < 8.0)
-        & (v > 1.0)
-    )
-    if rows.sum() * period < 8.0:
-        raise TooLittleMotionError(
-            f"the vehicle moves for only {rows.sum() * period:.0f} s, too little to find how "
-            "the inertial sensor is mounted: give the mounting in the vehicle file"
-        )
-    f, w, a, v = smooth_accel[rows], smooth_gyro[rows], rate[rows], v[rows]
-
-    coef = np.zeros((4, 3))
-    std = np.full(4, np.inf)
-    for _ in range(3):
-        turn = v * (w @ down)
-        design = np.column_stack([np.ones_like(a), a, turn, v])
-        if rest_gyro is not None:
-            design = design[:, :3]
-        weight = np.ones(a.size)
-        for _ in range(3):
-            root = np.sqrt(weight)[:, None]
-            sol, *_ = np.linalg.lstsq(design * root, f * root, rcond=None)
-            res = f - design @ sol
-            size = np.linalg.norm(res, axis=1)
-            weight = 1.0 / np.maximum(1.0, size / (1.5 * np.median(size) + 1e-9))
-        # gravity where rest says it: not tilted by the mean grade of the rows
-        down = -(sol[0]) / np.linalg.norm(sol[0])
-        coef[: sol.shape[0]] = sol
-        noise = float(np.sqrt(np.sum(weight[:, None] * res**2) / (2.0 * weight.sum())))
-        info = np.linalg.inv((design * weight[:, None]).T @ design + 1e-9 * np.eye(design.shape[1]))
-        std[: sol.shape[0]] = noise * np.sqrt(np.diag(info) * _CORRELATION)
+    f, w, a, v = _moving_rows(accel, gyro - bias, speed, period)
+    fit = _regressed(f, w, a, v, down, free_bias=rest_gyro is None)
+    coef, std, weight = fit.coef, fit.std, fit.weight
+    down = -coef[0] / np.linalg.norm(coef[0])
     _check_gravity(float(np.linalg.norm(coef[0])))
 
     forward = coef[1] - down * (coef[1] @ down)
@@ -156,6 +122,70 @@ def coarse_mounting(
         forward_gain_most=_most_gain(f @ axis, a, weight),
         yaw_rate_bias=yaw_bias,
     )
+
+
+def _moving_rows(
+    accel: Floats, gyro: Floats, speed: Floats, period: float
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Force, angular rate, rate of change of the speed and speed of the moving vehicle.
+
+    The speed's change over two periods stands against the force averaged over the same time.
+    """
+    smooth_accel = (accel[:-2] + 2.0 * accel[1:-1] + accel[2:]) / 4.0
+    smooth_gyro = (gyro[:-2] + 2.0 * gyro[1:-1] + gyro[2:]) / 4.0
+    rate = (speed[2:] - speed[:-2]) / (2.0 * period)
+    v = (speed[:-2] + 2.0 * speed[1:-1] + speed[2:]) / 4.0
+    rows = (
+        np.isfinite(smooth_accel).all(axis=1)
+        & np.isfinite(smooth_gyro).all(axis=1)
+        & np.isfinite(rate)
+        & (np.abs(rate) < 8.0)
+        & (v > 1.0)
+    )
+    if rows.sum() * period < 8.0:
+        raise TooLittleMotionError(
+            f"the vehicle moves for only {rows.sum() * period:.0f} s, too little to find how "
+            "the inertial sensor is mounted: give the mounting in the vehicle file"
+        )
+    return smooth_accel[rows], smooth_gyro[rows], rate[rows], v[rows]
+
+
+class _Fit(NamedTuple):
+    """Regression of the force: coefficients (4, 3), their stds (4,), weights of the rows (n,)."""
+
+    coef: Floats
+    std: Floats
+    weight: Floats
+
+
+def _regressed(
+    f: Floats, w: Floats, a: Floats, v: Floats, down: Floats, *, free_bias: bool
+) -> _Fit:
+    """Regress force on acceleration and turning, robustly; the yaw rate is that about ``down``.
+
+    Without ``free_bias`` the yaw rate has none, and the last coefficient is left zero.
+    """
+    coef, std = np.zeros((4, 3)), np.full(4, np.inf)
+    weight = np.ones(a.size)
+    for _ in range(3):
+        turn = v * (w @ down)
+        design = np.column_stack([np.ones_like(a), a, turn, v])
+        if not free_bias:
+            design = design[:, :3]
+        weight = np.ones(a.size)
+        for _ in range(3):
+            root = np.sqrt(weight)[:, None]
+            sol, *_ = np.linalg.lstsq(design * root, f * root, rcond=None)
+            res = f - design @ sol
+            size = np.linalg.norm(res, axis=1)
+            weight = 1.0 / np.maximum(1.0, size / (1.5 * np.median(size) + 1e-9))
+        # gravity where rest says it: not tilted by the mean grade of the rows
+        down = -(sol[0]) / np.linalg.norm(sol[0])
+        coef[: sol.shape[0]] = sol
+        noise = float(np.sqrt(np.sum(weight[:, None] * res**2) / (2.0 * weight.sum())))
+        info = np.linalg.inv((design * weight[:, None]).T @ design + 1e-9 * np.eye(design.shape[1]))
+        std[: sol.shape[0]] = noise * np.sqrt(np.diag(info) * _CORRELATION)
+    return _Fit(coef, std, weight)
 
 
 def _most_gain(force: Floats, rate: Floats, weight: Floats) -> float:

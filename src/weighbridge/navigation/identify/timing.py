@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from weighbridge.signals import Floats, Signal
@@ -83,18 +85,29 @@ def estimate_speed_delay(
             return float(target @ target)
         return float(np.sum((target - gain * model) ** 2))
 
+    delay, least, curvature = _minimum(residual, low, high)
+    if curvature <= 0.0 or least > 0.7 * float(target @ target):
+        return 0.0, np.inf
+    # overlapping spans repeat the same noise `ahead` times
+    noise_var = least / target.size
+    return delay, float(np.sqrt(2.0 * noise_var * ahead / curvature))
+
+
+def _minimum(
+    residual: Callable[[float], float], low: float, high: float
+) -> tuple[float, float, float]:
+    """Find the delay of the least residual, that residual, and its curvature.
+
+    The curvature is negative where the least lies at ``low`` or ``high``.
+    """
     grid = np.arange(low, high + 1e-9, 0.1)
     cost = np.array([residual(d) for d in grid])
     best = float(grid[int(np.argmin(cost))])
     fine = best + np.arange(-0.1, 0.1001, 0.02)
     cost_fine = np.array([residual(d) for d in fine])
     k = int(np.clip(np.argmin(cost_fine), 1, fine.size - 2))
-    left, mid, right = cost_fine[k - 1], cost_fine[k], cost_fine[k + 1]
+    left, mid, right = (float(c) for c in cost_fine[k - 1 : k + 2])
     curvature = (left - 2.0 * mid + right) / 0.02**2
-    if curvature <= 0.0 or not low < best < high or mid > 0.7 * float(target @ target):
-        return 0.0, np.inf
-    delay = float(fine[k]) + 0.5 * (left - right) / (curvature * 0.02)
-    # overlapping spans repeat the same noise `ahead` times
-    noise_var = mid / target.size
-    std = float(np.sqrt(2.0 * noise_var * ahead / curvature))
-    return delay, std
+    if curvature <= 0.0 or not low < best < high:
+        return best, mid, -1.0
+    return float(fine[k]) + 0.5 * (left - right) / (curvature * 0.02), mid, curvature
