@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.estimators.load_stops import loadable
 from weighbridge.estimators.track import FilterInput
 from weighbridge.kernels import disturbance
 from weighbridge.signals import Floats
@@ -17,16 +18,6 @@ STEPS: Final = 20
 ENDS: Final = 24
 """Windows at the beginning and end in which no change is looked for: a launch from cold passed for
 another scale in a recorded electric car."""
-
-OPENED: Final = 3.0
-"""In shorter stops nobody gets on or off [s]."""
-
-LOADED: Final = 0.01
-"""Part of the mass that a second of a longer stop loads or unloads [1/s]: a passenger in 1.6 s
-through each of three doors of a bus of 13 t."""
-
-MOST_LOADED: Final = 0.25
-"""The same of any stop [-]."""
 
 MOST_STOPS: Final = 40
 """Stops that are tried, the longest first."""
@@ -138,7 +129,7 @@ def largest(given: FilterInput) -> ScaleChange | None:
 
 def _with_stops(given: FilterInput, same: float) -> float:
     """Log-likelihood with jumps of the mass at the stops that explain most, short ones too."""
-    size = np.minimum(LOADED * np.maximum(given.stood - OPENED, 0.0), MOST_LOADED)
+    size = loadable(given.stood)
     stops = np.flatnonzero(size > 0.0)
     stops = stops[np.argsort(-size[stops], kind="stable")][:MOST_STOPS]
     added, best = given.added, same

@@ -18,18 +18,22 @@ SHORTEST: Final = 8.0
 """In shorter stops no load changes [s]: a parcel is handed out in ten. Of 68 drives of two other
 simulators, without a change of load, one was said to have one, with `STOP` in its place three."""
 
+CHANGE_RISE: Final = 1.6
+"""Growth of that logarithm with the logarithm of the standstill: at two minutes it is even."""
+
 OPENED: Final = 3.0
 """Nobody gets on or off so soon after the vehicle stands [s]."""
 
-LOADED: Final = 0.025
-"""Part of the mass that a second beyond `OPENED` loads or unloads at most, in a stop shorter than
-`STOP` [1/s]: 45 kg of a car, two and a half times what buses board."""
+LOADED: Final = 0.01
+"""Part of the mass that a second beyond `OPENED` loads or unloads [1/s]: a passenger in 1.6 s
+through each of three doors of a bus of 13 t."""
+
+HASTIEST: Final = 2.5
+"""Multiple of that beyond which nothing is loaded in a stop shorter than `STOP` [-]: 45 kg/s of a
+car."""
 
 MOST_LOADED: Final = 0.3
-"""The same of the whole stop [-]."""
-
-CHANGE_RISE: Final = 1.6
-"""Growth of that logarithm with the logarithm of the standstill: at two minutes it is even."""
+"""Part of the mass that a whole stop loads or unloads [-]."""
 
 
 def stood_before(view: MergedView, time: Floats) -> Floats:
@@ -73,6 +77,17 @@ def change_odds(stood: Floats) -> Floats:
     return odds
 
 
+def loadable(stood: Floats, haste: float = 1.0) -> Floats:
+    """Part of the mass that a stop loads or unloads (m,) [-].
+
+    Parameters
+    ----------
+    stood : (m,) how long the vehicle stood [s]
+    haste : multiple of `LOADED` [-]
+    """
+    return np.minimum(haste * LOADED * np.maximum(stood - OPENED, 0.0), MOST_LOADED)
+
+
 def too_hasty(begins: Bools, stood: Floats, mass: Floats) -> Bools:
     """Mark changes of load that are too large for the time the vehicle stood (m,).
 
@@ -83,5 +98,4 @@ def too_hasty(begins: Bools, stood: Floats, mass: Floats) -> Bools:
     mass : (m,) of the windows [kg]
     """
     change = np.abs(np.diff(mass, prepend=mass[:1])) / np.abs(mass)
-    most = np.minimum(LOADED * np.maximum(stood - OPENED, 0.0), MOST_LOADED)
-    return np.asarray(begins & (stood < STOP) & (change > most))
+    return np.asarray(begins & (stood < STOP) & (change > loadable(stood, HASTIEST)))
