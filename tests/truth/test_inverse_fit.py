@@ -1,14 +1,18 @@
 """The fit of the reading on the motion, against a map that is known."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from weighbridge.balance.table import MergedView
 from weighbridge.calibration.inverse import (
     DriveRows,
     FitSettings,
+    InverseFit,
+    _confounded,
     fit,
     fit_with_gusts,
 )
@@ -165,3 +169,28 @@ def test_what_gusts_confound_stays_open():
     # Speed answers to the gusts, and the drag that is missing passes for rolling resistance.
     assert min(told[fit]) > 2.0
     assert max(np.abs(told[fit_with_gusts])) < 1.8
+
+
+def test_a_drag_area_below_zero_meets_the_prior_again():
+    cov = np.diag([4.0, 1e-4, 0.02**2, 1e-6, 1e-4, 0.25])
+    cov[0, 2] = cov[2, 0] = 0.5 * 2.0 * 0.02
+    plain = InverseFit(
+        coefficients=np.array([1.0, 1.0]), road=np.array([-0.3, 0.012, 0.03, 4.0]),
+        stds=np.sqrt(np.diag(cov)), cov=cov, log_likelihood=0.0, windows=400,
+    )  # fmt: skip
+    apart = np.array([-6.0, 0.0, 1.2, -1e-3, 0.0, 0.0])
+    found = _confounded(plain, apart, 0.65, 0.25)
+    # The same by information: noise and bias of the drives, then the class.
+    told = 1.0 / (1.0 / 0.02**2 - 1.0 / 0.25**2)
+    widened = told + (1.2 * told / 0.02**2) ** 2
+    at = told * (-0.3 / 0.02**2 - 0.65 / 0.25**2)
+    after = 1.0 / (1.0 / widened + 1.0 / 0.25**2)
+    assert_allclose(found.road[0], after * (at / widened + 0.65 / 0.25**2), rtol=1e-9)
+    assert_allclose(found.stds[2] ** 2, after, rtol=1e-9)
+    assert 0.5 < found.road[0] < 0.65
+    # The offset follows the drag area along the difference of the two fits.
+    assert_allclose((found.coefficients[0] - 1.0) / (found.road[0] + 0.3), -5.0, rtol=0.02)
+    above = replace(plain, road=np.array([0.3, 0.012, 0.03, 4.0]))
+    kept = _confounded(above, apart, 0.65, 0.25)
+    assert_allclose(kept.road, above.road)
+    assert_allclose(kept.cov, cov + np.outer(apart, apart))

@@ -196,9 +196,10 @@ def fit_with_gusts(drives: list[DriveRows], settings: FitSettings) -> InverseFit
 def _confounded(plain: InverseFit, apart: Floats, mean: float, std: float) -> InverseFit:
     """Add what gusts leave confounded to a fit, and let the prior drag area count against it.
 
-    The prior has been weighed against the noise alone. Beside a confounded drag area it weighs
-    more: the likelihood is taken out of the posterior, widened, and met with the prior again. The
-    other parameters follow by their covariance with the drag area, which stays at zero or above.
+    The prior has been weighed against the noise alone. A drag area that gusts draw below
+    zero meets it again: the likelihood is taken out of the posterior, widened,
+    and met with the prior. The other parameters follow by their covariance with the drag area,
+    which stays at zero or above.
 
     Parameters
     ----------
@@ -210,7 +211,7 @@ def _confounded(plain: InverseFit, apart: Floats, mean: float, std: float) -> In
     cov = plain.cov + np.outer(apart, apart)
     x = np.concatenate((plain.coefficients, plain.road))
     var, before = float(plain.cov[drag, drag]), std**2
-    if not 0.0 < var < before:
+    if x[drag] > 0.0 or not 0.0 < var < before:
         return replace(plain, cov=cov, stds=np.sqrt(np.maximum(np.diag(cov), 0.0)))
     alone = 1.0 / (1.0 / var - 1.0 / before)
     told = alone * (float(x[drag]) / var - mean / before)
