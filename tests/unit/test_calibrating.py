@@ -348,17 +348,19 @@ def test_report_terminal_and_file_tell_the_same(empty, tmp_path, method):
     for name, (section, key, std_key) in FILE_KEYS.items():
         value, std = shown[name]
         last_digit = 10.0 ** -len(value.partition(".")[2])
-        assert float(value) == pytest.approx(saved[section][key], abs=0.51 * last_digit), name
+        # A file is rounded to a small part of its standard deviations.
+        rounding = 0.51 * last_digit + 0.02 * (saved[section].get(std_key) or 0.0)
+        assert float(value) == pytest.approx(saved[section][key], abs=rounding), name
         if std[:1].isdigit():
             stated = saved[section][std_key]
-            assert float(std) == pytest.approx(stated, abs=0.51 * last_digit), name
+            assert float(std) == pytest.approx(stated, abs=rounding), name
         else:
             assert not saved[section].get(std_key), name
         assert report[name].startswith(value)
         assert std in report[name]
     for k, w in enumerate(told["coefficients"]):
         value, std = shown[f"torque w{k}"]
-        assert float(value) == pytest.approx(w, rel=1e-4)
+        assert float(value) == pytest.approx(w, rel=1e-4, abs=0.02 * float(std))
         assert report[f"torque w{k}"] == f"{value} ± {std}"
     scale = 100.0 * saved["provenance"]["mass_scale_std"]
     assert float(shown["left in every mass (%)"][0]) == pytest.approx(scale, abs=0.0051)
@@ -373,14 +375,16 @@ def test_the_rows_shown_are_those_of_the_vehicle_saved(empty, tmp_path, method):
     )
     view = balance.merged
     index = np.searchsorted(view.time - view.time[0], done.rows.time - 1e-6)
-    np.testing.assert_allclose(done.rows.source_torque, balance.merged.torque[index], rtol=1e-6)
+    np.testing.assert_allclose(
+        done.rows.source_torque, balance.merged.torque[index], rtol=5e-4, atol=0.02
+    )
     phi, rest = regression(view, Vehicle.load(tmp_path / "car.toml"))
     mass = empty.drive.info.mass - view.fuel_burnt
     taken = (mass * phi + view.traction_force - rest) / view.gearing
-    np.testing.assert_allclose(done.rows.motion_torque, taken[index], rtol=1e-5, atol=0.01)
+    np.testing.assert_allclose(done.rows.motion_torque, taken[index], rtol=5e-4, atol=0.05)
     residual = taken[index] - balance.merged.torque[index]
     std = 1.4826 * np.median(np.abs(residual))
-    assert done.vehicle.provenance.residual_std == pytest.approx(std, rel=1e-3)
+    assert done.vehicle.provenance.residual_std == pytest.approx(std, rel=5e-3)
 
 
 def test_terminal_and_file_tell_the_same_speed_model(empty, tmp_path):
