@@ -160,7 +160,7 @@ def _dragged(
     )
     taken = averaged(torque, setup.period, PUSHED_TIME)
     odds = np.where(_noisy(source, level, taken, setup), ODDS[0], odds)
-    off = two_states.posterior(odds, recorded, STAY) > PROBABLE
+    off = two_states.posterior(odds, recorded, STAY, setup.ahead) > PROBABLE
     margin = float(np.clip(MARGIN_POLLS * setup.period, MARGIN, MOST_MARGIN))
     off = near(recorded, off, recorded, margin)
     # An engine without fuel cut burns its idle charge in overrun, and so reads above its floor

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -74,6 +75,7 @@ class FootSetup:
     pedal : name of the signal of the accelerator; None where nothing tells it
     pedal_up : its position below which no foot is on it
     pedal_period : its period [s]
+    ahead : time after a reading that may tell of it [s]
     """
 
     period: float
@@ -84,6 +86,7 @@ class FootSetup:
     pedal: str | None
     pedal_up: float
     pedal_period: float
+    ahead: float = math.inf
 
 
 def identify_foot(

@@ -75,7 +75,9 @@ def force_balance(
     """
     source = source_signal(drive, vehicle)
     recorded = source.time
-    time = recorded - ((vehicle.timing.torque_delay or 0.0) if delay is None else delay)
+    if delay is None:
+        delay = vehicle.timing.torque_delay or 0.0
+    time = recorded - delay
     lag = vehicle.timing.torque_lag if lag is None else lag
     rows = motion_at(smoothed(motion, lag), time)
     engine_speed = engine_speed_at(drive, vehicle, time + motion.speed_delay, rows["speed"])
@@ -129,6 +131,7 @@ def force_balance(
         switch_dead=brakes.switch_dead,
         coarse_std=coarse_std(source, source.at(recorded), reason == Reason.USED),
         setup=setup,
+        delay=delay,
     )
 
 

@@ -167,6 +167,7 @@ class ForceBalance:
     switch_dead : the brake switch contradicts the motion and is not used
     coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
     setup : what a whole drive tells of its force side; None where it was not looked for
+    delay : lateness of the torque, which is off its instants [s]
     """
 
     merged: MergedView
@@ -175,6 +176,7 @@ class ForceBalance:
     switch_dead: bool = False
     coarse_std: float = 0.0
     setup: ForceSetup | None = None
+    delay: float = 0.0
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -27,11 +27,8 @@ def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
     if drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude")):
         from weighbridge.navigation.inertial import inertial_motion
 
-        positions = drive.has("latitude", "longitude")
-        return inertial_motion(
-            drive if positions else _true_speed(drive, vehicle),
-            vehicle.mounting if vehicle is not None else None,
-        )
+        mounting = vehicle.mounting if vehicle is not None else None
+        return inertial_motion(scaled_for_navigation(drive, vehicle), mounting)
     if drive.has("longitudinal_accel", "vehicle_speed"):
         return longitudinal_motion(_true_speed(drive, vehicle))
     if has_speed:
@@ -39,6 +36,12 @@ def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
     raise DriveError(
         f"{drive.name}: no vehicle_speed and no GNSS; without a speed no vehicle can be weighed"
     )
+
+
+def scaled_for_navigation(drive: Drive, vehicle: Vehicle | None) -> Drive:
+    """Return the drive as navigation takes it: positions show the scale of its speed."""
+    positions = drive.has("latitude", "longitude")
+    return drive if positions else _true_speed(drive, vehicle)
 
 
 def _true_speed(drive: Drive, vehicle: Vehicle | None) -> Drive:
