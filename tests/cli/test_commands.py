@@ -67,7 +67,7 @@ def test_unknown_option_is_status_2(weighbridge):
 
 
 def test_bugs_keep_their_traceback(weighbridge, car, loaded, monkeypatch):
-    def broken(*_):
+    def broken(*_, **__):
         raise ZeroDivisionError
 
     monkeypatch.setattr("weighbridge.pipeline.weighing.weigh", broken)

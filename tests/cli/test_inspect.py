@@ -104,7 +104,7 @@ def test_brackets_stay_in_tables_of_several_drives():
     assert none.status is Status.MISSING_SIGNALS
     console = Console(width=160)
     with console.capture() as shown:
-        console.print(result_table([none], [(Path("logs[b]"), why)]))
+        console.print(result_table([none], [("logs[b]", why)]))
         console.print(method_table((none,)))
     text = shown.get()
     assert text.count("under [torque] of") == 3

@@ -24,7 +24,9 @@ def test_a_path_is_read_with_the_mapping_that_the_vehicle_file_names(
         lines.append(f'{name} = {{ column = "{column}", unit = "{unit}" }}')
     (tmp_path / "map.toml").write_text("\n".join(lines))
     replace(short_car, mapping="map.toml").save(tmp_path / "car.toml")
-    by_hand = wb.weigh(wb.read_drive(folder, tmp_path / "map.toml"), short_car)
+    by_hand = wb.weigh(
+        wb.read_drive(folder, tmp_path / "map.toml"), wb.Vehicle.load(tmp_path / "car.toml")
+    )
     weighed = wb.weigh(folder, tmp_path / "car.toml")
     assert weighed.mass == by_hand.mass
     assert wb.inspect_drive(folder, tmp_path / "car.toml").drive.has("vehicle_speed")

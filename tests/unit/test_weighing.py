@@ -199,7 +199,7 @@ def test_the_spread_that_a_warning_quotes_is_in_the_interval(method):
         w = weigh(recorded, car, method)
         [said] = [text for text in w.warnings if "not made by a calibration" in text]
         quoted = re.search(r"([\d.]+) % of the mass", said)
-        found.append((float(quoted[1]), 100.0 * w.std / w.mass))
+        found.append((float(quoted[1]), 100.0 * w.result.std / w.result.mass))
     (low, exact), (high, open_) = found
     assert low < exact
     assert high < open_

@@ -428,9 +428,12 @@ def unwrapped(seconds: Floats) -> Floats:
     return out
 
 
-def start_text(seconds: float) -> str:
-    """ISO 8601 text of a time counted from 1970."""
-    return dt.datetime.fromtimestamp(seconds, tz=dt.UTC).isoformat()
+def start_text(seconds: float) -> str | None:
+    """ISO 8601 text of a time counted from 1970; None of a year that no calendar has."""
+    try:
+        return dt.datetime.fromtimestamp(seconds, tz=dt.UTC).isoformat()
+    except (ValueError, OverflowError, OSError):
+        return None
 
 
 def column_list(names: Iterable[str], limit: int = 12) -> str:
