@@ -265,8 +265,9 @@ def test_names_of_three_hundred_bytes(refused, tmp_path, monkeypatch, words):
 def test_folders_and_devices_in_place_of_files(refused, tmp_path, option):
     said = "is a folder" if option == "--dbc" else "Is a directory"
     refused("inspect", GOLDEN / "csv", option, tmp_path, said=said)
-    said = "is a device" if option == "--dbc" else "longer than 4 MB"
-    refused("inspect", GOLDEN / "csv", option, "/dev/zero", said=said)
+    refused("inspect", GOLDEN / "csv", option, "/dev/zero", said="is a device or a pipe")
+    os.mkfifo(tmp_path / "pipe")
+    refused("inspect", GOLDEN / "csv", option, tmp_path / "pipe", said="is a device or a pipe")
 
 
 @pytest.mark.parametrize("name", ["drive.toml", "gnss.csv"])
@@ -298,7 +299,8 @@ def test_loops_devices_and_what_is_no_file(refused, tmp_path):
     refused("inspect", tmp_path / "file" / "x", said="Not a directory")
     refused("inspect", tmp_path / "pipe.csv", said="a device or a pipe")
     refused("inspect", "/dev/zero", said="a device or a pipe")
-    refused("weigh", GOLDEN / "csv", "--vehicle", "/dev/zero", said="longer than 4 MB")
+    refused("weigh", GOLDEN / "csv", "--vehicle", "/dev/zero", said="is a device or a pipe")
+    refused("vehicle", "show", tmp_path / "pipe.csv", said="is a device or a pipe")
     words = ("weigh", GOLDEN / "csv", "--vehicle", car, "--json")
     refused(*words, tmp_path / "file" / "x", said="there is no folder")
     refused("convert", GOLDEN / "csv", tmp_path / "file" / "x", said="Not a directory")

@@ -332,9 +332,12 @@ def read_toml(path: Path, error: type[WeighbridgeError] = ConfigError) -> Sectio
     Raises
     ------
     WeighbridgeError
-        Of the type given: no such file, not text, or not TOML.
+        Of the type given: no such file, a device or a pipe, not text, or not TOML.
     """
     try:
+        # To open a pipe that nobody writes to would wait without end.
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise error(f"{path} is a device or a pipe; name a file")
         with path.open("rb") as file:
             content = file.read(LONGEST_FILE + 1)
     except FileNotFoundError:
