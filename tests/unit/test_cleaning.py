@@ -1,6 +1,7 @@
 """Cleaning: what is left out is counted, and what is left is what was recorded."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -80,6 +81,32 @@ def test_values_read_together_one_to_a_row_keep_their_stamp():
     assert [s.name for s in signals] == ["vehicle_speed", "engine_speed"]
     for signal in signals:
         assert_array_equal(signal.time, np.arange(30.0))
+
+
+@pytest.mark.parametrize("order", ["reversed", "shuffled", "as text", "in blocks"])
+def test_rows_out_of_order_are_sorted(order):
+    time = 0.02 * np.arange(20_000)
+    rows = {
+        "reversed": np.arange(time.size)[::-1],
+        "shuffled": np.random.default_rng(1).permutation(time.size),
+        "as text": np.array(sorted(range(time.size), key=lambda k: f"{time[k]:.2f}")),
+        "in blocks": np.arange(time.size).reshape(-1, 50)[:, ::-1].ravel(),
+    }[order]
+    signals, problems = clean_columns(time[rows], [("vehicle_speed", np.sin(time[rows]))], "x.csv")
+    assert_array_equal(signals[0].time, time)
+    assert_array_equal(signals[0].values, np.sin(time))
+    assert [p.text for p in problems] == [
+        "x.csv: the rows are not in the order of their time; they were sorted"
+    ]
+
+
+def test_a_clock_that_is_set_back_is_not_sorted():
+    # Twelve recordings of which each begins 5 s before the last ended.
+    pieces = [95.0 * k + 0.1 * np.arange(1000) + 0.003 * k for k in range(12)]
+    time = np.concatenate(pieces)
+    signals, problems = clean_columns(time, [("vehicle_speed", time)], "x.csv")
+    assert len(signals[0]) < time.size - 500
+    assert "the clock runs backwards" in problems[0].text
 
 
 def test_one_late_stamp_costs_one_row():

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weighbridge.signals.drive import Problem
 from weighbridge.signals.signal import Bools, Floats, Signal
+
+Rows = NDArray[np.intp]
 
 COARSE: Final = 0.05
 """Stamps in steps below this are as fine as a drive needs [s]."""
@@ -26,6 +29,16 @@ NO_DRIVE: Final = 6 * 3600.0
 
 _STRAYS: Final = 0.01
 """Part of the rows from which stamps far from their neighbours are no mistake but a unit [-]."""
+
+_DISORDER: Final = 0.02
+"""Part of the rows out of order below which they are left out [-]."""
+
+_FEWEST_RUNS: Final = 8
+"""Fewer runs of rising stamps are recordings or clocks set anew, not rows out of order."""
+
+_MIXED: Final = 8.0
+"""Changes from run to run in the order of time, for each run: more, and runs tell of the same
+time, so that the clock was set back. Shuffled rows have 2, those sorted as text 1 [-]."""
 
 FEWEST_ROWS: Final = 20
 """Fewer rows do not tell a coarse clock from repeated rows."""
@@ -83,6 +96,35 @@ def _strays(time: Floats) -> Bools:
     alone[1:] &= far
     alone[:-1] &= far
     return alone if 0 < np.count_nonzero(alone) <= _STRAYS * time.size else np.zeros_like(alone)
+
+
+def order_of_time(time: Floats) -> Rows | None:
+    """Order in which the stamps of rows rise, where whole rows were shuffled, sorted or reversed.
+
+    Parameters
+    ----------
+    time : (n,) as recorded; NaN where missing [s]
+
+    Returns
+    -------
+    (n,) rows, those without time last; None where few are out of order, where many share a
+    stamp, or where the clock was set back and stamps come twice.
+    """
+    present = time[np.isfinite(time)]
+    if present.size < FEWEST_ROWS or (np.diff(present) >= 0.0).all():
+        return None
+    falls = np.diff(present) < 0.0
+    runs = int(np.count_nonzero(falls)) + 1
+    lost = np.count_nonzero(~rising(present))
+    if runs < _FEWEST_RUNS or lost < _DISORDER * present.size:
+        return None
+    run = np.concatenate(([0], np.cumsum(falls)))
+    rows = np.argsort(present, kind="stable")
+    shared = np.count_nonzero(np.diff(present[rows]) == 0.0)
+    mixed = np.count_nonzero(np.diff(run[rows]))
+    if shared > SHARED * present.size or mixed > _MIXED * runs:
+        return None
+    return np.argsort(time, kind="stable")
 
 
 def clean_clock(time: Floats, source: str) -> Clock:
@@ -245,6 +287,12 @@ def clean_columns(
             signals.append(Signal(name, time[there], raw[there]))
         return signals, []
     problems: list[Problem] = []
+    order = order_of_time(time)
+    if order is not None:
+        time, columns = time[order], [(name, raw[order]) for name, raw in columns]
+        problems.append(
+            Problem("", f"{source}: the rows are not in the order of their time; they were sorted")
+        )
     coarse = spread_rows(time)
     if coarse is not None:
         time, step = coarse
