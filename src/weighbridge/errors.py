@@ -5,9 +5,17 @@ offending value and the remedy. Poor data is not an exception but a result
 (`weighbridge.Status`).
 """
 
+from weighbridge.visible import cut
+
 
 class WeighbridgeError(Exception):
-    """Base of all errors a caller can mend; the command line exits with 2."""
+    """Base of all errors a caller can mend; the command line exits with 2.
+
+    Its text is cut to what a screen shows: what it quotes of a file may be endless.
+    """
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(cut(text))
 
 
 class ConfigError(WeighbridgeError):

@@ -56,8 +56,14 @@ def cut(text: str, longest: int = LONGEST) -> str:
     """Cut a message to what a screen shows, and say how much is left out."""
     if len(text) <= longest:
         return text
-    head, tail = text[: longest * 2 // 3], text[-longest // 3 :]
-    return f"{head} … ({len(text) - longest} characters left out) … {tail}"
+    # Not longer than allowed with its note, so that a text that was cut is not cut again.
+    room = max(longest - len(_left_out(len(text))), 3)
+    tail = room // 3
+    return text[: room - tail] + _left_out(len(text) - room) + text[-tail:]
+
+
+def _left_out(count: int) -> str:
+    return f" … ({count} characters left out) … "
 
 
 def _escape(found: re.Match[str]) -> str:

@@ -7,6 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from weighbridge.errors import DriveError
+from weighbridge.io import read_drive
+from weighbridge.signals import Problem
 from weighbridge.visible import (
     LONGEST,
     cut,
@@ -65,7 +68,25 @@ def test_long_messages_say_how_much_is_left_out():
     short, long = "x" * LONGEST, "begin" + "x" * 10_000_000 + "end"
     assert cut(short) == short
     said = cut(long)
-    assert len(said) < LONGEST + 60
+    assert len(said) <= LONGEST
     assert said.startswith("begin")
     assert said.endswith("end")
-    assert f"({len(long) - LONGEST} characters left out)" in said
+    kept = len(said) - len(" … (9998142 characters left out) … ")
+    assert f"({len(long) - kept} characters left out)" in said
+    assert cut(said) == said
+
+
+def test_a_message_that_quotes_an_endless_cell_is_cut_where_it_is_made():
+    cell = "x" * 1_000_000
+    said = Problem("vehicle_speed", f"1 of 9 cells are no numbers, such as {cell!r}").text
+    assert said == cut(said) == str(DriveError(said))
+    assert len(str(DriveError(cell))) < LONGEST + 60
+    assert "characters left out" in said
+
+
+def test_an_endless_cell_is_short_in_json_too(tmp_path):
+    rows = "".join(f"{k},{k}\n" for k in range(30))
+    (tmp_path / "x.csv").write_text(f"time_s,vehicle_speed_kmh\n{rows}30,{'z' * 5_000_000}\n")
+    drive = read_drive(tmp_path / "x.csv")
+    assert any("are no numbers" in p.text for p in drive.problems)
+    assert all(len(p.text) < LONGEST + 60 for p in drive.problems)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from weighbridge.signals.shown import at_rate, in_html, in_lines, plural
 from weighbridge.signals.signal import Signal
+from weighbridge.visible import cut
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +47,16 @@ class Problem:
     signal : name of the signal, or empty for the whole drive
     text : one sentence with the value and the remedy
     serious : a mass made in spite of it could be wrong, so `weigh` refuses
+
+    The text is cut to what a screen shows: what it quotes of a file may be endless.
     """
 
     signal: str
     text: str
     serious: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "text", cut(self.text))
 
 
 @dataclass(frozen=True, slots=True, repr=False)
