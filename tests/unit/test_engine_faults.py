@@ -502,3 +502,29 @@ def test_a_motor_torque_cut_off_at_either_end_is_weighed_by_the_rest(fleet):
             found.status is not Status.CONVERGED
             or abs(found.mass / fleet.mass("electric") - 1.0) < 0.03
         )
+
+
+@pytest.mark.parametrize("late", [4.0, -3.0])
+@pytest.mark.parametrize("kind", ["car", "truck"])
+def test_a_speed_that_alone_is_seconds_late_gives_no_mass(fleet, kind, late):
+    drive = fleet.drive(kind)
+    speed = drive.signals["vehicle_speed"]
+    with pytest.raises(DriveError, match=r"its torque lies [34]\.\d s (earlier|later)"):
+        fleet.weigh_alone(kind, drive.with_signals(replace(speed, time=speed.time + late)))
+
+
+def test_a_trip_of_another_vehicle_behind_a_pause_gives_no_mass(fleet):
+    drive = fleet.drive("car")
+    middle = drive.start + 0.5 * drive.duration
+    paused = drive.with_signals(
+        *(
+            replace(s, time=np.where(s.time > middle, s.time + 200.0, s.time))
+            for s in drive.signals.values()
+        )
+    )
+    right(fleet, "car", fleet.weigh("car", paused))
+    engine = paused.signals["engine_speed"]
+    other = np.where(engine.time > middle, 150.0 * (engine.values / 150.0) ** 0.7, engine.values)
+    w = fleet.weigh_alone("car", paused.with_signals(replace(engine, values=other)))
+    assert w.status is Status.INCONSISTENT
+    assert "another vehicle's" in w.reason

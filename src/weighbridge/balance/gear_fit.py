@@ -21,6 +21,9 @@ apart, catch a quarter by chance; a file that lacks one of its gears keeps more 
 FEWEST: Final = 100
 """Steady ratios needed to judge."""
 
+PAUSE: Final = 60.0
+"""After so long without rows another recording may begin [s]."""
+
 SLOWEST: Final = 3.0
 """Below, clutches slip [m/s]."""
 
@@ -43,6 +46,39 @@ def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     time, ratio = held_ratios(balance)
     if time.size < FEWEST:
         return None
+    return _share(ratio, vehicle)
+
+
+def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> str:
+    """Say which part of a recording, before or after a pause, is another vehicle's; empty if none.
+
+    Parameters
+    ----------
+    balance, vehicle
+    """
+    if not vehicle.driveline.gearings:
+        return ""
+    time, ratio = held_ratios(balance)
+    rows = balance.merged.time
+    begins = rows[1:][np.diff(rows) > PAUSE]
+    number = np.searchsorted(begins, time, side="right")
+    for k in range(begins.size + 1):
+        part = number == k
+        if np.count_nonzero(part) < FEWEST:
+            continue
+        share = _share(ratio[part], vehicle)
+        if share < ENOUGH:
+            begin, end = float(time[part][0]), float(time[part][-1])
+            return (
+                f"from {begin:.6g} to {end:.6g} s, beside a pause of the recording, only "
+                f"{100.0 * share:.0f} % of the steady ratios of engine to vehicle speed lie at a "
+                f"gearing of {vehicle.name}: another vehicle's trip; cut the recording there"
+            )
+    return ""
+
+
+def _share(ratio: Floats, vehicle: Vehicle) -> float:
+    """Part of logarithms of ratios (n,) that lie at a gearing [-]."""
     gearings = np.log(np.array(vehicle.driveline.gearings))
     # A short drive may not show the scale of its speed, which stays the indicated one then.
     true, indicated = (

@@ -10,8 +10,8 @@ from typing import Any
 
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
-from weighbridge.balance.delay import clock_shift, estimate_torque_delay
-from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
+from weighbridge.balance.delay import clock_shift, estimate_torque_delay, far_shift
+from weighbridge.balance.gear_fit import ENOUGH, foreign_part, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.balance.torque_drift import steadied
@@ -178,7 +178,9 @@ def weigh_balance(
             "are wrong; calibrate this vehicle"
         )
     elif not estimator.speed_alone and (
-        why := scale_contradiction(balance, vehicle) or _smoothed(drive, vehicle, balance)
+        why := scale_contradiction(balance, vehicle)
+        or foreign_part(balance, vehicle)
+        or _smoothed(drive, vehicle, balance)
     ):
         status, reason = Status.INCONSISTENT, why
     if status is Status.CONVERGED and not estimator.speed_alone:
@@ -296,6 +298,12 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
                 "its clock was moved by that",
             )
     balance = force_balance(drive, vehicle, motion, delay=delay)
+    if behind := far_shift(balance, vehicle):
+        raise DriveError(
+            f"{drive.name}: its torque lies {_later(-behind)} than the motion it makes, though "
+            "speed and accelerometer were put together: the clock of the speed or of the torque "
+            "alone is off, and the mass would be wrong; record all signals of the bus by one clock"
+        )
     return balance, notes + other_equipment(vehicle, motion) + balance.notes
 
 
