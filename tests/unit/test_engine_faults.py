@@ -528,3 +528,24 @@ def test_a_trip_of_another_vehicle_behind_a_pause_gives_no_mass(fleet):
     w = fleet.weigh_alone("car", paused.with_signals(replace(engine, values=other)))
     assert w.status is Status.INCONSISTENT
     assert "another vehicle's" in w.reason
+
+
+@pytest.mark.parametrize("scale", [1.04, 0.96])
+@pytest.mark.parametrize("kind", SOURCE)
+def test_tyres_of_another_circumference_are_found_and_corrected(fleet, kind, scale):
+    drive = fleet.drive(kind)
+    for name in ("vehicle_speed", "engine_speed"):
+        drive = with_signal(drive, name, lambda _, x: x / scale)
+    highest = np.inf if kind == "electric" else 1.0
+    drive = with_signal(drive, SOURCE[kind], lambda _, x: np.minimum(x * scale, highest))
+    weighing = fleet.weigh_alone(kind, drive)
+    said = "larger around" if scale > 1.0 else "smaller around"
+    assert any(said in w for w in weighing.warnings)
+    right(fleet, kind, weighing)
+
+
+@pytest.mark.parametrize("kind", ["car", "truck"])
+def test_an_engine_speed_or_a_speed_that_alone_is_off_is_no_tyre(fleet, kind):
+    for name in ("vehicle_speed", "engine_speed"):
+        drive = with_signal(fleet.drive(kind), name, lambda _, x: 0.97 * x)
+        assert not any("its tyres" in w for w in fleet.weigh_alone(kind, drive).warnings)

@@ -10,6 +10,7 @@ from typing import Any
 
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
+from weighbridge.balance.circumference import on_its_tyres
 from weighbridge.balance.delay import clock_shift, estimate_torque_delay, far_shift
 from weighbridge.balance.gear_fit import ENOUGH, foreign_part, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
@@ -138,6 +139,10 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     else:
         vehicle, found = by_power(drive, vehicle)
         balance, notes = torque_balance(drive, vehicle)
+        vehicle, tyres = on_its_tyres(balance, vehicle)
+        if tyres:
+            balance, notes = torque_balance(drive, vehicle)
+            notes = (tyres, *notes)
         warnings += found + notes + vehicle.provenance.doubts
         warnings += fitted_for_another(vehicle, method)
     return weigh_balance(drive, vehicle, method, balance, warnings, settings=settings)
