@@ -8,6 +8,7 @@ import pytest
 
 import weighbridge as wb
 from weighbridge.checks import check_drive
+from weighbridge.checks.spikes import without_spikes
 from weighbridge.io import read_drives, write_table
 from weighbridge.signals import Signal
 from weighbridge.signals.parts import KEPT, PAUSE, STANDING, find_cuts, find_splices, parted
@@ -174,3 +175,14 @@ def test_a_splice_is_refused_by_its_name(trips):
     drive = wb.Drive("d", {"vehicle_speed": Signal("vehicle_speed", time, values)})
     serious = [p.text for p in check_drive(drive) if p.serious]
     assert "put one behind another" in serious[0]
+
+
+def test_zeros_where_no_value_was_are_left_out(trips):
+    speed = trips[0].signals["vehicle_speed"]
+    lost = (np.random.default_rng(3).random(len(speed)) < 0.05) & (speed.values > 8.0)
+    zeros = replace(speed, values=np.where(lost, 0.0, speed.values))
+    kept = without_spikes(trips[0].with_signals(zeros))
+    assert len(kept.signals["vehicle_speed"]) == len(speed) - np.count_nonzero(lost)
+    assert (kept.signals["vehicle_speed"].values == speed.values[~lost]).all()
+    assert "leap away and return at once" in kept.problems[-1].text
+    assert without_spikes(trips[0]) is trips[0]

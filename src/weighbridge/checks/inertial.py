@@ -25,6 +25,8 @@ _SAMPLES: Final = 20_000
 # Long enough for fixes a metre off to show a bend [s].
 _TURN_WINDOW: Final = 5.0
 _WINDOW: Final = 2.0  # [s]
+# Correlation of the turns by gyro and course from which one scale may part them [-].
+_TURN_TOGETHER: Final = 0.5
 # No road vehicle rolls or pitches by 11 degrees within 2 s: what turns faster, yaws [rad/s].
 _YAWS: Final = 0.1
 # Windows enough for a correlation of 0.3 to be no chance.
@@ -135,6 +137,9 @@ def _check_rate(drive: Drive, gyro: tuple[Signal, Signal, Signal]) -> Iterator[P
     elif ratio < 1.0 / 15.0:
         unit, said = "rad/s", "gyro_x_radps"
     else:
+        return
+    # Positions that scatter turn as well, but not when the gyro does.
+    if np.corrcoef(angle[full], np.abs(change[full]))[0, 1] < _TURN_TOGETHER:
         return
     yield Problem(
         "gyro_x",

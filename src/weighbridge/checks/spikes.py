@@ -12,6 +12,9 @@ from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 FEW: Final = 0.01
 """Part of the samples up to which spikes are few; at least one [-]."""
 
+FEW_ZEROS: Final = 0.1
+"""The same of zeros, which a bus or a reader writes where it has no value [-]."""
+
 LONGEST: Final = 3
 """Samples of a spike at most."""
 
@@ -33,6 +36,9 @@ _LIMITS: Final = {
     "engine_speed": _Limit(1500.0, 150.0),
 }
 
+# Between two samples of one speed, to stop and to be as fast again takes twice its loss by grip.
+_GRIP: Final = {name: _Limit(6.0, 1.0) for name in ("vehicle_speed", "gnss_speed")}
+
 
 def without_spikes(drive: Drive) -> Drive:
     """Leave out spikes of speed and engine speed where they are few.
@@ -48,9 +54,18 @@ def without_spikes(drive: Drive) -> Drive:
         signal = drive.get(name)
         if signal is None or len(signal) < 20 or name in drive.info.trusted:
             continue
-        marked = spikes(signal.time, signal.values, limit.rate, limit.jump)
+        marked = np.zeros(len(signal), dtype=bool)
+        if name in _GRIP:
+            # First, so that a true sample between two zeros is no spike.
+            marked = spikes(signal.time, signal.values, *_GRIP[name]) & (signal.values == 0.0)
+            if np.count_nonzero(marked) > FEW_ZEROS * len(signal):
+                continue
+        rest = np.flatnonzero(~marked)
+        leaps = spikes(signal.time[rest], signal.values[rest], limit.rate, limit.jump)
+        if np.count_nonzero(leaps) <= max(1.0, FEW * len(signal)):
+            marked[rest[leaps]] = True
         count = int(np.count_nonzero(marked))
-        if not count or count > max(1.0, FEW * len(signal)):
+        if not count:
             continue
         worst = int(np.flatnonzero(marked)[np.argmax(np.abs(signal.values[marked]))])
         drive = drive.with_signals(

@@ -172,8 +172,8 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
         return Problem(
             "",
             f"vehicle speed and accelerometer agree in {lags.lag.size} of {lags.pieces} pieces of "
-            "the drive only, each at a lag of its own: a clock jumps all the time, or one of the "
-            "two is wrong; record both by one clock",
+            "the drive, each at a lag of its own: a clock jumps or runs fast all the time, or one "
+            "of the two is wrong; record both by one clock",
             serious=True,
         )
     if lags.lag.size < _FEWEST:
