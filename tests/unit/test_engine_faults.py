@@ -20,7 +20,7 @@ from weighbridge.estimators.contradicted import contradicted
 from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.weighing import below_tare, weigh_balance
-from weighbridge.signals import Drive, Signal
+from weighbridge.signals import QUANTITIES, Drive, Signal
 from weighbridge.simulation import simulate_car
 from weighbridge.simulation.named import make_scenario
 from weighbridge.vehicle.model import DraggedReading, Driveline, TorqueModel, Vehicle
@@ -549,3 +549,16 @@ def test_an_engine_speed_or_a_speed_that_alone_is_off_is_no_tyre(fleet, kind):
     for name in ("vehicle_speed", "engine_speed"):
         drive = with_signal(fleet.drive(kind), name, lambda _, x: 0.97 * x)
         assert not any("its tyres" in w for w in fleet.weigh_alone(kind, drive).warnings)
+
+
+@pytest.mark.parametrize("kind", ["car", "truck"])
+def test_a_table_that_is_a_second_late_as_a_whole_is_moved(fleet, kind):
+    drive = fleet.drive(kind)
+    bus = [s for s in drive.signals.values() if QUANTITIES[s.name].table == "obd"]
+    late = drive.with_signals(*(replace(s, time=s.time + 1.0) for s in bus))
+    weighing = fleet.weigh_alone(kind, late)
+    assert any("its clock was moved" in w for w in weighing.warnings)
+    right(fleet, kind, weighing)
+    torque = drive.signals[SOURCE[kind]]
+    with pytest.raises(DriveError, match="its torque lies"):
+        fleet.weigh_alone(kind, drive.with_signals(replace(torque, time=torque.time + 1.0)))
