@@ -8,6 +8,8 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
 import weighbridge as wb
+from weighbridge.balance.bandwidth import smoothed_torque
+from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.gear_fit import share_on_gears
 from weighbridge.balance.torque_drift import steadied
 from weighbridge.checks import check_drive
@@ -145,6 +147,27 @@ def test_a_torque_that_is_smoothed_gives_no_mass(fleet, kind):
         assert found.status is Status.INCONSISTENT
         assert "was smoothed" in found.reason
         assert np.isnan(found.mass)
+
+
+def test_a_torque_through_a_filter_of_seconds_is_found(fleet):
+    def filtered(t, x):
+        share = 1.0 - np.exp(-float(np.median(np.diff(t))) / 1.6)
+        return lfilter([share], [1.0, share - 1.0], x, zi=[(1.0 - share) * x[0]])[0]
+
+    vehicle, drive = fleet.files["car"], fleet.drive("car")
+    motion, late = find_motion(drive, vehicle), vehicle.timing.torque_delay
+    assert smoothed_torque(force_balance(drive, vehicle, motion, delay=late), vehicle) == ""
+    slow = with_signal(drive, SOURCE["car"], filtered)
+    said = smoothed_torque(force_balance(slow, vehicle, motion, delay=late + 1.0), vehicle)
+    assert "was smoothed" in said
+
+
+def test_a_change_of_scale_that_is_likely_and_not_sure_is_told():
+    change = changing.ScaleChange(900.0, 900.0, 0.15, 0.01, 6.4)
+    assert not change.sure
+    assert "perhaps the mass changes by +15 %" in change.doubt
+    assert replace(change, gain=2.0).doubt == replace(change, gain=20.0).doubt == ""
+    assert replace(change, change=0.04).doubt == ""
 
 
 @pytest.mark.parametrize("kind", SOURCE)

@@ -29,6 +29,9 @@ SURE: Final = 8.0
 """Gain of likelihood from which the scale changed [-]: in 43 drives of three simulators, of all
 classes, it was at most 2; a step or a ramp by a fifth in mid-drive gave 20 to 280."""
 
+DOUBTFUL: Final = 5.0
+"""The same from which a change is told as a doubt, and the mass is given [-]."""
+
 SIGNIFICANT: Final = 5.0
 """Changes below so many standard deviations are not told [-]."""
 
@@ -60,8 +63,18 @@ class ScaleChange:
     @property
     def sure(self) -> bool:
         """Whether no undamaged drive shows such a change."""
-        large = abs(self.change) > max(LEAST, SIGNIFICANT * self.std)
-        return large and self.gain > SURE
+        return self._large and self.gain > SURE
+
+    @property
+    def doubt(self) -> str:
+        """What may be wrong, in a sentence, where a change is likely and not sure; else empty."""
+        if not self._large or not DOUBTFUL < self.gain <= SURE:
+            return ""
+        return f"perhaps {self.text}; the mass may be wrong by as much"
+
+    @property
+    def _large(self) -> bool:
+        return abs(self.change) > max(LEAST, SIGNIFICANT * self.std)
 
     @property
     def text(self) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
@@ -204,8 +204,9 @@ def weigh_balance(
             status, reason = Status.INCONSISTENT, doubt
         elif why := contradicted(result, joined):
             status, reason = Status.INCONSISTENT, why
-        elif doubt:
-            warnings += (doubt,)
+        else:
+            doubts = (doubt, change.doubt if change is not None else "")
+            warnings += tuple(d for d in doubts if d)
     return Weighing(
         drive=drive,
         vehicle=vehicle,
