@@ -184,15 +184,36 @@ def test_a_mass_that_no_load_explains_is_refused(balance, car, factor, status):
         assert "times the" in found.why
 
 
-@pytest.mark.parametrize("late", [-1.0, 1.0, 1.5])
-def test_torque_on_another_clock_is_refused(made, car, late):
-    recorded = {
-        name: Signal(name, s.time + late, s.values)
+def late_engine(made, late, names):
+    recorded = [
+        Signal(name, s.time + late, s.values)
         for name, s in made.drive.signals.items()
-        if name in ("engine_load", "engine_speed", "vehicle_speed", "mass_air_flow")
-    }
-    with pytest.raises(DriveError, match=r"[0-2]\.[0-9] s (later|earlier) .*offset_s"):
-        wb.weigh(made.drive.with_signals(*recorded.values()), car)
+        if name in names
+    ]
+    return made.drive.with_signals(*recorded)
+
+
+ENGINE = ("engine_load", "mass_air_flow")
+
+
+def test_torque_ahead_of_its_motion_is_refused(made, car):
+    early = late_engine(made, -1.0, (*ENGINE, "engine_speed", "vehicle_speed"))
+    with pytest.raises(DriveError, match=r"[0-2]\.[0-9] s earlier .*offset_s"):
+        wb.weigh(early, car)
+
+
+def test_torque_that_is_late_alone_is_refused(made, car):
+    with pytest.raises(DriveError, match=r"[0-2]\.[0-9] s later .*offset_s"):
+        wb.weigh(late_engine(made, 1.5, ENGINE), car)
+
+
+@pytest.mark.parametrize("late", [1.0, 1.5])
+def test_a_table_that_is_late_as_a_whole_is_moved_and_told(made, car, balance, late):
+    drive = late_engine(made, late, (*ENGINE, "engine_speed", "vehicle_speed"))
+    found = wb.weigh(drive, car)
+    usual = wb.weigh(made.drive, car)
+    assert found.mass == pytest.approx(usual.mass, rel=0.01)
+    assert any(f"{late:.1f}" in w and "later" in w for w in found.warnings), found.warnings
 
 
 def forward(track, stops=1.0):
