@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -26,7 +26,7 @@ from weighbridge.balance.law import needed_force, traction_gain
 from weighbridge.balance.table import ForceBalance, ForceSetup, MergedView, Reason
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle.air import air_density, dynamic_pressure, identify_air
+from weighbridge.vehicle.air import Air, air_density, dynamic_pressure, identify_air
 from weighbridge.vehicle.fuel import fuel_burnt, full_load_torque
 from weighbridge.vehicle.gear import shifting
 from weighbridge.vehicle.model import DraggedReading, Vehicle
@@ -77,13 +77,76 @@ def force_balance(
     recorded = source.time
     if delay is None:
         delay = vehicle.timing.torque_delay or 0.0
-    time = recorded - delay
     lag = vehicle.timing.torque_lag if lag is None else lag
+    read = _read(drive, vehicle, motion, source, delay, lag, setup)
+    view = read.view
+    brakes = find_brakes(
+        drive, vehicle, motion, source, view,
+        known=read.known, lag=lag, signed=signed and source_of(vehicle).signed, setup=setup,
+    )  # fmt: skip
+    fill = setup.fill if setup is not None else identify_fill(source)
+    reason = _reasons(vehicle, motion, source, read, brakes, fill)
+    view = replace(view, reason=reason)
+    if setup is None:
+        setup = ForceSetup(
+            foot=brakes.foot,
+            switch_dead=brakes.switch_dead,
+            gears=read.gears,
+            air=read.air,
+            full_torque=read.full_torque,
+            torque_noise=_torque_noise(vehicle, view),
+            fill=fill,
+        )
+    return ForceBalance(
+        merged=replace(view, force_std=setup.torque_noise * np.nan_to_num(view.gearing)),
+        motion=motion,
+        brake_hidden=brakes.hidden,
+        switch_dead=brakes.switch_dead,
+        coarse_std=coarse_std(source, source.at(recorded), reason == Reason.USED),
+        setup=setup,
+        delay=delay,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Read:
+    """What is read of motion and torque at each row.
+
+    Attributes
+    ----------
+    view : (n,) rows, without reasons and noise
+    torque : of the rows
+    known : (n,) the motion is known
+    slipping : (n,) the clutch slips
+    gears, air, full_torque : of `ForceSetup`
+    """
+
+    view: MergedView
+    torque: Torque
+    known: Bools
+    slipping: Bools
+    gears: Mapping[int, int]
+    air: Air
+    full_torque: float
+
+
+def _read(
+    drive: Drive,
+    vehicle: Vehicle,
+    motion: Motion,
+    source: Signal,
+    delay: float,
+    lag: float,
+    setup: ForceSetup | None,
+) -> _Read:
+    """Read motion and torque at the stamps of the source, less its delay."""
+    recorded = source.time
+    time = recorded - delay
     rows = motion_at(smoothed(motion, lag), time)
     engine_speed = engine_speed_at(drive, vehicle, time + motion.speed_delay, rows["speed"])
-    told = (drive, vehicle, recorded, engine_speed, rows["speed"])
-    numbers = setup.gears if setup is not None else identify_told_gears(*told)
-    gear, gearing, slipping = gears_at(*told, numbers)
+    asked = (drive, vehicle, recorded, engine_speed, rows["speed"])
+    numbers = setup.gears if setup is not None else identify_told_gears(*asked)
+    gear, gearing, slipping = gears_at(*asked, numbers)
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
     full = setup.full_torque if setup is not None else full_load_torque(torque.torque)
     air = setup.air if setup is not None else identify_air(drive, rows["altitude"])
@@ -106,32 +169,14 @@ def force_balance(
         fuel_burnt=fuel_burnt(drive, vehicle, recorded, torque.torque, engine_speed, full),
         reason=np.zeros(time.size, dtype=np.uint8),
     )
-    known = rows["valid"] > 0.99
-    brakes = find_brakes(
-        drive, vehicle, motion, source, view,
-        known=known, lag=lag, signed=signed and source_of(vehicle).signed, setup=setup,
-    )  # fmt: skip
-    fill = setup.fill if setup is not None else identify_fill(source)
-    reason = _reasons(vehicle, motion, source, view, torque, brakes, known, slipping, fill)
-    view = replace(view, reason=reason)
-    if setup is None:
-        setup = ForceSetup(
-            foot=brakes.foot,
-            switch_dead=brakes.switch_dead,
-            gears=numbers,
-            air=air,
-            full_torque=full,
-            torque_noise=_torque_noise(vehicle, view),
-            fill=fill,
-        )
-    return ForceBalance(
-        merged=replace(view, force_std=setup.torque_noise * np.nan_to_num(gearing)),
-        motion=motion,
-        brake_hidden=brakes.hidden,
-        switch_dead=brakes.switch_dead,
-        coarse_std=coarse_std(source, source.at(recorded), reason == Reason.USED),
-        setup=setup,
-        delay=delay,
+    return _Read(
+        view=view,
+        torque=torque,
+        known=np.asarray(rows["valid"] > 0.99),
+        slipping=slipping,
+        gears=numbers,
+        air=air,
+        full_torque=full,
     )
 
 
@@ -139,11 +184,8 @@ def _reasons(
     vehicle: Vehicle,
     motion: Motion,
     source: Signal,
-    view: MergedView,
-    torque: Torque,
+    read: _Read,
     brakes: Brakes,
-    known: Bools,
-    slipping: Bools,
     fill: Fill | None,
 ) -> NDArray[np.uint8]:
     """Why a row is not usable (n,); the first reason that applies is told, so the order matters.
@@ -152,12 +194,10 @@ def _reasons(
     ----------
     vehicle, motion
     source : what the torque is made from
-    view : (n,) rows
-    torque, brakes : of the rows
-    known : (n,) the motion is known
-    slipping : (n,) the clutch slips
+    read, brakes : of the rows
     fill : how readings that a logger filled in would look
     """
+    view = read.view
     recorded = source.time
     fresh = source.age(recorded) <= 3.0 * source.period
     changing = shifting(view.time, view.gear, margin=SHIFT_MARGIN)
@@ -166,14 +206,14 @@ def _reasons(
     reason = np.zeros(view.time.size, dtype=np.uint8)
     told = np.isfinite(view.traction_force) & fresh & ~filled(source, recorded, fill)
     for flag, why in (
-        (~known | ~np.isfinite(view.speed), Reason.NO_MOTION),
+        (~read.known | ~np.isfinite(view.speed), Reason.NO_MOTION),
         (view.speed < SLOWEST, Reason.STANDING),
         (brakes.braked, Reason.BRAKING),
         (changing, Reason.SHIFTING),
-        (slipping, Reason.CLUTCH_SLIPPING),
+        (read.slipping, Reason.CLUTCH_SLIPPING),
         (~told, Reason.NO_TORQUE),
-        (torque.overrun | brakes.overrun, Reason.OVERRUN),
-        (torque.extrapolated, Reason.EXTRAPOLATED),
+        (read.torque.overrun | brakes.overrun, Reason.OVERRUN),
+        (read.torque.extrapolated, Reason.EXTRAPOLATED),
         (cornering(motion, view.time), Reason.CORNERING),
     ):
         reason[(reason == 0) & flag] = why
