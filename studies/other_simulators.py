@@ -1,9 +1,9 @@
 """Accuracy of ``joint`` on drives of two simulators that share nothing with the estimators'.
 
 Run from the checkout: ``python studies/other_simulators.py``, which prints the tables of
-``accuracy.md``; ``foreign``, ``minutes``, ``makers`` or ``second`` prints one alone. The first
-three need the foreign simulator's drives in ``../shared/data``; the second model's drives are made
-on the way, in a folder that is removed.
+``accuracy.md``; ``foreign``, ``minutes``, ``makers``, ``forward`` or ``second`` prints one alone.
+The first four need the foreign simulator's drives in ``../shared/data``; the second model's
+drives are made on the way, in a folder that is removed.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from second_model import make_drive, random_vehicle
 
 import weighbridge as wb
 from weighbridge.errors import WeighbridgeError
+from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.signals import Drive, Signal
 
 FOREIGN = Path(__file__).parents[2] / "shared" / "data" / "foreign-simulator"
@@ -52,6 +53,7 @@ WEIGHED = {
     "drive-6": (0.95, "brisk"),
 }
 DRIVER = 75.0
+FIVE_MINUTES = 300.0
 
 GNSS = ("latitude", "longitude", "altitude")
 POLLED = ("vehicle_speed", "engine_speed", "engine_load", "engine_torque")
@@ -163,7 +165,7 @@ def first_minutes(drive: Drive, folder: Path) -> Drive:
     truth = pl.read_parquet(folder / "truth.parquet")
     time, speed = truth["time_s"].to_numpy(), truth["speed_mps"].to_numpy()
     moved = np.cumsum((speed > 0.5) * np.gradient(time))
-    return drive.between(drive.start, float(time[np.searchsorted(moved, 300.0)]))
+    return drive.between(drive.start, float(time[np.searchsorted(moved, FIVE_MINUTES)]))
 
 
 def minutes() -> str:
@@ -238,7 +240,40 @@ def second() -> str:
     return "\n".join([lines[0], *(row(f"all, {n}", g) for n, g in every.items()), *lines[1:]])
 
 
-PARTS = {"foreign": foreign, "minutes": minutes, "makers": makers, "second": second}
+def forward() -> str:
+    """Forward passes of the foreign drives beside what the smoother makes of them."""
+    lines = [
+        "| drive | true kg | smoothed, error % | forward at the end % | forward after 5 min % "
+        "| forward over smoothed % |",
+        "|---|---|---|---|---|---|",
+    ]
+    for vehicle in VEHICLES:
+        root = FOREIGN / vehicle
+        names = CALIBRATIONS["three drives"]
+        car = wb.calibrate(
+            [wb.read_drive(root / n) for n in names], [masses(root / n)[0] for n in names]
+        )
+        for name in DRIVES:
+            weighing = wb.weigh(wb.read_drive(root / name), car)
+            track = forward_weigh(weighing.drive, car, identify_forward(weighing))
+            begun, true = masses(root / name)
+            early = track.mass[np.searchsorted(track.time, track.time[0] + FIVE_MINUTES)]
+            lines.append(
+                f"| {vehicle}, {name} | {true:.0f} | {100.0 * (weighing.mass / true - 1.0):+.2f} "
+                f"| {100.0 * (track.mass[-1] / true - 1.0):+.2f} "
+                f"| {100.0 * (early / begun - 1.0):+.2f} "
+                f"| {100.0 * (track.mass[-1] / weighing.mass - 1.0):+.2f} |"
+            )
+    return "\n".join(lines)
+
+
+PARTS = {
+    "foreign": foreign,
+    "minutes": minutes,
+    "makers": makers,
+    "forward": forward,
+    "second": second,
+}
 
 
 def main() -> None:
