@@ -525,11 +525,11 @@ def canedge() -> str:
             wb.weigh(drive, other, method="rls").mass / small,
         ]
         table.append((drive.duration, *row))
-        of_small = f"{row[3]:.2f}" if np.isfinite(row[3]) else "none"
+        by_rls = [f"{x:.2f}" if np.isfinite(x) else "none" for x in row[2:]]
         lines.append(
             f"| {name} | {drive.duration:.0f} | {w.used_time:.0f} | {row[0]:.2f} "
             f"| {w.std / reference:.2f} | {row[1]:.2f} | {joint.std / reference:.2f} "
-            f"| {row[2]:.2f} | {of_small} | {forward} | {sd} |"
+            f"| {by_rls[0]} | {by_rls[1]} | {forward} | {sd} |"
         )
     rows = np.array(table)
     full = rows[rows[:, 0] > 500.0]
