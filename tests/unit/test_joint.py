@@ -125,9 +125,9 @@ def test_fuel_counts_in_a_calibration(made, car):
 
 def test_what_noise_of_the_motion_takes_reaches_mass_and_interval(balance, car, monkeypatch):
     real = joint.estimate(balance, car)
-    monkeypatch.setattr(joint, "drawn", lambda weight, *_: np.full(weight.size, 0.0))
+    monkeypatch.setattr(joint, "attenuation", lambda weight, *_: np.full(weight.size, 0.0))
     bare = joint.estimate(balance, car)
-    monkeypatch.setattr(joint, "drawn", lambda weight, *_: np.full(weight.size, 0.1))
+    monkeypatch.setattr(joint, "attenuation", lambda weight, *_: np.full(weight.size, 0.1))
     much = joint.estimate(balance, car)
     assert bare.mass < real.mass < 1.02 * bare.mass
     assert much.mass + balance.merged.fuel_burnt[-1] == pytest.approx(

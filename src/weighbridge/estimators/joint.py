@@ -27,7 +27,7 @@ from weighbridge.estimators.judging import (
     nothing,
 )
 from weighbridge.estimators.load_stops import change_odds, stood_before, too_hasty
-from weighbridge.estimators.noisy_motion import LEVEL_STD, drawn
+from weighbridge.estimators.noisy_motion import LEVEL_STD, attenuation
 from weighbridge.estimators.slow_errors import (
     LASTING,
     SlowErrors,
@@ -236,7 +236,7 @@ def _track(
     view, problem, time = balance.merged, asked.problem, asked.problem.time
     # More noise than usual is more likely the torque's; less is less on both sides.
     shown = min(solved.fast, 1.0) ** 2 * motion_variance(balance.motion)
-    low = drawn(solved.weight, np.full(time.size, shown), solved.var[:, 0], solved.begins)
+    low = attenuation(solved.weight, np.full(time.size, shown), solved.var[:, 0], solved.begins)
 
     left_out = np.zeros(view.time.size, dtype=bool)
     left_out[cut.index] = ~solved.taken[cut.window]

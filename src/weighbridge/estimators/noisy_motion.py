@@ -15,7 +15,7 @@ LEVEL_STD: Final = 0.5
 how the noise that a drive shows is shared between torque and motion is by typical sizes."""
 
 
-def drawn(weight: Floats, variance: Floats, mass_var: Floats, begins: Bools) -> Floats:
+def attenuation(weight: Floats, variance: Floats, mass_var: Floats, begins: Bools) -> Floats:
     """Part by which the mass of each load is too low (m,) [-], the same all along a load.
 
     Least squares of y on phi + n, weighted by W, comes out as ``phi W y / (phi W phi + n W n)``.
