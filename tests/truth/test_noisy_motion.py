@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.estimators.noisy_motion import drawn
+from weighbridge.estimators.noisy_motion import attenuation
 from weighbridge.kernels import disturbance as kernel
 
 MASS = 1500.0
@@ -31,7 +31,7 @@ def weighed(seed, n=400):
     rows = np.column_stack([motion, np.ones(n)])
     none = np.zeros(rows.shape)
     x, var, _, weight = kernel.smooth(start, time, rows, y, noise, none, params)
-    low = drawn(weight, np.full(n, NOISE**2), var[:, 0], np.zeros(n, dtype=bool))
+    low = attenuation(weight, np.full(n, NOISE**2), var[:, 0], np.zeros(n, dtype=bool))
     return x[-1, 0], x[-1, 0] * (1.0 + low[-1])
 
 
@@ -46,5 +46,5 @@ def test_each_load_counts_its_own_windows():
     begins = np.array([False, False, True, False, True])
     weight = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     mass_var = np.array([1.0, 1.0, 0.5, 0.5, 2.0])
-    low = drawn(weight, np.full(5, 2.0), mass_var, begins)
+    low = attenuation(weight, np.full(5, 2.0), mass_var, begins)
     assert_allclose(low, [6.0, 6.0, 7.0, 7.0, 20.0])
