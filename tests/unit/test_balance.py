@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from weighbridge.balance import Reason, force_balance
-from weighbridge.balance.force_balance import WIND_AT_VEHICLE
 from weighbridge.balance.gear_fit import share_on_gears
+from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.balance.law import drag_force, rotating_mass
 from weighbridge.errors import DriveError
 from weighbridge.estimators.rls import estimate

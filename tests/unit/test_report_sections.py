@@ -10,7 +10,7 @@ from tests.unit.test_report import GEARINGS, VEHICLE, Elements, figures, make_we
 from tests.unit.test_weighing import weighing as weighed_by_rls
 
 from weighbridge.balance import ForceBalance, MergedView, Reason
-from weighbridge.balance.force_balance import WIND_AT_VEHICLE
+from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, joint
 from weighbridge.navigation.motion import Motion

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -14,31 +14,15 @@ from weighbridge.balance.coarse import coarse_std
 from weighbridge.balance.cornering import cornering
 from weighbridge.balance.filled import Fill, filled, identify_fill
 from weighbridge.balance.foot_setup import learn_dragged
-from weighbridge.balance.instants import (
-    SLOWEST,
-    engine_speed_at,
-    gears_at,
-    identify_told_gears,
-    motion_at,
-    smoothed,
-)
+from weighbridge.balance.instants import SLOWEST, Instants, motion_at, read_instants, smoothed
 from weighbridge.balance.law import needed_force, traction_gain
 from weighbridge.balance.table import ForceBalance, ForceSetup, MergedView, Reason
 from weighbridge.navigation.motion import BY_SPEED, Motion
-from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.air import Air, air_density, dynamic_pressure, identify_air
 from weighbridge.vehicle.fuel import fuel_burnt, full_load_torque
-from weighbridge.vehicle.gear import shifting
 from weighbridge.vehicle.model import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import Torque, engine_torque, source_of, source_signal
-
-SHIFT_MARGIN: Final = 0.4
-"""Samples nearer than this to a change of gear are left out [s]."""
-
-WIND_AT_VEHICLE: Final = 0.5
-"""Wind at a vehicle over the wind reported at 10 m [-]: logarithmic profile down to 1 m
-over a roughness length of 0.1 m, ln(1 / 0.1) / ln(10 / 0.1) (Stull, An Introduction to
-Boundary Layer Meteorology, 1988, ch. 9)."""
 
 ROUGH_NOISE: Final = 0.03
 """Noise of a torque of which the vehicle file says none, over the highest of the drive [-]."""
@@ -82,7 +66,8 @@ def force_balance(
     view = read.view
     brakes = find_brakes(
         drive, vehicle, motion, source, view,
-        known=read.known, lag=lag, signed=signed and source_of(vehicle).signed, setup=setup,
+        known=read.instants.known, lag=lag,
+        signed=signed and source_of(vehicle).signed, setup=setup,
     )  # fmt: skip
     fill = setup.fill if setup is not None else identify_fill(source)
     reason = _reasons(vehicle, motion, source, read, brakes, fill)
@@ -91,7 +76,7 @@ def force_balance(
         setup = ForceSetup(
             foot=brakes.foot,
             switch_dead=brakes.switch_dead,
-            gears=read.gears,
+            gears=read.instants.numbers,
             air=read.air,
             full_torque=read.full_torque,
             torque_noise=_torque_noise(vehicle, view),
@@ -116,16 +101,13 @@ class _Read:
     ----------
     view : (n,) rows, without reasons and noise
     torque : of the rows
-    known : (n,) the motion is known
-    slipping : (n,) the clutch slips
-    gears, air, full_torque : of `ForceSetup`
+    instants : motion, engine speed and gear
+    air, full_torque : of `ForceSetup`
     """
 
     view: MergedView
     torque: Torque
-    known: Bools
-    slipping: Bools
-    gears: Mapping[int, int]
+    instants: Instants
     air: Air
     full_torque: float
 
@@ -141,40 +123,25 @@ def _read(
 ) -> _Read:
     """Read motion and torque at the stamps of the source, less its delay."""
     recorded = source.time
-    time = recorded - delay
-    rows = motion_at(smoothed(motion, lag), time)
-    engine_speed = engine_speed_at(drive, vehicle, time + motion.speed_delay, rows["speed"])
-    asked = (drive, vehicle, recorded, engine_speed, rows["speed"])
-    numbers = setup.gears if setup is not None else identify_told_gears(*asked)
-    gear, gearing, slipping = gears_at(*asked, numbers)
+    gears = setup.gears if setup is not None else None
+    at = read_instants(drive, vehicle, smoothed(motion, lag), recorded, delay, gears)
+    engine_speed, gearing, altitude = at.columns["engine_speed"], at.columns["gearing"], at.altitude
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
     full = setup.full_torque if setup is not None else full_load_torque(torque.torque)
-    air = setup.air if setup is not None else identify_air(drive, rows["altitude"])
+    air = setup.air if setup is not None else identify_air(drive, altitude)
     view = MergedView(
-        time=time,
+        **at.columns,
         traction_force=traction_gain(vehicle, torque.torque, gearing) * torque.torque,
-        force_std=np.full(time.size, np.nan),
+        force_std=np.full(recorded.size, np.nan),
         torque=torque.torque,
-        engine_speed=engine_speed,
-        speed=rows["speed"],
-        accel=rows["accel"],
-        specific_force=rows["specific_force"],
-        grade=rows["grade"],
-        pitch=rows["pitch"],
-        heading=rows["heading"],
-        gear=gear,
-        gearing=gearing,
-        air_speed=rows["speed"] + headwind(drive, rows["heading"]),
-        air_density=air.density(rows["altitude"]),
+        air_density=air.density(altitude),
         fuel_burnt=fuel_burnt(drive, vehicle, recorded, torque.torque, engine_speed, full),
-        reason=np.zeros(time.size, dtype=np.uint8),
+        reason=np.zeros(recorded.size, dtype=np.uint8),
     )
     return _Read(
         view=view,
         torque=torque,
-        known=np.asarray(rows["valid"] > 0.99),
-        slipping=slipping,
-        gears=numbers,
+        instants=at,
         air=air,
         full_torque=full,
     )
@@ -200,17 +167,14 @@ def _reasons(
     view = read.view
     recorded = source.time
     fresh = source.age(recorded) <= 3.0 * source.period
-    changing = shifting(view.time, view.gear, margin=SHIFT_MARGIN)
-    if vehicle.driveline.single_speed:
-        changing[:] = False
     reason = np.zeros(view.time.size, dtype=np.uint8)
     told = np.isfinite(view.traction_force) & fresh & ~filled(source, recorded, fill)
     for flag, why in (
-        (~read.known | ~np.isfinite(view.speed), Reason.NO_MOTION),
+        (~read.instants.known | ~np.isfinite(view.speed), Reason.NO_MOTION),
         (view.speed < SLOWEST, Reason.STANDING),
         (brakes.braked, Reason.BRAKING),
-        (changing, Reason.SHIFTING),
-        (read.slipping, Reason.CLUTCH_SLIPPING),
+        (read.instants.changing, Reason.SHIFTING),
+        (read.instants.slipping, Reason.CLUTCH_SLIPPING),
         (~told, Reason.NO_TORQUE),
         (read.torque.overrun | brakes.overrun, Reason.OVERRUN),
         (read.torque.extrapolated, Reason.EXTRAPOLATED),
@@ -258,22 +222,3 @@ def dragged_reading(
         sources.append(source)
         needs.append(np.full_like(needed, np.nan) if motion.source in BY_SPEED else needed / weight)
     return learn_dragged(drives, sources, needs)
-
-
-def headwind(drive: Drive, heading: Floats) -> Floats:
-    """Wind against the vehicle by the weather report of the drive.
-
-    Parameters
-    ----------
-    drive : with ``wind_speed`` and ``wind_from`` in its info, else there is none
-    heading : (n,) of the vehicle [rad]; NaN where unknown
-
-    Returns
-    -------
-    (n,) positive from ahead [m/s]
-    """
-    speed, direction = drive.info.wind_speed, drive.info.wind_from
-    if not speed or direction is None:
-        return np.zeros_like(heading)
-    along = WIND_AT_VEHICLE * speed * np.cos(direction - heading)
-    return np.asarray(np.where(np.isfinite(along), along, 0.0))

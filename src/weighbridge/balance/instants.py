@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from scipy.signal import lfilter
@@ -16,6 +16,7 @@ from weighbridge.vehicle.gear import (
     effective_gearing,
     number_told_gears,
     predict_gear,
+    shifting,
     told_gear_numbers,
 )
 from weighbridge.vehicle.model import Vehicle
@@ -23,6 +24,14 @@ from weighbridge.vehicle.torque import source_of
 
 SLOWEST: Final = 1.5
 """Below this speed gears, slip and torque are not told apart [m/s]."""
+
+SHIFT_MARGIN: Final = 0.4
+"""Samples nearer than this to a change of gear are left out [s]."""
+
+WIND_AT_VEHICLE: Final = 0.5
+"""Wind at a vehicle over the wind reported at 10 m [-]: logarithmic profile down to 1 m
+over a roughness length of 0.1 m, ln(1 / 0.1) / ln(10 / 0.1) (Stull, An Introduction to
+Boundary Layer Meteorology, 1988, ch. 9)."""
 
 _FORGOTTEN: Final = 2.0
 """Time constants after which a first-order lag has forgotten a gap that a line bridges [-]."""
@@ -139,3 +148,89 @@ def gears_at(
     slipping = (gear == 0) | pressed | (np.abs(np.nan_to_num(mismatch)) > 0.06)
     gearing = np.where(gear > 0, gearings[np.maximum(gear, 1) - 1], np.nan)
     return gear, gearing, slipping
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Instants:
+    """Motion, engine speed and gear at the instants of the force samples.
+
+    Attributes
+    ----------
+    columns : of `weighbridge.balance.table.MergedView` that hang on neither torque nor air (n,)
+    altitude : (n,) [m]; NaN where unknown
+    known : (n,) the motion is known
+    slipping : (n,) the clutch slips
+    changing : (n,) the gear changes soon or has just changed
+    numbers : of `identify_told_gears`
+    """
+
+    columns: dict[str, Any]
+    altitude: Floats
+    known: Bools
+    slipping: Bools
+    changing: Bools
+    numbers: Mapping[int, int]
+
+
+def read_instants(
+    drive: Drive,
+    vehicle: Vehicle,
+    motion: Motion,
+    recorded: Floats,
+    delay: float,
+    numbers: Mapping[int, int] | None = None,
+) -> Instants:
+    """Read a motion, smoothed as the torque is, where a delay puts the force samples.
+
+    Parameters
+    ----------
+    drive, vehicle, motion
+    recorded : (n,) stamps of the torque [s]
+    delay : by which they are late [s]
+    numbers : of `identify_told_gears`; found from this drive when None
+    """
+    time = recorded - delay
+    rows = motion_at(motion, time)
+    speed = rows["speed"]
+    engine_speed = engine_speed_at(drive, vehicle, time + motion.speed_delay, speed)
+    if numbers is None:
+        numbers = identify_told_gears(drive, vehicle, recorded, engine_speed, speed)
+    gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, speed, numbers)
+    changing = shifting(time, gear, margin=SHIFT_MARGIN)
+    if vehicle.driveline.single_speed:
+        changing[:] = False
+    moved = ("speed", "accel", "specific_force", "grade", "pitch", "heading")
+    return Instants(
+        columns={
+            "time": time,
+            "engine_speed": engine_speed,
+            "gear": gear,
+            "gearing": gearing,
+            "air_speed": speed + headwind(drive, rows["heading"]),
+            **{name: rows[name] for name in moved},
+        },
+        altitude=rows["altitude"],
+        known=np.asarray(rows["valid"] > 0.99),
+        slipping=slipping,
+        changing=changing,
+        numbers=numbers,
+    )
+
+
+def headwind(drive: Drive, heading: Floats) -> Floats:
+    """Wind against the vehicle by the weather report of the drive.
+
+    Parameters
+    ----------
+    drive : with ``wind_speed`` and ``wind_from`` in its info, else there is none
+    heading : (n,) of the vehicle [rad]; NaN where unknown
+
+    Returns
+    -------
+    (n,) positive from ahead [m/s]
+    """
+    speed, direction = drive.info.wind_speed, drive.info.wind_from
+    if not speed or direction is None:
+        return np.zeros_like(heading)
+    along = WIND_AT_VEHICLE * speed * np.cos(direction - heading)
+    return np.asarray(np.where(np.isfinite(along), along, 0.0))

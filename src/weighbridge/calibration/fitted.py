@@ -16,18 +16,11 @@ from weighbridge.calibration.recording import DelayedRows, Recording
 from weighbridge.errors import DriveError
 from weighbridge.results.calibration import DelaySearch, FittedRows
 from weighbridge.signals import Floats
-from weighbridge.vehicle.model import DraggedReading, Vehicle
+from weighbridge.vehicle.model import EARLIEST_TORQUE, LATEST_TORQUE, DraggedReading, Vehicle
 from weighbridge.vehicle.torque import parameters, rows_of
 
 NOT_TOLD: Final = "the drives do not show how late the torque is"
 """What is noted where the search for the delay ends at its end."""
-
-
-EARLIEST: Final = -1.0
-"""Delay of the torque below which a vehicle file takes none [s]."""
-
-LATEST: Final = 3.0
-"""The same above [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,17 +56,18 @@ def check_delay(problem: Problem, delay: float) -> None:
     Raises
     ------
     DriveError
-        It is not between `EARLIEST` and `LATEST`: torque and motion are on two clocks.
+        No vehicle file takes it: torque and motion are on two clocks.
     """
-    if EARLIEST <= delay <= LATEST:
+    if EARLIEST_TORQUE <= delay <= LATEST_TORQUE:
         return
     signal = problem.source.signals[0]
     side = "early" if delay < 0.0 else "late"
     raise DriveError(
         f"{problem.names}: {signal} fits the motion best where its stamps are {abs(delay):.1f} s "
-        f"{side}, and one logger stamps from {-EARLIEST:g} s early to {LATEST:g} s late: it is on "
-        f"another clock, or says nothing of the torque; add {-delay:+.1f} s to its time_s "
-        "(offset_s in the mapping), or calibrate with another --torque"
+        f"{side}, and one logger stamps from {-EARLIEST_TORQUE:g} s early to "
+        f"{LATEST_TORQUE:g} s late: it is on another clock, or says nothing of the torque; add "
+        f"{-delay:+.1f} s to its time_s (offset_s in the mapping), or calibrate with another "
+        "--torque"
     )
 
 

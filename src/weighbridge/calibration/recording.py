@@ -9,20 +9,11 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance, force_balance
-from weighbridge.balance.force_balance import SHIFT_MARGIN, headwind
-from weighbridge.balance.instants import (
-    SLOWEST,
-    engine_speed_at,
-    gears_at,
-    identify_told_gears,
-    motion_at,
-    smoothed,
-)
+from weighbridge.balance.instants import SLOWEST, read_instants, smoothed
 from weighbridge.balance.table import MergedView
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import air_density
-from weighbridge.vehicle.gear import shifting
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import DRAGGED_TIME, averaged
 from weighbridge.vehicle.torque_sources import TorqueSource
@@ -146,35 +137,19 @@ class Recording:
         """Read motion, engine speed and gear where a delay puts the force samples."""
         drive, draft = self.drive, self.draft
         recorded = self.source.carrier(drive).time
-        time = recorded - delay
-        rows = motion_at(motion, time)
-        engine_speed = engine_speed_at(drive, draft, time + motion.speed_delay, rows["speed"])
-        told = (drive, draft, recorded, engine_speed, rows["speed"])
-        gear, gearing, slipping = gears_at(*told, identify_told_gears(*told))
-        changing = shifting(time, gear, margin=SHIFT_MARGIN)
-        if draft.driveline.single_speed:
-            changing[:] = False
-        nothing = np.full(time.size, np.nan)
+        at = read_instants(drive, draft, motion, recorded, delay)
+        nothing = np.full(recorded.size, np.nan)
         view = replace(
             anchor.merged,
-            time=time,
+            **at.columns,
             traction_force=nothing,
             force_std=nothing,
             torque=nothing,
-            engine_speed=engine_speed,
-            speed=rows["speed"],
-            accel=rows["accel"],
-            specific_force=rows["specific_force"],
-            grade=rows["grade"],
-            pitch=rows["pitch"],
-            heading=rows["heading"],
-            gear=gear,
-            gearing=gearing,
-            air_speed=rows["speed"] + headwind(drive, rows["heading"]),
-            air_density=air_density(drive, rows["altitude"]),
+            air_density=air_density(drive, at.altitude),
         )
-        usable = self._complete(view, engine_speed) & ~changing & ~slipping
-        usable &= (rows["valid"] > 0.99) & (rows["speed"] >= SLOWEST)
+        engine_speed = at.columns["engine_speed"]
+        usable = self._complete(view, engine_speed) & ~at.changing & ~at.slipping
+        usable &= at.known & (view.speed >= SLOWEST)
         return DelayedRows(view=view, engine_speed=engine_speed, usable=usable)
 
     def _complete(self, view: MergedView, engine_speed: Floats) -> Bools:

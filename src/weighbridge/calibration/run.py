@@ -128,7 +128,7 @@ def run_calibration(
         *doubts,
         *contradictions,
     ]
-    done = _with_doubts(done, balances, [*others, *unbacked_scale(done)])
+    done = _with_notes(done, balances, [*others, *unbacked_scale(done)])
     done = with_doubts(done, doubts)
     if problem.source.gearing is not None:
         done = _with_gears(done, problem.given)
@@ -143,7 +143,7 @@ def run_calibration(
     )
 
 
-def _with_doubts(
+def _with_notes(
     vehicle: Vehicle, balances: Sequence[ForceBalance], notes: Sequence[str]
 ) -> Vehicle:
     """Note what is doubted of a calibration's drives, and count what is hidden in them."""

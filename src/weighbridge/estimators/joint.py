@@ -15,7 +15,7 @@ from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.table import MergedView
 from weighbridge.estimators.confounded import inertia_relative_std
 from weighbridge.estimators.considered import force_columns, open_std, sensitivity
-from weighbridge.estimators.joint_forward import JointSetup
+from weighbridge.estimators.joint_forward import JointSizes
 from weighbridge.estimators.joint_problem import FEWEST_WINDOWS, UNMODELLED, Problem
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
@@ -299,28 +299,15 @@ def _track(
             stood=asked.stood,
             traction=problem.rows[:, 0] * solved.x[:, 0] + cut.mean(view.traction_force - asked.y),
         ),
-        setup=_setup(balance, asked, solved, shown, left),
-    )
-
-
-def _setup(
-    balance: ForceBalance, asked: _Asked, solved: _Solved, shown: float, left: float
-) -> JointSetup:
-    """What of a whole drive the forward filter needs; ``shown`` is noise of the motion."""
-    problem = asked.problem
-    before = disturbance.weights(
-        solved.start, problem.time, problem.rows, problem.y, solved.noise, solved.added,
-        solved.params,
-    )  # fmt: skip
-    moved = motion_variance(balance.motion) + balance.motion.mean_accel_std(WINDOW) ** 2
-    return JointSetup(
-        std=problem.std,
-        fast=solved.fast,
-        slow=solved.slow,
-        body=asked.body,
-        motion_var=moved,
-        attenuating_var=shown * float(np.sum(solved.weight)) / before,
-        left=left,
+        sizes=JointSizes(
+            std=problem.std,
+            fast=solved.fast,
+            slow=solved.slow,
+            body=asked.body,
+            motion_var=motion_variance(balance.motion) + balance.motion.mean_accel_std(WINDOW) ** 2,
+            noise_information=shown * float(np.sum(solved.weight)),
+            left=left,
+        ),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -11,13 +11,14 @@ from weighbridge.estimators.joint_problem import UNMODELLED, first_state, load_p
 from weighbridge.estimators.judging import STOP
 from weighbridge.estimators.load_stops import change_odds
 from weighbridge.estimators.squat import Lean
+from weighbridge.estimators.track import FilterInput
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JointSetup:
-    """What a whole drive or a vehicle file tells before the filter runs.
+class JointSizes:
+    """Sizes of noise and states that the whole drive tells.
 
     Attributes
     ----------
@@ -25,8 +26,8 @@ class JointSetup:
     fast, slow : levels of the noise over their usual sizes [-]
     body : squat that rows and torque do not have in common
     motion_var : variance of the specific force of a window [m^2/s^4]
-    attenuating_var : of it what draws the mass down, per weight that the filter gives a window
-        before it is seen [m^2/s^4]
+    noise_information : trace of the windows' information times the noise of the motion in them,
+        which times the variance of the mass is the part that it is too low by [1/kg^2]
     left : relative standard deviation of the mass that no row takes away [-]
     """
 
@@ -35,13 +36,38 @@ class JointSetup:
     slow: float
     body: Lean
     motion_var: float
-    attenuating_var: float
+    noise_information: float
     left: float
 
     @property
     def mass(self) -> float:
         """Guess of the mass [kg]."""
         return float(self.std[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointSetup(JointSizes):
+    """What the filter is given from outside before it runs forward.
+
+    Attributes
+    ----------
+    attenuating_var : noise of the motion that draws the mass down, for the weight that the filter
+        gives a window before it is seen [m^2/s^4]
+    """
+
+    attenuating_var: float
+
+
+def identify_joint(given: FilterInput, sizes: JointSizes) -> JointSetup:
+    """Set up a forward run by what the smoother was given, and the sizes it found.
+
+    Windows weigh more once later ones are known: their noise counts as much more.
+    """
+    before = disturbance.weights(
+        given.start, given.time, given.rows, given.y, given.noise, given.added, given.params
+    )
+    known = {f.name: getattr(sizes, f.name) for f in fields(sizes)}
+    return JointSetup(**known, attenuating_var=sizes.noise_information / before)
 
 
 class JointState(NamedTuple):
@@ -66,9 +92,9 @@ class JointState(NamedTuple):
     mass: float = np.nan
     var: float = np.nan
 
-    def std(self, setup: JointSetup) -> float:
+    def std(self, sizes: JointSizes) -> float:
         """Standard deviation of the running mass [kg]."""
-        return float(np.hypot(UNMODELLED * np.sqrt(self.var), self.mass * setup.left))
+        return float(np.hypot(UNMODELLED * np.sqrt(self.var), self.mass * sizes.left))
 
 
 class Window(NamedTuple):

@@ -14,7 +14,7 @@ from weighbridge.balance import ForceBalance, Reason
 from weighbridge.signals import Bools, Floats
 
 if TYPE_CHECKING:
-    from weighbridge.estimators.joint_forward import JointSetup
+    from weighbridge.estimators.joint_forward import JointSizes
     from weighbridge.estimators.slow_errors import SlowErrors
     from weighbridge.kernels import disturbance
 
@@ -96,7 +96,7 @@ class MassTrack:
         [kg per unit]; None where a method does not say
     slow_errors : what was estimated beside the mass; None where a method does not
     filtered : what the filter of the joint estimator was given; None of other methods
-    setup : what a forward run of the joint estimator takes from this drive; None of other methods
+    sizes : of noise and states, by which the joint estimator runs forward; None of other methods
     """
 
     method: str
@@ -117,7 +117,7 @@ class MassTrack:
     sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
     filtered: FilterInput | None = None
-    setup: JointSetup | None = None
+    sizes: JointSizes | None = None
 
     @property
     def time(self) -> Floats:

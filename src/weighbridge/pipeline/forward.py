@@ -17,7 +17,7 @@ from weighbridge.balance import force_balance
 from weighbridge.balance.averaging import FEWEST, PAUSE, WINDOW
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import joint_forward
-from weighbridge.estimators.joint_forward import JointSetup, JointState, Window
+from weighbridge.estimators.joint_forward import JointSetup, JointState, Window, identify_joint
 from weighbridge.estimators.judging import STOP
 from weighbridge.estimators.slow_errors import design, usable_rows
 from weighbridge.kernels import window_means
@@ -91,7 +91,8 @@ def identify_forward(weighing: Weighing) -> ForwardSetup:
         The drive has no inertial sensor that can be navigated by.
     """
     result = weighing.result
-    if result is None or result.setup is None or result.balance.setup is None:
+    force = None if result is None else result.balance.setup
+    if result is None or force is None or result.sizes is None or result.filtered is None:
         raise ConfigError(
             f"{weighing.drive.name}: a forward pass is set up by a weighing of method joint that "
             f"found a mass, not by one of {weighing.method}: {weighing.reason or 'no sizes'}"
@@ -103,12 +104,11 @@ def identify_forward(weighing: Weighing) -> ForwardSetup:
             f"weighed by {motion.source}"
         )
     time = result.balance.merged.time
-    force = result.balance.setup
     navigation = identify(scaled_for_navigation(drive, vehicle), vehicle.mounting)
     return ForwardSetup(
         navigation=_holding(navigation, motion.squat),
         force=replace(force, foot=replace(force.foot, ahead=AHEAD)),
-        joint=result.setup,
+        joint=identify_joint(result.filtered, result.sizes),
         delay=result.balance.delay,
         period=float(np.median(np.diff(time))),
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import WIND_AT_VEHICLE
+from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.slow_errors import WIND_STD, SlowErrors
 from weighbridge.report.maps import mark, positions, track_map

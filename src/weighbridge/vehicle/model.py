@@ -57,6 +57,13 @@ def _within(name: str, value: float | None, low: float, high: float, unit: str =
         )
 
 
+EARLIEST_TORQUE: Final = -1.0
+"""Delay of the torque below which a vehicle file takes none [s]."""
+
+LATEST_TORQUE: Final = 3.0
+"""The same above [s]."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Driveline:
     """Constants of one driveline.
@@ -309,8 +316,10 @@ class Timing:
 
     def __post_init__(self) -> None:
         delay = self.torque_delay
-        if delay is not None and not -1.0 <= delay <= 3.0:
-            raise ConfigError(f"torque_delay must be in [-1, 3] s, got {delay}")
+        if delay is not None and not EARLIEST_TORQUE <= delay <= LATEST_TORQUE:
+            raise ConfigError(
+                f"torque_delay must be in [{EARLIEST_TORQUE:g}, {LATEST_TORQUE:g}] s, got {delay}"
+            )
         _within("torque_delay_std", self.torque_delay_std, 0.0, 1_000.0, "s")
         if not 0.0 <= self.torque_lag <= 3.0:
             raise ConfigError(f"torque_lag must be in [0, 3] s, got {self.torque_lag}")
