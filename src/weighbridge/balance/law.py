@@ -146,9 +146,7 @@ def gust_column(view: MergedView, grade_open: float = 0.0) -> Floats:
 
 def coldness(view: MergedView) -> Floats:
     """How much of the cold of the start is left at each row, ``exp(-t / tau)`` (n,) [-]."""
-    moving = np.flatnonzero(np.nan_to_num(view.speed) > 0.5)
-    start = view.time[moving[0]] if moving.size else view.time[0]
-    return np.asarray(np.exp(-np.maximum(view.time - start, 0.0) / WARM_UP))
+    return np.asarray(np.exp(-np.maximum(view.time - view.first_moved, 0.0) / WARM_UP))
 
 
 def cold_torque_column(view: MergedView) -> Floats:

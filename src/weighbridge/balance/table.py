@@ -17,6 +17,9 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.air import Air, dynamic_pressure
 
+MOVING: Final = 0.5
+"""Slower a vehicle stands [m/s]."""
+
 
 class Reason(IntEnum):
     """Why a sample is not usable; 0 where it is."""
@@ -93,6 +96,7 @@ class MergedView:
     air_density : (n,) [kg/m^3]
     fuel_burnt : (n,) since the first row, as far as the drive tells [kg]
     reason : (n,) `Reason` why a sample is not usable
+    begun : instant at which the vehicle first moved; found from the rows when None [s]
     """
 
     time: Floats
@@ -112,6 +116,15 @@ class MergedView:
     air_density: Floats
     fuel_burnt: Floats
     reason: NDArray[np.uint8]
+    begun: float | None = None
+
+    @property
+    def first_moved(self) -> float:
+        """Instant at which the vehicle first moved, or that of the first row [s]."""
+        if self.begun is not None:
+            return self.begun
+        moving = np.flatnonzero(np.nan_to_num(self.speed) > MOVING)
+        return float(self.time[moving[0]] if moving.size else self.time[0])
 
     @property
     def usable(self) -> Bools:

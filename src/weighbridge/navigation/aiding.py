@@ -136,8 +136,13 @@ def _kept(imu: Imu, keep: Bools, period: float) -> Imu:
     )
 
 
-def read_fixes(drive: Drive, start: float, end: float) -> Fixes | None:
-    """Gather the GNSS fixes between two instants; None where there are fewer than two."""
+def read_fixes(
+    drive: Drive, start: float, end: float, frame: LocalFrame | None = None
+) -> Fixes | None:
+    """Gather the GNSS fixes between two instants; None where there are fewer than two.
+
+    The first of them is the origin where no ``frame`` is given.
+    """
     lat, lon = drive.get("latitude"), drive.get("longitude")
     if lat is None or lon is None:
         return None
@@ -153,9 +158,10 @@ def read_fixes(drive: Drive, start: float, end: float) -> Fixes | None:
         near = altitude.age(time) < 1.5
         height[near] = altitude.at(time[near])
     has_height = bool(np.isfinite(height).sum() >= 2)
-    origin = float(height[np.isfinite(height)][0]) if has_height else 0.0
-    frame = LocalFrame(float(lat.values[keep][0]), float(lon.at(time)[0]), origin)
-    ned = frame.to_ned(lat.values[keep], lon.at(time), np.nan_to_num(height, nan=origin))
+    if frame is None:
+        origin = float(height[np.isfinite(height)][0]) if has_height else 0.0
+        frame = LocalFrame(float(lat.values[keep][0]), float(lon.at(time)[0]), origin)
+    ned = frame.to_ned(lat.values[keep], lon.at(time), np.nan_to_num(height))
     ned[~np.isfinite(height), 2] = np.nan
     return Fixes(time, ned, frame, has_height)
 

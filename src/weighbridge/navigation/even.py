@@ -32,9 +32,12 @@ class Even:
     values: Floats
 
 
-def evenly(imu: Imu, rate: float) -> Even:
-    """Low-pass the inertial samples and take them to an even clock."""
-    start = float(imu.time[0])
+def evenly(imu: Imu, rate: float, first: int | None = None) -> Even:
+    """Low-pass the inertial samples and take them to an even clock.
+
+    It begins with the first sample, or with row ``first`` of a clock that began at 0 s.
+    """
+    start = float(imu.time[0]) if first is None else first / rate
     count = max(4, math.floor((imu.time[-1] - start) * rate) + 1)
     if imu.period * rate > _SPARSE:
         return _interpolated(imu, start + np.arange(count) / rate)

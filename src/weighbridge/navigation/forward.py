@@ -1,28 +1,35 @@
-"""Motion without smoother: each row from what is known soon after it."""
+"""Motion without smoother, second by second: each row from what is known soon after it."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from weighbridge.constants import GRAVITY
+from weighbridge.errors import DriveError
 from weighbridge.kernels.ins_model import (
     E_SCALE,
     E_SQUAT,
     PITCH0,
     S_GRADE,
     SCALE,
+    SHOWN,
     SQUAT,
+    STDS,
     YAW0,
     Z_STILL,
 )
 from weighbridge.kernels.rotation import euler_to_matrix
-from weighbridge.navigation.even import evenly
-from weighbridge.navigation.filter import Block, Nodes, run
+from weighbridge.navigation.aiding import read_fixes, read_imu, speed_from_fixes
+from weighbridge.navigation.even import Even, evenly
+from weighbridge.navigation.filter import Block, Nodes, State, run
 from weighbridge.navigation.identify.setup import Setup
 from weighbridge.navigation.layout import (
     LONGEST_AIDED,
+    SQUAT_WIDTH,
     Constants,
     Found,
     accel_along,
@@ -41,17 +48,182 @@ from weighbridge.navigation.rows import (
     place_nodes,
     still_state,
 )
-from weighbridge.navigation.sources import Sources, read_sources, undelayed
-from weighbridge.signals import Bools, Drive, Floats
+from weighbridge.navigation.sources import Sources, undelayed
+from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.recent import BEHIND, instants, recent
+
+LAID_OUT: Final = 0.25
+"""A row is laid out so long after its instant [s]: half of `SQUAT_WIDTH` and a node."""
+
+
+class Level(NamedTuple):
+    """Mean grade of the way so far.
+
+    Attributes
+    ----------
+    way : travelled [m]
+    moved : sum of the speeds [m/s]
+    lifted : sum of grade times speed [m/s]
+    """
+
+    way: float = 0.0
+    moved: float = 0.0
+    lifted: float = 0.0
+
+
+class ForwardState(NamedTuple):
+    """What the stage goes on from.
+
+    Attributes
+    ----------
+    filter : after the last sample that was folded
+    folded : samples up to this instant were [s]
+    nodes : of the last `BEHIND` seconds
+    motion : rows of the last `BEHIND` seconds; None before the first
+    row : number of the next row on the even clock
+    level : of the way so far, for drives without heights
+    """
+
+    filter: State
+    folded: float
+    nodes: Nodes
+    motion: Motion | None
+    row: int
+    level: Level
+
+
+def begin(setup: Setup, start: float) -> ForwardState:
+    """Return the state before the first sample, which comes at ``start`` [s] or later."""
+    nothing = Nodes(np.empty(0), np.empty((0, SHOWN)), np.empty((0, STDS)))
+    row = math.ceil(start * setup.rate)
+    return ForwardState(setup.start, -math.inf, nothing, None, row, Level())
+
+
+def lateness(setup: Setup) -> float:
+    """Time that a row waits for what tells of it [s]: delays of the sources, and look-ahead."""
+    return max(0.0, setup.clocks.speed_delay, setup.clocks.gnss_delay) + AHEAD + LAID_OUT
+
+
+def step(
+    state: ForwardState, records: Drive, until: float, setup: Setup
+) -> tuple[ForwardState, Motion | None]:
+    """Fold what came since the last step, and lay the rows out that it makes known.
+
+    A row knows its records up to `AHEAD` past its instant, delays taken off, and what the setup
+    took from a whole drive: mounting, delays, noise levels, changes of mounting, scale of the
+    accelerometer. Where nothing comes the rows go on, not valid.
+
+    Parameters
+    ----------
+    state : before it
+    records : those of `weighbridge.signals.recent.recent`, up to ``until``
+    until : instant up to which records are complete [s]
+    setup : of `weighbridge.navigation.identify.identify`
+
+    Returns
+    -------
+    state : after it
+    rows : that became known; None without any
+    """
+    horizon = until - lateness(setup) + LAID_OUT
+    sources = _gather(records, setup)
+    found = None if sources is None else _prepared(sources, setup)
+    after, nodes = state.filter, state.nodes
+    if found is not None:
+        first, last = found.block.time.searchsorted([state.folded, horizon], side="right")
+        after, new = run(state.filter, found.block.part(first, last), setup)
+        kept = int(nodes.time.searchsorted(horizon - BEHIND))
+        nodes = Nodes(*(np.concatenate([a[kept:], b]) for a, b in zip(nodes, new, strict=True)))
+    state = state._replace(filter=after, folded=horizon, nodes=nodes)
+    ahead = math.floor(horizon * setup.rate + 1e-6) + 1
+    end = math.floor((horizon - LAID_OUT) * setup.rate + 1e-6) + 1
+    if not nodes.time.size:
+        return state._replace(row=max(state.row, end)), None
+    row = max(state.row, math.ceil(nodes.time[0] * setup.rate))
+    if row >= end:
+        return state._replace(row=row), None
+    return _laid_out(state._replace(row=row), found, (end, ahead), setup)
+
+
+def _laid_out(
+    state: ForwardState, found: Found | None, ends: tuple[int, int], setup: Setup
+) -> tuple[ForwardState, Motion]:
+    """Lay out the rows from ``state.row`` up to the first of ``ends``; the second is known."""
+    nodes, before = state.nodes, state.motion
+    numbers = np.arange(state.row, ends[1])
+    count = ends[0] - state.row
+    time = numbers / setup.rate
+    pose = pose_at(time, nodes, longest=AHEAD)
+    squat = nodes.states[:, SQUAT] * float(setup.use_squat)
+    constants = Constants(
+        *(
+            np.interp(time, nodes.time, y)
+            for y in (nodes.states[:, PITCH0], nodes.states[:, YAW0], squat)
+        )
+    )
+    grid = Even(time, _values_at(found, numbers, setup.rate))
+    known = accel_along(grid, pose, constants, setup)
+    half = round(0.5 * SQUAT_WIDTH * setup.rate)
+    last = before.accel[-half:] if before is not None else np.empty(0)
+    accel = held(known, float(last[-1]) if last.size else 0.0)
+    lean = averaged(1.0 / setup.rate, np.concatenate([last, accel]))[last.size :]
+    grade = pose.pitch - constants.pitch0 - constants.squat * lean
+    floor: Floats | float = setup.settings.body_pitch_std
+    level = state.level
+    pose = type(pose)(*(y[:count] for y in pose))
+    time, known, accel, grade = time[:count], known[:count], accel[:count], grade[:count]
+    if not setup.has_height:
+        moved = np.hypot(pose.velocity[:, 0], pose.velocity[:, 1])
+        level, grade, left = _levelled_so_far(level, grade, moved, setup)
+        floor = np.hypot(floor, left)
+    end_std = np.sqrt(np.maximum(np.diag(state.filter.cov), 0.0))
+    end = state.filter.x
+    has_scale = scale_is_found(end_std, setup)
+    turn = euler_to_matrix(0.0, float(end[PITCH0]), -float(end[YAW0]))
+    mounting, mounting_std = mounting_of(turn, end_std, setup)
+    rows = laid_out(
+        pose,
+        setup,
+        time=time,
+        accel=accel,
+        specific_force=accel + GRAVITY * np.sin(grade),
+        grade=grade,
+        valid=np.isfinite(known) & _aided(found, time),
+        specific_force_std=setup.specific_force_std,
+        specific_force_scale_std=setup.scale_std,
+        grade_std=np.hypot(_at(time, nodes, S_GRADE), floor),
+        speed_scale=float(end[SCALE]) if has_scale else None,
+        speed_scale_std=float(end_std[E_SCALE]) if has_scale else None,
+        squat=float(end[SQUAT]) if setup.use_squat else None,
+        squat_std=float(end_std[E_SQUAT]) if setup.use_squat else None,
+        mounting=mounting,
+        mounting_std=mounting_std,
+        notes=setup.notes,
+    )
+    motion = rows
+    if before is not None:
+        step_way = 0.5 * (abs(before.speed[-1]) + abs(rows.speed[0])) / setup.rate
+        rows = replace(rows, distance=rows.distance + before.distance[-1] + step_way)
+        motion = joined([before, rows], last=round(BEHIND * setup.rate))
+    return state._replace(motion=motion, row=ends[0], level=level), rows
+
+
+def joined(parts: list[Motion], last: int | None = None) -> Motion:
+    """Put successive rows together, the ``last`` of them if so many are asked for."""
+    keep = slice(None if last is None else -last, None)
+    columns = {
+        name: np.concatenate([getattr(part, name) for part in parts])[keep]
+        for name in ("time", "speed", "accel", "specific_force", "grade", "pitch", "roll",
+                     "heading", "distance", "altitude", "latitude", "longitude", "valid",
+                     "grade_std")
+    }  # fmt: skip
+    return replace(parts[-1], **columns)
 
 
 def forward_motion(drive: Drive, setup: Setup) -> Motion:
-    """Fold a drive and lay the forward pass out on the even clock, without smoother.
+    """Fold a drive second by second, without smoother.
 
-    A row knows the drive up to 0.3 s past its instant at 20 Hz, and what the setup took from the
-    whole drive: mounting, delays, noise levels, changes of mounting, scale of the accelerometer.
-    A record that is late by a delay is taken to come so much earlier. The single numbers of the
-    result are those at the end of the pass.
+    The single numbers of the result are those at the end of the pass.
 
     Parameters
     ----------
@@ -63,74 +235,74 @@ def forward_motion(drive: Drive, setup: Setup) -> Motion:
     DriveError
         Signals are missing.
     """
-    found = _prepared(read_sources(drive), setup)
-    state, nodes = run(setup.start, found.block, setup)
-    time = found.grid.time
-    pose = pose_at(time, nodes, longest=AHEAD)
-    squat = nodes.states[:, SQUAT] * float(setup.use_squat)
-    constants = Constants(
-        *(
-            np.interp(time, nodes.time, y)
-            for y in (nodes.states[:, PITCH0], nodes.states[:, YAW0], squat)
-        )
-    )
-    known = accel_along(found.grid, pose, constants, setup)
-    accel = held(known)
-    grade = pose.pitch - constants.pitch0 - constants.squat * averaged(time, accel)
-    floor: Floats | float = setup.settings.body_pitch_std
-    if not setup.has_height:
-        moved = np.hypot(pose.velocity[:, 0], pose.velocity[:, 1])
-        grade, left = _levelled_so_far(grade, moved, float(time[1] - time[0]), setup)
-        floor = np.hypot(floor, left)
-    end_std = np.sqrt(np.maximum(np.diag(state.cov), 0.0))
-    has_scale = scale_is_found(end_std, setup)
-    turn = euler_to_matrix(0.0, float(state.x[PITCH0]), -float(state.x[YAW0]))
-    mounting, mounting_std = mounting_of(turn, end_std, setup)
-    return laid_out(
-        pose,
-        setup,
-        time=time,
-        accel=accel,
-        specific_force=accel + GRAVITY * np.sin(grade),
-        grade=grade,
-        valid=np.isfinite(known) & (time >= found.block.time[0]) & _aided(found),
-        specific_force_std=setup.specific_force_std,
-        specific_force_scale_std=setup.scale_std,
-        grade_std=np.hypot(_at(time, nodes, S_GRADE), floor),
-        speed_scale=float(state.x[SCALE]) if has_scale else None,
-        speed_scale_std=float(end_std[E_SCALE]) if has_scale else None,
-        squat=float(state.x[SQUAT]) if setup.use_squat else None,
-        squat_std=float(end_std[E_SQUAT]) if setup.use_squat else None,
-        mounting=mounting,
-        mounting_std=mounting_std,
-        notes=setup.notes,
-    )
+    state, parts = begin(setup, drive.start), []
+    for until in instants(drive.start, drive.end):
+        state, rows = step(state, recent(drive, until), until, setup)
+        if rows is not None:
+            parts.append(rows)
+    if not parts:
+        raise DriveError(f"{drive.name}: no second of it has inertial samples; nothing is known")
+    return joined(parts)
 
 
-def _prepared(sources: Sources, setup: Setup) -> Found:
+def _gather(records: Drive, setup: Setup) -> Sources | None:
+    """Gather inertial samples and what aids them; None without samples."""
+    try:
+        imu = read_imu(records)
+    except DriveError:
+        return None
+    fixes = None
+    if setup.origin is not None:
+        fixes = read_fixes(records, float(imu.time[0]), float(imu.time[-1]), setup.origin)
+    name = "vehicle_speed" if setup.has_wheel else "gnss_speed"
+    reference = records.get(name)
+    if reference is None and not setup.has_wheel and fixes is not None:
+        reference = speed_from_fixes(fixes)
+    if reference is None:
+        reference = Signal(name, np.empty(0), np.empty(0))
+    return Sources(records, imu, fixes, reference if setup.has_wheel else None, reference)
+
+
+def _prepared(sources: Sources, setup: Setup) -> Found | None:
     """Correct the samples, place the nodes and lay the measurements out, none known too early."""
     imu, fixes, clocks = sources.imu, sources.fixes, setup.clocks
     sure = setup.is_sure(imu.time)
+    if np.count_nonzero(sure) < 2:
+        return None
     time = imu.time[sure]
     accel, gyro = setup.corrected(time, imu.accel[sure], imu.gyro[sure])
-    grid = evenly(replace(imu, time=time, accel=accel, gyro=gyro), setup.rate)
+    first = math.ceil(time[0] * setup.rate)
+    grid = evenly(replace(imu, time=time, accel=accel, gyro=gyro), setup.rate, first)
     reference = undelayed(sources.reference, clocks.speed_delay)
     fix_times = fixes.time - clocks.gnss_delay if fixes is not None else np.empty(0)
     nodes = place_nodes(time, fix_times, setup.rate, setup.settings.max_gap, causal=True)
     at = time[nodes]
     speed = None if sources.speed is None else reference
-    z = measurements(at, sources.drive, speed, fixes, clocks, setup.settings, causal=True)
+    z = measurements(
+        at, sources.drive, speed, fixes, clocks, setup.settings,
+        has_height=setup.has_height, causal=True,
+    )  # fmt: skip
     wheel = reference if sources.wheel is not None else None
     z[:, Z_STILL] = still_state(at, grid, setup.rot_bs, wheel, reference, causal=True)
     open_mounting(z, at, setup.moved_time, setup.moved_var)
     return Found(Block(time, accel, gyro, nodes, z), grid, reference, fixes)
 
 
-def held(y: Floats) -> Floats:
-    """Hold the last value (n,) where it is NaN; 0 before the first."""
+def _values_at(found: Found | None, numbers: np.ndarray, rate: float) -> Floats:
+    """Low-passed samples (n, 6) of rows on the even clock; NaN where there are none."""
+    values = np.full((numbers.size, 6), np.nan)
+    if found is not None:
+        at = numbers - round(float(found.grid.time[0]) * rate)
+        inside = (at >= 0) & (at < found.grid.time.size)
+        values[inside] = found.grid.values[at[inside]]
+    return values
+
+
+def held(y: Floats, before: float) -> Floats:
+    """Hold the last value (n,) where it is NaN; ``before`` ahead of the first."""
     known = np.isfinite(y)
     last = np.maximum.accumulate(np.where(known, np.arange(y.size), -1))
-    return np.where(last >= 0, y[np.maximum(last, 0)], 0.0)
+    return np.where(last >= 0, y[np.maximum(last, 0)], before)
 
 
 def _at(time: Floats, nodes: Nodes, std: int) -> Floats:
@@ -140,21 +312,25 @@ def _at(time: Floats, nodes: Nodes, std: int) -> Floats:
 
 
 def _levelled_so_far(
-    grade: Floats, moved: Floats, period: float, setup: Setup
-) -> tuple[Floats, Floats]:
+    level: Level, grade: Floats, moved: Floats, setup: Setup
+) -> tuple[Level, Floats, Floats]:
     """Take the mean grade of the way so far off; return it and what is left of it as std (n,)."""
-    way = np.maximum(np.cumsum(moved) * period, 1.0)
-    mean = np.cumsum(grade * moved) / np.maximum(np.cumsum(moved), 1e-9)
-    trust, left = level_trust(way, setup)
-    return grade - trust * mean, left
+    way = level.way + np.cumsum(moved) / setup.rate
+    total = level.moved + np.cumsum(moved)
+    lifted = level.lifted + np.cumsum(grade * moved)
+    trust, left = level_trust(np.maximum(way, 1.0), setup)
+    after = Level(float(way[-1]), float(total[-1]), float(lifted[-1]))
+    return after, grade - trust * lifted / np.maximum(total, 1e-9), left
 
 
-def _aided(found: Found) -> Bools:
+def _aided(found: Found | None, time: Floats) -> Bools:
     """Tell the instants (n,) not long after a speed or fix."""
-    time = found.grid.time
-    stamps = [found.reference.time] + ([found.fixes.time] if found.fixes is not None else [])
     near: Bools = np.zeros(time.size, dtype=bool)
+    if found is None:
+        return near
+    stamps = [found.reference.time] + ([found.fixes.time] if found.fixes is not None else [])
     for t in stamps:
-        place = np.searchsorted(t, time + AHEAD, side="right") - 1
-        near |= (place >= 0) & (time - t[np.maximum(place, 0)] < LONGEST_AIDED)
+        if t.size:
+            place = np.searchsorted(t, time + AHEAD, side="right") - 1
+            near |= (place >= 0) & (time - t[np.maximum(place, 0)] < LONGEST_AIDED)
     return near

@@ -116,7 +116,7 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
             yaw0=np.interp(time, nodes.time, nodes.states[:, YAW0]),
         )
     accel = accel_along(found.grid, pose, constants, setup)
-    lean = averaged(time, bridged(time, accel))
+    lean = averaged(float(time[1] - time[0]), bridged(time, accel))
     grade = pose.pitch - constants.pitch0 - constants.squat * lean
     mounting_pitch, floor = float(end[PITCH0]), setup.settings.body_pitch_std
     if not setup.has_height:
@@ -224,9 +224,9 @@ def accel_along(grid: Even, pose: Pose, constants: Constants, setup: Setup) -> F
     return np.asarray(forward + constants.yaw0 * right + constants.pitch0 * down)
 
 
-def averaged(time: Floats, y: Floats) -> Floats:
-    """Mean of an even series (n,) over `SQUAT_WIDTH` around each instant, ends held."""
-    width = max(1, round(SQUAT_WIDTH / (time[1] - time[0]))) | 1
+def averaged(period: float, y: Floats) -> Floats:
+    """Mean of a series (n,) of a period [s] over `SQUAT_WIDTH` around each instant, ends held."""
+    width = max(1, round(SQUAT_WIDTH / period)) | 1
     padded = np.pad(y, width // 2, mode="edge")
     return np.convolve(padded, np.full(width, 1.0 / width), "valid")
 

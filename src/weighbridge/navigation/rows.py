@@ -92,9 +92,9 @@ def place_nodes(
 
     An even ``rate``, and the sample nearest to each GNSS fix, so that no fix is
     used at another instant than its own; both sides of each gap. A causal pass knows of a gap
-    only after it, and of no end.
+    only after it, of no end, and counts from 0 s.
     """
-    slots = np.floor((time - time[0]) * rate + 1e-6).astype(np.int64)
+    slots = np.floor((time - (0.0 if causal else time[0])) * rate + 1e-6).astype(np.int64)
     even = np.flatnonzero(np.diff(slots, prepend=-1) > 0)
     right = np.clip(np.searchsorted(time, fixes), 1, time.size - 1)
     nearest = np.where(fixes - time[right - 1] < time[right] - fixes, right - 1, right)
@@ -155,7 +155,7 @@ def still_state(
     index = np.clip(np.round((node_time - grid.time[0]) / period), 0, grid.time.size - 1)
     at = index.astype(np.int64)
     still = np.zeros(node_time.size)
-    if wheel is None or not len(wheel):
+    if wheel is None:
         fast = (
             _held(reference, grid.time, 3.0) if causal else interpolated(reference, grid.time, 3.0)
         )
@@ -181,6 +181,8 @@ def _distance(stamps: Floats, time: Floats, ahead: float) -> Floats:
 
 def _held(signal: Signal, time: Floats, longest: float) -> Floats:
     """Last value of a signal; NaN where it is older than that."""
+    if not len(signal):
+        return np.full(time.size, np.nan)
     place = np.searchsorted(signal.time, time, side="right") - 1
     held = np.where(place >= 0, signal.values[np.maximum(place, 0)], np.nan)
     age = time - signal.time[np.maximum(place, 0)]
@@ -189,7 +191,7 @@ def _held(signal: Signal, time: Floats, longest: float) -> Floats:
 
 def measurements(
     node_time: Floats, drive: Drive, speed: Signal | None, fixes: Fixes | None, clocks: Clocks,
-    settings: NavigationSettings, *, causal: bool = False,
+    settings: NavigationSettings, *, has_height: bool, causal: bool = False,
 ) -> Floats:  # fmt: skip
     """Lay all measurements out, one row (13,) per node, NaN where there is none.
 
@@ -201,6 +203,7 @@ def measurements(
     fixes : as recorded; None without
     clocks : delays and periods
     settings : noise levels
+    has_height : the drive's fixes carry height
     """
     z = np.full((node_time.size, MEASUREMENTS), np.nan)
     if speed is not None and len(speed) > 1:
@@ -208,7 +211,7 @@ def measurements(
     if fixes is not None:
         _fix_rows(z, node_time, drive, fixes, clocks, settings)
         _velocity_rows(z, node_time, drive, clocks, settings)
-    if fixes is None or not fixes.has_height:
+    if not has_height:
         # nobody drives far up or down for long: without heights this alone keeps
         # a bias of the accelerometer from being taken for an endless hill
         every = np.flatnonzero(np.diff(np.floor(node_time / _HEIGHT_PERIOD), prepend=-1.0) > 0)

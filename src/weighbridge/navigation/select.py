@@ -30,9 +30,9 @@ def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
         mounting = vehicle.mounting if vehicle is not None else None
         return inertial_motion(scaled_for_navigation(drive, vehicle), mounting)
     if drive.has("longitudinal_accel", "vehicle_speed"):
-        return longitudinal_motion(_true_speed(drive, vehicle))
+        return longitudinal_motion(true_speed(drive, vehicle))
     if has_speed:
-        return speed_motion(_true_speed(drive, vehicle))
+        return speed_motion(true_speed(drive, vehicle))
     raise DriveError(
         f"{drive.name}: no vehicle_speed and no GNSS; without a speed no vehicle can be weighed"
     )
@@ -41,10 +41,10 @@ def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
 def scaled_for_navigation(drive: Drive, vehicle: Vehicle | None) -> Drive:
     """Return the drive as navigation takes it: positions show the scale of its speed."""
     positions = drive.has("latitude", "longitude")
-    return drive if positions else _true_speed(drive, vehicle)
+    return drive if positions else true_speed(drive, vehicle)
 
 
-def _true_speed(drive: Drive, vehicle: Vehicle | None) -> Drive:
+def true_speed(drive: Drive, vehicle: Vehicle | None) -> Drive:
     """Take the vehicle's known speed scale off its indicated speed."""
     speed = drive.get("vehicle_speed")
     if speed is None or vehicle is None or vehicle.driveline.speed_scale == 1.0:

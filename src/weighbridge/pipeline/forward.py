@@ -1,20 +1,23 @@
 """The mass while a drive goes on: stages that look a second ahead, set up from outside.
 
 A whole drive tells mounting, delays, levels of noise and floors once (`identify_forward`). Then
-each stage reads what was recorded until soon after its instant, and no more: navigation by the
-filter alone, force balance, windows, and the joint filter. What the stages tell of an instant
-does not change with what comes more than `AHEAD` after it.
+the drive is taken in steps of a second (`step`): navigation by the filter alone, force balance,
+windows, and the joint filter, each from its state and the last seconds of the records. A recorded
+drive is folded with the same steps (`forward_weigh`), so that a vehicle which is weighed on the
+way gets the same numbers to the last bit.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from weighbridge.balance import force_balance
 from weighbridge.balance.averaging import FEWEST, PAUSE, WINDOW
+from weighbridge.balance.table import MOVING, MergedView
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators import joint_forward
 from weighbridge.estimators.joint_forward import JointSetup, JointState, Window, identify_joint
@@ -22,10 +25,11 @@ from weighbridge.estimators.judging import STOP
 from weighbridge.estimators.slow_errors import design, usable_rows
 from weighbridge.kernels import window_means
 from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
-from weighbridge.navigation.forward import forward_motion
+from weighbridge.navigation import forward
 from weighbridge.navigation.identify import identify
-from weighbridge.navigation.select import scaled_for_navigation
+from weighbridge.navigation.select import scaled_for_navigation, true_speed
 from weighbridge.signals import Drive, Floats
+from weighbridge.signals.recent import instants, recent
 from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
@@ -33,12 +37,9 @@ if TYPE_CHECKING:
     from weighbridge.navigation.identify.setup import Setup
     from weighbridge.pipeline.weighing import Weighing
 
-AHEAD: Final = 1.0
-"""Each stage reads so much past the instant that it tells of, at most [s]; the stages together
-twice as much."""
-
-MOVING: Final = 0.5
-"""Slower a vehicle stands [m/s]."""
+AHEAD: Final = 0.45
+"""The force side reads so much past the instant that it tells of [s], the motion
+`weighbridge.navigation.forward.lateness`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +60,7 @@ class ForwardSetup:
     period: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class ForwardTrack:
     """Running mass of a forward pass, one row per window.
 
@@ -125,6 +126,143 @@ def _holding(setup: Setup, squat: float | None) -> Setup:
     return replace(setup, use_squat=True, start=setup.start._replace(x=x, cov=cov))
 
 
+class ForwardState(NamedTuple):
+    """What the stages go on from.
+
+    Attributes
+    ----------
+    motion : of the navigation
+    windows : of the means of rows
+    joint : of the filter of the mass
+    read : instant of the last row that was folded [s]
+    burnt : fuel since the first row, until then [kg]
+    begun : instant at which the vehicle first moved; None before [s]
+    """
+
+    motion: forward.ForwardState
+    windows: window_means.WindowState
+    joint: JointState
+    read: float
+    burnt: float
+    begun: float | None
+
+
+class Running(NamedTuple):
+    """The mass after some windows, one row each.
+
+    Attributes
+    ----------
+    time : (m,) middle of each window [s]
+    mass, std : (m,) after it, fuel burnt by then taken off [kg]
+    """
+
+    time: Floats
+    mass: Floats
+    std: Floats
+
+
+NO_WINDOWS: Final = Running(np.empty(0), np.empty(0), np.empty(0))
+"""What a step tells in which no window became complete."""
+
+
+def begin(setup: ForwardSetup, start: float) -> ForwardState:
+    """Return the state before the first record, which comes at ``start`` [s] or later."""
+    columns = 3 + setup.joint.std.size
+    return ForwardState(
+        motion=forward.begin(setup.navigation, start),
+        windows=window_means.initial_state(columns),  # type: ignore[no-untyped-call]
+        joint=JointState(),
+        read=-math.inf,
+        burnt=0.0,
+        begun=None,
+    )
+
+
+def lateness(setup: ForwardSetup) -> float:
+    """Time that a row waits for what tells of it [s]: delays, and look-ahead of the stages."""
+    return forward.lateness(setup.navigation) + AHEAD + max(setup.delay, 0.0)
+
+
+def step(
+    state: ForwardState, records: Drive, until: float, vehicle: Vehicle, setup: ForwardSetup
+) -> tuple[ForwardState, Running]:
+    """Weigh by what came since the last step.
+
+    Parameters
+    ----------
+    state : before it
+    records : those of `weighbridge.signals.recent.recent`, up to ``until``
+    until : instant up to which records are complete [s]
+    vehicle
+    setup : of `identify_forward`
+
+    Returns
+    -------
+    state : after it
+    running : mass after each window that became complete
+    """
+    seen = records if setup.navigation.origin is not None else true_speed(records, vehicle)
+    moved, _ = forward.step(state.motion, seen, until, setup.navigation)
+    state = state._replace(motion=moved)
+    if moved.motion is None or moved.motion.time.size < 2:
+        return state, NO_WINDOWS
+    try:
+        balance = force_balance(
+            records, vehicle, moved.motion, delay=setup.delay, setup=setup.force
+        )
+    except DriveError:
+        # No torque came for long: the rows go on with the next one.
+        return state, NO_WINDOWS
+    view = balance.merged
+    horizon = float(moved.motion.time[-1]) - AHEAD
+    first, last = view.time.searchsorted([state.read, horizon], side="right")
+    if last <= first:
+        return state, NO_WINDOWS
+    return _folded(state, view, slice(int(first), int(last)), vehicle, setup)
+
+
+def _folded(
+    state: ForwardState, view: MergedView, new: slice, vehicle: Vehicle, setup: ForwardSetup
+) -> tuple[ForwardState, Running]:
+    """Fold new rows of the table into windows, and complete windows into the filter."""
+    sizes = setup.joint
+    burnt = view.fuel_burnt + (state.burnt - view.fuel_burnt[max(new.start - 1, 0)])
+    moving = np.nan_to_num(view.speed) > MOVING
+    begun = state.begun
+    if begun is None and moving[new].any():
+        begun = float(view.time[new][np.argmax(moving[new])])
+    view = replace(view, fuel_burnt=burnt, begun=begun)
+    rows, y = design(view, vehicle, leaned=sizes.body.leaned(view.accel))
+    values = np.column_stack([view.time, y, view.force_std**2, rows])
+    windows, means, count, stood = window_means.run(
+        state.windows,
+        np.ascontiguousarray(view.time[new]),
+        usable_rows(view, rows, y)[new],
+        moving[new],
+        values[new],
+        window_means.WindowParams(
+            length=WINDOW,
+            pause=max(PAUSE, 2.5 * setup.period),
+            enough=max(2, int(FEWEST * WINDOW / setup.period)),
+            long_gap=STOP,
+        ),
+    )
+    joint, mass, std = state.joint, np.empty(len(means)), np.empty(len(means))
+    for k, (mean, many) in enumerate(zip(means, count, strict=True)):
+        window = Window(float(mean[0]), mean[3:], float(mean[1]), float(mean[2] / many), stood[k])
+        joint = joint_forward.step(joint, window, sizes)
+        mass[k], std[k] = joint.mass, joint.std(sizes)
+    light = np.interp(means[:, 0], view.time, burnt)
+    after = state._replace(
+        windows=windows,
+        joint=joint,
+        read=float(view.time[new][-1]),
+        burnt=float(burnt[new][-1]),
+        begun=begun,
+    )
+    return after, Running(means[:, 0], mass - light, std)
+
+
 def forward_weigh(drive: Drive, vehicle: Vehicle, setup: ForwardSetup) -> ForwardTrack:
     """Weigh a drive, or the beginning of one, as it would have been weighed on the way.
 
@@ -133,36 +271,9 @@ def forward_weigh(drive: Drive, vehicle: Vehicle, setup: ForwardSetup) -> Forwar
     drive : as settled for the weighing of ``setup``
     vehicle
     setup : of `identify_forward`
-
-    Raises
-    ------
-    DriveError
-        The drive lacks signals that the setup has.
     """
-    motion = forward_motion(scaled_for_navigation(drive, vehicle), setup.navigation)
-    balance = force_balance(drive, vehicle, motion, delay=setup.delay, setup=setup.force)
-    view = balance.merged
-    sizes = setup.joint
-    rows, y = design(view, vehicle, leaned=sizes.body.leaned(view.accel))
-    values = np.column_stack([view.time, y, view.force_std**2, rows])
-    begin = window_means.initial_state(values.shape[1])  # type: ignore[no-untyped-call]
-    _, means, count, stood = window_means.run(
-        begin,
-        view.time,
-        usable_rows(view, rows, y),
-        np.nan_to_num(view.speed) > MOVING,
-        values,
-        window_means.WindowParams(
-            length=WINDOW,
-            pause=max(PAUSE, 2.5 * setup.period),
-            enough=max(2, int(FEWEST * WINDOW / setup.period)),
-            long_gap=STOP,
-        ),
-    )
-    state, mass, std = JointState(), np.empty(len(means)), np.empty(len(means))
-    for k, (mean, many) in enumerate(zip(means, count, strict=True)):
-        window = Window(float(mean[0]), mean[3:], float(mean[1]), float(mean[2] / many), stood[k])
-        state = joint_forward.step(state, window, sizes)
-        mass[k], std[k] = state.mass, state.std(sizes)
-    burnt = np.interp(means[:, 0], view.time, view.fuel_burnt)
-    return ForwardTrack(time=means[:, 0], mass=mass - burnt, std=std, state=state)
+    state, parts = begin(setup, drive.start), [NO_WINDOWS]
+    for until in instants(drive.start, drive.end):
+        state, running = step(state, recent(drive, until), until, vehicle, setup)
+        parts.append(running)
+    return ForwardTrack(*map(np.concatenate, zip(*parts, strict=True)), state=state.joint)

@@ -210,7 +210,10 @@ def _identified(
     speed = None if sources.speed is None else reference
     clocks = find_clocks(sources.drive, speed, fixes, (delay, late), node_time)
     still = still_state(node_time, grid, aligned.rot_bs, wheel, reference)
-    z = measurements(node_time, sources.drive, speed, fixes, clocks, settings)
+    has_height = fixes is not None and fixes.has_height
+    z = measurements(
+        node_time, sources.drive, speed, fixes, clocks, settings, has_height=has_height
+    )
     z[:, Z_STILL] = still
     moved_time, moved_var = openings(imu.time, settled.changes)
     open_mounting(z, node_time, moved_time, moved_var)
@@ -238,7 +241,7 @@ def _identified(
         gain_axis=scale.axis,
         scale_std=scale.std,
         origin=fixes.frame if fixes is not None else None,
-        has_height=fixes is not None and fixes.has_height,
+        has_height=has_height,
         has_wheel=sources.wheel is not None,
         notes=settled.notes,
     )

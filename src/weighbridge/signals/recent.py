@@ -1,0 +1,39 @@
+"""The last seconds of a drive, for stages that go forward with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.signals.drive import Drive
+from weighbridge.signals.signal import Floats, Signal
+
+STEP: Final = 1.0
+"""The stages take a drive in steps between whole multiples of this [s]."""
+
+BEHIND: Final = 15.0
+"""They look back so far [s]: a reading that runs straight for 10 s was filled in, and filters
+have forgotten by then."""
+
+FEWEST: Final = 16
+"""They see so many samples of a slow signal at least, however old."""
+
+
+def recent(drive: Drive, until: float) -> Drive:
+    """Return the part of a drive that a step up to ``until`` [s] reads; no signal is copied."""
+    cut = {}
+    for name, s in drive.signals.items():
+        first, last = s.time.searchsorted([until - STEP - BEHIND, until])
+        first = max(min(first, last - FEWEST), 0)
+        if last > first:
+            cut[name] = Signal(name, s.time[first:last], s.values[first:last])
+    return replace(drive, signals=cut)
+
+
+def instants(start: float, end: float) -> Floats:
+    """Ends of the steps (n,) that a drive from ``start`` to ``end`` is taken in [s]."""
+    first = math.floor(start / STEP) + 1
+    return np.arange(first, math.floor(end / STEP) + 1) * STEP
