@@ -26,7 +26,7 @@ from accuracy_drives import (
 )
 
 from weighbridge.errors import DriveError
-from weighbridge.estimators import joint
+from weighbridge.estimators.joint import batch
 from weighbridge.papers.jensen2022 import without_weather
 from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.signals import Drive
@@ -659,12 +659,12 @@ STARTS: Final = (1.0 / 3.0, 1.0, 3.0)
 @contextmanager
 def started(factor: float) -> Iterator[None]:
     """Let the filter start at a multiple of its guess."""
-    guess = joint.first_guess
-    joint.first_guess = lambda phi, y: factor * guess(phi, y)
+    guess = batch.first_guess
+    batch.first_guess = lambda phi, y: factor * guess(phi, y)
     try:
         yield
     finally:
-        joint.first_guess = guess
+        batch.first_guess = guess
 
 
 def start_job(number: int, vehicle: Vehicle) -> list[tuple[float, ...]]:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.special import ndtr
 
-from weighbridge.estimators.inertia import (
+from weighbridge.inertia.filter import (
     InertiaSettings,
     body_noise,
     corners,
@@ -24,9 +24,9 @@ from weighbridge.estimators.inertia import (
     push_var,
     stiffness,
 )
+from weighbridge.inertia.ride_checks import ride_samples
 from weighbridge.papers import nguyen2024 as paper
 from weighbridge.pipeline.inertia import estimate_inertia
-from weighbridge.pipeline.ride_checks import ride_samples
 from weighbridge.signals import Drive
 from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
 from weighbridge.vehicle.model import Vehicle

@@ -26,8 +26,9 @@ from weighbridge.balance.averaging import windows
 from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.balance.law import force_on_mass
 from weighbridge.estimators import joint
+from weighbridge.estimators.joint.problem import UNMODELLED
+from weighbridge.estimators.joint.slow_errors import design, prior_std
 from weighbridge.estimators.regression import regression
-from weighbridge.estimators.slow_errors import design, prior_std
 from weighbridge.estimators.squat import SQUAT, Lean
 from weighbridge.io.candump import read_candump
 from weighbridge.io.j1939 import decode_j1939
@@ -125,7 +126,7 @@ def bmw_i3() -> str:
             lines.append(f"{head} | {w.reason} | | | | | |")
             continue
         other = wb.weigh(drive, car, method="rls").mass
-        own = joint.UNMODELLED * w.result.bound_std
+        own = UNMODELLED * w.result.bound_std
         power = find_power_balance(drive, car)
         offset = next(n.split()[2] for n in w.warnings if n.startswith("accelerometer offset"))
         rows.append((name, when, load, w.mass, own, other))

@@ -9,6 +9,7 @@ import pytest
 import weighbridge as wb
 from weighbridge.balance import force_balance
 from weighbridge.estimators import Status, joint
+from weighbridge.estimators.joint import batch
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Signal
 from weighbridge.simulation import (
@@ -159,8 +160,8 @@ def test_noise_of_a_measured_torque_does_not_move_the_mean():
 
 @pytest.mark.parametrize("factor", [1.0 / 3.0, 3.0])
 def test_a_start_three_times_off_costs_no_accuracy(car, usual, factor, monkeypatch):
-    guess = joint.first_guess
-    monkeypatch.setattr(joint, "first_guess", lambda phi, y: factor * guess(phi, y))
+    guess = batch.first_guess
+    monkeypatch.setattr(batch, "first_guess", lambda phi, y: factor * guess(phi, y))
     assert np.max(np.abs(ratios(car) / usual - 1.0)) < MOST_MOVED
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.stats import truncnorm
 
-from weighbridge.estimators.inertia import (
+from weighbridge.inertia.filter import (
     InertiaFilter,
     InertiaSettings,
     RideSamples,

@@ -9,7 +9,7 @@ from numba import config
 
 import weighbridge as wb
 from weighbridge.estimators import Status
-from weighbridge.estimators.load_stops import change_odds, loadable, stood_before, too_hasty
+from weighbridge.estimators.joint.load_stops import change_odds, loadable, stood_before, too_hasty
 from weighbridge.kernels import disturbance
 from weighbridge.kernels import load_change as kernel
 from weighbridge.simulation import Loading, make_scenario, simulate_car

@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 from weighbridge.balance import Reason
 from weighbridge.balance.table import MergedView
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.confounded import inertia_relative_std
+from weighbridge.estimators.joint.confounded import inertia_relative_std
+from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
 from weighbridge.estimators.judging import LEAN_STD, uncalibrated_std
-from weighbridge.estimators.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.data_sheet import (
     ACCESSORY_POWER,

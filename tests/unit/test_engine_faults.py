@@ -17,8 +17,9 @@ from weighbridge.checks.false_samples import clipped, isolated, piled, repeated
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.mending import mended
 from weighbridge.errors import DriveError
-from weighbridge.estimators import Status, changing, joint
-from weighbridge.estimators.contradicted import contradicted
+from weighbridge.estimators import Status, joint
+from weighbridge.estimators.joint import changing
+from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.navigation.select import find_motion
 from weighbridge.pipeline.weighing import below_tare, weigh_balance

@@ -10,8 +10,9 @@ import weighbridge as wb
 from weighbridge.balance import ForceBalance, Reason, force_balance
 from weighbridge.balance.cornering import HARD_CORNERING, cornering, lateral_acceleration
 from weighbridge.balance.table import MergedView
-from weighbridge.estimators import ESTIMATORS, Status, fit_std, foreign, judging
+from weighbridge.estimators import ESTIMATORS, Status, fit_std, judging
 from weighbridge.estimators.fit_std import honest_std, slow_std
+from weighbridge.estimators.joint import foreign
 from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle

@@ -9,12 +9,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators.inertia import integration_std, jumps
-from weighbridge.estimators.suspension import check_suspension
+from weighbridge.inertia.filter import integration_std, jumps
+from weighbridge.inertia.ride_checks import ride_samples
+from weighbridge.inertia.suspension import check_suspension
 from weighbridge.io import read_drive
 from weighbridge.papers.nguyen2024 import suspension_of
 from weighbridge.pipeline.inertia import estimate_inertia
-from weighbridge.pipeline.ride_checks import ride_samples
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation.ride import TRUCK, RideScenario, RideSensors, simulate_ride
 from weighbridge.vehicle.model import Vehicle

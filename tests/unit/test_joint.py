@@ -10,9 +10,11 @@ import weighbridge as wb
 from weighbridge.balance import Reason
 from weighbridge.balance.averaging import windows
 from weighbridge.errors import DriveError
-from weighbridge.estimators import joint, joint_forward, joint_problem
-from weighbridge.estimators.joint_problem import UNMODELLED
-from weighbridge.estimators.slow_errors import DATA_SHEET_NAMES, design, usable_rows
+from weighbridge.estimators import joint
+from weighbridge.estimators.joint import batch, problem
+from weighbridge.estimators.joint import forward as joint_forward
+from weighbridge.estimators.joint.problem import UNMODELLED
+from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, usable_rows
 from weighbridge.report.slow_section import constants_table
 from weighbridge.signals import Signal
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
@@ -84,7 +86,7 @@ def test_a_body_that_leans_with_its_load_costs_little(balance, car, monkeypatch)
         return abs(joint.estimate(leaning, car).mass / upright - 1.0)
 
     allowed = off()
-    monkeypatch.setattr(joint_problem, "LOAD_LEAN_STD", 0.0)
+    monkeypatch.setattr(problem, "LOAD_LEAN_STD", 0.0)
     assert allowed < 0.7 * off()
 
 
@@ -125,9 +127,9 @@ def test_fuel_counts_in_a_calibration(made, car):
 
 def test_what_noise_of_the_motion_takes_reaches_mass_and_interval(balance, car, monkeypatch):
     real = joint.estimate(balance, car)
-    monkeypatch.setattr(joint, "attenuation", lambda weight, *_: np.full(weight.size, 0.0))
+    monkeypatch.setattr(batch, "attenuation", lambda weight, *_: np.full(weight.size, 0.0))
     bare = joint.estimate(balance, car)
-    monkeypatch.setattr(joint, "attenuation", lambda weight, *_: np.full(weight.size, 0.1))
+    monkeypatch.setattr(batch, "attenuation", lambda weight, *_: np.full(weight.size, 0.1))
     much = joint.estimate(balance, car)
     assert bare.mass < real.mass < 1.02 * bare.mass
     assert much.mass + balance.merged.fuel_burnt[-1] == pytest.approx(
@@ -138,7 +140,7 @@ def test_what_noise_of_the_motion_takes_reaches_mass_and_interval(balance, car, 
 
 def test_what_the_fit_left_open_reaches_the_interval(balance, car, monkeypatch):
     real = joint.estimate(balance, car)
-    monkeypatch.setattr(joint, "open_std", lambda *_: 0.05)
+    monkeypatch.setattr(batch, "open_std", lambda *_: 0.05)
     wide = joint.estimate(balance, car)
     assert wide.mass == real.mass
     assert wide.std > UNMODELLED * 0.05 * wide.mass

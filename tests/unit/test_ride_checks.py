@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from weighbridge.errors import DriveError
-from weighbridge.pipeline.ride_checks import NEEDED, ride_samples
+from weighbridge.inertia.ride_checks import NEEDED, ride_samples
 from weighbridge.signals import Drive, Problem, Signal
 
 

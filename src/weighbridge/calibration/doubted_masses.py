@@ -11,7 +11,7 @@ import numpy as np
 from weighbridge.balance import ForceBalance
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
-from weighbridge.estimators.joint_problem import UNMODELLED
+from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of

@@ -19,8 +19,8 @@ from weighbridge.balance.law import DISTURBANCE_STD
 from weighbridge.balance.table import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
-from weighbridge.estimators.joint_problem import GATE
-from weighbridge.estimators.slow_errors import (
+from weighbridge.estimators.joint.problem import GATE
+from weighbridge.estimators.joint.slow_errors import (
     RESISTANCE_STD,
     TIME_CONSTANTS,
     WIND_STD,

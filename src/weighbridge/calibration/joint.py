@@ -35,7 +35,7 @@ from weighbridge.calibration.rls import fit_rls, refuse_nonsense
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.considered import pinned, triangle
-from weighbridge.estimators.joint_problem import UNMODELLED
+from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle.fits import JOINT

@@ -76,7 +76,7 @@ def _next(
 
 
 def _show(screen: Console, found: Inspection, every_way: bool) -> None:
-    from weighbridge.pipeline.ride_checks import NEEDED as RIDE
+    from weighbridge.inertia.ride_checks import NEEDED as RIDE
 
     drive = found.drive
     screen.print(f"[bold]{shown(drive.name)}[/]: {drive.duration / 60.0:.1f} min")

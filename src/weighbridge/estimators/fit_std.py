@@ -11,22 +11,22 @@ from scipy.signal import lfilter
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.estimators.considered import force_columns, open_std
-from weighbridge.estimators.judging import LEAST_SPREAD, Evidence, judge
-from weighbridge.estimators.noisy_motion import row_noise_std, too_noisy
-from weighbridge.estimators.slow_errors import (
+from weighbridge.estimators.joint.slow_errors import (
     LASTING,
     NAMES,
     TIME_CONSTANTS,
     design,
     prior_std,
 )
+from weighbridge.estimators.judging import LEAST_SPREAD, Evidence, judge
+from weighbridge.estimators.noisy_motion import row_noise_std, too_noisy
 from weighbridge.estimators.track import Status
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.model import Vehicle
 
 BIN: Final = 2.5
 """Time over which a slow error counts as one [s]: it is short beside the shortest of
-`weighbridge.estimators.slow_errors.TIME_CONSTANTS`."""
+`weighbridge.estimators.joint.slow_errors.TIME_CONSTANTS`."""
 
 
 COLD: Final = NAMES.index("cold_torque")

@@ -14,9 +14,8 @@ from weighbridge.balance import ForceBalance, Reason
 from weighbridge.signals import Bools, Floats
 
 if TYPE_CHECKING:
-    from weighbridge.estimators.joint_forward import JointSizes
-    from weighbridge.estimators.slow_errors import SlowErrors
-    from weighbridge.kernels import disturbance
+    from weighbridge.estimators.joint.problem import FilterInput, JointSizes
+    from weighbridge.estimators.joint.slow_errors import SlowErrors
 
 
 class Status(StrEnum):
@@ -42,32 +41,6 @@ class Segment:
     end: float
     mass: float
     std: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FilterInput:
-    """What the filter of the joint estimator was given, one row per window.
-
-    Attributes
-    ----------
-    start, params : first state and parameters of `weighbridge.kernels.disturbance`
-    time : (m,) [s]
-    rows : (m, k) of the states; the mass is the first
-    y, noise : (m,) force [N] and its noise variance [N^2]
-    added : (m, k) variance by which states jump where the load changes
-    stood : (m,) how long the vehicle stood before each window [s]
-    traction : (m,) what the whole model says of the force at the wheels [N]
-    """
-
-    start: disturbance.DisturbanceState
-    params: disturbance.DisturbanceParams
-    time: Floats
-    rows: Floats
-    y: Floats
-    noise: Floats
-    added: Floats
-    stood: Floats
-    traction: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from weighbridge.estimators.inertia import (
+from weighbridge.inertia.filter import (
     AXES,
     InertiaSettings,
     InertiaTrack,
@@ -20,8 +20,8 @@ from weighbridge.estimators.inertia import (
     RideSamples,
     estimate,
 )
+from weighbridge.inertia.ride_checks import ride_samples
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
-from weighbridge.pipeline.ride_checks import ride_samples
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats
 from weighbridge.simulation.ride import (

@@ -19,10 +19,10 @@ from weighbridge.balance import force_balance
 from weighbridge.balance.averaging import FEWEST, PAUSE, WINDOW
 from weighbridge.balance.table import MOVING, MergedView
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators import joint_forward
-from weighbridge.estimators.joint_forward import JointSetup, JointState, Window, identify_joint
+from weighbridge.estimators.joint import forward as joint_forward
+from weighbridge.estimators.joint.forward import JointSetup, JointState, Window, identify_joint
+from weighbridge.estimators.joint.slow_errors import design, usable_rows
 from weighbridge.estimators.judging import STOP
-from weighbridge.estimators.slow_errors import design, usable_rows
 from weighbridge.kernels import window_means
 from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
 from weighbridge.navigation import forward

@@ -13,7 +13,8 @@ import numpy as np
 from weighbridge.checks import refuse_serious, settle_drive
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.inertia import (
+from weighbridge.estimators.track import Status
+from weighbridge.inertia.filter import (
     AXES,
     METHODS,
     InertiaSettings,
@@ -26,7 +27,17 @@ from weighbridge.estimators.inertia import (
     jumps,
     load_changes,
 )
-from weighbridge.estimators.suspension import (
+from weighbridge.inertia.ride_checks import (
+    LEAST,
+    NEEDED,
+    SLOWEST,
+    check_response,
+    check_signals,
+    nothing_moves,
+    ride_of,
+    ride_samples,
+)
+from weighbridge.inertia.suspension import (
     PARTS,
     SHORTEST,
     SuspensionCheck,
@@ -36,7 +47,6 @@ from weighbridge.estimators.suspension import (
     response,
     static_mass,
 )
-from weighbridge.estimators.track import Status
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -44,16 +54,6 @@ from weighbridge.pipeline.given import (
     as_vehicle,
     home_of,
     mapping_of,
-)
-from weighbridge.pipeline.ride_checks import (
-    LEAST,
-    NEEDED,
-    SLOWEST,
-    check_response,
-    check_signals,
-    nothing_moves,
-    ride_of,
-    ride_samples,
 )
 from weighbridge.results.inertia import TOO_WIDE, InertiaResult, LoadSegment
 from weighbridge.signals import Drive, Floats

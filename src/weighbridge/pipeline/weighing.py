@@ -18,9 +18,9 @@ from weighbridge.balance.speed_balance import SPEEDS, speed_balance
 from weighbridge.balance.torque_drift import steadied
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
-from weighbridge.estimators.changing import largest
-from weighbridge.estimators.contradicted import contradicted
-from weighbridge.estimators.foreign import of_another
+from weighbridge.estimators.joint.changing import largest
+from weighbridge.estimators.joint.contradicted import contradicted
+from weighbridge.estimators.joint.foreign import of_another
 from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from weighbridge.estimators.inertia import AXES, InertiaTrack
-from weighbridge.estimators.suspension import PARTS, SuspensionCheck
+from weighbridge.inertia.filter import AXES, InertiaTrack
+from weighbridge.inertia.suspension import PARTS, SuspensionCheck
 from weighbridge.report.study import write_study
 from weighbridge.report.style import BAND, BLUE, GREY, VERMILLION, Panel, blank, dots, line
 from weighbridge.report.table import Table

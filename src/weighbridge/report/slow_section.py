@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.constants import GRAVITY
-from weighbridge.estimators.slow_errors import WIND_STD, SlowErrors
+from weighbridge.estimators.joint.slow_errors import WIND_STD, SlowErrors
 from weighbridge.report.maps import mark, positions, track_map
 from weighbridge.report.style import (
     BLUE,

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from weighbridge.estimators.inertia import InertiaTrack, Method, inverse_interval
-from weighbridge.estimators.suspension import SuspensionCheck
 from weighbridge.estimators.track import Status
+from weighbridge.inertia.filter import InertiaTrack, Method, inverse_interval
+from weighbridge.inertia.suspension import SuspensionCheck
 from weighbridge.results.writing import check_level, number, write_track
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Ride, Vehicle

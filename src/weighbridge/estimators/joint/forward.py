@@ -7,42 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from weighbridge.estimators.joint_problem import UNMODELLED, first_state, load_params
+from weighbridge.estimators.joint.load_stops import change_odds
+from weighbridge.estimators.joint.problem import (
+    UNMODELLED,
+    FilterInput,
+    JointSizes,
+    first_state,
+    load_params,
+)
 from weighbridge.estimators.judging import STOP
-from weighbridge.estimators.load_stops import change_odds
-from weighbridge.estimators.squat import Lean
-from weighbridge.estimators.track import FilterInput
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Floats
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JointSizes:
-    """Sizes of noise and states that the whole drive tells.
-
-    Attributes
-    ----------
-    std : (k,) of the states; that of the mass is its guess as well
-    fast, slow : levels of the noise over their usual sizes [-]
-    body : squat that rows and torque do not have in common
-    motion_var : variance of the specific force of a window [m^2/s^4]
-    noise_information : trace of the windows' information times the noise of the motion in them,
-        which times the variance of the mass is the part that it is too low by [1/kg^2]
-    left : relative standard deviation of the mass that no row takes away [-]
-    """
-
-    std: Floats
-    fast: float
-    slow: float
-    body: Lean
-    motion_var: float
-    noise_information: float
-    left: float
-
-    @property
-    def mass(self) -> float:
-        """Guess of the mass [kg]."""
-        return float(self.std[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.estimators.inertia import RideSamples, longest_step
-from weighbridge.estimators.suspension import Response
+from weighbridge.inertia.filter import RideSamples, longest_step
+from weighbridge.inertia.suspension import Response
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem
 
 WHEELS: Final = ("fl", "fr", "rl", "rr")

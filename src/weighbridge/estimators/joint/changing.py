@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.estimators.load_stops import loadable
-from weighbridge.estimators.track import FilterInput
+from weighbridge.estimators.joint.load_stops import loadable
+from weighbridge.estimators.joint.problem import FilterInput
 from weighbridge.kernels import disturbance
 from weighbridge.signals import Floats
 

@@ -60,7 +60,7 @@ calibration finds once is found from each drive. An offset of the torque works t
 gear, and low gears go with strong acceleration: taken for none it makes mass. So does
 friction that grows with engine speed, which is high where torque is. The inertias are states
 where there are several gears: with one they are like the scale and the lean of the
-accelerometer, which would be taken for them (`weighbridge.estimators.confounded`)."""
+accelerometer, which would be taken for them (`weighbridge.estimators.joint.confounded`)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

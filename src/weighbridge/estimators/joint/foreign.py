@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.estimators.slow_errors import NAMES, prior_std
+from weighbridge.estimators.joint.slow_errors import NAMES, prior_std
 from weighbridge.estimators.track import MassTrack
 from weighbridge.vehicle.model import Vehicle
 

@@ -13,10 +13,25 @@ from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import WINDOW, Windows, windows
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.table import MergedView
-from weighbridge.estimators.confounded import inertia_relative_std
 from weighbridge.estimators.considered import force_columns, open_std, sensitivity
-from weighbridge.estimators.joint_forward import JointSizes
-from weighbridge.estimators.joint_problem import FEWEST_WINDOWS, UNMODELLED, Problem
+from weighbridge.estimators.joint.confounded import inertia_relative_std
+from weighbridge.estimators.joint.load_stops import change_odds, stood_before, too_hasty
+from weighbridge.estimators.joint.problem import (
+    FEWEST_WINDOWS,
+    UNMODELLED,
+    FilterInput,
+    JointSizes,
+    Problem,
+)
+from weighbridge.estimators.joint.slow_errors import (
+    LASTING,
+    SlowErrors,
+    design,
+    motion_variance,
+    noise_variance,
+    prior_std,
+    usable_rows,
+)
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
     OTHER_METHOD_STD,
@@ -26,19 +41,9 @@ from weighbridge.estimators.judging import (
     lacks_accelerometer,
     nothing,
 )
-from weighbridge.estimators.load_stops import change_odds, stood_before, too_hasty
 from weighbridge.estimators.noisy_motion import LEVEL_STD, attenuation
-from weighbridge.estimators.slow_errors import (
-    LASTING,
-    SlowErrors,
-    design,
-    motion_variance,
-    noise_variance,
-    prior_std,
-    usable_rows,
-)
 from weighbridge.estimators.squat import Lean, lean
-from weighbridge.estimators.track import FilterInput, MassTrack, Segment
+from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import Bools, Floats
@@ -126,7 +131,7 @@ class _Asked:
     ----------
     problem
     body : squat that rows and torque do not have in common
-    rows, y : (n, k), (n,) of `weighbridge.estimators.slow_errors.design`
+    rows, y : (n, k), (n,) of `weighbridge.estimators.joint.slow_errors.design`
     stood : (m,) how long the vehicle stood before each window [s]
     """
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.signal import butter, sosfilt
 
-from weighbridge.estimators.inertia import (
+from weighbridge.inertia.filter import (
     RideSamples,
     body_noise,
     corners,

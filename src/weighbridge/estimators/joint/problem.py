@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 from scipy.optimize import minimize
 
-from weighbridge.estimators.slow_errors import filter_params
+from weighbridge.estimators.joint.slow_errors import filter_params
+from weighbridge.estimators.squat import Lean
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Bools, Floats
 
@@ -142,3 +143,58 @@ class Problem:
             self.odds,
             load_params(params, self.std),
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilterInput:
+    """What the filter of the joint estimator was given, one row per window.
+
+    Attributes
+    ----------
+    start, params : first state and parameters of `weighbridge.kernels.disturbance`
+    time : (m,) [s]
+    rows : (m, k) of the states; the mass is the first
+    y, noise : (m,) force [N] and its noise variance [N^2]
+    added : (m, k) variance by which states jump where the load changes
+    stood : (m,) how long the vehicle stood before each window [s]
+    traction : (m,) what the whole model says of the force at the wheels [N]
+    """
+
+    start: disturbance.DisturbanceState
+    params: disturbance.DisturbanceParams
+    time: Floats
+    rows: Floats
+    y: Floats
+    noise: Floats
+    added: Floats
+    stood: Floats
+    traction: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointSizes:
+    """Sizes of noise and states that the whole drive tells.
+
+    Attributes
+    ----------
+    std : (k,) of the states; that of the mass is its guess as well
+    fast, slow : levels of the noise over their usual sizes [-]
+    body : squat that rows and torque do not have in common
+    motion_var : variance of the specific force of a window [m^2/s^4]
+    noise_information : trace of the windows' information times the noise of the motion in them,
+        which times the variance of the mass is the part that it is too low by [1/kg^2]
+    left : relative standard deviation of the mass that no row takes away [-]
+    """
+
+    std: Floats
+    fast: float
+    slow: float
+    body: Lean
+    motion_var: float
+    noise_information: float
+    left: float
+
+    @property
+    def mass(self) -> float:
+        """Guess of the mass [kg]."""
+        return float(self.std[0])
