@@ -21,7 +21,6 @@ from weighbridge.vehicle.data_sheet import (
     scale_std,
     wheel_efficiency,
 )
-from weighbridge.vehicle.file import load_vehicle
 from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel, Vehicle
 from weighbridge.vehicle.torque import engine_torque
 
@@ -46,11 +45,11 @@ def test_a_file_that_does_not_state_the_efficiency_gets_that_of_its_kind(tmp_pat
 
     file = tmp_path / "car.toml"
     file.write_text('[driveline]\ngearings_per_m = [12.0, 7.0]\nlayout = "transverse"\n')
-    loaded = load_vehicle(file)
+    loaded = Vehicle.load(file)
     assert loaded.driveline.efficiency is None
     assert wheel_efficiency(loaded) == wheel_efficiency(across)
     loaded.save(tmp_path / "again.toml")
-    assert load_vehicle(tmp_path / "again.toml") == loaded
+    assert Vehicle.load(tmp_path / "again.toml") == loaded
     with pytest.raises(ConfigError, match="transverse or longitudinal"):
         Driveline(layout="sideways")
 

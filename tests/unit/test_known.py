@@ -4,8 +4,9 @@ import pytest
 
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
-from weighbridge.vehicle.file import load_vehicle, save_vehicle
+from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.telling import can_weigh, tell
 from weighbridge.vehicle.tyre import rolling_radius
 
@@ -40,7 +41,7 @@ def test_a_class_alone_makes_a_file_that_can_be_calibrated(kind, tmp_path):
     made = describe(Known(kind=kind))
     path = tmp_path / "v.toml"
     save_vehicle(made.vehicle, path, made.origins)
-    assert load_vehicle(path) == made.vehicle
+    assert Vehicle.load(path) == made.vehicle
     assert not can_weigh(made.vehicle)
     text = path.read_text()
     assert f"of {VEHICLE_CLASSES[kind].tyre}, usual for a {kind}" in text
@@ -60,7 +61,7 @@ def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
     )  # fmt: skip
     path = tmp_path / "v.toml"
     save_vehicle(made.vehicle, path, made.origins)
-    loaded = load_vehicle(path)
+    loaded = Vehicle.load(path)
     assert loaded == made.vehicle
     assert can_weigh(loaded)
     assert loaded.driveline.gearings[0] == pytest.approx(

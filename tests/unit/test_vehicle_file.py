@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from weighbridge.errors import ConfigError
-from weighbridge.vehicle.file import load_vehicle, save_vehicle
+from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.model import (
     WITNESS_TERMS,
     DraggedReading,
@@ -254,7 +254,7 @@ def test_file_speaks_the_units_of_people(tmp_path):
 def load(tmp_path, content):
     path = tmp_path / "car.toml"
     path.write_text(content, encoding="utf-8")
-    return load_vehicle(path)
+    return Vehicle.load(path)
 
 
 def test_data_sheet_values_are_accepted(tmp_path):
@@ -383,7 +383,7 @@ def test_broken_toml_is_told(tmp_path):
 
 def test_missing_file_is_told(tmp_path):
     with pytest.raises(ConfigError, match=r"nowhere\.toml: no such file"):
-        load_vehicle(tmp_path / "nowhere.toml")
+        Vehicle.load(tmp_path / "nowhere.toml")
 
 
 def test_unwritable_place_is_told(tmp_path):

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from itertools import islice, pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol, TypeVar
 
 import tomlkit
 from tomlkit.items import Table
@@ -19,29 +19,36 @@ from tomlkit.items import Table
 from weighbridge.errors import ConfigError
 from weighbridge.signals.tomlfile import Section, read_toml
 from weighbridge.vehicle.file_keys import SECTIONS, VEHICLE_KEYS, WITNESS_KEYS, Key
-from weighbridge.vehicle.model import (
-    FORMAT_VERSION,
-    WITNESS_TERMS,
-    Vehicle,
-    WitnessRelation,
-)
 from weighbridge.vehicle.rounding import covariance_texts, rounded_texts
+from weighbridge.vehicle.torque_model import WITNESS_TERMS, WitnessRelation
 from weighbridge.whole import write_whole
+
+FORMAT_VERSION: Final = 1
+"""Version of the vehicle file this program writes and reads."""
 
 # A comment that does not fit behind its key goes above it.
 _LINE: Final = 90
 
 
-def load_vehicle(path: str | Path) -> Vehicle:
+Made = TypeVar("Made")
+
+
+class Written(Protocol):
+    """A vehicle, as a file holds it: a field for each of its sections and keys."""
+
+    @property
+    def witnesses(self) -> tuple[WitnessRelation, ...]:
+        """How the torque's reading goes with other signals of the engine."""
+        ...
+
+
+def load_vehicle(path: str | Path, build: type[Made]) -> Made:
     """Read a vehicle file.
 
     Parameters
     ----------
     path : the TOML file; a mapping it names is looked for beside it
-
-    Returns
-    -------
-    Vehicle
+    build : what is made of it, such as `weighbridge.vehicle.model.Vehicle`
 
     Raises
     ------
@@ -53,7 +60,7 @@ def load_vehicle(path: str | Path) -> Vehicle:
     root = read_toml(path)
     _check_version(root)
     sections: dict[str, Any] = {}
-    for name, (build, keys) in SECTIONS.items():
+    for name, (part, keys) in SECTIONS.items():
         section = root.section(name)
         if section is None:
             continue
@@ -65,8 +72,8 @@ def load_vehicle(path: str | Path) -> Vehicle:
         elif name == "provenance":
             section.count("format_version")
         section.done()
-        _refuse_gaps(section, build, keys, values)
-        sections[name] = _built(build, section, values)
+        _refuse_gaps(section, part, keys, values)
+        sections[name] = _built(part, section, values)
     sections["witnesses"] = _witnesses(root)
     section = root.section("vehicle") or Section({}, root.name, root.lines, ("vehicle",))
     values = {
@@ -74,8 +81,8 @@ def load_vehicle(path: str | Path) -> Vehicle:
     }
     section.done()
     root.done()
-    vehicle: Vehicle = _built(Vehicle, section, {**values, **sections})
-    return vehicle
+    made: Made = _built(build, section, {**values, **sections})
+    return made
 
 
 def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
@@ -100,7 +107,7 @@ def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
 
 
 def save_vehicle(
-    vehicle: Vehicle,
+    vehicle: Written,
     path: str | Path,
     origins: Mapping[tuple[str, str], str] | None = None,
     *,
@@ -248,9 +255,8 @@ def _built(build: type[Any], section: Section, values: Mapping[str, Any]) -> Any
         return build(**values)
     except ConfigError as e:
         message = str(e)
-        keys = {Vehicle: VEHICLE_KEYS, WitnessRelation: WITNESS_KEYS}.get(build) or SECTIONS[
-            section.path[-1]
-        ][1]
+        said_of = {"vehicle": VEHICLE_KEYS, "witnesses": WITNESS_KEYS}
+        keys = said_of.get(section.path[0]) or SECTIONS[section.path[0]][1]
         said = [
             k
             for key in sorted(keys, key=lambda k: len(k.stem), reverse=True)

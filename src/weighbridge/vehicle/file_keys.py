@@ -5,17 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from weighbridge.vehicle.model import (
-    DraggedReading,
-    Driveline,
-    Mounting,
-    Provenance,
-    Ride,
-    RoadLoad,
-    SpeedModel,
-    Timing,
-    TorqueModel,
-)
+from weighbridge.vehicle.driveline import Driveline, Mounting, RoadLoad
+from weighbridge.vehicle.provenance import Provenance
+from weighbridge.vehicle.ride import Ride
+from weighbridge.vehicle.speed_model import SpeedModel
+from weighbridge.vehicle.torque_model import DraggedReading, Timing, TorqueModel
 
 Kind = Literal["text", "texts", "number", "numbers", "triangle", "count"]
 

@@ -1,0 +1,73 @@
+"""Where the numbers of a vehicle file come from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from weighbridge.errors import ConfigError
+from weighbridge.vehicle.fits import FITS, Fit
+from weighbridge.vehicle.possible import MASSES, not_negative, within
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """Where the numbers come from.
+
+    Attributes
+    ----------
+    drives : names of the drives of the calibration
+    masses : their known masses [kg]
+    date : ISO 8601 date
+    r_squared : of the torque fit [-]
+    residual_std : of the torque fit [N m]
+    samples : samples used
+    method : what the drives were fitted for: the torque of "joint" or "rls", or the speed
+        model of "speed-ekf" alone; None where nothing was
+    motion : how the motion of the drives was found, as `weighbridge.navigation.Motion.source`
+    mass_scale_std : relative standard deviation that the calibration leaves in
+        every mass weighed with it [-]
+    fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
+        triangle, row by row, of torque coefficients, curvature, slopes at the knots, drag area,
+        rolling coefficient, engine and wheel inertia; empty where it is not known
+    notes : free text
+    doubts : of the masses of the calibration, told at each weighing
+    """
+
+    drives: tuple[str, ...] = ()
+    masses: tuple[float, ...] = ()
+    date: str | None = None
+    r_squared: float | None = None
+    residual_std: float | None = None
+    samples: int | None = None
+    method: str | None = None
+    motion: str | None = None
+    mass_scale_std: float | None = None
+    fit_cov: tuple[float, ...] = ()
+    notes: str | None = None
+    doubts: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        not_negative("mass_scale_std", self.mass_scale_std)
+        within("mass_scale_std", self.mass_scale_std, 0.0, 1e3)
+        for mass in self.masses:
+            within("one of masses", mass, *MASSES, "kg")
+        size = math.isqrt(2 * len(self.fit_cov))
+        if size * (size + 1) != 2 * len(self.fit_cov):
+            raise ConfigError(
+                "fit_cov must be the lower triangle of a square, 1, 3, 6, 10 ... numbers, "
+                f"got {len(self.fit_cov)}"
+            )
+        if self.method is not None and self.method not in FITS:
+            *most, last = FITS
+            raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+
+    @property
+    def fit(self) -> Fit | None:
+        """What was fitted; None where nothing was, or the file does not say it."""
+        return FITS[self.method] if self.method is not None else None
+
+    @property
+    def torque_fitted(self) -> bool:
+        """Whether a calibration has fitted the torque to drives of known mass."""
+        return bool(self.masses) if self.fit is None else self.fit.torque
