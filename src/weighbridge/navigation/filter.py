@@ -22,7 +22,6 @@ from weighbridge.kernels.ins_model import (
     SHOWN,
     SQUAT,
     STDS,
-    TIME,
     Q,
     Samples,
     V,
@@ -30,6 +29,7 @@ from weighbridge.kernels.ins_model import (
 )
 from weighbridge.kernels.ins_smoother import smooth
 from weighbridge.kernels.rotation import matrix_to_euler, quaternion_to_matrix
+from weighbridge.navigation.state import State
 from weighbridge.signals import Floats, Ints
 
 if TYPE_CHECKING:
@@ -37,24 +37,6 @@ if TYPE_CHECKING:
 
 _STRETCH: Final = 512
 """Nodes the backward pass holds at a time: bounds its memory."""
-
-
-class State(NamedTuple):
-    """All that the filter needs to go on.
-
-    Attributes
-    ----------
-    x : (47,) filter state, see `weighbridge.kernels.ins_model`
-    cov : (20, 20) covariance of its errors
-    """
-
-    x: Floats
-    cov: Floats
-
-    @property
-    def time(self) -> float:
-        """Instant of the last sample [s]; NaN before the first."""
-        return float(self.x[TIME])
 
 
 class Block(NamedTuple):

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from weighbridge.kernels.ins_model import Noise
-from weighbridge.navigation.filter import State
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.identify.gain import Gain
 from weighbridge.navigation.identify.remounting import Change, unsure
 from weighbridge.navigation.rows import Clocks
 from weighbridge.navigation.settings import NavigationSettings
+from weighbridge.navigation.state import State
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Mounting
 

@@ -35,9 +35,9 @@ from weighbridge.kernels.ins_model import (
 )
 from weighbridge.kernels.rotation import euler_to_matrix, euler_to_quaternion, rotate_body
 from weighbridge.navigation.aiding import Fixes
-from weighbridge.navigation.filter import State
 from weighbridge.navigation.identify.alignment import Alignment
 from weighbridge.navigation.settings import NavigationSettings
+from weighbridge.navigation.state import State
 from weighbridge.signals import Bools, Floats
 
 _LEVEL_TIME = 2.0
