@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from weighbridge.kernels.ins_model import (
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.navigation.aiding import read_fixes, read_imu, speed_from_fixes
 from weighbridge.navigation.even import Even, evenly
-from weighbridge.navigation.filter import Block, Nodes, State, run
+from weighbridge.navigation.filter import Block, Nodes, run
 from weighbridge.navigation.identify.setup import Setup
 from weighbridge.navigation.layout import (
     LONGEST_AIDED,
@@ -49,6 +49,7 @@ from weighbridge.navigation.rows import (
     still_state,
 )
 from weighbridge.navigation.sources import Sources, undelayed
+from weighbridge.navigation.state import State
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.recent import BEHIND, instants, recent
 
@@ -211,7 +212,7 @@ def _laid_out(
 def joined(parts: list[Motion], last: int | None = None) -> Motion:
     """Put successive rows together, the ``last`` of them if so many are asked for."""
     keep = slice(None if last is None else -last, None)
-    columns = {
+    columns: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])[keep]
         for name in ("time", "speed", "accel", "specific_force", "grade", "pitch", "roll",
                      "heading", "distance", "altitude", "latitude", "longitude", "valid",

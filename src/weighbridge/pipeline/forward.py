@@ -276,4 +276,5 @@ def forward_weigh(drive: Drive, vehicle: Vehicle, setup: ForwardSetup) -> Forwar
     for until in instants(drive.start, drive.end):
         state, running = step(state, recent(drive, until), until, vehicle, setup)
         parts.append(running)
-    return ForwardTrack(*map(np.concatenate, zip(*parts, strict=True)), state=state.joint)
+    time, mass, std = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+    return ForwardTrack(time, mass, std, state.joint)

@@ -36,4 +36,4 @@ def recent(drive: Drive, until: float) -> Drive:
 def instants(start: float, end: float) -> Floats:
     """Ends of the steps (n,) that a drive from ``start`` to ``end`` is taken in [s]."""
     first = math.floor(start / STEP) + 1
-    return np.arange(first, math.floor(end / STEP) + 1) * STEP
+    return np.arange(first, math.floor(end / STEP) + 1, dtype=np.float64) * STEP
