@@ -26,6 +26,10 @@ class DriveError(WeighbridgeError):
     """A drive cannot be read, or what it says cannot be so."""
 
 
+class SourceError(WeighbridgeError):
+    """A device or interface that samples come from is gone, silent or not what it should be."""
+
+
 class MissingExtraError(WeighbridgeError):
     """An optional dependency is needed and not installed."""
 

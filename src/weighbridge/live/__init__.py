@@ -1,0 +1,1 @@
+"""Weighing while driving: samples in as they come, a mass out at any time."""

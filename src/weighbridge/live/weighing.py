@@ -1,0 +1,154 @@
+"""What a live scale tells at one moment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from scipy.special import ndtr, ndtri
+
+
+class LiveStatus(StrEnum):
+    """What a live mass is worth."""
+
+    LEARNING = "learning"
+    WEIGHED = "weighed"
+    INCONSISTENT = "inconsistent"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalHealth:
+    """How one signal comes in.
+
+    Attributes
+    ----------
+    name : canonical name
+    rate : samples per second lately [Hz]; 0 where none came
+    age : since its newest sample, by the newest of all [s]; infinite where none came
+    late, unfit : samples dropped because they came too late, or were no finite number or an
+        impossible instant
+    needed : the scale cannot weigh without it
+    """
+
+    name: str
+    rate: float
+    age: float
+    late: int = 0
+    unfit: int = 0
+    needed: bool = False
+
+    @property
+    def fresh(self) -> bool:
+        """Whether it comes at all: not silent for 3 s and three of its periods."""
+        return self.age <= max(3.0, 3.0 / self.rate if self.rate > 0.0 else 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveWeighing:
+    """The mass at one moment of a drive, how sure it is, and what would make it surer.
+
+    Attributes
+    ----------
+    vehicle : its name
+    time : instant it holds for, on the clock of the samples [s]; NaN before the first
+    age : by how much the newest sample is later [s]
+    status : ``learning`` until the mass is within 5 % with 95 % probability, ``weighed``, or
+        ``inconsistent`` where the drive contradicts itself or the vehicle file
+    reason : why it is not ``weighed``; empty where it is
+    mass, std : [kg]; NaN where there is none
+    tare, gross : of the vehicle file [kg]; None where it does not say
+    tared : mass that the user has set to nought [kg]; None for ``tare``
+    driven : time on the move so far [s]
+    progress : part of the way to 2 % [-], 0 to 1
+    minutes_to_5, minutes_to_2 : of driving like until now until the interval of 95 % is as narrow
+        as so many percent; 0 where it is, infinite where it will not be, NaN where unknown
+    advice : which driving would help; empty where nothing more is needed
+    signals : health of each
+    notes : what was found or doubted, one sentence each
+    """
+
+    vehicle: str
+    time: float
+    age: float
+    status: LiveStatus
+    reason: str
+    mass: float
+    std: float
+    tare: float | None
+    gross: float | None
+    tared: float | None
+    driven: float
+    progress: float
+    minutes_to_5: float
+    minutes_to_2: float
+    advice: str
+    signals: tuple[SignalHealth, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Interval that holds the mass with probability ``level`` [kg]."""
+        half = float(ndtri(0.5 * (1.0 + level))) * self.std
+        return self.mass - half, self.mass + half
+
+    @property
+    def payload(self) -> float | None:
+        """Mass above the tare, or above what was set to nought [kg]; None where none is known."""
+        nought = self.tared if self.tared is not None else self.tare
+        return None if nought is None or math.isnan(self.mass) else self.mass - nought
+
+    @property
+    def overload(self) -> float | None:
+        """Probability that the permitted mass is exceeded [-]; None where it is not known."""
+        return self.above(self.gross)
+
+    def above(self, limit: float | None) -> float | None:
+        """Probability that the mass is above a limit [kg]; None where either is not known."""
+        if limit is None or not self.std > 0.0:
+            return None
+        return float(ndtr((self.mass - limit) / self.std))
+
+    @property
+    def share(self) -> float | None:
+        """Mass over the permitted one [-]; None where it is not known."""
+        return None if self.gross is None or math.isnan(self.mass) else self.mass / self.gross
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is written as JSON; what is not known is None."""
+        low, high = self.interval()
+        return {
+            "vehicle": self.vehicle,
+            "time_s": _known(self.time),
+            "age_s": _known(self.age),
+            "status": str(self.status),
+            "reason": self.reason,
+            "mass_kg": _known(self.mass),
+            "std_kg": _known(self.std),
+            "interval95_kg": None if math.isnan(low) else [low, high],
+            "payload_kg": self.payload,
+            "share_of_permitted": self.share,
+            "overload_probability": self.overload,
+            "driven_s": self.driven,
+            "progress": self.progress,
+            "minutes_to_5_percent": _known(self.minutes_to_5),
+            "minutes_to_2_percent": _known(self.minutes_to_2),
+            "advice": self.advice,
+            "signals": [
+                {
+                    "name": s.name,
+                    "rate_hz": s.rate,
+                    "age_s": _known(s.age),
+                    "fresh": s.fresh,
+                    "needed": s.needed,
+                    "late": s.late,
+                    "unfit": s.unfit,
+                }
+                for s in self.signals
+            ],
+            "notes": list(self.notes),
+        }
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
