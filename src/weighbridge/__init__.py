@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from weighbridge.errors import ConfigError, DriveError, MissingExtraError, WeighbridgeError
     from weighbridge.estimators import Segment, Status
     from weighbridge.io import read_drive, read_drives, read_frame, to_frames
+    from weighbridge.live.scale import LiveScale
+    from weighbridge.live.weighing import LiveStatus, LiveWeighing
     from weighbridge.pipeline.inertia import Inertia, estimate_inertia
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.pipeline.weighing import Weighing, compare, weigh
@@ -33,6 +35,9 @@ _HOMES = {
     "DriveError": "weighbridge.errors",
     "DriveInfo": "weighbridge.signals",
     "Inertia": "weighbridge.pipeline.inertia",
+    "LiveScale": "weighbridge.live.scale",
+    "LiveStatus": "weighbridge.live.weighing",
+    "LiveWeighing": "weighbridge.live.weighing",
     "MissingExtraError": "weighbridge.errors",
     "Problem": "weighbridge.signals",
     "Segment": "weighbridge.estimators",
@@ -60,6 +65,9 @@ __all__ = [
     "DriveError",
     "DriveInfo",
     "Inertia",
+    "LiveScale",
+    "LiveStatus",
+    "LiveWeighing",
     "MissingExtraError",
     "Problem",
     "Segment",

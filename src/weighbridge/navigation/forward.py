@@ -141,6 +141,9 @@ def step(
     if not nodes.time.size:
         return state._replace(row=max(state.row, end)), None
     row = max(state.row, math.ceil(nodes.time[0] * setup.rate))
+    if row > state.row:
+        # Before the first sample, or after a silence: the even clock begins anew.
+        state = state._replace(motion=None)
     if row >= end:
         return state._replace(row=row), None
     return _laid_out(state._replace(row=row), found, (end, ahead), setup)
@@ -237,7 +240,7 @@ def forward_motion(drive: Drive, setup: Setup) -> Motion:
         Signals are missing.
     """
     state, parts = begin(setup, drive.start), []
-    for until in instants(drive.start, drive.end):
+    for until in instants(drive):
         state, rows = step(state, recent(drive, until), until, setup)
         if rows is not None:
             parts.append(rows)

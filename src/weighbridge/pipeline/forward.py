@@ -178,6 +178,11 @@ def begin(setup: ForwardSetup, start: float) -> ForwardState:
     )
 
 
+def unloaded(state: ForwardState) -> ForwardState:
+    """Forget the mass, for the load has changed; motion and windows go on."""
+    return state._replace(joint=JointState())
+
+
 def lateness(setup: ForwardSetup) -> float:
     """Time that a row waits for what tells of it [s]: delays, and look-ahead of the stages."""
     return forward.lateness(setup.navigation) + AHEAD + max(setup.delay, 0.0)
@@ -273,7 +278,7 @@ def forward_weigh(drive: Drive, vehicle: Vehicle, setup: ForwardSetup) -> Forwar
     setup : of `identify_forward`
     """
     state, parts = begin(setup, drive.start), [NO_WINDOWS]
-    for until in instants(drive.start, drive.end):
+    for until in instants(drive):
         state, running = step(state, recent(drive, until), until, vehicle, setup)
         parts.append(running)
     time, mass, std = (np.concatenate(rows) for rows in zip(*parts, strict=True))

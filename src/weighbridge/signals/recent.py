@@ -33,7 +33,20 @@ def recent(drive: Drive, until: float) -> Drive:
     return replace(drive, signals=cut)
 
 
-def instants(start: float, end: float) -> Floats:
-    """Ends of the steps (n,) that a drive from ``start`` to ``end`` is taken in [s]."""
-    first = math.floor(start / STEP) + 1
-    return np.arange(first, math.floor(end / STEP) + 1, dtype=np.float64) * STEP
+def first_instant(time: float) -> float:
+    """Return the end of the step that an instant lies in [s]."""
+    return (math.floor(time / STEP) + 1) * STEP
+
+
+def instants(drive: Drive) -> Floats:
+    """Ends of the steps (n,) that a drive is taken in [s].
+
+    There are none where all signals have been silent for longer than `BEHIND`.
+    """
+    stamps = [s.time for s in drive.signals.values() if len(s)]
+    if not stamps:
+        return np.empty(0)
+    steps = np.unique(np.concatenate([np.floor(t / STEP) for t in stamps]))
+    after = 1.0 + np.arange(round(BEHIND / STEP) + 1)
+    ends = np.unique(steps[:, None] + after) * STEP
+    return np.asarray(ends[ends <= drive.end])

@@ -1,0 +1,139 @@
+"""What a drive so far tells of sensors and noise, by which it is weighed on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from weighbridge.errors import WeighbridgeError
+from weighbridge.estimators import Status
+from weighbridge.pipeline import forward
+from weighbridge.pipeline.forward import ForwardSetup, ForwardState
+from weighbridge.pipeline.weighing import Weighing, weigh
+from weighbridge.signals import Drive
+from weighbridge.vehicle.model import Vehicle
+
+FIRST: Final = 60.0
+"""Time on the move after which a drive is looked at for the first time [s]."""
+
+GROWTH: Final = 1.5
+"""It is looked at again after so many times as much."""
+
+LONGEST: Final = 2700.0
+"""No more of it is kept and looked at [s],"""
+
+PERIOD: Final = 900.0
+"""and once it is as long, so often [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """What the records until an instant tell.
+
+    Attributes
+    ----------
+    until : that instant [s]
+    setup : by which the drive is weighed on; None where no forward pass is possible
+    state : of a forward pass, at ``until``
+    vehicle : as the weighing took it
+    mass, std : of these records as a whole [kg]; NaN where they carry none
+    floor : part of ``std`` that no driving takes away, relative to the mass [-]
+    inconsistent : the records contradict themselves or the vehicle file
+    reason : why there is no mass; empty where there is one
+    notes : what was found or doubted
+    """
+
+    until: float
+    setup: ForwardSetup | None
+    state: ForwardState | None
+    vehicle: Vehicle
+    mass: float
+    std: float
+    floor: float
+    inconsistent: bool
+    reason: str
+    notes: tuple[str, ...]
+
+
+def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:
+    """Weigh what was recorded so far as a whole, and set up the stages to go on from it.
+
+    Parameters
+    ----------
+    drive : records from the beginning, or the last `LONGEST` seconds of them, up to ``until``
+    vehicle
+    until : instant up to which they are complete [s]
+    """
+    try:
+        weighing = weigh(drive, vehicle)
+    except WeighbridgeError as error:
+        return _nothing(until, vehicle, str(error), inconsistent=True)
+    inconsistent = weighing.status is Status.INCONSISTENT
+    if weighing.result is None or not math.isfinite(weighing.mass):
+        return _nothing(
+            until, vehicle, weighing.reason, inconsistent=inconsistent, notes=weighing.warnings
+        )
+    setup, state, notes = _set_up(weighing, drive, until)
+    mass, std = _at_the_end(weighing)
+    return Learned(
+        until=until,
+        setup=setup,
+        state=state,
+        vehicle=weighing.vehicle,
+        mass=mass,
+        std=std,
+        floor=_floor(weighing),
+        inconsistent=False,
+        reason="",
+        notes=notes,
+    )
+
+
+def _set_up(
+    weighing: Weighing, drive: Drive, until: float
+) -> tuple[ForwardSetup | None, ForwardState | None, tuple[str, ...]]:
+    """Set up the stages; all records so far are one step of theirs."""
+    try:
+        setup = forward.identify_forward(weighing)
+    except WeighbridgeError as error:
+        return None, None, (*weighing.warnings, str(error))
+    begin = forward.begin(setup, drive.start)
+    state, _ = forward.step(begin, drive, until, weighing.vehicle, setup)
+    return setup, state, weighing.warnings
+
+
+def _at_the_end(weighing: Weighing) -> tuple[float, float]:
+    """Mass of the last load and its standard deviation, the fuel burnt by then taken off [kg]."""
+    result = weighing.result
+    assert result is not None
+    mass, std = weighing.mass, weighing.std
+    last = [s for s in weighing.segments if math.isfinite(s.mass)]
+    if weighing.load_changed and last:
+        mass, std = last[-1].mass, last[-1].std
+    return mass - float(result.balance.merged.fuel_burnt[-1]), std
+
+
+def _floor(weighing: Weighing) -> float:
+    result = weighing.result
+    assert result is not None
+    left = result.left_std
+    return left / weighing.mass if math.isfinite(left) else 0.0
+
+
+def _nothing(
+    until: float, vehicle: Vehicle, reason: str, *, inconsistent: bool,
+    notes: tuple[str, ...] = (),
+) -> Learned:  # fmt: skip
+    return Learned(
+        until=until,
+        setup=None,
+        state=None,
+        vehicle=vehicle,
+        mass=math.nan,
+        std=math.nan,
+        floor=0.0,
+        inconsistent=inconsistent,
+        reason=reason,
+        notes=notes,
+    )

@@ -1,0 +1,250 @@
+"""Samples as they come from a vehicle, put in order behind a window of lateness."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import ConfigError
+from weighbridge.live.source import Samples
+from weighbridge.signals import Drive, DriveInfo, Floats, Signal
+from weighbridge.signals.catalogue import QUANTITIES
+
+LATENESS: Final = 1.0
+"""A sample may come so much later than the newest [s]: PX4 waits 0.2, openpilot 1 s."""
+
+FARTHEST: Final = 3600.0
+"""A stamp so far ahead of the newest is of another clock [s]: no drive goes on after such a gap."""
+
+BACK: Final = 60.0
+"""So far behind the newest likewise [s]."""
+
+JUMPED: Final = 50
+"""Of so many such samples in succession the clock has jumped; fewer are false."""
+
+_FIRST: Final = 1e10
+"""No clock tells such an instant [s]: it is the year 2286."""
+
+_ROOM: Final = 256
+
+
+class _Column:
+    """Sealed samples of one signal in rising order, and those that are still open."""
+
+    def __init__(self) -> None:
+        self.time, self.values = np.empty(_ROOM), np.empty(_ROOM)
+        self.first = self.last = 0
+        self.open_time: list[float] = []
+        self.open_values: list[float] = []
+        self.newest = -math.inf
+
+    def seal(self, until: float) -> None:
+        """Put the open samples before ``until`` in order behind the sealed ones."""
+        time = np.array(self.open_time)
+        old = time < until
+        if not old.any():
+            return
+        values = np.array(self.open_values)
+        self.open_time, self.open_values = time[~old].tolist(), values[~old].tolist()
+        time, values = time[old], values[old]
+        # Of two samples with one stamp the order they came in must not choose.
+        order = np.lexsort((values, time))
+        time, values = time[order], values[order]
+        keep = np.concatenate(([True], np.diff(time) > 0.0))
+        self._append(time[keep], values[keep])
+
+    def _append(self, time: Floats, values: Floats) -> None:
+        count = self.last - self.first
+        need = count + time.size
+        if self.last + time.size > self.time.size:
+            # New arrays, never the old ones moved: a drive may still look at them.
+            room = max(_ROOM, 2 * need)
+            grown = np.empty(room), np.empty(room)
+            for new, old in zip(grown, (self.time, self.values), strict=True):
+                new[:count] = old[self.first : self.last]
+            self.time, self.values = grown
+            self.first, self.last = 0, count
+        end = self.last + time.size
+        self.time[self.last : end], self.values[self.last : end] = time, values
+        self.last = end
+
+    @property
+    def sealed(self) -> tuple[Floats, Floats]:
+        return self.time[self.first : self.last], self.values[self.first : self.last]
+
+
+class Records:
+    """Samples of many signals, each on its own clock.
+
+    Samples come in any order within ``lateness``; later ones are counted and dropped. What was
+    sealed never changes again, so that what is made of it hangs on neither order nor block sizes.
+    A clock that jumps is brought back: time goes on from the newest sample.
+
+    Parameters
+    ----------
+    lateness : by which a sample may be older than the newest of all signals [s]
+
+    Attributes
+    ----------
+    newest : instant of the newest sample [s]; -inf before the first
+    oldest : instant of the first sample of all that were taken [s]; inf before the first
+    offset : what jumps of the clock have added up to, which is taken off [s]
+    jumps : jumps of the clock so far
+    late, unfit : samples dropped because they came too late, or were no finite number or
+        impossible instant, by signal
+    """
+
+    def __init__(self, lateness: float = LATENESS) -> None:
+        if not 0.0 <= lateness < math.inf:
+            raise ConfigError(f"lateness must be 0 s or more, got {lateness}")
+        self.lateness = lateness
+        self.newest = -math.inf
+        self.oldest = math.inf
+        self.offset = 0.0
+        self.jumps = 0
+        self.late: dict[str, int] = {}
+        self.unfit: dict[str, int] = {}
+        self._columns: dict[str, _Column] = {}
+        self._strange = 0
+
+    @property
+    def watermark(self) -> float:
+        """No sample before this instant is taken any more [s]."""
+        return self.newest - self.lateness
+
+    def add(self, name: str, time: float, value: float) -> None:
+        """Take one sample of a signal; see `add_block`."""
+        at = time - self.offset
+        ahead = at - self.newest
+        ordinary = ahead < FARTHEST or (self.newest == -math.inf and abs(at) < _FIRST)
+        if not (ordinary and ahead >= -self.lateness and math.isfinite(value)):
+            self.add_block({name: (np.array([time]), np.array([value]))})
+            return
+        column = self._columns.get(name) or self._column(name)
+        column.open_time.append(at)
+        column.open_values.append(value)
+        column.newest = max(column.newest, at)
+        self._strange = 0
+        self.newest, self.oldest = max(self.newest, at), min(self.oldest, at)
+
+    def add_block(self, samples: Samples) -> None:
+        """Take samples of several signals that came together.
+
+        Parameters
+        ----------
+        samples : by canonical name, instants (n,) [s] and values (n,) in SI
+
+        Raises
+        ------
+        ConfigError
+            There is no such signal, or times and values differ in number.
+        """
+        newest = self.newest
+        for name, (time, values) in samples.items():
+            if time.shape != values.shape or time.ndim != 1:
+                raise ConfigError(
+                    f"{name}: {time.size} instants and {values.size} values; give one for each"
+                )
+            column = self._columns.get(name) or self._column(name)
+            at = time - self.offset
+            finite = np.isfinite(at) & np.isfinite(values)
+            near = finite & (np.abs(at) < _FIRST)
+            if math.isfinite(self.newest):
+                near &= (at < self.newest + FARTHEST) & (at > self.watermark - BACK)
+            fresh = near & (at >= self.watermark)
+            self._count(self.unfit, name, int(np.count_nonzero(~near)))
+            self._count(self.late, name, int(np.count_nonzero(near & ~fresh)))
+            self._watch(at[finite & ~near], bool(near.any()))
+            if fresh.any():
+                at = at[fresh]
+                column.open_time += at.tolist()
+                column.open_values += values[fresh].tolist()
+                column.newest = max(column.newest, float(at.max()))
+                newest = max(newest, float(at.max()))
+                self.oldest = min(self.oldest, float(at.min()))
+        self.newest = newest
+
+    def _column(self, name: str) -> _Column:
+        if name not in QUANTITIES:
+            raise ConfigError(
+                f"{name!r} is no signal; weighbridge.signals.catalogue lists those there are"
+            )
+        return self._columns.setdefault(name, _Column())
+
+    @staticmethod
+    def _count(counts: dict[str, int], name: str, more: int) -> None:
+        if more:
+            counts[name] = counts.get(name, 0) + more
+
+    def _watch(self, strange: Floats, ordinary: bool) -> None:
+        """Look for a clock that has jumped: samples of it come one after another."""
+        self._strange = 0 if ordinary else self._strange + strange.size
+        if self._strange >= JUMPED and math.isfinite(self.newest):
+            self.offset += float(strange[-1]) - self.newest
+            self.jumps += 1
+            self._strange = 0
+
+    def seal(self, until: float) -> None:
+        """Put all samples before ``until`` in order; none of them comes any more."""
+        for column in self._columns.values():
+            if column.open_time:
+                column.seal(until)
+
+    @property
+    def sealed_until(self) -> float:
+        """Instant of the last sealed sample [s]; -inf without any."""
+        ends = [c.sealed[0][-1] for c in self._columns.values() if c.last > c.first]
+        return float(max(ends, default=-math.inf))
+
+    @property
+    def waiting_from(self) -> float:
+        """Instant of the first sample that is not sealed [s]; inf without any."""
+        waiting = [min(c.open_time) for c in self._columns.values() if c.open_time]
+        return min(waiting, default=math.inf)
+
+    def forget(self, before: float, fewest: int) -> None:
+        """Let sealed samples before an instant [s] go, but for the last ``fewest`` of a signal."""
+        for column in self._columns.values():
+            time = column.sealed[0]
+            keep = min(int(time.searchsorted(before)), time.size - fewest)
+            column.first += max(keep, 0)
+
+    def last(self, span: float, fewest: int) -> dict[str, tuple[Floats, Floats]]:
+        """Samples of the last ``span`` [s], ``fewest`` of each signal at least, open ones too."""
+        found = {}
+        for name, column in self._columns.items():
+            time, values = column.sealed
+            keep = max(min(int(time.searchsorted(self.newest - span)), time.size - fewest), 0)
+            found[name] = (
+                np.concatenate([time[keep:], column.open_time]),
+                np.concatenate([values[keep:], column.open_values]),
+            )
+        return found
+
+    def drive(self, name: str, info: DriveInfo) -> Drive:
+        """Sealed samples as a drive, which shares their memory."""
+        return Drive(
+            name,
+            {n: Signal(n, *c.sealed) for n, c in self._columns.items() if c.last > c.first},
+            info,
+        )
+
+    def names(self) -> tuple[str, ...]:
+        """Signals of which samples came, in order."""
+        return tuple(sorted(self._columns))
+
+    def newest_of(self, name: str) -> float:
+        """Instant of the newest sample of a signal [s]; -inf without any."""
+        column = self._columns.get(name)
+        return -math.inf if column is None else column.newest
+
+    def rate(self, name: str, span: float) -> float:
+        """Sealed samples per second of a signal over the last ``span`` [s] that were sealed."""
+        column = self._columns.get(name)
+        if column is None:
+            return 0.0
+        time = column.sealed[0]
+        end = min(self.watermark, self.newest)
+        return float(time.size - time.searchsorted(end - span)) / span

@@ -1,0 +1,341 @@
+"""A scale that is fed while the vehicle drives."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from weighbridge.errors import ConfigError
+from weighbridge.live.checkpoint import packed, unpacked
+from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, Learned, learn
+from weighbridge.live.outlook import Outlook, outlook
+from weighbridge.live.records import LATENESS, Records
+from weighbridge.live.source import Samples
+from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
+from weighbridge.pipeline import forward
+from weighbridge.pipeline.forward import ForwardSetup, ForwardState
+from weighbridge.signals import Drive, DriveInfo, Floats
+from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.recent import BEHIND, FEWEST, STEP, first_instant, recent
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import source_of
+
+_LOG = logging.getLogger(__name__)
+
+MOVES: Final = 0.5
+"""Slower a vehicle stands [m/s]."""
+
+RATE_SPAN: Final = 10.0
+"""Time over which the rate of a signal is told [s]."""
+
+FAR: Final = 3.0
+"""The mass on the way and that of all records so far contradict each other beyond so many standard
+deviations [-],"""
+
+LEAST_FAR: Final = 0.03
+"""and so much of the mass [-]."""
+
+LIGHTEST, HEAVIEST = 50.0, 200e3
+"""Masses that road vehicles have [kg]."""
+
+
+class LiveScale:
+    """Weighs a vehicle from samples as they come.
+
+    The first minutes are weighed as a whole, again and again, until they tell mounting, delays and
+    noise; from then on each second is weighed by the forward stages
+    (`weighbridge.pipeline.forward`), and all that came is still looked at now and then, by the
+    checks of a recorded drive. With a ``setup`` nothing is learnt, and the mass is to the last bit
+    that of `weighbridge.pipeline.forward.forward_weigh` over the same samples.
+
+    Parameters
+    ----------
+    vehicle : as of `weighbridge.calibrate` or a vehicle file
+    lateness : by which a sample may be older than the newest [s]; later ones are counted and
+        dropped
+    setup : of `weighbridge.pipeline.forward.identify_forward`
+    info : what is known beside the samples, such as wind and temperature
+
+    Notes
+    -----
+    One thread feeds a scale. A step takes milliseconds, one in which it learns a second or two.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        *,
+        lateness: float = LATENESS,
+        setup: ForwardSetup | None = None,
+        info: DriveInfo | None = None,
+    ) -> None:
+        self.vehicle = vehicle
+        self.info = info or DriveInfo()
+        self._records = Records(lateness)
+        self._learns = setup is None
+        self._setup = setup
+        self._weighed = vehicle
+        self._state: ForwardState | None = None
+        self._learned: Learned | None = None
+        self._next: float | None = None
+        self._driven = 0.0
+        self._informed = 0.0
+        self._look = FIRST
+        self._tared: float | None = None
+        self._needed = _needed(vehicle)
+
+    def update(self, time: float | Floats, signal: str, value: float | Floats) -> None:
+        """Take one sample of a signal, or several.
+
+        Parameters
+        ----------
+        time : instant, or instants (n,) [s]
+        signal : canonical name, see `weighbridge.signals.catalogue`
+        value : or values (n,), in SI
+
+        Raises
+        ------
+        ConfigError
+            There is no such signal, or times and values differ in number.
+        """
+        if isinstance(time, float | int) and isinstance(value, float | int):
+            self._records.add(signal, float(time), float(value))
+        else:
+            pair = np.atleast_1d(np.asarray(time, float)), np.atleast_1d(np.asarray(value, float))
+            self._records.add_block({signal: pair})
+        if self._next is None or self._records.watermark >= self._next:
+            self._advance()
+
+    def update_block(self, samples: Samples) -> None:
+        """Take samples of several signals that came together, whatever time they span.
+
+        Parameters
+        ----------
+        samples : by canonical name, instants (n,) [s] and values (n,) in SI
+        """
+        self._records.add_block(samples)
+        self._advance()
+
+    def finish(self) -> None:
+        """Take it that no more samples come: weigh what still waits for late ones."""
+        if math.isfinite(self._records.newest):
+            self._advance(self._records.newest)
+
+    def checkpoint(self) -> bytes:
+        """Return all that the scale goes on from, for `restore`, as text."""
+        content = {
+            "setup": self._setup,
+            "state": self._state,
+            "weighed": self._weighed,
+            "next": self._next,
+            "driven": self._driven,
+            "informed": self._informed,
+            "tared": self._tared,
+            "learns": self._learns,
+            "lateness": self._records.lateness,
+            "info": self.info,
+            "samples": self._records.last(BEHIND + 2.0 * STEP, FEWEST),
+        }
+        return packed(content, self.vehicle)
+
+    @classmethod
+    def restore(cls, vehicle: Vehicle, checkpoint: bytes) -> LiveScale:
+        """Go on from a checkpoint of the same vehicle file.
+
+        Parameters
+        ----------
+        vehicle : as it was then
+        checkpoint : of `checkpoint`
+
+        Raises
+        ------
+        ConfigError
+            The checkpoint is damaged, of another version or vehicle file, or holds a mass that
+            no vehicle has.
+        """
+        content = unpacked(checkpoint, vehicle)
+        try:
+            scale = cls(vehicle, lateness=content["lateness"], info=content["info"])
+            scale._setup, scale._state = content["setup"], content["state"]
+            scale._weighed, scale._next = content["weighed"], content["next"]
+            scale._driven, scale._informed = content["driven"], content["informed"]
+            scale._tared, scale._learns = content["tared"], content["learns"]
+            scale._records.add_block(content["samples"])
+            if scale._next is not None:
+                scale._records.seal(scale._next - STEP)
+        except (KeyError, TypeError, AttributeError) as error:
+            raise ConfigError(f"the checkpoint is not used: {error}") from None
+        scale._look = scale._driven + FIRST
+        mass, std, _, _ = scale._mass()
+        if (
+            scale._state is not None
+            and scale._state.joint.windows
+            and not (LIGHTEST < mass < HEAVIEST and 0.0 < std < mass)
+        ):
+            raise ConfigError(f"the checkpoint is not used: it holds {mass:.0f} ± {std:.0f} kg")
+        return scale
+
+    def tare(self) -> float:
+        """Set the mass of this moment to nought, for the payload; return it [kg].
+
+        Raises
+        ------
+        ConfigError
+            There is no mass yet.
+        """
+        mass = self.weighing().mass
+        if math.isnan(mass):
+            raise ConfigError("nothing is weighed yet: drive on before the scale is tared")
+        self._tared = mass
+        return mass
+
+    def load_changed(self) -> None:
+        """Tell that the load has changed: what was weighed before says nothing of it any more."""
+        if self._state is not None:
+            self._state = forward.unloaded(self._state)
+        self._informed = 0.0
+
+    def weighing(self) -> LiveWeighing:
+        """Return the mass as it is known now, and what would make it surer."""
+        mass, std, floor, at = self._mass()
+        found = self._outlook(mass, std, floor)
+        newest = self._records.newest
+        learned = self._learned
+        return LiveWeighing(
+            vehicle=self.vehicle.name,
+            time=at,
+            age=newest - at if math.isfinite(at) else math.nan,
+            status=found.status,
+            reason=found.reason,
+            mass=mass,
+            std=std,
+            tare=self.vehicle.tare,
+            gross=self.vehicle.gross,
+            tared=self._tared,
+            driven=self._driven,
+            progress=found.progress,
+            minutes_to_5=found.minutes_to_5,
+            minutes_to_2=found.minutes_to_2,
+            advice=found.advice,
+            signals=tuple(self._health()),
+            notes=self._notes(learned.notes if learned is not None else ()),
+        )
+
+    def _mass(self) -> tuple[float, float, float, float]:
+        """Mass, its standard deviation, what no driving takes away of it, and its instant."""
+        learned, state, setup = self._learned, self._state, self._setup
+        nothing = math.nan, math.nan, 0.0, math.nan
+        if learned is not None and learned.inconsistent:
+            return nothing
+        if state is not None and setup is not None and state.joint.windows:
+            floor = setup.joint.left
+            mass = state.joint.mass - state.burnt
+            return mass, state.joint.std(setup.joint), floor, state.read
+        if learned is not None and math.isfinite(learned.mass):
+            return learned.mass, learned.std, learned.floor, learned.until
+        return nothing
+
+    def _outlook(self, mass: float, std: float, floor: float) -> Outlook:
+        learned = self._learned
+        if learned is not None and learned.inconsistent:
+            return Outlook(status=LiveStatus.INCONSISTENT, reason=learned.reason)
+        silent = [s.name for s in self._health() if s.needed and not s.fresh]
+        reason = learned.reason if learned is not None else ""
+        return outlook(
+            mass, std, floor, driven=self._informed, reason=reason, silent=silent, first=FIRST
+        )
+
+    def _advance(self, until: float | None = None) -> None:
+        """Take the steps that the samples so far complete."""
+        end = self._records.watermark if until is None else until
+        if self._next is None:
+            oldest = self._records.oldest
+            if not end >= oldest:
+                return
+            self._next = first_instant(oldest)
+            if self._setup is not None and self._state is None:
+                self._state = forward.begin(self._setup, oldest)
+        while self._next <= end:
+            self._records.seal(self._next)
+            if self._records.sealed_until >= self._next - STEP - BEHIND:
+                self._step(self._next)
+                self._next += STEP
+            else:
+                # Nothing came for long: on to the next sample.
+                self._next = first_instant(self._records.waiting_from)
+
+    def _step(self, until: float) -> None:
+        drive = self._records.drive("live", self.info)
+        seen = recent(drive, until)
+        moved = _moved(seen, until)
+        self._driven += moved
+        self._informed += moved
+        if self._setup is not None and self._state is not None:
+            self._state, _ = forward.step(self._state, seen, until, self._weighed, self._setup)
+        keep = BEHIND + 2.0 * STEP
+        if self._learns:
+            keep += LONGEST
+            if self._driven >= self._look:
+                self._learn(drive, until)
+        self._records.forget(until - keep, FEWEST)
+
+    def _learn(self, drive: Drive, until: float) -> None:
+        """Look at all that is kept, and go on from it where it tells more than is known."""
+        self._look = min(self._driven * GROWTH, self._driven + PERIOD)
+        if drive.duration < LONGEST:
+            self._look = self._driven * GROWTH
+        learned = learn(drive, self.vehicle, until)
+        _LOG.info("looked at %.0f s: %.0f kg %s", drive.duration, learned.mass, learned.reason)
+        mass, std, _, _ = self._mass()
+        self._learned = learned
+        if learned.inconsistent or math.isnan(learned.mass):
+            return
+        far = abs(learned.mass - mass) > max(
+            FAR * math.hypot(std, learned.std), LEAST_FAR * learned.mass
+        )
+        if math.isnan(mass) or far or learned.std <= 1.05 * std or self._setup is None:
+            self._setup, self._state = learned.setup, learned.state
+            self._weighed = learned.vehicle
+
+    def _health(self) -> Iterable[SignalHealth]:
+        records = self._records
+        for name in dict.fromkeys((*self._needed, *records.names())):
+            yield SignalHealth(
+                name=name,
+                rate=records.rate(name, RATE_SPAN),
+                age=records.newest - records.newest_of(name)
+                if math.isfinite(records.newest)
+                else math.inf,
+                late=records.late.get(name, 0),
+                unfit=records.unfit.get(name, 0),
+                needed=name in self._needed,
+            )
+
+    def _notes(self, learned: tuple[str, ...]) -> tuple[str, ...]:
+        jumps = self._records.jumps
+        if not jumps:
+            return learned
+        told = (
+            f"the clock of the samples jumped {jumps} times, by {self._records.offset:.0f} s in all"
+        )
+        return (told, *learned)
+
+
+def _needed(vehicle: Vehicle) -> tuple[str, ...]:
+    """Signals without which a vehicle is not weighed on the way."""
+    names = ["vehicle_speed", *source_of(vehicle).signals]
+    if not vehicle.driveline.single_speed:
+        names.append("engine_speed")
+    return (*dict.fromkeys(names), *IMU_SIGNALS)
+
+
+def _moved(seen: Drive, until: float) -> float:
+    """Time on the move within the last step [s]."""
+    speed = seen.speed
+    if speed is None:
+        return 0.0
+    return STEP if float(speed.held(np.array([until]))[0]) > MOVES else 0.0

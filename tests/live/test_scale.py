@@ -1,0 +1,243 @@
+"""A live scale beside the forward pass of the recorded drive, whatever the way samples come."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+import weighbridge as wb
+from weighbridge.errors import ConfigError
+from weighbridge.live.weighing import LiveStatus
+from weighbridge.pipeline.forward import forward_weigh, identify_forward
+from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+
+SHORT = 240.0
+"""Of the drives that are fed again and again [s]."""
+
+
+@pytest.fixture(scope="module")
+def car():
+    known = [
+        simulate_car(
+            Scenario(name="known", car=MIDSIZE, route=short_route(), payload=load, seed=51_001 + k)
+        )
+        for k, load in enumerate((0.0, 300.0, 100.0))
+    ]
+    return wb.calibrate([m.drive for m in known], mass=[m.scenario.mass for m in known])
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return simulate_car(
+        Scenario(name="loaded", car=MIDSIZE, route=short_route(), payload=250.0, seed=51_010)
+    )
+
+
+@pytest.fixture(scope="module")
+def weighing(car, loaded):
+    return wb.weigh(loaded.drive, car)
+
+
+@pytest.fixture(scope="module")
+def setup(weighing):
+    return identify_forward(weighing)
+
+
+@pytest.fixture(scope="module")
+def short(weighing):
+    return weighing.drive.between(weighing.drive.start, weighing.drive.start + SHORT)
+
+
+@pytest.fixture(scope="module")
+def forward(short, weighing, setup):
+    return forward_weigh(short, weighing.vehicle, setup)
+
+
+def blocks(drive, edges):
+    """Samples of a drive between one edge and the next."""
+    for a, b in pairwise(edges):
+        part = drive.between(a, b)
+        yield {n: (s.time, s.values) for n, s in part.signals.items()}
+
+
+def fed(scale, drive, edges):
+    for block in blocks(drive, edges):
+        scale.update_block(block)
+    scale.finish()
+    return scale.weighing()
+
+
+def even(drive, length):
+    return np.append(np.arange(drive.start, drive.end, length), drive.end + 1.0)
+
+
+@settings(max_examples=5, deadline=None, phases=[Phase.explicit, Phase.generate])
+@given(
+    lengths=st.lists(st.floats(0.4, 40.0), min_size=1, max_size=12),
+    late=st.sampled_from([0.0, 0.3, 0.9]),
+    seed=st.integers(0, 2**32 - 1),
+)
+@pytest.mark.filterwarnings("ignore:Generating overly large repr")
+def test_live_is_the_forward_pass_to_the_last_bit(
+    short, weighing, setup, forward, lengths, late, seed
+):
+    edges = [short.start]
+    while edges[-1] < short.end:
+        edges.append(edges[-1] + lengths[len(edges) % len(lengths)])
+    edges.append(edges[-1] + 1.0)
+    rng = np.random.default_rng(seed)
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    held = {}
+    for block in blocks(short, edges):
+        # Some samples come with the next block, just not too late; within a block any order.
+        newest = max((t[-1] for t, _ in block.values()), default=-np.inf)
+        now, held, before = {}, {}, held
+        for name, (time, values) in block.items():
+            order = rng.permutation(time.size)
+            hold = (rng.random(time.size) < 0.3) & (time > newest - late)
+            now[name] = time[order][~hold[order]], values[order][~hold[order]]
+            held[name] = time[order][hold[order]], values[order][hold[order]]
+        scale.update_block(before)
+        scale.update_block(now)
+    scale.update_block(held)
+    scale.finish()
+    told = scale.weighing()
+    assert not any(s.late or s.unfit for s in told.signals)
+    assert told.mass == forward.state.mass - scale._state.burnt
+    assert told.std == forward.std[-1]
+
+
+def test_single_samples_are_blocks_of_one(short, weighing, setup, forward):
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    samples = sorted(
+        (t, n, v)
+        for n, s in short.signals.items()
+        for t, v in zip(s.time.tolist(), s.values.tolist(), strict=True)
+    )
+    for time, name, value in samples:
+        scale.update(time, name, value)
+    scale.finish()
+    assert scale.weighing().std == forward.std[-1]
+
+
+def test_a_scale_learns_and_weighs(car, loaded, weighing):
+    scale = wb.LiveScale(car, info=loaded.drive.info)
+    drive = loaded.drive
+    statuses = []
+    for block in blocks(drive, even(drive, 5.0)):
+        scale.update_block(block)
+        statuses.append(scale.weighing().status)
+    scale.finish()
+    told = scale.weighing()
+    assert statuses[0] is LiveStatus.LEARNING
+    assert told.status is LiveStatus.WEIGHED
+    assert told.mass == pytest.approx(weighing.mass, rel=0.015)
+    low, high = told.interval()
+    assert low < loaded.scenario.mass < high
+    assert told.progress > 0.3
+    assert all(s.fresh for s in told.signals if s.needed)
+    same = wb.LiveScale(car, info=loaded.drive.info)
+    assert fed(same, drive, even(drive, 37.0)).mass == told.mass
+
+
+def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
+    middle = short.start + 0.6 * SHORT
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    for block in blocks(short, even(short.between(short.start, middle), 7.0)[:-1]):
+        scale.update_block(block)
+    rest = scale._records.newest
+    saved = scale.checkpoint()
+    assert len(saved) < 3e6
+    again = wb.LiveScale.restore(weighing.vehicle, saved)
+    assert again.weighing().mass == scale.weighing().mass
+    told = fed(again, short, [np.nextafter(rest, np.inf), short.end + 1.0])
+    assert told.std == forward.std[-1]
+    assert told.mass == forward.state.mass - again._state.burnt
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lambda b: b[: len(b) // 2], "damaged"),
+        (lambda b: b.replace(b'"d"', b'"x"', 1), "damaged"),
+        (lambda b: b.replace(b'checkpoint": 1', b'checkpoint": 9', 1), "version 9"),
+        (lambda b: b"\xff" + b, "damaged"),
+        (lambda b: b"", "damaged"),
+    ],
+)
+def test_a_damaged_checkpoint_is_refused(short, weighing, setup, damage, says):
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    fed(scale, short.between(short.start, short.start + 60.0), even(short, 60.0)[:2])
+    saved = damage(scale.checkpoint())
+    with pytest.raises(ConfigError, match=says):
+        wb.LiveScale.restore(weighing.vehicle, saved)
+
+
+def test_a_checkpoint_of_another_vehicle_is_refused(weighing, setup):
+    saved = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info).checkpoint()
+    with pytest.raises(ConfigError, match="another vehicle file"):
+        wb.LiveScale.restore(replace(weighing.vehicle, tare=1000.0), saved)
+
+
+def test_a_silence_of_hours_costs_no_steps(short, weighing, setup, forward):
+    """After five hours without a sample the mass stays, and memory and time do not grow."""
+    gap = 5 * 3600.0
+    later = short.with_signals(
+        *(
+            replace(s, time=np.where(s.time < short.start + 120.0, s.time, s.time + gap))
+            for s in short.signals.values()
+        )
+    )
+    # An hour is the farthest that a stamp may lie ahead; then the clock is taken to have jumped.
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    told = fed(scale, later, [later.start, later.start + 120.0, later.end + 1.0])
+    # The load may have changed meanwhile, so a few windows tell less than they do without a stop.
+    assert abs(told.mass - forward.mass[-1]) < forward.std[-1]
+    direct = forward_weigh(later, weighing.vehicle, setup)
+    assert abs(direct.mass[-1] - forward.mass[-1]) < forward.std[-1]
+
+
+def test_a_clock_that_jumps_is_brought_back(short, weighing, setup, forward):
+    """From 1970 to the date in mid-drive: time goes on, and it is said once."""
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    jump = 1.7e9
+    for k, block in enumerate(blocks(short, even(short, 0.5))):
+        moved = jump if k > 240 else 0.0
+        scale.update_block({n: (t + moved, v) for n, (t, v) in block.items()})
+    scale.finish()
+    told = scale.weighing()
+    assert told.mass == pytest.approx(forward.mass[-1], rel=0.01)
+    assert sum("jumped" in n for n in told.notes) == 1
+
+
+def test_unfit_and_late_samples_are_counted(short, weighing, setup):
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    fed(scale, short.between(short.start, short.start + 30.0), [short.start, short.start + 31.0])
+    scale.update(short.start + 1.0, "vehicle_speed", 3.0)
+    scale.update(short.start + 40.0, "vehicle_speed", float("nan"))
+    speed = next(s for s in scale.weighing().signals if s.name == "vehicle_speed")
+    assert (speed.late, speed.unfit) == (1, 1)
+    with pytest.raises(ConfigError, match="no signal"):
+        scale.update(1.0, "warp_factor", 9.0)
+
+
+def test_a_signal_that_stays_away_is_named(short, weighing):
+    scale = wb.LiveScale(weighing.vehicle)
+    told = fed(scale, short.without("engine_load"), even(short, 5.0))
+    assert told.status is LiveStatus.LEARNING
+    assert np.isnan(told.mass)
+    assert "engine_load" in told.reason
+
+
+def test_tare_and_change_of_load(short, weighing, setup):
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    with pytest.raises(ConfigError, match="nothing is weighed yet"):
+        scale.tare()
+    fed(scale, short, even(short, 20.0))
+    scale.tare()
+    assert scale.weighing().payload == 0.0
+    scale.load_changed()
+    assert np.isnan(scale.weighing().mass)
