@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.inertia.filter import integration_std, jumps
+from weighbridge.inertia.filter import integration_std
+from weighbridge.inertia.load_changes import jumps
 from weighbridge.inertia.ride_checks import ride_samples
 from weighbridge.inertia.suspension import check_suspension
 from weighbridge.io import read_drive

@@ -195,60 +195,80 @@ def _check_axes(
     down = -np.mean(force[full], axis=0)
     down /= np.linalg.norm(down)
     bias = np.median(rate[full], axis=0)
-    turned = np.linalg.norm(rate - bias, axis=1)
+    found = _not_about_vertical(rate - bias, full, down)
+    if found is None and turns is not None:
+        found = _against_course(gyro, turns, bias, down)
+    if found is None and speed is not None and len(speed) > 20:
+        found = _against_speed(speed, at, force, rate, full, down)
+    if found is not None:
+        yield found
+
+
+def _not_about_vertical(rate: Floats, full: Bools, down: Floats) -> Problem | None:
+    """Compare the axis of fast turns, of windows (n, 3), with the vertical."""
+    turned = np.linalg.norm(rate, axis=1)
     fast = full & (turned > _YAWS)
-    if np.count_nonzero(fast) >= 4:
-        upright = float(np.median(np.abs((rate - bias)[fast] @ down) / turned[fast]))
-        if upright < 0.6:
-            yield Problem(
-                "gyro_z",
-                "in bends the gyro turns, but not about the accelerometer's vertical (only "
-                f"{100.0 * upright:.0f} % of the rate): their axes are not the same; map them "
-                "alike",
-                serious=True,
-            )
-            return
-    if turns is not None:
-        time, change = turns
-        along, good = _window_means(gyro, time)
-        yaw = (along - np.median(rate[full], axis=0)) @ down
-        course_rate = change / np.diff(time)
-        bend = good & (np.abs(change) > np.radians(8.0)) & (np.abs(change) < np.radians(120.0))
-        if np.count_nonzero(bend) >= 8:
-            agreement = float(np.corrcoef(yaw[bend], course_rate[bend])[0, 1])
-            if agreement < -0.6:
-                yield Problem(
-                    "gyro_z",
-                    "the gyro turns against the GNSS course about the accelerometer's vertical "
-                    f"(correlation {agreement:.2f}): the signs of all gyro or of all accelerometer "
-                    "axes are reversed; set factor = -1 for them in the mapping",
-                    serious=True,
-                )
-                return
-            size = np.linalg.norm(along - np.median(rate[full], axis=0), axis=1)[bend]
-            total = np.abs(course_rate[bend])
-            upright = float(yaw[bend] @ course_rate[bend]) / float(size @ total)
-            if upright < 0.6 and _alike(size, total):
-                yield Problem(
-                    "gyro_z",
-                    "the gyro turns with the GNSS course, but not about the accelerometer's "
-                    "vertical: their axes are not the same; map them alike",
-                    serious=True,
-                )
-                return
-    if speed is None or len(speed) <= 20:
-        return
-    v, ok = windows.means(speed, at)
+    if np.count_nonzero(fast) < 4:
+        return None
+    upright = float(np.median(np.abs(rate[fast] @ down) / turned[fast]))
+    if upright >= 0.6:
+        return None
+    return Problem(
+        "gyro_z",
+        "in bends the gyro turns, but not about the accelerometer's vertical (only "
+        f"{100.0 * upright:.0f} % of the rate): their axes are not the same; map them "
+        "alike",
+        serious=True,
+    )
+
+
+def _against_course(
+    gyro: tuple[Signal, Signal, Signal], turns: tuple[Floats, Floats], bias: Floats, down: Floats
+) -> Problem | None:
+    """Compare the turns by gyro with those of the course."""
+    time, change = turns
+    along, good = _window_means(gyro, time)
+    yaw = (along - bias) @ down
+    course_rate = change / np.diff(time)
+    bend = good & (np.abs(change) > np.radians(8.0)) & (np.abs(change) < np.radians(120.0))
+    if np.count_nonzero(bend) < 8:
+        return None
+    agreement = float(np.corrcoef(yaw[bend], course_rate[bend])[0, 1])
+    if agreement < -0.6:
+        return Problem(
+            "gyro_z",
+            "the gyro turns against the GNSS course about the accelerometer's vertical "
+            f"(correlation {agreement:.2f}): the signs of all gyro or of all accelerometer "
+            "axes are reversed; set factor = -1 for them in the mapping",
+            serious=True,
+        )
+    size = np.linalg.norm(along - bias, axis=1)[bend]
+    total = np.abs(course_rate[bend])
+    upright = float(yaw[bend] @ course_rate[bend]) / float(size @ total)
+    if upright >= 0.6 or not _alike(size, total):
+        return None
+    return Problem(
+        "gyro_z",
+        "the gyro turns with the GNSS course, but not about the accelerometer's "
+        "vertical: their axes are not the same; map them alike",
+        serious=True,
+    )
+
+
+def _against_speed(
+    speed: Signal, at: Floats, force: Floats, rate: Floats, full: Bools, down: Floats
+) -> Problem | None:
+    """Compare the axes with the acceleration and the bends that the speed shows."""
+    v, _ = windows.means(speed, at)
     near = (speed.age(at) < 1.0)[1:] & (speed.age(at) < 1.0)[:-1]
-    full &= near & np.isfinite(v)
     accel_along = np.diff(speed.at(at)) / _WINDOW
-    full &= np.isfinite(accel_along)
+    full = full & near & np.isfinite(v) & np.isfinite(accel_along)
     if np.count_nonzero(full) < 30:
-        return
+        return None
     forward, agreement, slope = _forward(accel_along[full], force[full], down)
     # A speed in another unit would pass for gravity across the vehicle.
     if forward is None or agreement < 0.7 or slope > _STEEPEST:
-        return
+        return None
     right = np.cross(down, forward)
     bias = np.median(rate[full], axis=0)
     centripetal = v[full] * ((rate[full] - bias) @ down)
@@ -256,29 +276,28 @@ def _check_axes(
     seen = min(float(np.std(centripetal)), float(np.std(lateral))) >= 0.08
     agreement = float(np.corrcoef(lateral, centripetal)[0, 1]) if seen else 0.0
     if agreement < -0.6:
-        yield Problem(
+        return Problem(
             "accel_y",
             "in bends the lateral acceleration runs against speed times yaw rate "
             f"(correlation {agreement:.2f}): two axes of the inertial sensor are swapped or one "
             "has the wrong sign; correct it in the mapping (factor = -1)",
             serious=True,
         )
-        return
     usual, crossed, pitch = _ties(force, rate, full, forward, right)
     if crossed > 0.3 and crossed > 2.5 * usual:
-        yield Problem(
+        return Problem(
             "gyro_x",
             "the gyro rolls where the vehicle speeds up and brakes, and pitches in bends: two of "
             "its axes are swapped; map them the other way round",
             serious=True,
         )
-        return
     against = -max(_AGAINST, _CHANCE / math.sqrt(max(int(np.count_nonzero(_inner(full))), 1)))
     felt = _tilt_tie(force @ forward - accel_along, rate @ right, full)
     if (0.5 * (pitch + felt) if pitch else felt) < against:
-        yield _mirrored("gyro_y", "nose down", "nose up")
-    elif _tilt_tie(v * ((rate - bias) @ down) - force @ right, rate @ forward, full) < against:
-        yield _mirrored("gyro_x", "right side down", "right side up")
+        return _mirrored("gyro_y", "nose down", "nose up")
+    if _tilt_tie(v * ((rate - bias) @ down) - force @ right, rate @ forward, full) < against:
+        return _mirrored("gyro_x", "right side down", "right side up")
+    return None
 
 
 def _inner(full: Bools) -> Bools:

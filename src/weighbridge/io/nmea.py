@@ -39,10 +39,77 @@ _FIELDS: Final = {"RMC": 9, "GGA": 9, "GNS": 9, "GST": 7, "VTG": 7}
 class _Rows:
     """Values of one kind of sentence, each with the stamp of its epoch."""
 
-    def __init__(self, names: tuple[str, ...]) -> None:
+    def __init__(self, *names: str) -> None:
         self.names = names
         self.stamps: list[int] = []
         self.values: list[tuple[float, ...]] = []
+
+    def add(self, stamp: int, *values: float) -> None:
+        self.stamps.append(stamp)
+        self.values.append(values)
+
+
+class _Sentences:
+    """What the sentences of a file say, one after another.
+
+    Attributes
+    ----------
+    position, minimum : of GGA and GNS, and of RMC, which has less of it
+    motion, velocity : of RMC in knots, of VTG in km/h
+    accuracy : of GST
+    clocks, days : time of day and date of each epoch [s]
+    lost : how many sentences were left out, by reason
+    """
+
+    def __init__(self) -> None:
+        self.position = _Rows("latitude", "longitude", "altitude", "hdop")
+        self.minimum = _Rows("latitude", "longitude")
+        self.motion = _Rows("gnss_speed", "gnss_course")
+        self.velocity = _Rows("gnss_speed", "gnss_course")
+        self.accuracy = _Rows("gnss_accuracy")
+        self.clocks: list[float] = []
+        self.days: list[float] = []
+        self.lost: Counter[str] = Counter()
+
+    def take(self, message: Any, *, checked: bool) -> None:
+        """Take what a parsed sentence says; damage in a field is raised as the parser has it."""
+        kind = message.sentence_type
+        if len(message.data) < _FIELDS[kind]:
+            self.lost["damaged"] += 1
+            return
+        if kind == "VTG":
+            # It has no time of its own and follows the sentences of its epoch.
+            row = (_number(message.spd_over_grnd_kmph), _number(message.true_track))
+            if self.clocks:
+                self.velocity.add(len(self.clocks) - 1, *row)
+            return
+        clock = _clock(message)
+        day = _day(message) if kind == "RMC" else math.nan
+        if clock is None or not _fixed(message, kind):
+            self.lost["without a fix"] += 1
+            return
+        # Nothing is added before all fields are known to be sound.
+        found = self._read(message, kind)
+        for rows, values in found:
+            rows.add(len(self.clocks), *values)
+        self.clocks.append(clock)
+        self.days.append(day)
+        if not checked:
+            self.lost["taken without a checksum"] += 1
+
+    def _read(self, message: Any, kind: str) -> list[tuple[_Rows, tuple[float, ...]]]:
+        """Read the fields of a sentence with a time, for the rows they belong to."""
+        if kind == "GST":
+            spread = math.hypot(
+                _number(message.std_dev_latitude), _number(message.std_dev_longitude)
+            )
+            return [(self.accuracy, (spread,))]
+        place = (_coordinate(message, "lat", 90.0), _coordinate(message, "lon", 180.0))
+        if kind == "RMC":
+            moving = (_number(message.spd_over_grnd), _number(message.true_course))
+            return [(self.minimum, place), (self.motion, moving)]
+        dilution = message.horizontal_dil if kind == "GGA" else message.hdop
+        return [(self.position, (*place, _number(message.altitude), _number(dilution)))]
 
 
 def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -64,85 +131,30 @@ def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
         raise MissingExtraError("pynmea2", "position", f"reading {path.name}") from None
     data = path.read_bytes()
     log = Log(path)
-    position = _Rows(("latitude", "longitude", "altitude", "hdop"))
-    minimum = _Rows(("latitude", "longitude"))
-    motion = _Rows(("gnss_speed", "gnss_course"))
-    velocity = _Rows(("gnss_speed", "gnss_course"))
-    accuracy = _Rows(("gnss_accuracy",))
-    clocks: list[float] = []
-    days: list[float] = []
-    lost: Counter[str] = Counter()
+    read = _Sentences()
+    lost = read.lost
     for found in _SENTENCE.finditer(data):
         text = found.group().decode("ascii").rstrip()
         try:
-            message = pynmea2.parse(text)
-            kind = message.sentence_type
-            if len(message.data) < _FIELDS[kind]:
-                lost["damaged"] += 1
-                continue
-            clock = None if kind == "VTG" else _clock(message)
-            day = _day(message) if kind == "RMC" else math.nan
-            if kind == "VTG":
-                # It has no time of its own and follows the sentences of its epoch.
-                row = (_number(message.spd_over_grnd_kmph), _number(message.true_track))
-                if clocks:
-                    velocity.stamps.append(len(clocks) - 1)
-                    velocity.values.append(row)
-                continue
-            if clock is None or not _fixed(message, kind):
-                lost["without a fix"] += 1
-                continue
-            if kind == "RMC":
-                places = (_coordinate(message, "lat", 90.0), _coordinate(message, "lon", 180.0))
-                moving = (_number(message.spd_over_grnd), _number(message.true_course))
-            elif kind in ("GGA", "GNS"):
-                dilution = message.horizontal_dil if kind == "GGA" else message.hdop
-                full = (
-                    _coordinate(message, "lat", 90.0),
-                    _coordinate(message, "lon", 180.0),
-                    _number(message.altitude),
-                    _number(dilution),
-                )
-            else:
-                spread = math.hypot(
-                    _number(message.std_dev_latitude), _number(message.std_dev_longitude)
-                )
+            read.take(pynmea2.parse(text), checked=b"*" in found.group()[-5:])
         except pynmea2.ChecksumError:
             lost["with a wrong checksum"] += 1
-            continue
         # The parser leaves damage in a field to whoever asks for it, with errors of many kinds.
         except Exception:
             lost["damaged"] += 1
-            continue
-        stamp = len(clocks)
-        clocks.append(clock)
-        days.append(day)
-        if kind == "RMC":
-            minimum.stamps.append(stamp)
-            minimum.values.append(places)
-            motion.stamps.append(stamp)
-            motion.values.append(moving)
-        elif kind == "GST":
-            accuracy.stamps.append(stamp)
-            accuracy.values.append((spread,))
-        else:
-            position.stamps.append(stamp)
-            position.values.append(full)
-        if b"*" not in found.group()[-5:]:
-            lost["taken without a checksum"] += 1
-    if not clocks:
+    if not read.clocks:
         raise DriveError(_nothing(path, data, lost))
-    time, log.absolute = _time(np.array(clocks), np.array(days))
+    time, log.absolute = _time(np.array(read.clocks), np.array(read.days))
     if mapping:
         time = time + mapping.time.offset
     for reason, count in lost.items():
         log.problems.append(Problem("", f"{path.name}: {count} NMEA sentences {reason}"))
-    known = position if position.stamps else minimum
-    speeds, unit = (motion, "kn") if motion.stamps else (velocity, "kmh")
+    known = read.position if read.position.stamps else read.minimum
+    speeds, unit = (read.motion, "kn") if read.motion.stamps else (read.velocity, "kmh")
     for rows, units in (
         (known, ("deg", "deg", "m", "")),
         (speeds, (unit, "deg")),
-        (accuracy, ("m",)),
+        (read.accuracy, ("m",)),
     ):
         _add(log, rows, units, time)
     if not log.signals:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weighbridge.kernels._jit import kernel
-from weighbridge.kernels.inertia import VELOCITY_STD, integral
+from weighbridge.kernels.inertia_hypothesis import VELOCITY_STD, integral
 
 PRINTED, EXTENDED, INVERSE = 0, 1, 2
 """As printed (A_02 = 0 in the Riccati equation), with the Jacobian, in inverse parameters."""

@@ -18,20 +18,15 @@ import numpy as np
 from weighbridge.balance import ForceBalance
 from weighbridge.calibration.run import run_calibration
 from weighbridge.estimators import MassTrack, ekf, hybrid, robust_rls
+from weighbridge.papers.du2025_bus import LOADS, data_sheet, known_bus, simulate
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, Panel, blank, line
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si
-from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import (
-    Driveline,
-    Mounting,
-    Provenance,
-    RoadLoad,
-    TorqueModel,
     Vehicle,
 )
 
@@ -39,9 +34,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from weighbridge.simulation import SimulatedDrive
-
-LOADS: Final = {"no-load": 0.0, "half-load": 3000.0, "full-load": 6000.0}
-"""Payload over the empty bus of 7000 kg, Table 1 [kg]."""
 
 METHODS: Final = ("robust-rls", "ekf", "hybrid")
 
@@ -74,81 +66,7 @@ CALIBRATION_SEED: Final = 1_000_000
 CALIBRATION_DRIVES: Final = 2
 """Drives of known mass at each load that the bus is calibrated on."""
 
-NOT_IN_THE_PAPER: Final = (
-    "accessories", "load_nonlinearity", "driveline_loss", "warm_up", "tyre_temperature", "surface",
-    "gusts", "squat", "load_pitch", "imu_bias", "imu_bias_walk", "imu_cross_axis",
-)  # fmt: skip
-"""Effects that the paper's filters and its simulated sensors do not have: they know torque,
-efficiency, rolling resistance and the zero of the accelerometer, and no wind blows. Noise,
-vibration, scale errors, rounding, lateness and jitter of the sensors, the tyres' slip and
-growth with speed, shifts, rough road and released brakes that hold a little are left in."""
-
-ROLLING_SPEED: Final = 3.5e-5
-"""Growth of the rolling coefficient with speed, f1 [s/m]: straight line to what the simulated
-tyres have at 70 km/h, a fifth of the quadratic growth at 30 m/s."""
-
 COLOURS: Final = dict(zip(METHODS, (ORANGE, GREEN, BLUE), strict=True))
-
-
-def data_sheet() -> Vehicle:
-    """Return the bus of Table 1, and what the table lacks from the simulated one's data sheet.
-
-    Gear ratios and inertias are not in the table. Its rolling coefficient of
-    0.0005 is a tenth of any tyre's; 0.0075 is usual for buses.
-    """
-    radius, axle = 0.49, 3.545
-    ratios = (6.75, 3.60, 2.13, 1.39, 1.00, 0.78)
-    return Vehicle(
-        name="bus of Du 2025, data sheet",
-        kind="bus",
-        tare=7000.0,
-        gross=13_000.0,
-        driveline=Driveline(
-            gearings=tuple(g * axle / radius for g in ratios),
-            engine_inertia=1.1,
-            wheel_inertia=62.0,
-            wheel_radius=radius,
-            efficiency=0.95,
-        ),
-        torque=TorqueModel(source="percent"),
-        road_load=RoadLoad(drag_area=0.69 * 7.9, rolling_coefficient=0.0075),
-    )
-
-
-def known_bus() -> Vehicle:
-    """Return the bus as the paper's filters know it: nothing about it is in doubt.
-
-    The losses of the driveline are off in these drives, as the paper knows
-    them, so its efficiency is one; the sensor's mounting is known.
-    """
-    sheet = data_sheet()
-    roll, pitch, yaw = Sensors().mounting
-    return replace(
-        sheet,
-        name="bus of Du 2025, known",
-        driveline=replace(sheet.driveline, efficiency=1.0),
-        road_load=replace(sheet.road_load, rolling_speed_coefficient=ROLLING_SPEED),
-        mounting=Mounting(roll=roll, pitch=pitch, yaw=yaw, std=(1e-3, 1e-3, 1e-3)),
-        provenance=Provenance(mass_scale_std=0.0),
-    )
-
-
-def simulate(payload: float, seed: int, *, as_paper: bool) -> SimulatedDrive:
-    """Simulate a drive of the bus on the straight road.
-
-    Parameters
-    ----------
-    payload : [kg]
-    seed : of driver, weather and sensors
-    as_paper : on a level road, without `NOT_IN_THE_PAPER`, wind and GNSS; else with
-        all effects. Without GNSS no height tells grade from the accelerometer's
-        zero, which the paper's filters know.
-    """
-    if not as_paper:
-        return simulate_car(make_scenario("bus", payload=payload, seed=seed))
-    made = make_scenario("bus", payload=payload, seed=seed, wind=0.0, without=NOT_IN_THE_PAPER)
-    level = replace(made.route, grade=0.0 * made.route.grade)
-    return simulate_car(replace(made, route=level, sensors=replace(made.sensors, gnss_rate=0.0)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

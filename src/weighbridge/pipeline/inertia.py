@@ -21,12 +21,10 @@ from weighbridge.inertia.filter import (
     InertiaTrack,
     Method,
     RideSamples,
-    believed_otherwise,
     estimate,
     integration_std,
-    jumps,
-    load_changes,
 )
+from weighbridge.inertia.load_changes import believed_otherwise, jumps, load_changes
 from weighbridge.inertia.ride_checks import (
     LEAST,
     NEEDED,

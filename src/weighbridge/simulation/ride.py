@@ -321,19 +321,8 @@ def simulate_ride(scenario: RideScenario) -> SimulatedRide:
     rows = warm + (samples - 1) * every + 1
     time = (np.arange(rows) - warm) * step
 
-    road = draw_road(
-        scenario.road_class,
-        scenario.speed * (rows * step) + sum(truck.axle_distance),
-        0.5 * sum(truck.track),
-        road_random,
-    )
-    under_front = scenario.speed * np.arange(rows) * step + sum(truck.axle_distance)
-    heights = np.ones((rows, 7))
+    heights = _heights(scenario, rows, step, road_random)
     heights[:, 5:] = _pushes(scenario, rows, step, warm)
-    for wheel, behind in enumerate((0.0, 0.0, *2 * (sum(truck.axle_distance),))):
-        track = road.right if wheel % 2 else road.left
-        heights[:, wheel] = track(under_front - behind)
-
     factors = np.array([1.0, *(f for _, f in scenario.changes)])
     begins = np.array([t for t, _ in scenario.changes])
     # A change on a sample holds from that sample on, whatever the last bit of its time.
@@ -380,6 +369,24 @@ def simulate_ride(scenario: RideScenario) -> SimulatedRide:
         inputs=inputs,
         velocities=velocities,
     )
+
+
+def _heights(scenario: RideScenario, rows: int, step: float, random: np.random.Generator) -> Floats:
+    """(n, 7) of the road under the four wheels [m]; ones in the other columns."""
+    truck = scenario.vehicle
+    wheelbase = sum(truck.axle_distance)
+    road = draw_road(
+        scenario.road_class,
+        scenario.speed * (rows * step) + wheelbase,
+        0.5 * sum(truck.track),
+        random,
+    )
+    under_front = scenario.speed * np.arange(rows) * step + wheelbase
+    heights = np.ones((rows, 7))
+    for wheel, behind in enumerate((0.0, 0.0, wheelbase, wheelbase)):
+        track = road.right if wheel % 2 else road.left
+        heights[:, wheel] = track(under_front - behind)
+    return heights
 
 
 def _pushes(scenario: RideScenario, rows: int, step: float, warm: int) -> Floats:

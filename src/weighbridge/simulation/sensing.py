@@ -94,24 +94,7 @@ def simulate_imu(
         force += np.cross(turning, lever_column, axis=0)
         force += np.cross(rate, np.cross(rate, lever_column, axis=0), axis=0)
     time = drive.time
-    if effects.imu_vibration > 0.0 and scenario.car.cylinders:
-        # A four-stroke engine fires half as often per turn as it has cylinders.
-        order = scenario.car.cylinders / 2.0
-        phase = np.cumsum(drive.engine_speed) * (DT * order)
-        strength = (sensors.vibration * effects.imu_vibration) * (
-            0.3 + 0.7 * np.clip(drive.pedal, 0.0, 1.0)
-        )
-        for axis, (share, shift) in enumerate(((0.6, 0.3), (0.5, 1.9), (1.0, 0.0))):
-            force[axis] += share * strength * np.sin(phase + shift)
-    if effects.imu_vibration > 0.0:
-        # Shaking of what the sensor sits on, not of the body as a whole.
-        band = dsp.butter(2, (8.0, 60.0), btype="band", fs=1.0 / DT, output="sos")
-        gain = 1.0 / np.sqrt((60.0 - 8.0) * 2.0 * DT)  # the share of white noise passed
-        level = effects.imu_vibration * gain * np.sqrt(drive.speed / 25.0)
-        for values, worst in zip((force, rate), sensors.road_vibration, strict=True):
-            for axis, share in enumerate((0.6, 0.7, 1.0) if values is force else (0.7, 1.0, 0.3)):
-                shaking = dsp.sosfilt(band, rng.standard_normal(drive.time.size))
-                values[axis] += share * worst * level * shaking
+    _shake(scenario, drive, force, rate, rng)
     stride = max(1, round(1.0 / (DT * sensors.imu_rate)))
     if stride > 1:
         count = time.size // stride
@@ -151,6 +134,31 @@ def simulate_imu(
                 row = np.round(row / step) * step
             signals.append(Signal(f"{kind}_{name}", stamps, row))
     return signals
+
+
+def _shake(
+    scenario: Scenario, drive: Trajectory, force: Floats, rate: Floats, rng: np.random.Generator
+) -> None:
+    """Add vibration of engine and road to specific force and angular rate (3, n), in place."""
+    sensors, effects = scenario.sensors, scenario.effects
+    if effects.imu_vibration > 0.0 and scenario.car.cylinders:
+        # A four-stroke engine fires half as often per turn as it has cylinders.
+        order = scenario.car.cylinders / 2.0
+        phase = np.cumsum(drive.engine_speed) * (DT * order)
+        strength = (sensors.vibration * effects.imu_vibration) * (
+            0.3 + 0.7 * np.clip(drive.pedal, 0.0, 1.0)
+        )
+        for axis, (share, shift) in enumerate(((0.6, 0.3), (0.5, 1.9), (1.0, 0.0))):
+            force[axis] += share * strength * np.sin(phase + shift)
+    if effects.imu_vibration > 0.0:
+        # Shaking of what the sensor sits on, not of the body as a whole.
+        band = dsp.butter(2, (8.0, 60.0), btype="band", fs=1.0 / DT, output="sos")
+        gain = 1.0 / np.sqrt((60.0 - 8.0) * 2.0 * DT)  # the share of white noise passed
+        level = effects.imu_vibration * gain * np.sqrt(drive.speed / 25.0)
+        for values, worst in zip((force, rate), sensors.road_vibration, strict=True):
+            for axis, share in enumerate((0.6, 0.7, 1.0) if values is force else (0.7, 1.0, 0.3)):
+                shaking = dsp.sosfilt(band, rng.standard_normal(drive.time.size))
+                values[axis] += share * worst * level * shaking
 
 
 def _gauss_markov(n: int, dt: float, time: float, rng: np.random.Generator) -> Floats:

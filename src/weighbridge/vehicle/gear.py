@@ -141,17 +141,7 @@ def detect_gearings(
         )
     blur = np.hypot(width, 0.29 * speed_step / speed[kept])
     grid, density = ratio_density(gearing[kept], width / blur, width=width)
-    # A gear is a peak that stands out from its surroundings, be it ever so
-    # rarely used: shifting smears samples evenly, gears pile them up.
-    peaks, found = find_peaks(
-        density,
-        prominence=max(5.0, 0.002 * density.sum() / (2.0 * width) * np.log(grid[1] / grid[0])),
-        distance=int(0.07 / np.log(grid[1] / grid[0])),
-    )
-    keep = found["prominences"] > 0.55 * density[peaks]
-    peaks = peaks[keep]
-    if peaks.size > most:
-        peaks = np.sort(peaks[np.argsort(density[peaks])[-most:]])
+    peaks = _standing_out(grid, density, width, most)
     if peaks.size == 0:
         raise DriveError(
             "no gear ratio stands out from engine over vehicle speed: the drive is too short, "
@@ -177,6 +167,23 @@ def detect_gearings(
         grid,
         density,
     )
+
+
+def _standing_out(grid: Floats, density: Floats, width: float, most: int) -> Ints:
+    """Places of the peaks of a density that stand out from their surroundings, rising.
+
+    A gear is such a peak, be it ever so rarely used: shifting smears samples evenly, gears pile
+    them up.
+    """
+    peaks, found = find_peaks(
+        density,
+        prominence=max(5.0, 0.002 * density.sum() / (2.0 * width) * np.log(grid[1] / grid[0])),
+        distance=int(0.07 / np.log(grid[1] / grid[0])),
+    )
+    peaks = peaks[found["prominences"] > 0.55 * density[peaks]]
+    if peaks.size > most:
+        peaks = np.sort(peaks[np.argsort(density[peaks])[-most:]])
+    return np.asarray(peaks)
 
 
 def predict_gear(

@@ -293,17 +293,7 @@ def _track(
         slow_errors=SlowErrors.from_states(
             time, solved.x, solved.var, solved.running_var, problem.rows[:, 1]
         ),
-        filtered=FilterInput(
-            start=solved.start,
-            params=solved.params,
-            time=time,
-            rows=problem.rows,
-            y=problem.y,
-            noise=solved.noise,
-            added=solved.added,
-            stood=asked.stood,
-            traction=problem.rows[:, 0] * solved.x[:, 0] + cut.mean(view.traction_force - asked.y),
-        ),
+        filtered=_given(asked, solved, cut.mean(view.traction_force - asked.y)),
         sizes=JointSizes(
             std=problem.std,
             fast=solved.fast,
@@ -313,6 +303,22 @@ def _track(
             noise_information=shown * float(np.sum(solved.weight)),
             left=left,
         ),
+    )
+
+
+def _given(asked: _Asked, solved: _Solved, beside: Floats) -> FilterInput:
+    """Keep what the filter was given; ``beside`` (m,) is the force that is no row's [N]."""
+    problem = asked.problem
+    return FilterInput(
+        start=solved.start,
+        params=solved.params,
+        time=problem.time,
+        rows=problem.rows,
+        y=problem.y,
+        noise=solved.noise,
+        added=solved.added,
+        stood=asked.stood,
+        traction=problem.rows[:, 0] * solved.x[:, 0] + beside,
     )
 
 
