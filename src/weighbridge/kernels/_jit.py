@@ -81,3 +81,7 @@ hold many arrays, which a call would count references of."""
 
 inlined_fast_kernel = _decorator(fastmath=_FAST, forceinline=True)
 """As `fast_kernel`, put in the place of its call."""
+
+spliced_kernel = _decorator(inline="always")
+"""As `inlined_kernel`, put in before compiling and never compiled alone: for the one call of a long
+step."""

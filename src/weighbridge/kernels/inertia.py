@@ -274,8 +274,17 @@ def impulses(phi, old_step, length, longest):
 
 
 @kernel
-def predict_all(j, count, cause, mean, cov, impulse, doubt, length, params):
-    """Integrate all hypotheses of one axis over a step."""
+def predict_all(j, count, cause, mean, cov, impulse, doubt, measured, length, params):
+    """Integrate all hypotheses of one axis over a step; over one of unknown impulse, forget.
+
+    A velocity forgotten starts from the one ``measured``, where there is one.
+    """
+    if not np.isfinite(impulse):
+        if not length <= 0.0:
+            for i in range(count):
+                held = measured if np.isfinite(measured) else mean[j, i, 0]
+                forget_velocity(mean[j, i], cov[j, i], held)
+        return
     push_var = params.push_var[j] * length * length + doubt * doubt
     for i in range(count):
         var = mean[j, i, 1] * mean[j, i, 1] * push_var
@@ -293,7 +302,15 @@ def correct_all(weight, mean, cov, measured, noise_var):
     mean, cov : (c, 3), (c, 3, 3) float64
     measured, noise_var : float
         Velocity and the variance of its noise [m/s], [rad/s] and their squares.
+
+    Returns
+    -------
+    innovation, innovation_var : float
+        Of the likeliest hypothesis before.
     """
+    best = likeliest(weight, weight.size)
+    innovation = measured - mean[best, 0]
+    innovation_var = cov[best, 0, 0] + noise_var
     top = -np.inf
     for i in range(weight.size):
         e, var = correct(mean[i], cov[i], measured, noise_var)
@@ -301,6 +318,7 @@ def correct_all(weight, mean, cov, measured, noise_var):
         top = max(top, weight[i])
     for i in range(weight.size):
         weight[i] -= top
+    return innovation, innovation_var
 
 
 @kernel
@@ -388,17 +406,11 @@ def step(state, time, travel, rate, velocity, params):
     innovation, innovation_var = np.full(AXES, np.nan), np.full(AXES, np.nan)
     for j in range(AXES):
         measured, n = velocity[j], count[j]
-        if np.isfinite(impulse[j]):
-            predict_all(j, n, cause, mean, cov, impulse[j], doubt[j], length, params)
-        elif not np.isfinite(state.time) or length > 0.0:
-            for i in range(n):
-                held = measured if np.isfinite(measured) else mean[j, i, 0]
-                forget_velocity(mean[j, i], cov[j, i], held)
+        predict_all(j, n, cause, mean, cov, impulse[j], doubt[j], measured, length, params)
         if np.isfinite(measured):
-            best = likeliest(weight[j], n)
-            innovation[j] = measured - mean[j, best, 0]
-            innovation_var[j] = cov[j, best, 0, 0] + params.noise_var[j]
-            correct_all(weight[j, :n], mean[j, :n], cov[j, :n], measured, params.noise_var[j])
+            innovation[j], innovation_var[j] = correct_all(
+                weight[j, :n], mean[j, :n], cov[j, :n], measured, params.noise_var[j]
+            )
         if params.spawn < np.inf:
             # A change is at most half the time between two hypotheses from the nearest: one
             # millisecond of another load is more than a quiet velocity forgives.
@@ -417,23 +429,13 @@ def step(state, time, travel, rate, velocity, params):
         pushed[j] = cause[j, best] == BEGAN
     return (
         InertiaState(
-            time,
-            phi[:2].copy(),
-            length if known else 0.0,
-            next_spawn,
-            next_turn,
-            count,
-            cause,
-            born,
-            loaded,
-            weight,
-            mean,
-            cov,
+            time, phi[:2].copy(), length if known else 0.0, next_spawn, next_turn, count, cause,
+            born, loaded, weight, mean, cov,
         ),
         InertiaSample(
             alpha, alpha_std, beta, speed, innovation, innovation_var, impulse, jumped, pushed
         ),
-    )
+    )  # fmt: skip
 
 
 @kernel

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.kernels._jit import inlined_kernel, kernel
+from weighbridge.kernels._jit import inlined_kernel, kernel, spliced_kernel
 from weighbridge.kernels.simulated_driveline import (
     DRIVING,
     OPEN,
@@ -77,6 +77,24 @@ class Weather(NamedTuple):
     cross_gust: float
     slow: float
     electric_load: float
+
+
+class Car(NamedTuple):
+    """Vehicle and driver at one instant."""
+
+    s: float  # distance [m]
+    v: float  # [m/s]
+    a: float  # [m/s^2]
+    shaft: Shaft
+    intent: Intent
+    foot: Foot
+    brake: float  # force [N]
+    residual: float  # left of the brakes when released [N]
+    off_pedal: float  # time since the foot left the accelerator [s]
+    uncut: float  # part of the charge of overrun that still burns [-]
+    fuel: float  # burnt [kg]
+    load: float  # taken on [kg]
+    mass: float  # [kg]
 
 
 @inlined_kernel
@@ -192,6 +210,103 @@ def _shift(power, shaft, road, where, sync, braking, pedal_torque, pedal, dt):
     )  # fmt: skip
 
 
+@inlined_kernel
+def _wanted_torque(power, shaft, crank_side, wanted, inertia, against, gearing, sync):
+    """Torque at the crank [N m] for an acceleration wanted, against the forces [N] of road and
+    gearbox.
+    """
+    turning = power.engine_inertia * gearing * gearing
+    if power.automated and shaft.phase != DRIVING:
+        # Behind a slipping clutch the engine need not gain speed with the vehicle.
+        turning = 0.0
+    resist, spin = against
+    torque = (
+        ((inertia + turning) * wanted + resist + spin) / gearing + crank_side.loss_constant
+    ) * (1.0 + power.loss_slope)
+    if power.converter > 0.0 and not shaft.locked and torque > 0.0:
+        torque /= converter_torques(power, shaft.engine, sync, 1.0)[1]
+    return torque
+
+
+@spliced_kernel
+def _step(road, power, resistance, driver, car, weather, uneven, every, dt, out, k):
+    """Drive step ``k`` and note it down in ``out``.
+
+    ``uneven`` are the random numbers of the foot, which decide over ``every`` seconds.
+    """
+    t = k * dt
+    s, v, shaft, mass = car.s, car.v, car.shaft, car.mass
+    where = s / road.step
+    cold = np.exp(-t / resistance.warm_up_time)
+    drag, rolling, slope, tail = _resist(road, resistance, weather, where, v, mass, cold)
+    resist = drag + rolling + slope
+
+    gearing = power.gearings[shaft.gear - 1]
+    weight = resistance.mass / (resistance.mass + car.load)
+    pull = mass * car.a + drag + rolling + slope
+    slip = min(0.05, max(-0.05, resistance.tyre_slip * weight * pull))
+    sync = gearing * v * (1.0 + slip)
+    crank_side = crank_drag(power, shaft.engine, v, t, cold, weather.electric_load, car.uncut)
+    spin = power.spin_loss * (1.0 + power.spin_cold * cold) * v
+
+    intent = steer(road, driver, car.intent, t, s, v, weather.ripple, weather.speed_ripple, dt)
+    load = loaded(road, intent) if car.intent.at_stop else car.load
+    inertia = mass + power.wheel_mass
+    idle_force = gearing * foot_off(power, shaft, crank_side, sync)
+    coasting = (idle_force - spin - resist) / inertia
+    foot = move_foot(
+        driver, car.foot, uneven, every, power.electric, intent.wanted, coasting, intent.coast,
+        intent.at_stop, v, dt,
+    )  # fmt: skip
+    lifted = foot.place != ACCELERATOR
+    brake = _brake(
+        car.brake, foot, intent.wanted, coasting, intent.at_stop, inertia,
+        abs(slope) + max(0.0, idle_force), resistance, dt,
+    )  # fmt: skip
+    torque = _wanted_torque(
+        power, shaft, crank_side, intent.wanted, inertia, (resist, spin), gearing, sync
+    )
+    pedal_torque, pedal = _press(power, shaft, crank_side, torque, intent.coast, lifted, v, dt)
+
+    shaft = _shift(power, shaft, road, where, sync, lifted, pedal_torque, pedal, dt)
+    shaft, gearing, net, crank = transmit(
+        power, shaft, crank_side, gearing, v, slip, pedal, lifted, dt
+    )
+    off_pedal, uncut = cut_fuel(power, shaft, crank_side, car.off_pedal, car.uncut, dt)
+    gross, burnt = crank, 0.0
+    if not power.electric:
+        gross = max(0.0, crank + crank_side.friction + crank_side.accessory)
+        burnt = fuel_flow(power, shaft, crank_side, gross)
+
+    loss = crank_side.loss_constant * min(1.0, v / 0.5) + power.loss_slope * abs(net)
+    rotating = power.engine_inertia * gearing * gearing if shaft.phase == DRIVING else 0.0
+    force = gearing * (net - loss) - spin
+    residual = car.residual * (1.0 - dt / resistance.brake_drag_time)
+    if brake > resistance.brake_drag:
+        residual = resistance.brake_drag
+    held = max(brake, residual) if v > 0.0 else 0.0
+    a = (force - held - resist) / (inertia + rotating)
+    if v <= 0.0 and (intent.at_stop or a < 0.0):
+        a = 0.0
+    v_new = v + a * dt
+    if v_new < 0.0:
+        v_new = 0.0
+        a = -v / dt
+    fuel = car.fuel + burnt * dt
+    mass = resistance.mass - resistance.fuel_burn * fuel + load
+    out[DISTANCE, k], out[SPEED, k], out[ACCEL, k] = s, v, a
+    out[ENGINE_SPEED, k], out[GEAR, k], out[PHASE, k] = shaft.engine, shaft.gear, shaft.phase
+    out[TORQUE, k], out[GROSS_TORQUE, k], out[ACCESSORY, k] = crank, gross, crank_side.accessory
+    out[TRACTION, k], out[BRAKE, k], out[DRAG, k] = force - rotating * a, held, drag
+    out[ROLLING, k], out[WIND_ALONG, k], out[MASS, k], out[LOADED, k] = rolling, tail, mass, load
+    out[FUEL_FLOW, k], out[PEDAL, k], out[UNCUT, k] = burnt, 0.0 if lifted else pedal, uncut
+    out[BRAKE_PEDAL, k] = 1.0 if foot.place == ON_BRAKE or foot.both > 0.0 else 0.0
+    return Car(
+        s + 0.5 * (v + v_new) * dt, v_new, a, shaft, intent, foot, brake, residual, off_pedal,
+        uncut, fuel, load, mass,
+    )  # fmt: skip
+
+
 @kernel
 def drive(road, power, resistance, driver, noise, chance, dt, steps):
     """Drive the road from end to end.
@@ -225,133 +340,24 @@ def drive(road, power, resistance, driver, noise, chance, dt, steps):
     out = np.zeros((FIELDS, steps))
     length = (road.grade.size - 1) * road.step
     fast = dt * NOISE_STRIDE
-
-    s, v, a = 0.0, 0.0, 0.0
     shaft = Shaft(
         power.idle_speed, 0.0, power.launch_gear, power.launch_gear, 10.0, 0.0,
         power.electric, False, OPEN, 0.0, 0.0,
     )  # fmt: skip
     intent = Intent(0.0, 0.0, 0, False, 0, True, driver.rest)
-    weather = Weather(0.0, 0.0, 0.0, 0.0, noise[0, 4], 0.0)
-    brake = 0.0
     foot = Foot(ON_BRAKE, 0.0, driver.least_high, 0.0, 0.0, 0.0)
-    off_pedal = 0.0
-    uncut = 1.0
-    residual = 0.0
-    fuel = 0.0
-    load = 0.0
-    mass = resistance.mass
-
+    car = Car(0.0, 0.0, 0.0, shaft, intent, foot, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, resistance.mass)
+    weather = Weather(0.0, 0.0, 0.0, 0.0, noise[0, 4], 0.0)
     for k in range(steps):
-        t = k * dt
-        where = s / road.step
+        every = 0.0
         if k % NOISE_STRIDE == 0:
             row = noise[(k // NOISE_STRIDE) % noise.shape[0]]
-            weather = _wander(weather, row, v, fast, resistance.gust_length)
+            weather = _wander(weather, row, car.v, fast, resistance.gust_length)
             uneven = chance[(k // NOISE_STRIDE) % chance.shape[0]]
-
-        # What holds the vehicle back.
-        cold = np.exp(-t / resistance.warm_up_time)
-        drag, rolling, slope, tail = _resist(road, resistance, weather, where, v, mass, cold)
-        resist = drag + rolling + slope
-
-        # Engine side.
-        gearing = power.gearings[shaft.gear - 1]
-        weight = resistance.mass / (resistance.mass + load)
-        pull = mass * a + drag + rolling + slope
-        slip = min(0.05, max(-0.05, resistance.tyre_slip * weight * pull))
-        sync = gearing * v * (1.0 + slip)
-        crank_side = crank_drag(power, shaft.engine, v, t, cold, weather.electric_load, uncut)
-        spin = power.spin_loss * (1.0 + power.spin_cold * cold) * v
-
-        # Driver.
-        stood = intent.at_stop
-        intent = steer(road, driver, intent, t, s, v, weather.ripple, weather.speed_ripple, dt)
-        if stood:
-            load = loaded(road, intent)
-        inertia = mass + power.wheel_mass
-        idle_force = gearing * foot_off(power, shaft, crank_side, sync)
-        coasting = (idle_force - spin - resist) / inertia
-        foot = move_foot(
-            driver, foot, uneven, fast if k % NOISE_STRIDE == 0 else 0.0, power.electric,
-            intent.wanted, coasting, intent.coast, intent.at_stop, v, dt,
-        )  # fmt: skip
-        lifted = foot.place != ACCELERATOR
-        brake = _brake(
-            brake, foot, intent.wanted, coasting, intent.at_stop, inertia,
-            abs(slope) + max(0.0, idle_force), resistance, dt,
-        )  # fmt: skip
-        turning = power.engine_inertia * gearing * gearing
-        if power.automated and shaft.phase != DRIVING:
-            # Behind a slipping clutch the engine need not gain speed with the vehicle.
-            turning = 0.0
-        torque_wanted = (
-            ((inertia + turning) * intent.wanted + resist + spin) / gearing
-            + crank_side.loss_constant
-        ) * (1.0 + power.loss_slope)
-        if power.converter > 0.0 and not shaft.locked and torque_wanted > 0.0:
-            torque_wanted /= converter_torques(power, shaft.engine, sync, 1.0)[1]
-        pedal_torque, pedal = _press(
-            power, shaft, crank_side, torque_wanted, intent.coast, lifted, v, dt
-        )
-
-        # Gearbox and clutch.
-        shaft = _shift(power, shaft, road, where, sync, lifted, pedal_torque, pedal, dt)
-        shaft, gearing, net, crank = transmit(
-            power, shaft, crank_side, gearing, v, slip, pedal, lifted, dt
-        )
-        off_pedal, uncut = cut_fuel(power, shaft, crank_side, off_pedal, uncut, dt)
-
-        # Motion.
-        loss = crank_side.loss_constant * min(1.0, v / 0.5) + power.loss_slope * abs(net)
-        rotating = power.engine_inertia * gearing * gearing if shaft.phase == DRIVING else 0.0
-        force = gearing * (net - loss) - spin
-        residual *= 1.0 - dt / resistance.brake_drag_time
-        if brake > resistance.brake_drag:
-            residual = resistance.brake_drag
-        held = max(brake, residual) if v > 0.0 else 0.0
-        new_a = (force - held - resist) / (inertia + rotating)
-        if v <= 0.0 and (intent.at_stop or new_a < 0.0):
-            new_a = 0.0
-        v_new = v + new_a * dt
-        if v_new < 0.0:
-            v_new = 0.0
-            new_a = -v / dt
-        a = new_a
-        traction = force - rotating * a
-
-        gross = crank
-        burnt = 0.0
-        if not power.electric:
-            gross = max(0.0, crank + crank_side.friction + crank_side.accessory)
-            burnt = fuel_flow(power, shaft, crank_side, gross)
-        fuel += burnt * dt
-        mass = resistance.mass - resistance.fuel_burn * fuel + load
-
-        out[DISTANCE, k] = s
-        out[SPEED, k] = v
-        out[ACCEL, k] = a
-        out[ENGINE_SPEED, k] = shaft.engine
-        out[GEAR, k] = shaft.gear
-        out[TORQUE, k] = crank
-        out[GROSS_TORQUE, k] = gross
-        out[TRACTION, k] = traction
-        out[BRAKE, k] = held
-        out[DRAG, k] = drag
-        out[ROLLING, k] = rolling
-        out[WIND_ALONG, k] = tail
-        out[MASS, k] = mass
-        out[FUEL_FLOW, k] = burnt
-        out[PEDAL, k] = 0.0 if lifted else pedal
-        out[PHASE, k] = shaft.phase
-        out[ACCESSORY, k] = crank_side.accessory
-        out[LOADED, k] = load
-        out[BRAKE_PEDAL, k] = 1.0 if foot.place == ON_BRAKE or foot.both > 0.0 else 0.0
-        out[UNCUT, k] = uncut
-
-        s += 0.5 * (v + v_new) * dt
-        v = v_new
+            every = fast
+        car = _step(road, power, resistance, driver, car, weather, uneven, every, dt, out, k)
+        intent = car.intent
         last = intent.stop >= road.stop_distance.size and intent.at_stop
-        if s >= length - 2.0 or (last and intent.waiting < dt):
+        if car.s >= length - 2.0 or (last and intent.waiting < dt):
             return out, k + 1
     return out, steps

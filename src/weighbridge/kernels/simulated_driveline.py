@@ -331,6 +331,68 @@ def through_converter(power, shaft, drag, turbine, pedal, keep, dt):
 
 
 @inlined_kernel
+def _between_gears(power, shaft, drag, v, grip, gearing, pedal, asked, dt):
+    """Blend the gearings of a shift, with less torque in its middle.
+
+    ``grip`` is 1 and the slip of the driven tyres [-], ``asked`` what engine or motor can give of
+    the torque that the pedal asks for [N m].
+    """
+    shifting = shaft.shifting - dt
+    torque = shaft.torque
+    part = min(1.0, max(0.0, 1.0 - shifting / power.shift_time))
+    blend = part * part * (3.0 - 2.0 * part)
+    old = power.gearings[shaft.gear_from - 1]
+    gearing = old + blend * (power.gearings[shaft.gear - 1] - old)
+    dip = min(1.0, 1.6 * (4.0 * part * (1.0 - part)))
+    keep = 1.0 - (1.0 - power.shift_floor) * dip
+    turbine = gearing * v * grip
+    if power.converter > 0.0 and not shaft.locked:
+        engine, torque, net, crank, locked = through_converter(
+            power, shaft, drag, turbine, pedal, keep, dt
+        )
+    else:
+        engine = max(turbine, power.idle_speed) if power.automated else turbine
+        torque += (asked - torque) * dt / power.torque_lag
+        locked = True
+        net = torque * keep
+        crank = net + power.engine_inertia * (engine - shaft.engine) / dt
+        crank = min(drag.full, max(drag.lowest, crank))
+    return gearing, max(shifting, 0.0), engine, torque, net, crank, locked
+
+
+@inlined_kernel
+def _overrun(shaft, drag, torque):
+    """Cut combustion below some charge; it comes back softly."""
+    gross = torque + drag.friction + drag.accessory
+    least = 0.25 if shaft.fuel_cut else 0.05
+    fuel_cut = shaft.pedal_torque < drag.lowest + least * drag.friction
+    fuel_cut = fuel_cut and drag.charge <= 0.02 * drag.friction
+    if gross < 0.0:
+        torque = drag.lowest - drag.charge
+    return torque, fuel_cut
+
+
+@inlined_kernel
+def _slip_clutch(power, shaft, full, sync, pedal, braking, dt):
+    """Slip the clutch of a launch, or hold it open."""
+    torque, lift = shaft.torque, 0.0
+    if shaft.pedal_torque > 2.0 and not braking:
+        phase = SLIPPING
+        lift = min(1.0, pedal)
+        least = max(power.torque_lag, 0.15)
+        torque += (min(full, shaft.pedal_torque) - torque) * dt / least
+    else:
+        phase = OPEN
+        torque += (0.0 - torque) * dt / 0.1
+    hold = power.idle_speed + lift * 1.2 * power.idle_speed
+    engine = shaft.engine + (max(hold, sync) - shaft.engine) * dt / 0.2
+    locked = phase == SLIPPING and sync >= engine - 3.0
+    if locked:
+        engine = sync
+    return phase, engine, torque, locked
+
+
+@inlined_kernel
 def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
     """Turn engine, clutch and gearbox for one step.
 
@@ -368,41 +430,14 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
     sync = gearing * v * (1.0 + slip)
     if shifting > 0.0 and v > 0.5:
         phase = SHIFTING
-        shifting -= dt
-        part = min(1.0, max(0.0, 1.0 - shifting / power.shift_time))
-        blend = part * part * (3.0 - 2.0 * part)
-        old = power.gearings[shaft.gear_from - 1]
-        gearing = old + blend * (power.gearings[gear - 1] - old)
-        dip = 4.0 * part * (1.0 - part)
-        dip = min(1.0, 1.6 * dip)
-        keep = 1.0 - (1.0 - power.shift_floor) * dip
-        turbine = gearing * v * (1.0 + slip)
-        if power.converter > 0.0 and not locked:
-            engine, torque, net, crank, locked = through_converter(
-                power, shaft, drag, turbine, pedal, keep, dt
-            )
-        else:
-            engine = max(turbine, power.idle_speed) if power.automated else turbine
-            torque += (asked - torque) * dt / power.torque_lag
-            locked = True
-            net = torque * keep
-            crank = net + power.engine_inertia * (engine - before) / dt
-            crank = min(full, max(lowest, crank))
-        if shifting <= 0.0:
-            shifting = 0.0
+        gearing, shifting, engine, torque, net, crank, locked = _between_gears(
+            power, shaft, drag, v, 1.0 + slip, gearing, pedal, asked, dt
+        )
     elif power.electric or (locked and sync > _lowest_locked(power, gear)):
         phase = DRIVING
         torque += (asked - torque) * dt / power.torque_lag
         if not power.electric:
-            # Combustion below some charge is cut, and comes back softly.
-            gross = torque + drag.friction + drag.accessory
-            if fuel_cut:
-                fuel_cut = shaft.pedal_torque < lowest + 0.25 * drag.friction
-            else:
-                fuel_cut = shaft.pedal_torque < lowest + 0.05 * drag.friction
-            fuel_cut = fuel_cut and drag.charge <= 0.02 * drag.friction
-            if gross < 0.0:
-                torque = lowest - drag.charge
+            torque, fuel_cut = _overrun(shaft, drag, torque)
         engine = sync
         if engine > power.max_speed:
             # A limiter cuts the fuel at once.
@@ -417,26 +452,11 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
         )
         fuel_cut = False
     else:
-        # Clutch slips at a launch or is open.
         gear = power.launch_gear
         shifting = 0.0
         gearing = power.gearings[gear - 1]
         sync = gearing * v * (1.0 + slip)
-        lift = 0.0
-        if shaft.pedal_torque > 2.0 and not braking:
-            phase = SLIPPING
-            lift = min(1.0, pedal)
-            least = max(power.torque_lag, 0.15)
-            torque += (min(full, shaft.pedal_torque) - torque) * dt / least
-        else:
-            phase = OPEN
-            torque += (0.0 - torque) * dt / 0.1
-        hold = power.idle_speed + lift * 1.2 * power.idle_speed
-        aim = max(hold, sync)
-        engine = before + (aim - before) * dt / 0.2
-        locked = phase == SLIPPING and sync >= engine - 3.0
-        if locked:
-            engine = sync
+        phase, engine, torque, locked = _slip_clutch(power, shaft, full, sync, pedal, braking, dt)
         net = torque
         crank = net + power.engine_inertia * (engine - before) / dt
         crank = min(full, max(lowest, crank))
