@@ -25,6 +25,7 @@ from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappingSource, TableMapping, load_mapping, mapping_for
+from weighbridge.io.parts import part_folders, read_parts
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.table import read_parquet, read_text, start_text
 from weighbridge.signals import Drive, DriveInfo, Floats, Problem, Signal
@@ -184,6 +185,7 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
     if info_path in inside and not info_path.is_file():
         raise DriveError(f"{info_path} is no file: put the file there, or remove this")
     info = read_info(info_path) if info_path in inside else DriveInfo()
+    parts = [read_parts(where, table) for table, where in part_folders(folder).items()]
     tables: dict[str, Path] = {}
     for f in files:
         table = f.stem.lower()
@@ -196,8 +198,8 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
     if tables and not mappings:
         others = [f for f in files if f not in tables.values() and _self_described(f)]
         known = [*((f, t) for t, f in tables.items()), *((f, None) for f in others)]
-        return _read_files(known, ()), info
-    if not files:
+        return _read_files(known, ()) + parts, info
+    if not files and not parts:
         raise DriveError(
             f"{folder} holds no drive: it needs at least one of "
             f"{', '.join(f'{t}.csv' for t in TABLES)} (or .parquet), "
@@ -209,7 +211,7 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
             for f in files
             if f.stem.lower() in TABLES or mapping_for(f, mappings) or _self_described(f)
         ]
-    return _read_files([(f, None) for f in files], mappings), info
+    return _read_files([(f, None) for f in files], mappings) + parts, info
 
 
 def is_folder(path: Path) -> bool:

@@ -17,6 +17,7 @@ import polars as pl
 from weighbridge.errors import DriveError, MissingExtraError, WeighbridgeError
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import MDF_INFO_MARK, info_text
+from weighbridge.io.parts import SUFFIX as PARTS
 from weighbridge.io.quiet import first_line
 from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
@@ -28,7 +29,7 @@ TableFormat = Literal["csv", "parquet"]
 _PARQUET: Final = (".parquet", ".pq")
 
 DRIVE_FILES: Final = frozenset(
-    f"{table}{suffix}" for table in (*TABLES, "truth") for suffix in (".csv", *_PARQUET)
+    f"{table}{suffix}" for table in (*TABLES, "truth") for suffix in (".csv", *_PARQUET, PARTS)
 ) | {INFO_NAME}
 """Files that a drive written as a folder may have: those of another drive would be read with it."""
 

@@ -1,0 +1,286 @@
+"""A weighing on the terminal: a view that changes in place, or plain lines where nobody looks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Final
+
+from weighbridge.live.outputs.words import (
+    age_text,
+    mass_text,
+    needed_text,
+    overload_text,
+    payload_text,
+    rate_text,
+    signals_text,
+    state_text,
+)
+from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
+from weighbridge.report.text import duration, kg
+from weighbridge.visible import cut, visible
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions
+    from rich.text import Text
+
+_STATUS_STYLE: Final = {
+    LiveStatus.LEARNING: "bold black on yellow",
+    LiveStatus.WEIGHED: "bold black on green",
+    LiveStatus.INCONSISTENT: "bold white on red",
+}
+
+# Probabilities of an overload from which the bar is yellow and red [-].
+_DOUBTFUL: Final = 0.05
+_LIKELY: Final = 0.5
+
+# The view is drawn anew at most so often [s].
+_PERIOD: Final = 0.2
+
+# From this width on, two signals stand in one line.
+_WIDE: Final = 78
+_LONGEST_NAME: Final = 26
+
+_LINE_PERIOD: Final = 60.0
+"""A plain line comes at least so often, on the clock of the samples [s]."""
+
+
+class TerminalView:
+    """Shows the newest weighing in place, as high and wide as the terminal has room.
+
+    Parameters
+    ----------
+    console : of the terminal, for standard error
+    clock : tells the time [s], for how often the view is drawn
+    """
+
+    name = "terminal"
+
+    def __init__(self, console: Console, clock: Callable[[], float] = time.monotonic) -> None:
+        from rich.live import Live
+
+        self._clock = clock
+        self._drawn = -_PERIOD
+        self._newest: LiveWeighing | None = None
+        # Standard output is for results.
+        self._live = Live(
+            console=console, auto_refresh=False, redirect_stdout=False, redirect_stderr=True
+        )
+        self._live.start()
+
+    def show(self, weighing: LiveWeighing) -> None:
+        """Draw a weighing, unless the last one was drawn a moment ago."""
+        self._newest = weighing
+        now = self._clock()
+        if now - self._drawn >= _PERIOD:
+            self._drawn = now
+            self._live.update(View(weighing), refresh=True)
+
+    def close(self) -> None:
+        """Leave the newest view on the terminal."""
+        if self._newest is not None:
+            self._live.update(View(self._newest), refresh=True)
+        self._live.stop()
+
+
+class PlainLines:
+    """Prints a line a minute, and one whenever the status changes.
+
+    Parameters
+    ----------
+    console : for standard error
+    """
+
+    name = "standard error"
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._status: LiveStatus | None = None
+        self._told = float("-inf")
+
+    def show(self, weighing: LiveWeighing) -> None:
+        """Print a line where one is due."""
+        age = weighing.time - self._told
+        # A clock that begins anew is a new drive.
+        if weighing.status is self._status and 0.0 <= age < _LINE_PERIOD:
+            return
+        if weighing.time != weighing.time and self._status is not None:
+            return
+        self._status = weighing.status
+        if weighing.time == weighing.time:
+            self._told = weighing.time
+        self._console.print(plain_line(weighing), markup=False, highlight=False, soft_wrap=True)
+
+    def close(self) -> None:
+        """Nothing was begun."""
+
+
+def terminal(console: Console) -> TerminalView | PlainLines:
+    """Choose how a weighing is shown: in place on a terminal, else in lines."""
+    return TerminalView(console) if console.is_terminal else PlainLines(console)
+
+
+def plain_line(weighing: LiveWeighing) -> str:
+    """Write a weighing in one line."""
+    parts = [f"{weighing.vehicle}, driven {duration(weighing.driven)}: {weighing.status}"]
+    if weighing.reason:
+        parts[0] += f" ({weighing.reason})"
+    if weighing.mass == weighing.mass:
+        parts += [mass_text(weighing), payload_text(weighing)]
+        if weighing.share is not None:
+            parts.append(f"{100.0 * weighing.share:.0f} % of {kg(weighing.gross)}")
+        parts.append(overload_text(weighing))
+    parts += [needed_text(weighing), signals_text(weighing)]
+    return visible(cut("; ".join(part for part in parts if part)))
+
+
+class View:
+    """One weighing, laid out to the room there is.
+
+    Parameters
+    ----------
+    weighing : what is shown
+    """
+
+    def __init__(self, weighing: LiveWeighing) -> None:
+        self.weighing = weighing
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        # The last line stays free for the cursor.
+        yield from lines(
+            self.weighing, options.max_width, console.size.height - 1, ascii_only=options.ascii_only
+        )
+
+
+def lines(w: LiveWeighing, width: int, height: int, *, ascii_only: bool = False) -> list[Text]:
+    """Lay a weighing out, the most important first where not all has room.
+
+    Parameters
+    ----------
+    w : the weighing
+    width, height : of the terminal [characters, lines]
+    ascii_only : bars are drawn with letters that every terminal has
+    """
+    from rich.text import Text
+
+    title = Text(visible(cut(w.vehicle, max(width - 18, 12))), style="bold")
+    driven = f"driven {duration(w.driven)}"
+    gap = width - title.cell_len - len(driven)
+    if gap > 1:
+        title.append(" " * gap + driven, style="not bold dim")
+    bars = _bars(w, width, ascii_only=ascii_only)
+    reason = _wrapped(w.reason, width, "yellow" if w.status is LiveStatus.LEARNING else "red")
+    advice = _wrapped(w.advice, width, "cyan")
+    load = ", ".join(t for t in (payload_text(w), overload_text(w)) if t)
+    payload = _wrapped(load, width, _load_style(w))
+    needed = _wrapped(needed_text(w), width)
+    head = [_mass_line(w, width), *reason, *payload, *bars, *needed, *advice]
+    if height < len(head) + 5:
+        # Little room: what is known first.
+        signals = _wrapped(signals_text(w), width, _signals_style(w))
+        return [*head, *signals][: max(height, 1)]
+    top = [title, Text(""), *head, Text("")]
+    left = height - len(top)
+    notes = [line for note in reversed(w.notes) for line in _wrapped(f"Note: {note}", width, "dim")]
+    table = _table(w.signals, width)
+    if not w.signals or len(table) > left:
+        table = _wrapped(signals_text(w), width, _signals_style(w))
+    return [*top, *table, *notes][:height]
+
+
+def _mass_line(w: LiveWeighing, width: int) -> Text:
+    from rich.text import Text
+
+    known = w.mass == w.mass
+    line = Text(mass_text(w) if known else "no mass yet", style="bold")
+    line.append("  ")
+    line.append(f" {w.status} ", style=_STATUS_STYLE[w.status])
+    low, high = w.interval()
+    told = f"  {low:.0f} to {high:.0f} kg with 95 %"
+    if known and high - low < float("inf") and line.cell_len + len(told) <= width:
+        line.append(told, style="dim")
+    line.truncate(width)
+    return line
+
+
+def _bars(w: LiveWeighing, width: int, *, ascii_only: bool) -> list[Text]:
+    found = []
+    if w.share is not None:
+        text = f"{100.0 * w.share:4.0f} % of {kg(w.gross)}"
+        found.append(("permitted", w.share, _load_style(w), text))
+    found.append(("learnt", w.progress, "cyan", f"{100.0 * w.progress:4.0f} %"))
+    room = max(len(text) for *_, text in found)
+    length = max(min(width - 11 - room, 50), 5)
+    return [_bar(*f, length, width, ascii_only=ascii_only) for f in found]
+
+
+def _bar(
+    name: str, part: float, style: str, text: str, length: int, width: int, *, ascii_only: bool
+) -> Text:
+    from rich.text import Text
+
+    full, empty = ("#", "-") if ascii_only else ("█", "░")
+    filled = round(min(max(part, 0.0), 1.0) * length)
+    line = Text(f"{name:<10}")
+    line.append(full * filled, style=style)
+    line.append(empty * (length - filled), style="dim")
+    line.append(f" {text}")
+    line.truncate(width)
+    return line
+
+
+def _load_style(w: LiveWeighing) -> str:
+    p = w.overload
+    if p is None:
+        return ""
+    return "red" if p >= _LIKELY else "yellow" if p >= _DOUBTFUL else "green"
+
+
+def _signals_style(w: LiveWeighing) -> str:
+    wrong = [s for s in w.signals if not s.fresh]
+    return "red" if any(s.needed for s in wrong) else "yellow" if wrong else "dim"
+
+
+def _table(signals: tuple[SignalHealth, ...], width: int) -> list[Text]:
+    """Signals in one column, or in two where the terminal is wide; those that fail first."""
+    from rich.text import Text
+
+    ordered = sorted(signals, key=lambda s: (s.fresh, not s.needed))
+    if width < _WIDE:
+        return [_signal(s, width) for s in ordered]
+    half = (width - 2) // 2
+    rows = (len(ordered) + 1) // 2
+    lines = []
+    for k in range(rows):
+        line = _signal(ordered[k], half)
+        if k + rows < len(ordered):
+            line = Text.assemble(line, "  ", _signal(ordered[k + rows], half))
+        lines.append(line)
+    return lines
+
+
+def _signal(s: SignalHealth, width: int) -> Text:
+    from rich.text import Text
+
+    state = state_text(s)
+    style = "green" if s.fresh else "red" if s.needed else "yellow"
+    lost = s.late + s.unfit
+    tail = f"{rate_text(s):>8}{age_text(s):>7} "
+    room = max(min(width - len(tail) - 7, _LONGEST_NAME), 4)
+    name = visible(s.name)
+    line = Text(f"{name if len(name) <= room else name[: room - 1] + '…':<{room}}{tail}")
+    line.append(f"{state:<6}", style=style)
+    told = f" {lost} lost"
+    if lost and line.cell_len + len(told) <= width:
+        line.append(told, style="dim")
+    line.truncate(width, pad=True)
+    return line
+
+
+def _wrapped(text: str, width: int, style: str = "") -> list[Text]:
+    """Break a sentence into lines of the width; none for no sentence."""
+    from textwrap import wrap
+
+    from rich.text import Text
+
+    return [Text(part, style=style) for part in wrap(visible(cut(text)), max(width, 8))]

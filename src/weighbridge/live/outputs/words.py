@@ -1,0 +1,93 @@
+"""A weighing in words, for a person."""
+
+from __future__ import annotations
+
+import math
+
+from weighbridge.live.weighing import LiveWeighing, SignalHealth
+from weighbridge.report.text import NOTHING, kg
+
+
+def half_width(weighing: LiveWeighing) -> float:
+    """Half of the interval of 95 % [kg]; NaN or infinite where there is none."""
+    low, high = weighing.interval()
+    return 0.5 * (high - low)
+
+
+def mass_text(weighing: LiveWeighing) -> str:
+    """Write the mass with half the width of its interval of 95 %."""
+    half = half_width(weighing)
+    if not math.isfinite(half):
+        return kg(weighing.mass)
+    return f"{weighing.mass:.0f} ± {half:.0f} kg"
+
+
+def payload_text(weighing: LiveWeighing) -> str:
+    """Write the payload."""
+    name = "payload" if weighing.tared is None else "since set to nought"
+    return f"{name} {kg(weighing.payload)}"
+
+
+def overload_text(weighing: LiveWeighing) -> str:
+    """Write the probability that the permitted mass is exceeded; empty where it is not known."""
+    p = weighing.overload
+    return "" if p is None else f"overload probability {_percent(p)}"
+
+
+def _percent(p: float) -> str:
+    if 0.0 < p < 0.01:
+        return "less than 1 %"
+    if 0.99 < p < 1.0:
+        return "more than 99 %"
+    return f"{100.0 * p:.0f} %"
+
+
+def remaining_text(minutes: float, percent: int) -> str:
+    """Write how long until the interval is within so many percent."""
+    if math.isnan(minutes):
+        return f"± {percent} %: not known yet"
+    if minutes == 0.0:
+        return f"± {percent} %: reached"
+    if math.isinf(minutes):
+        return f"± {percent} %: not by driving like this"
+    more = f"{minutes:.0f} min" if minutes >= 1.0 else "less than 1 min"
+    return f"± {percent} %: {more} more"
+
+
+def needed_text(weighing: LiveWeighing) -> str:
+    """Write what is needed until 5 % and 2 %."""
+    two = remaining_text(weighing.minutes_to_2, 2)
+    five = remaining_text(weighing.minutes_to_5, 5)
+    reached = weighing.minutes_to_2 == 0.0
+    same = math.isnan(weighing.minutes_to_5) and math.isnan(weighing.minutes_to_2)
+    return two if reached else "time left not known yet" if same else f"{five}, {two}"
+
+
+def rate_text(signal: SignalHealth) -> str:
+    """Write the rate of a signal."""
+    return f"{signal.rate:.1f} Hz" if signal.rate < 1000.0 else f"{signal.rate:.0f} Hz"
+
+
+def age_text(signal: SignalHealth) -> str:
+    """Write the age of a signal's newest sample."""
+    if not math.isfinite(signal.age):
+        return NOTHING
+    if signal.age < 99.95:
+        return f"{max(signal.age, 0.0):.1f} s"
+    return f"{signal.age / 60.0:.0f} min" if signal.age < 6000.0 else f"{signal.age / 3600.0:.0f} h"
+
+
+def state_text(signal: SignalHealth) -> str:
+    """Write how a signal does, in one word."""
+    if not signal.fresh:
+        return "silent" if math.isfinite(signal.age) else "absent"
+    return "ok"
+
+
+def signals_text(weighing: LiveWeighing) -> str:
+    """Write how many signals come, and which do not, needed ones first."""
+    if not weighing.signals:
+        return "no signal yet"
+    wrong = sorted((s for s in weighing.signals if not s.fresh), key=lambda s: not s.needed)
+    text = f"{len(weighing.signals) - len(wrong)} of {len(weighing.signals)} signals come"
+    return f"{text}; not: {', '.join(s.name for s in wrong)}" if wrong else text

@@ -1,0 +1,119 @@
+"""The view of a live weighing, on terminals of any size and where there is none."""
+
+import io
+import itertools
+import math
+
+import pytest
+from rich.console import Console
+from tests.unit.made_weighings import NAMES, drive, health, weighing
+
+from weighbridge.live.outputs.terminal import PlainLines, TerminalView, lines, terminal
+from weighbridge.live.weighing import LiveStatus
+
+
+def text(found):
+    return "\n".join(line.plain for line in found)
+
+
+def test_the_view_tells_mass_interval_payload_share_and_what_is_needed():
+    shown = text(lines(weighing(), 80, 40))
+    # 1.96 x 25 kg.
+    for part in (
+        "2100 ± 49 kg", "weighed", "2051 to 2149 kg with 95 %", "payload 300 kg",
+        "88 % of 2400 kg", "± 5 %: reached", "± 2 %: 3 min more", "Speed up firmly",
+        "overload probability less than 1 %", "vehicle_speed",
+    ):  # fmt: skip
+        assert part in shown, part
+
+
+@pytest.mark.parametrize("width", [20, 40, 64, 80, 132])
+@pytest.mark.parametrize("height", [1, 4, 9, 16, 23, 50])
+def test_the_view_never_leaves_the_terminal(width, height):
+    told = weighing(
+        status=LiveStatus.INCONSISTENT,
+        reason="The drive says two masses that contradict each other, so none is told. " * 3,
+        notes=("A note that is longer than a line of any terminal that this is shown on. " * 4,),
+        signals=health(silent=("gnss_speed", "vehicle_speed")),
+    )
+    found = lines(told, width, height)
+    assert len(found) <= height
+    assert all(line.cell_len <= width for line in found)
+    assert found[0].plain.strip()
+    if width >= 40:
+        assert "2100" in text(found[:3])
+
+
+def test_a_small_terminal_names_the_signals_that_do_not_come():
+    silent = weighing(signals=health(silent=("gnss_speed", "vehicle_speed")))
+    shown = text(lines(silent, 80, 12))
+    assert f"{len(NAMES) - 2} of {len(NAMES)} signals come; not: vehicle_speed, gnss_speed" in shown
+
+
+def test_signals_that_fail_come_first_in_the_table():
+    silent = weighing(signals=health(silent=("gnss_speed",)))
+    rows = [line.plain for line in lines(silent, 80, 40) if " Hz" in line.plain]
+    assert rows[0].startswith("gnss_speed")
+    assert "absent" in rows[0]
+
+
+def test_a_view_without_a_mass_or_permitted_mass_shows_what_there_is():
+    none = weighing(mass=math.nan, std=math.nan, gross=None, tare=None, minutes_to_2=math.inf)
+    shown = text(lines(none, 80, 24))
+    assert "no mass yet" in shown
+    assert "nan" not in shown.lower()
+    assert "permitted" not in shown
+    assert "not by driving like this" in shown
+
+
+def test_control_characters_of_a_name_do_not_act():
+    assert "\x1b" not in text(lines(weighing(vehicle="van\x1b[2J"), 80, 24))
+
+
+def test_bars_of_a_terminal_without_unicode_are_letters():
+    bars = [t.plain for t in lines(weighing(), 80, 24, ascii_only=True) if "##" in t.plain]
+    assert len(bars) == 2
+    assert all("█" not in bar for bar in bars)
+
+
+def test_a_terminal_gets_a_view_and_a_pipe_lines():
+    screen = Console(file=io.StringIO(), force_terminal=True, width=80, height=24)
+    view = terminal(screen)
+    view.close()
+    assert isinstance(view, TerminalView)
+    assert isinstance(terminal(Console(file=io.StringIO())), PlainLines)
+
+
+def test_the_view_is_drawn_at_most_five_times_a_second_and_the_last_one_stays():
+    out = io.StringIO()
+    screen = Console(file=out, force_terminal=True, width=80, height=24)
+    time = iter(range(1000))
+    view = TerminalView(screen, clock=lambda: 0.01 * next(time))
+    for k in range(100):
+        view.show(weighing(mass=1000.0 + k))
+    view.close()
+    # 100 weighings within a second: five are drawn, and the newest when it closes.
+    assert out.getvalue().count("weighed") == pytest.approx(6, abs=1)
+    assert "1099 ± 49 kg" in out.getvalue()
+
+
+def test_plain_lines_come_once_a_minute_and_on_a_change_of_status():
+    out = io.StringIO()
+    view = PlainLines(Console(file=out, width=40))
+    told = list(drive(600))
+    for w in told:
+        view.show(w)
+    printed = out.getvalue().splitlines()
+    changes = sum(a.status is not b.status for a, b in itertools.pairwise(told))
+    assert changes == 1
+    assert len(printed) == 10 + changes
+    assert "Delivery van" in printed[0]
+    assert f"{told[540].mass:.0f} ±" in printed[-1] or f"{told[-20].mass:.0f} ±" in printed[-1]
+
+
+def test_plain_lines_go_on_when_the_clock_begins_anew():
+    out = io.StringIO()
+    view = PlainLines(Console(file=out))
+    for time in (5000.0, 5001.0, 10.0, 11.0):
+        view.show(weighing(time))
+    assert len(out.getvalue().splitlines()) == 2
