@@ -51,10 +51,18 @@ from weighbridge.navigation.rows import (
 from weighbridge.navigation.sources import Sources, undelayed
 from weighbridge.navigation.state import State
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.recent import BEHIND, instants, recent
 
 LAID_OUT: Final = 0.25
 """A row is laid out so long after its instant [s]: half of `SQUAT_WIDTH` and a node."""
+
+
+IMU_BEHIND: Final = 6.0
+"""Inertial samples are cleaned beside those of so long before [s]."""
+
+NODES: Final = 40
+"""So many nodes are kept that were folded before."""
 
 
 class Level(NamedTuple):
@@ -79,7 +87,7 @@ class ForwardState(NamedTuple):
     ----------
     filter : after the last sample that was folded
     folded : samples up to this instant were [s]
-    nodes : of the last `BEHIND` seconds
+    nodes : the last ones
     motion : rows of the last `BEHIND` seconds; None before the first
     row : number of the next row on the even clock
     level : of the way so far, for drives without heights
@@ -127,14 +135,13 @@ def step(
     rows : that became known; None without any
     """
     horizon = until - lateness(setup) + LAID_OUT
-    sources = _gather(records, setup)
+    sources = _gather(_unfolded(records, state.folded), setup)
     found = None if sources is None else _prepared(sources, setup)
     after, nodes = state.filter, state.nodes
     if found is not None:
         first, last = found.block.time.searchsorted([state.folded, horizon], side="right")
         after, new = run(state.filter, found.block.part(first, last), setup)
-        kept = int(nodes.time.searchsorted(horizon - BEHIND))
-        nodes = Nodes(*(np.concatenate([a[kept:], b]) for a, b in zip(nodes, new, strict=True)))
+        nodes = _followed(nodes, new)
     state = state._replace(filter=after, folded=horizon, nodes=nodes)
     ahead = math.floor(horizon * setup.rate + 1e-6) + 1
     end = math.floor((horizon - LAID_OUT) * setup.rate + 1e-6) + 1
@@ -147,6 +154,26 @@ def step(
     if row >= end:
         return state._replace(row=row), None
     return _laid_out(state._replace(row=row), found, (end, ahead), setup)
+
+
+def _unfolded(records: Drive, folded: float) -> Drive:
+    """Leave inertial samples out that were folded long ago."""
+    cut = {}
+    for name in IMU_SIGNALS:
+        s = records.get(name)
+        if s is not None:
+            first = int(s.time.searchsorted(folded - IMU_BEHIND))
+            cut[name] = Signal(name, s.time[first:], s.values[first:])
+    return records.with_signals(*cut.values())
+
+
+def _followed(nodes: Nodes, new: Nodes) -> Nodes:
+    """Append new nodes to the last of the old ones, unless they come after a long silence."""
+    if not new.time.size:
+        return nodes
+    if nodes.time.size and new.time[0] - nodes.time[-1] > BEHIND:
+        return new
+    return Nodes(*(np.concatenate([a[-NODES:], b]) for a, b in zip(nodes, new, strict=True)))
 
 
 def _laid_out(
@@ -188,6 +215,7 @@ def _laid_out(
     rows = laid_out(
         pose,
         setup,
+        places=False,
         time=time,
         accel=accel,
         specific_force=accel + GRAVITY * np.sin(grade),
@@ -257,7 +285,7 @@ def _gather(records: Drive, setup: Setup) -> Sources | None:
         return None
     fixes = None
     if setup.origin is not None:
-        fixes = read_fixes(records, float(imu.time[0]), float(imu.time[-1]), setup.origin)
+        fixes = read_fixes(records, -math.inf, float(imu.time[-1]), setup.origin)
     name = "vehicle_speed" if setup.has_wheel else "gnss_speed"
     reference = records.get(name)
     if reference is None and not setup.has_wheel and fixes is not None:

@@ -56,4 +56,8 @@ class LocalFrame:
             self.altitude,
             deg=False,
         )
-        return np.asarray(lat), np.asarray(lon), self.altitude - ned[:, 2]
+        return np.asarray(lat), np.asarray(lon), self.height(ned)
+
+    def height(self, ned: Floats) -> Floats:
+        """Return the altitude of positions (n, 3) [m]."""
+        return np.asarray(self.altitude - ned[:, 2])

@@ -149,8 +149,11 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
     )
 
 
-def laid_out(pose: Pose, setup: Setup, **rows: object) -> Motion:
-    """Complete a motion by what the pose shows alone: speed, distance, angles and place."""
+def laid_out(pose: Pose, setup: Setup, *, places: bool = True, **rows: object) -> Motion:
+    """Complete a motion by what the pose shows alone: speed, distance, angles and place.
+
+    Without ``places`` latitude and longitude stay unknown, which takes a third of the work.
+    """
     time = rows["time"]
     assert isinstance(time, np.ndarray)
     velocity, heading = pose.velocity, pose.heading
@@ -159,8 +162,10 @@ def laid_out(pose: Pose, setup: Setup, **rows: object) -> Motion:
     speed = np.where(size < _STANDS, 0.0, np.copysign(size, ahead))
     nothing = np.full(time.size, np.nan)
     latitude, longitude, altitude = nothing, nothing, nothing
-    if setup.origin is not None:
+    if setup.origin is not None and places:
         latitude, longitude, altitude = setup.origin.to_geodetic(pose.position)
+    elif setup.origin is not None:
+        altitude = setup.origin.height(pose.position)
     way = np.cumsum(0.5 * np.abs(speed[1:] + speed[:-1]) * np.diff(time))
     return Motion(
         source="inertial",
