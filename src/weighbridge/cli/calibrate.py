@@ -11,17 +11,21 @@ from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
     MappingPath,
-    load,
+    Whole,
+    load_parts,
 )
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
-from weighbridge.cli.terminal import console, say
+from weighbridge.cli.terminal import complain, console, say
 from weighbridge.cli.terminal import shown as _shown
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.table import Table
 
     from weighbridge.calibration.speed import SpeedCalibration
     from weighbridge.results.calibration import Calibration
+    from weighbridge.signals import Drive
 
 
 def calibrate(
@@ -33,8 +37,9 @@ def calibrate(
         Optional[list[float]],  # noqa: UP045
         typer.Option(
             "--mass",
-            help="Known mass in kg as the drive begins; repeat it, one for each drive, where they "
-            "differ. Without it, mass_kg of each drive.toml.",
+            help="Known mass in kg as the drive begins; repeat it where they differ, one for each "
+            "recording, or one for each drive that recordings hold. Without it, mass_kg of each "
+            "drive.toml.",
         ),
     ] = None,
     vehicle: Annotated[
@@ -63,11 +68,15 @@ def calibrate(
         bool,
         typer.Option("--straight", help="Torque linear in load, as eq. 49 of Jensen 2022 prints."),
     ] = False,
+    whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Calibrate a vehicle from drives of known mass.
+
+    A recording of several drives (a day's file, a splice) is parted, as `weighbridge weigh` parts
+    it: `weighbridge inspect` lists its drives.
 
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
@@ -87,7 +96,11 @@ def calibrate(
     chosen = mapping_of(base, vehicle, mapping)
     read = inputs(drives, vehicle, chosen, dbc)
     refuse_results(read, [Result("--output", output, "vehicle file")])
-    recorded = [load(path, chosen, dbc) for path in drives]
+    parts = [load_parts(path, chosen, dbc, whole=whole) for path in drives]
+    masses = masses_of_parts(parts, mass)
+    recorded = [drive for held in parts for drive in held]
+    for held in (h for h in parts if len(h) > 1):
+        complain(f"  note: {_told_parts(held)}")
     settings = CalibrationSettings(
         order=order,
         source=torque,
@@ -95,7 +108,6 @@ def calibrate(
         curved=not straight,
         method=method,
     )
-    masses = mass[0] if mass is not None and len(mass) == 1 else mass
     if not settings.fit.torque:
         _refuse_torque_options(torque, order, grid, straight)
         by_speed = run_speed_calibration(recorded, masses, vehicle=base)
@@ -118,6 +130,47 @@ def calibrate(
     for doubt in doubts:
         say(f"  note: {doubt}")
     say(f"written: {output}")
+
+
+def masses_of_parts(
+    parts: Sequence[Sequence[Drive]], masses: Sequence[float] | None
+) -> list[float] | None:
+    """Masses of the drives that recordings hold, in order [kg].
+
+    Parameters
+    ----------
+    parts : drives of each recording
+    masses : as given: one of all, one for each recording, or one for each drive; None where each
+        drive tells its own
+
+    Raises
+    ------
+    ConfigError
+        There are as many as neither recordings nor drives.
+    """
+    from weighbridge.errors import ConfigError
+
+    if masses is None:
+        return None
+    drives = sum(map(len, parts))
+    if len(masses) == 1:
+        return list(masses) * drives
+    if len(masses) == drives:
+        return list(masses)
+    if len(masses) == len(parts):
+        return [kg for kg, held in zip(masses, parts, strict=True) for _ in held]
+    several = "; ".join(_told_parts(held) for held in parts if len(held) > 1)
+    raise ConfigError(
+        f"{len(masses)} values of --mass for {drives} drives in {len(parts)} recording(s): give "
+        f"one, or one for each{'; ' + several if several else ''}"
+    )
+
+
+def _told_parts(held: Sequence[Drive]) -> str:
+    """Say which drives a recording holds, in the order their masses are given."""
+    spans = ", ".join(f"{d.start:.0f}–{d.end:.0f} s" for d in held)
+    name = held[0].name.rsplit(" part ", 1)[0]
+    return f"{_shown(name)} holds {len(held)} drives: {spans}"
 
 
 def _refuse_torque_options(

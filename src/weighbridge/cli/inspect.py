@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.options import DbcPaths, DrivePaths, MappingPath, load
+from weighbridge.cli.options import DbcPaths, DrivePaths, MappingPath, Whole, load_parts
 from weighbridge.cli.terminal import console, say, shown
 
 if TYPE_CHECKING:
@@ -34,8 +34,12 @@ def inspect(
     every_way: Annotated[
         bool, typer.Option("--all", help="List the ways that lack signals, too.")
     ] = False,
+    whole: Whole = False,
 ) -> None:
     """Tell what a drive holds: signals, rates, gaps, problems, possible methods.
+
+    A recording of several drives (a day's file, a splice) is parted, as `weighbridge weigh` parts
+    it, and each is told of.
 
     Example: weighbridge inspect drive/ --vehicle car.toml
     """
@@ -49,30 +53,46 @@ def inspect(
     if not screen.is_terminal:
         screen.width = _WIDTH
     for path in drives:
-        found = inspect_drive(load(path, chosen, dbc), car)
-        _show(screen, found, every_way)
-        say(_next(found, path, mapping, vehicle, dbc))
+        parts = load_parts(path, chosen, dbc, whole=whole)
+        found = [inspect_drive(drive, car) for drive in parts]
+        for one in found:
+            _show(screen, one, every_way)
+        best = next((one for one in found if _weighable(one)), found[0])
+        say(_next(best, path, len(parts), _options(mapping, vehicle, dbc, whole=whole)))
 
 
-def _next(
-    found: Inspection,
-    path: Path,
-    mapping: Path | None,
-    vehicle: Path | None,
-    dbc: list[str] | None,
-) -> str:
+def _options(
+    mapping: Path | None, vehicle: Path | None, dbc: list[str] | None, *, whole: bool
+) -> list[str]:
+    """Options that the next command takes as this one did."""
+    return [
+        *([f"--vehicle {vehicle}"] if vehicle is not None else []),
+        *([f"--mapping {mapping}"] if mapping is not None else []),
+        *(f"--dbc {d}" for d in dbc or ()),
+        *(["--whole"] if whole else []),
+    ]
+
+
+def _weighable(found: Inspection) -> bool:
+    serious = any(p.serious for p in found.problems)
+    return not serious and any(w.possible and w.torque != "speed" for w in found.ways)
+
+
+def _next(found: Inspection, path: Path, parts: int, options: list[str]) -> str:
     """Say what to type next."""
     if any(p.serious for p in found.problems):
         return "next: settle what is serious above, then inspect again"
-    if not any(w.possible and w.torque != "speed" for w in found.ways):
+    if not _weighable(found):
         return "next: record what the nearest way lacks"
-    named = (f"--dbc {d}" for d in dbc or ())
-    more = " ".join((*([f"--mapping {mapping}"] if mapping is not None else []), *named))
-    if vehicle is not None:
-        words = f"weigh {path} --vehicle {vehicle} {more}"
+    calibrated = any(o.startswith("--vehicle") for o in options)
+    if calibrated:
+        words = ["weigh", str(path), *options]
     else:
-        words = f"calibrate {path} --mass KG -o vehicle.toml {more}"
-    return f"next: weighbridge {words.rstrip()}"
+        masses = (
+            "--mass KG" if parts == 1 else " ".join(f"--mass KG{k}" for k in range(1, parts + 1))
+        )
+        words = ["calibrate", str(path), masses, "-o vehicle.toml", *options]
+    return f"next: weighbridge {' '.join(words)}"
 
 
 def _show(screen: Console, found: Inspection, every_way: bool) -> None:

@@ -35,6 +35,11 @@ DbcPaths = Annotated[
     ),
 ]
 
+Whole = Annotated[
+    bool,
+    typer.Option("--whole", help="Take each recording as one drive, whatever it holds."),
+]
+
 
 def load(path: Path, mapping: Path | None, dbc: list[str] | None = None) -> Drive:
     """Read one drive."""

@@ -13,6 +13,7 @@ from weighbridge.cli.options import (
     DrivePaths,
     MappingPath,
     ReportPath,
+    Whole,
     load_parts,
 )
 from weighbridge.cli.results import asked_for, inputs, refuse_results
@@ -59,10 +60,7 @@ def weigh(
             "--compare", help="Weigh by every method; show them side by side, in the report too."
         ),
     ] = False,
-    whole: Annotated[
-        bool,
-        typer.Option("--whole", help="Take each recording as one drive, whatever it holds."),
-    ] = False,
+    whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
