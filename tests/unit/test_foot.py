@@ -103,6 +103,19 @@ def test_a_brake_switch_leaves_the_dragged_rows_of_a_torque():
     assert np.all(found[away & (foot(STAMPS) < 0.5)] == Reason.USED)
 
 
+def test_a_truck_without_a_signal_of_its_retarder_leaves_its_dragged_rows():
+    """A retarder slows a truck by its lever while the brake switch is off."""
+    switch = 0.0 * STAMPS
+    truck = replace(CAR, kind="truck", tare=None)
+    torque = torque_of(STAMPS)
+    untold = recorded(engine_torque=torque, brake_switch=switch)
+    told = recorded(engine_torque=torque, brake_switch=switch, retarder_torque=0.0 * STAMPS)
+    dragged = foot(STAMPS) < 0.5
+    assert np.all(reasons(untold, truck)[dragged] == Reason.OVERRUN)
+    assert np.all(reasons(told, truck)[dragged] == Reason.USED)
+    assert np.all(reasons(untold, CAR)[dragged] == Reason.USED)
+
+
 @pytest.mark.parametrize("late", [None, 8.0])
 def test_a_brake_switch_that_misses_hard_braking_is_not_believed(late):
     """Dead, or late: the floor of the torque tells where the foot may be on the brake then."""

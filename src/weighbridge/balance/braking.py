@@ -128,8 +128,10 @@ def find_brakes(
     need, torque = told * needed / weight, told * needed / view.gearing
     by = setup.foot if setup is not None else identify_foot(drive, vehicle, source, need, torque)
     foot = find_foot(drive, vehicle, source, need, torque, by)
-    # What a dragged engine takes is told by a torque alone, and by none where a foot may brake.
-    overrun = np.zeros_like(foot.off) if signed and pressed is not None else foot.off
+    # What a dragged engine takes is told by a torque alone, and by none where a foot may brake,
+    # or a retarder.
+    released = signed and pressed is not None and not retarder_untold(drive, vehicle)
+    overrun = np.zeros_like(foot.off) if released else foot.off
     slowed = foot.off if pressed is None else pressed
     held = _trailing(vehicle, motion, view.time, slowed, traction if signed else None, lag)
     slows = (needed < -SLOWED * weight)[slowing.moving]
@@ -141,6 +143,13 @@ def find_brakes(
         switch_dead=dead,
         foot=by,
     )
+
+
+def retarder_untold(drive: Drive, vehicle: Vehicle) -> bool:
+    """Whether a retarder may slow the vehicle that neither switch nor signal tells of."""
+    retarder = drive.get("retarder_torque")
+    told = retarder is not None and len(retarder) > 0
+    return vehicle.of_class.retarded and not vehicle.driveline.single_speed and not told
 
 
 def brake_pressed(drive: Drive, recorded: Floats) -> Bools | None:

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.balance.braking import retarder_untold
 from weighbridge.balance.delay import FARTHEST as FARTHEST_DELAY
 from weighbridge.balance.delay import beyond, vertex
 from weighbridge.calibration.fitted import (
@@ -104,12 +105,25 @@ def fit_joint(problem: Problem) -> Fitted:
         if problem.by_speed:
             # The torque of eq. 48 is worse still: noise of the motion and hills draw it.
             raise DriveError(
-                f"without an accelerometer {strange}: hills and braking pass for resistance; "
-                "calibrate with an inertial sensor or GNSS heights, on more or longer drives, or "
-                "with a brake switch"
+                f"without an accelerometer {strange}: hills, braking or a wrong mass pass for "
+                f"resistance; check the masses, and calibrate on more or longer drives, or with "
+                f"{_would_help(problem)}"
             ) from None
         return _as_it_is(problem, str(strange))
     return replace(fitted, vehicle=self_weighed(problem, fitted.vehicle, cov))
+
+
+def _would_help(problem: Problem) -> str:
+    """Name the signals that tell hills and braking from resistance and that the drives lack."""
+    drives = [recording.drive for recording in problem.recordings]
+    lacked = ["an inertial sensor"]
+    if any(not (d.has("altitude") or d.has("grade")) for d in drives):
+        lacked.append("GNSS heights")
+    if any(not d.has("brake_switch") for d in drives):
+        lacked.append("a brake switch")
+    if any(retarder_untold(d, problem.base) for d in drives):
+        lacked.append("the torque of its retarder (retarder_torque)")
+    return " or ".join(lacked)
 
 
 class _NoRoadLoad(Exception):

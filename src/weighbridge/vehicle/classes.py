@@ -56,6 +56,7 @@ class VehicleClass:
         stiff, 1
     fastest : speed that it hardly reaches [m/s]
     strongest : acceleration times speed that it hardly reaches [W/kg]
+    retarded : a retarder or an engine brake may slow it without the brake pedal
     jensen_grid : whether the grid of Jensen 2022, Table 5, is for it
     """
 
@@ -80,6 +81,7 @@ class VehicleClass:
     squat_growth: float = 1.0
     fastest: float
     strongest: float
+    retarded: bool = False
     jensen_grid: bool = False
 
     def road_prior(self, *, single_speed: bool) -> tuple[Floats, Floats]:
@@ -185,6 +187,7 @@ VEHICLE_CLASSES: Final = Registry(
             tyre="275/70 R22.5",
             fastest=45.0,
             strongest=60.0,
+            retarded=True,
         ),
         VehicleClass(
             name="truck",
@@ -206,6 +209,7 @@ VEHICLE_CLASSES: Final = Registry(
             tyre="315/80 R22.5",
             fastest=45.0,
             strongest=60.0,
+            retarded=True,
         ),
     ),
 )
