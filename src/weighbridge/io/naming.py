@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from weighbridge.io.abbreviations import OF_ANOTHER, SOURCES, spelled
 from weighbridge.io.columns import dimension_of, unit_suffix
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
 PHRASES: Final[dict[str, tuple[str, ...]]] = {
-    "vehicle_speed": ("v fzg", "vfzg", "v veh", "vveh", "v vehicle", "veh v", "veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph",
+    "vehicle_speed": ("v fzg", "vfzg", "v veh", "vveh", "v vehicle", "veh v", "veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph", "kmh",
         "vehicle speed", "speed", "obd speed", "speed obd", "car speed", "wheel speed", "wheel based vehicle speed",
         "ground speed can", "velocity", "geschwindigkeit", "fahrgeschwindigkeit", "fahrzeuggeschwindigkeit",
         "vitesse", "vitesse vehicule", "velocidad", "velocidad vehiculo", "velocita", "velocita veicolo",
@@ -92,7 +93,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "relative_throttle": ("relative throttle position", "relative throttle"),
     "commanded_throttle": ("commanded throttle actuator", "commanded throttle", "commanded throttle actuator control"),
     "throttle_b": ("absolute throttle position b", "throttle position b", "absolute throttle b"),
-    "accelerator_pedal": ("acc pedal", "aps", "accel pedal pos",
+    "accelerator_pedal": ("acc pedal", "aps", "accel pedal pos", "accel position", "accel actu pos",
         "accelerator pedal position", "accelerator pedal position d", "accelerator pedal", "accelerator",
         "pedal position", "gas pedal", "gaspedal", "gaspedalstellung", "fahrpedal", "fahrpedalstellung",
         "position pedale accelerateur", "pedal acelerador", "pedale acceleratore", "pedal accelerator",
@@ -138,9 +139,10 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "gear": (
         "gear", "current gear", "selected gear", "gang", "aktueller gang", "rapport", "rapport engage", "marcha",
         "marcia", "transmission gear", "gear position", "actual gear", "transmission current gear",
+        "transmission estimated gear",
     ),
     "gear_ratio": ("transmission actual gear ratio", "actual gear ratio", "gear ratio"),
-    "brake_switch": ("brk sw", "brk",
+    "brake_switch": ("brk sw", "brk", "brake pedal switch", "brake pedal applied", "brake applied",
         "brake switch", "brake pressed", "brake", "brake pedal", "brake pedal pressed", "brake status", "bremse", "bremspedal",
         "bremslicht", "frein", "freno", "brake light", "brake pedal status", "brakes", "brake lights",
     ),
@@ -163,7 +165,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "latitude": ("pos lat", "latitude", "lat", "breitengrad", "breite", "latitud", "latitudine", "gps latitude", "latitude deg", "gps lat", "position latitude"),
     "longitude": ("pos lon", "pos lng", "pos long", "longitude", "lon", "lng", "long", "langengrad", "lange", "longitud", "longitudine", "gps longitude", "gps lon", "gps long", "gps lng"),
     "altitude": ("alt msl", "hgt", "altitude", "alt", "height", "elevation", "ele", "hohe", "altitud", "altitudine", "gps altitude", "gps alt", "gps height", "hauteur", "altura", "msl altitude", "height above msl", "location altitude"),
-    "gnss_speed": ("gps spd", "gp sspeed", "gps speed", "speed gps", "gnss speed", "speed over ground", "gps geschwindigkeit", "vitesse gps", "velocidad gps", "location speed", "gps velocity", "sog", "velocita gps", "geschwindigkeit gps"),
+    "gnss_speed": ("gps kmh", "gps kph", "gps mph", "gps mps", "gps spd", "gp sspeed", "gps speed", "speed gps", "gnss speed", "speed over ground", "gps geschwindigkeit", "vitesse gps", "velocidad gps", "location speed", "gps velocity", "sog", "velocita gps", "geschwindigkeit gps"),
     "gnss_course": ("course", "heading", "bearing", "gps course", "gps bearing", "gps heading", "course over ground", "cog", "kurs", "cap", "rumbo", "track angle", "location course", "direction", "gps direction", "location bearing"),
     "hdop": ("hdop", "horizontal dilution of precision", "dop", "gps hdop"),
     "gnss_accuracy": ("horizontal accu", "accuracy", "gps accuracy", "horizontal accuracy", "genauigkeit", "precision", "location accuracy", "location horizontal accuracy", "position accuracy", "h accuracy", "gps horizontal accuracy"),
@@ -185,7 +187,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
             f"{a} gyro", f"angular velocity {a}", f"drehrate {a}", f"gyr {a}", f"omega {a}", f"{a} gyroscope",
             f"gyroscope rotation {a}", f"giroscopio {a}", f"gyro rotation {a}", f"imu gyro {a}", f"w{a}",
             f"{a} rate of rotation", f"rate of rotation {a}", f"gyro{a}", f"gyr{a}", f"angular speed {a}",
-            f"gyroscope {a} axis", f"{a} angular rate",
+            f"gyroscope {a} axis", f"{a} angular rate", f"rate {a}", f"imu rate {a}",
         )
         for a in "xyz"
     },
@@ -252,8 +254,8 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
     "gear": frozenset(("ratio", "shift", "recommended", "target", "steering", "input", "desired")),
     "brake_switch": frozenset(("pressure", "torque", "force", "parking", "temperature", "retarder", "fluid", "percent", "calculated", "regenerative", "regen")),
     "altitude": frozenset(("accuracy", "ellipsoid", "ellipsoidal", "barometric", "relative")),
-    "latitude": frozenset(("accuracy", "start", "end", "std")),
-    "longitude": frozenset(("accuracy", "start", "end", "std")),
+    "latitude": frozenset(("accuracy", "start", "end", "std", "minutes", "seconds")),
+    "longitude": frozenset(("accuracy", "start", "end", "std", "minutes", "seconds")),
     "gnss_speed": frozenset(("accuracy", "max", "average", "difference", "vs", "obd")),
     "gnss_course": frozenset(("accuracy", "magnetic", "rate", "north")),
     "gnss_accuracy": frozenset(("vertical", "speed", "bearing", "course", "heading", "altitude")),
@@ -269,6 +271,16 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
     **{f"gyro_{a}": frozenset(("accel", "acceleration", "uncalibrated", "vector", "bias", "drift")) for a in "xyz"},
 }  # fmt: skip
 """Words with which a name means something else."""
+
+_WANTED: Final = {
+    quantity: tuple(dict.fromkeys(frozenset(spelled(p.split())) for p in phrases))
+    for quantity, phrases in PHRASES.items()
+}
+"""The words of `PHRASES`, spelled out."""
+
+_NOT: Final = {q: frozenset(spelled(words)) | words for q, words in _AGAINST.items()}
+
+_SILENT: Final = _NOISE | SOURCES
 
 _ENGINE: Final = frozenset(("engine_speed", "engine_load", "engine_torque", "mass_air_flow"))
 """Quantities of a table that an engine's control unit fills."""
@@ -350,15 +362,16 @@ def recognise(name: str, unit: str | None = None) -> Named:
     """
     stated, words = unit_of(name)
     stated = stated or unit
-    whole = words_of(name)
+    # A last word may be a unit or part of the name, as in ENGINE_RPM.
+    readings = {frozenset(spelled(words)), frozenset(spelled(words_of(name)))}
+    whole = frozenset(spelled(words_of(name)))
     best = Named("", stated, 0.0)
-    for quantity, phrases in PHRASES.items():
-        if _AGAINST.get(quantity, frozenset()) & set(whole):
+    for quantity, phrases in _WANTED.items():
+        if _NOT.get(quantity, frozenset()) & whole:
             continue
         if stated is not None and not _can_be(quantity, stated):
             continue
-        # A last word may be a unit or part of the name, as in ENGINE_RPM.
-        score = max(_score(said, phrase.split()) for said in {words, whole} for phrase in phrases)
+        score = max(_score(said, wanted) for said in readings for wanted in phrases)
         if score > best.score:
             best = Named(quantity, stated, score)
     return best if best.score >= LEAST else Named("", stated, best.score)
@@ -378,10 +391,13 @@ def _can_be(quantity: str, unit: str) -> bool:
     return UNITS[unit].dimension == dimension_of(q)
 
 
-def _score(words: tuple[str, ...], phrase: list[str]) -> float:
-    """Part of the words of a name that a phrase has; 0 where the name lacks one of the phrase's."""
-    said = {w for w in words if w not in _NOISE} or set(words)
-    wanted = {w for w in phrase if w not in _NOISE} or set(phrase)
+def _score(words: frozenset[str], phrase: frozenset[str]) -> float:
+    """Part of the words of a name that a phrase has; 0 where the name lacks one of the phrase's,
+    or is that of a request, a bound or a state of it.
+    """
+    if (words - phrase) & OF_ANOTHER:
+        return 0.0
+    said, wanted = words - _SILENT or words, phrase - _SILENT or phrase
     return len(wanted) / len(said) if said and wanted <= said else 0.0
 
 

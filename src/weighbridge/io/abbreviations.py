@@ -1,0 +1,64 @@
+"""Shortened words of signal names, and words that say nothing of a quantity or tell of another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+_SHORT: Final[dict[str, tuple[str, ...]]] = {
+    "speed": ("spd", "spds"),
+    "torque": ("trq", "tq", "toq", "torq", "trqe"),
+    "vehicle": ("veh", "vhcl", "vehcl"),
+    "engine": ("eng", "engn"),
+    "motor": ("mot", "mtr"),
+    "emotor": ("emot",),
+    "wheel": ("whl", "whls"),
+    "brake": ("brk", "brks"),
+    "pedal": ("pdl", "pedl", "ped"),
+    "accel": ("accl", "accelr", "accr"),
+    "position": ("pos", "posn", "psn", "pstn"),
+    "switch": ("sw", "swt", "swtch"),
+    "temperature": ("temp", "tmp", "tempr"),
+    "ambient": ("amb", "ambt", "ambnt"),
+    "coolant": ("clnt", "coolnt"),
+    "current": ("cur", "curr", "crnt"),
+    "voltage": ("volt", "volts", "vltg"),
+    "power": ("pwr",),
+    "battery": ("batt", "bat", "batry"),
+    "pressure": ("pres", "prs", "press"),
+    "throttle": ("thr", "thrtl", "throt"),
+    "reference": ("ref", "refr"),
+    "transmission": ("trns", "trans", "tr", "gbx"),
+    "gear": ("gr",),
+    "longitudinal": ("longi", "longt", "longit", "lgt"),
+    "acceleration": ("acceln", "accn"),
+    "applied": ("appd", "appl"),
+    "estimated": ("est", "estd", "estmd"),
+    "percent": ("pct", "perc"),
+    "parking": ("prk", "park"),
+    "gps": ("gnss",),
+}
+
+_LONG: Final = {short: word for word, shorts in _SHORT.items() for short in shorts}
+
+SOURCES: Final = frozenset(
+    ("imu", "vcu", "esp", "esc", "ins", "sg", "sig", "hsc", "act", "actl", "actual", "phys")
+)
+"""Prefixes and endings that name who sends a signal, or that it is measured."""
+
+OF_ANOTHER: Final = frozenset(
+    (
+        "req", "rq", "rqst", "rqd", "request", "requested", "cmd", "command", "trg", "trgt", "tgt",
+        "target", "setpoint", "lim", "limit", "max", "mx", "maximum", "mn", "minimum", "des",
+        "desired", "dmd", "valid", "vld", "vldy", "validity", "qf", "quality", "sts", "stat",
+        "status", "state", "flt", "falt", "fault", "err", "error", "cnt", "counter", "crc", "chksm",
+        "checksum", "alv", "alive", "diag", "warn", "warning", "lamp", "avail", "offset", "std",
+        "sigma", "rolling",
+    )
+)  # fmt: skip
+"""Words of a request, a bound, a check or a state of a signal, in place of the signal."""
+
+
+def spelled(words: Iterable[str]) -> tuple[str, ...]:
+    """Spell shortened words out."""
+    return tuple(_LONG.get(word, word) for word in words)
