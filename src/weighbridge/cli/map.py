@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from weighbridge.io.dbc import Database
-    from weighbridge.io.draft import Draft, DraftColumn
+    from weighbridge.io.draft import Draft
+    from weighbridge.io.draft_column import DraftColumn
 
 _SHOWN = 12
 """Columns that are not taken, named at most."""
@@ -29,7 +30,8 @@ def map_log(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="Logs of one drive whose names are foreign (CSV, Parquet …), or a folder of them.",
+            help="Logs of one drive or one logger whose names are foreign (CSV, Parquet …), or "
+            "a folder of them.",
             show_default=False,
         ),
     ],
@@ -45,11 +47,13 @@ def map_log(
 ) -> None:
     """Draft the mapping of a log: its separator, its time, its columns and their units.
 
+    Files that read alike, such as one a day, get one mapping that fits those of other days too.
     Of raw CAN logs it finds which signals of a DBC mean what.
 
     Example: weighbridge map trip.csv -o map.toml
     """
     from weighbridge.errors import DriveError
+    from weighbridge.io.draft_alike import merged
     from weighbridge.io.mapping_text import mapping_text
     from weighbridge.whole import whole_file
 
@@ -64,9 +68,13 @@ def map_log(
         except DriveError as error:
             refused.append(str(error))
             continue
-        drafts.append(_asked(found) if ask else found)
+        drafts.append(found)
     if not drafts:
         raise DriveError("; ".join(refused))
+    one = merged(drafts)
+    alike = one is not None and len(drafts) > 1
+    drafts = [one] if one is not None else drafts
+    drafts = [_asked(found) for found in drafts] if ask else drafts
     screen = console(stderr=output is None)
     for found in drafts:
         _show(found, screen)
@@ -80,7 +88,8 @@ def map_log(
         part.write_text(text, encoding="utf-8")
     say(f"written: {output}")
     more = "".join(f" --dbc {d}" for d in dbc or ())
-    say(f"next: weighbridge inspect {_drive(logs)} --mapping {output}{more}")
+    drive = drafts[0].path if alike else _drive(logs)
+    say(f"next: weighbridge inspect {drive} --mapping {output}{more}")
 
 
 def _files(logs: list[Path], dbc: list[str]) -> list[tuple[Path, Callable[[Path], Draft]]]:
@@ -140,8 +149,9 @@ def _show(found: Draft, screen: Console) -> None:
 
     taken = found.time_format or found.time_unit or "date"
     clock = f"time '{shown(found.time)}' ({taken})" if found.time else "a clock of its own"
+    more = f" and {found.files - 1} that read alike" if found.files > 1 else ""
     table = Table(
-        title=f"{shown(found.path.name)}: {clock}, "
+        title=f"{shown(found.path.name)}{more}: {clock}, "
         f"{found.rate:.3g} rows per second for {found.duration:.0f} s",
         title_justify="left",
     )

@@ -17,7 +17,8 @@ import numpy as np
 
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
-from weighbridge.io.draft import Draft, draft_column, gravity_checked
+from weighbridge.io.draft import Draft, draft_column
+from weighbridge.io.draft_column import checked
 from weighbridge.io.frames import Frames
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import MappedSignal, TableMapping, TimeColumn, lacking, resolved_unit
@@ -262,7 +263,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
     unnamed = [c for c in channels if not c.quantity]
     units = [unit_suffix(c.unit) for c in unnamed]
     named = recognise_all([_told(c.name) for c in unnamed], units)
-    columns = gravity_checked(
+    columns = checked(
         tuple(
             draft_column(c.name, n, c.values, u)
             for c, n, u in zip(unnamed, named, units, strict=True)

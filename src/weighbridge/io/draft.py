@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 import polars as pl
 
-from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import dimension_of, suffixes_of, unit_suffix
+from weighbridge.io.draft_column import DraftColumn, checked
 from weighbridge.io.naming import (
     TIME_WORDS,
     Named,
@@ -73,34 +73,6 @@ _USUAL_STEP: Final = (1e-3, 20.0)
 """Time between rows of loggers [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class DraftColumn:
-    """One column of a log and what it is taken for.
-
-    Attributes
-    ----------
-    name : as it stands in the log
-    quantity : canonical name; empty where it is not known or not needed
-    unit : suffix; empty for a quantity without one
-    stated : whether the log itself states that unit
-    low, usual, high : lowest, median and highest value in that unit; NaN where there is none
-    count : cells with a number
-    doubt : what is not sure, one sentence; empty where it is
-    valid : signal of the same message that says whether it counts; empty for none
-    """
-
-    name: str
-    quantity: str
-    unit: str
-    stated: bool
-    low: float
-    usual: float
-    high: float
-    count: int
-    doubt: str = ""
-    valid: str = ""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Draft:
     """What one file seems to be.
@@ -116,6 +88,7 @@ class Draft:
     duration : from the first to the last row [s]
     columns : all but the time
     doubts : of the file and its time, one sentence each
+    files : how many files it is of, that read alike
     """
 
     path: Path
@@ -127,6 +100,7 @@ class Draft:
     duration: float
     columns: tuple[DraftColumn, ...]
     doubts: tuple[str, ...] = ()
+    files: int = 1
 
     @property
     def known(self) -> tuple[DraftColumn, ...]:
@@ -176,7 +150,7 @@ def draft(path: Path) -> Draft:
         _column(raw, name, found, stated=units.get(name))
         for name, found in zip(names, named, strict=True)
     )
-    columns = gravity_checked(columns)
+    columns = checked(columns)
     if not any(c.quantity for c in columns):
         if doubts := [f"{c.name!r} is {c.doubt}" for c in columns if c.doubt]:
             raise DriveError(f"{path}: none of its columns can be taken: {'; '.join(doubts[:3])}")
@@ -474,24 +448,3 @@ def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]
             sure = q.suffix in ("deg", "rpm", "v", "a") and unit == q.suffix
             return unit, "" if sure else f"states no unit; taken as {unit}"
     return q.suffix, f"states no unit, and its values fit none; taken as {q.suffix}"
-
-
-def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Tell m/s^2 from g by gravity where the log states no unit, and gravity that is missing."""
-    axes = [c for c in columns if c.quantity.startswith("accel_")]
-    if len(axes) < 3:
-        return columns
-    size = float(np.linalg.norm([c.usual * UNITS[c.unit].factor for c in axes if c.stated]))
-    doubt = ""
-    unit = axes[0].unit
-    if not axes[0].stated:
-        read = float(np.linalg.norm([c.usual for c in axes]))
-        unit = "g" if 0.7 < read < 1.4 else "mps2"
-        size = read * UNITS[unit].factor
-        doubt = f"states no unit; taken as {unit}, for it reads {read:.2g} in the median"
-    if size < 0.5 * GRAVITY:
-        doubt = (
-            f"reads {size:.2g} m/s^2 in the median: gravity was taken out of it; record the raw "
-            "accelerometer"
-        )
-    return tuple(replace(c, unit=unit, doubt=doubt or c.doubt) if c in axes else c for c in columns)

@@ -11,7 +11,8 @@ from pathlib import Path
 import tomlkit
 from tomlkit.items import Table
 
-from weighbridge.io.draft import Draft, DraftColumn
+from weighbridge.io.draft import Draft
+from weighbridge.io.draft_column import DraftColumn
 from weighbridge.io.table import TextFormat
 from weighbridge.signals import QUANTITIES
 from weighbridge.visible import visible

@@ -1,0 +1,88 @@
+"""A column of a drafted mapping, and what columns of one log tell of each other's units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.constants import GRAVITY
+from weighbridge.signals.units import UNITS
+
+PERCENT: Final = (-130.0, 130.0)
+"""Values of a torque in percent, at least and at most; J1939 has -125 to 125 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class DraftColumn:
+    """One column of a log and what it is taken for.
+
+    Attributes
+    ----------
+    name : as it stands in the log
+    quantity : canonical name; empty where it is not known or not needed
+    unit : suffix; empty for a quantity without one
+    stated : whether the log itself states that unit
+    low, usual, high : lowest, median and highest value in that unit; NaN where there is none
+    count : cells with a number
+    doubt : what is not sure, one sentence; empty where it is
+    valid : signal of the same message that says whether it counts; empty for none
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    stated: bool
+    low: float
+    usual: float
+    high: float
+    count: int
+    doubt: str = ""
+    valid: str = ""
+
+
+def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Say what the columns of one log tell of each other's units."""
+    return percent_checked(gravity_checked(columns))
+
+
+def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Tell m/s^2 from g by gravity where the log states no unit, and gravity that is missing."""
+    axes = [c for c in columns if c.quantity.startswith("accel_")]
+    if len(axes) < 3:
+        return columns
+    size = float(np.linalg.norm([c.usual * UNITS[c.unit].factor for c in axes if c.stated]))
+    doubt = ""
+    unit = axes[0].unit
+    if not axes[0].stated:
+        read = float(np.linalg.norm([c.usual for c in axes]))
+        unit = "g" if 0.7 < read < 1.4 else "mps2"
+        size = read * UNITS[unit].factor
+        doubt = f"states no unit; taken as {unit}, for it reads {read:.2g} in the median"
+    if size < 0.5 * GRAVITY:
+        doubt = (
+            f"reads {size:.2g} m/s^2 in the median: gravity was taken out of it; record the raw "
+            "accelerometer"
+        )
+    return tuple(replace(c, unit=unit, doubt=doubt or c.doubt) if c in axes else c for c in columns)
+
+
+def percent_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Tell a torque in percent from one in N m where the log states no unit of it.
+
+    A reference torque beside it is what it is a part of, and it stays within what percents are.
+    """
+    torques = [c for c in columns if c.quantity == "engine_torque" and not c.stated]
+    known = {c.quantity: c for c in columns}
+    reference = known.get("reference_torque")
+    if not torques or reference is None or "engine_torque_fraction" in known:
+        return columns
+    torque = torques[0]
+    within = PERCENT[0] <= torque.low and torque.high <= PERCENT[1]
+    if not within or not torque.high < reference.low:
+        return columns
+    unit = "ratio" if max(abs(torque.low), torque.high) <= PERCENT[1] / 100.0 else "pct"
+    doubt = f"states no unit; taken as a part of {reference.name!r}, for it stays within 130 %"
+    told = replace(torque, quantity="engine_torque_fraction", unit=unit, doubt=doubt)
+    return tuple(told if c is torque else c for c in columns)
