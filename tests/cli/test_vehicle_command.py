@@ -1,6 +1,9 @@
 """``weighbridge vehicle``: written from papers, told in words."""
 
+import pytest
+
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 
 def test_a_file_from_papers_is_told_and_names_the_next_command(weighbridge, tmp_path):
@@ -49,3 +52,23 @@ def test_a_load_means_nothing_before_a_calibration(weighbridge, loaded, tmp_path
     text = " ".join(ran.out.split())
     assert "was never calibrated" in text
     assert "weighbridge calibrate DRIVE --torque load --mass KG" in text
+
+
+@pytest.mark.parametrize("words", [("vehicle", "new"), ("calibrate",)])
+def test_help_names_every_torque_source(weighbridge, words):
+    ran = weighbridge(*words, "--help")
+    assert ran.code == 0
+    told = "".join(c for c in ran.out if c.isalnum() or c in "_()")
+    for source in TORQUE_SOURCES.values():
+        title = "".join(c for c in source.title if c.isalnum())
+        assert f"{source.name}({title})" in told
+
+
+@pytest.mark.parametrize("name", TORQUE_SOURCES)
+def test_a_vehicle_file_is_made_for_every_torque_source(weighbridge, tmp_path, name):
+    path = tmp_path / "v.toml"
+    more = ("--reference-torque", 300) if TORQUE_SOURCES[name].needs_reference else ()
+    assert weighbridge("vehicle", "new", "--torque", name, *more, "-o", path).code == 0
+    told = weighbridge("vehicle", "show", path)
+    assert told.code == 0
+    assert name in path.read_text() or name.replace("_", " ") in path.read_text()

@@ -59,7 +59,7 @@ def calibrate(
     ] = None,
     torque: Annotated[
         Optional[str],  # noqa: UP045
-        typer.Option("--torque", help="Torque source: measured, percent, load or air_flow."),
+        typer.Option("--torque", help="What the drives tell: a torque source."),
     ] = None,
     grid: Annotated[
         bool, typer.Option("--grid", help="Search the grid of Jensen 2022, Table 5, instead.")

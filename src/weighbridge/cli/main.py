@@ -28,6 +28,7 @@ from weighbridge.cli import (
     weigh,
 )
 from weighbridge.cli.terminal import STREAM, complain, guarded, leave_quietly, say
+from weighbridge.cli.torque_help import TellsSources
 from weighbridge.errors import WeighbridgeError
 from weighbridge.visible import visible_text
 
@@ -44,8 +45,10 @@ app = typer.Typer(
     epilog="Start with: weighbridge demo",
 )
 
-for _command in (demo.demo, inspect.inspect, calibrate.calibrate, weigh.weigh):
-    app.command()(_command)
+app.command()(demo.demo)
+app.command()(inspect.inspect)
+app.command(cls=TellsSources)(calibrate.calibrate)
+app.command()(weigh.weigh)
 app.command()(inertia.inertia)
 app.command()(simulate.simulate)
 app.command()(convert.convert)

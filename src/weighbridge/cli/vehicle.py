@@ -9,6 +9,7 @@ import typer
 
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say, shown
+from weighbridge.cli.torque_help import TellsSources
 
 if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
@@ -19,7 +20,7 @@ _Text = Optional[str]  # noqa: UP045  (typer reads the annotation at run time)
 _Number = Optional[float]  # noqa: UP045
 
 
-@app.command()
+@app.command(cls=TellsSources)
 def new(
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
@@ -55,7 +56,7 @@ def new(
         _Text,
         typer.Option(
             "--torque",
-            help="What the drives tell: measured (N m), percent, load or air_flow.",
+            help="What the drives tell: a torque source.",
             show_default=False,
         ),
     ] = None,

@@ -1,0 +1,25 @@
+"""Help of ``--torque``: the torque sources there are, those of other packages included."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typer.core import TyperCommand, TyperOption
+
+
+class TellsSources(TyperCommand):
+    """A command whose help lists the torque sources, read only where help is asked for."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help page."""
+        for option in self.params:
+            if isinstance(option, TyperOption) and option.name == "torque":
+                option.help = f"What the drives tell: {sources()}."
+        super().format_help(ctx, formatter)
+
+
+def sources() -> str:
+    """Each torque source by its name, with what it is."""
+    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+    return ", ".join(f"{source.name} ({source.title})" for source in TORQUE_SOURCES.values())
