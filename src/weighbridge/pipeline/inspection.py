@@ -11,6 +11,7 @@ import numpy as np
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.checks import settle_drive
 from weighbridge.navigation.motion import MotionSource
+from weighbridge.pipeline.expected import EXPECTED, FAST, MOTIONS
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -98,7 +99,7 @@ class Way:
         """The way in words."""
         if self.torque == "speed":
             return "speed without torque (speed-ekf)"
-        return f"{_MOTIONS[self.motion]} and {TORQUE_SOURCES[self.torque].title}"
+        return f"{MOTIONS[self.motion]} and {TORQUE_SOURCES[self.torque].title}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,31 +119,6 @@ class Inspection:
     signals: tuple[SignalReport, ...]
     problems: tuple[Problem, ...]
     ways: tuple[Way, ...]
-
-
-_MOTIONS: Final[dict[MotionSource, str]] = {
-    "inertial": "IMU with speed",
-    "longitudinal_accel": "longitudinal accelerometer with speed",
-    "speed_grade": "speed with grade or height",
-    "speed": "speed alone",
-}
-
-FAST: Final = 2.9
-"""Readings of torque or load per second from which they are in time for the motion [1/s]."""
-
-_EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
-    ("inertial", True): (0.5, 2.5, "what the torque's reading is worth, squat and wind"),
-    ("inertial", False): (1.0, 2.0, "how late slow readings are"),
-    ("longitudinal_accel", True): (1.5, 3.5, "the lean of the accelerometer, the torque's scale"),
-    ("longitudinal_accel", False): (2.0, 4.0, "how late slow readings are, the sensor's lean"),
-    ("speed_grade", True): (2.0, 3.0, "acceleration and grade come from smoothed speed and height"),
-    ("speed_grade", False): (3.0, 5.0, "acceleration comes from slowly polled speed"),
-    ("speed", True): (4.0, 5.0, "no grade is measured"),
-    ("speed", False): (5.0, 8.0, "no grade is measured, and speed is slowly polled"),
-}
-"""Standard deviation of a mass, best to worst [%], and what sets it, by motion and whether the
-torque is read at `FAST` or more: the drives of the README's table. Of slow speed alone and of a
-slow longitudinal accelerometer nothing was measured; theirs are graded from the others."""
 
 
 def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Inspection:
@@ -239,10 +215,10 @@ def quantisation(values: Floats) -> float | None:
 
 def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
     ways = []
-    for motion in _MOTIONS:
+    for motion in MOTIONS:
         for torque in TORQUE_SOURCES.values():
             needs = (*_motion_needs(drive, motion), *_torque_needs(drive, torque, vehicle))
-            best, worst, reason = _EXPECTED[motion, _is_fast(drive, torque)]
+            best, worst, reason = EXPECTED[motion, _is_fast(drive, torque)]
             if torque.expected:
                 best, worst, reason = best + torque.expected, worst + torque.expected, torque.limit
             # Nobody records torque at the wheels for want of another signal.
@@ -286,7 +262,7 @@ def _by_speed_alone(drive: Drive) -> Way:
 def _mark_chosen(ways: list[Way], vehicle: Vehicle | None) -> tuple[Way, ...]:
     """Mark the way that `weigh` goes: the vehicle file's torque, the best motion."""
     source = vehicle.torque.of_source.name if vehicle is not None else None
-    order = list(_MOTIONS)
+    order = list(MOTIONS)
     possible = [w for w in ways if w.possible and w.torque == source]
     best = min(possible, key=lambda w: order.index(w.motion), default=None)
     return tuple(replace(w, chosen=True) if w is best else w for w in ways)

@@ -1,0 +1,33 @@
+"""What to expect of a mass by each way to weigh, as `inspect` and the README tell it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from weighbridge.navigation.motion import MotionSource
+
+MOTIONS: Final[dict[MotionSource, str]] = {
+    "inertial": "IMU with speed",
+    "longitudinal_accel": "longitudinal accelerometer with speed",
+    "speed_grade": "speed with grade or height",
+    "speed": "speed alone",
+}
+"""Each source of motion in words, the best first."""
+
+FAST: Final = 2.9
+"""Readings of torque or load per second from which they are in time for the motion [1/s]."""
+
+EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
+    ("inertial", True): (0.4, 3.0, "what the torque's reading is worth, squat and wind"),
+    ("inertial", False): (1.0, 2.0, "how late slow readings are"),
+    ("longitudinal_accel", True): (1.5, 3.5, "the lean of the accelerometer, the torque's scale"),
+    ("longitudinal_accel", False): (2.0, 4.0, "how late slow readings are, the sensor's lean"),
+    ("speed_grade", True): (2.0, 3.0, "acceleration and grade come from smoothed speed and height"),
+    ("speed_grade", False): (3.0, 5.0, "acceleration comes from slowly polled speed"),
+    ("speed", True): (4.0, 5.0, "no grade is measured"),
+    ("speed", False): (4.0, 8.0, "no grade is measured, and speed is slowly polled"),
+}
+"""Standard deviation of a mass, best to worst [%], and what sets it, by motion and whether the
+torque is read at `FAST` or more: it holds what the README says was measured. Of fast speed alone,
+of speed alone below 2 Hz and of a slow longitudinal accelerometer nothing was measured; theirs are
+graded from the others."""

@@ -1,0 +1,47 @@
+"""What `inspect` says to expect of a drive, beside what the README says was measured."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from weighbridge.pipeline.expected import EXPECTED, MOTIONS
+
+README = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
+
+
+def measured(row):
+    """Percents of a row of the README's table (low, high), less what it says in brackets."""
+    line = next(x for x in README.splitlines() if x.startswith(f"| {row}"))
+    cell = re.sub(r"\(.*?\)", "", line.split("|")[2])
+    found = re.findall(r"([\d.]+)(?:–([\d.]+))? %", cell)
+    return [(float(a), float(b or a)) for a, b in found]
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_the_readme_has_what_inspect_tells(motion):
+    fast, slow = (EXPECTED[motion, f] for f in (True, False))
+    row = f"| {MOTIONS[motion]} | {fast[0]:g}–{fast[1]:g} % | {slow[0]:g}–{slow[1]:g} % |"
+    assert row in README.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("row", "ways"),
+    [
+        ("IMU, OBD speed, engine speed", [("inertial", True)] * 2),
+        ("the same, one calibration drive", [("inertial", True)] * 2),
+        ("the same, five minutes of driving", [("inertial", True)]),
+        ("OBD at 1 Hz with an IMU", [("inertial", False)]),
+        (
+            "OBD at 4 Hz, at 1 Hz, with GNSS, no IMU",
+            [("speed_grade", True), ("speed_grade", False)],
+        ),
+        ("OBD at 2 Hz alone", [("speed", False)]),
+    ],
+)
+def test_what_was_measured_is_within_what_inspect_tells(row, ways):
+    told = measured(row)
+    assert len(told) == len(ways)
+    for (low, high), way in zip(told, ways, strict=True):
+        best, worst, _ = EXPECTED[way]
+        assert best <= low <= high <= worst
