@@ -156,3 +156,11 @@ def test_a_stop_loads_no_more_than_its_time_allows():
     # hurries in a minute.
     before = np.array([0.0, 0.0, 8.0, 6.0, 0.0, 60.0])
     assert too_hasty(begins, before, mass).tolist() == [False] * 3 + [True] + [False] * 2
+
+
+def test_without_an_accelerometer_no_load_changes_within_a_minute():
+    stood = np.array([0.0, 7.0, 9.0, 59.0, 61.0])
+    assert np.isfinite(change_odds(stood)).tolist() == [False, False, True, True, True]
+    by_speed = change_odds(stood, by_speed=True)
+    assert np.isfinite(by_speed).tolist() == [False] * 4 + [True]
+    assert by_speed[-1] == change_odds(stood)[-1]

@@ -88,7 +88,7 @@ def map_log(
         part.write_text(text, encoding="utf-8")
     say(f"written: {output}")
     more = "".join(f" --dbc {d}" for d in dbc or ())
-    drive = drafts[0].path if alike else _drive(logs)
+    drive = logs[0] if alike else _drive(logs)
     say(f"next: weighbridge inspect {drive} --mapping {output}{more}")
 
 

@@ -45,7 +45,7 @@ from weighbridge.estimators.noisy_motion import LEVEL_STD, attenuation
 from weighbridge.estimators.squat import Lean, lean
 from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance
-from weighbridge.navigation.motion import MotionSource
+from weighbridge.navigation.motion import BY_SPEED, MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.fuel import FUEL_STD
@@ -187,7 +187,7 @@ def _ask(balance: ForceBalance, vehicle: Vehicle, cut: Windows, rough: float) ->
             time=time,
             rows=means,
             y=sums,
-            odds=change_odds(stood),
+            odds=change_odds(stood, by_speed=balance.motion.source in BY_SPEED),
             variance=noise_variance(view, cut, guess, balance.motion),
             std=_prior(balance, vehicle, cut, guess),
         )
