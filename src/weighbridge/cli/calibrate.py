@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from weighbridge.calibration.speed import SpeedCalibration
     from weighbridge.results.calibration import Calibration
     from weighbridge.signals import Drive
+    from weighbridge.vehicle.model import Vehicle
 
 
 def calibrate(
@@ -80,8 +81,6 @@ def calibrate(
 
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
-    from dataclasses import replace
-
     from weighbridge.calibration.run import run_calibration, run_speed_calibration
     from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError
@@ -118,18 +117,27 @@ def calibrate(
         done = run_calibration(recorded, masses, vehicle=base, settings=settings)
         car, found, doubts = done.vehicle, table(done), ()
         lightest = min(car.provenance.masses)
-    if tare is not None and not 0.3 * lightest <= tare <= 1.02 * lightest:
-        raise ConfigError(
-            f"--tare {tare:g}: must not be above the known mass of {lightest:g} kg nor far below; "
-            "it is the vehicle without payload"
-        )
     if tare is not None:
-        car = replace(car, tare=tare)
+        car = _with_tare(car, tare, lightest)
     car.save(output)
     console().print(found)
     for doubt in doubts:
         say(f"  note: {doubt}")
     say(f"written: {output}")
+
+
+def _with_tare(car: Vehicle, tare: float, lightest: float) -> Vehicle:
+    """Return a vehicle with its mass without payload, checked by the lightest known mass [kg]."""
+    from dataclasses import replace
+
+    from weighbridge.errors import ConfigError
+
+    if not 0.3 * lightest <= tare <= 1.02 * lightest:
+        raise ConfigError(
+            f"--tare {tare:g}: must not be above the known mass of {lightest:g} kg nor far below; "
+            "it is the vehicle without payload"
+        )
+    return replace(car, tare=tare)
 
 
 def masses_of_parts(
@@ -161,8 +169,8 @@ def masses_of_parts(
         return [kg for kg, held in zip(masses, parts, strict=True) for _ in held]
     several = "; ".join(_told_parts(held) for held in parts if len(held) > 1)
     raise ConfigError(
-        f"{len(masses)} values of --mass for {drives} drives in {len(parts)} recording(s): give "
-        f"one, or one for each{'; ' + several if several else ''}"
+        f"{len(masses)} masses for {drives} drives in {len(parts)} recording(s): give --mass "
+        f"once, or once for each{'; ' + several if several else ''}"
     )
 
 
