@@ -56,6 +56,14 @@ def test_inspect_tells_of_each_part_unless_it_is_to_take_the_whole(weighbridge, 
     assert whole.out.strip().endswith("--mass KG -o vehicle.toml --whole")
 
 
+def test_a_file_that_cannot_weigh_yet_is_to_be_calibrated_first(weighbridge, day, tmp_path):
+    base = tmp_path / "base.toml"
+    assert weighbridge("vehicle", "new", "--tare", 1500, "-o", base).code == 0
+    last = weighbridge("inspect", day, "--vehicle", base).out.strip().splitlines()[-1]
+    assert "weighbridge calibrate" in last
+    assert last.endswith(f"-o vehicle.toml --vehicle {base}")
+
+
 def test_calibrate_says_which_drives_it_wants_the_masses_of(weighbridge, day, tmp_path):
     masses = ("--mass", 1580, "--mass", 1700, "--mass", 1800)
     ran = weighbridge("calibrate", day, *masses, "-o", tmp_path / "car.toml")

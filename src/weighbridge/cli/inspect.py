@@ -46,6 +46,7 @@ def inspect(
     from weighbridge.pipeline.given import mapping_of
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.vehicle.model import Vehicle
+    from weighbridge.vehicle.telling import can_weigh
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = mapping_of(car, vehicle, mapping)
@@ -58,7 +59,9 @@ def inspect(
         for one in found:
             _show(screen, one, every_way)
         best = next((one for one in found if _weighable(one)), found[0])
-        say(_next(best, path, len(parts), _options(mapping, vehicle, dbc, whole=whole)))
+        options = _options(mapping, vehicle, dbc, whole=whole)
+        weighs = car is not None and can_weigh(car)
+        say(_next(best, path, len(parts), options, weighs=weighs))
 
 
 def _options(
@@ -78,14 +81,13 @@ def _weighable(found: Inspection) -> bool:
     return not serious and any(w.possible and w.torque != "speed" for w in found.ways)
 
 
-def _next(found: Inspection, path: Path, parts: int, options: list[str]) -> str:
-    """Say what to type next."""
+def _next(found: Inspection, path: Path, parts: int, options: list[str], *, weighs: bool) -> str:
+    """Say what to type next, by whether the vehicle file weighs or has to be calibrated first."""
     if any(p.serious for p in found.problems):
         return "next: settle what is serious above, then inspect again"
     if not _weighable(found):
         return "next: record what the nearest way lacks"
-    calibrated = any(o.startswith("--vehicle") for o in options)
-    if calibrated:
+    if weighs:
         words = ["weigh", str(path), *options]
     else:
         masses = (
