@@ -51,7 +51,7 @@ class _Cache(FunctionCache):
 
 
 def _decorator(**options):
-    compiled = njit(error_model="numpy", nogil=True, **options)
+    compiled = njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)
 
     def decorate(function):
         dispatcher = compiled(function)

@@ -54,19 +54,32 @@ def initial_state(x, cov, time):
 @kernel
 def _faded(state, time, params):
     """Estimate and covariance at ``time``, and the part of each state that is left (n,)."""
-    x = state.x.copy()
-    cov = state.cov.copy()
-    left = np.ones(x.size)
+    n = state.x.size
+    x, cov, left = np.empty(n), np.empty((n, n)), np.empty(n)
     span = time - state.time
-    for i in range(x.size):
-        if params.std[i] > 0.0:
-            keep = np.exp(-span / params.time_constant[i])
-            left[i] = keep
-            x[i] *= keep
-            cov[i, :] *= keep
-            cov[:, i] *= keep
-            cov[i, i] += params.std[i] ** 2 * (1.0 - keep * keep)
+    for i in range(n):
+        left[i] = np.exp(-span / params.time_constant[i]) if params.std[i] > 0.0 else 1.0
+        x[i] = state.x[i] * left[i]
+        for j in range(i + 1):
+            cov[i, j] = state.cov[i, j] * left[j] * left[i]
+            cov[j, i] = state.cov[j, i] * left[j] * left[i]
+        cov[i, i] += params.std[i] ** 2 * (1.0 - left[i] * left[i])
     return x, cov, left
+
+
+@kernel
+def _predicted(x, cov, row, noise_var, cov_row):
+    """Mean and variance of a measurement; ``cov_row`` (n,) becomes ``cov @ row``."""
+    mean = 0.0
+    var = noise_var
+    for i in range(x.size):
+        total = 0.0
+        for j in range(x.size):
+            total += cov[i, j] * row[j]
+        cov_row[i] = total
+        mean += row[i] * x[i]
+        var += row[i] * total
+    return mean, var
 
 
 @kernel
@@ -96,16 +109,18 @@ def step(state, time, row, y, noise_var, params):
     Gelb, Applied Optimal Estimation, 1974, ch. 3.8 (Gauss-Markov), 4.2.
     """
     x, cov, _ = _faded(state, time, params)
-    cov_row = cov @ row
-    innovation_var = row @ cov_row + noise_var
-    innovation = (y - row @ x) / np.sqrt(innovation_var)
+    cov_row = np.empty(x.size)
+    mean, innovation_var = _predicted(x, cov, row, noise_var, cov_row)
+    innovation = (y - mean) / np.sqrt(innovation_var)
     taken = state.rows < params.settle or abs(innovation) <= params.gate
     seen = min(abs(innovation), params.gate)
     likelihood = state.log_likelihood - 0.5 * (np.log(innovation_var) + seen * seen)
     if taken:
-        gain = cov_row / innovation_var
-        x = x + gain * (y - row @ x)
-        cov = cov - np.outer(gain, cov_row)
+        for i in range(x.size):
+            gain = cov_row[i] / innovation_var
+            x[i] += gain * (y - mean)
+            for j in range(x.size):
+                cov[i, j] -= gain * cov_row[j]
     return DisturbanceState(x, cov, time, state.rows + 1, likelihood), innovation, taken
 
 
@@ -139,8 +154,7 @@ def run(state, time, rows, y, noise_var, added, params):
     innovation = np.empty(y.size)
     taken = np.empty(y.size, dtype=np.bool_)
     for k in range(y.size):
-        if np.any(added[k] > 0.0):
-            state = loosened(state, added[k])
+        state = loosened(state, added[k])
         state, innovation[k], taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         first[k] = state.x[0]
         first_var[k] = state.cov[0, 0]
@@ -150,15 +164,17 @@ def run(state, time, rows, y, noise_var, added, params):
 @kernel
 def loosened(state, variance):
     """Return the state with ``variance`` (n,) added to those of the estimates."""
-    cov = state.cov + np.diag(variance)
+    cov = state.cov.copy()
+    for i in range(variance.size):
+        cov[i, i] += variance[i]
     return DisturbanceState(state.x, cov, state.time, state.rows, state.log_likelihood)
 
 
 @kernel
 def weight(state, time, row, noise_var, params):
     """Inverse variance of a measurement given all before it; parameters as of ``step``."""
-    _, cov, _ = _faded(state, time, params)
-    return 1.0 / (row @ (cov @ row) + noise_var)
+    x, cov, _ = _faded(state, time, params)
+    return 1.0 / _predicted(x, cov, row, noise_var, np.empty(x.size))[1]
 
 
 @kernel
@@ -166,8 +182,7 @@ def weights(state, time, rows, y, noise_var, added, params):
     """Sum of `weight` over all rows; parameters as of ``run``."""
     total = 0.0
     for k in range(y.size):
-        if np.any(added[k] > 0.0):
-            state = loosened(state, added[k])
+        state = loosened(state, added[k])
         total += weight(state, time[k], rows[k], noise_var[k], params)
         state, _, _ = step(state, time[k], rows[k], y[k], noise_var[k], params)
     return total
@@ -208,33 +223,61 @@ def smooth(state, time, rows, y, noise_var, added, params):
     error = np.zeros(m)
     weight = np.zeros(m)
     for k in range(m):
-        if np.any(added[k] > 0.0):
-            state = loosened(state, added[k])
-        x, cov, keep[k] = _faded(state, time[k], params)
-        x_pred[k] = x
-        cov_pred[k] = cov
+        state = loosened(state, added[k])
+        x, cov, left = _faded(state, time[k], params)
         state, _, taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         if taken[k]:
-            cov_row = cov @ rows[k]
-            inverse[k] = 1.0 / (rows[k] @ cov_row + noise_var[k])
-            gain[k] = cov_row * inverse[k]
-            error[k] = y[k] - rows[k] @ x
+            mean, var = _predicted(x, cov, rows[k], noise_var[k], gain[k])
+            inverse[k] = 1.0 / var
+            error[k] = y[k] - mean
+        for i in range(n):
+            x_pred[k, i], keep[k, i] = x[i], left[i]
+            gain[k, i] *= inverse[k]
+            for j in range(n):
+                cov_pred[k, i, j] = cov[i, j]
     adjoint = np.zeros(n)
     information = np.zeros((n, n))
     x_out = np.empty((m, n))
     var_out = np.empty((m, n))
     for k in range(m - 1, -1, -1):
-        row = rows[k]
-        weight[k] = inverse[k] + gain[k] @ information @ gain[k]
-        back = np.eye(n) - np.outer(gain[k], row)
-        information = back.T @ information @ back + inverse[k] * np.outer(row, row)
-        adjoint = back.T @ adjoint - inverse[k] * error[k] * row
-        x_out[k] = x_pred[k] - cov_pred[k] @ adjoint
-        spread = cov_pred[k] @ information @ cov_pred[k]
+        weight[k] = _back(adjoint, information, gain[k], rows[k], inverse[k], error[k])
         for i in range(n):
-            var_out[k, i] = max(cov_pred[k, i, i] - spread[i, i], 0.0)
+            x_out[k, i] = x_pred[k, i]
+            var_out[k, i] = cov_pred[k, i, i]
+            for a in range(n):
+                total = 0.0
+                for b in range(n):
+                    total += information[a, b] * cov_pred[k, b, i]
+                x_out[k, i] -= cov_pred[k, i, a] * adjoint[a]
+                var_out[k, i] -= cov_pred[k, i, a] * total
+            var_out[k, i] = max(var_out[k, i], 0.0)
         for i in range(n):
             adjoint[i] *= keep[k, i]
-            information[i, :] *= keep[k, i]
-            information[:, i] *= keep[k, i]
+            for j in range(n):
+                information[i, j] *= keep[k, i] * keep[k, j]
     return x_out, var_out, taken, weight
+
+
+@kernel
+def _back(adjoint, information, gain, row, inverse, error):
+    """Take a row into ``adjoint`` (n,) and ``information`` (n, n); return its weight."""
+    n = row.size
+    weight = inverse
+    along = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += information[i, j] * gain[j]
+        weight += gain[i] * total
+        along += gain[i] * adjoint[i]
+        for j in range(n):
+            information[i, j] -= total * row[j]
+    for i in range(n):
+        adjoint[i] -= (along + inverse * error) * row[i]
+    for j in range(n):
+        total = inverse * row[j]
+        for i in range(n):
+            total -= gain[i] * information[i, j]
+        for i in range(n):
+            information[i, j] += row[i] * total
+    return weight

@@ -13,6 +13,8 @@ Farrell, Aided Navigation, 2008, ch. 11.
 
 import math
 
+import numpy as np
+
 from weighbridge.kernels._jit import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
 from weighbridge.kernels.ins_model import (
     ACCEL,
@@ -317,7 +319,7 @@ def run(x, cov, samples, rot_bs, noise, rows, states, stds):
     """
     time, accel, gyro, nodes, z = samples
     step_slot = 1 if rows.cov.shape[0] > 0 else 0
-    k = 0
+    k = np.int64(0)  # not compiled for a literal 0 as well
     for i in range(time.size):
         f0, f1, f2 = accel[i, 0], accel[i, 1], accel[i, 2]
         w0, w1, w2 = gyro[i, 0], gyro[i, 1], gyro[i, 2]

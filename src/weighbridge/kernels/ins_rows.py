@@ -10,6 +10,8 @@ Velocity rows carry the attitude term ``r x v`` that eq. 46 leaves out, where
 
 import math
 
+import numpy as np
+
 from weighbridge.kernels._jit import contracted_kernel, fast_kernel, inlined_fast_kernel
 from weighbridge.kernels.ins_model import (
     ACCEL,
@@ -243,7 +245,7 @@ def update(x, cov, z, node, noise, rows, slot):
     h, ph, innovation, innovation_var, counts, _, _ = rows
     first, fix, last = _first_and_last(z, node, noise)
     standing = z[node, Z_STILL] > 0.0
-    start = 0
+    start = np.int64(0)
     refused = False
     for kind in range(first, last):
         if fix and kind == VELOCITY and _is_lost(x, LOST_GNSS, refused, noise):

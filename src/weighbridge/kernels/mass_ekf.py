@@ -233,7 +233,9 @@ def step(state, row, params):
         x[SPEED] += accel * span
         # Only the first row of the transition differs from the unit matrix.
         slope = (1.0 + by_speed * span, by_grade * span, by_mass * span)
-        first = slope[0] * cov[0] + slope[1] * cov[1] + slope[2] * cov[2]
+        first = np.empty(4)
+        for i in range(4):
+            first[i] = slope[0] * cov[0, i] + slope[1] * cov[1, i] + slope[2] * cov[2, i]
         cov[SPEED, SPEED] = (
             slope[0] * first[0] + slope[1] * first[1] + slope[2] * first[2]
         ) + params.accel_walk * span

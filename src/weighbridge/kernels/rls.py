@@ -73,6 +73,29 @@ def initial_state(theta, cov):
 
 
 @kernel
+def _fold(theta, cov, phi, innovation, params):
+    """Fold an innovation into ``theta`` (n,) and ``cov`` (n, n)."""
+    n = theta.size
+    keep = params.forgetting
+    for i in range(n):
+        if cov[i, i] / params.forgetting > params.cov_limit[i]:
+            keep = 1.0
+    cov_phi = np.zeros(n)
+    known = 1.0
+    for i in range(n):
+        for j in range(n):
+            cov[i, j] /= keep
+            cov_phi[i] += cov[i, j] * phi[j]
+        known += phi[i] * cov_phi[i]
+    for i in range(n):
+        theta[i] += cov_phi[i] / known * innovation
+        for j in range(i + 1):
+            both = cov[i, j] + cov[j, i]
+            both -= cov_phi[i] / known * cov_phi[j] + cov_phi[j] / known * cov_phi[i]
+            cov[i, j] = cov[j, i] = 0.5 * both
+
+
+@kernel
 def step(state, time, phi, y, params):
     """Fold the row ``y = phi @ theta + noise`` into the estimate.
 
@@ -100,7 +123,11 @@ def step(state, time, phi, y, params):
     Jensen et al. 2022, eqs. 7-9, here for n parameters.
     Ljung, System Identification, 2nd ed., 1999, sec. 11.2.
     """
-    innovation = y - phi @ state.theta
+    n = phi.size
+    predicted = 0.0
+    for i in range(n):
+        predicted += phi[i] * state.theta[i]
+    innovation = y - predicted
     std = np.sqrt(state.noise_var)
     settled = state.rows >= params.settle_rows
     taken = not settled or abs(innovation) <= params.gate * std
@@ -116,19 +143,9 @@ def step(state, time, phi, y, params):
     else:
         noise_var = state.noise_var + weight * (clipped * clipped - state.noise_var)
 
-    theta, cov = state.theta, state.cov
+    theta, cov = state.theta.copy(), state.cov.copy()
     if taken:
-        forget = True
-        for i in range(theta.size):
-            if cov[i, i] / params.forgetting > params.cov_limit[i]:
-                forget = False
-        if forget:
-            cov = cov / params.forgetting
-        cov_phi = cov @ phi
-        gain = cov_phi / (phi @ cov_phi + 1.0)
-        theta = theta + gain * innovation
-        cov = cov - np.outer(gain, cov_phi)
-        cov = 0.5 * (cov + cov.T)
+        _fold(theta, cov, phi, innovation, params)
 
     # Rows near each other share their error (wind, grade, torque model). The
     # sum over a block against its value for independent rows tells how much
@@ -204,6 +221,7 @@ def run(state, time, phi, y, valid, params):
     for k in range(y.size):
         if valid[k]:
             state, innovation[k], taken[k] = step(state, time[k], phi[k], y[k], params)
-        theta[k] = state.theta
+        for i in range(state.theta.size):
+            theta[k, i] = state.theta[i]
         var[k] = variance(state, 0)
     return state, theta, var, innovation, taken
