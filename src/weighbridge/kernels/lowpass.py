@@ -8,7 +8,7 @@ from weighbridge.kernels._jit import fast_kernel
 
 
 @fast_kernel
-def lowpass_resample(time, values, start, period, count, reach, out, weight):
+def lowpass_resample(time, values, start, period, first, reach, out, weight):
     """Low-pass unevenly sampled channels and take them to an even clock, without delay.
 
     Each output is the weighted mean of the samples within ``reach`` output
@@ -22,8 +22,9 @@ def lowpass_resample(time, values, start, period, count, reach, out, weight):
         Rising [s].
     values : (n, c) float64
     start, period : float
-        First output instant and distance of outputs [s].
-    count : int
+        Begin of the even clock and distance of its instants [s].
+    first : int
+        Which of them is the first output.
     reach : float
         [-]
     out : (count, c) float64
@@ -31,7 +32,7 @@ def lowpass_resample(time, values, start, period, count, reach, out, weight):
     weight : (count,) float64
         Filled: sum of the weights, about samples per output period.
     """
-    channels = values.shape[1]
+    count, channels = out.shape
     fine = 256
     size = int(reach * fine)
     window = np.empty(size + 2)
@@ -50,10 +51,10 @@ def lowpass_resample(time, values, start, period, count, reach, out, weight):
         right = time[i + 1] - time[i] if i + 1 < time.size else left
         share = 0.5 * (min(left, 2.0 * period) + min(right, 2.0 * period)) / period
         place = (time[i] - start) / period
-        low = max(0, math.ceil(place - reach))
-        high = min(count - 1, math.floor(place + reach))
-        for k in range(low, high + 1):
-            u = place - k
+        low = max(first, math.ceil(place - reach))
+        high = min(first + count - 1, math.floor(place + reach))
+        for k in range(low - first, high - first + 1):
+            u = place - (first + k)
             cell = abs(u) * fine
             at = int(cell)
             w = share * (window[at] + (cell - at) * (window[at + 1] - window[at]))

@@ -8,13 +8,12 @@ import numpy as np
 
 from weighbridge.errors import DriveError
 from weighbridge.kernels.lowpass import lowpass_resample
+from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.dropouts import false_rows, repeated_rows
 from weighbridge.navigation.frozen import thawed
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
-
-_AXES = ("x", "y", "z")
 
 _FEWEST = 50
 """Fewer inertial samples show nothing."""
@@ -24,6 +23,12 @@ _BRIEF = 30.0
 
 _MOVES = 1.0
 """Slower, a sensor may well repeat itself or read zero [m/s]."""
+
+_REACH = 3.0
+"""Periods of an even clock to both sides that its low-pass reaches to [-]."""
+
+_AT_ONCE = 1 << 15
+"""Outputs low-passed at a time: bounds the memory."""
 
 _SLOWEST = 0.11
 """Inertial samples further apart lose what happens between them [s]."""
@@ -36,15 +41,15 @@ class Imu:
     Attributes
     ----------
     time : (n,) strictly increasing [s]
-    accel : (n, 3) specific force [m/s^2]
-    gyro : (n, 3) angular rate [rad/s]
+    accel : specific force [m/s^2]
+    gyro : angular rate [rad/s]
     period : median distance of samples [s]
     false : part of the samples that could not be and were left out [-]
     """
 
     time: Floats
-    accel: Floats
-    gyro: Floats
+    accel: Axes
+    gyro: Axes
     period: float
     false: float = 0.0
 
@@ -94,18 +99,21 @@ def read_imu(drive: Drive) -> Imu:
             f"{drive.name}: accel and gyro have only {int(keep.sum())} samples in common: "
             "check their time stamps"
         )
-    time = np.ascontiguousarray(clock[keep])
-    data = {kind: np.empty((time.size, 3)) for kind in ("accel", "gyro")}
-    for kind, block in data.items():
-        for i, axis in enumerate(_AXES):
-            s = drive.signals[f"{kind}_{axis}"]
-            same = s.time is clock or np.array_equal(s.time, clock)
-            block[:, i] = s.values[keep] if same else np.interp(time, s.time, s.values)
+    whole = bool(keep.all())
+    # Kernels are compiled for arrays that can be written to and lie in one piece.
+    time = np.require(clock if whole else clock[keep], requirements=("C", "W"))
+    columns = []
+    for s in signals:
+        if s.time is not clock and not np.array_equal(s.time, clock):
+            columns.append(np.interp(time, s.time, s.values))
+        else:
+            columns.append(s.values if whole else s.values[keep])
+    accel, gyro = Axes(*columns[:3]), Axes(*columns[3:])
     speed = drive.speed
     moving = np.ones(time.size, dtype=bool)
     if speed is not None and len(speed):
         moving = np.interp(time, speed.time, speed.values) > _MOVES
-    imu = Imu(time, data["accel"], data["gyro"], float(np.median(np.diff(time))))
+    imu = Imu(time, accel, gyro, float(np.median(np.diff(time))))
     repeated = repeated_rows(imu.accel, imu.gyro, moving)
     own = time[moving & ~repeated]
     if repeated.any() and own.size >= _FEWEST:
@@ -128,12 +136,7 @@ def read_imu(drive: Drive) -> Imu:
 
 
 def _kept(imu: Imu, keep: Bools, period: float) -> Imu:
-    return Imu(
-        np.ascontiguousarray(imu.time[keep]),
-        np.ascontiguousarray(imu.accel[keep]),
-        np.ascontiguousarray(imu.gyro[keep]),
-        period,
-    )
+    return Imu(imu.time[keep], imu.accel.kept(keep), imu.gyro.kept(keep), period)
 
 
 def read_fixes(
@@ -166,10 +169,20 @@ def read_fixes(
     return Fixes(time, ned, frame, has_height)
 
 
-def resample(time: Floats, values: Floats, start: float, period: float, count: int) -> Floats:
+def resample(
+    time: Floats, values: Floats | Axes, start: float, period: float, count: int
+) -> Floats:
     """Low-pass channels (n, c) without delay and take them to an even clock; NaN in gaps."""
-    out = np.empty((count, values.shape[1]))
-    lowpass_resample(time, values, start, period, count, 3.0, out, np.empty(count))
+    out = np.empty((count, 3 if isinstance(values, Axes) else values.shape[1]))
+    for first in range(0, count, _AT_ONCE):
+        part = out[first : first + _AT_ONCE]
+        # One period and one sample more than the low-pass reaches to.
+        near = start + period * np.array([first - _REACH - 1.0, first + len(part) + _REACH])
+        low, high = np.searchsorted(time, near)
+        rows = slice(max(min(low - 1, time.size - 2), 0), max(high + 1, 2))
+        lowpass_resample(
+            time[rows], values[rows], start, period, first, _REACH, part, np.empty(len(part))
+        )
     return out
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
+from weighbridge.navigation.axes import Axes
 from weighbridge.signals import Bools, Floats
 
 _LEAST_FORCE, _MOST_FORCE = 2.0, 50.0
@@ -39,12 +40,12 @@ _WINDOW: Final = 1.0
 """over so long [s]."""
 
 
-def false_rows(accel: Floats, gyro: Floats, moving: Bools, period: float) -> Bools:
+def false_rows(accel: Axes, gyro: Axes, moving: Bools, period: float) -> Bools:
     """Mark samples that say nothing of the motion.
 
     Parameters
     ----------
-    accel, gyro : (n, 3) specific force [m/s^2] and rate [rad/s]
+    accel, gyro : specific force [m/s^2] and rate [rad/s]
     moving : (n,) the vehicle moves
     period : of the samples [s]
 
@@ -52,39 +53,42 @@ def false_rows(accel: Floats, gyro: Floats, moving: Bools, period: float) -> Boo
     -------
     (n,)
     """
-    size = np.sqrt(np.einsum("ij,ij->i", accel, accel))
+    size = np.square(accel.x)
+    size += np.square(accel.y)
+    size += np.square(accel.z)
+    np.sqrt(size, out=size)
     false = np.zeros(size.size, dtype=bool)
     if 0.5 * GRAVITY < float(np.median(size)) < 2.0 * GRAVITY:
         # Otherwise the unit is wrong, which others tell.
         false |= (size < _LEAST_FORCE) | (size > _MOST_FORCE)
+    del size
     for kind, block in enumerate((accel, gyro)):
-        for axis in range(3):
-            x = block[:, axis]
+        for x in block.columns:
             false |= _spikes(x, _LEAST_SPIKE[kind]) | _zeros(x, moving)
     # What has no reading must not pass for the lowest one.
-    left = np.flatnonzero(~false)
-    if left.size:
-        for block in (accel, gyro):
-            for axis in range(3):
-                false[left] |= _clipped(block[left, axis], round(_WINDOW / period))
+    good = ~false
+    if good.any():
+        for x in (*accel.columns, *gyro.columns):
+            false[good] |= _clipped(x if good.all() else x[good], round(_WINDOW / period))
     return np.asarray(false)
 
 
-def repeated_rows(accel: Floats, gyro: Floats, moving: Bools) -> Bools:
+def repeated_rows(accel: Axes, gyro: Axes, moving: Bools) -> Bools:
     """Mark samples in motion that a slower sensor only repeats; none where few are alike.
 
     Parameters
     ----------
-    accel, gyro : (n, 3)
+    accel, gyro
     moving : (n,) the vehicle moves
 
     Returns
     -------
     (n,)
     """
-    same = np.zeros(moving.size, dtype=bool)
-    same[1:] = (accel[1:] == accel[:-1]).all(axis=1) & (gyro[1:] == gyro[:-1]).all(axis=1)
-    same &= moving
+    same = moving.copy()
+    same[:1] = False
+    for x in (*accel.columns, *gyro.columns):
+        same[1:] &= x[1:] == x[:-1]
     if np.count_nonzero(same) < _REPEATS * np.count_nonzero(moving):
         same[:] = False
     return same
@@ -92,14 +96,17 @@ def repeated_rows(accel: Floats, gyro: Floats, moving: Bools) -> Bools:
 
 def _spikes(x: Floats, least: float) -> Bools:
     off = np.zeros(x.size)
-    off[1:-1] = np.abs(x[1:-1] - 0.5 * (x[2:] + x[:-2]))
+    inner = off[1:-1]
+    np.add(x[2:], x[:-2], out=inner)
+    inner *= -0.5
+    inner += x[1:-1]
+    np.abs(off, out=off)
     limit = max(_SPIKE * 1.4826 * float(np.median(off)), least)
     found = off > limit
-    if not found.any():
-        return found
     # The neighbours of a spike are off by half of it.
-    beside = np.maximum(np.append(off[1:], 0.0), np.append(0.0, off[:-1]))
-    return np.asarray(found & (off > beside))
+    found[1:] &= off[1:] > off[:-1]
+    found[:-1] &= off[:-1] > off[1:]
+    return np.asarray(found)
 
 
 def _zeros(x: Floats, moving: Bools) -> Bools:

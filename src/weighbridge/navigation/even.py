@@ -50,7 +50,8 @@ def _interpolated(imu: Imu, time: Floats) -> Even:
     right = np.clip(np.searchsorted(imu.time, time), 1, imu.time.size - 1)
     near = imu.time[right] - imu.time[right - 1] < _LONGEST * imu.period
     columns = [
-        np.where(near, np.interp(time, imu.time, y), np.nan) for y in (*imu.accel.T, *imu.gyro.T)
+        np.where(near, np.interp(time, imu.time, y), np.nan)
+        for y in (*imu.accel.columns, *imu.gyro.columns)
     ]
     return Even(time, np.column_stack(columns))
 

@@ -23,12 +23,14 @@ from weighbridge.kernels.ins_model import (
     SQUAT,
     STDS,
     Q,
+    Rows,
     Samples,
     V,
     new_rows,
 )
 from weighbridge.kernels.ins_smoother import smooth
 from weighbridge.kernels.rotation import matrix_to_euler, quaternion_to_matrix
+from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.state import State
 from weighbridge.signals import Floats, Ints
 
@@ -45,7 +47,8 @@ class Block(NamedTuple):
     Attributes
     ----------
     time : (n,) rising [s]
-    accel : (n, 3) specific force in sensor axes, corrected by `Setup.corrected` [m/s^2]
+    accel : (n, 3) specific force in sensor axes, corrected by `Setup.corrected` [m/s^2];
+        `Axes` are put together where a part of them is taken
     gyro : (n, 3) angular rate likewise [rad/s]
     nodes : (m,) samples after which covariance and measurements are processed, rising
     z : (m, 13) their measurements, NaN where there is none; places are named ``Z_...`` in
@@ -53,8 +56,8 @@ class Block(NamedTuple):
     """
 
     time: Floats
-    accel: Floats
-    gyro: Floats
+    accel: Floats | Axes
+    gyro: Floats | Axes
     nodes: Ints
     z: Floats
 
@@ -130,18 +133,26 @@ def run(state: State, block: Block, setup: Setup) -> tuple[State, Nodes]:
     Samples that are not finite or not later than the last one are left out; over more than
     0.5 s without samples the state is carried with the uncertainty a vehicle can make.
     """
-    x, cov = state.x.copy(), state.cov.ravel().copy()
     count = block.nodes.size
     states, stds = np.empty((count, SHOWN)), np.empty((count, STDS))
+    state = _fold(state, block, setup, new_rows(), states, stds)
+    return state, Nodes(block.time[block.nodes], states, stds)
+
+
+def _fold(
+    state: State, block: Block, setup: Setup, rows: Rows, states: Floats, stds: Floats
+) -> State:
+    """Fold a block into the state; fill what was found at its nodes."""
+    x, cov = state.x.copy(), state.cov.ravel().copy()
     samples = Samples(
         np.ascontiguousarray(block.time),
-        np.ascontiguousarray(block.accel),
-        np.ascontiguousarray(block.gyro),
+        np.ascontiguousarray(block.accel[:]),
+        np.ascontiguousarray(block.gyro[:]),
         np.ascontiguousarray(block.nodes, dtype=np.int64),
         np.ascontiguousarray(block.z),
     )
-    ins.run(x, cov, samples, setup.rot_bs, setup.noise, new_rows(), states, stds)
-    return State(x, cov.reshape(ERRORS, ERRORS)), Nodes(block.time[block.nodes], states, stds)
+    ins.run(x, cov, samples, setup.rot_bs, setup.noise, rows, states, stds)
+    return State(x, cov.reshape(ERRORS, ERRORS))
 
 
 def step(state: State, sample: Sample, setup: Setup) -> State:
@@ -162,25 +173,18 @@ def run_smoothed(state: State, block: Block, setup: Setup) -> tuple[State, Nodes
     count = block.nodes.size
     edges = [*range(0, count, _STRETCH), count]
     cuts = [0, *(int(block.nodes[k - 1]) + 1 for k in edges[1:-1]), block.time.size]
-    parts = [block.part(a, b) for a, b in pairwise(cuts)]
-    begins, ends = [], []
-    for part in parts:
+    stretches = list(zip(pairwise(cuts), pairwise(edges), strict=True))
+    states, stds = np.empty((count, SHOWN)), np.empty((count, STDS))
+    begins = []
+    for cut, (first, last) in stretches:
         begins.append(state)
-        state, nodes = run(state, part, setup)
-        ends.append(nodes)
-    states = np.vstack([n.states for n in ends])
-    stds = np.vstack([n.stds for n in ends])
+        part = block.part(*cut)
+        state = _fold(state, part, setup, new_rows(), states[first:last], stds[first:last])
     log, adjoint = new_rows(_STRETCH), np.zeros(ERRORS)
-    for part, begin, first in zip(
-        reversed(parts), reversed(begins), reversed(edges[:-1]), strict=True
-    ):
-        x, cov = begin.x.copy(), begin.cov.ravel().copy()
-        size = part.nodes.size
-        ins.run(
-            x, cov, Samples(*part), setup.rot_bs, setup.noise, log,
-            states[first : first + size], np.empty((size, STDS)),
-        )  # fmt: skip
-        smooth(log, size, adjoint, states, first)
+    for begin, (cut, (first, last)) in zip(reversed(begins), reversed(stretches), strict=True):
+        part = block.part(*cut)
+        _fold(begin, part, setup, log, states[first:last], np.empty((last - first, STDS)))
+        smooth(log, last - first, adjoint, states, first)
     return state, Nodes(block.time[block.nodes], states, stds)
 
 

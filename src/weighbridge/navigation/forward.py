@@ -23,7 +23,8 @@ from weighbridge.kernels.ins_model import (
     Z_STILL,
 )
 from weighbridge.kernels.rotation import euler_to_matrix
-from weighbridge.navigation.aiding import read_fixes, read_imu, speed_from_fixes
+from weighbridge.navigation.aiding import Imu, read_fixes, read_imu, speed_from_fixes
+from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.even import Even, evenly
 from weighbridge.navigation.filter import Block, Nodes, run
 from weighbridge.navigation.identify.setup import Setup
@@ -304,7 +305,8 @@ def _prepared(sources: Sources, setup: Setup) -> Found | None:
     time = imu.time[sure]
     accel, gyro = setup.corrected(time, imu.accel[sure], imu.gyro[sure])
     first = math.ceil(time[0] * setup.rate)
-    grid = evenly(replace(imu, time=time, accel=accel, gyro=gyro), setup.rate, first)
+    imu = Imu(time, Axes.of(accel), Axes.of(gyro), imu.period)
+    grid = evenly(imu, setup.rate, first)
     reference = undelayed(sources.reference, clocks.speed_delay)
     fix_times = fixes.time - clocks.gnss_delay if fixes is not None else np.empty(0)
     nodes = place_nodes(time, fix_times, setup.rate, setup.settings.max_gap, causal=True)

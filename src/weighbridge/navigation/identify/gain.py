@@ -11,6 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.aiding import resolution
+from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Floats, Signal
@@ -115,13 +116,13 @@ class Gain:
         return np.interp(time, self.time, self.value)
 
 
-def gravity_read(time: Floats, accel: Floats) -> tuple[Floats, Floats]:
+def gravity_read(time: Floats, accel: Axes) -> tuple[Floats, Floats]:
     """Return what an accelerometer reads of gravity, as means over blocks of a minute.
 
     Parameters
     ----------
     time : (n,) [s]
-    accel : (n, 3) specific force [m/s^2]
+    accel : specific force [m/s^2]
 
     Returns
     -------
@@ -130,7 +131,8 @@ def gravity_read(time: Floats, accel: Floats) -> tuple[Floats, Floats]:
     """
     starts = np.flatnonzero(np.diff(np.floor((time - time[0]) / _BLOCK), prepend=-1.0))
     count = np.diff(np.append(starts, time.size))
-    mean = np.add.reduceat(accel, starts) / count[:, None]
+    sums = np.column_stack([np.add.reduceat(x, starts) for x in accel.columns])
+    mean = sums / count[:, None]
     part = np.linalg.norm(mean, axis=1) / GRAVITY
     return np.add.reduceat(time, starts) / count, part
 

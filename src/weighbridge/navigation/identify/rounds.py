@@ -12,6 +12,7 @@ import numpy as np
 from weighbridge.kernels.ins_model import Z_STILL
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.navigation.aiding import Imu, interpolated
+from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.even import Even, coarsely, evenly
 from weighbridge.navigation.filter import Block, run
 from weighbridge.navigation.identify.alignment import (
@@ -165,8 +166,8 @@ def _settled(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Set
             "of the sensor, and were left out",
         )
     if scale.axis is not None:
-        accel = scaled(imu.time, imu.accel, scale.gains, scale.axis)
-        imu = replace(imu, accel=np.ascontiguousarray(accel))
+        accel = scaled(imu.time, imu.accel[:], scale.gains, scale.axis)
+        imu = replace(imu, accel=Axes.of(accel))
     fine = evenly(imu, FINE_RATE)
     aligned, align_notes = align(fine, sources.reference, mounting)
     shifted = undelayed(sources.reference, aligned.speed_delay)
@@ -177,12 +178,7 @@ def _settled(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Set
     keep = ~unsure(imu.time, changes)
     time = imu.time[keep]
     values = undo(time, np.hstack([imu.accel[keep], imu.gyro[keep]]), changes)
-    imu = Imu(
-        time,
-        np.ascontiguousarray(values[:, :3]),
-        np.ascontiguousarray(values[:, 3:]),
-        imu.period,
-    )
+    imu = Imu(time, Axes.of(values[:, :3]), Axes.of(values[:, 3:]), imu.period)
     fine = evenly(imu, FINE_RATE)
     aligned, align_notes = align(fine, sources.reference, mounting)
     moved = told(changes, float(time[0]), float(time[-1]))

@@ -22,6 +22,10 @@ _RAMP_SURE: Final = 12.0
 """Further squared error that a ramp must explain, over its variance [-]."""
 
 
+_AT_ONCE: Final = 1 << 21
+"""Values of trial ramps made at a time: all of a long drive's would fill the memory."""
+
+
 @dataclass(frozen=True, slots=True)
 class Step:
     """The step or ramp that explains most.
@@ -56,14 +60,18 @@ def fitted(at: Floats, y: Floats, weight: Floats, floor: float, *, like: float) 
     span = float(at[-1] - at[0])
     lengths = [1e-3, *(r for r in _RAMPS if r < 0.8 * span), *(part * span for part in _PARTS)]
     where, long = (x.ravel() for x in np.meshgrid(centers, np.array(lengths)))
-    shape = np.clip((at[None, :] - where[:, None]) / long[:, None] + 0.5, 0.0, 1.0)
     total = float(weight.sum())
     mean = float(weight @ y) / total
     off = y - mean
-    means = (shape @ weight) / total
-    centred = shape - means[:, None]
-    spread = centred**2 @ weight
-    common = centred @ (weight * off)
+    means, spread, common = (np.empty(where.size) for _ in range(3))
+    each = max(1, _AT_ONCE // at.size)
+    for first in range(0, where.size, each):
+        part = slice(first, first + each)
+        shape = np.clip((at - where[part, None]) / long[part, None] + 0.5, 0.0, 1.0)
+        means[part] = (shape @ weight) / total
+        shape -= means[part, None]
+        common[part] = shape @ (weight * off)
+        spread[part] = np.square(shape, out=shape) @ weight
     explained = np.where(spread > 0.1, common**2 / np.maximum(spread, 1e-9), 0.0)
     step = int(np.argmax(explained[: centers.size]))
     ramp = int(np.argmax(explained))
