@@ -225,7 +225,7 @@ def test_panics_of_the_reading_library(tmp_path, monkeypatch, capfd, name):
     else:
         shutil.copy(GOLDEN / "parquet" / "obd.parquet", log)
     monkeypatch.setattr(pl, "read_csv", panic)
-    monkeypatch.setattr(pl, "read_parquet", panic)
+    monkeypatch.setattr(pl, "scan_parquet", panic)
     with pytest.raises(DriveError, match="index out of bounds"):
         read_drive(log)
     assert capfd.readouterr().err == ""

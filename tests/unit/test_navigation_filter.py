@@ -92,11 +92,11 @@ def test_any_split_of_the_samples_gives_the_same(size):
         assert_array_equal(before[1], state.cov)
         state = pickle.loads(pickle.dumps(after))
         states.append(part.states)
-        stds.append(part.stds)
+        stds.append(part.grade_std)
     assert_array_equal(state.x, whole.x)
     assert_array_equal(state.cov, whole.cov)
     assert_array_equal(np.vstack(states), nodes.states)
-    assert_array_equal(np.vstack(stds), nodes.stds)
+    assert_array_equal(np.concatenate(stds), nodes.grade_std)
     assert_array_equal(whole.cov, whole.cov.T)
     assert whole.time == block.time[-1]
 
@@ -130,7 +130,7 @@ def test_samples_that_are_no_numbers_or_late_are_left_out(fault):
     time[303] = time[250]
     state, nodes = run(setup.start, Block(time, accel, gyro, block.nodes, block.z), setup)
     assert np.isfinite(state.x).all()
-    assert np.isfinite(nodes.stds).all()
+    assert np.isfinite(nodes.grade_std).all()
     assert_allclose(state.x[V : V + 3], usual.x[V : V + 3], atol=0.05)
 
 
@@ -140,7 +140,7 @@ def test_the_forward_pass_carries_no_log():
     end, smoothed = run_smoothed(setup.start, block, setup)
     assert_array_equal(ahead.x, end.x)
     assert_array_equal(ahead.cov, end.cov)
-    assert_array_equal(nodes.stds, smoothed.stds)
+    assert_array_equal(nodes.grade_std, smoothed.grade_std)
     assert_allclose(smoothed.states[-1], nodes.states[-1], atol=1e-12)
     assert np.abs(smoothed.states[0] - nodes.states[0]).max() > 1e-6
 

@@ -27,7 +27,13 @@ def means(signal: Signal, at: Floats) -> tuple[Floats, Bools]:
     full : (n,) no gap of more than a quarter of the window in or at it
     """
     t, v = signal.time, signal.values
-    area = np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))))
+    # In place: several copies of a day's samples at 200 Hz would fill the memory.
+    area = np.zeros(t.size)
+    pieces = area[1:]
+    np.add(v[1:], v[:-1], out=pieces)
+    pieces *= 0.5
+    pieces *= np.diff(t)
+    np.cumsum(pieces, out=pieces)
     mean = np.diff(np.interp(at, t, area)) / np.diff(at)
     return mean, _full(signal, at)
 
@@ -35,8 +41,8 @@ def means(signal: Signal, at: Floats) -> tuple[Floats, Bools]:
 def _full(signal: Signal, at: Floats) -> Bools:
     t = signal.time
     limit = 0.25 * float(at[1] - at[0])
-    gap_ends = t[1:][np.diff(t) > limit]
-    gap_starts = t[:-1][np.diff(t) > limit]
+    gaps = np.flatnonzero(np.diff(t) > limit)
+    gap_starts, gap_ends = t[gaps], t[gaps + 1]
     inside = (at[:-1] >= t[0] - limit) & (at[1:] <= t[-1] + limit)
     # A gap touches a window that starts before it ends and ends after it starts.
     ended = np.searchsorted(gap_ends, at[:-1], side="right")

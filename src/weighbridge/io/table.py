@@ -38,6 +38,9 @@ _HEAD: Final = 1 << 18
 
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
 
+_ROWS: Final = 1 << 18
+"""Rows of a Parquet table read at a time."""
+
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
 
@@ -75,6 +78,8 @@ class RawTable:
     path : the file
     names : all its columns
     frame : cells, columns named by their place "0", "1", …; text cells as text
+    plain : columns of numbers that are not in ``frame``, by their place, and how many of their
+        cells are not-a-number; NaN there and where a cell is empty
     notes : what was odd about the file itself
     separator : found or given; empty for Parquet
     missing : texts that mean "no value", lower case
@@ -88,11 +93,12 @@ class RawTable:
     missing: frozenset[str] = frozenset(MISSING)
     decimal: str = "."
     notes: list[str] = field(default_factory=list)
+    plain: dict[int, tuple[Floats, int]] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
         """Number of rows."""
-        return self.frame.height
+        return next((values.size for values, _ in self.plain.values()), self.frame.height)
 
     def index(self, name: str) -> int | None:
         """Place of a column; spaces and case do not count where that is unambiguous."""
@@ -104,7 +110,14 @@ class RawTable:
 
     def column(self, index: int) -> pl.Series:
         """One column as it stands in the file."""
+        if index in self.plain:
+            return pl.Series(str(index), self.plain[index][0])
         return self.frame[str(index)]
+
+    def release(self, index: int) -> None:
+        """Hold a column no longer that was read and is not the last one."""
+        if len(self.plain) > 1:
+            self.plain.pop(index, None)
 
     def numbers(self, index: int) -> tuple[Floats, list[str]]:
         """Read a column as numbers.
@@ -119,7 +132,11 @@ class RawTable:
         DriveError
             Most of the column is text.
         """
-        series, name, notes = _plain_text(self.column(index)), self.names[index], []
+        name = self.names[index]
+        if index in self.plain:
+            values, nans = self.plain[index]
+            return values, _nan_notes(nans, values.size, name)
+        series, notes = _plain_text(self.column(index)), []
         if series.dtype == pl.String:
             text = series.str.strip_chars()
             if self.decimal == ",":
@@ -153,13 +170,16 @@ class RawTable:
             )
         elif series.dtype != pl.Float64:
             series = series.cast(pl.Float64, strict=False)
-        if nans := int(series.is_nan().sum() or 0):
-            notes.append(f"{nans} of {series.len()} cells of {name!r} are NaN and were left out")
+        notes += _nan_notes(int(series.is_nan().sum() or 0), series.len(), name)
         values = series.to_numpy()
         # Kernels are compiled for arrays that can be written to and lie in one piece.
         if not (values.flags.writeable and values.flags.c_contiguous):
             values = np.array(values, dtype=np.float64)
         return np.asarray(values, dtype=np.float64), notes
+
+
+def _nan_notes(nans: int, cells: int, name: str) -> list[str]:
+    return [f"{nans} of {cells} cells of {name!r} are NaN and were left out"] if nans else []
 
 
 def _plain_text(series: pl.Series) -> pl.Series:
@@ -315,19 +335,53 @@ def read_parquet(path: Path, text_format: TextFormat | None = None) -> RawTable:
         Not a Parquet file, or only the first part of one.
     """
     try:
-        # An open file: a path would be taken for a pattern, and joined with its neighbours.
         with path.open("rb") as file, quietly():
-            frame = pl.read_parquet(file)
+            # A path is no pattern, by which a file would be joined with its neighbours; one that
+            # is no text cannot be handed over.
+            source = path.absolute() if _is_text(path) else file
+            table = pl.scan_parquet(source, glob=False, hive_partitioning=False)
+            schema = table.collect_schema()
+            names = tuple(schema.names())
+            kinds = [kind == pl.Float64 for kind in schema.dtypes()]
+            if len(names) <= MOST_COLUMNS:
+                plain = {k: _numbers(table, names[k]) for k, there in enumerate(kinds) if there}
+                others = [k for k, there in enumerate(kinds) if not there]
+                frame = table.select([pl.col(names[k]).alias(str(k)) for k in others]).collect()
     except (*PARSE_ERRORS, OSError) as e:
         raise DriveError(
             f"{path} is not a readable Parquet file ({first_line(e)}); "
             "it may have been cut off: copy or convert it again"
         ) from None
-    names = tuple(frame.columns)
     if len(names) > MOST_COLUMNS:
         raise DriveError(f"{path} has {len(names)} columns, and a table may have {MOST_COLUMNS}")
-    frame.columns = [str(i) for i in range(len(names))]
-    return RawTable(path, names, frame)
+    return RawTable(path, names, frame, plain=plain)
+
+
+def _is_text(path: Path) -> bool:
+    """Tell whether a path can be written in UTF-8."""
+    try:
+        str(path.absolute()).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _numbers(table: pl.LazyFrame, name: str) -> tuple[Floats, int]:
+    """Read a column of numbers by and by, so that it is in the memory once.
+
+    Returns
+    -------
+    values : (n,) NaN where a cell is empty
+    nans : cells that are not-a-number
+    """
+    column = table.select(pl.col(name))
+    values = np.empty(int(table.select(pl.len()).collect().item()))
+    nans = 0
+    for first in range(0, values.size, _ROWS):
+        part = column.slice(first, _ROWS).collect()[name]
+        values[first : first + _ROWS] = part.to_numpy()
+        nans += int(part.is_nan().sum() or 0)
+    return values, nans
 
 
 def time_seconds(
@@ -354,14 +408,13 @@ def time_seconds(
     DriveError
         The column holds no times in that format.
     """
-    series = table.column(index)
-    if series.dtype.is_temporal():
-        return (*_temporal(series), [])
+    if index not in table.plain and table.column(index).dtype.is_temporal():
+        return (*_temporal(table.column(index)), [])
     if time_format is None:
         values, notes = table.numbers(index)
         seconds = values * unit_factor if unit_factor != 1.0 else values
         return seconds, since_1970(seconds), notes
-    text = series.cast(pl.String).str.strip_chars()
+    text = table.column(index).cast(pl.String).str.strip_chars()
     if time_format == "clock":
         part = text.str.extract_groups(r"^(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)$").struct.unnest()
         hour, minute, second = (

@@ -98,6 +98,8 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
         values, notes = raw.numbers(i)
         log.problems += [Problem(name, f"{raw.path.name}: {note}") for note in notes]
         columns.append((name, to_si(values, suffix) if suffix else values))
+        del values
+        raw.release(i)
     _finish(log, raw, time, columns)
     return log
 

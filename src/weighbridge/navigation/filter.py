@@ -89,13 +89,12 @@ class Nodes(NamedTuple):
     ----------
     time : (m,) [s]
     states : (m, 24) first part of the filter state
-    stds : (m, 7) standard deviations; places are named ``S_...`` in
-        `weighbridge.kernels.ins_model`
+    grade_std : (m,) standard deviation of the grade [rad]
     """
 
     time: Floats
     states: Floats
-    stds: Floats
+    grade_std: Floats
 
 
 class MotionRow(NamedTuple):
@@ -136,7 +135,7 @@ def run(state: State, block: Block, setup: Setup) -> tuple[State, Nodes]:
     count = block.nodes.size
     states, stds = np.empty((count, SHOWN)), np.empty((count, STDS))
     state = _fold(state, block, setup, new_rows(), states, stds)
-    return state, Nodes(block.time[block.nodes], states, stds)
+    return state, Nodes(block.time[block.nodes], states, stds[:, S_GRADE].copy())
 
 
 def _fold(
@@ -166,26 +165,28 @@ def step(state: State, sample: Sample, setup: Setup) -> State:
 def run_smoothed(state: State, block: Block, setup: Setup) -> tuple[State, Nodes]:
     """Fold a block, then go backward over its nodes.
 
-    The states of the nodes are smoothed, their standard deviations and the state at the end
-    are those of the forward pass. One stretch after another is run again from where it began:
+    The states of the nodes are smoothed, the standard deviation of the grade and the state at the
+    end are those of the forward pass. One stretch after another is run again from where it began:
     the covariances of a whole drive would fill the memory.
     """
     count = block.nodes.size
     edges = [*range(0, count, _STRETCH), count]
     cuts = [0, *(int(block.nodes[k - 1]) + 1 for k in edges[1:-1]), block.time.size]
     stretches = list(zip(pairwise(cuts), pairwise(edges), strict=True))
-    states, stds = np.empty((count, SHOWN)), np.empty((count, STDS))
+    states, grade_std = np.empty((count, SHOWN)), np.empty(count)
+    stds = np.empty((_STRETCH, STDS))
     begins = []
     for cut, (first, last) in stretches:
         begins.append(state)
         part = block.part(*cut)
-        state = _fold(state, part, setup, new_rows(), states[first:last], stds[first:last])
+        state = _fold(state, part, setup, new_rows(), states[first:last], stds)
+        grade_std[first:last] = stds[: last - first, S_GRADE]
     log, adjoint = new_rows(_STRETCH), np.zeros(ERRORS)
     for begin, (cut, (first, last)) in zip(reversed(begins), reversed(stretches), strict=True):
         part = block.part(*cut)
-        _fold(begin, part, setup, log, states[first:last], np.empty((last - first, STDS)))
+        _fold(begin, part, setup, log, states[first:last], stds)
         smooth(log, last - first, adjoint, states, first)
-    return state, Nodes(block.time[block.nodes], states, stds)
+    return state, Nodes(block.time[block.nodes], states, grade_std)
 
 
 def motion_at(state: State, setup: Setup) -> MotionRow:

@@ -14,11 +14,9 @@ from weighbridge.kernels.ins_model import (
     E_SCALE,
     E_SQUAT,
     PITCH0,
-    S_GRADE,
     SCALE,
     SHOWN,
     SQUAT,
-    STDS,
     YAW0,
     Z_STILL,
 )
@@ -104,7 +102,7 @@ class ForwardState(NamedTuple):
 
 def begin(setup: Setup, start: float) -> ForwardState:
     """Return the state before the first sample, which comes at ``start`` [s] or later."""
-    nothing = Nodes(np.empty(0), np.empty((0, SHOWN)), np.empty((0, STDS)))
+    nothing = Nodes(np.empty(0), np.empty((0, SHOWN)), np.empty(0))
     row = math.ceil(start * setup.rate)
     return ForwardState(setup.start, -math.inf, nothing, None, row, Level())
 
@@ -224,7 +222,7 @@ def _laid_out(
         valid=np.isfinite(known) & _aided(found, time),
         specific_force_std=setup.specific_force_std,
         specific_force_scale_std=setup.scale_std,
-        grade_std=np.hypot(_at(time, nodes, S_GRADE), floor),
+        grade_std=np.hypot(_grade_std_at(time, nodes), floor),
         speed_scale=float(end[SCALE]) if has_scale else None,
         speed_scale_std=float(end_std[E_SCALE]) if has_scale else None,
         squat=float(end[SQUAT]) if setup.use_squat else None,
@@ -339,10 +337,10 @@ def held(y: Floats, before: float) -> Floats:
     return np.where(last >= 0, y[np.maximum(last, 0)], before)
 
 
-def _at(time: Floats, nodes: Nodes, std: int) -> Floats:
-    """Standard deviation (n,) of the last node."""
+def _grade_std_at(time: Floats, nodes: Nodes) -> Floats:
+    """Standard deviation of the grade (n,) at the last node [rad]."""
     place = np.searchsorted(nodes.time, time, side="right") - 1
-    return np.asarray(nodes.stds[np.maximum(place, 0), std])
+    return np.asarray(nodes.grade_std[np.maximum(place, 0)])
 
 
 def _levelled_so_far(

@@ -16,8 +16,8 @@ from weighbridge.kernels.ins_model import (
     E_SCALE,
     E_SQUAT,
     E_YAW0,
+    MEASUREMENTS,
     PITCH0,
-    S_GRADE,
     SCALE,
     SQUAT,
     YAW0,
@@ -50,14 +50,18 @@ _SCALE_FOUND: Final = 0.02
 _STANDS: Final = 0.02
 """Slower is standing [m/s]."""
 
+_AT_ONCE: Final = 1 << 16
+"""Nodes whose angles are found at a time."""
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(slots=True)
 class Found:
     """Samples and measurements of a drive, prepared for the filter.
 
     Attributes
     ----------
-    block : samples, nodes and measurements
+    block : samples, nodes and measurements; without measurements once `smoothed_motion` has
+        folded them, since those of a day take 200 MB
     grid : low-passed inertial samples on the even clock, sensor axes
     reference : a speed without its delay
     fixes : of GNSS; None without
@@ -102,7 +106,8 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
     """
     fold = run_smoothed if setup.settings.smooth else run
     state, nodes = fold(setup.start, found.block, setup)
-    end = nodes.states[-1] if setup.settings.smooth else state.x
+    found.block = found.block._replace(z=np.empty((0, MEASUREMENTS)))
+    end = nodes.states[-1].copy() if setup.settings.smooth else state.x
     end_std = np.sqrt(np.maximum(np.diag(state.cov), 0.0))
     time = found.grid.time
     pose = pose_at(time, nodes)
@@ -115,6 +120,9 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
             pitch0=np.interp(time, nodes.time, nodes.states[:, PITCH0]),
             yaw0=np.interp(time, nodes.time, nodes.states[:, YAW0]),
         )
+    grade_std = np.interp(time, nodes.time, nodes.grade_std)
+    # As large as the motion that is made of it.
+    del nodes
     accel = accel_along(found.grid, pose, constants, setup)
     lean = averaged(float(time[1] - time[0]), bridged(time, accel))
     grade = pose.pitch - constants.pitch0 - constants.squat * lean
@@ -138,7 +146,7 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
         grade=grade,
         valid=valid,
         specific_force_std=noise_level(force[valid]),
-        grade_std=np.hypot(np.interp(time, nodes.time, nodes.stds[:, S_GRADE]), floor),
+        grade_std=np.hypot(grade_std, floor),
         speed_scale=float(end[SCALE]) if found_scale else None,
         speed_scale_std=float(end_std[E_SCALE]) if found_scale else None,
         squat=squat if shown or known else None,
@@ -191,13 +199,18 @@ def pose_at(time: Floats, nodes: Nodes, *, longest: float = math.inf) -> Pose:
         time = _held_time(time, nodes.time, longest)
     states = nodes.states
     angles = np.empty((nodes.time.size, 3))
-    quaternions_to_euler(np.ascontiguousarray(states[:, Q : Q + 4]), angles)
+    for first in range(0, nodes.time.size, _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        quaternions_to_euler(np.ascontiguousarray(states[part, Q : Q + 4]), angles[part])
 
     def on_grid(y: Floats) -> Floats:
         return np.interp(time, nodes.time, y)
 
     def three(first: int) -> Floats:
-        return np.column_stack([on_grid(states[:, first + i]) for i in range(3)])
+        out = np.empty((time.size, 3))
+        for i in range(3):
+            out[:, i] = on_grid(states[:, first + i])
+        return out
 
     return Pose(
         on_grid(angles[:, 0]),

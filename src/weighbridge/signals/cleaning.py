@@ -208,13 +208,13 @@ def spread_rows(time: Floats) -> tuple[Floats, float] | None:
     places = np.flatnonzero(np.isfinite(time))
     present = time[places]
     steps = np.diff(present)
-    ahead = steps[steps > 0.0]
-    if present.size < FEWEST_ROWS or ahead.size < 2:
-        return None
-    step = float(ahead.min())
-    uneven = np.abs(ahead / step - np.rint(ahead / step)) > 1e-3
     shared = np.count_nonzero(steps == 0.0)
-    if step < COARSE or uneven.any() or shared < SHARED * present.size:
+    if present.size < FEWEST_ROWS or shared < SHARED * present.size:
+        return None
+    ahead = steps[steps > 0.0]
+    if ahead.size < 2 or (step := float(ahead.min())) < COARSE:
+        return None
+    if (np.abs(ahead / step - np.rint(ahead / step)) > 1e-3).any():
         return None
     starts = np.flatnonzero(np.concatenate(([True], steps != 0.0)))
     count = np.diff(np.append(starts, present.size))

@@ -225,16 +225,16 @@ def _stops(speed: Signal) -> list[Cut]:
 
 
 def _between(drive: Drive, start: float, end: float) -> Drive:
-    """Samples from one instant to another; what is sent rarely goes on to hold."""
+    """Samples from one instant to another, not copied; what is sent rarely goes on to hold."""
     clocks: dict[int, tuple[slice, Floats]] = {}
     signals = {}
     for name, s in drive.signals.items():
         if id(s.time) not in clocks:
             a, b = np.searchsorted(s.time, start), np.searchsorted(s.time, end, side="right")
-            clocks[id(s.time)] = slice(int(a), int(b)), s.time[a:b].copy()
+            clocks[id(s.time)] = slice(int(a), int(b)), s.time[a:b]
         rows, time = clocks[id(s.time)]
         if time.size:
-            signals[name] = Signal(name, time, s.values[rows].copy())
+            signals[name] = Signal(name, time, s.values[rows])
     begin = min((float(s.time[0]) for s in signals.values()), default=start)
     for name, s in drive.signals.items():
         rows, time = clocks[id(s.time)]

@@ -213,14 +213,8 @@ def _identified(
     z[:, Z_STILL] = still
     moved_time, moved_var = openings(imu.time, settled.changes)
     open_mounting(z, node_time, moved_time, moved_var)
-    block = Block(imu.time, imu.accel, imu.gyro, nodes, z)
-    begin = Begin(
-        grid.time,
-        grid.values[:, :3] @ aligned.rot_bs.T,
-        grid.values[:, 3:] @ aligned.rot_bs.T,
-        interpolated(reference, grid.time, 3.0),
-        np.interp(grid.time, node_time, still) > 1.9,
-    )
+    found = Found(Block(imu.time, imu.accel, imu.gyro, nodes, z), grid, reference, fixes)
+    del z
     free_scale = sources.wheel is not None and fixes is not None
     setup = Setup(
         settings=settings,
@@ -228,7 +222,19 @@ def _identified(
         rot_bs=aligned.rot_bs,
         clocks=clocks,
         noise=settings.noise(),
-        start=first_state(begin, aligned, fixes, settings, free_scale),
+        start=first_state(
+            Begin(
+                grid.time,
+                grid.values[:, :3] @ aligned.rot_bs.T,
+                grid.values[:, 3:] @ aligned.rot_bs.T,
+                interpolated(reference, grid.time, 3.0),
+                np.interp(grid.time, node_time, still) > 1.9,
+            ),
+            aligned,
+            fixes,
+            settings,
+            free_scale,
+        ),
         given=aligned.given,
         changes=settled.changes,
         moved_time=moved_time,
@@ -242,10 +248,10 @@ def _identified(
         notes=settled.notes,
     )
     cut = int(np.searchsorted(node_time, float(sources.imu.time[0]) + _FIRST_PASS)) + 1
-    end, _ = run(setup.start, block.part(0, int(nodes[min(nodes.size, cut) - 1]) + 1), setup)
+    end, _ = run(setup.start, found.block.part(0, int(nodes[min(nodes.size, cut) - 1]) + 1), setup)
     rot_bs, start = restarted(setup.rot_bs, setup.start, end)
     setup = replace(setup, rot_bs=rot_bs, start=start)
-    motion = smoothed_motion(Found(block, grid, reference, fixes), setup)
+    motion = smoothed_motion(found, setup)
     return (
         replace(
             setup,
