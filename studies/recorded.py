@@ -29,7 +29,7 @@ from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.joint.slow_errors import design, prior_std
 from weighbridge.estimators.regression import regression
-from weighbridge.estimators.squat import SQUAT, Lean
+from weighbridge.estimators.squat import SQUAT, ResidualSquat
 from weighbridge.io.candump import read_candump
 from weighbridge.io.j1939 import decode_j1939
 from weighbridge.kernels.rotation import euler_to_matrix
@@ -181,7 +181,7 @@ def bmw_loads() -> str:
         return np.append(prior_std(vehicle, *given, **options), inertias)
 
     def usual_lean(*_):  # type: ignore[no-untyped-def]
-        return Lean(*SQUAT)
+        return ResidualSquat(*SQUAT)
 
     lines = [
         "| | narrowest third % | December kg | heavier than December kg | slope "

@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 
 from weighbridge.balance import force_balance
 from weighbridge.estimators.considered import (
+    fit_consider_std,
     force_columns,
     from_triangle,
-    open_std,
     pinned,
     sensitivity,
     triangle,
@@ -110,7 +110,7 @@ def test_a_drive_like_the_calibration_is_as_sure_as_its_scale_and_another_is_not
     cov = np.diag([4.0, 9.0])
     alike, other = np.array([30.0, 20.0]), np.array([45.0, 0.0])
     car = replace(CAR, provenance=Provenance(fit_cov=triangle(pinned(cov, alike))))
-    assert open_std(car, 1.1 * alike, 1000.0) == pytest.approx(0.0, abs=1e-9)
+    assert fit_consider_std(car, 1.1 * alike, 1000.0) == pytest.approx(0.0, abs=1e-9)
     # By hand: the first parameter keeps 1 / (1/4 + 30^2 / (20^2 * 9)) of its variance.
-    assert open_std(car, other, 1000.0) == pytest.approx(0.045 * np.sqrt(2.0))
-    assert open_std(CAR, other, 1000.0) == 0.0
+    assert fit_consider_std(car, other, 1000.0) == pytest.approx(0.045 * np.sqrt(2.0))
+    assert fit_consider_std(CAR, other, 1000.0) == 0.0

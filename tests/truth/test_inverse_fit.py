@@ -35,7 +35,7 @@ def sagging(engine):
     return growing(engine) * (1.0 - 0.12 * np.exp(-(((engine - 150.0) / 35.0) ** 2)))
 
 
-def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, grade_open=0.008):
+def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, unmeasured_grade=0.008):
     """One drive at 2 Hz whose reading is the share of a full-load torque."""
     time = 0.5 * np.arange(n)
     stretch = (time // 12.0).astype(int)
@@ -56,7 +56,7 @@ def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, grade_open=0.008
         air_speed=speed, air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
     )  # fmt: skip
     motion = SimpleNamespace(
-        source="speed", specific_force_std=motion_noise, grade_open=grade_open,
+        source="speed", specific_force_std=motion_noise, unmeasured_grade=unmeasured_grade,
         mean_accel_std=lambda length: motion_noise / np.sqrt(2.0 * length),
     )  # fmt: skip
     return DriveRows(
@@ -68,7 +68,7 @@ def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, grade_open=0.008
 def settings_of_load(*, knots=(), knot=0.0):
     return FitSettings(
         source=TORQUE_SOURCES["load"], order=2, curved=True, knots=knots, torque_noise=5.0,
-        bounds=TorqueTerms(offset=0.5, growth=0.5, lean=1.0, bend=0.5, knot=knot),
+        bounds=TorqueTerms(offset=0.5, growth=0.5, speed_growth=1.0, bend=0.5, knot=knot),
         wheel_radius=RADIUS, prior=VEHICLE_CLASSES["car"].road_prior(single_speed=False),
     )  # fmt: skip
 
@@ -90,7 +90,7 @@ def test_masses_far_apart_pin_the_rolling_resistance():
     stds = []
     for masses in ((MASS,) * 3, (MASS, 2.0 * MASS, 3.0 * MASS)):
         rng = np.random.default_rng(4)
-        drives = [made(rng, 0.05, mass=mass, grade_open=0.0) for mass in masses]
+        drives = [made(rng, 0.05, mass=mass, unmeasured_grade=0.0) for mass in masses]
         found = fit(drives, settings_of_load())
         road = np.array(found.road)
         stds.append(found.stds[-4:])
@@ -145,7 +145,10 @@ def gusty(rng, mass):
         air_speed=speed, air_density=1.2 * one, fuel_burnt=zero, reason=np.zeros(n, dtype=np.uint8),
     )  # fmt: skip
     motion = SimpleNamespace(
-        source="inertial", specific_force_std=0.01, grade_open=0.0, mean_accel_std=lambda _: 0.0
+        source="inertial",
+        specific_force_std=0.01,
+        unmeasured_grade=0.0,
+        mean_accel_std=lambda _: 0.0,
     )
     return DriveRows(
         view=view, regressor=force / gearing, engine_speed=gearing * speed,
@@ -156,7 +159,7 @@ def gusty(rng, mass):
 def test_what_gusts_confound_stays_open():
     settings = FitSettings(
         source=TORQUE_SOURCES["percent"], order=0, curved=False, knots=(), torque_noise=5.0,
-        bounds=TorqueTerms(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012),
+        bounds=TorqueTerms(offset=0.05, growth=0.02, speed_growth=0.03, bend=0.05, knot=0.012),
         wheel_radius=0.5, prior=VEHICLE_CLASSES["truck"].road_prior(single_speed=False),
     )  # fmt: skip
     told = {fit: [], fit_with_gusts: []}

@@ -76,7 +76,7 @@ NORTH, EAST = law.wind_columns(VIEW)
         (law.torque_offset_column(VIEW), [10.0, 5.0]),
         # The engine turns at its 200 rad/s, and at a quarter of them.
         (law.torque_growth_column(VIEW), [10.0, 5.0 * 0.25]),
-        (law.lean_column(VIEW.accel), [4.905, -9.81]),
+        (law.squat_column(VIEW.accel), [4.905, -9.81]),
         # 4.5 / 0.09 + 0.2 x 100; + 0.2 x 25.
         (law.rotating_mass(CAR, VIEW.gearing), [70.0, 55.0]),
         (law.drag_force(VIEW, CAR), [225.0, -4.8]),

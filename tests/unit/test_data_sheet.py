@@ -12,7 +12,7 @@ from weighbridge.balance.table import MergedView
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
-from weighbridge.estimators.judging import LEAN_STD, uncalibrated_std
+from weighbridge.estimators.judging import SQUAT_STD, uncalibrated_std
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.data_sheet import (
     ACCESSORY_POWER,
@@ -71,7 +71,7 @@ def test_what_was_fitted_at_the_wheels_is_left_alone(vehicle):
 def test_the_interval_holds_torque_efficiency_radius_and_lean():
     electric = Vehicle(driveline=Driveline(gearings=(30.0,)))
     assert_allclose(scale_std(electric), np.sqrt(0.03**2 + 0.01**2 + 0.015**2))
-    leaning = np.hypot(scale_std(electric), LEAN_STD)
+    leaning = np.hypot(scale_std(electric), SQUAT_STD)
     for source, squat, expected in (
         ("speed", None, scale_std(electric)),
         ("inertial", None, leaning),

@@ -26,7 +26,7 @@ def done(three):
         r_squared=fitted.fit.r_squared,
         tests=tests,
         starts=((800.0, 800.4, 810.0), (2000.0, 1999.0, 1900.0)),
-        told=((900.0, 900.1, 0.5),),
+        stated=((900.0, 900.1, 0.5),),
         trials=(trial, trial),
     )
 

@@ -6,10 +6,10 @@ import pytest
 from weighbridge.errors import DriveError
 from weighbridge.vehicle.gear import (
     detect_gearings,
-    number_told_gears,
+    number_reported_gears,
     predict_gear,
+    reported_gear_numbers,
     shifting,
-    told_gear_numbers,
 )
 
 GEARINGS = np.array([36.0, 22.0, 14.5, 10.6, 8.4])
@@ -89,12 +89,12 @@ def test_gears_told_are_numbered_by_the_gearings_of_the_file():
     gearings = np.array([18.9, 14.7, 10.5])
     told = np.repeat([2, 3, 4, 0, -1, 9], 10)
     ratio = np.repeat([18.8, 14.8, 10.5, 30.0, 40.0, np.nan], 10)
-    gear = number_told_gears(told, told_gear_numbers(told, ratio, gearings))
+    gear = number_reported_gears(told, reported_gear_numbers(told, ratio, gearings))
     assert gear[::10].tolist() == [1, 2, 3, 0, 0, 0]
 
 
 def test_a_gear_told_that_slips_keeps_its_number():
     told = np.full(10, 2)
-    numbers = told_gear_numbers(told, np.full(10, 17.0), np.array([18.9, 14.7, 10.5]))
-    gear = number_told_gears(told, numbers)
+    numbers = reported_gear_numbers(told, np.full(10, 17.0), np.array([18.9, 14.7, 10.5]))
+    gear = number_reported_gears(told, numbers)
     assert gear.tolist() == [2] * 10

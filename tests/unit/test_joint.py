@@ -86,7 +86,7 @@ def test_a_body_that_leans_with_its_load_costs_little(balance, car, monkeypatch)
         return abs(joint.estimate(leaning, car).mass / upright - 1.0)
 
     allowed = off()
-    monkeypatch.setattr(problem, "LOAD_LEAN_STD", 0.0)
+    monkeypatch.setattr(problem, "LOAD_PITCH_STD", 0.0)
     assert allowed < 0.7 * off()
 
 
@@ -140,7 +140,7 @@ def test_what_noise_of_the_motion_takes_reaches_mass_and_interval(balance, car, 
 
 def test_what_the_fit_left_open_reaches_the_interval(balance, car, monkeypatch):
     real = joint.estimate(balance, car)
-    monkeypatch.setattr(batch, "open_std", lambda *_: 0.05)
+    monkeypatch.setattr(batch, "fit_consider_std", lambda *_: 0.05)
     wide = joint.estimate(balance, car)
     assert wide.mass == real.mass
     assert wide.std > UNMODELLED * 0.05 * wide.mass

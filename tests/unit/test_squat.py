@@ -12,10 +12,10 @@ from weighbridge.estimators import joint
 from weighbridge.estimators.squat import (
     DRIVE_STD,
     SQUAT,
-    Lean,
-    lean,
+    ResidualSquat,
     of_vehicle,
     pooled,
+    residual_squat,
     squat_at,
     squat_by_speed,
 )
@@ -38,8 +38,8 @@ def weighed():
 
 def seen(balance, squat, *, factor):
     """The balance with ``factor`` of a lean in its readings, and the squat the drive shows."""
-    leaned = factor * GRAVITY * K * balance.merged.accel
-    view = replace(balance.merged, specific_force=balance.merged.specific_force + leaned)
+    squat_accel = factor * GRAVITY * K * balance.merged.accel
+    view = replace(balance.merged, specific_force=balance.merged.specific_force + squat_accel)
     std = None if squat is None else 2e-4
     return replace(balance, merged=view, motion=replace(balance.motion, squat=squat, squat_std=std))
 
@@ -90,15 +90,15 @@ def test_without_a_calibration_an_unknown_squat_widens_the_interval(weighed):
 @pytest.mark.parametrize(
     ("calibrated_by", "given", "weighed_by", "shown", "expected"),
     [
-        ("inertial", K, "inertial", K, Lean(0.0, 2e-4)),
-        ("inertial", K, "speed", None, Lean(0.0, 0.0)),
-        ("inertial", None, "longitudinal_accel", None, Lean(0.0, 0.0)),
-        ("inertial", None, "speed", None, Lean(-SQUAT[0], SQUAT[1])),
-        ("speed", None, "speed_grade", None, Lean(0.0, 0.0)),
-        ("speed", None, "inertial", K, Lean(0.0, 2e-4)),
-        ("speed", None, "inertial", None, Lean(*SQUAT)),
+        ("inertial", K, "inertial", K, ResidualSquat(0.0, 2e-4)),
+        ("inertial", K, "speed", None, ResidualSquat(0.0, 0.0)),
+        ("inertial", None, "longitudinal_accel", None, ResidualSquat(0.0, 0.0)),
+        ("inertial", None, "speed", None, ResidualSquat(-SQUAT[0], SQUAT[1])),
+        ("speed", None, "speed_grade", None, ResidualSquat(0.0, 0.0)),
+        ("speed", None, "inertial", K, ResidualSquat(0.0, 2e-4)),
+        ("speed", None, "inertial", None, ResidualSquat(*SQUAT)),
         # A vehicle file that does not say how its drives moved.
-        (None, None, "inertial", K, Lean(0.0, 2e-4)),
+        (None, None, "inertial", K, ResidualSquat(0.0, 2e-4)),
     ],
 )
 def test_torque_meets_what_it_was_calibrated_with(
@@ -109,21 +109,21 @@ def test_torque_meets_what_it_was_calibrated_with(
     car = replace(calibrated(car, given), provenance=made)
     balance = seen(weighing.result.balance, shown, factor=0.0)
     balance = replace(balance, motion=replace(balance.motion, source=weighed_by))
-    assert lean(balance, car, 1500.0) == expected
+    assert residual_squat(balance, car, 1500.0) == expected
 
 
 def test_a_speed_does_not_lean(weighed):
     car, weighing = weighed
     balance = seen(weighing.result.balance, None, factor=0.0)
     by_speed = replace(balance, motion=replace(balance.motion, source="speed"))
-    assert lean(by_speed, uncalibrated(car), 1500.0) == Lean(0.0, 0.0)
+    assert residual_squat(by_speed, uncalibrated(car), 1500.0) == ResidualSquat(0.0, 0.0)
 
 
 def test_hills_weigh_without_a_lean():
     rng = np.random.default_rng(0)
     accel, hill = rng.normal(0.0, 0.3, (2, 4000))
     every = np.ones(4000, dtype=bool)
-    body = Lean(0.0, 0.0025)
+    body = ResidualSquat(0.0, 0.0025)
     full = GRAVITY * 0.0025
     assert_allclose(body.relative_std(accel, accel, every), full)
     assert_allclose(body.relative_std(accel, accel + hill, every), 0.5 * full, rtol=0.05)
@@ -158,7 +158,7 @@ def test_one_accelerometer_shows_its_lean_against_the_wheels(weighed, k):
     assert 1.5e-3 < std < 2.5e-3
     car, weighing = weighed
     balance = replace(weighing.result.balance, motion=motion)
-    taken = lean(balance, uncalibrated(car), 1500.0)
+    taken = residual_squat(balance, uncalibrated(car), 1500.0)
     assert min(k, SQUAT[0]) < taken.squat < max(k, SQUAT[0])
     assert taken.std < 0.75 * SQUAT[1]
 

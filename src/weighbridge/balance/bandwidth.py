@@ -132,8 +132,12 @@ def _ratio(fast: tuple[Floats, Floats], slow: tuple[Floats, Floats]) -> tuple[fl
     """Mass over fast against slow changes, and its standard deviation by the jackknife."""
     size = max(fast[0].size, slow[0].size)
     sums = [np.pad(x, (0, size - x.size)) for x in (*fast, *slow)]
-    told = np.flatnonzero((sums[1] > 0.0) | (sums[3] > 0.0))
-    common, square, slow_common, slow_square = (x.sum() - np.append(x[told], 0.0) for x in sums)
+    informative = np.flatnonzero((sums[1] > 0.0) | (sums[3] > 0.0))
+    common, square, slow_common, slow_square = (
+        x.sum() - np.append(x[informative], 0.0) for x in sums
+    )
     ratios = (common / square) / (slow_common / slow_square)
     left = ratios[:-1] - float(np.mean(ratios[:-1]))
-    return float(ratios[-1]), float(np.sqrt((told.size - 1) / told.size * (left @ left)))
+    return float(ratios[-1]), float(
+        np.sqrt((informative.size - 1) / informative.size * (left @ left))
+    )

@@ -19,9 +19,9 @@ from weighbridge.balance.witness import (
     compare,
     follow,
     means,
+    predicted_by,
     ranges_of,
     rows_of,
-    told_by,
 )
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
@@ -180,8 +180,8 @@ def _against_before(
     first, second = _part(every, 0, cut), _part(every, cut, every.time.size)
     air = air_of(drive, float(first.time[0]), float(first.time[-1]))
     later = air_of(drive, float(second.time[0]), float(second.time[-1]))
-    a = compare(first.reading, told_by(relation, first))
-    b = compare(second.reading, a.level + a.scale * (told_by(relation, second) - a.told))
+    a = compare(first.reading, predicted_by(relation, first))
+    b = compare(second.reading, a.level + a.scale * (predicted_by(relation, second) - a.predicted))
     pressure, temperature = (x if np.isfinite(x) else None for x in air)
     before = replace(relation, pressure=pressure, temperature=temperature)
     accepted = accepted_scales(source, before, later, unknown=UNKNOWN_CHANGE)
@@ -229,7 +229,7 @@ def judged(
     Finding
         None where the part is not off and cannot tell that it is right either.
     """
-    found = compare(part.reading, told_by(relation, part))
+    found = compare(part.reading, predicted_by(relation, part))
     if found.scale <= 0.0:
         return None  # The two have nothing to do with each other.
     stds = (
@@ -266,8 +266,8 @@ def _judged(
     witness = BY_SIGNAL[relation.signal]
     low, high = accepted
     scale_off = max(low - found.scale, found.scale - high, 0.0)
-    told = sorted((low * found.told, high * found.told))
-    level_off = max(told[0] - found.level, found.level - told[1], 0.0) / relation.span
+    predicted = sorted((low * found.predicted, high * found.predicted))
+    level_off = max(predicted[0] - found.level, found.level - predicted[1], 0.0) / relation.span
     if witness.battery:
         level_off = 0.0  # Heating and cooling come and go.
     by_scale = _verdict(scale_off, stds[0], doubtful)
@@ -276,7 +276,7 @@ def _judged(
     finding = replace(
         finding,
         scale=found.scale,
-        offset=(found.level - found.told) / relation.span,
+        offset=(found.level - found.predicted) / relation.span,
         scaled=_ORDER.index(by_scale) >= _ORDER.index(by_level),
     )
     # Of what a battery gives, heating takes a part that may change on the way.
@@ -293,14 +293,14 @@ def _verdict(off: float, std: float, doubtful: float) -> Verdict:
 
 def _change(every: Means, relation: WitnessRelation) -> int | None:
     """Find where reading and witness begin to go otherwise: first row of the second part."""
-    told = told_by(relation, every)
+    predicted = predicted_by(relation, every)
     best, at = 0.0, None
     for k in range(1, PARTS):
         cut = every.time.size * k // PARTS
         if min(cut, every.time.size - cut) < FEWEST:
             continue
         before, after = (
-            compare(every.reading[part], told[part]) for part in (slice(cut), slice(cut, None))
+            compare(every.reading[part], predicted[part]) for part in (slice(cut), slice(cut, None))
         )
         gain = _apart(before, after, relation)
         if gain > best:
@@ -312,7 +312,7 @@ def _apart(a: Comparison, b: Comparison, relation: WitnessRelation) -> float:
     """By how many standard deviations two parts differ surely [-]; 0 where they do not."""
     scale = abs(a.scale - b.scale)
     scale_std = float(np.hypot(a.scale_std, b.scale_std))
-    level = abs((a.level - a.told) - (b.level - b.told)) / relation.span
+    level = abs((a.level - a.predicted) - (b.level - b.predicted)) / relation.span
     level_std = float(np.hypot(a.level_std, b.level_std)) / relation.span
     found = [
         off / max(std, 1e-9)

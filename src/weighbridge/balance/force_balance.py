@@ -168,14 +168,14 @@ def _reasons(
     recorded = source.time
     fresh = source.age(recorded) <= 3.0 * source.period
     reason = np.zeros(view.time.size, dtype=np.uint8)
-    told = np.isfinite(view.traction_force) & fresh & ~filled(source, recorded, fill)
+    has_torque = np.isfinite(view.traction_force) & fresh & ~filled(source, recorded, fill)
     for flag, why in (
         (~read.instants.known | ~np.isfinite(view.speed), Reason.NO_MOTION),
         (view.speed < SLOWEST, Reason.STANDING),
         (brakes.braked, Reason.BRAKING),
         (read.instants.changing, Reason.SHIFTING),
         (read.instants.slipping, Reason.CLUTCH_SLIPPING),
-        (~told, Reason.NO_TORQUE),
+        (~has_torque, Reason.NO_TORQUE),
         (read.torque.overrun | brakes.overrun, Reason.OVERRUN),
         (read.torque.extrapolated, Reason.EXTRAPOLATED),
         (cornering(motion, view.time), Reason.CORNERING),

@@ -14,10 +14,10 @@ from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
 from weighbridge.vehicle.gear import (
     effective_gearing,
-    number_told_gears,
+    number_reported_gears,
     predict_gear,
+    reported_gear_numbers,
     shifting,
-    told_gear_numbers,
 )
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
@@ -107,9 +107,9 @@ def identify_told_gears(
     measured = drive.get("gear")
     if measured is None or not len(measured) or len(vehicle.driveline.gearings) < 2:
         return {}
-    told = np.nan_to_num(measured.held(recorded)).astype(np.int64)
+    reported = np.nan_to_num(measured.held(recorded)).astype(np.int64)
     ratio = effective_gearing(engine_speed, speed)
-    return told_gear_numbers(told, ratio, np.array(vehicle.driveline.gearings))
+    return reported_gear_numbers(reported, ratio, np.array(vehicle.driveline.gearings))
 
 
 def gears_at(
@@ -136,8 +136,8 @@ def gears_at(
     gear, mismatch = predict_gear(engine_speed, speed, gearings)
     measured: Signal | None = drive.get("gear")
     if measured is not None and len(measured):
-        told = np.nan_to_num(measured.held(recorded)).astype(np.int64)
-        gear = number_told_gears(told, numbers)
+        reported = np.nan_to_num(measured.held(recorded)).astype(np.int64)
+        gear = number_reported_gears(reported, numbers)
         mismatch = np.where(
             gear > 0,
             engine_speed / np.maximum(speed, SLOWEST) / gearings[np.maximum(gear, 1) - 1] - 1.0,

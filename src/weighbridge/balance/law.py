@@ -128,7 +128,7 @@ def resistance_column(view: MergedView) -> Floats:
     return np.ones_like(view.time)
 
 
-def gust_column(view: MergedView, grade_open: float = 0.0) -> Floats:
+def gust_column(view: MergedView, unmeasured_grade: float = 0.0) -> Floats:
     """How large the fast disturbance is at each row over its usual size (n,) [-].
 
     Half of it are errors of grade and torque, the other half gusts, whose force grows with the
@@ -137,10 +137,10 @@ def gust_column(view: MergedView, grade_open: float = 0.0) -> Floats:
     Parameters
     ----------
     view
-    grade_open : what of the grade nothing has measured [rad]
+    unmeasured_grade : what of the grade nothing has measured [rad]
     """
     gusts = 0.5 * (1.0 + (np.nan_to_num(view.speed) / GUST_SPEED) ** 2)
-    grade = (GRAVITY * grade_open / DISTURBANCE_STD) ** 2
+    grade = (GRAVITY * unmeasured_grade / DISTURBANCE_STD) ** 2
     return np.asarray(np.sqrt((gusts + grade) / (1.0 + grade)))
 
 
@@ -198,8 +198,8 @@ def torque_columns(view: MergedView, vehicle: Vehicle) -> Floats:
     return np.asarray(rows_of(model, reading_of(torque, speed, model), speed) * gain[:, None])
 
 
-def lean_column(accel: Floats) -> Floats:
-    """Specific force that a lean of one radian per m/s^2 adds, ``g a`` (n,) [m/s^2]."""
+def squat_column(accel: Floats) -> Floats:
+    """Specific force that a squat of one radian per m/s^2 adds, ``g a`` (n,) [m/s^2]."""
     return np.asarray(GRAVITY * accel)
 
 

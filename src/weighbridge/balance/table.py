@@ -194,5 +194,5 @@ class ForceBalance:
     @property
     def notes(self) -> tuple[str, ...]:
         """What is doubted, one sentence each."""
-        told = ((BRAKE_HIDDEN, self.brake_hidden), (SWITCH_DEAD, self.switch_dead))
-        return tuple(text for text, so in told if so) + coarse_note(self.coarse_std)
+        noted = ((BRAKE_HIDDEN, self.brake_hidden), (SWITCH_DEAD, self.switch_dead))
+        return tuple(text for text, so in noted if so) + coarse_note(self.coarse_std)

@@ -170,15 +170,15 @@ class Comparison:
     Attributes
     ----------
     scale, scale_std : [-]
-    level, level_std : reading where the witness tells ``told``, in the reading's unit
-    told : mean of what the witness tells
+    level, level_std : reading where the witness tells ``predicted``, in the reading's unit
+    predicted : mean of what the witness tells
     """
 
     scale: float
     scale_std: float
     level: float
     level_std: float
-    told: float
+    predicted: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,27 +281,27 @@ def ranges_of(relation: WitnessRelation) -> Ranges:
     return relation.value_range, relation.speed_range
 
 
-def told_by(relation: WitnessRelation, rows: Means) -> Floats:
+def predicted_by(relation: WitnessRelation, rows: Means) -> Floats:
     """Reading that a witness tells (m,)."""
     return np.asarray(rows.terms @ np.array(relation.coefficients))
 
 
-def compare(reading: Floats, told: Floats) -> Comparison:
+def compare(reading: Floats, predicted: Floats) -> Comparison:
     """Fit a scale and a level of the reading against what a witness tells.
 
     Parameters
     ----------
-    reading, told : (m,) in the order of time
+    reading, predicted : (m,) in the order of time
 
     References
     ----------
     Huber, Robust Statistics, 1981, ch. 7; standard deviations by leaving out one part of the
     drive after another (Efron, Stein, Ann. Statist. 9, 1981).
     """
-    middle = float(np.mean(told))
-    columns = np.column_stack([told - middle, np.ones_like(told)])
+    middle = float(np.mean(predicted))
+    columns = np.column_stack([predicted - middle, np.ones_like(predicted)])
     (scale, level), weight = robust_fit(columns, reading)
-    part = np.arange(told.size) * BLOCKS // told.size
+    part = np.arange(predicted.size) * BLOCKS // predicted.size
     left_out = []
     for k in range(BLOCKS):
         kept = part != k
@@ -346,15 +346,17 @@ def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following
         return None
     value = np.clip(rows.value, *relation.value_range)
     turning = np.clip(rows.turning, *relation.speed_range)
-    told = terms(witness, value, turning, ranges_of(relation)) @ np.array(relation.coefficients)
+    predicted = terms(witness, value, turning, ranges_of(relation)) @ np.array(
+        relation.coefficients
+    )
     period = float(np.median(np.diff(rows.time)))
     reading = rows.reading[rows.driving]
     left = np.empty((len(BLURS), len(DELAYS)))
     for i, blur in enumerate(BLURS):
         kept = np.exp(-period / blur) if blur > 0.0 else 0.0
-        smooth, _ = lfilter([1.0 - kept], [1.0, -kept], told, zi=[kept * told[0]])
+        delayed, _ = lfilter([1.0 - kept], [1.0, -kept], predicted, zi=[kept * predicted[0]])
         for j, delay in enumerate(DELAYS):
-            moved = np.interp(rows.time - delay, rows.time, smooth)[rows.driving]
+            moved = np.interp(rows.time - delay, rows.time, delayed)[rows.driving]
             left[i, j] = 1.0 - _correlation(moved, reading) ** 2
     best = int(np.argmin(left.min(axis=1)))
     usual = int(np.argmin(np.abs(np.array(BLURS) - (relation.blur or 0.0))))

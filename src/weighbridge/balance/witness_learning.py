@@ -142,15 +142,15 @@ def learn(
         return None
     columns = np.vstack([p.terms for p in parts])
     found, _ = robust_fit(columns, reading)
-    told = columns @ found
+    predicted = columns @ found
     bottom, top = np.percentile(reading, [2.0, 98.0])
     span = float(top - bottom)
-    scatter = 1.4826 * float(np.median(np.abs(reading - told)))
+    scatter = 1.4826 * float(np.median(np.abs(reading - predicted)))
     if not span > 0.0 or scatter > SCATTERED * span:
         return None
-    if 1.0 - float(np.var(reading - told)) / float(np.var(reading)) < EXPLAINED:
+    if 1.0 - float(np.var(reading - predicted)) / float(np.var(reading)) < EXPLAINED:
         return None
-    own = compare(reading, told)
+    own = compare(reading, predicted)
     known = [np.array(x) for x in zip(*airs, strict=True)]
     pressure, temperature = (float(np.mean(x)) if np.isfinite(x).all() else None for x in known)
     relation = WitnessRelation(

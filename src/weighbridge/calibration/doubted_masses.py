@@ -48,7 +48,7 @@ def doubted_masses(
         One mass contradicts the others.
     """
     names, gross = vehicle.provenance.drives, vehicle.gross
-    told = [
+    contradictions = [
         f"{name} has {kg:.0f} kg by the calibration, above the permitted mass of {gross:.0f} kg: "
         "if that was not so, every mass is too heavy by as much; weigh it again"
         for name, kg in zip(names, masses, strict=True)
@@ -56,12 +56,12 @@ def doubted_masses(
     ]
     fit = vehicle.provenance.fit
     if fit is None or not fit.refined or len(masses) < 2:
-        return told
+        return contradictions
     tracks = [joint.estimate(b, vehicle, load_changes=False) for b in balances]
     left = np.array(masses) - np.array([float(b.merged.fuel_burnt[-1]) for b in balances])
     ratios = np.array([t.mass for t in tracks]) / left
     stds = UNMODELLED * np.array([t.bound_std for t in tracks]) / left
-    return told + contradicting(names, masses, ratios, stds)
+    return contradictions + contradicting(names, masses, ratios, stds)
 
 
 def contradicting(

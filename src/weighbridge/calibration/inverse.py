@@ -152,13 +152,13 @@ def terms_covariance(
     stds = [terms.offset]
     stds += [terms.growth / TYPICAL_SPEED**k for k in range(1, settings.order + 1)]
     if settings.curved:
-        stds += [terms.lean / (TYPICAL_SPEED * reading), terms.bend / reading**2]
+        stds += [terms.speed_growth / (TYPICAL_SPEED * reading), terms.bend / reading**2]
     cov = np.diag(np.square(stds))
     if settings.knots:
         where = np.log(settings.knots)
         apart = (where[:, None] - where) / KNOT_LENGTH
-        smooth = (terms.knot / reading) ** 2 * np.exp(-0.5 * apart**2)
-        cov = block_diag(cov, smooth)
+        knot_cov = (terms.knot / reading) ** 2 * np.exp(-0.5 * apart**2)
+        cov = block_diag(cov, knot_cov)
     return np.asarray(torque**2 * cov)
 
 
@@ -214,10 +214,10 @@ def _confounded(plain: InverseFit, apart: Floats, mean: float, std: float) -> In
     if x[drag] > 0.0 or not 0.0 < var < before:
         return replace(plain, cov=cov, stds=np.sqrt(np.maximum(np.diag(cov), 0.0)))
     alone = 1.0 / (1.0 / var - 1.0 / before)
-    told = alone * (float(x[drag]) / var - mean / before)
+    by_drives = alone * (float(x[drag]) / var - mean / before)
     widened = alone + (float(apart[drag]) * alone / var) ** 2
     after = 1.0 / (1.0 / before + 1.0 / widened)
-    wanted = max(after * (mean / before + told / widened), 0.0)
+    wanted = max(after * (mean / before + by_drives / widened), 0.0)
     gain = cov[:, drag] / cov[drag, drag]
     x = x + gain * (wanted - x[drag])
     cov = cov - np.outer(gain, gain) * (cov[drag, drag] - after)
@@ -305,7 +305,7 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
         *road.T,
         # The reading itself stands on the left; the other torque terms stand here.
         *-np.delete(terms, 1, axis=1).T,
-        law.gust_column(view, d.motion.grade_open),
+        law.gust_column(view, d.motion.unmeasured_grade),
         law.resistance_column(view),
         north,
         east,
@@ -346,7 +346,7 @@ def _solve(
     )
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
     terms = terms_covariance(settings.bounds, settings, torque, torque / scale)
-    grade = GRAVITY * max(d.motion.grade_open for d in drives)
+    grade = GRAVITY * max(d.motion.unmeasured_grade for d in drives)
     fading = np.array(
         [
             mass * float(np.hypot(DISTURBANCE_STD, grade)),

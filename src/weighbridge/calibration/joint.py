@@ -145,7 +145,7 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     settings = _settings(problem, _rough_noise(problem, rough))
     quick = replace(settings, window=TIMING_WINDOW, rounds=1)
     quick = replace(quick, torque_noise=_noise(problem, rough, quick))
-    delay, lag, told, search = find_timing(_Misfits(problem, quick, middle))
+    delay, lag, identified, search = find_timing(_Misfits(problem, quick, middle))
 
     check_delay(problem, delay)
     timing = Timing(torque_delay=delay, torque_lag=lag)
@@ -170,7 +170,7 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
         timing=replace(timing, torque_delay_std=search.std),
         provenance=Provenance(masses=tuple(problem.masses), method=JOINT.name),
     )
-    if not told:
+    if not identified:
         vehicle = noted(vehicle, NOT_TOLD)
     held = ("drag_area",) if found.road[0] <= 0.0 else ()
     return Fitted(vehicle=vehicle, rows=rows, search=search, held=held), found.cov
@@ -313,7 +313,7 @@ def find_timing(
     Returns
     -------
     delay, lag : [s]
-    told : whether the drives show them
+    identified : whether the drives show them
     search : what was tried of their sum, and the standard deviation of the delay
     """
     middle = LAGS[len(LAGS) // 2]

@@ -97,11 +97,11 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
     std = scale_std(vehicle)
     if abs(ratio - 1.0) <= DOUBTFUL * std:
         return ""
-    told = " and ".join(f"{kg:.0f}" for kg in masses)
+    listed = " and ".join(f"{kg:.0f}" for kg in masses)
     likely = " and ".join(f"{kg / ratio:.0f}" for kg in masses)
     text = (
-        f"with {told} kg the torque of {names} would read {1.0 / ratio:.2f} of what it is; by data "
-        f"sheets, which are good to {200.0 * std:.0f} %, {likely} kg are plausible"
+        f"with {listed} kg the torque of {names} would read {1.0 / ratio:.2f} of what it is; by "
+        f"data sheets, which are good to {200.0 * std:.0f} %, {likely} kg are plausible"
     )
     if abs(np.log(ratio)) > SURE:
         pounds = " and ".join(f"{kg * POUND:.0f}" for kg in masses)

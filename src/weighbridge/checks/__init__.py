@@ -71,7 +71,7 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
         is added to its ``problems``, serious ones first. What is wrong with a signal that a person
         vouches for (``drive.info.trusted``) is never serious.
     """
-    told = drive.problems
+    earlier = drive.problems
     drive = well_formed(drive)
     if found := tuple(check_rates(drive, vehicle)):
         return drive.with_problems(*found)
@@ -82,7 +82,7 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     drive = without_spikes(without_strays(drive, vehicle))
     if not any(p.serious for p in check_range(drive, vehicle)):
         drive = mend_clocks(drive)
-    problems = [*drive.problems[len(told) :], *found]
+    problems = [*drive.problems[len(earlier) :], *found]
     if not any(p.serious for p in problems):
         problems += (
             replace(p, serious=False) if p.signal in drive.info.trusted else p
@@ -90,14 +90,14 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
             for p in check(drive, vehicle)
         )
     problems.sort(key=lambda p: not p.serious)
-    settled = replace(within_ranges(drive), problems=(*told, *problems))
+    settled = replace(within_ranges(drive), problems=(*earlier, *problems))
     if any(p.serious for p in problems):
         return settled
     settled = mended(settled, vehicle)
     # Last: what froze or dropped out is not held against a witness.
-    problems = [*settled.problems[len(told) :], *check_witnesses(settled, vehicle)]
+    problems = [*settled.problems[len(earlier) :], *check_witnesses(settled, vehicle)]
     problems.sort(key=lambda p: not p.serious)
-    return replace(settled, problems=(*told, *problems))
+    return replace(settled, problems=(*earlier, *problems))
 
 
 def refuse_serious(name: str, problems: Iterable[Problem]) -> None:

@@ -74,14 +74,14 @@ def _friction_remedy(drive: Drive, vehicle: Vehicle | None, idle: float | None) 
             "vehicle file"
         )
     turning = engine.values[(engine.values > _IDLE[0]) & (engine.values < _IDLE[1])]
-    told = []
+    remedies = []
     for fuel in FRICTION_PRESSURE:
         w0, w2, w3 = friction_coefficients(idle * full, float(np.median(turning)), fuel)
-        told.append(f"[{-w0:.3g}, 1.0, {-w2:.3g}, {-w3:.3g}] for {fuel}")
+        remedies.append(f"[{-w0:.3g}, 1.0, {-w2:.3g}, {-w3:.3g}] for {fuel}")
     return (
-        f"state it under [torque] of the vehicle file as coefficients = {' or '.join(told)}, which "
-        "grows with engine speed; with an automatic stand in neutral for it: in gear the reading "
-        "holds the drag of the converter as well"
+        f"state it under [torque] of the vehicle file as coefficients = {' or '.join(remedies)}, "
+        "which grows with engine speed; with an automatic stand in neutral for it: in gear the "
+        "reading holds the drag of the converter as well"
     )
 
 

@@ -86,8 +86,8 @@ def isolated(drive: Drive, name: str) -> Bools:
     alone &= signal.time[last] - signal.time[first - 1] < 3.0 * LONGEST
     alone &= _same_gear(drive, signal.time[first] - AROUND, signal.time[last] + AROUND)
     # Dropouts fall to a level of their own, again and again.
-    told, which = np.unique(level, return_inverse=True)
-    often = np.bincount(which, weights=alone, minlength=told.size)
+    levels, which = np.unique(level, return_inverse=True)
+    often = np.bincount(which, weights=alone, minlength=levels.size)
     alone &= (often >= max(FEWEST, OFTEN * values.size))[which]
     if not alone.any():
         return marked

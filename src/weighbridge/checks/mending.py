@@ -91,7 +91,7 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
     if vehicle is None or name != vehicle.torque.of_source.signals[0]:
         return drive
     signal, model, dragged = drive.signals[name], vehicle.torque, vehicle.dragged
-    told = []
+    notes = []
     highest = np.inf
     if model.load_range is not None:
         # Of other sources the range is not that of the signal.
@@ -101,29 +101,29 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
         highest = dragged.span + min(dragged.level)
     marked = clipped(signal, highest)
     if marked.any():
-        told.append(
+        notes.append(
             f"{name} never exceeds {show(name, float(signal.values.max()))}, which "
             f"{np.count_nonzero(marked)} of {len(signal)} samples read, and the calibration's went "
             f"up to {show(name, highest)}: it is cut off there, and those rows are left out"
         )
     if not np.isfinite(highest) and model.of_source.signed:
         marked, more = _piled(signal, vehicle)
-        told += more
+        notes += more
     if dragged is not None and len(signal) > 200:
         floor = min(dragged.level) + 3.0 * dragged.scatter
         if floor < 0.0 <= float(signal.values.min()):
             # What may be the size of a negative reading is as doubtful as a zero.
             doubtful = signal.values <= 3.0 * dragged.scatter - min(dragged.level)
             marked = marked | doubtful
-            told.append(
+            notes.append(
                 f"{name} is never below zero, and a dragged engine read down to "
                 f"{show(name, min(dragged.level))} in the calibration: its sign is lost, and the "
                 f"{np.count_nonzero(doubtful)} samples it may concern are left out"
             )
-    if not told or marked.all():
+    if not notes or marked.all():
         return drive
     return drive.with_signals(_without(signal, marked)).with_problems(
-        *(Problem(name, text) for text in told)
+        *(Problem(name, text) for text in notes)
     )
 
 
@@ -133,19 +133,19 @@ def _piled(signal: Signal, vehicle: Vehicle) -> tuple[Bools, list[str]]:
     At a motor's own limit they tell nothing wrong; the rest weighs without them as well. The lowest
     is looked at of motors alone: an engine that is dragged reads the same for long.
     """
-    marked, told = np.zeros(len(signal), dtype=bool), []
+    marked, notes = np.zeros(len(signal), dtype=bool), []
     for lowest in (False, True)[: 1 + vehicle.driveline.single_speed]:
         found = piled(signal, lowest=lowest)
         if found.any():
             marked |= found
             end = float(signal.values[found][0])
-            told.append(
+            notes.append(
                 f"{signal.name} never {'falls below' if lowest else 'exceeds'} "
                 f"{show(signal.name, end)}, which {np.count_nonzero(found)} of "
                 f"{len(signal)} samples read: it is cut off there, or the motor is at its limit, "
                 "and those rows are left out"
             )
-    return marked, told
+    return marked, notes
 
 
 def _without(signal: Signal, marked: Bools) -> Signal:
@@ -156,14 +156,14 @@ def _ends(drive: Drive, names: list[str]) -> list[Problem]:
     """Tell of signals that end long before the drive, or begin long after."""
     ends = [s.time[-1] for s in drive.signals.values() if len(s) > 10]
     starts = [s.time[0] for s in drive.signals.values() if len(s) > 10]
-    told: list[Problem] = []
+    notes: list[Problem] = []
     for name in names if ends else ():
         signal = drive.signals[name]
         if not len(signal):
             continue
         early, late = max(ends) - signal.time[-1], signal.time[0] - min(starts)
         if early > ENDS:
-            told.append(
+            notes.append(
                 Problem(
                     name,
                     f"{name} ends at {signal.time[-1]:.6g} s, {early:.0f} s before the drive: "
@@ -171,11 +171,11 @@ def _ends(drive: Drive, names: list[str]) -> list[Problem]:
                 )
             )
         if late > ENDS:
-            told.append(
+            notes.append(
                 Problem(
                     name,
                     f"{name} begins at {signal.time[0]:.6g} s, {late:.0f} s after the drive: "
                     "what comes before is not weighed by it",
                 )
             )
-    return told
+    return notes

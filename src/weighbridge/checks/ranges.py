@@ -53,7 +53,7 @@ def within_ranges(drive: Drive) -> Drive:
     for s in drive.signals.values():
         outside = None if s.name in drive.info.trusted else _outside(s)
         if outside is not None:
-            drive = _cut(drive, s, outside, told=False)
+            drive = _cut(drive, s, outside, noted=False)
     return drive
 
 
@@ -80,8 +80,10 @@ def _outside(s: Signal) -> Bools | None:
     return np.asarray((s.values < q.low) | (s.values > q.high))
 
 
-def _cut(drive: Drive, s: Signal, out: Bools, *, serious: bool = False, told: bool = True) -> Drive:
-    if told:
+def _cut(
+    drive: Drive, s: Signal, out: Bools, *, serious: bool = False, noted: bool = True
+) -> Drive:
+    if noted:
         drive = drive.with_problems(_problem(s, out, ", and were left out", serious=serious))
     if out.all():
         return drive.without(s.name)

@@ -44,14 +44,14 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     reference = drive.get("reference_torque")
     if reference is None or len(reference) < 2:
         return
-    told = reference_torques(reference)
-    if len(told) < 2:
+    reported = reference_torques(reference)
+    if len(reported) < 2:
         return
     model = TorqueModel() if vehicle is None else vehicle.torque
-    values = np.array([value for value, _ in told])
+    values = np.array([value for value, _ in reported])
     nearest = np.argmin(np.abs(reference.values[:, None] - values[None, :]), axis=1)
-    once = bool(np.count_nonzero(np.diff(nearest)) < len(told))
-    which = " and ".join(f"{value:.0f} N m from {time:.6g} s" for value, time in told)
+    once = bool(np.count_nonzero(np.diff(nearest)) < len(reported))
+    which = " and ".join(f"{value:.0f} N m from {time:.6g} s" for value, time in reported)
     said = (
         f"reference_torque is {which}{'' if once else ', in turn'}: it is a constant of an engine"
     )

@@ -97,7 +97,7 @@ def pinned(cov: Floats, direction: Floats) -> Floats:
     return np.asarray(cov - np.outer(gain, gain) / power) if power > 0.0 else cov
 
 
-def open_std(vehicle: Vehicle, moved: Floats, mass: float) -> float:
+def fit_consider_std(vehicle: Vehicle, moved: Floats, mass: float) -> float:
     """Relative standard deviation of a mass by what the fit left open [-].
 
     Parameters

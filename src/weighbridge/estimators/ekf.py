@@ -167,11 +167,11 @@ def estimate(
     fit = robust_rls.window_fit(view.time, mean_phi, mean_y, rls_params)
     params = parameters(settings, vehicle, robust_rls.row_period(view.time))
     table = columns(balance, vehicle, valid)
-    told = np.flatnonzero(information * rls_params.window >= settings.start.first_information)
+    informed = np.flatnonzero(information * rls_params.window >= settings.start.first_information)
     n = view.time.size
     mass, var, taken = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool)
-    if told.size:
-        k = int(told[0])
+    if informed.size:
+        k = int(informed[0])
         start = kernel.initial_state(
             theta[k], (settings.start_std * theta[k]) ** 2, kernel.row_at(table, k), params
         )

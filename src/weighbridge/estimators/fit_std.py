@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.force_balance import highest_torque
-from weighbridge.estimators.considered import force_columns, open_std
+from weighbridge.estimators.considered import fit_consider_std, force_columns
 from weighbridge.estimators.joint.slow_errors import (
     LASTING,
     NAMES,
@@ -83,7 +83,7 @@ def slow_std(
     view = balance.merged
     if not (index.size and np.isfinite(mass) and mass > 0.0):
         return float("inf"), 0.0
-    rows, _ = design(view, vehicle, grade_open=balance.motion.grade_open)
+    rows, _ = design(view, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
     highest = highest_torque(view.torque[index])
     std = prior_std(_known_road_load(vehicle), mass, highest)
     # The methods that ask have `weighbridge.estimators.judging.consider_std` for the cold.
@@ -99,7 +99,7 @@ def slow_std(
         passing += std[k] ** 2 * _correlated(binned, keep)
     if vehicle.provenance.fit_cov:
         moved = influence @ force_columns(balance, vehicle, mass)[index]
-        passing += (mass * open_std(vehicle, moved, mass)) ** 2
+        passing += (mass * fit_consider_std(vehicle, moved, mass)) ** 2
         return float(np.sqrt(passing)), 0.0
     # What a file says of its own road load is in the resistance and the last states.
     open_ = prior_std(vehicle, mass, highest)

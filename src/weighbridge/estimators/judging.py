@@ -32,7 +32,7 @@ OTHER_METHOD_STD: Final = 0.06
 was fitted for rls [-]: that fit is drawn by the noise of the reading, the joint
 estimator is not; simulated vehicles came out 4 to 8 % light."""
 
-LEAN_STD: Final = 0.03
+SQUAT_STD: Final = 0.03
 """Relative standard deviation of masses by an accelerometer that leans with the body, where
 no calibration took that up [-]: recorded cars leaned by 2 to 5 % of the mass."""
 
@@ -118,8 +118,8 @@ def lacks_accelerometer(vehicle: Vehicle, motion: Motion) -> bool:
 
 def uncalibrated_std(vehicle: Vehicle, motion: Motion) -> float:
     """Relative standard deviation by what a data sheet leaves open [-]."""
-    leans = motion.source not in BY_SPEED and motion.squat is None
-    return float(np.hypot(scale_std(vehicle), LEAN_STD if leans else 0.0))
+    holds_squat = motion.source not in BY_SPEED and motion.squat is None
+    return float(np.hypot(scale_std(vehicle), SQUAT_STD if holds_squat else 0.0))
 
 
 def cold_share(time: Floats, phi: Floats, used: Bools, start: float | None = None) -> float:
@@ -203,8 +203,8 @@ def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, str]:
     view, count = found.view, int(np.count_nonzero(found.used))
     if count >= FEWEST_ROWS and found.blocks >= FEWEST_BLOCKS:
         return _PASSED
-    told, share = np.unique(view.reason[view.reason != 0], return_counts=True)
-    most = Reason(int(told[np.argmax(share)])).text if told.size else "too short"
+    reasons, share = np.unique(view.reason[view.reason != 0], return_counts=True)
+    most = Reason(int(reasons[np.argmax(share)])).text if reasons.size else "too short"
     return Status.NOT_EXCITED, (
         f"only {count} usable samples, in {found.blocks} stretch(es) of time; "
         f"most of the others: {most}"

@@ -1,4 +1,4 @@
-"""How far noise of the motion draws a mass down: regressors that are themselves measured."""
+"""Attenuation bias by noise of the motion: regressors that are themselves measured."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from weighbridge.navigation.motion import noise_level
 from weighbridge.signals import Bools, Floats
 
 LEVEL_STD: Final = 0.5
-"""Standard deviation of how far the motion's noise draws a mass, over what is reckoned [-]:
+"""Standard deviation of the attenuation by the motion's noise, over what is reckoned [-]:
 how the noise that a drive shows is shared between torque and motion is by typical sizes."""
 
 

@@ -279,14 +279,14 @@ def estimate(
     _, running, var, information, mean_phi, mean_y, _ = kernel.run(
         initial_state(), view.time, phi, y, valid, params
     )
-    told = information * params.window >= settings.first_information
+    informed = information * params.window >= settings.first_information
     return finish(
         "robust-rls",
         balance,
         vehicle,
         window_fit(view.time, mean_phi, mean_y, params),
         window_reason(view, valid, mean_phi),
-        running=np.where(told, running, np.nan),
+        running=np.where(informed, running, np.nan),
         spread=np.sqrt(var),
         phi=phi,
         y=y,

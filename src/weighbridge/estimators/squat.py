@@ -1,4 +1,4 @@
-"""What an accelerometer that leans with the body leaves in the mass."""
+"""Squat: the body pitches as it accelerates, and the accelerometer with it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.balance import ForceBalance
-from weighbridge.balance.law import lean_column
+from weighbridge.balance.law import squat_column
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
@@ -19,7 +19,7 @@ from weighbridge.vehicle.model import Vehicle
 
 SQUAT: Final = (0.0035, 0.0025)
 """Pitch of the body per acceleration of a vehicle of which nothing is known, and its standard
-deviation [rad per m/s^2]: four recorded cars had 0.0024 to 0.0051, and stiff trucks lean less."""
+deviation [rad per m/s^2]: four recorded cars had 0.0024 to 0.0051, and stiff trucks squat less."""
 
 DRIVE_STD: Final = 0.0009
 """Standard deviation of the squat that one drive shows, beside what its navigation says
@@ -33,7 +33,7 @@ LOADED_STD: Final = 0.0003
 MOVING: Final = 1.0
 """Slower than this wheels tell no acceleration [m/s]."""
 
-SMOOTH: Final = 1.0
+AVERAGED: Final = 1.0
 """Accelerations are compared as means over this time [s]."""
 
 BRIEF: Final = 10.0
@@ -105,7 +105,7 @@ def of_vehicle(motion: Motion, vehicle: Vehicle) -> Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class Lean:
+class ResidualSquat:
     """Squat that is still in the specific force.
 
     Attributes
@@ -117,12 +117,12 @@ class Lean:
     squat: float
     std: float
 
-    def leaned(self, accel: Floats) -> Floats:
-        """Specific force that the lean adds to an acceleration (n,) [m/s^2]."""
-        return np.asarray(self.squat * lean_column(accel))
+    def squat_accel(self, accel: Floats) -> Floats:
+        """Specific force that the squat adds to an acceleration (n,) [m/s^2]."""
+        return np.asarray(self.squat * squat_column(accel))
 
     def relative_std(self, accel: Floats, phi: Floats, used: Bools) -> float:
-        """Relative standard deviation of the mass [-]; hills, which do not lean, weigh without.
+        """Relative standard deviation of the mass [-]; hills, where nothing squats, weigh without.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
     """
     rate = motion.rate
     moving = motion.valid & (motion.speed > MOVING)
-    around = max(round(SMOOTH * rate), 1), max(round(BRIEF * rate), 1)
+    around = max(round(AVERAGED * rate), 1), max(round(BRIEF * rate), 1)
     parts = [
         uniform_filter1d(x, around[0]) - uniform_filter1d(x, around[1])
         for x in (motion.specific_force, np.gradient(motion.speed, 1.0 / rate))
@@ -190,7 +190,7 @@ def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
     return (slope - 1.0) / GRAVITY, std / GRAVITY
 
 
-def lean(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Lean:
+def residual_squat(balance: ForceBalance, vehicle: Vehicle, mass: float) -> ResidualSquat:
     """Find what squat the rows and the torque of the vehicle do not have in common.
 
     Parameters
@@ -209,21 +209,23 @@ def lean(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Lean:
     found_std = motion.squat_std or 0.0
     if made.torque_fitted and given is None and made.motion is None:
         # The file does not say what its torque has met: most likely the same.
-        return Lean(0.0, found_std)
-    rows_lean = motion.source not in BY_SPEED and motion.squat is None
-    torque_leans = made.torque_fitted and given is None and made.motion not in BY_SPEED
-    if rows_lean == torque_leans:
-        if rows_lean or given is None or motion.squat is None or not made.torque_fitted:
-            return Lean(0.0, found_std)
-        return Lean(squat_at(given, mass, made.masses, vehicle.of_class) - motion.squat, found_std)
-    if rows_lean:
+        return ResidualSquat(0.0, found_std)
+    rows_hold_squat = motion.source not in BY_SPEED and motion.squat is None
+    torque_holds_squat = made.torque_fitted and given is None and made.motion not in BY_SPEED
+    if rows_hold_squat == torque_holds_squat:
+        if rows_hold_squat or given is None or motion.squat is None or not made.torque_fitted:
+            return ResidualSquat(0.0, found_std)
+        return ResidualSquat(
+            squat_at(given, mass, made.masses, vehicle.of_class) - motion.squat, found_std
+        )
+    if rows_hold_squat:
         if given is not None:
-            return Lean(squat_at(given, mass, made.masses, vehicle.of_class), given_std)
+            return ResidualSquat(squat_at(given, mass, made.masses, vehicle.of_class), given_std)
         seen = squat_by_speed(motion) if motion.source == "longitudinal_accel" else None
-        return Lean(*SQUAT) if seen is None else Lean(*_mean(SQUAT, seen))
+        return ResidualSquat(*SQUAT) if seen is None else ResidualSquat(*_mean(SQUAT, seen))
     if motion.squat is not None:
-        return Lean(-motion.squat, found_std)
-    return Lean(-SQUAT[0], SQUAT[1])
+        return ResidualSquat(-motion.squat, found_std)
+    return ResidualSquat(-SQUAT[0], SQUAT[1])
 
 
 def _mean(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:

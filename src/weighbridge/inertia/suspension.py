@@ -254,7 +254,7 @@ def static_mass(samples: RideSamples, ride: Ride, gravity: float) -> tuple[float
     return ride.zero_mass + mean, std
 
 
-def lean(samples: RideSamples, ride: Ride) -> tuple[float, float, float]:
+def body_tilt(samples: RideSamples, ride: Ride) -> tuple[float, float, float]:
     """Angles by which the mean travel says the body leans over the front and the rear axle.
 
     A stiff body leans alike over both, whatever its load and the turns it takes, but for the

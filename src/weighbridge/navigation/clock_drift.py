@@ -62,14 +62,14 @@ class _Path:
     time, lag : (k,) knots [s]; beyond them ``slope`` goes on
     slope : at both ends [-]
     cuts : (start, end) of times in which a step lies [s]
-    told : what was found, for the sentence
+    text : what was found, for the sentence
     """
 
     time: Floats
     lag: Floats
     slope: float
     cuts: tuple[tuple[float, float], ...]
-    told: str
+    text: str
 
     def at(self, time: Floats) -> Floats:
         """Lag at instants of the table's clock [s]."""
@@ -202,8 +202,8 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     if follows and np.ptp(_median_of_three(lag - fit)) <= allowed + 2.0 * more:
         slope = slope if drifts else 0.0
         knots = time[[0, -1]]
-        told = f"drifts by {1e6 * slope:+.0f} ppm" if drifts else ""
-        return _Path(knots, float(np.mean(fit)) + slope * (knots - time.mean()), slope, (), told)
+        text = f"drifts by {1e6 * slope:+.0f} ppm" if drifts else ""
+        return _Path(knots, float(np.mean(fit)) + slope * (knots - time.mean()), slope, (), text)
     return _broken(time, lag, table)
 
 
@@ -232,8 +232,8 @@ def _lost(lags: Lags) -> tuple[tuple[float, float], ...]:
 
 def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     """Follow a lag that changes by steps, or slowly but not evenly."""
-    smooth = _median_of_three(lag)
-    jumps = np.flatnonzero(np.abs(np.diff(smooth)) > _STEP)
+    level_lag = _median_of_three(lag)
+    jumps = np.flatnonzero(np.abs(np.diff(level_lag)) > _STEP)
     # One step shows as two or three where a piece holds both sides of it.
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > 2) + 1) if jumps.size else []
     cuts, sizes, blended = [], [], np.zeros(lag.size, dtype=bool)
@@ -252,11 +252,11 @@ def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     follows = np.count_nonzero(np.abs(lag - level) < _NEAR) + np.count_nonzero(blended)
     if len(cuts) > _MOST_STEPS or follows < _FOLLOWS * blended.size:
         return _hopeless(table, "it jumps about") if table == "obd" else None
-    told = "is late by " + f"{float(level.min()):.2f} to {float(level.max()):.2f} s in turn"
+    text = "is late by " + f"{float(level.min()):.2f} to {float(level.max()):.2f} s in turn"
     if cuts:
         several = ", ".join(f"{s:+.2f} s" for s in sizes)
-        told = f"jumps by {several}"
-    return _Path(time, level, 0.0, tuple(cuts), told)
+        text = f"jumps by {several}"
+    return _Path(time, level, 0.0, tuple(cuts), text)
 
 
 def _hopeless(table: str, why: str) -> Problem:
@@ -271,11 +271,11 @@ def _hopeless(table: str, why: str) -> Problem:
 def _left_out(drive: Drive, table: str, lost: tuple[tuple[float, float], ...]) -> Drive:
     """Leave the rows of a table out where its speed does not fit the accelerometer at all."""
     first, last = drive.start, drive.end
-    told = " and ".join(f"{max(a, first):.0f} to {min(b, last):.0f} s" for a, b in lost)
+    text = " and ".join(f"{max(a, first):.0f} to {min(b, last):.0f} s" for a, b in lost)
     return _moved(drive, table, lambda t: t, lost).with_problems(
         Problem(
             "",
-            f"from {told} vehicle speed does not fit the accelerometer at any lag of its clock; "
+            f"from {text} vehicle speed does not fit the accelerometer at any lag of its clock; "
             f"the rows of {table} were left out there",
         )
     )
@@ -381,7 +381,7 @@ def _moved(
 def _note(table: str, other: str, path: _Path, level: float) -> Problem:
     most = path.lag - level
     far = float(most[int(np.argmax(np.abs(most)))])
-    what = path.told or f"is {far:+.2f} s off"
+    what = path.text or f"is {far:+.2f} s off"
     left_out = ""
     if path.cuts:
         at = ", ".join(f"{0.5 * (a + b):.0f} s" for a, b in path.cuts)

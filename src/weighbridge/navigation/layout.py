@@ -124,8 +124,8 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
     # As large as the motion that is made of it.
     del nodes
     accel = accel_along(found.grid, pose, constants, setup)
-    lean = averaged(float(time[1] - time[0]), bridged(time, accel))
-    grade = pose.pitch - constants.pitch0 - constants.squat * lean
+    accel_mean = averaged(float(time[1] - time[0]), bridged(time, accel))
+    grade = pose.pitch - constants.pitch0 - constants.squat * accel_mean
     mounting_pitch, floor = float(end[PITCH0]), setup.settings.body_pitch_std
     if not setup.has_height:
         grade, taken, floor = _levelled(time, grade, pose, setup)

@@ -89,7 +89,7 @@ class Motion:
         return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
 
     @property
-    def grade_open(self) -> float:
+    def unmeasured_grade(self) -> float:
         """What of the grade nothing has measured, as a standard deviation [rad]."""
         if self.source not in BY_SPEED or not self.valid.any():
             return 0.0

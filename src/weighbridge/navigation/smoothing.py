@@ -128,8 +128,10 @@ def smooth_speed(speed: Signal, time: Floats) -> tuple[Floats, Floats, Floats, F
     def misfit(level: Floats) -> float:
         transition, cov, noise, start, spread = model(thin, level)
         var = np.full(thin.size, noise)
-        told = rts.log_likelihood(transition, cov, row, speed.values[::stride], var, start, spread)
-        return float(-told + 0.5 * np.sum((level / LEVEL_STD) ** 2))
+        likelihood = rts.log_likelihood(
+            transition, cov, row, speed.values[::stride], var, start, spread
+        )
+        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
 
     found = minimize(misfit, np.zeros(3), method="Nelder-Mead", options={"xatol": 0.02}).x
     clock, z, at = _merged(speed.time, speed.values, time)
@@ -187,8 +189,8 @@ def smooth_height(
     def misfit(level: Floats) -> float:
         transition, cov, noise, start, spread = model(thin, level)
         var = np.full(thin.size, noise)
-        told = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
-        return float(-told + 0.5 * np.sum((level / LEVEL_STD) ** 2))
+        likelihood = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
+        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
 
     found = minimize(
         misfit, np.zeros(5), method="Nelder-Mead", options={"xatol": 0.05, "maxiter": 300}
@@ -228,10 +230,10 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
     def misfit(level: Floats) -> float:
         transition, cov, noise, start, spread = model(thin, level)
         var = np.full(thin.size, noise)
-        told = rts.log_likelihood(
+        likelihood = rts.log_likelihood(
             transition, cov, row, measured.values[::stride], var, start, spread
         )
-        return float(-told + 0.5 * np.sum((level / LEVEL_STD) ** 2))
+        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
 
     found = minimize(misfit, np.zeros(3), method="Nelder-Mead", options={"xatol": 0.05}).x
     clock, z, at = _merged(measured.time, measured.values, time)

@@ -82,7 +82,7 @@ PINNED: Final = SpeedEkfSettings(process_var=(0.1, 0.0, 1e-10))
 STARTS: Final = (800.0, 1092.0, 1500.0, 2000.0)
 """Masses the filter is started from, to see where it ends [kg]."""
 
-TOLD: Final = (900.0, 1092.0, 1400.0)
+STATED: Final = (900.0, 1092.0, 1400.0)
 """Masses the calibration is told of one and the same drive [kg]."""
 
 PAYLOADS: Final = (0.0, 100.0, 200.0, 300.0, 400.0)
@@ -149,7 +149,7 @@ class Reproduction:
     r_squared : of the fit
     tests : the three drives
     starts : `STARTS` against where the second drive ends, ours and noise as printed [kg]
-    told : `TOLD` against what the second drive then weighs [kg], and R² of the fit
+    stated : `STATED` against what the second drive then weighs [kg], and R² of the fit
     trials : drives the paper did not try
     """
 
@@ -157,7 +157,7 @@ class Reproduction:
     r_squared: float
     tests: tuple[Test, ...]
     starts: tuple[tuple[float, float, float], ...]
-    told: tuple[tuple[float, float, float], ...]
+    stated: tuple[tuple[float, float, float], ...]
     trials: tuple[Trial, ...]
 
 
@@ -199,11 +199,11 @@ def reproduce(*, seed: int = 777, progress: Progress | None = None) -> Reproduct
             run = run_filter(second.balance, vehicle, settings)
             ends.append(mean_mass(run.mass, run.used))
         starts.append((start, ends[0], ends[1]))
-    told = []
-    for mass in TOLD:
+    stated = []
+    for mass in STATED:
         other = calibrate_by_speed([known], [mass], base, nominal=NOMINAL)
         run = run_filter(speed_balance(drives[1].drive, other.vehicle), other.vehicle)
-        told.append((mass, mean_mass(run.mass, run.used), other.fit.r_squared))
+        stated.append((mass, mean_mass(run.mass, run.used), other.fit.r_squared))
     _tell(progress, 2, total)
 
     trials = []
@@ -236,7 +236,7 @@ def reproduce(*, seed: int = 777, progress: Progress | None = None) -> Reproduct
         r_squared=fitted.fit.r_squared,
         tests=tests,
         starts=tuple(starts),
-        told=tuple(told),
+        stated=tuple(stated),
         trials=tuple(trials),
     )
 
@@ -357,8 +357,8 @@ def starts_table(done: Reproduction) -> Table:
         for start, ours, printed in done.starts
     ]
     rows += [
-        (f"calibration told {told:.0f} kg", f"{ends:.1f}", "", f"{r_squared:.3f}")
-        for told, ends, r_squared in done.told
+        (f"calibration told {stated:.0f} kg", f"{ends:.1f}", "", f"{r_squared:.3f}")
+        for stated, ends, r_squared in done.stated
     ]
     return Table(
         f"What Test 02, truly {done.tests[1].mass:.0f} kg, weighs",

@@ -237,7 +237,7 @@ def _folded(
     if begun is None and moving[new].any():
         begun = float(view.time[new][np.argmax(moving[new])])
     view = replace(view, fuel_burnt=burnt, begun=begun)
-    rows, y = design(view, vehicle, leaned=sizes.body.leaned(view.accel))
+    rows, y = design(view, vehicle, squat_accel=sizes.body.squat_accel(view.accel))
     values = np.column_stack([view.time, y, view.force_std**2, rows])
     windows, means, count, stood = window_means.run(
         state.windows,

@@ -40,8 +40,8 @@ from weighbridge.inertia.suspension import (
     SHORTEST,
     SuspensionCheck,
     attenuation,
+    body_tilt,
     check_suspension,
-    lean,
     response,
     static_mass,
 )
@@ -80,10 +80,10 @@ HOPPING: Final = 0.0075
 """A ride sampled more slowly is told that faster is better [s]: at 100 Hz the axles' hop is
 integrated to within 0.5 %, at 200 Hz to within 0.03 %."""
 
-LEAN: Final = 0.003
+TILT: Final = 0.003
 """Angles of the body over its two axles may differ by so much [rad]: 5 mm over a track."""
 
-LEAN_PART: Final = 0.3
+TILT_PART: Final = 0.3
 """Or by this part of them: tyres give, and differently at front and rear [-]."""
 
 
@@ -232,17 +232,17 @@ def _judged(
     ):
         # Were it the stiffness, the inertias would be as wrong as the mass.
         std = np.hypot(std, abs(carried / found - 1.0))
-        told = (
+        note = (
             f"at rest the springs carry {carried:.0f} kg, in motion the sprung mass is "
             f"{found:.0f} kg: a travel sensor is offset, zero_mass_kg is not the mass with which "
             "they read zero, or the stiffness is wrong"
         )
-        doubts.append((told, "the interval holds both"))
+        doubts.append((note, "the interval holds both"))
     status, reason = _status(vehicle, track, check, trouble, [text for text, _ in doubts], std)
     weighed = status is Status.CONVERGED
     warnings += _limits(samples, ride, track, check, weighed)
     warnings += tuple(f"{text}; {effect}" if weighed else text for text, effect in doubts)
-    warnings += _leaning(last, ride)
+    warnings += _tilt_notes(last, ride)
     result = Inertia(
         drive=drive,
         vehicle=vehicle,
@@ -259,8 +259,8 @@ def _judged(
         AXES[k] for k in (1, 2) if status is Status.CONVERGED and math.isnan(result.values[k])
     ]
     if unknown:
-        told = f"the ride says too little about the {' and the '.join(unknown)}"
-        return _with_warning(result, told)
+        note = f"the ride says too little about the {' and the '.join(unknown)}"
+        return _with_warning(result, note)
     if vehicle.gross is not None and result.mass > vehicle.gross:
         sure = "surely" if result.mass - 2.0 * result.std > vehicle.gross else "perhaps"
         return _with_warning(result, f"{sure} above the permitted mass of {vehicle.gross:.0f} kg")
@@ -270,12 +270,12 @@ def _judged(
 def _trouble(track: InertiaTrack, changes: tuple[float, ...]) -> str:
     """Say what no vehicle does, in the hypotheses that the filter came to believe."""
     pushed = float(np.mean(track.pushed.any(axis=1)))
-    told = ""
+    note = ""
     if len(changes) > max(3.0, 0.1 * float(track.time[-1] - track.time[0])):
-        told = f"the load seems to change {len(changes)} times"
+        note = f"the load seems to change {len(changes)} times"
     elif pushed > MOSTLY_CALM:
-        told = f"the vehicle seems to brake or turn {100.0 * pushed:.0f} % of the time"
-    return told and f"{told}: springs, dampers or sensors are not those of the vehicle file"
+        note = f"the vehicle seems to brake or turn {100.0 * pushed:.0f} % of the time"
+    return note and f"{note}: springs, dampers or sensors are not those of the vehicle file"
 
 
 def _check(
@@ -315,35 +315,35 @@ def _limits(
     weighed: bool,
 ) -> tuple[str, ...]:
     """Say what limits the result: the vehicle file, noise, the logger, a short ride."""
-    told = []
+    note = []
     if ride.force_std is None and weighed:
-        told.append(
+        note.append(
             "the vehicle file does not say how sure its springs and dampers are (force_std): "
             f"{100.0 * UNKNOWN_FORCE_STD:.0f} % is in the interval"
         )
     if track.noise_factor > 1.0:
-        told.append(
+        note.append(
             f"the ride fits as if the suspension signals had {track.noise_factor:.2g} times the "
             "noise of the vehicle file: the sensors are noisier, or springs and dampers are not "
             f"the file's{'; the interval is widened' if weighed else ''}"
         )
     if samples.period > HOPPING:
-        told.append(
+        note.append(
             f"sampled at {1.0 / samples.period:.0f} Hz, axles that hop are hardly seen; "
             "200 Hz or more is better"
         )
     if check is None:
-        told.append(
+        note.append(
             f"springs and dampers could not be checked one by one, which takes {SHORTEST:.0f} s "
             "of one load: a broken one would not be told"
         )
-    return tuple(told)
+    return tuple(note)
 
 
-def _leaning(samples: RideSamples, ride: Ride) -> tuple[str, ...]:
+def _tilt_notes(samples: RideSamples, ride: Ride) -> tuple[str, ...]:
     """Tell where front and rear springs contradict each other about how the body leans."""
-    front, rear, std = lean(samples, ride)
-    if abs(front - rear) > max(LEAN, LEAN_PART * max(abs(front), abs(rear)), 4.0 * std):
+    front, rear, std = body_tilt(samples, ride)
+    if abs(front - rear) > max(TILT, TILT_PART * max(abs(front), abs(rear)), 4.0 * std):
         return (
             f"on average the body leans by {1e3 * front:.0f} mrad to the right over the front axle "
             f"and by {1e3 * rear:.0f} mrad over the rear axle: a travel sensor is offset; the "

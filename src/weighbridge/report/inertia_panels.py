@@ -207,9 +207,9 @@ def _tables(result: InertiaResult) -> list[Table]:
                 ),
             )
         )
-    told = (*((result.reason,) if result.reason else ()), *result.warnings)
-    if told:
-        notes = tuple((f"{text[:1].upper()}{text[1:]}.",) for text in dict.fromkeys(told))
+    remarks = (*((result.reason,) if result.reason else ()), *result.warnings)
+    if remarks:
+        notes = tuple((f"{text[:1].upper()}{text[1:]}.",) for text in dict.fromkeys(remarks))
         tables.append(Table("What was found, mended or doubted", ("",), notes))
     return tables
 

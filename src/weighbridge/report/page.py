@@ -272,8 +272,8 @@ def _drive(weighing: MassResult, known: float | None) -> str:
     """Answer, facts, warnings and segments of one drive."""
     body = _answer(weighing, known) + _facts(weighing, known)
     if weighing.warnings:
-        told = "".join(f"<li>{escape(sentence(w))}</li>" for w in weighing.warnings)
-        body += f'<h3>What was found, mended or doubted</h3><ul class="warnings">{told}</ul>'
+        noted = "".join(f"<li>{escape(sentence(w))}</li>" for w in weighing.warnings)
+        body += f'<h3>What was found, mended or doubted</h3><ul class="warnings">{noted}</ul>'
     return body + _segments(weighing)
 
 

@@ -102,8 +102,8 @@ class Section:
     @property
     def missing(self) -> tuple[str, ...]:
         """Why the section, or some of its figures, are not there."""
-        told = (self.absent, *(p.absent for p in self.panels if p.figure is None))
-        return tuple(text for text in told if text)
+        absent_notes = (self.absent, *(p.absent for p in self.panels if p.figure is None))
+        return tuple(text for text in absent_notes if text)
 
 
 def reason_name(reason: Reason) -> str:

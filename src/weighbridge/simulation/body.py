@@ -103,11 +103,11 @@ def simulate_pose(scenario: Scenario, drive: Trajectory, rng: np.random.Generato
     payload = scenario.payload + (drive.loaded if scenario.loading else 0.0)
     lever = car.squat * effects.squat * (1.0 + car.squat_load * payload / car.mass)
     squat = second_order(accel * lever, car.pitch_frequency, 0.45, zero=False)
-    lean = second_order(
+    body_roll = second_order(
         lateral * (-car.roll_gain * effects.roll), car.roll_frequency, 0.35, zero=False
     )
     pitch = grade + squat + car.load_pitch * payload * effects.load_pitch
-    roll = second_order(np.interp(s, grid, route.bank), 3.0, 0.7, zero=False) + lean
+    roll = second_order(np.interp(s, grid, route.bank), 3.0, 0.7, zero=False) + body_roll
     heave = np.zeros_like(s)
     if effects.roughness > 0.0:
         uneven = np.interp(s, grid, route.roughness) * np.sqrt(

@@ -267,8 +267,8 @@ def engine_load(scenario: Scenario, drive: Trajectory) -> Floats:
         top = top + size * (full - top)
     part = drive.gross_torque / top
     bend = effects.load_nonlinearity * car.load_curvature * 2.0 * part * (1.0 - part)
-    lean = effects.load_nonlinearity * car.load_speed_slope
-    load = (part + bend) * (1.0 + lean * (drive.engine_speed / car.max_speed - 0.35))
+    slope = effects.load_nonlinearity * car.load_speed_slope
+    load = (part + bend) * (1.0 + slope * (drive.engine_speed / car.max_speed - 0.35))
     # Air still passes a closed throttle.
     least = np.maximum(0.03, effects.overrun_fuel * car.least_charge * drive.uncut)
     load = car.load_full * np.maximum(load, least)
@@ -299,11 +299,11 @@ def _net_fraction(scenario: Scenario, drive: Trajectory) -> Floats:
     reference = round(max(car.curve_torque))
     part = drive.gross_torque / reference
     bend = 2.0 * car.torque_curvature * effects.load_nonlinearity
-    told = part * (1.0 + bend * (1.0 - part))
-    told = _smooth(told, car.load_smoothing * effects.load_smoothing)
+    reported = part * (1.0 + bend * (1.0 - part))
+    reported = _smooth(reported, car.load_smoothing * effects.load_smoothing)
     c = car.drag_torque
     friction = c[0] + c[1] * drive.engine_speed + c[2] * drive.engine_speed**2
-    return np.asarray(told - np.round(friction / reference, 2))
+    return np.asarray(reported - np.round(friction / reference, 2))
 
 
 def _values(scenario: Scenario, drive: Trajectory, name: str, pose: Pose) -> tuple[Floats, float]:

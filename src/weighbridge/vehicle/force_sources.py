@@ -139,8 +139,8 @@ def _driving_power(drive: Drive) -> Signal:
     time, power = amps.time[known], power[known]
     v = speed.at(time)
     around = max(round(1.0 / amps.period), 1) if amps.period > 0.0 else 1
-    smooth = uniform_filter1d(np.nan_to_num(v), around) if time.size else v
-    gained = np.gradient(smooth**2, time) if time.size > 1 else np.zeros(time.size)
+    averaged = uniform_filter1d(np.nan_to_num(v), around) if time.size else v
+    gained = np.gradient(averaged**2, time) if time.size > 1 else np.zeros(time.size)
     sign = math.copysign(1.0, float((power - np.mean(power)) @ gained)) if time.size else 1.0
     moves = time[np.abs(v) >= SLOWEST]
     near = np.searchsorted(moves, time + NEAR) > np.searchsorted(moves, time - NEAR)

@@ -215,7 +215,7 @@ def predict_gear(
     return np.where(engaged, gearings.size - nearest, 0).astype(np.int64), mismatch
 
 
-def told_gear_numbers(told: Ints, gearing: Floats, gearings: Floats) -> dict[int, int]:
+def reported_gear_numbers(reported: Ints, gearing: Floats, gearings: Floats) -> dict[int, int]:
     """Find which gears of the vehicle file the gears are that a gearbox tells.
 
     A file fitted to drives that never used the first gears counts from the
@@ -225,7 +225,7 @@ def told_gear_numbers(told: Ints, gearing: Floats, gearings: Floats) -> dict[int
 
     Parameters
     ----------
-    told : (n,) as the gearbox counts, 1 and up forward
+    reported : (n,) as the gearbox counts, 1 and up forward
     gearing : (n,) of the moment [1/m]; NaN where unknown
     gearings : (m,) of gears 1..m [1/m]
 
@@ -234,8 +234,8 @@ def told_gear_numbers(told: Ints, gearing: Floats, gearings: Floats) -> dict[int
     Number 1..m of each gear told; 0 where it is none of the file's
     """
     numbers = {}
-    for k in np.unique(told[told >= 1]).tolist():
-        ratio = gearing[(told == k) & np.isfinite(gearing) & (gearing > 0.0)]
+    for k in np.unique(reported[reported >= 1]).tolist():
+        ratio = gearing[(reported == k) & np.isfinite(gearing) & (gearing > 0.0)]
         numbers[k] = k if k <= gearings.size else 0
         if ratio.size >= 5:
             distance = np.abs(np.log(np.median(ratio) / gearings))
@@ -245,11 +245,11 @@ def told_gear_numbers(told: Ints, gearing: Floats, gearings: Floats) -> dict[int
     return numbers
 
 
-def number_told_gears(told: Ints, numbers: Mapping[int, int]) -> Ints:
+def number_reported_gears(reported: Ints, numbers: Mapping[int, int]) -> Ints:
     """Number the gears a gearbox tells (n,) by those of the vehicle file; 0 where none."""
-    gear = np.zeros(told.size, dtype=np.int64)
+    gear = np.zeros(reported.size, dtype=np.int64)
     for k, number in numbers.items():
-        gear[told == k] = number
+        gear[reported == k] = number
     return gear
 
 

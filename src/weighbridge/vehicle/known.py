@@ -116,12 +116,12 @@ def describe(known: Known) -> Described:
 
 
 def _notes(known: Known) -> str:
-    told = ["written by weighbridge vehicle new; nothing is calibrated"]
+    remarks = ["written by weighbridge vehicle new; nothing is calibrated"]
     if known.engine is not None:
-        told.append(f"{known.engine} engine" if known.engine != "electric" else "electric motor")
+        remarks.append(f"{known.engine} engine" if known.engine != "electric" else "electric motor")
     if known.torque is not None and not TORQUE_SOURCES[known.torque].signed:
-        told.append(f"torque by {known.torque.replace('_', ' ')}, which calibrate finds")
-    return "; ".join(told)
+        remarks.append(f"torque by {known.torque.replace('_', ' ')}, which calibrate finds")
+    return "; ".join(remarks)
 
 
 def _refuse(known: Known) -> None:

@@ -184,10 +184,10 @@ def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
     weight = usual**2 / (usual**2 + found.std**2)
     scale = 1.0 + weight * (found.scale - 1.0)
     std = math.sqrt(weight) * found.std
-    told = f"{found.text}; with the data sheet {scale:.3f} ± {{:.3f}}, by which it is divided"
+    note = f"{found.text}; with the data sheet {scale:.3f} ± {{:.3f}}, by which it is divided"
     if abs(found.scale - 1.0) > CONTRADICTION * math.hypot(usual, found.std):
         std = math.hypot(std, found.scale - scale)
-        told += "; a motor's torque is seldom so far off: check gearing, radius and battery current"
+        note += "; a motor's torque is seldom so far off: check gearing, radius and battery current"
     offset, slope, *powers = vehicle.torque.coefficients or (0.0, 1.0)
     model = replace(
         vehicle.torque,
@@ -195,7 +195,7 @@ def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
         coefficient_stds=(),
         scale_std=std,
     )
-    return replace(vehicle, torque=model), (told.format(std),)
+    return replace(vehicle, torque=model), (note.format(std),)
 
 
 def _rows(drive: Drive, vehicle: Vehicle) -> tuple[Floats, Floats, Floats, Bools] | None:

@@ -74,15 +74,15 @@ def worth(vehicle: Vehicle) -> str:
 
 
 def _masses(vehicle: Vehicle) -> str:
-    told = [f"{vehicle.kind} {vehicle.name!r}"]
-    told.append(
+    parts = [f"{vehicle.kind} {vehicle.name!r}"]
+    parts.append(
         f"tare {vehicle.tare:.0f} kg"
         if vehicle.tare is not None
         else "tare unknown, so payloads are not told"
     )
     if vehicle.gross is not None:
-        told.append(f"permitted mass {vehicle.gross:.0f} kg")
-    return ", ".join(told)
+        parts.append(f"permitted mass {vehicle.gross:.0f} kg")
+    return ", ".join(parts)
 
 
 def _gears(vehicle: Vehicle) -> str:

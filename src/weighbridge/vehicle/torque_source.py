@@ -38,14 +38,14 @@ class TorqueTerms:
     ----------
     offset : torque at no reading
     growth : for each power of engine speed, at a typical one
-    lean : torque at the highest reading that grows with engine speed
+    speed_growth : torque at the highest reading that grows with engine speed
     bend : of the highest reading squared
     knot : of the smooth correction at the highest reading
     """
 
     offset: float
     growth: float
-    lean: float
+    speed_growth: float
     bend: float
     knot: float
 
@@ -140,10 +140,12 @@ class TorqueSource:
         return drive.signals[self.found(drive)[0]]
 
 
-REPORTED_TERMS: Final = TorqueTerms(offset=0.05, growth=0.02, lean=0.03, bend=0.05, knot=0.012)
+REPORTED_TERMS: Final = TorqueTerms(
+    offset=0.05, growth=0.02, speed_growth=0.03, bend=0.05, knot=0.012
+)
 """Of a torque that is told: the maker has modelled it to a few percent of the full-load torque."""
 
-ROUGH_TERMS: Final = TorqueTerms(offset=0.15, growth=0.10, lean=0.30, bend=0.15, knot=0.08)
+ROUGH_TERMS: Final = TorqueTerms(offset=0.15, growth=0.10, speed_growth=0.30, bend=0.15, knot=0.08)
 """Of a reading that is only roughly torque: friction and accessories are a tenth of the full-load
 torque and grow with speed (Heywood, 1988, ch. 13); the full-load curve is smooth."""
 

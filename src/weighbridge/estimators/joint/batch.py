@@ -13,7 +13,7 @@ from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import WINDOW, Windows, windows
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.table import MergedView
-from weighbridge.estimators.considered import force_columns, open_std, sensitivity
+from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.load_stops import change_odds, stood_before, too_hasty
 from weighbridge.estimators.joint.problem import (
@@ -42,7 +42,7 @@ from weighbridge.estimators.judging import (
     nothing,
 )
 from weighbridge.estimators.noisy_motion import LEVEL_STD, attenuation
-from weighbridge.estimators.squat import Lean, lean
+from weighbridge.estimators.squat import ResidualSquat, residual_squat
 from weighbridge.estimators.track import MassTrack, Segment
 from weighbridge.kernels import disturbance
 from weighbridge.navigation.motion import BY_SPEED, MotionSource
@@ -107,7 +107,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     drive can improve are considered, not estimated: Schmidt, 1966.
     """
     view = balance.merged
-    rows, y = design(view, vehicle, grade_open=balance.motion.grade_open)
+    rows, y = design(view, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
     usable = usable_rows(view, rows, y)
     cut = windows(view.time, usable)
     reason = view.reason.copy()
@@ -136,7 +136,7 @@ class _Asked:
     """
 
     problem: Problem
-    body: Lean
+    body: ResidualSquat
     rows: Floats
     y: Floats
     stood: Floats
@@ -178,9 +178,11 @@ def _ask(balance: ForceBalance, vehicle: Vehicle, cut: Windows, rough: float) ->
 
     def of(mass: float | None) -> _Asked:
         """Squat and levels of noise are told in terms of a mass [kg]."""
-        body = lean(balance, vehicle, mass or rough)
-        leaned = body.leaned(view.accel)
-        rows, y = design(view, vehicle, leaned=leaned, grade_open=balance.motion.grade_open)
+        body = residual_squat(balance, vehicle, mass or rough)
+        squat_accel = body.squat_accel(view.accel)
+        rows, y = design(
+            view, vehicle, squat_accel=squat_accel, unmeasured_grade=balance.motion.unmeasured_grade
+        )
         means, sums = np.ascontiguousarray(cut.mean(rows)), cut.mean(y)
         guess = mass or first_guess(means[:, 0], sums)
         problem = Problem(
@@ -257,10 +259,10 @@ def _track(
     )  # fmt: skip
     phi = asked.rows[:, 0]
     left = math.hypot(
-        _left_open(balance, vehicle, mass),
+        _systematic_std(balance, vehicle, mass),
         asked.body.relative_std(view.accel, phi, used),
         inertia_relative_std(vehicle, mass, view.accel, phi, used),
-        UNMODELLED * open_std(vehicle, moved, mass),
+        UNMODELLED * fit_consider_std(vehicle, moved, mass),
         LEVEL_STD * float(low[-1]),
     )
     std = float(np.hypot(UNMODELLED * bound, mass * left))
@@ -330,7 +332,7 @@ def _explained(rows: Floats, x: Floats) -> Floats:
     return np.asarray(rows[:, 0] * x[:, 0] + np.sum(rows[:, LASTING:] * x[:, LASTING:], axis=1))
 
 
-def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
+def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
     """Relative standard deviation that no row of this drive can take away [-]."""
     made = vehicle.provenance
     scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(vehicle)
@@ -360,7 +362,7 @@ def _left_open(balance: ForceBalance, vehicle: Vehicle, mass: float) -> float:
 def _prior(balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float) -> Floats:
     """Standard deviations of the states before the drive has told, of a rough mass [kg]."""
     torque = highest_torque(balance.merged.torque[cut.index])
-    return prior_std(vehicle, guess, torque, grade_open=balance.motion.grade_open)
+    return prior_std(vehicle, guess, torque, unmeasured_grade=balance.motion.unmeasured_grade)
 
 
 def _segments(

@@ -116,8 +116,8 @@ def largest(given: FilterInput) -> ScaleChange | None:
     if time.size < 4 * STEPS:
         return None
     # Even in what the windows weigh, so that each part can tell.
-    told = np.cumsum(given.rows[:, 0] ** 2 / given.noise)
-    instants = np.interp((np.arange(STEPS - 1) + 1) / STEPS, told / told[-1], time)
+    information = np.cumsum(given.rows[:, 0] ** 2 / given.noise)
+    instants = np.interp((np.arange(STEPS - 1) + 1) / STEPS, information / information[-1], time)
     instants = instants[(instants >= time[ENDS]) & (instants <= time[-ENDS])]
     if not instants.size:
         return None

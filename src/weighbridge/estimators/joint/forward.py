@@ -26,7 +26,7 @@ class JointSetup(JointSizes):
 
     Attributes
     ----------
-    attenuating_var : noise of the motion that draws the mass down, for the weight that the filter
+    attenuating_var : noise of the motion that attenuates the mass, for the weight that the filter
         gives a window before it is seen [m^2/s^4]
     """
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from weighbridge.estimators.joint.slow_errors import filter_params
-from weighbridge.estimators.squat import Lean
+from weighbridge.estimators.squat import ResidualSquat
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Bools, Floats
 
@@ -25,7 +25,7 @@ SETTLE: Final = 40
 CHANGE_STD: Final = 0.25
 """Standard deviation of a change of load at a stop, over mass [-]."""
 
-LOAD_LEAN_STD: Final = 0.03
+LOAD_PITCH_STD: Final = 0.03
 """Standard deviation of what a change of load adds to the slow resistance, over mass [m/s^2]:
 the body leans with its load, and the accelerometer with it; 240 kg in the boot of a simulated car
 make 0.27 deg, 0.046 m/s^2."""
@@ -60,7 +60,7 @@ def jump_variance(std: Floats) -> Floats:
     """Variance (k,) by which each state of ``std`` may jump where the load changes."""
     jump = np.zeros(std.size)
     jump[0] = CHANGE_STD * std[0]
-    jump[2] = LOAD_LEAN_STD * std[0]
+    jump[2] = LOAD_PITCH_STD * std[0]
     return jump**2
 
 
@@ -189,7 +189,7 @@ class JointSizes:
     std: Floats
     fast: float
     slow: float
-    body: Lean
+    body: ResidualSquat
     motion_var: float
     noise_information: float
     left: float

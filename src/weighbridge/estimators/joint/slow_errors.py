@@ -131,8 +131,8 @@ def design(
     view: MergedView,
     vehicle: Vehicle,
     *,
-    leaned: Floats | None = None,
-    grade_open: float = 0.0,
+    squat_accel: Floats | None = None,
+    unmeasured_grade: float = 0.0,
 ) -> tuple[Floats, Floats]:
     """Rows of the model ``y = phi m + d + c + wind + cold torque + drag``.
 
@@ -141,8 +141,8 @@ def design(
     Parameters
     ----------
     view, vehicle
-    leaned : (n,) what the lean of the accelerometer adds to the specific force [m/s^2]
-    grade_open : what of the grade nothing has measured [rad]
+    squat_accel : (n,) what squat of the body adds to the specific force [m/s^2]
+    unmeasured_grade : what of the grade nothing has measured [rad]
 
     Returns
     -------
@@ -152,13 +152,13 @@ def design(
         would have weighed [N]
     """
     phi, y = regression(view, vehicle)
-    if leaned is not None:
-        phi = phi - leaned
+    if squat_accel is not None:
+        phi = phi - squat_accel
     area = vehicle.road.drag_area.value
     north, east = law.wind_columns(view)
     columns = [
         phi,
-        law.gust_column(view, grade_open),
+        law.gust_column(view, unmeasured_grade),
         law.resistance_column(view),
         area * north,
         area * east,
@@ -210,7 +210,9 @@ def motion_variance(motion: Motion, length: float = WINDOW) -> float:
     return MOTION_WINDOW_STD**2 + (MOTION_SHARE * level) ** 2 * WINDOW / length
 
 
-def prior_std(vehicle: Vehicle, mass: float, torque: float, *, grade_open: float = 0.0) -> Floats:
+def prior_std(
+    vehicle: Vehicle, mass: float, torque: float, *, unmeasured_grade: float = 0.0
+) -> Floats:
     """Standard deviations (7,), (9,) or (11,) of the states before the drive has told.
 
     Parameters
@@ -218,10 +220,10 @@ def prior_std(vehicle: Vehicle, mass: float, torque: float, *, grade_open: float
     vehicle : its drag area, rolling resistance and inertias are as uncertain as its ``road`` says
     mass : rough [kg]; its own standard deviation is as large
     torque : highest of the drive [N m]
-    grade_open : what of the grade nothing has measured; the disturbance takes it [rad]
+    unmeasured_grade : what of the grade nothing has measured; the disturbance takes it [rad]
     """
     road = vehicle.road
-    grade = GRAVITY * grade_open
+    grade = GRAVITY * unmeasured_grade
     resistance = float(np.hypot(RESISTANCE_STD, GRAVITY * road.rolling_coefficient.std))
     states = [
         mass,

@@ -163,9 +163,9 @@ def find_gain(
     block = ((time - time[0]) / _BLOCK).astype(np.int64)
     square = np.bincount(block, force**2)
     common = np.bincount(block, force * shown)
-    told = square > 0.05 * float(np.max(square))
-    square, common = square[told], common[told]
-    at = np.bincount(block, time)[told] / np.bincount(block)[told]
+    strong = square > 0.05 * float(np.max(square))
+    square, common = square[strong], common[strong]
+    at = np.bincount(block, time)[strong] / np.bincount(block)[strong]
     if at.size < _FEWEST:
         return None
     # Weighed by what each block tells, so that quiet ones do no harm.

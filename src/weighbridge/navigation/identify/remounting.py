@@ -188,7 +188,7 @@ def openings(time: Floats, changes: Sequence[Change]) -> tuple[Floats, Floats]:
     return instants[order][within], variances[order][within]
 
 
-def told(changes: Sequence[Change], start: float, end: float) -> list[str]:
+def remounting_notes(changes: Sequence[Change], start: float, end: float) -> list[str]:
     """Say in sentences what changed when in a drive from ``start`` to ``end`` [s]."""
     texts = []
     for change in sorted(changes, key=lambda c: c.start):

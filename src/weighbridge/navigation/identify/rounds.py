@@ -27,7 +27,7 @@ from weighbridge.navigation.identify.remounting import (
     Change,
     find_changes,
     openings,
-    told,
+    remounting_notes,
     undo,
     unsure,
 )
@@ -181,7 +181,7 @@ def _settled(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Set
     imu = Imu(time, Axes.of(values[:, :3]), Axes.of(values[:, 3:]), imu.period)
     fine = evenly(imu, FINE_RATE)
     aligned, align_notes = align(fine, sources.reference, mounting)
-    moved = told(changes, float(time[0]), float(time[-1]))
+    moved = remounting_notes(changes, float(time[0]), float(time[-1]))
     return _Settled(imu, fine, aligned, tuple(changes), (*notes, *moved, *align_notes))
 
 
