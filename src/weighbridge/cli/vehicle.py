@@ -19,6 +19,42 @@ app = typer.Typer(no_args_is_help=True, help="Write a vehicle file, or tell what
 _Text = Optional[str]  # noqa: UP045  (typer reads the annotation at run time)
 _Number = Optional[float]  # noqa: UP045
 
+_Tare = Annotated[
+    _Number,
+    typer.Option(
+        "--tare",
+        help="Empty mass in kg; field G of an EU registration document.",
+        show_default=False,
+    ),
+]
+_Gross = Annotated[
+    _Number,
+    typer.Option("--gross", help="Permitted mass in kg, field F.1 or F.2.", show_default=False),
+]
+_Tyre = Annotated[
+    _Text, typer.Option("--tyre", help="Size, such as '205/55 R16'.", show_default=False)
+]
+_GearRatios = Annotated[
+    _Text,
+    typer.Option("--gear-ratios", help="Such as 3.77,2.09,1.32,0.98,0.78.", show_default=False),
+]
+_Torque = Annotated[
+    _Text,
+    typer.Option(
+        "--torque",
+        help="What the drives tell: a torque source.",
+        show_default=False,
+    ),
+]
+_Layout = Annotated[
+    _Text,
+    typer.Option(
+        "--layout",
+        help="Engine transverse or longitudinal, of a car or van.",
+        show_default=False,
+    ),
+]
+
 
 @app.command(cls=TellsSources)
 def new(
@@ -30,36 +66,14 @@ def new(
     engine: Annotated[
         _Text, typer.Option("--engine", help="petrol, diesel or electric.", show_default=False)
     ] = None,
-    tare: Annotated[
-        _Number,
-        typer.Option(
-            "--tare",
-            help="Empty mass in kg; field G of an EU registration document.",
-            show_default=False,
-        ),
-    ] = None,
-    gross: Annotated[
-        _Number,
-        typer.Option("--gross", help="Permitted mass in kg, field F.1 or F.2.", show_default=False),
-    ] = None,
-    tyre: Annotated[
-        _Text, typer.Option("--tyre", help="Size, such as '205/55 R16'.", show_default=False)
-    ] = None,
-    gear_ratios: Annotated[
-        _Text,
-        typer.Option("--gear-ratios", help="Such as 3.77,2.09,1.32,0.98,0.78.", show_default=False),
-    ] = None,
+    tare: _Tare = None,
+    gross: _Gross = None,
+    tyre: _Tyre = None,
+    gear_ratios: _GearRatios = None,
     final_drive: Annotated[
         _Number, typer.Option("--final-drive", help="Ratio of the axle.", show_default=False)
     ] = None,
-    torque: Annotated[
-        _Text,
-        typer.Option(
-            "--torque",
-            help="What the drives tell: a torque source.",
-            show_default=False,
-        ),
-    ] = None,
+    torque: _Torque = None,
     reference_torque: Annotated[
         _Number,
         typer.Option("--reference-torque", help="100 % torque in N m.", show_default=False),
@@ -70,14 +84,7 @@ def new(
     frontal_area: Annotated[
         _Number, typer.Option("--frontal-area", help="In m².", show_default=False)
     ] = None,
-    layout: Annotated[
-        _Text,
-        typer.Option(
-            "--layout",
-            help="Engine transverse or longitudinal, of a car or van.",
-            show_default=False,
-        ),
-    ] = None,
+    layout: _Layout = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Write a vehicle file from what an owner knows; the rest is usual for the class.
