@@ -1,5 +1,7 @@
 """Settings of estimators by name: in Python, as text, in a weighing."""
 
+from dataclasses import replace
+
 import pytest
 
 import weighbridge as wb
@@ -25,7 +27,9 @@ def test_settings_within_settings_are_reached_by_dots():
 @pytest.mark.parametrize(
     ("method", "given", "said"),
     [
-        ("joint", {"gate": 5.0}, "method joint has no settings, got gate"),
+        ("joint", {"gate": 0.0}, "gate must be positive, got 0"),
+        ("joint", {"change_std": 2.0}, r"change_std must be in \(0, 1\]"),
+        ("joint", {"settle": 0}, "settle must be 1 or more"),
         ("rls", {"lambda": 0.99}, "no setting 'lambda'; known are forgetting, initial_mass"),
         ("rls", {"forgetting": 0.5}, r"forgetting must be in \(0.9, 1\], got 0.5"),
         ("rls", {"forgetting": "fast"}, "forgetting takes a number, got 'fast'"),
@@ -39,6 +43,12 @@ def test_settings_within_settings_are_reached_by_dots():
 def test_what_cannot_be_set_is_one_sentence(method, given, said):
     with pytest.raises(ConfigError, match=said):
         ESTIMATORS[method].settings_of(given)
+
+
+def test_a_method_without_settings_says_so():
+    bare = replace(ESTIMATORS["rls"], settings=None)
+    with pytest.raises(ConfigError, match="method rls has no settings, got gate"):
+        bare.settings_of({"gate": 5.0})
 
 
 def test_texts_are_read_as_toml():

@@ -19,7 +19,7 @@ from weighbridge.balance.law import DISTURBANCE_STD
 from weighbridge.balance.table import MergedView
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
-from weighbridge.estimators.joint.problem import GATE
+from weighbridge.estimators.joint import JointSettings
 from weighbridge.estimators.joint.slow_errors import (
     RESISTANCE_STD,
     TIME_CONSTANTS,
@@ -361,7 +361,7 @@ def _solve(
     params = kernel.DisturbanceParams(
         time_constant=np.concatenate((np.full(5 + extra, np.inf), TIME_CONSTANTS)),
         std=np.concatenate((np.zeros(5 + extra), fading)),
-        gate=GATE,
+        gate=JointSettings().gate,
         settle=100,
     )
     start = kernel.initial_state(x0, prior, 0.0)  # type: ignore[no-untyped-call]

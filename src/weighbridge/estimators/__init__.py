@@ -72,6 +72,7 @@ ESTIMATORS: Final = Registry(
         Estimator(
             name="joint",
             estimate=joint.estimate,
+            settings=joint.JointSettings,
             fits=(JOINT.name,),
             segments_are_loads=True,
             reckons_fuel=True,

@@ -5,5 +5,6 @@
 """
 
 from weighbridge.estimators.joint.batch import estimate
+from weighbridge.estimators.joint.settings import JointSettings
 
-__all__ = ["estimate"]
+__all__ = ["JointSettings", "estimate"]

@@ -17,12 +17,12 @@ from weighbridge.estimators.considered import fit_consider_std, force_columns, s
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.load_stops import change_odds, stood_before, too_hasty
 from weighbridge.estimators.joint.problem import (
-    FEWEST_WINDOWS,
     UNMODELLED,
     FilterInput,
     JointSizes,
     Problem,
 )
+from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.estimators.joint.slow_errors import (
     LASTING,
     SlowErrors,
@@ -82,7 +82,13 @@ def _sensible(mass: float) -> float:
     return float(np.clip(mass, 200.0, 60_000.0)) if np.isfinite(mass) else 2000.0
 
 
-def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = True) -> MassTrack:
+def estimate(
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    settings: JointSettings | None = None,
+    *,
+    load_changes: bool = True,
+) -> MassTrack:
     """Weigh by a Kalman filter of the mass and the slow errors of `slow_errors`.
 
     Usable rows, braking and overrun aside, are averaged over windows of
@@ -97,6 +103,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     Parameters
     ----------
     balance, vehicle
+    settings : the defaults when None
     load_changes : the load may change at stops; not where the mass is known
 
     References
@@ -106,6 +113,7 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     IEEE Trans. Information Theory 11, 1965. Parameters that no data of the
     drive can improve are considered, not estimated: Schmidt, 1966.
     """
+    settings = settings or JointSettings()
     view = balance.merged
     rows, y = design(view, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
     usable = usable_rows(view, rows, y)
@@ -114,9 +122,10 @@ def estimate(balance: ForceBalance, vehicle: Vehicle, *, load_changes: bool = Tr
     reason[view.usable] = Reason.NO_MOTION
     reason[usable] = Reason.TOO_SHORT
     reason[cut.index] = Reason.USED
-    if cut.count.size < FEWEST_WINDOWS:
+    if cut.count.size < settings.fewest_windows:
         return nothing("joint", balance, vehicle, reason, int(cut.count.size))
-    asked = _ask(balance, vehicle, cut, first_guess(cut.mean(rows[:, 0]), cut.mean(y)))
+    rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
+    asked = _ask(balance, vehicle, cut, rough, settings)
     if not load_changes:
         problem = replace(asked.problem, odds=np.full(asked.stood.size, np.nan))
         asked = replace(asked, problem=problem)
@@ -170,7 +179,9 @@ class _Solved:
     weight: Floats
 
 
-def _ask(balance: ForceBalance, vehicle: Vehicle, cut: Windows, rough: float) -> _Asked:
+def _ask(
+    balance: ForceBalance, vehicle: Vehicle, cut: Windows, rough: float, settings: JointSettings
+) -> _Asked:
     """State the problem of a drive whose mass is ``rough`` [kg]."""
     view = balance.merged
     time = cut.mean(view.time)
@@ -192,6 +203,7 @@ def _ask(balance: ForceBalance, vehicle: Vehicle, cut: Windows, rough: float) ->
             odds=change_odds(stood, by_speed=balance.motion.source in BY_SPEED),
             variance=noise_variance(view, cut, guess, balance.motion),
             std=_prior(balance, vehicle, cut, guess),
+            settings=settings,
         )
         return _Asked(problem=problem, body=body, rows=rows, y=y, stood=stood)
 
@@ -304,6 +316,7 @@ def _track(
             motion_var=motion_variance(balance.motion) + balance.motion.mean_accel_std(WINDOW) ** 2,
             noise_information=shown * float(np.sum(solved.weight)),
             left=left,
+            settings=problem.settings,
         ),
     )
 

@@ -108,7 +108,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     As of `weighbridge.estimators.joint.estimate`; attenuation: Fuller, Measurement Error
     Models, 1987, ch. 1, 2.
     """
-    start, params = first_state(setup.std, setup.slow, window.time)
+    start, params = first_state(setup.std, setup.slow, window.time, setup.settings)
     load, begun, tried = state.load, state.begun, state.tried
     if load is None:
         load = load_change.initial_state(start)  # type: ignore[no-untyped-call]
@@ -117,8 +117,9 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     odds = float(change_odds(np.array([window.stood]))[0]) if long else np.nan
     weight = disturbance.weight(load.same, window.time, window.row, noise, params)
     opened = load.begun
+    weighed = load_params(params, setup.std, setup.settings)
     load, mass, var, changed = load_change.step(
-        load, window.time, window.row, window.y, noise, odds, load_params(params, setup.std)
+        load, window.time, window.row, window.y, noise, odds, weighed
     )
     if changed >= 0:
         begun = tried

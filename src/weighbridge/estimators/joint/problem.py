@@ -8,27 +8,11 @@ from typing import Final
 import numpy as np
 from scipy.optimize import minimize
 
+from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.estimators.joint.slow_errors import filter_params
 from weighbridge.estimators.squat import ResidualSquat
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Bools, Floats
-
-GATE: Final = 5.0
-"""Windows with a larger normalised innovation are left out [-]."""
-
-FEWEST_WINDOWS: Final = 8
-"""Fewer usable windows carry no mass, after a stop no change of it."""
-
-SETTLE: Final = 40
-"""Windows before the gate closes."""
-
-CHANGE_STD: Final = 0.25
-"""Standard deviation of a change of load at a stop, over mass [-]."""
-
-LOAD_PITCH_STD: Final = 0.03
-"""Standard deviation of what a change of load adds to the slow resistance, over mass [m/s^2]:
-the body leans with its load, and the accelerometer with it; 240 kg in the boot of a simulated car
-make 0.27 deg, 0.046 m/s^2."""
 
 UNMODELLED: Final = 1.6
 """Errors of the mass over what the filter says of them [-]: simulated drives of one
@@ -36,7 +20,7 @@ calibration scatter so around their mean, after five minutes as after an hour.""
 
 
 def first_state(
-    std: Floats, slow: float, time: float
+    std: Floats, slow: float, time: float, settings: JointSettings
 ) -> tuple[disturbance.DisturbanceState, disturbance.DisturbanceParams]:
     """State to start from and parameters of the filter.
 
@@ -45,6 +29,7 @@ def first_state(
     std : (k,) of the states before the drive has told; that of the mass is its guess as well
     slow : level of the disturbance over its usual size [-]
     time : of the first window [s]
+    settings
     """
     std = std.copy()
     std[1] *= slow
@@ -53,24 +38,26 @@ def first_state(
     start = disturbance.initial_state(  # type: ignore[no-untyped-call]
         begin, np.diag(std**2), time
     )
-    return start, filter_params(std, GATE, SETTLE)
+    return start, filter_params(std, settings.gate, settings.settle)
 
 
-def jump_variance(std: Floats) -> Floats:
+def jump_variance(std: Floats, settings: JointSettings) -> Floats:
     """Variance (k,) by which each state of ``std`` may jump where the load changes."""
     jump = np.zeros(std.size)
-    jump[0] = CHANGE_STD * std[0]
-    jump[2] = LOAD_PITCH_STD * std[0]
+    jump[0] = settings.change_std * std[0]
+    jump[2] = settings.load_pitch_std * std[0]
     return jump**2
 
 
-def load_params(params: disturbance.DisturbanceParams, std: Floats) -> load_change.LoadParams:
+def load_params(
+    params: disturbance.DisturbanceParams, std: Floats, settings: JointSettings
+) -> load_change.LoadParams:
     """How the hypotheses of the load are weighed, by the sizes of the states (k,)."""
     return load_change.LoadParams(
         filter=params,
-        jump_var=jump_variance(std),
+        jump_var=jump_variance(std, settings),
         temper=1.0 / UNMODELLED**2,
-        fewest=FEWEST_WINDOWS,
+        fewest=settings.fewest_windows,
     )
 
 
@@ -86,6 +73,7 @@ class Problem:
     odds : (m,) logarithm of the odds that the load changed before a window; NaN where it cannot
     variance : (m,) of the usual fast noise of ``y`` [N^2]
     std : (k,) of the states before the drive has told; that of the mass is its guess as well
+    settings
     """
 
     time: Floats
@@ -94,18 +82,19 @@ class Problem:
     odds: Floats
     variance: Floats
     std: Floats
+    settings: JointSettings
 
     def kernel_input(
         self, fast: float, slow: float
     ) -> tuple[disturbance.DisturbanceState, Floats, disturbance.DisturbanceParams]:
         """State to start from, noise variance and parameters at a level of noise."""
-        start, params = first_state(self.std, slow, float(self.time[0]))
+        start, params = first_state(self.std, slow, float(self.time[0]), self.settings)
         return start, fast**2 * self.variance, params
 
     @property
     def jump_var(self) -> Floats:
         """Variance (n,) by which each state may jump where the load changes."""
-        return jump_variance(self.std)
+        return jump_variance(self.std, self.settings)
 
     def likeliest(self) -> tuple[float, float]:
         """Levels of fast noise and of the disturbance, over their usual sizes [-].
@@ -141,7 +130,7 @@ class Problem:
             self.y,
             noise,
             self.odds,
-            load_params(params, self.std),
+            load_params(params, self.std, self.settings),
         )
 
 
@@ -184,6 +173,7 @@ class JointSizes:
     noise_information : trace of the windows' information times the noise of the motion in them,
         which times the variance of the mass is the part that it is too low by [1/kg^2]
     left : relative standard deviation of the mass that no row takes away [-]
+    settings : of the estimator
     """
 
     std: Floats
@@ -193,6 +183,7 @@ class JointSizes:
     motion_var: float
     noise_information: float
     left: float
+    settings: JointSettings
 
     @property
     def mass(self) -> float:
