@@ -26,12 +26,12 @@ ETC1, ETC2 = 0xF002, 0xF005
 CCVS1, EBC1, ERC1 = 0xFEF1, 0xF001, 0xF000
 VDHR, AMB, LFE, VW, CVW = 0xFEC1, 0xFEF5, 0xFEF2, 0xFEEA, 0xFE70
 EC1 = 0xFEE3
-_TP_CM, _TP_DT = 0xEC00, 0xEB00
+TP_CM, TP_DT = 0xEC00, 0xEB00
 
 NAMES: Final[dict[int, str]] = {
     EEC1: "EEC1", EEC2: "EEC2", EEC3: "EEC3", ETC1: "ETC1", ETC2: "ETC2", CCVS1: "CCVS1",
     EBC1: "EBC1", ERC1: "ERC1", VDHR: "VDHR", AMB: "AMB", LFE: "LFE", VW: "VW", CVW: "CVW",
-    EC1: "EC1", _TP_CM: "TP.CM", _TP_DT: "TP.DT",
+    EC1: "EC1", TP_CM: "TP.CM", TP_DT: "TP.DT",
 }  # fmt: skip
 """Parameter groups by number, with the acronyms of J1939-71."""
 
@@ -94,13 +94,14 @@ SPNS: Final[tuple[Spn, ...]] = (
 )
 """Every parameter read, all of SAE J1939-71."""
 
-_SPN: Final = {s.name: s for s in SPNS}
+SPN: Final = {s.name: s for s in SPNS}
+"""The parameters by name."""
 
 _PARK: Final = 0xFB
 """SPN 523: a gearbox in park is told by a code above the range of gears."""
 
 # Friction changes with engine speed and heat; older than this it says nothing.
-_FRICTION_AGE: Final = 5.0
+FRICTION_AGE: Final = 5.0
 
 
 @dataclass(slots=True)
@@ -189,7 +190,7 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
     parts = {number: frames.select(group == number) for number in numbers.tolist()}
     empty = Frames.empty()
     assembled, summary.incomplete = assemble(
-        parts.get(_TP_CM, empty), parts.get(_TP_DT, empty), EC1
+        parts.get(TP_CM, empty), parts.get(TP_DT, empty), EC1
     )
     parts[EC1] = assembled
     if len(assembled):
@@ -249,7 +250,7 @@ class _Reader:
         part = self.parts.get(spn.pgn)
         if part is None or not len(part):
             return []
-        values = _values(part, spn)
+        values = spn_values(part, spn)
         sender = part.channel.astype(np.int64) << 8 | (part.id & 0xFF).astype(np.int64)
         found = []
         for s in np.unique(sender).tolist():
@@ -261,7 +262,7 @@ class _Reader:
 
     def best(self, name: str) -> Signal | None:
         """The signal of the sender with the most valid values."""
-        senders = self.senders(_SPN[name])
+        senders = self.senders(SPN[name])
         if not senders:
             return None
         address, time, values = senders[0]
@@ -274,8 +275,8 @@ class _Reader:
         """One switch of several: pressed where any says so, each holding its last value."""
         told = []
         for spn in spns:
-            for _, time, values in self.senders(_SPN[spn]):
-                on = _pressed(spn, values)
+            for _, time, values in self.senders(SPN[spn]):
+                on = is_pressed(spn, values)
                 signal, problems = clean_signal(name, time, on.astype(np.float64), self.name)
                 self.summary.problems += problems
                 if signal is not None:
@@ -293,7 +294,7 @@ class _Reader:
         return Signal(name, time[kept], on[kept])
 
 
-def _pressed(spn: str, values: Floats) -> Bools:
+def is_pressed(spn: str, values: Floats) -> Bools:
     """Whether a brake or clutch works, by what one parameter says."""
     match spn:
         case "driveline_engaged":
@@ -307,7 +308,7 @@ def _pressed(spn: str, values: Floats) -> Bools:
     return np.asarray(values > 0.5)
 
 
-def _values(part: Frames, spn: Spn) -> Floats:
+def spn_values(part: Frames, spn: Spn) -> Floats:
     """Values of one parameter in SI; NaN where not available, in error or cut off.
 
     J1939-71, table 1: codes from 0xFB.. up are no values; a switch of two bits
@@ -344,7 +345,7 @@ def _net_torque(reader: _Reader) -> list[Signal]:
     reader.summary.sources.pop("actual_torque", None)
     if actual is None:
         return []
-    address = reader.senders(_SPN["actual_torque"])[0][0]
+    address = reader.senders(SPN["actual_torque"])[0][0]
     reader.summary.sources["engine_torque_fraction"] = address
     reader.summary.extras["actual_torque"] = actual
     friction = reader.best("friction_torque")
@@ -367,12 +368,12 @@ def _net_torque(reader: _Reader) -> list[Signal]:
         # A controller that does not know it sends its lowest code, -125 %.
         told = np.interp(actual.time, parasitic.time, parasitic.values)
         lost = lost + np.where(told > 0.0, told, 0.0)
-    near = friction.age(actual.time) <= _FRICTION_AGE
+    near = friction.age(actual.time) <= FRICTION_AGE
     if not near.all():
         reader.note(
             "engine_torque_fraction",
             f"{int(np.count_nonzero(~near))} of {near.size} values of engine torque have no "
-            f"friction torque within {_FRICTION_AGE:g} s and were left out",
+            f"friction torque within {FRICTION_AGE:g} s and were left out",
         )
     if not near.any():
         return []
@@ -384,7 +385,7 @@ def _check_buses(reader: _Reader) -> None:
     part = reader.parts.get(EEC1)
     if part is None or np.unique(part.channel).size < 2:
         return
-    values = _values(part, _SPN["engine_speed"])
+    values = spn_values(part, SPN["engine_speed"])
     own = (part.channel == reader.bus) & np.isfinite(values)
     if not own.any():
         return
@@ -442,8 +443,8 @@ def _tell_weights(reader: _Reader) -> None:
     part = reader.parts.get(VW)
     if part is None or not len(part):
         return
-    weight = _values(part, _SPN["axle_weight"])
-    axle = _values(part, _SPN["axle"])
+    weight = spn_values(part, SPN["axle_weight"])
+    axle = spn_values(part, SPN["axle"])
     good = np.isfinite(weight) & np.isfinite(axle)
     if good.any():
         total = sum(

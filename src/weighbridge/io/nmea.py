@@ -10,6 +10,7 @@ import datetime as dt
 import math
 import re
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,7 +25,9 @@ from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
 
 # Longest sentence of the standard is 82 characters; receivers send longer ones of their own.
-_SENTENCE: Final = re.compile(rb"\$[A-Z]{2}(?:RMC|GGA|GNS|GST|VTG)[ -#%-~]{0,180}")
+SENTENCE: Final = re.compile(rb"\$[A-Z]{2}(?:RMC|GGA|GNS|GST|VTG)[ -#%-~]{0,180}")
+"""A sentence that is read, among any other bytes."""
+
 _OTHER: Final = re.compile(rb"\$[A-Z]{5,6},")
 _DAY: Final = 86_400.0
 
@@ -36,80 +39,95 @@ _NO_FIX: Final = frozenset((0, 6, 7, 8))
 _FIELDS: Final = {"RMC": 9, "GGA": 9, "GNS": 9, "GST": 7, "VTG": 7}
 
 
+class UnfitSentenceError(Exception):
+    """A sentence that tells nothing; its text is why, as in ``3 sentences damaged``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """What one sentence says, in its own units.
+
+    Attributes
+    ----------
+    kind : RMC, GGA, GNS, GST or VTG
+    clock : time of day [s]; None for VTG, which follows the sentences of its epoch
+    day : date as seconds from 1970; NaN where it has none
+    place : latitude, longitude [deg] and, of GGA and GNS, height [m] and dilution; empty without
+    motion : speed [kn; km/h of VTG] and course [deg]; empty without
+    spread : horizontal standard deviation [m]; NaN without
+    """
+
+    kind: str
+    clock: float | None
+    day: float = math.nan
+    place: tuple[float, ...] = ()
+    motion: tuple[float, ...] = ()
+    spread: float = math.nan
+
+
+def read_sentence(text: str) -> Sentence:
+    """Read one sentence, from its ``$`` on.
+
+    Raises
+    ------
+    UnfitSentenceError
+        It is damaged, or there is no fix.
+    MissingExtraError
+        pynmea2 is not installed.
+    """
+    pynmea2 = _parser("reading NMEA sentences")
+    try:
+        return _read(pynmea2.parse(text))
+    except UnfitSentenceError:
+        raise
+    except pynmea2.ChecksumError:
+        raise UnfitSentenceError("with a wrong checksum") from None
+    # The parser leaves damage in a field to whoever asks for it, with errors of many kinds.
+    except Exception:
+        raise UnfitSentenceError("damaged") from None
+
+
+def _parser(purpose: str) -> Any:
+    try:
+        import pynmea2
+    except ImportError:
+        raise MissingExtraError("pynmea2", "position", purpose) from None
+    return pynmea2
+
+
+def _read(message: Any) -> Sentence:
+    kind = message.sentence_type
+    if len(message.data) < _FIELDS[kind]:
+        raise UnfitSentenceError("damaged")
+    if kind == "VTG":
+        moving = (_number(message.spd_over_grnd_kmph), _number(message.true_track))
+        return Sentence(kind, None, motion=moving)
+    clock = _clock(message)
+    day = _day(message) if kind == "RMC" else math.nan
+    if clock is None or not _fixed(message, kind):
+        raise UnfitSentenceError("without a fix")
+    if kind == "GST":
+        spread = math.hypot(_number(message.std_dev_latitude), _number(message.std_dev_longitude))
+        return Sentence(kind, clock, spread=spread)
+    place = (_coordinate(message, "lat", 90.0), _coordinate(message, "lon", 180.0))
+    if kind == "RMC":
+        moving = (_number(message.spd_over_grnd), _number(message.true_course))
+        return Sentence(kind, clock, day, place, moving)
+    dilution = message.horizontal_dil if kind == "GGA" else message.hdop
+    return Sentence(kind, clock, place=(*place, _number(message.altitude), _number(dilution)))
+
+
 class _Rows:
     """Values of one kind of sentence, each with the stamp of its epoch."""
 
-    def __init__(self, *names: str) -> None:
+    def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names
         self.stamps: list[int] = []
         self.values: list[tuple[float, ...]] = []
 
-    def add(self, stamp: int, *values: float) -> None:
+    def add(self, stamp: int, values: tuple[float, ...]) -> None:
         self.stamps.append(stamp)
         self.values.append(values)
-
-
-class _Sentences:
-    """What the sentences of a file say, one after another.
-
-    Attributes
-    ----------
-    position, minimum : of GGA and GNS, and of RMC, which has less of it
-    motion, velocity : of RMC in knots, of VTG in km/h
-    accuracy : of GST
-    clocks, days : time of day and date of each epoch [s]
-    lost : how many sentences were left out, by reason
-    """
-
-    def __init__(self) -> None:
-        self.position = _Rows("latitude", "longitude", "altitude", "hdop")
-        self.minimum = _Rows("latitude", "longitude")
-        self.motion = _Rows("gnss_speed", "gnss_course")
-        self.velocity = _Rows("gnss_speed", "gnss_course")
-        self.accuracy = _Rows("gnss_accuracy")
-        self.clocks: list[float] = []
-        self.days: list[float] = []
-        self.lost: Counter[str] = Counter()
-
-    def take(self, message: Any, *, checked: bool) -> None:
-        """Take what a parsed sentence says; damage in a field is raised as the parser has it."""
-        kind = message.sentence_type
-        if len(message.data) < _FIELDS[kind]:
-            self.lost["damaged"] += 1
-            return
-        if kind == "VTG":
-            # It has no time of its own and follows the sentences of its epoch.
-            row = (_number(message.spd_over_grnd_kmph), _number(message.true_track))
-            if self.clocks:
-                self.velocity.add(len(self.clocks) - 1, *row)
-            return
-        clock = _clock(message)
-        day = _day(message) if kind == "RMC" else math.nan
-        if clock is None or not _fixed(message, kind):
-            self.lost["without a fix"] += 1
-            return
-        # Nothing is added before all fields are known to be sound.
-        found = self._read(message, kind)
-        for rows, values in found:
-            rows.add(len(self.clocks), *values)
-        self.clocks.append(clock)
-        self.days.append(day)
-        if not checked:
-            self.lost["taken without a checksum"] += 1
-
-    def _read(self, message: Any, kind: str) -> list[tuple[_Rows, tuple[float, ...]]]:
-        """Read the fields of a sentence with a time, for the rows they belong to."""
-        if kind == "GST":
-            spread = math.hypot(
-                _number(message.std_dev_latitude), _number(message.std_dev_longitude)
-            )
-            return [(self.accuracy, (spread,))]
-        place = (_coordinate(message, "lat", 90.0), _coordinate(message, "lon", 180.0))
-        if kind == "RMC":
-            moving = (_number(message.spd_over_grnd), _number(message.true_course))
-            return [(self.minimum, place), (self.motion, moving)]
-        dilution = message.horizontal_dil if kind == "GGA" else message.hdop
-        return [(self.position, (*place, _number(message.altitude), _number(dilution)))]
 
 
 def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -125,36 +143,52 @@ def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
     MissingExtraError
         pynmea2 is not installed.
     """
-    try:
-        import pynmea2
-    except ImportError:
-        raise MissingExtraError("pynmea2", "position", f"reading {path.name}") from None
+    _parser(f"reading {path.name}")
     data = path.read_bytes()
     log = Log(path)
-    read = _Sentences()
-    lost = read.lost
-    for found in _SENTENCE.finditer(data):
-        text = found.group().decode("ascii").rstrip()
+    position = _Rows(("latitude", "longitude", "altitude", "hdop"))
+    minimum = _Rows(("latitude", "longitude"))
+    motion = _Rows(("gnss_speed", "gnss_course"))
+    velocity = _Rows(("gnss_speed", "gnss_course"))
+    accuracy = _Rows(("gnss_accuracy",))
+    clocks: list[float] = []
+    days: list[float] = []
+    lost: Counter[str] = Counter()
+    for found in SENTENCE.finditer(data):
         try:
-            read.take(pynmea2.parse(text), checked=b"*" in found.group()[-5:])
-        except pynmea2.ChecksumError:
-            lost["with a wrong checksum"] += 1
-        # The parser leaves damage in a field to whoever asks for it, with errors of many kinds.
-        except Exception:
-            lost["damaged"] += 1
-    if not read.clocks:
+            said = read_sentence(found.group().decode("ascii").rstrip())
+        except UnfitSentenceError as reason:
+            lost[str(reason)] += 1
+            continue
+        if said.clock is None:
+            if clocks:
+                velocity.add(len(clocks) - 1, said.motion)
+            continue
+        stamp = len(clocks)
+        clocks.append(said.clock)
+        days.append(said.day)
+        if said.kind == "RMC":
+            minimum.add(stamp, said.place)
+            motion.add(stamp, said.motion)
+        elif said.kind == "GST":
+            accuracy.add(stamp, (said.spread,))
+        else:
+            position.add(stamp, said.place)
+        if b"*" not in found.group()[-5:]:
+            lost["taken without a checksum"] += 1
+    if not clocks:
         raise DriveError(_nothing(path, data, lost))
-    time, log.absolute = _time(np.array(read.clocks), np.array(read.days))
+    time, log.absolute = _time(np.array(clocks), np.array(days))
     if mapping:
         time = time + mapping.time.offset
     for reason, count in lost.items():
         log.problems.append(Problem("", f"{path.name}: {count} NMEA sentences {reason}"))
-    known = read.position if read.position.stamps else read.minimum
-    speeds, unit = (read.motion, "kn") if read.motion.stamps else (read.velocity, "kmh")
+    known = position if position.stamps else minimum
+    speeds, unit = (motion, "kn") if motion.stamps else (velocity, "kmh")
     for rows, units in (
         (known, ("deg", "deg", "m", "")),
         (speeds, (unit, "deg")),
-        (read.accuracy, ("m",)),
+        (accuracy, ("m",)),
     ):
         _add(log, rows, units, time)
     if not log.signals:

@@ -17,7 +17,7 @@ from weighbridge.io.frames import Frames
 from weighbridge.io.isotp import Messages, assemble
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_signal
-from weighbridge.signals.units import to_si
+from weighbridge.signals.units import scalar_to_si, to_si
 from weighbridge.signals.words import counted
 
 SOURCE: Final = "SAE J1979"
@@ -123,12 +123,44 @@ _FULL_SCALES: Final[dict[tuple[int, int], str]] = {
     (0x50, 0): "mass_air_flow",
 }
 
-_CURRENT_DATA: Final = 0x41
+CURRENT_DATA: Final = 0x41
+"""First byte of an answer of service 01."""
+
 _VEHICLE_INFORMATION: Final = 0x49
 _VIN: Final = 0x02
 _REFUSED: Final = 0x7F
 # An answer with speed, engine speed and four more is 25 bytes long; the longest value has 41.
 _MOST_PARAMETERS: Final = 8
+
+
+def parameters_of(answer: bytes) -> dict[int, bytes]:
+    """Bytes of each parameter in one answer of service 01; empty where it is none.
+
+    What is cut off, or follows a parameter of unknown length, is left out.
+    """
+    found: dict[int, bytes] = {}
+    if not answer or answer[0] != CURRENT_DATA:
+        return found
+    at = 1
+    while at < len(answer):
+        size = LENGTHS.get(answer[at], 0)
+        raw = answer[at + 1 : at + 1 + size]
+        if size == 0 or len(raw) < size:
+            break
+        found[answer[at]] = raw
+        at += 1 + size
+    return found
+
+
+def values_of(number: int, raw: bytes) -> dict[str, float]:
+    """Values [SI] by canonical name of one parameter's bytes; those not supported are left out."""
+    found = {}
+    for p in PIDS:
+        if p.number == number and raw[0] & p.needs == p.needs:
+            value = (int.from_bytes(raw[p.first : p.first + p.count]) >> p.shift) * p.scale
+            value += p.offset
+            found[p.name] = scalar_to_si(value, p.unit) if p.unit else value
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +277,7 @@ def _read_messages(messages: Messages, sender: _Sender) -> None:
     sender.refused = int(np.count_nonzero(service == _REFUSED))
     vin = (service == _VEHICLE_INFORMATION) & (data[:, 1 % data.shape[1]] == _VIN)
     sender.vins = {row.tobytes() for row in np.unique(data[vin][:, 2:], axis=0)}
-    current = service == _CURRENT_DATA
+    current = service == CURRENT_DATA
     sender.other = int(np.count_nonzero(~current & (service != _REFUSED)))
     data, length, time = data[current], length[current], messages.time[current]
     table = np.zeros(256, np.int64)
