@@ -191,9 +191,9 @@ def _databases(
         if not found
     ]
     wanted = (
-        _mapped(frames, name, mapping, databases, carried, done)
+        mapped_signals(frames, name, mapping, databases, carried, done)
         if mapping is not None
-        else _canonical(databases, carried)
+        else canonical_signals(databases, carried)
     )
     columns: dict[bytes, tuple[NDArray[np.intp], list[tuple[str, Floats]]]] = {}
     taken: dict[str, list[str]] = {}
@@ -214,7 +214,7 @@ def _databases(
             )
         if mapped is not None:
             values = values * mapped.factor + mapped.offset
-            values, at = _valid(frames, name, found_signal, mapped, values, at, done)
+            values, at = valid_values(frames, name, found_signal, mapped, values, at, done)
         used[found_signal.frames] = True
         taken.setdefault(found_signal.message.name, []).append(quantity)
         if at.size == 0:
@@ -281,18 +281,20 @@ def _why_absent(frames: Frames, signal: MappedSignal, databases: Sequence[Databa
     return "; check the name in the DBC"
 
 
-_Wanted = dict[str, tuple[Found, str, MappedSignal | None]]
+Wanted = dict[str, tuple[Found, str, MappedSignal | None]]
+"""By quantity: where it is, the suffix of its unit, and how the mapping names it, if it does."""
 
 
-def _mapped(
+def mapped_signals(
     frames: Frames,
     name: str,
     mapping: TableMapping,
     databases: Sequence[Database],
     carried: Sequence[dict[str, NDArray[np.intp]]],
     done: Decoded,
-) -> _Wanted:
-    wanted: _Wanted = {}
+) -> Wanted:
+    """Find what a mapping names in databases, of the messages that are carried."""
+    wanted: Wanted = {}
     for s in mapping.signals:
         found = find_signal(s.column, databases, carried)
         if not found:
@@ -311,10 +313,11 @@ def _mapped(
     return wanted
 
 
-def _canonical(
+def canonical_signals(
     databases: Sequence[Database], carried: Sequence[dict[str, NDArray[np.intp]]]
-) -> _Wanted:
-    wanted: _Wanted = {}
+) -> Wanted:
+    """Find what has a canonical name in databases, of the messages that are carried."""
+    wanted: Wanted = {}
     for database, frames in zip(databases, carried, strict=True):
         for message in database.messages:
             if message.name not in frames:
@@ -369,7 +372,7 @@ def _one_sender(
     return values[mine], at[mine]
 
 
-def _valid(
+def valid_values(
     frames: Frames,
     name: str,
     found: Found,

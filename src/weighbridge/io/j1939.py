@@ -97,6 +97,18 @@ SPNS: Final[tuple[Spn, ...]] = (
 SPN: Final = {s.name: s for s in SPNS}
 """The parameters by name."""
 
+PLAIN: Final = (
+    "engine_speed", "vehicle_speed", "gear", "reference_torque", "throttle", "engine_load",
+    "retarder_torque", "barometric_pressure", "ambient_temperature", "fuel_rate",
+)  # fmt: skip
+"""Parameters that are a canonical quantity as they are."""
+
+SWITCHES: Final = {
+    "brake_switch": ("brake", "ebs_brake", "brake_pedal", "retarder_torque"),
+    "clutch_switch": ("clutch", "driveline_engaged", "shift_in_process"),
+}
+"""Switches, and the parameters of which any says that one is pressed."""
+
 _PARK: Final = 0xFB
 """SPN 523: a gearbox in park is told by a code above the range of gears."""
 
@@ -189,25 +201,16 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
             summary.ignored[number] = count
     parts = {number: frames.select(group == number) for number in numbers.tolist()}
     empty = Frames.empty()
-    assembled, summary.incomplete = assemble(
-        parts.get(TP_CM, empty), parts.get(TP_DT, empty), EC1
-    )
+    assembled, summary.incomplete = assemble(parts.get(TP_CM, empty), parts.get(TP_DT, empty), EC1)
     parts[EC1] = assembled
     if len(assembled):
         summary.decoded[NAMES[EC1]] = len(assembled)
     reader = _Reader(parts, summary, name)
 
-    signals = [
-        reader.best(q)
-        for q in (
-            "engine_speed", "vehicle_speed", "gear", "reference_torque", "throttle", "engine_load",
-            "retarder_torque", "barometric_pressure", "ambient_temperature", "fuel_rate",
-        )
-    ]  # fmt: skip
+    signals = [reader.best(q) for q in PLAIN]
     signals += [
         *_net_torque(reader),
-        reader.pressed("brake_switch", ("brake", "ebs_brake", "brake_pedal", "retarder_torque")),
-        reader.pressed("clutch_switch", ("clutch", "driveline_engaged", "shift_in_process")),
+        *(reader.pressed(name, spns) for name, spns in SWITCHES.items()),
     ]
     for extra in ("input_shaft_speed", "output_shaft_speed", "clutch_slip", "gear_ratio"):
         if (found := reader.best(extra)) is not None:

@@ -157,8 +157,8 @@ def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
     for found in SENTENCE.finditer(data):
         try:
             said = read_sentence(found.group().decode("ascii").rstrip())
-        except UnfitSentenceError as reason:
-            lost[str(reason)] += 1
+        except UnfitSentenceError as error:
+            lost[str(error)] += 1
             continue
         if said.clock is None:
             if clocks:
