@@ -39,6 +39,8 @@ def test_no_module_of_ours_knows_the_network():
                 names = [a.name for a in node.names]
             elif isinstance(node, ast.ImportFrom) and node.level == 0:
                 names = [node.module or ""]
+            # Taking an address apart opens nothing.
+            names = [n for n in names if n != "urllib.parse"]
             assert not {n.partition(".")[0] for n in names} & NETWORK, path
 
 

@@ -1,0 +1,411 @@
+"""A weighing for a broker of MQTT: its topics, for Home Assistant and by COVESA VSS."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import secrets
+import sqlite3
+import unicodedata
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Condition, Event, Thread
+from time import monotonic
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import unquote, urlsplit
+
+from weighbridge.errors import ConfigError, MissingExtraError
+from weighbridge.live.outputs.lines import json_line
+from weighbridge.live.outputs.outbox import MOST, Outbox
+from weighbridge.live.weighing import LiveStatus, LiveWeighing
+
+if TYPE_CHECKING:
+    from paho.mqtt.client import Client
+
+_logger = logging.getLogger(__name__)
+
+PERIOD: Final = 5.0
+"""Weighings are sent at most so often, and whenever the status changes [s]."""
+
+VSS_TOPIC: Final = "Vehicle/CurrentOverallWeight"
+"""COVESA Vehicle Signal Specification 5.0, ``Vehicle.CurrentOverallWeight``: uint16, kg."""
+
+_HIGHEST: Final = 65_535
+
+# Messages that the broker has not yet confirmed at once.
+_WINDOW: Final = 20
+_KEEPALIVE: Final = 30
+_ANSWER: Final = 5.0
+# How long the last messages are waited for at the end [s].
+_FAREWELL: Final = 3.0
+_SHORTEST_PAUSE: Final = 1.0
+_LONGEST_PAUSE: Final = 60.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Broker:
+    """Where a broker is and who we are to it.
+
+    Attributes
+    ----------
+    host, port : of the broker
+    tls : the connection is encrypted, the certificate checked
+    user, password : None for none
+    prefix : first levels of all topics
+    """
+
+    host: str
+    port: int
+    tls: bool = False
+    user: str | None = None
+    password: str | None = field(default=None, repr=False)
+    prefix: str = "weighbridge"
+
+    @property
+    def name(self) -> str:
+        """Where it is, without who we are."""
+        return f"mqtt{'s' if self.tls else ''}://{self.host}:{self.port}"
+
+
+def parse_broker(url: str) -> Broker:
+    """Read ``mqtt://user:password@host:port/prefix``; ``mqtts`` for an encrypted connection.
+
+    Raises
+    ------
+    ConfigError
+        It is none.
+    """
+    form = "write mqtt://USER:PASSWORD@HOST:PORT/PREFIX, or mqtts:// for an encrypted one"
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError:
+        raise ConfigError(f"the address of the broker has no valid host and port: {form}") from None
+    if parts.scheme not in ("mqtt", "mqtts") or not parts.hostname or parts.query or parts.fragment:
+        # The address may hold a password and is not repeated.
+        raise ConfigError(f"the address of the broker is no address of MQTT: {form}")
+    prefix = unquote(parts.path).strip("/") or "weighbridge"
+    if re.search(r"[+#\x00-\x1f]", prefix):
+        raise ConfigError(f"topics cannot begin with {prefix!r}: leave +, # and controls out")
+    tls = parts.scheme == "mqtts"
+    return Broker(
+        host=parts.hostname,
+        port=port or (8883 if tls else 1883),
+        tls=tls,
+        user=unquote(parts.username) if parts.username else None,
+        password=unquote(parts.password) if parts.password else None,
+        prefix=prefix,
+    )
+
+
+def slug(vehicle: str) -> str:
+    """Write a vehicle's name with what a topic and Home Assistant allow: a-z, 0-9, - and _."""
+    plain = unicodedata.normalize("NFKD", vehicle).encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9_-]+", "-", plain).strip("-") or "vehicle"
+
+
+class Topics:
+    """Topics of one vehicle, and what is said on them.
+
+    Parameters
+    ----------
+    prefix : first levels of all
+    vehicle : its name
+    """
+
+    def __init__(self, prefix: str, vehicle: str) -> None:
+        self.vehicle = vehicle
+        self.node = slug(vehicle)
+        self.weighing = f"{prefix}/{self.node}/weighing"
+        self.available = f"{prefix}/{self.node}/available"
+        self.vss = f"{prefix}/{self.node}/{VSS_TOPIC}"
+
+    def messages(self, weighing: LiveWeighing) -> list[tuple[str, bytes]]:
+        """Return the messages of a weighing, as topic and payload.
+
+        The weight by VSS carries no uncertainty: it is told where the vehicle is weighed, and
+        withdrawn by an empty message where it is not.
+        """
+        mass = weighing.mass
+        told = weighing.status is LiveStatus.WEIGHED and 0.0 <= mass <= _HIGHEST
+        return [
+            (self.weighing, json_line(weighing).encode("ascii")),
+            (self.vss, f"{mass:.0f}".encode("ascii") if told else b""),
+        ]
+
+    def discovery(self) -> list[tuple[str, bytes]]:
+        """Return what tells Home Assistant of the sensors, as topic and payload."""
+        device = {
+            "identifiers": [f"weighbridge_{self.node}"],
+            "name": self.vehicle,
+            "manufacturer": "weighbridge",
+            "model": "software weighbridge",
+        }
+        weight = {
+            "device_class": "weight",
+            "unit_of_measurement": "kg",
+            "state_class": "measurement",
+            "suggested_display_precision": 0,
+        }
+        part = {"unit_of_measurement": "%", "state_class": "measurement", "icon": "mdi:weight"}
+        overload = (
+            "{{ (100 * value_json.overload_probability) | round(1) "
+            "if value_json.overload_probability is not none else none }}"
+        )
+        sensors: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
+            ("mass", "Mass", "{{ value_json.mass_kg }}", weight),
+            ("std", "Standard deviation of the mass", "{{ value_json.std_kg }}", weight),
+            ("payload", "Payload", "{{ value_json.payload_kg }}", weight),
+            ("status", "Status", "{{ value_json.status }}", {"icon": "mdi:scale"}),
+            ("overload", "Overload probability", overload, part),
+        )
+        return [
+            (
+                f"homeassistant/sensor/weighbridge_{self.node}/{key}/config",
+                json.dumps(
+                    {
+                        "name": name,
+                        "unique_id": f"weighbridge_{self.node}_{key}",
+                        "state_topic": self.weighing,
+                        "value_template": template,
+                        "availability_topic": self.available,
+                        "device": device,
+                        "origin": {"name": "weighbridge"},
+                        **more,
+                    }
+                ).encode(),
+            )
+            for key, name, template, more in sensors
+        ]
+
+
+class Mqtt:
+    """Sends weighings to a broker, all of them, in order, each at least once.
+
+    Each waits in the outbox until the broker has confirmed it. A lost broker is sought until it
+    is back. The last message of each topic is retained by the broker.
+
+    Parameters
+    ----------
+    broker : where it is
+    vehicle : name of the vehicle
+    outbox : file of the messages that wait
+    most : of them; beyond, the oldest are dropped and counted
+    period : a weighing is sent so often, and on a change of status [s]
+    pauses : shortest and longest time until a lost broker is tried again [s]
+
+    Raises
+    ------
+    ConfigError
+        The outbox cannot be used.
+    MissingExtraError
+        paho-mqtt is not installed.
+    """
+
+    def __init__(
+        self,
+        broker: Broker,
+        vehicle: str,
+        outbox: str | Path,
+        *,
+        most: int = MOST,
+        period: float = PERIOD,
+        pauses: tuple[float, float] = (_SHORTEST_PAUSE, _LONGEST_PAUSE),
+    ) -> None:
+        try:
+            import paho.mqtt.client  # noqa: F401
+        except ImportError:
+            raise MissingExtraError("paho-mqtt", "mqtt", "sending to a broker of MQTT") from None
+        self.name = broker.name
+        self._broker = broker
+        self._topics = Topics(broker.prefix, vehicle)
+        self._period = period
+        self._pauses = pauses
+        self._outbox = Outbox(outbox, most)
+        self._last: tuple[float, LiveStatus] | None = None
+        self._stop = Event()
+        self._changed = Condition()
+        self._told = False
+        self._thread = Thread(target=self._run, name=self.name, daemon=True)
+        self._thread.start()
+
+    @property
+    def waiting(self) -> int:
+        """Messages that the broker has not confirmed yet."""
+        return len(self._outbox)
+
+    @property
+    def dropped(self) -> int:
+        """Messages dropped because too many waited."""
+        return self._outbox.dropped
+
+    def show(self, weighing: LiveWeighing) -> None:
+        """Put a weighing into the outbox where one is due.
+
+        Raises
+        ------
+        WeighbridgeError
+            The disk is full or gone.
+        """
+        if self._last is not None:
+            time, status = self._last
+            if status is weighing.status and 0.0 <= weighing.time - time < self._period:
+                return
+            if status is weighing.status and weighing.time != weighing.time:
+                return
+        self._outbox.put(self._topics.messages(weighing))
+        self._last = weighing.time, weighing.status
+        with self._changed:
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Send what waits if the broker is there, say goodbye, and end."""
+        self._stop.set()
+        with self._changed:
+            self._changed.notify_all()
+        self._thread.join()
+        self._outbox.close()
+
+    def _run(self) -> None:
+        shortest, longest = self._pauses
+        pause = shortest
+        while not self._stop.is_set():
+            session = _Session(self._broker, self._topics, self._outbox, self._changed)
+            try:
+                session.begin()
+                self._tell("")
+                pause = shortest
+                session.send(self._stop)
+            except (OSError, ValueError, sqlite3.Error) as error:
+                self._tell(str(error))
+            finally:
+                session.end()
+            if not self._stop.is_set():
+                self._tell("the connection is lost")
+            self._stop.wait(pause)
+            pause = min(2.0 * pause, longest)
+
+    def _tell(self, trouble: str) -> None:
+        """Log once that the broker is gone, and once that it is back."""
+        if trouble and not self._told:
+            _logger.warning("%s: %s; messages wait until it is back", self.name, trouble)
+        elif not trouble and self._told:
+            _logger.warning("%s is back, %d messages waited", self.name, self.waiting)
+        self._told = bool(trouble)
+
+
+class _Session:
+    """One connection to the broker, from greeting to loss.
+
+    What was not confirmed in it is sent again in the next, from the oldest on, so that the
+    order stays.
+    """
+
+    def __init__(self, broker: Broker, topics: Topics, outbox: Outbox, changed: Condition) -> None:
+        self._broker = broker
+        self._topics = topics
+        self._outbox = outbox
+        self._changed = changed
+        self._client = self._made()
+        self._answer: str | None = None
+        self._lost = False
+        self._sent: dict[int, int] = {}
+        self._confirmed: set[int] = set()
+
+    def begin(self) -> None:
+        """Connect, and tell who we are.
+
+        Raises
+        ------
+        OSError
+            The broker is not there or refuses.
+        """
+        self._client.connect(self._broker.host, self._broker.port, _KEEPALIVE)
+        self._client.loop_start()
+        with self._changed:
+            self._changed.wait_for(lambda: self._answer is not None or self._lost, _ANSWER)
+        if self._answer is None:
+            raise OSError("the broker does not answer")
+        if self._answer:
+            raise OSError(f"the broker refuses: {self._answer}")
+        for topic, payload in (*self._topics.discovery(), (self._topics.available, b"online")):
+            self._client.publish(topic, payload, qos=1, retain=True)
+
+    def send(self, stop: Event) -> None:
+        """Send what waits and what comes, until the broker is lost or all is said at the end.
+
+        Raises
+        ------
+        sqlite3.Error
+            The disk is full or gone.
+        """
+        newest = 0
+        until = float("inf")
+        while not self._lost:
+            self._clear()
+            if stop.is_set() and until == float("inf"):
+                until = monotonic() + _FAREWELL
+            if stop.is_set() and (monotonic() > until or not (self._sent or len(self._outbox))):
+                break
+            room = _WINDOW - len(self._sent)
+            found = self._outbox.after(newest, room) if room > 0 else []
+            for message in found:
+                told = self._client.publish(message.topic, message.payload, qos=1, retain=True)
+                with self._changed:
+                    self._sent[told.mid] = message.number
+                newest = message.number
+            if not found:
+                with self._changed:
+                    self._changed.wait(0.05 if stop.is_set() else 0.5)
+        if not self._lost:
+            told = self._client.publish(self._topics.available, b"offline", qos=1, retain=True)
+            told.wait_for_publish(1.0)
+
+    def end(self) -> None:
+        """Close the connection, whatever its state."""
+        if not self._lost:
+            self._client.disconnect()
+        self._client.loop_stop()
+        self._clear()
+
+    def _clear(self) -> None:
+        """Take what the broker has confirmed out of the outbox."""
+        with self._changed:
+            numbers = [self._sent.pop(mid) for mid in self._confirmed if mid in self._sent]
+            self._confirmed.clear()
+        if numbers:
+            self._outbox.remove(numbers)
+
+    def _made(self) -> Client:
+        from paho.mqtt.client import Client
+        from paho.mqtt.enums import CallbackAPIVersion
+
+        broker = self._broker
+        name = f"weighbridge-{self._topics.node}-{secrets.token_hex(3)}"
+        client = Client(CallbackAPIVersion.VERSION2, client_id=name, reconnect_on_failure=False)
+        if broker.user is not None:
+            client.username_pw_set(broker.user, broker.password)
+        if broker.tls:
+            client.tls_set()
+        client.will_set(self._topics.available, b"offline", qos=1, retain=True)
+        client.connect_timeout = _ANSWER
+        client.on_connect = self._on_connect
+        client.on_disconnect = self._on_disconnect
+        client.on_publish = self._on_publish
+        return client
+
+    def _on_connect(self, client: Any, data: Any, flags: Any, reason: Any, properties: Any) -> None:
+        with self._changed:
+            self._answer = str(reason) if reason.is_failure else ""
+            self._changed.notify_all()
+
+    def _on_disconnect(self, client: Any, data: Any, flags: Any, reason: Any, prop: Any) -> None:
+        with self._changed:
+            self._lost = True
+            self._changed.notify_all()
+
+    def _on_publish(self, client: Any, data: Any, mid: int, reason: Any, properties: Any) -> None:
+        with self._changed:
+            self._confirmed.add(mid)
+            self._changed.notify_all()

@@ -1,0 +1,354 @@
+"""Weighings to a broker of MQTT that comes and goes."""
+
+import asyncio
+import json
+import logging
+import math
+import sqlite3
+import threading
+import time
+from contextlib import contextmanager
+
+import pytest
+from tests.unit.made_weighings import drive, weighing
+
+from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.live.outputs.mqtt import Mqtt, Topics, parse_broker, slug
+from weighbridge.live.outputs.outbox import Outbox
+from weighbridge.live.weighing import LiveStatus
+
+amqtt_broker = pytest.importorskip("amqtt.broker", reason="amqtt is not installed")
+from amqtt.plugins.base import BasePlugin  # noqa: E402
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+class Taken(BasePlugin):
+    """Notes what the broker has taken, as (topic, payload, retained), in order of confirmation."""
+
+    messages: list = []  # noqa: RUF012
+    open: dict = {}  # noqa: RUF012
+
+    async def on_mqtt_packet_received(self, *, packet, session=None):
+        if type(packet).__name__ == "PublishPacket":
+            told = packet.topic_name, bytes(packet.payload.data), packet.retain_flag
+            self.open[session.client_id, packet.packet_id] = told
+
+    async def on_mqtt_packet_sent(self, *, packet, session=None):
+        if type(packet).__name__ == "PubackPacket":
+            told = self.open.pop((session.client_id, packet.packet_id))
+            self.messages.append(told)
+
+    @classmethod
+    def of(cls, topic):
+        return [payload for t, payload, _ in cls.messages if t == topic]
+
+
+@contextmanager
+def broker(port=0):
+    """Run a broker in a thread, which ends as one that crashes; yields its port."""
+    loop = asyncio.new_event_loop()
+    plugins = {
+        "amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True},
+        f"{__name__}.Taken": {},
+    }
+    config = {
+        "listeners": {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}"}},
+        "plugins": plugins,
+    }
+    made = {}
+
+    async def begin():
+        made["broker"] = amqtt_broker.Broker(config, loop=loop)
+        await made["broker"].start()
+        server = next(iter(made["broker"]._servers.values()))
+        return server.instance.sockets[0].getsockname()[1]
+
+    async def crash():
+        for server in made["broker"]._servers.values():
+            server.instance.close()
+        for transport in list(loop._transports.values()):
+            transport.abort()
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    thread = threading.Thread(target=loop.run_forever, daemon=True)
+    thread.start()
+    try:
+        yield asyncio.run_coroutine_threadsafe(begin(), loop).result(20)
+    finally:
+        asyncio.run_coroutine_threadsafe(crash(), loop).result(20)
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()
+
+
+def until(true, seconds=30.0):
+    """Wait for something that must come."""
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not come"
+        time.sleep(0.01)
+
+
+@pytest.fixture(autouse=True)
+def nothing_taken():
+    Taken.messages.clear()
+    Taken.open.clear()
+    logging.getLogger("amqtt").setLevel(logging.CRITICAL)
+    logging.getLogger("transitions").setLevel(logging.CRITICAL)
+
+
+def sender(port, folder, **kwargs):
+    kwargs = {"period": 0.0, "pauses": (0.05, 0.2), **kwargs}
+    place = parse_broker(f"mqtt://127.0.0.1:{port}/fleet")
+    return Mqtt(place, "Delivery van", folder / "outbox.sqlite", **kwargs)
+
+
+def in_order(payloads):
+    """Each once, in the order of its first coming."""
+    return list(dict.fromkeys(payloads))
+
+
+TOPIC = "fleet/delivery-van/weighing"
+
+
+def test_weighings_go_to_their_topics_and_are_retained(tmp_path):
+    with broker() as port:
+        mqtt = sender(port, tmp_path)
+        told = list(drive(300))
+        for w in told:
+            mqtt.show(w)
+        until(lambda: mqtt.waiting == 0)
+        mqtt.close()
+        until(lambda: Taken.of("fleet/delivery-van/available")[-1:] == [b"offline"])
+    found = [json.loads(p) for p in Taken.of(TOPIC)]
+    assert [f["time_s"] for f in found] == [w.time for w in told]
+    assert found[-1] == json.loads(json.dumps(told[-1].to_dict()))
+    assert all(retained for *_, retained in Taken.messages)
+    assert Taken.of("fleet/delivery-van/available")[0] == b"online"
+    vss = Taken.of("fleet/delivery-van/Vehicle/CurrentOverallWeight")
+    weighed = [w.status is LiveStatus.WEIGHED for w in told]
+    assert vss == [
+        f"{w.mass:.0f}".encode() if yes else b"" for w, yes in zip(told, weighed, strict=True)
+    ]
+
+
+def test_home_assistant_is_told_of_the_sensors_of_one_device(tmp_path):
+    with broker() as port:
+        mqtt = sender(port, tmp_path)
+        until(lambda: len(Taken.messages) >= 6)
+        mqtt.close()
+    sensors = {t: json.loads(p) for t, p, _ in Taken.messages if t.startswith("homeassistant/")}
+    assert [t.split("/")[3] for t in sensors] == ["mass", "std", "payload", "status", "overload"]
+    assert len({s["unique_id"] for s in sensors.values()}) == 5
+    for topic, sensor in sensors.items():
+        assert topic.startswith("homeassistant/sensor/weighbridge_delivery-van/")
+        assert sensor["device"]["identifiers"] == ["weighbridge_delivery-van"]
+        assert sensor["device"]["name"] == "Delivery van"
+        assert sensor["state_topic"] == TOPIC
+        assert sensor["availability_topic"] == "fleet/delivery-van/available"
+        key = sensor["value_template"].partition("value_json.")[2].split()[0].rstrip(")")
+        assert key in weighing().to_dict()
+
+
+def test_nothing_is_lost_while_the_broker_restarts_and_the_order_stays(tmp_path, caplog):
+    with broker() as port:
+        mqtt = sender(port, tmp_path)
+        for w in drive(100):
+            mqtt.show(w)
+        until(lambda: len(Taken.of(TOPIC)) >= 20)
+    # The broker is gone, in the middle of it.
+    for w in drive(200, begin=100.0):
+        mqtt.show(w)
+    assert mqtt.waiting > 200
+    with broker(port):
+        for w in drive(100, begin=300.0):
+            mqtt.show(w)
+        until(lambda: mqtt.waiting == 0)
+        mqtt.close()
+    times = [json.loads(p)["time_s"] for p in in_order(Taken.of(TOPIC))]
+    assert times == [float(k) for k in range(400)]
+    assert mqtt.dropped == 0
+    words = [r.getMessage() for r in caplog.records if "mqtt://" in r.getMessage()]
+    assert len(words) == 2
+    assert "messages wait until it is back" in words[0]
+    assert "is back" in words[1]
+
+
+def test_what_a_process_could_not_send_the_next_one_does(tmp_path):
+    with broker() as port:
+        pass
+    mqtt = sender(port, tmp_path)
+    for w in drive(50):
+        mqtt.show(w)
+    mqtt.close()
+    with broker(port):
+        later = sender(port, tmp_path)
+        later.show(weighing(1000.0))
+        until(lambda: later.waiting == 0)
+        later.close()
+    times = [json.loads(p)["time_s"] for p in in_order(Taken.of(TOPIC))]
+    assert times == [*(float(k) for k in range(50)), 1000.0]
+
+
+def test_beyond_the_limit_the_oldest_are_dropped_and_counted_and_told_once(tmp_path, caplog):
+    with broker() as port:
+        pass
+    mqtt = sender(port, tmp_path, most=60)
+    for w in drive(100):
+        mqtt.show(w)
+    assert (mqtt.waiting, mqtt.dropped) == (60, 140)
+    with broker(port):
+        until(lambda: mqtt.waiting == 0)
+        mqtt.close()
+    times = [json.loads(p)["time_s"] for p in in_order(Taken.of(TOPIC))]
+    assert times == [float(k) for k in range(70, 100)]
+    assert sum("the oldest are dropped" in r.getMessage() for r in caplog.records) == 1
+
+
+def test_a_killed_connection_leaves_the_last_will(tmp_path):
+    from amqtt.client import MQTTClient
+
+    async def heard(port, kill):
+        client = MQTTClient(config={"auto_reconnect": False})
+        await client.connect(f"mqtt://127.0.0.1:{port}/")
+        await client.subscribe([("fleet/delivery-van/available", 1)])
+        kill()
+        while True:
+            message = await client.deliver_message(timeout_duration=20)
+            if bytes(message.data) == b"offline":
+                return
+
+    sessions = []
+    with broker() as port, pytest.MonkeyPatch.context() as patch:
+        begin = Mqtt.__module__ + "._Session.begin"
+        original = __import__(Mqtt.__module__, fromlist=["x"])._Session.begin
+        patch.setattr(begin, lambda s: (sessions.append(s), original(s))[1])
+        mqtt = sender(port, tmp_path, pauses=(60.0, 60.0))
+        until(lambda: b"online" in Taken.of("fleet/delivery-van/available"))
+        asyncio.run(heard(port, lambda: sessions[0]._client.socket().close()))
+        mqtt.close()
+
+
+def test_a_refused_password_is_told_without_the_password(tmp_path, caplog):
+    place = parse_broker("mqtt://me:secret%20word@127.0.0.1:1")
+    assert (place.user, place.password) == ("me", "secret word")
+    mqtt = Mqtt(place, "van", tmp_path / "outbox.sqlite", pauses=(0.01, 0.01))
+    until(lambda: caplog.records)
+    mqtt.close()
+    assert "mqtt://127.0.0.1:1" in caplog.text
+    assert "secret" not in caplog.text + repr(place)
+
+
+@pytest.mark.parametrize(
+    ("url", "port", "tls", "prefix"),
+    [
+        ("mqtt://host", 1883, False, "weighbridge"),
+        ("mqtts://host/", 8883, True, "weighbridge"),
+        ("mqtt://[::1]:99/a/b/", 99, False, "a/b"),
+    ],
+)
+def test_addresses_of_brokers(url, port, tls, prefix):
+    found = parse_broker(url)
+    assert (found.port, found.tls, found.prefix) == (port, tls, prefix)
+    assert found.user is None
+
+
+@pytest.mark.parametrize(
+    "url", ["host", "http://u:pw@host", "mqtt://", "mqtt://h:pw@h:999999", "mqtt://h/a+b"]
+)
+def test_what_is_no_address_is_refused_without_a_password(url):
+    with pytest.raises(ConfigError) as found:
+        parse_broker(url)
+    assert "pw" not in str(found.value)
+
+
+def test_names_of_vehicles_become_levels_of_topics():
+    assert slug("Müller's Bus #3/+") == "muller-s-bus-3"
+    assert slug("雪") == "vehicle"
+
+
+def test_the_weight_by_vss_is_withdrawn_where_there_is_none():
+    topics = Topics("p", "v")
+    for w in (
+        weighing(status=LiveStatus.INCONSISTENT),
+        weighing(mass=math.nan, std=math.nan),
+        weighing(mass=70_000.0),
+    ):
+        assert topics.messages(w)[1] == ("p/v/Vehicle/CurrentOverallWeight", b"")
+    assert topics.messages(weighing(mass=2100.4))[1][1] == b"2100"
+
+
+def test_weighings_are_thinned_but_not_a_change_of_status(tmp_path):
+    with broker() as port:
+        pass
+    mqtt = sender(port, tmp_path, period=5.0)
+    for k in range(20):
+        status = LiveStatus.INCONSISTENT if k == 12 else LiveStatus.WEIGHED
+        mqtt.show(weighing(float(k), status=status))
+    rows = [json.loads(m.payload)["time_s"] for m in mqtt._outbox.after(0, 99) if m.topic == TOPIC]
+    assert rows == [0.0, 5.0, 10.0, 12.0, 13.0, 18.0]
+    mqtt.close()
+
+
+def test_an_outbox_has_one_owner(tmp_path):
+    first = Outbox(tmp_path / "box")
+    with pytest.raises(ConfigError, match="is used by another weighbridge"):
+        Outbox(tmp_path / "box")
+    first.put([("a", b"1")])
+    first.close()
+    second = Outbox(tmp_path / "box")
+    assert [m.payload for m in second.after(0, 9)] == [b"1"]
+    # One that was there before has it as well.
+    with pytest.raises(ConfigError, match="end that one"):
+        Outbox(tmp_path / "box")
+    second.close()
+
+
+def test_a_damaged_outbox_is_set_aside(tmp_path, caplog):
+    path = tmp_path / "box"
+    box = Outbox(path)
+    box.put([("topic", b"x" * 200)] * 500)
+    box.close()
+    data = bytearray(path.read_bytes())
+    data[100:30_000] = b"\xa5" * 29_900
+    path.write_bytes(data)
+    fresh = Outbox(path)
+    fresh.put([("a", b"1")])
+    assert len(fresh) == 1
+    fresh.close()
+    assert (tmp_path / "box.damaged").exists()
+    assert "set aside" in caplog.text
+
+
+def test_files_of_something_else_are_no_outbox(tmp_path):
+    (tmp_path / "car.toml").write_text("[vehicle]\n" * 200)
+    with pytest.raises(ConfigError, match="is no outbox; name another file"):
+        Outbox(tmp_path / "car.toml")
+    assert (tmp_path / "car.toml").exists()
+    with sqlite3.connect(tmp_path / "other") as other:
+        other.execute("CREATE TABLE messages (a)")
+    other.close()
+    with pytest.raises(ConfigError, match="database of something else"):
+        Outbox(tmp_path / "other")
+    with pytest.raises(ConfigError, match="cannot be used as an outbox"):
+        Outbox(tmp_path)
+
+
+def test_a_full_disk_is_told_and_weighing_goes_on(tmp_path):
+    box = Outbox(tmp_path / "box")
+    pages = box._database.execute("PRAGMA page_count").fetchone()[0]
+    box._database.execute(f"PRAGMA max_page_count = {pages + 2}")
+    with pytest.raises(WeighbridgeError, match=r"full.*weighing goes on"):
+        box.put([("a", b"x" * 100_000)])
+    assert len(box) == 0
+    box.put([("a", b"small")])
+    assert [m.payload for m in box.after(0, 9)] == [b"small"]
+    box.close()
