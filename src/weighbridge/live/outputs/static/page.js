@@ -1,0 +1,221 @@
+"use strict";
+// Shows what the server tells; asks for nothing else and sends nothing.
+
+const WINDOW = 1800; // [s]
+const MOST = 1800; // points
+const OLD = 5000; // without news for so long, what is shown is old [ms]
+
+const at = (id) => document.getElementById(id);
+const put = (id, text) => {
+  if (at(id).textContent !== text) at(id).textContent = text;
+};
+const kg = (value) => (value === null ? "–" : `${Math.round(value)} kg`);
+const percent = (p) => {
+  if (p === null) return "–";
+  if (p > 0 && p < 0.01) return "< 1 %";
+  if (p > 0.99 && p < 1) return "> 99 %";
+  return `${Math.round(100 * p)} %`;
+};
+const duration = (s) => {
+  if (s === null) return "–";
+  return s < 120 ? `${Math.round(s)} s` : s < 7200 ? `${Math.round(s / 60)} min` : `${(s / 3600).toFixed(1)} h`;
+};
+
+// Points of the plot: never more than the window holds.
+const points = { time: [], mass: [], low: [], high: [] };
+const names = Object.keys(points);
+
+function keep(more) {
+  if (more.fresh) for (const n of names) points[n].length = 0;
+  for (const n of names) points[n].push(...more[n]);
+  const t = points.time;
+  const begin = t.length ? t[t.length - 1] - WINDOW : 0;
+  let out = Math.max(t.length - MOST, 0);
+  while (out < t.length && t[out] < begin) out += 1;
+  for (const n of names) points[n].splice(0, out);
+  document.documentElement.dataset.points = t.length;
+}
+
+let plot = null;
+let limit = null;
+
+function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+function columns() {
+  const t = points.time;
+  const end = t.length ? t[t.length - 1] : 0;
+  const x = t.map((v) => (v - end) / 60);
+  return [x, points.high, points.low, points.mass, t.map(() => limit)];
+}
+
+// The intervals at first are as wide as the plot is high: what is known later counts.
+function range() {
+  const known = points.mass.filter((m) => m !== null);
+  if (!known.length) return [0, 1];
+  let low = Math.min(...known);
+  let high = Math.max(...known);
+  const last = names.slice(2).map((n) => points[n][points[n].length - 1]);
+  if (last[0] !== null && last[0] !== undefined) {
+    low = Math.min(low, last[0]);
+    high = Math.max(high, last[1]);
+  }
+  if (limit !== null && limit < high + 0.25 * high) high = Math.max(high, limit);
+  const pad = Math.max(0.15 * (high - low), 0.02 * high);
+  return [Math.max(low - pad, 0), high + pad];
+}
+
+function draw() {
+  const box = at("plot");
+  const axis = {
+    stroke: colour("--soft"),
+    grid: { stroke: colour("--line"), width: 1 },
+    ticks: { stroke: colour("--line"), width: 1 },
+    font: "13px system-ui, sans-serif",
+  };
+  if (plot) plot.destroy();
+  plot = new uPlot(
+    {
+      width: box.clientWidth,
+      height: box.clientHeight,
+      padding: [6, 14, 0, 0],
+      legend: { show: false },
+      cursor: { show: false },
+      scales: { x: { time: false, range: [-WINDOW / 60, 0] }, y: { range } },
+      axes: [
+        { ...axis, incrs: [5, 10], size: 34, values: (u, v) => v.map((m) => (m ? `${m} min` : "now")) },
+        { ...axis, size: 48, values: (u, v) => v.map((m) => `${m}`) },
+      ],
+      series: [
+        {},
+        { stroke: "transparent", points: { show: false } },
+        { stroke: "transparent", points: { show: false } },
+        { stroke: colour("--blue"), width: 2.5, points: { show: false } },
+        { stroke: colour("--bad"), width: 2, dash: [8, 6], points: { show: false } },
+      ],
+      bands: [{ series: [1, 2], fill: colour("--band") }],
+    },
+    columns(),
+    box,
+  );
+}
+
+function needed(w) {
+  const one = (m, p) => {
+    if (m === null) return `± ${p} %: not yet in sight`;
+    if (m === 0) return `± ${p} %: reached`;
+    return `± ${p} %: ${m < 1 ? "less than 1" : Math.round(m)} min more`;
+  };
+  const [five, two] = [w.minutes_to_5_percent, w.minutes_to_2_percent];
+  if (five === null && two === null) return "time left not known yet";
+  return two === 0 ? one(two, 2) : `${one(five, 5)}, ${one(two, 2)}`;
+}
+
+function cell(row, text, kind) {
+  const td = row.insertCell();
+  td.textContent = text;
+  if (kind) td.className = kind;
+}
+
+function showSignals(signals) {
+  const rows = [...signals].sort((a, b) => a.fresh - b.fresh || b.needed - a.needed);
+  const body = at("signals");
+  body.replaceChildren();
+  for (const s of rows) {
+    const row = body.insertRow();
+    cell(row, s.name);
+    cell(row, `${s.rate_hz.toFixed(1)} Hz`, "n");
+    cell(row, s.age_s === null ? "–" : s.age_s < 100 ? `${Math.max(s.age_s, 0).toFixed(1)} s` : duration(s.age_s), "n");
+    cell(row, s.late + s.unfit ? `${s.late + s.unfit}` : "", "n");
+    const state = s.fresh ? "ok" : s.age_s === null ? "absent" : "silent";
+    cell(row, state, s.fresh ? "ok" : s.needed ? "silent needed" : "silent");
+  }
+  const wrong = rows.filter((s) => !s.fresh);
+  const brief = `${rows.length - wrong.length} of ${rows.length} come`;
+  put("signals-brief", wrong.length ? `${brief}; not: ${wrong.map((s) => s.name).join(", ")}` : brief);
+  at("signals-brief").classList.toggle("wrong", wrong.some((s) => s.needed));
+}
+
+function show(w) {
+  const known = w.mass_kg !== null;
+  document.title = `${known ? kg(w.mass_kg) : w.status}, ${w.vehicle}`;
+  put("vehicle", w.vehicle);
+  put("status", w.status);
+  at("status").className = `status ${w.status}`;
+  document.body.classList.toggle("inconsistent", w.status === "inconsistent");
+  put("mass", known ? `${Math.round(w.mass_kg)}` : "–");
+  const [low, high] = w.interval95_kg || [null, null];
+  put("interval", low === null ? "no mass yet" : `± ${kg((high - low) / 2)}: ${Math.round(low)} to ${kg(high)} with 95 %`);
+  put("reason", w.reason);
+  put("payload", kg(w.payload_kg));
+  put("overload", percent(w.overload_probability));
+  put("driven", duration(w.driven_s));
+  at("load").hidden = w.share_of_permitted === null;
+  if (w.share_of_permitted !== null) {
+    const p = w.overload_probability;
+    put("share", `${Math.round(100 * w.share_of_permitted)} %`);
+    at("share-bar").value = Math.min(w.share_of_permitted, 1);
+    at("share-bar").className = p >= 0.5 ? "bad" : p >= 0.05 ? "fair" : "";
+    limit = w.mass_kg / w.share_of_permitted;
+  }
+  put("learnt", `${Math.round(100 * w.progress)} %`);
+  at("learnt-bar").value = w.progress;
+  put("needed", needed(w));
+  put("advice", w.advice);
+  showSignals(w.signals);
+  at("notes-box").hidden = !w.notes.length;
+  const list = w.notes.map((note) => {
+    const item = document.createElement("li");
+    item.textContent = note;
+    return item;
+  });
+  at("notes").replaceChildren(...list.reverse());
+}
+
+let heard = 0;
+let waiting = null;
+
+function take(event) {
+  const told = JSON.parse(event.data);
+  heard = Date.now();
+  waiting = told;
+  keep(told.points);
+  // A page in the background draws when it is looked at again.
+  requestAnimationFrame(() => {
+    if (waiting === null) return;
+    const weighing = waiting.weighing;
+    waiting = null;
+    show(weighing);
+    if (plot) plot.setData(columns());
+    else draw();
+    look();
+  });
+}
+
+function look() {
+  const old = Date.now() - heard > OLD;
+  document.body.classList.toggle("old", old);
+  at("link").hidden = !old;
+  if (old && heard) {
+    put("link", `No news for ${duration((Date.now() - heard) / 1000)}: what is shown is old.`);
+  }
+}
+
+function listen() {
+  const source = new EventSource("events");
+  source.onmessage = take;
+  source.onerror = () => {
+    // The browser tries again by itself unless it was refused.
+    if (source.readyState === EventSource.CLOSED) setTimeout(listen, 3000);
+  };
+}
+
+at("signals-box").open = matchMedia("(min-width: 60rem)").matches;
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => plot && draw());
+new ResizeObserver(() => {
+  const box = at("plot");
+  if (plot) plot.setSize({ width: box.clientWidth, height: box.clientHeight });
+}).observe(at("plot"));
+setInterval(look, 1000);
+listen();
