@@ -9,51 +9,10 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import weighbridge as wb
+from tests.live.conftest import SHORT
 from weighbridge.errors import ConfigError
 from weighbridge.live.weighing import LiveStatus
-from weighbridge.pipeline.forward import forward_weigh, identify_forward
-from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
-
-SHORT = 240.0
-"""Of the drives that are fed again and again [s]."""
-
-
-@pytest.fixture(scope="module")
-def car():
-    known = [
-        simulate_car(
-            Scenario(name="known", car=MIDSIZE, route=short_route(), payload=load, seed=51_001 + k)
-        )
-        for k, load in enumerate((0.0, 300.0, 100.0))
-    ]
-    return wb.calibrate([m.drive for m in known], mass=[m.scenario.mass for m in known])
-
-
-@pytest.fixture(scope="module")
-def loaded():
-    return simulate_car(
-        Scenario(name="loaded", car=MIDSIZE, route=short_route(), payload=250.0, seed=51_010)
-    )
-
-
-@pytest.fixture(scope="module")
-def weighing(car, loaded):
-    return wb.weigh(loaded.drive, car)
-
-
-@pytest.fixture(scope="module")
-def setup(weighing):
-    return identify_forward(weighing)
-
-
-@pytest.fixture(scope="module")
-def short(weighing):
-    return weighing.drive.between(weighing.drive.start, weighing.drive.start + SHORT)
-
-
-@pytest.fixture(scope="module")
-def forward(short, weighing, setup):
-    return forward_weigh(short, weighing.vehicle, setup)
+from weighbridge.pipeline.forward import forward_weigh
 
 
 def blocks(drive, edges):
@@ -162,10 +121,10 @@ def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
     ("damage", "says"),
     [
         (lambda b: b[: len(b) // 2], "damaged"),
-        (lambda b: b.replace(b'"d"', b'"x"', 1), "damaged"),
-        (lambda b: b.replace(b'checkpoint": 1', b'checkpoint": 9', 1), "version 9"),
-        (lambda b: b"\xff" + b, "damaged"),
-        (lambda b: b"", "damaged"),
+        (lambda b: b.replace('"d"', '"x"', 1), "damaged"),
+        (lambda b: b.replace('checkpoint": 1', 'checkpoint": 9', 1), "version 9"),
+        (lambda b: "\xff" + b, "damaged"),
+        (lambda b: "", "damaged"),
     ],
 )
 def test_a_damaged_checkpoint_is_refused(short, weighing, setup, damage, says):
@@ -197,7 +156,8 @@ def test_a_silence_of_hours_costs_no_steps(short, weighing, setup, forward):
     # The load may have changed meanwhile, so a few windows tell less than they do without a stop.
     assert abs(told.mass - forward.mass[-1]) < forward.std[-1]
     direct = forward_weigh(later, weighing.vehicle, setup)
-    assert abs(direct.mass[-1] - forward.mass[-1]) < forward.std[-1]
+    assert abs(direct.mass[-1] - forward.mass[-1]) < 2.0 * direct.std[-1]
+    assert direct.std[-1] > forward.std[-1]
 
 
 def test_a_clock_that_jumps_is_brought_back(short, weighing, setup, forward):

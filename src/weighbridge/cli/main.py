@@ -21,6 +21,7 @@ from weighbridge.cli import (
     demo,
     inertia,
     inspect,
+    live,
     map,
     reproduce,
     simulate,
@@ -49,6 +50,7 @@ app.command()(demo.demo)
 app.command()(inspect.inspect)
 app.command(cls=TellsSources)(calibrate.calibrate)
 app.command()(weigh.weigh)
+app.command()(live.live)
 app.command()(inertia.inertia)
 app.command()(simulate.simulate)
 app.command()(convert.convert)

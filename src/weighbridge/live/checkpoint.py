@@ -32,7 +32,7 @@ def fingerprint(vehicle: Vehicle) -> str:
     return hashlib.sha256(json.dumps(_plain(vehicle)).encode()).hexdigest()[:16]
 
 
-def packed(content: object, vehicle: Vehicle) -> bytes:
+def packed(content: object, vehicle: Vehicle) -> str:
     """Write a content of numbers, arrays, records and tuples as text.
 
     Parameters
@@ -46,10 +46,10 @@ def packed(content: object, vehicle: Vehicle) -> bytes:
         "vehicle": fingerprint(vehicle),
         "sha256": hashlib.sha256(body.encode()).hexdigest(),
     }
-    return (json.dumps(head) + "\n" + body).encode()
+    return json.dumps(head) + "\n" + body
 
 
-def unpacked(data: bytes, vehicle: Vehicle) -> Any:
+def unpacked(text: str, vehicle: Vehicle) -> Any:
     """Read a content back.
 
     Raises
@@ -58,13 +58,13 @@ def unpacked(data: bytes, vehicle: Vehicle) -> Any:
         The text is damaged, of another version or of another vehicle file.
     """
     refused = "the checkpoint is not used"
-    if len(data) > _MOST:
-        raise ConfigError(f"{refused}: it has {len(data)} bytes, more than any of ours")
+    if len(text) > _MOST:
+        raise ConfigError(f"{refused}: it has {len(text)} letters, more than any of ours")
     try:
-        first, body = data.decode("ascii").split("\n", 1)
+        first, body = text.split("\n", 1)
         head = json.loads(first)
         version, of = head["weighbridge_checkpoint"], head["vehicle"]
-        whole = hashlib.sha256(body.encode()).hexdigest() == head["sha256"]
+        whole = hashlib.sha256(body.encode(errors="replace")).hexdigest() == head["sha256"]
     except (ValueError, KeyError, TypeError, RecursionError):
         raise ConfigError(f"{refused}: it is damaged") from None
     if version != VERSION:

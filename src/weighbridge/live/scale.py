@@ -125,7 +125,7 @@ class LiveScale:
         if math.isfinite(self._records.newest):
             self._advance(self._records.newest)
 
-    def checkpoint(self) -> bytes:
+    def checkpoint(self) -> str:
         """Return all that the scale goes on from, for `restore`, as text."""
         content = {
             "setup": self._setup,
@@ -143,7 +143,7 @@ class LiveScale:
         return packed(content, self.vehicle)
 
     @classmethod
-    def restore(cls, vehicle: Vehicle, checkpoint: bytes) -> LiveScale:
+    def restore(cls, vehicle: Vehicle, checkpoint: str) -> LiveScale:
         """Go on from a checkpoint of the same vehicle file.
 
         Parameters
@@ -178,6 +178,15 @@ class LiveScale:
         ):
             raise ConfigError(f"the checkpoint is not used: it holds {mass:.0f} ± {std:.0f} kg")
         return scale
+
+    @property
+    def newest(self) -> float:
+        """Instant of the newest sample [s]; -inf before the first."""
+        return self._records.newest
+
+    def recorded(self) -> Drive:
+        """Samples that are kept as a drive: the last `LONGEST` seconds where the scale learns."""
+        return self._records.drive("live", self.info)
 
     def tare(self) -> float:
         """Set the mass of this moment to nought, for the payload; return it [kg].

@@ -1,0 +1,307 @@
+"""``weighbridge live``: the mass while the vehicle drives."""
+
+from __future__ import annotations
+
+import math
+import signal
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING, Annotated, Optional
+
+import typer
+
+from weighbridge.cli.options import DbcPaths, MappingPath, load
+from weighbridge.cli.results import (
+    Result,
+    asked_for,
+    inputs,
+    refuse_missing_folder,
+    refuse_overwriting,
+    refuse_results,
+)
+from weighbridge.cli.terminal import complain, console, say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from weighbridge.live.alerts import Alert
+    from weighbridge.live.keeper import Keeper
+    from weighbridge.live.outputs import Output
+    from weighbridge.live.scale import LiveScale
+    from weighbridge.live.session import Session
+    from weighbridge.live.source import Source
+    from weighbridge.live.weighing import LiveWeighing
+    from weighbridge.signals import DriveInfo
+    from weighbridge.vehicle.model import Vehicle
+
+_NO_STATE = "none"
+
+
+def live(
+    vehicle: Annotated[
+        Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
+    ],
+    source: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            "--source",
+            help="Where samples come from, such as elm:/dev/ttyUSB0 or can:socketcan:can0; "
+            "repeat it for more. docs/live.md lists them.",
+            metavar="KIND:PLACE",
+        ),
+    ] = None,
+    replay: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--replay", help="Take a recorded drive as the source.", metavar="DRIVE"),
+    ] = None,
+    rate: Annotated[
+        str,
+        typer.Option("--rate", help="Of the replay: 1 as recorded, 10 tenfold, or max."),
+    ] = "1",
+    json_path: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--json", help="Write a JSON line per weighing to a file, or - for here."),
+    ] = None,
+    mqtt: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--mqtt", help="Send weighings to mqtt://USER:PASSWORD@HOST:PORT/PREFIX."),
+    ] = None,
+    page: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--page",
+            help="Show a page at this port, for this computer alone; HOST:PORT for others too.",
+            metavar="[HOST:]PORT",
+        ),
+    ] = None,
+    record: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--record", help="Record what comes as a drive, too.", metavar="DRIVE"),
+    ] = None,
+    every: Annotated[float, typer.Option("--every", help="Seconds between weighings.")] = 1.0,
+    above: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--above", help="Alert above so many kg; the permitted mass by default."),
+    ] = None,
+    below: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--below", help="Alert below so many kg."),
+    ] = None,
+    ticket: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(
+            "--ticket",
+            help="Mass in kg by a weighbridge: calibrate the vehicle with this drive at its end.",
+        ),
+    ] = None,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("-o", "--out", help="Vehicle file that --ticket writes."),
+    ] = None,
+    state: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--state",
+            help="File that keeps what was weighed over a power cut or a short stop; by default "
+            "beside the vehicle file, none for a replay.",
+            metavar="FILE|none",
+        ),
+    ] = None,
+    lateness: Annotated[
+        float, typer.Option("--lateness", help="Seconds that a sample may come late.")
+    ] = 1.0,
+    listen_only: Annotated[
+        bool, typer.Option("--listen-only", help="Send nothing to the vehicle, no request either.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file of -o.")] = False,
+    mapping: MappingPath = None,
+    dbc: DbcPaths = None,
+) -> None:
+    """Weigh a vehicle while it drives.
+
+    On a terminal: t tares, l tells that the load has changed, q ends.
+    Exits with 0 where there is a mass at the end, with 1 where there is none.
+
+    Example: weighbridge live --vehicle car.toml --replay drive/ --rate 20
+    """
+    import logging
+
+    from weighbridge.errors import ConfigError
+    from weighbridge.live.feed import Feed
+    from weighbridge.live.keys import keys
+    from weighbridge.live.outputs import Outputs
+    from weighbridge.live.recorder import Recorder
+    from weighbridge.live.session import Session
+    from weighbridge.pipeline.given import mapping_of
+    from weighbridge.vehicle.model import Vehicle
+
+    if (ticket is None) != (out is None):
+        raise ConfigError("--ticket KG and -o FILE go together: the vehicle file that it writes")
+    if not every > 0.0:
+        raise ConfigError(f"--every {every:g}: give seconds above 0")
+    if bool(source) == (replay is not None):
+        raise ConfigError("give --source KIND:PLACE once or more, or --replay DRIVE")
+    car = Vehicle.load(vehicle)
+    read = [replay] if replay is not None else []
+    chosen = mapping_of(car, vehicle, mapping)
+    results = asked_for(track=None, report=None, json=json_path)
+    if out is not None:
+        refuse_overwriting(out, force, "vehicle file")
+        results.append(Result("--out", out, "vehicle file"))
+    refuse_results(inputs(read, vehicle, chosen, dbc), results)
+    logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    sources, info = _sources(source or (), replay, rate, chosen, dbc, listen_only)
+    scale, keeper = _scale(car, _state_file(state, replay, vehicle), lateness, info)
+    with (
+        keys(wanted=not any(s.name == "lines:-" for s in sources)) as pressed,
+        Outputs(_outputs(json_path, mqtt, page, car, vehicle)) as outputs,
+        Feed(sources) as feed,
+    ):
+        session = Session(
+            feed=feed,
+            scale=scale,
+            outputs=outputs,
+            period=every,
+            keeper=keeper,
+            recorder=None if record is None else Recorder(record, info),
+            alerts=_alerts(above, below, car),
+        )
+        last = _run(session, pressed)
+    if ticket is not None and out is not None:
+        _calibrate(scale, ticket, car, out)
+    if math.isnan(last.mass):
+        complain(f"{last.status}: {last.reason}")
+        raise typer.Exit(1)
+    if json_path != "-":
+        low, high = last.interval()
+        say(f"{last.mass:.0f} kg, {low:.0f} to {high:.0f} kg with 95 % probability")
+
+
+def _sources(
+    texts: Sequence[str],
+    replay: Path | None,
+    rate: str,
+    mapping: Path | None,
+    dbc: list[str] | None,
+    listen_only: bool,
+) -> tuple[list[Source], DriveInfo]:
+    """Make the sources, and tell what is known beside their samples."""
+    from weighbridge.errors import ConfigError
+    from weighbridge.live.replay import Replay
+    from weighbridge.signals import DriveInfo
+
+    if replay is None:
+        from weighbridge.live.sources import parse_source
+
+        made = [
+            parse_source(text, dbc=dbc or (), mapping=mapping, listen_only=listen_only)
+            for text in texts
+        ]
+        return made, DriveInfo()
+    try:
+        speed = math.inf if rate == "max" else float(rate)
+    except ValueError:
+        raise ConfigError(f"--rate {rate}: give 1 as recorded, 10 for tenfold, or max") from None
+    drive = load(replay, mapping, dbc)
+    return [Replay(drive, speed)], drive.info
+
+
+def _state_file(state: str | None, replay: Path | None, vehicle: Path) -> Path | None:
+    """Choose the file that keeps the state; None for none."""
+    if state is not None:
+        return None if state == _NO_STATE else Path(state)
+    return None if replay is not None else vehicle.with_suffix(".state")
+
+
+def _scale(
+    car: Vehicle, state: Path | None, lateness: float, info: DriveInfo
+) -> tuple[LiveScale, Keeper | None]:
+    """Go on from the state that was kept, or begin anew."""
+    from weighbridge.live.keeper import Keeper
+    from weighbridge.live.scale import LiveScale
+
+    if state is None:
+        return LiveScale(car, lateness=lateness, info=info), None
+    refuse_missing_folder(state)
+    keeper = Keeper(state)
+    scale, found = keeper.restored(car, lateness=lateness, info=info)
+    if found:
+        complain(found)
+    return scale, keeper
+
+
+def _outputs(
+    json_path: str | None, mqtt: str | None, page: str | None, car: Vehicle, vehicle: Path
+) -> list[Output]:
+    """Make the outputs that were asked for, the terminal first."""
+    from weighbridge.live.outputs.lines import Lines
+    from weighbridge.live.outputs.terminal import terminal
+
+    made: list[Output] = [terminal(console(stderr=True))]
+    if json_path is not None:
+        made.append(Lines(json_path))
+    if mqtt is not None:
+        from weighbridge.live.outputs.mqtt import Mqtt, parse_broker
+
+        made.append(Mqtt(parse_broker(mqtt), car.name, vehicle.with_suffix(".outbox")))
+    if page is not None:
+        from weighbridge.live.outputs.page import Page
+
+        shown = Page(*_address(page))
+        complain(f"page: {shown.name}")
+        made.append(shown)
+    return made
+
+
+def _address(text: str) -> tuple[str, int]:
+    """Part ``[HOST:]PORT``; without a host this computer alone is served."""
+    from weighbridge.errors import ConfigError
+
+    host, _, port = text.rpartition(":")
+    if not (port.isascii() and port.isdigit() and int(port) < 65536):
+        raise ConfigError(f"--page {text}: give a port such as 8080, or HOST:PORT")
+    return host.strip("[]") or "127.0.0.1", int(port)
+
+
+def _alerts(above: float | None, below: float | None, car: Vehicle) -> list[Alert]:
+    from weighbridge.live.alerts import Alert
+
+    above = car.gross if above is None else above
+    return [
+        Alert(limit, above=over)
+        for limit, over in ((above, True), (below, False))
+        if limit is not None
+    ]
+
+
+def _run(session: Session, pressed: Callable[[], str]) -> LiveWeighing:
+    """Weigh until the sources end, q is pressed, or the process is asked to end."""
+    from weighbridge.live.session import order
+
+    stop = Event()
+
+    def orders(scale: LiveScale) -> None:
+        for key in pressed():
+            if key == "q":
+                stop.set()
+            elif said := order(scale, key):
+                complain(said)
+
+    session.orders = orders
+    before = {
+        number: signal.signal(number, lambda *_: stop.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        return session.run(stop)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _calibrate(scale: LiveScale, ticket: float, car: Vehicle, out: Path) -> None:
+    """Calibrate by the mass of a weighbridge and write the vehicle file."""
+    from weighbridge.calibration.run import calibrate
+
+    calibrate([scale.recorded()], mass=ticket, vehicle=car).save(out)
+    complain(f"written: {out}")

@@ -1,0 +1,111 @@
+"""One run of a live scale: samples in, weighings out, until the sources end."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from threading import Event
+from time import monotonic
+from typing import Final
+
+from weighbridge.errors import WeighbridgeError
+from weighbridge.live.alerts import Alert
+from weighbridge.live.feed import Feed
+from weighbridge.live.keeper import Keeper
+from weighbridge.live.outputs import Outputs
+from weighbridge.live.recorder import Recorder
+from weighbridge.live.scale import LiveScale
+from weighbridge.live.weighing import LiveWeighing
+
+_LOG = logging.getLogger(__name__)
+
+WAIT: Final = 0.1
+"""Samples are waited for so long at a time [s]."""
+
+
+@dataclass(slots=True)
+class Session:
+    """Feeds a scale, shows what it tells, and keeps its state.
+
+    Attributes
+    ----------
+    feed, scale, outputs
+    period : between weighings that are shown, on the clock of the samples; when none come, on
+        the host's [s]
+    keeper : writes checkpoints; None for none
+    recorder : records what comes; None for none
+    alerts : limits that are watched
+    orders : looked at between samples: what a person at the terminal asks for
+    """
+
+    feed: Feed
+    scale: LiveScale
+    outputs: Outputs
+    period: float = 1.0
+    keeper: Keeper | None = None
+    recorder: Recorder | None = None
+    alerts: Sequence[Alert] = ()
+    orders: Callable[[LiveScale], None] | None = None
+    _shown: float = field(default=-float("inf"), init=False)
+    _looked: float = field(default=-float("inf"), init=False)
+
+    def run(self, stop: Event) -> LiveWeighing:
+        """Weigh until the sources end or ``stop`` is set; return the last weighing."""
+        try:
+            while not stop.is_set() and not self.feed.ended:
+                for samples in self.feed.read(WAIT):
+                    if self.recorder is not None:
+                        self.recorder.put(samples)
+                    self.scale.update_block(samples)
+                    self._show()
+                    if stop.is_set():
+                        break
+                if monotonic() - self._looked >= self.period:
+                    self._show(due=True)
+                if self.orders is not None:
+                    self.orders(self.scale)
+                if self.keeper is not None:
+                    self.keeper.look(self.scale)
+                if self.recorder is not None:
+                    self.recorder.tick()
+        finally:
+            self.scale.finish()
+            if self.recorder is not None:
+                self.recorder.close()
+            if self.keeper is not None:
+                self.keeper.write(self.scale)
+        self._show(due=True)
+        return self.scale.weighing()
+
+    def _show(self, *, due: bool = False) -> None:
+        newest = self.scale.newest
+        if not due and newest - self._shown < self.period:
+            return
+        self._shown, self._looked = newest, monotonic()
+        weighing = self.scale.weighing()
+        for alert in self.alerts:
+            event = alert.look(weighing)
+            if event is not None:
+                _LOG.warning("%s", event.text)
+        active = [alert.text for alert in self.alerts if alert.active]
+        lost = [f"{s.name}: {s.error}" for s in self.feed.states() if s.error and not s.ended]
+        told = (*active, *lost, *self._doubts())
+        self.outputs.show(replace(weighing, notes=(*told, *weighing.notes)))
+
+    def _doubts(self) -> list[str]:
+        problem = "" if self.recorder is None else self.recorder.problem
+        return [problem] if problem else []
+
+
+def order(scale: LiveScale, key: str) -> str:
+    """Do what a key asks for; return one sentence, empty for a key that asks for nothing."""
+    try:
+        if key == "t":
+            return f"tared at {scale.tare():.0f} kg"
+        if key == "l":
+            scale.load_changed()
+            return "the load has changed: what was weighed before is forgotten"
+    except WeighbridgeError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,82 @@
+"""The state of a scale on disk: whole, restored, set aside where it is damaged."""
+
+import logging
+import os
+
+import pytest
+
+import weighbridge as wb
+from weighbridge.live.keeper import Keeper
+from weighbridge.signals import DriveInfo
+from weighbridge.vehicle.model import Driveline, Vehicle
+
+
+@pytest.fixture(scope="module")
+def car():
+    return Vehicle(name="van", tare=2000.0, driveline=Driveline(gearings=(40.0, 20.0, 12.0)))
+
+
+def restored(keeper, car):
+    return keeper.restored(car, lateness=1.0, info=DriveInfo())
+
+
+def test_nothing_there_is_a_new_scale(car, tmp_path):
+    scale, said = restored(Keeper(tmp_path / "car.state"), car)
+    assert said == ""
+    assert scale.weighing().driven == 0.0
+
+
+def test_a_state_comes_back(car, tmp_path):
+    keeper = Keeper(tmp_path / "car.state")
+    scale = wb.LiveScale(car)
+    for k in range(100):
+        scale.update(0.1 * k, "vehicle_speed", 10.0)
+    scale.finish()
+    keeper.write(scale)
+    again, _ = restored(keeper, car)
+    assert again.weighing().driven == scale.weighing().driven > 0.0
+
+
+def test_a_damaged_state_is_set_aside(car, tmp_path):
+    path = tmp_path / "car.state"
+    Keeper(path).write(wb.LiveScale(car))
+    path.write_bytes(path.read_bytes()[:-10] + b"\x00\xff")
+    scale, said = restored(Keeper(path), car)
+    assert "damaged" in said
+    assert "car.state.bad" in said
+    assert not path.exists()
+    assert (tmp_path / "car.state.bad").exists()
+    assert scale.weighing().driven == 0.0
+
+
+def test_a_state_of_another_vehicle_is_set_aside(car, tmp_path):
+    from dataclasses import replace
+
+    path = tmp_path / "car.state"
+    Keeper(path).write(wb.LiveScale(replace(car, tare=1400.0)))
+    _, said = restored(Keeper(path), car)
+    assert "another vehicle file" in said
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
+def test_a_folder_that_is_closed_is_told_once_by_permission(car, tmp_path, caplog):
+    tmp_path.chmod(0o500)
+    _told_once(Keeper(tmp_path / "car.state"), car, caplog)
+    tmp_path.chmod(0o700)
+
+
+def test_a_folder_that_is_gone_is_told_once(car, tmp_path, caplog):
+    folder = tmp_path / "gone"
+    keeper = Keeper(folder / "car.state")
+    _told_once(keeper, car, caplog)
+    folder.mkdir()
+    keeper.write(wb.LiveScale(car))
+    assert "written again" in caplog.text
+    assert (folder / "car.state").exists()
+
+
+def _told_once(keeper, car, caplog):
+    with caplog.at_level(logging.WARNING):
+        keeper.write(wb.LiveScale(car))
+        keeper.write(wb.LiveScale(car))
+    assert caplog.text.count("is not written") == 1

@@ -1,0 +1,131 @@
+"""A recorded drive through feed, scale and outputs, as the command runs it."""
+
+from threading import Event
+
+import pytest
+
+from weighbridge.errors import ConfigError, SourceError
+from weighbridge.live.alerts import Alert
+from weighbridge.live.feed import Feed
+from weighbridge.live.keeper import Keeper
+from weighbridge.live.outputs import Outputs
+from weighbridge.live.recorder import Recorder
+from weighbridge.live.replay import Replay
+from weighbridge.live.scale import LiveScale
+from weighbridge.live.session import Session, order
+
+
+class Shown:
+    name = "test"
+
+    def __init__(self):
+        self.weighings = []
+
+    def show(self, weighing):
+        self.weighings.append(weighing)
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def minute(short):
+    return short.between(short.start, short.start + 90.0)
+
+
+def run(drive, scale, **more):
+    shown = Shown()
+    with Outputs([shown]) as outputs, Feed([Replay(drive, float("inf"))]) as feed:
+        session = Session(feed=feed, scale=scale, outputs=outputs, **more)
+        last = session.run(Event())
+    return last, shown.weighings
+
+
+def test_a_replay_is_weighed_as_its_samples(minute, weighing, setup, tmp_path):
+    scale = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
+    keeper = Keeper(tmp_path / "car.state")
+    last, shown = run(
+        minute, scale, keeper=keeper, recorder=Recorder(tmp_path / "drive"), alerts=[Alert(9e4)]
+    )
+    direct = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
+    direct.update_block({n: (s.time, s.values) for n, s in minute.signals.items()})
+    direct.finish()
+    assert last.mass == direct.weighing().mass
+    assert last.mass > 0.0
+    assert len(shown) >= 45
+    assert (tmp_path / "car.state").exists()
+    import weighbridge as wb
+
+    kept = wb.read_drive(tmp_path / "drive")
+    assert {n: len(s) for n, s in kept.signals.items()} == {
+        n: len(s) for n, s in minute.signals.items()
+    }
+
+
+def test_a_lost_source_is_told_and_weighing_goes_on(minute, weighing, setup):
+    class Lost:
+        name = "gone"
+
+        def run(self, put, stop):
+            raise SourceError("gone: there is no such device")
+
+    class Patient(Replay):
+        def run(self, put, stop):
+            super().run(put, stop)
+            done.set()
+
+    done, shown = Event(), Shown()
+    scale = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
+    sources = [Lost(), Patient(minute, float("inf"))]
+    with Outputs([shown]) as outputs, Feed(sources) as feed:
+        session = Session(feed=feed, scale=scale, outputs=outputs)
+        session.orders = lambda _: stop.set() if done.is_set() and scale.newest > 80.0 else None
+        stop = Event()
+        last = session.run(stop)
+    assert last.mass > 0.0
+    assert any("no such device" in note for note in shown.weighings[-1].notes)
+
+
+def test_orders_of_a_person(short, weighing, setup):
+    scale = LiveScale(weighing.vehicle, setup=setup, info=short.info)
+    assert "nothing is weighed yet" in order(scale, "t")
+    scale.update_block({n: (s.time, s.values) for n, s in short.signals.items()})
+    assert "tared at" in order(scale, "t")
+    assert "changed" in order(scale, "l")
+    assert order(scale, "x") == ""
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])
+def test_a_replay_has_a_rate(minute, rate):
+    with pytest.raises(ConfigError, match="--rate"):
+        Replay(minute, rate)
+
+
+def test_a_replay_at_a_rate_takes_its_time(minute):
+    from time import monotonic
+
+    part = minute.between(minute.start, minute.start + 2.0)
+    blocks, begun = [], monotonic()
+    Replay(part, 10.0).run(lambda samples: blocks.append(samples), Event())
+    assert monotonic() - begun >= 0.15
+    count = {n: sum(len(b[n][0]) for b in blocks if n in b) for n in part.signals}
+    assert count == {n: len(s) for n, s in part.signals.items()}
+
+
+def test_a_replay_does_not_wait_for_days_of_silence(minute):
+    from dataclasses import replace
+
+    import numpy as np
+
+    later = minute.with_signals(
+        *(
+            replace(s, time=np.where(s.time < minute.start + 45.0, s.time, s.time + 10 * 86_400.0))
+            for s in minute.signals.values()
+        )
+    )
+    blocks = []
+    Replay(later, float("inf")).run(blocks.append, Event())
+    assert len(blocks) < 100
+    assert sum(len(b["accel_x"][0]) for b in blocks if "accel_x" in b) == len(
+        minute.signals["accel_x"]
+    )
