@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -10,7 +11,8 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
-from weighbridge.io.table import RawTable, read_parquet
+from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
+from weighbridge.io.table import RawTable
 from weighbridge.io.tabular import read_canonical
 from weighbridge.signals import Problem
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
@@ -72,11 +74,11 @@ def read_parts(folder: Path, table: str) -> Log:
     frames, problems = [], []
     for path in part_files(folder):
         try:
-            raw = read_parquet(path)
-        except DriveError as error:
-            problems.append(Problem("", f"{error} The rest of {folder.name} was read."))
-        else:
-            frames.append(raw.frame.rename(dict(zip(raw.frame.columns, raw.names, strict=True))))
+            with quietly():
+                frames.append(_read(path))
+        except (*PARSE_ERRORS, OSError) as error:
+            told = f"{folder.name}/{path.name} is not readable ({first_line(error)})"
+            problems.append(Problem("", f"{told}; the rest of the table was read"))
     if not frames:
         raise DriveError(f"{folder}: no part of the table is readable; remove the folder")
     frame = in_order(frames)
@@ -86,6 +88,15 @@ def read_parts(folder: Path, table: str) -> Log:
     text = f"{folder.name}: the recording was cut off; up to its last minute is missing"
     log.problems += [*problems, Problem("", text)]
     return log
+
+
+def _read(path: Path, columns: list[str] | None = None) -> pl.DataFrame:
+    return pl.read_parquet(_bytes(path), columns=columns)
+
+
+def _bytes(path: Path) -> BytesIO:
+    """Read a file: a path would be taken for a pattern."""
+    return BytesIO(path.read_bytes())
 
 
 def in_order(frames: Iterable[pl.DataFrame]) -> pl.DataFrame:
@@ -118,8 +129,8 @@ def join_parts(drive: Path, table: str) -> None:
     if not files:
         return
     # What a later part may still add to: everything from its first stamp on.
-    begins = [pl.scan_parquet(f).select(pl.col(TIME_COLUMN).min()).collect().item() for f in files]
-    names = list(dict.fromkeys(n for f in files for n in pl.read_parquet_schema(f)))
+    begins = [float(_read(f, [TIME_COLUMN])[TIME_COLUMN].to_numpy().min()) for f in files]
+    names = list(dict.fromkeys(n for f in files for n in pl.read_parquet_schema(_bytes(f))))
     schema = pa.schema([(name, pa.float64()) for name in names])
     with (
         whole_file(drive / f"{table}.parquet", DriveError) as path,
@@ -129,7 +140,7 @@ def join_parts(drive: Path, table: str) -> None:
         held = pl.DataFrame(schema=dict.fromkeys(names, pl.Float64))
         ready: list[pl.DataFrame] = []
         for k, part in enumerate(files):
-            held = in_order([held, pl.read_parquet(part.read_bytes())])
+            held = in_order([held, _read(part)])
             done = held[TIME_COLUMN] < min(begins[k + 1 :], default=float("inf"))
             ready.append(held.filter(done))
             held = held.filter(~done)
