@@ -23,6 +23,7 @@ from weighbridge.cli import (
     inspect,
     live,
     map,
+    record,
     reproduce,
     simulate,
     vehicle,
@@ -54,6 +55,7 @@ app.command()(live.live)
 app.command()(inertia.inertia)
 app.command()(simulate.simulate)
 app.command()(convert.convert)
+app.command()(record.record)
 app.command()(reproduce.reproduce)
 app.command("map")(map.map_log)
 app.add_typer(vehicle.app, name="vehicle")

@@ -1,0 +1,205 @@
+"""``weighbridge record``: samples of live sources as a drive."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Final, Optional
+
+import typer
+
+from weighbridge.cli.options import DbcPaths, MappingPath
+from weighbridge.cli.terminal import complain, console, say
+from weighbridge.errors import ConfigError, DriveError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from weighbridge.live.arrival import Arrivals, Need
+    from weighbridge.live.feed import Feed
+    from weighbridge.live.recorder import Recorder
+
+_WAIT: Final = 0.25
+"""How long samples are waited for at once [s]."""
+
+_LEAST_CHECK: Final = 3.0
+"""So long signals are looked at for their rate, also where all have come [s]."""
+
+_TOLD: Final = 60.0
+"""Without a terminal a line comes so often [s]."""
+
+
+def record(
+    source: Annotated[
+        list[str],
+        typer.Option("--source", help="Where samples come from; repeatable.", show_default=False),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder to record into.", show_default=False)
+    ],
+    vehicle: Annotated[
+        Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
+        typer.Option("--vehicle", help="Vehicle file, for the signals that it needs."),
+    ] = None,
+    mapping: MappingPath = None,
+    dbc: DbcPaths = None,
+    listen_only: Annotated[
+        bool, typer.Option("--listen-only", help="Refuse sources that ask the vehicle.")
+    ] = False,
+    check: Annotated[
+        float,
+        typer.Option("--check", min=0.0, help="How long to wait for all signals, in s; 0: not."),
+    ] = 20.0,
+    duration: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--duration", min=0.0, help="End after so many s; else with Ctrl-C."),
+    ] = None,
+) -> None:
+    """Record live sources as a drive, after a look whether all signals arrive.
+
+    A power cut costs less than the last minute. Ctrl-C ends the recording.
+
+    Example: weighbridge record --source elm:/dev/ttyUSB0 --source gpsd:localhost:2947 -o drive/
+    """
+    from weighbridge.live.arrival import needs
+    from weighbridge.live.feed import Feed
+    from weighbridge.live.recorder import Recorder
+    from weighbridge.live.sources import parse_source
+    from weighbridge.signals import DriveInfo
+    from weighbridge.vehicle.model import Vehicle
+
+    car = Vehicle.load(vehicle) if vehicle is not None else None
+    sources = [
+        parse_source(s, dbc=tuple(dbc or ()), mapping=mapping, listen_only=listen_only)
+        for s in source
+    ]
+    recorder = Recorder(output, DriveInfo(vehicle=car.name if car is not None else None))
+    with Feed(sources) as feed:
+        look(feed, needs(car), check)
+        until = monotonic() + duration if duration is not None else float("inf")
+        with _ended() as ended:
+            arrived = run(feed, recorder, lambda: ended() or monotonic() >= until)
+    if recorder.problem:
+        raise DriveError(recorder.problem)
+    if not arrived.count:
+        raise DriveError(f"{output}: nothing was recorded, no sample came; check the sources")
+    say(f"written: {output}, {len(arrived.names)} signals, {arrived.count} samples")
+
+
+def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
+    """Wait until all that is needed arrives; ask on a terminal, tell elsewhere, what does not.
+
+    Raises
+    ------
+    ConfigError
+        The person at the terminal wants no drive without it.
+    """
+    from weighbridge.live.arrival import Arrivals
+
+    if not seconds:
+        return
+    arrivals = Arrivals()
+    begun = monotonic()
+    with _table(wanted, arrivals) as draw:
+        while not feed.ended and monotonic() - begun < seconds:
+            arrivals.add(feed.read(_WAIT))
+            draw()
+            whole = not any(arrivals.of(need).lacking for need in wanted)
+            if whole and monotonic() - begun >= min(_LEAST_CHECK, seconds):
+                break
+    missing = [found for need in wanted if (found := arrivals.of(need)).lacking]
+    for state in feed.states():
+        if state.error:
+            complain(f"{state.name}: {state.error}")
+    for found in missing:
+        such = "such as " if len(found.need.sets) > 1 else ""
+        names = ", ".join(found.lacking)
+        complain(f"no {found.need.name} ({such}{names}) has come; {found.need.why}")
+    if missing and sys.stdin.isatty() and sys.stderr.isatty():
+        names = ", ".join(found.need.name for found in missing)
+        if not typer.confirm(f"Record without {names}?", err=True):
+            raise ConfigError(f"not recorded: {names} did not come; check the sources")
+
+
+def run(feed: Feed, recorder: Recorder, ended: Callable[[], bool]) -> Arrivals:
+    """Record until it is ended, the sources have no more or the disk is full; tell how it goes."""
+    from weighbridge.live.arrival import Arrivals
+
+    arrivals = Arrivals()
+    begun = told = monotonic()
+    screen = console(stderr=True)
+    try:
+        with screen.status("recording") if screen.is_terminal else contextlib.nullcontext() as line:
+            while not (ended() or feed.ended or recorder.problem):
+                blocks = feed.read(_WAIT)
+                for samples in blocks:
+                    recorder.put(samples)
+                recorder.tick()
+                arrivals.add(blocks)
+                if line is not None:
+                    line.update(_told(feed, arrivals, monotonic() - begun))
+                elif monotonic() - told >= _TOLD:
+                    told = monotonic()
+                    complain(_told(feed, arrivals, told - begun))
+    finally:
+        recorder.close()
+    return arrivals
+
+
+def _told(feed: Feed, arrivals: Arrivals, seconds: float) -> str:
+    minutes, rest = divmod(int(seconds), 60)
+    text = f"recording {minutes}:{rest:02d}, {arrivals.count} samples of {len(arrivals.names)} "
+    lost = [f"{state.name}: {state.error}" for state in feed.states() if state.error]
+    return "; ".join((f"{text}signals, Ctrl-C ends", *lost))
+
+
+@contextlib.contextmanager
+def _table(wanted: tuple[Need, ...], arrivals: Arrivals) -> Iterator[Callable[[], None]]:
+    """Show on a terminal what arrives; nothing elsewhere."""
+    screen = console(stderr=True)
+    if not screen.is_terminal:
+        yield lambda: None
+        return
+    from rich.live import Live
+
+    with Live(console=screen, auto_refresh=False, redirect_stdout=False) as live:
+        yield lambda: live.update(arrival_table(wanted, arrivals), refresh=True)
+
+
+def arrival_table(wanted: tuple[Need, ...], arrivals: Arrivals) -> Table:
+    """Lay out what is needed, whether it comes and how fast."""
+    from rich.table import Table
+
+    table = Table(title="Before recording: what arrives", title_justify="left")
+    table.add_column("needed", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    table.add_column("Hz", justify="right", no_wrap=True)
+    table.add_column("signals")
+    for need in wanted:
+        found = arrivals.of(need)
+        rate = f"{found.rate:.1f}" if found.rate == found.rate else ""
+        state = "[yellow]waiting[/]" if found.lacking else "[green]comes[/]"
+        names = ", ".join(found.lacking or found.signals)
+        table.add_row(need.name, state, rate, names)
+    return table
+
+
+@contextlib.contextmanager
+def _ended() -> Iterator[Callable[[], bool]]:
+    """Tell of Ctrl-C and of a request to end, so that what was recorded is joined."""
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked.is_set
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: asked.set()) for number in numbers]
+    try:
+        yield asked.is_set
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

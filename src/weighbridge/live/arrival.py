@@ -1,0 +1,121 @@
+"""Whether the signals that a drive needs arrive, and how fast."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from weighbridge.live.source import Samples
+from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+if TYPE_CHECKING:
+    from weighbridge.vehicle.model import Vehicle
+
+_SPEEDS: Final = (("vehicle_speed",), ("gnss_speed",))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Need:
+    """Something that a drive needs.
+
+    Attributes
+    ----------
+    name : for people
+    sets : sets of signals, any of which does; the first is named where none comes
+    why : what a drive without it lacks
+    """
+
+    name: str
+    sets: tuple[tuple[str, ...], ...]
+    why: str
+
+
+def needs(vehicle: Vehicle | None = None) -> tuple[Need, ...]:
+    """Return what a drive needs.
+
+    Parameters
+    ----------
+    vehicle : whose torque source is needed; None for any source
+    """
+    sources = list(TORQUE_SOURCES.values())
+    if vehicle is not None and vehicle.torque.stated:
+        sources = [vehicle.torque.of_source]
+    torque = tuple(dict.fromkeys(s for source in sources for s in (source.signals, *source.others)))
+    return (
+        Need(name="speed", sets=_SPEEDS, why="no drive is weighed without it"),
+        Need(name="torque", sets=torque, why="the mass is not found without it"),
+        Need(name="engine speed", sets=(("engine_speed",),), why="gears are not found without it"),
+        Need(name="inertial sensor", sets=(IMU_SIGNALS,), why="the road's slope is uncertain"),
+        Need(name="position", sets=(("latitude", "longitude"),), why="the heading is uncertain"),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrival:
+    """How something that is needed arrives.
+
+    Attributes
+    ----------
+    need : what
+    signals : of the set that is complete, or nearest to it
+    lacking : those of them that have not come
+    rate : of the slowest that has come, by its stamps [Hz]; NaN below two samples
+    """
+
+    need: Need
+    signals: tuple[str, ...]
+    lacking: tuple[str, ...]
+    rate: float
+
+
+class Arrivals:
+    """Counts samples of each signal as they come."""
+
+    def __init__(self) -> None:
+        self._count: dict[str, int] = {}
+        self._first: dict[str, float] = {}
+        self._last: dict[str, float] = {}
+
+    def add(self, blocks: Iterable[Samples]) -> None:
+        """Count the samples of some blocks; those that are not finite do not count."""
+        for samples in blocks:
+            for name, (time, values) in samples.items():
+                known = np.asarray(time)[np.isfinite(time) & np.isfinite(values)]
+                if known.size:
+                    low, high = float(known.min()), float(known.max())
+                    self._count[name] = self._count.get(name, 0) + int(known.size)
+                    self._first[name] = min(self._first.get(name, low), low)
+                    self._last[name] = max(self._last.get(name, high), high)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Signals that have come."""
+        return tuple(self._count)
+
+    @property
+    def count(self) -> int:
+        """Samples that have come."""
+        return sum(self._count.values())
+
+    def rate(self, name: str) -> float:
+        """Samples per second of a signal, by its stamps [Hz]; NaN below two samples."""
+        count = self._count.get(name, 0)
+        span = self._last.get(name, 0.0) - self._first.get(name, 0.0)
+        return (count - 1) / span if count > 1 and span > 0.0 else float("nan")
+
+    def of(self, need: Need) -> Arrival:
+        """Tell how something that is needed arrives."""
+        lacking = [tuple(n for n in signals if n not in self._count) for signals in need.sets]
+        best = min(range(len(lacking)), key=lambda k: len(lacking[k]) / len(need.sets[k]))
+        rates = [self.rate(n) for n in need.sets[best] if n in self._count]
+        known = [r for r in rates if r == r]
+        return Arrival(
+            need=need,
+            signals=need.sets[best],
+            lacking=lacking[best],
+            rate=min(known) if known and len(known) == len(rates) else float("nan"),
+        )
