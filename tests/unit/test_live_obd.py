@@ -203,8 +203,10 @@ def test_second_owner_of_the_bus_is_refused(request):
 
         def until(samples):
             if samples and not done:
+                ended = Event()
+                ended.set()
                 with pytest.raises(SourceError, match="another process"):
-                    ObdSource(place(request.node.name)).run(lambda _: None, Event())
+                    ObdSource(place(request.node.name)).run(lambda _: None, ended)
                 done.append(True)
             return bool(done)
 

@@ -14,7 +14,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.source import Samples
-from weighbridge.live.sources.gathered import Gathered
+from weighbridge.live.sources.gathered import BLOCK, Gathered
 from weighbridge.live.sources.kind import SourceOptions, checked_port
 from weighbridge.live.sources.links import TcpLink
 
@@ -90,7 +90,7 @@ class GpsdSource:
                         arrived = now()
                         known = math.isfinite(stamp)
                         gathered.add(clock.host(stamp, arrived) if known else arrived, values)
-                gathered.flush()
+                gathered.flush(BLOCK)
                 if monotonic() - fixed > SILENT:
                     self.trouble = (
                         "gpsd has no fix; is a receiver connected, with a view of the sky?"

@@ -19,7 +19,7 @@ from weighbridge.io.columns import UnitlessColumnError, near_column, parse_colum
 from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.source import Samples
-from weighbridge.live.sources.gathered import Gathered
+from weighbridge.live.sources.gathered import BLOCK, Gathered
 from weighbridge.live.sources.kind import SourceOptions, checked_port
 from weighbridge.signals.units import scalar_to_si
 
@@ -79,7 +79,7 @@ class LinesSource:
                     break
                 for time, values in reader.read(data, now()):
                     gathered.add(time, values)
-                gathered.flush()
+                gathered.flush(BLOCK)
         gathered.flush()
 
 

@@ -13,7 +13,7 @@ from weighbridge.io.nmea import SENTENCE, Sentence, UnfitSentenceError, read_sen
 from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.source import Samples
-from weighbridge.live.sources.gathered import Gathered
+from weighbridge.live.sources.gathered import BLOCK, Gathered
 from weighbridge.live.sources.kind import SourceOptions, parted_rate
 from weighbridge.live.sources.links import Link, SerialLink
 from weighbridge.live.sources.lock import DeviceLock
@@ -81,7 +81,7 @@ class NmeaSource:
             for time, values in reader.read(data, now()):
                 fixed, self.trouble = monotonic(), ""
                 gathered.add(time, values)
-            gathered.flush()
+            gathered.flush(BLOCK)
             if monotonic() - heard > SILENT:
                 self.trouble = f"the receiver sent nothing for {SILENT:g} s; check cable and rate"
             elif monotonic() - fixed > SILENT:
