@@ -17,7 +17,7 @@ from weighbridge.live.outputs.words import (
     state_text,
 )
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
-from weighbridge.report.text import duration, kg
+from weighbridge.report.text import capital, duration, kg
 from weighbridge.visible import cut, visible
 
 if TYPE_CHECKING:
@@ -169,8 +169,10 @@ def lines(w: LiveWeighing, width: int, height: int, *, ascii_only: bool = False)
     if gap > 1:
         title.append(" " * gap + driven, style="not bold dim")
     bars = _bars(w, width, ascii_only=ascii_only)
-    reason = _wrapped(w.reason, width, "yellow" if w.status is LiveStatus.LEARNING else "red")
-    advice = _wrapped(w.advice, width, "cyan")
+    reason = _wrapped(
+        capital(w.reason), width, "yellow" if w.status is LiveStatus.LEARNING else "red"
+    )
+    advice = _wrapped(capital(w.advice), width, "cyan")
     load = ", ".join(t for t in (payload_text(w), overload_text(w)) if t)
     payload = _wrapped(load, width, _load_style(w))
     needed = _wrapped(needed_text(w), width)
