@@ -30,6 +30,7 @@ class Outlook:
     status: LiveStatus
     reason: str = ""
     progress: float = 0.0
+    reach: float = math.nan
     minutes_to_5: float = math.nan
     minutes_to_2: float = math.nan
     advice: str = ""
@@ -79,7 +80,8 @@ def outlook(
     return Outlook(
         status=LiveStatus.WEIGHED if good and not silent else LiveStatus.LEARNING,
         reason="" if good and not silent else reason,
-        progress=_progress(mass, noise, floor),
+        progress=min(1.0, (BETTER / half) ** 2),
+        reach=_REACH * floor,
         minutes_to_5=to_good,
         minutes_to_2=to_better,
         advice="" if to_better == 0.0 else ADVICE,
@@ -97,12 +99,3 @@ def _minutes(half: float, mass: float, noise: float, floor: float, driven: float
     if noise <= allowed:
         return 0.0
     return driven / 60.0 * (noise / allowed - 1.0) if allowed > 0.0 else math.inf
-
-
-def _progress(mass: float, noise: float, floor: float) -> float:
-    """Part of the way to the narrower interval, or to the wider one where it is out of reach."""
-    for half in (BETTER, GOOD):
-        allowed = _allowed(half, mass, floor)
-        if allowed > 0.0:
-            return min(1.0, allowed / noise) if noise > 0.0 else 1.0
-    return 0.0

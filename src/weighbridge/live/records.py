@@ -108,18 +108,20 @@ class Records:
         self.unfit: dict[str, int] = {}
         self._columns: dict[str, _Column] = {}
         self._strange = 0
+        self._sealed_to = -math.inf
 
     @property
     def watermark(self) -> float:
         """No sample before this instant is taken any more [s]."""
-        return self.newest - self.lateness
+        return max(self.newest - self.lateness, self._sealed_to)
 
     def add(self, name: str, time: float, value: float) -> None:
         """Take one sample of a signal; see `add_block`."""
         at = time - self.offset
         ahead = at - self.newest
         ordinary = ahead < FARTHEST or (self.newest == -math.inf and abs(at) < _FIRST)
-        if not (ordinary and ahead >= -self.lateness and math.isfinite(value)):
+        in_time = ahead >= -self.lateness and at >= self._sealed_to
+        if not (ordinary and in_time and math.isfinite(value)):
             self.add_block({name: (np.array([time]), np.array([value]))})
             return
         column = self._columns.get(name) or self._column(name)
@@ -188,6 +190,7 @@ class Records:
 
     def seal(self, until: float) -> None:
         """Put all samples before ``until`` in order; none of them comes any more."""
+        self._sealed_to = max(self._sealed_to, until)
         for column in self._columns.values():
             if column.open_time:
                 column.seal(until)

@@ -227,6 +227,7 @@ class LiveScale:
             tared=self._tared,
             driven=self._driven,
             progress=found.progress,
+            reach=found.reach,
             minutes_to_5=found.minutes_to_5,
             minutes_to_2=found.minutes_to_2,
             advice=found.advice,

@@ -61,7 +61,9 @@ class LiveWeighing:
     tare, gross : of the vehicle file [kg]; None where it does not say
     tared : mass that the user has set to nought [kg]; None for ``tare``
     driven : time on the move so far [s]
-    progress : part of the way to 2 % [-], 0 to 1
+    progress : part of the way to 2 % [-], 0 to 1: the variance that is allowed then over that now
+    reach : half width of the 95 % interval over the mass that no driving gets below, by what
+        vehicle file and equipment leave open [-]; NaN where unknown
     minutes_to_5, minutes_to_2 : of driving like until now until the interval of 95 % is as narrow
         as so many percent; 0 where it is, infinite where it will not be, NaN where unknown
     advice : which driving would help; empty where nothing more is needed
@@ -84,6 +86,7 @@ class LiveWeighing:
     minutes_to_5: float
     minutes_to_2: float
     advice: str
+    reach: float = math.nan
     signals: tuple[SignalHealth, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -131,6 +134,7 @@ class LiveWeighing:
             "overload_probability": self.overload,
             "driven_s": self.driven,
             "progress": self.progress,
+            "reach_percent": _known(100.0 * self.reach),
             "minutes_to_5_percent": _known(self.minutes_to_5),
             "minutes_to_2_percent": _known(self.minutes_to_2),
             "advice": self.advice,

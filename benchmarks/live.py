@@ -1,0 +1,119 @@
+"""Live weighing: share of a core, time of a step, age of what is shown, memory over a day.
+
+Run with an installed package, whose compiled code is cached: ``pip install . && python
+benchmarks/live.py``; ``--hours 24`` replays a day for the memory. The yardstick is openpilot, whose
+``locationd``, ``paramsd`` and ``torqued`` may take 25, 9 and 5 % of a core (its
+``selfdrive/test/test_onroad.py``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+from pathlib import Path
+
+import numpy as np
+
+import weighbridge as wb
+from weighbridge.signals import Drive
+from weighbridge.simulation import make_scenario, simulate_car
+
+OPENPILOT = 25.0 + 9.0 + 5.0
+"""Of a core, all that weighs, steers and learns there [%]."""
+
+
+def made(seed: int) -> tuple[Drive, float]:
+    """Simulate a drive with a 200 Hz inertial sensor; return it and its mass."""
+    scenario = make_scenario("car", seed=seed)
+    return simulate_car(scenario).drive, scenario.mass
+
+
+def blocks(drive: Drive, length: float, shift: float = 0.0):
+    """Samples of a drive in blocks of so long [s], stamps moved by ``shift``."""
+    for start in np.arange(drive.start, drive.end, length):
+        part = drive.between(start, start + length)
+        yield {n: (s.time + shift, s.values) for n, s in part.signals.items()}
+
+
+def replayed(car: wb.Vehicle, drive: Drive) -> None:
+    """Feed a drive as fast as it goes: processor time, and how old what is shown is."""
+    scale = wb.LiveScale(car, info=drive.info)
+    begin, wall, ages = time.process_time(), time.perf_counter(), []
+    for samples in blocks(drive, 1.0):
+        scale.update_block(samples)
+        ages.append(scale.weighing().age)
+    spent, wall = time.process_time() - begin, time.perf_counter() - wall
+    core = 100.0 * spent / drive.duration
+    known = np.array([a for a in ages if np.isfinite(a)][300:])
+    print(f"{'replay of ' + f'{drive.duration / 60:.0f} min, real time':<44}"
+          f"{drive.duration / wall:8.0f} x")  # fmt: skip
+    print(f"{'share of a core, all that it learns included':<44}{core:8.2f} %")
+    print(f"{'the same over the budgets of openpilot':<44}{core / OPENPILOT:8.3f} x")
+    print(f"{'age of what is shown, median and 99 %':<44}"
+          f"{np.median(known):8.2f} s {np.percentile(known, 99.0):.2f} s")  # fmt: skip
+
+
+def sample_by_sample(car: wb.Vehicle, drive: Drive, span: float = 300.0) -> None:
+    """Feed one sample at a time: what each takes."""
+    part = drive.between(drive.start, drive.start + span)
+    samples = sorted(
+        (t, n, v)
+        for n, s in part.signals.items()
+        for t, v in zip(s.time.tolist(), s.values.tolist(), strict=True)
+    )
+    scale = wb.LiveScale(car, info=drive.info)
+    taken = np.empty(len(samples))
+    for k, (at, name, value) in enumerate(samples):
+        begin = time.perf_counter()
+        scale.update(at, name, value)
+        taken[k] = time.perf_counter() - begin
+    print(f"{'one sample, median':<44}{1e6 * np.median(taken):8.1f} us")
+    for part_of in (99.0, 99.9, 100.0):
+        print(f"{f'one sample, {part_of:g} %':<44}{1e3 * np.percentile(taken, part_of):8.2f} ms")
+
+
+def a_day(car: wb.Vehicle, drive: Drive, hours: float) -> None:
+    """Replay drives one after another with stops between them: memory each hour."""
+    scale = wb.LiveScale(car, info=drive.info)
+    told, shift, next_hour, begin = [], 0.0, 3600.0, time.perf_counter()
+    while shift < 3600.0 * hours:
+        for samples in blocks(drive, 10.0, shift):
+            scale.update_block(samples)
+            scale.weighing()
+        shift += drive.duration + 600.0
+        if shift >= next_hour:
+            told.append((shift / 3600.0, current_memory()))
+            next_hour += 3600.0
+    wall = time.perf_counter() - begin
+    for at, memory in told:
+        print(f"  after {at:4.1f} h {memory:8.0f} MB, {scale.weighing().status}")
+    print(f"{'memory at the end over that after two hours':<44}"
+          f"{told[-1][1] / told[min(1, len(told) - 1)][1]:8.2f} x")  # fmt: skip
+    print(f"{'replay of it all, real time':<44}{shift / wall:8.0f} x")
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    print(f"{'peak memory':<44}{peak:8.0f} MB")
+
+
+def current_memory() -> float:
+    """Memory of this process now [MB]."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize() / 2**20
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--hours", type=float, default=0.0)
+    asked = parser.parse_args()
+    known, mass = made(61)
+    car = wb.calibrate(known, mass=mass)
+    drive, _ = made(62)
+    replayed(car, drive)
+    replayed(car, drive)
+    sample_by_sample(car, drive)
+    if asked.hours > 0.0:
+        a_day(car, drive, asked.hours)
+
+
+if __name__ == "__main__":
+    main()

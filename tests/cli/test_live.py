@@ -1,0 +1,95 @@
+"""The command ``live`` on recorded drives."""
+
+import json
+import math
+
+import pytest
+
+import weighbridge as wb
+
+
+def test_a_replay_ends_with_a_mass(weighbridge, loaded, car, tmp_path):
+    lines, kept = tmp_path / "lines.jsonl", tmp_path / "kept"
+    ran = weighbridge(
+        "live", "--vehicle", car, "--replay", loaded.folder, "--rate", "max",
+        "--json", lines, "--record", kept, "--state", tmp_path / "car.state", "--every", 5,
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
+    assert "with 95 % probability" in ran.out
+    told = [json.loads(line) for line in lines.read_text().splitlines()]
+    assert {t["status"] for t in told} >= {"learning"}
+    assert told[0]["mass_kg"] is None
+    last = told[-1]
+    assert last["interval95_kg"][0] < loaded.mass < last["interval95_kg"][1]
+    assert last["mass_kg"] == pytest.approx(wb.weigh(loaded.folder, car).mass, rel=0.015)
+    assert last["payload_kg"] == pytest.approx(last["mass_kg"] - 1580.0)
+    assert (tmp_path / "car.state").exists()
+    drive = wb.read_drive(kept)
+    assert len(drive.signals["accel_x"]) == len(wb.read_drive(loaded.folder).signals["accel_x"])
+    # Where the state stays, the next run begins with it.
+    again = weighbridge(
+        "live", "--vehicle", car, "--replay", loaded.folder, "--rate", "max",
+        "--state", tmp_path / "car.state", "--json", "-",
+    )  # fmt: skip
+    assert "going on from" in again.err
+    first = json.loads(again.out.splitlines()[0])
+    assert math.isclose(first["mass_kg"], last["mass_kg"], rel_tol=0.005)
+
+
+def test_no_mass_is_exit_1(weighbridge, loaded, car, changed):
+    import polars as pl
+
+    brief = changed(
+        imu=lambda t: t.filter(pl.col("time_s") < 40.0),
+        obd=lambda t: t.filter(pl.col("time_s") < 40.0),
+        gnss=lambda t: t.filter(pl.col("time_s") < 40.0),
+    )
+    ran = weighbridge("live", "--vehicle", car, "--replay", brief, "--rate", "max")
+    assert ran.code == 1
+    assert "learning" in ran.err
+    assert ran.out == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ((), "give --source KIND:PLACE once or more, or --replay DRIVE"),
+        (("--replay", "d", "--rate", "fast"), "--rate fast"),
+        (("--replay", "d", "--rate", "0"), "--rate 0"),
+        (("--replay", "d", "--ticket", "1800"), "go together"),
+        (("--replay", "d", "--every", "0"), "--every 0"),
+        (("--replay", "d", "--above", "-5"), "-5 kg is no mass"),
+        (("--replay", "d", "--page", "here"), "--page here"),
+        (("--source", "warp:core"), "no known kind"),
+        (("--source", "elm:/dev/nothing", "--listen-only"), "cannot listen only"),
+    ],
+)
+def test_wrong_usage_is_one_sentence(weighbridge, loaded, car, words, says):
+    words = [str(loaded.folder) if w == "d" else w for w in words]
+    ran = weighbridge("live", "--vehicle", car, "--state", "none", *words)
+    assert ran.code == 2
+    assert says in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+
+
+def test_nothing_that_is_read_is_replaced(weighbridge, loaded, car):
+    for words in (
+        ("--json", car),
+        ("--json", loaded.folder / "imu.parquet"),
+        ("--ticket", 1700, "-o", car),
+    ):
+        before = car.read_bytes()
+        ran = weighbridge("live", "--vehicle", car, "--replay", loaded.folder, *words)
+        assert ran.code == 2
+        assert car.read_bytes() == before
+
+
+def test_a_ticket_calibrates(weighbridge, known, car, tmp_path):
+    out = tmp_path / "better.toml"
+    ran = weighbridge(
+        "live", "--vehicle", car, "--replay", known.folder, "--rate", "max",
+        "--ticket", f"{known.mass:.0f}", "-o", out,
+    )  # fmt: skip
+    assert ran.code in (0, 1), ran.err
+    assert "written" in ran.err
+    assert wb.Vehicle.load(out).provenance.masses == pytest.approx((known.mass,), abs=1.0)
