@@ -37,83 +37,102 @@ if TYPE_CHECKING:
 _NO_STATE = "none"
 
 
+_VehiclePath = Annotated[
+    Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
+]
+_Sources = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--source",
+        help="Where samples come from, such as elm:/dev/ttyUSB0 or can:socketcan:can0; "
+        "repeat it for more. docs/live.md lists them.",
+        metavar="KIND:PLACE",
+    ),
+]
+_Replay = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--replay", help="Take a recorded drive as the source.", metavar="DRIVE"),
+]
+_Rate = Annotated[
+    str,
+    typer.Option("--rate", help="Of the replay: 1 as recorded, 10 tenfold, or max."),
+]
+_Json = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--json", help="Write a JSON line per weighing to a file, or - for here."),
+]
+_Mqtt = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--mqtt", help="Send weighings to mqtt://USER:PASSWORD@HOST:PORT/PREFIX."),
+]
+_Page = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--page",
+        help="Show a page at this port, for this computer alone; HOST:PORT for others too.",
+        metavar="[HOST:]PORT",
+    ),
+]
+_Record = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--record", help="Record what comes as a drive, too.", metavar="DRIVE"),
+]
+_Every = Annotated[float, typer.Option("--every", help="Seconds between weighings.")]
+_Above = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--above", help="Alert above so many kg; the permitted mass by default."),
+]
+_Below = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--below", help="Alert below so many kg."),
+]
+_Ticket = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        "--ticket",
+        help="Mass in kg by a weighbridge: calibrate the vehicle with this drive at its end.",
+    ),
+]
+_Out = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("-o", "--out", help="Vehicle file that --ticket writes."),
+]
+_State = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--state",
+        help="File that keeps what was weighed over a power cut or a short stop; by default "
+        "beside the vehicle file, none for a replay.",
+        metavar="FILE|none",
+    ),
+]
+_Lateness = Annotated[
+    float, typer.Option("--lateness", help="Seconds that a sample may come late.")
+]
+_ListenOnly = Annotated[
+    bool, typer.Option("--listen-only", help="Send nothing to the vehicle, no request either.")
+]
+_Force = Annotated[bool, typer.Option("--force", help="Replace the file of -o.")]
+
+
 def live(
-    vehicle: Annotated[
-        Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
-    ],
-    source: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(
-            "--source",
-            help="Where samples come from, such as elm:/dev/ttyUSB0 or can:socketcan:can0; "
-            "repeat it for more. docs/live.md lists them.",
-            metavar="KIND:PLACE",
-        ),
-    ] = None,
-    replay: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--replay", help="Take a recorded drive as the source.", metavar="DRIVE"),
-    ] = None,
-    rate: Annotated[
-        str,
-        typer.Option("--rate", help="Of the replay: 1 as recorded, 10 tenfold, or max."),
-    ] = "1",
-    json_path: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--json", help="Write a JSON line per weighing to a file, or - for here."),
-    ] = None,
-    mqtt: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--mqtt", help="Send weighings to mqtt://USER:PASSWORD@HOST:PORT/PREFIX."),
-    ] = None,
-    page: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            "--page",
-            help="Show a page at this port, for this computer alone; HOST:PORT for others too.",
-            metavar="[HOST:]PORT",
-        ),
-    ] = None,
-    record: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--record", help="Record what comes as a drive, too.", metavar="DRIVE"),
-    ] = None,
-    every: Annotated[float, typer.Option("--every", help="Seconds between weighings.")] = 1.0,
-    above: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--above", help="Alert above so many kg; the permitted mass by default."),
-    ] = None,
-    below: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--below", help="Alert below so many kg."),
-    ] = None,
-    ticket: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option(
-            "--ticket",
-            help="Mass in kg by a weighbridge: calibrate the vehicle with this drive at its end.",
-        ),
-    ] = None,
-    out: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("-o", "--out", help="Vehicle file that --ticket writes."),
-    ] = None,
-    state: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            "--state",
-            help="File that keeps what was weighed over a power cut or a short stop; by default "
-            "beside the vehicle file, none for a replay.",
-            metavar="FILE|none",
-        ),
-    ] = None,
-    lateness: Annotated[
-        float, typer.Option("--lateness", help="Seconds that a sample may come late.")
-    ] = 1.0,
-    listen_only: Annotated[
-        bool, typer.Option("--listen-only", help="Send nothing to the vehicle, no request either.")
-    ] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace the file of -o.")] = False,
+    vehicle: _VehiclePath,
+    source: _Sources = None,
+    replay: _Replay = None,
+    rate: _Rate = "1",
+    json_path: _Json = None,
+    mqtt: _Mqtt = None,
+    page: _Page = None,
+    record: _Record = None,
+    every: _Every = 1.0,
+    above: _Above = None,
+    below: _Below = None,
+    ticket: _Ticket = None,
+    out: _Out = None,
+    state: _State = None,
+    lateness: _Lateness = 1.0,
+    listen_only: _ListenOnly = False,
+    force: _Force = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:

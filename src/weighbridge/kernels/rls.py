@@ -163,21 +163,11 @@ def step(state, time, phi, y, params):
     if taken:
         block_score = block_score + phi[0] * innovation
         block_expected = block_expected + phi[0] * phi[0] * noise_var
-    return (
-        RlsState(
-            theta,
-            cov,
-            noise_var,
-            state.rows + 1,
-            block_end,
-            block_score,
-            block_expected,
-            score,
-            expected,
-        ),
-        innovation,
-        taken,
-    )
+    after = RlsState(
+        theta, cov, noise_var, state.rows + 1, block_end, block_score, block_expected,
+        score, expected,
+    )  # fmt: skip
+    return after, innovation, taken
 
 
 @kernel
