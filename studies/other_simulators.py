@@ -255,7 +255,7 @@ def forward() -> str:
         )
         for name in DRIVES:
             weighing = wb.weigh(wb.read_drive(root / name), car)
-            track = forward_weigh(weighing.drive, car, identify_forward(weighing))
+            track = forward_weigh(weighing.drive, identify_forward(weighing))
             begun, true = masses(root / name)
             early = track.mass[np.searchsorted(track.time, track.time[0] + FIVE_MINUTES)]
             lines.append(

@@ -45,4 +45,4 @@ def short(weighing):
 
 @pytest.fixture(scope="session")
 def forward(short, weighing, setup):
-    return forward_weigh(short, weighing.vehicle, setup)
+    return forward_weigh(short, setup)

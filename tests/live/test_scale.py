@@ -155,7 +155,7 @@ def test_a_silence_of_hours_costs_no_steps(short, weighing, setup, forward):
     told = fed(scale, later, [later.start, later.start + 120.0, later.end + 1.0])
     # The load may have changed meanwhile, so a few windows tell less than they do without a stop.
     assert abs(told.mass - forward.mass[-1]) < forward.std[-1]
-    direct = forward_weigh(later, weighing.vehicle, setup)
+    direct = forward_weigh(later, setup)
     assert abs(direct.mass[-1] - forward.mass[-1]) < 2.0 * direct.std[-1]
     assert direct.std[-1] > forward.std[-1]
 

@@ -404,14 +404,14 @@ def test_the_change_is_found_where_it_is(fleet):
         return x * np.where(t > 500.0, 0.8, 1.0)
 
     drive = with_signal(fleet.drive("truck"), SOURCE["truck"], change)
-    found = changing.largest(fleet.weigh("truck", drive).result.filtered)
+    found = changing.largest(fleet.weigh("truck", drive).result.filter_input)
     assert found.sure
     assert found.change == pytest.approx(-0.2, abs=0.05)
     assert found.start - drive.start == pytest.approx(500.0, abs=60.0)
-    clean = changing.largest(fleet.weigh("truck", fleet.drive("truck")).result.filtered)
+    clean = changing.largest(fleet.weigh("truck", fleet.drive("truck")).result.filter_input)
     assert not clean.sure
     balance = fleet.weigh("truck", fleet.drive("truck")).result.balance
-    assert joint.estimate(balance, fleet.files["truck"]).filtered.stood.max() > 0.0
+    assert joint.estimate(balance, fleet.files["truck"]).filter_input.stood.max() > 0.0
 
 
 def test_a_sign_that_was_never_seen_is_not_missed():

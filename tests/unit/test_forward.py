@@ -35,7 +35,7 @@ def setup(weighing):
 
 @pytest.fixture(scope="module")
 def whole(weighing, setup):
-    return forward_weigh(weighing.drive, weighing.vehicle, setup)
+    return forward_weigh(weighing.drive, setup)
 
 
 def test_the_forward_pass_ends_near_the_smoothed_answer(weighing, whole):
@@ -50,7 +50,7 @@ def test_the_forward_pass_ends_near_the_smoothed_answer(weighing, whole):
 def test_what_comes_later_changes_no_bit(weighing, setup, whole, part):
     drive = weighing.drive
     cut = drive.start + part * drive.duration
-    begun = forward_weigh(drive.between(drive.start, cut), weighing.vehicle, setup)
+    begun = forward_weigh(drive.between(drive.start, cut), setup)
     count = begun.time.size
     assert count > 10
     assert_array_equal(begun.time, whole.time[:count])
@@ -73,7 +73,7 @@ def test_a_drive_that_pauses_goes_on(weighing, setup):
             for keep in [(s.time < middle) | (s.time > middle + 60.0)]
         )
     )
-    track = forward_weigh(gap, weighing.vehicle, setup)
+    track = forward_weigh(gap, setup)
     assert track.mass[-1] == pytest.approx(weighing.mass, rel=0.02)
     assert not ((track.time > middle + 1.0) & (track.time < middle + 60.0)).any()
     assert (track.time > middle + 60.0).sum() > 20
@@ -90,7 +90,7 @@ def test_a_signal_that_ends_adds_no_windows(weighing, setup, lost):
             if s.name in lost
         )
     )
-    track = forward_weigh(cut, weighing.vehicle, setup)
+    track = forward_weigh(cut, setup)
     assert track.time.size > 20
     # GNSS goes on for the motion; a torque or an accelerometer nothing replaces.
     if lost != ("vehicle_speed",):

@@ -218,7 +218,7 @@ def test_a_table_that_is_late_as_a_whole_is_moved_and_told(made, car, balance, l
 
 def forward(track, stops=1.0):
     """Fold the windows of a track into the forward filter, standing so many times as long."""
-    given = track.filtered
+    given = track.filter_input
     setup = joint_forward.identify_joint(given, track.sizes)
     state = joint_forward.JointState()
     torque_var = given.noise / setup.fast**2 - setup.mass**2 * setup.motion_var
@@ -239,7 +239,7 @@ def test_forward_ends_where_the_smoother_does(balance, car):
     end = track.mass + balance.merged.fuel_burnt[-1]
     assert state.mass == pytest.approx(end, rel=1e-9)
     assert state.std(track.sizes) == pytest.approx(track.std, rel=1e-3)
-    assert state.windows == track.filtered.time.size
+    assert state.windows == track.filter_input.time.size
 
 
 def test_forward_follows_a_load_that_changes_at_a_stop(balance, car):

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals import Bools, Floats, Signal
+from weighbridge.signals import Bools, Signal
 
 FINE: Final = 0.025
 """Steps of a reading over its range that do no harm [-]: control units send 0.4 and 1 %."""
@@ -19,7 +19,7 @@ ROUNDING: Final = 1.0 / math.sqrt(12.0)
 """Standard deviation of an even error over its step [-]."""
 
 
-def coarse_std(source: Signal, reading: Floats, usable: Bools) -> float:
+def coarse_std(source: Signal, usable: Bools) -> float:
     """Relative standard deviation of a mass by the steps of the torque's reading [-].
 
     Rounding down takes half a step of every reading, and nothing tells it from rounding to the
@@ -27,9 +27,8 @@ def coarse_std(source: Signal, reading: Floats, usable: Bools) -> float:
 
     Parameters
     ----------
-    source : as recorded, in its own unit
-    reading : (n,) the same at the rows
-    usable : (n,)
+    source : as recorded, in its own unit, one sample per row
+    usable : (n,) rows
     """
     if len(source) < 200 or not usable.any():
         return 0.0
@@ -37,7 +36,7 @@ def coarse_std(source: Signal, reading: Floats, usable: Bools) -> float:
     if levels.size < 3:
         return 0.0
     step, span = float(np.median(np.diff(levels))), float(np.ptp(levels))
-    mean = float(np.nanmean(np.abs(reading[usable])))
+    mean = float(np.nanmean(np.abs(source.values[usable])))
     if step < FINE * span or not mean > 0.0:
         return 0.0
     return ROUNDING * step / mean

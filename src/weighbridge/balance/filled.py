@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.signals import Bools, Floats, Signal
+from weighbridge.signals import Bools, Signal
 from weighbridge.signals.runs import marked_runs
 
 FILLED_TIME: Final = 10.0
@@ -55,15 +55,14 @@ def identify_fill(signal: Signal) -> Fill | None:
     return Fill(least, 1.01 * step, (0.0, float(np.nanmin(values))))
 
 
-def filled(signal: Signal, time: Floats, fill: Fill | None) -> Bools:
+def filled(signal: Signal, fill: Fill | None) -> Bools:
     """Where a signal holds one value or runs straight for longer than a real one does.
 
     Loggers and makers of data sets fill gaps so, and the fill looks like data.
 
     Parameters
     ----------
-    signal
-    time : (n,) instants asked about [s]
+    signal : of n samples
     fill : of `identify_fill`
 
     Returns
@@ -72,12 +71,11 @@ def filled(signal: Signal, time: Floats, fill: Fill | None) -> Bools:
     """
     values = signal.values
     if fill is None or values.size <= fill.least:
-        return np.zeros(time.size, dtype=bool)
+        return np.zeros(values.size, dtype=bool)
     straight = np.concatenate(([False], np.abs(np.diff(values, 2)) <= fill.tolerance, [False]))
     straight &= ~np.isin(values, fill.resting)
     runs = np.zeros(values.size, dtype=bool)
     for begin, end in zip(*marked_runs(straight), strict=True):
         if end - begin >= fill.least:
             runs[begin:end] = True
-    index = np.clip(np.searchsorted(signal.time, time), 0, values.size - 1)
-    return np.asarray(runs[index])
+    return runs

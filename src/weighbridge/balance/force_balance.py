@@ -58,7 +58,6 @@ def force_balance(
         The drive lacks what the vehicle's torque source needs.
     """
     source = source_signal(drive, vehicle)
-    recorded = source.time
     if delay is None:
         delay = vehicle.timing.torque_delay or 0.0
     lag = vehicle.timing.torque_lag if lag is None else lag
@@ -87,7 +86,7 @@ def force_balance(
         motion=motion,
         brake_hidden=brakes.hidden,
         switch_dead=brakes.switch_dead,
-        coarse_std=coarse_std(source, source.at(recorded), reason == Reason.USED),
+        coarse_std=coarse_std(source, reason == Reason.USED),
         setup=setup,
         delay=delay,
     )
@@ -165,10 +164,8 @@ def _reasons(
     fill : how readings that a logger filled in would look
     """
     view = read.view
-    recorded = source.time
-    fresh = source.age(recorded) <= 3.0 * source.period
     reason = np.zeros(view.time.size, dtype=np.uint8)
-    has_torque = np.isfinite(view.traction_force) & fresh & ~filled(source, recorded, fill)
+    has_torque = np.isfinite(view.traction_force) & ~filled(source, fill)
     for flag, why in (
         (~read.instants.known | ~np.isfinite(view.speed), Reason.NO_MOTION),
         (view.speed < SLOWEST, Reason.STANDING),

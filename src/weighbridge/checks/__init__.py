@@ -54,7 +54,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
 
 
 def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
-    """Judge a drive, and leave out of it what cannot be so.
+    """Judge a drive, bring its clocks together, and leave out of it what cannot be so.
 
     Clocks come first: what is laid on an even grid later grows with the time from first to last
     stamp. Where they are seriously wrong, nothing else is looked at.

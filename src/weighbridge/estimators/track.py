@@ -68,7 +68,7 @@ class MassTrack:
     sensitivity : (k,) how far one unit of each parameter of the calibration moves the mass
         [kg per unit]; None where a method does not say
     slow_errors : what was estimated beside the mass; None where a method does not
-    filtered : what the filter of the joint estimator was given; None of other methods
+    filter_input : what the filter of the joint estimator was given; None of other methods
     sizes : of noise and states, by which the joint estimator runs forward; None of other methods
     """
 
@@ -89,7 +89,7 @@ class MassTrack:
     left_std: float = math.nan
     sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
-    filtered: FilterInput | None = None
+    filter_input: FilterInput | None = None
     sizes: JointSizes | None = None
 
     @property

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 _SPEEDS: Final = (("vehicle_speed",), ("gnss_speed",))
 
 
+_INERTIAL: Final = "inertial sensor"
+_POSITION: Final = "position"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Need:
     """Something that a drive needs.
@@ -45,13 +49,41 @@ def needs(vehicle: Vehicle | None = None) -> tuple[Need, ...]:
     if vehicle is not None and vehicle.torque.stated:
         sources = [vehicle.torque.of_source]
     torque = tuple(dict.fromkeys(s for source in sources for s in (source.signals, *source.others)))
+    geared = vehicle is None or not (
+        vehicle.driveline.single_speed or all(source.gearing is not None for source in sources)
+    )
+    engine = Need(
+        name="engine speed", sets=(("engine_speed",),), why="gears are not found without it"
+    )
     return (
         Need(name="speed", sets=_SPEEDS, why="no drive is weighed without it"),
         Need(name="torque", sets=torque, why="the mass is not found without it"),
-        Need(name="engine speed", sets=(("engine_speed",),), why="gears are not found without it"),
-        Need(name="inertial sensor", sets=(IMU_SIGNALS,), why="the road's slope is uncertain"),
-        Need(name="position", sets=(("latitude", "longitude"),), why="the heading is uncertain"),
+        *((engine,) if geared else ()),
+        Need(name=_INERTIAL, sets=(IMU_SIGNALS,), why="the road's slope is uncertain"),
+        Need(name=_POSITION, sets=(("latitude", "longitude"),), why="the heading is uncertain"),
     )
+
+
+def needed_signals(vehicle: Vehicle, came: Iterable[str]) -> tuple[str, ...]:
+    """Name the signals that a vehicle is weighed by on the way.
+
+    Of what can be told by several sets of signals it is the set that came, else the first. An
+    inertial sensor is needed once it has come; without one the mass is that of all records so
+    far, each time they are looked at.
+
+    Parameters
+    ----------
+    vehicle
+    came : names of the signals of which samples came
+    """
+    known = set(came)
+    found: list[str] = []
+    for need in needs(vehicle):
+        whole = next((s for s in need.sets if known.issuperset(s)), None)
+        if need.name == _POSITION or (need.name == _INERTIAL and known.isdisjoint(*need.sets)):
+            continue
+        found += whole or need.sets[0]
+    return tuple(dict.fromkeys(found))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

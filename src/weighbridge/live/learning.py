@@ -36,7 +36,6 @@ class Learned:
     until : that instant [s]
     setup : by which the drive is weighed on; None where no forward pass is possible
     state : of a forward pass, at ``until``
-    vehicle : as the weighing took it
     mass, std : of these records as a whole [kg]; NaN where they carry none
     floor : part of ``std`` that no driving takes away, relative to the mass [-]
     inconsistent : the records contradict themselves or the vehicle file
@@ -47,7 +46,6 @@ class Learned:
     until: float
     setup: ForwardSetup | None
     state: ForwardState | None
-    vehicle: Vehicle
     mass: float
     std: float
     floor: float
@@ -68,21 +66,17 @@ def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:
     try:
         weighing = weigh(drive, vehicle)
     except WeighbridgeError as error:
-        return _nothing(until, vehicle, str(error), inconsistent=True)
+        return _nothing(until, str(error), inconsistent=True)
     inconsistent = weighing.status is Status.INCONSISTENT
     if weighing.result is None or not math.isfinite(weighing.mass):
-        return _nothing(
-            until, vehicle, weighing.reason, inconsistent=inconsistent, notes=weighing.warnings
-        )
+        return _nothing(until, weighing.reason, inconsistent=inconsistent, notes=weighing.warnings)
     setup, state, notes = _set_up(weighing, drive, until)
-    mass, std = _at_the_end(weighing)
     return Learned(
         until=until,
         setup=setup,
         state=state,
-        vehicle=weighing.vehicle,
-        mass=mass,
-        std=std,
+        mass=weighing.mass,
+        std=weighing.std,
         floor=_floor(weighing),
         inconsistent=False,
         reason="",
@@ -93,25 +87,17 @@ def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:
 def _set_up(
     weighing: Weighing, drive: Drive, until: float
 ) -> tuple[ForwardSetup | None, ForwardState | None, tuple[str, ...]]:
-    """Set up the stages; all records so far are one step of theirs."""
+    """Set up the stages; all records so far are one step of theirs.
+
+    The records are as they came: what the checks of the weighing left out or moved is in them.
+    """
     try:
         setup = forward.identify_forward(weighing)
     except WeighbridgeError as error:
         return None, None, (*weighing.warnings, str(error))
     begin = forward.begin(setup, drive.start)
-    state, _ = forward.step(begin, drive, until, weighing.vehicle, setup)
+    state, _ = forward.step(begin, drive, until, setup)
     return setup, state, weighing.warnings
-
-
-def _at_the_end(weighing: Weighing) -> tuple[float, float]:
-    """Mass of the last load and its standard deviation, the fuel burnt by then taken off [kg]."""
-    result = weighing.result
-    assert result is not None
-    mass, std = weighing.mass, weighing.std
-    last = [s for s in weighing.segments if math.isfinite(s.mass)]
-    if weighing.load_changed and last:
-        mass, std = last[-1].mass, last[-1].std
-    return mass - float(result.balance.merged.fuel_burnt[-1]), std
 
 
 def _floor(weighing: Weighing) -> float:
@@ -122,14 +108,13 @@ def _floor(weighing: Weighing) -> float:
 
 
 def _nothing(
-    until: float, vehicle: Vehicle, reason: str, *, inconsistent: bool,
+    until: float, reason: str, *, inconsistent: bool,
     notes: tuple[str, ...] = (),
 ) -> Learned:  # fmt: skip
     return Learned(
         until=until,
         setup=None,
         state=None,
-        vehicle=vehicle,
         mass=math.nan,
         std=math.nan,
         floor=0.0,

@@ -25,7 +25,7 @@ ADVICE: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outlook:
-    """What a mass is worth, and what is still needed; see `weighbridge.live.LiveWeighing`."""
+    """What a mass is worth and still needs; see `weighbridge.live.weighing.LiveWeighing`."""
 
     status: LiveStatus
     reason: str = ""

@@ -196,7 +196,7 @@ class Records:
                 column.seal(until)
 
     @property
-    def sealed_until(self) -> float:
+    def newest_sealed(self) -> float:
         """Instant of the last sealed sample [s]; -inf without any."""
         ends = [c.sealed[0][-1] for c in self._columns.values() if c.last > c.first]
         return float(max(ends, default=-math.inf))

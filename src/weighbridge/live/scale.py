@@ -9,7 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.balance.table import MOVING
 from weighbridge.errors import ConfigError
+from weighbridge.live.arrival import needed_signals
 from weighbridge.live.checkpoint import packed, unpacked
 from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, Learned, learn
 from weighbridge.live.outlook import Outlook, outlook
@@ -19,15 +21,10 @@ from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
 from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.signals import Drive, DriveInfo, Floats
-from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.recent import BEHIND, FEWEST, STEP, first_instant, recent
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import source_of
 
 _LOG = logging.getLogger(__name__)
-
-MOVES: Final = 0.5
-"""Slower a vehicle stands [m/s]."""
 
 RATE_SPAN: Final = 10.0
 """Time over which the rate of a signal is told [s]."""
@@ -50,7 +47,9 @@ class LiveScale:
     noise; from then on each second is weighed by the forward stages
     (`weighbridge.pipeline.forward`), and all that came is still looked at now and then, by the
     checks of a recorded drive. With a ``setup`` nothing is learnt, and the mass is to the last bit
-    that of `weighbridge.pipeline.forward.forward_weigh` over the same samples.
+    that of `weighbridge.pipeline.forward.forward_weigh` over the same samples. Samples are taken as
+    they come: what the checks of a recorded drive leave out or move is noticed when they are
+    looked at.
 
     Parameters
     ----------
@@ -78,15 +77,13 @@ class LiveScale:
         self._records = Records(lateness)
         self._learns = setup is None
         self._setup = setup
-        self._weighed = vehicle
         self._state: ForwardState | None = None
         self._learned: Learned | None = None
         self._next: float | None = None
         self._driven = 0.0
-        self._informed = 0.0
-        self._look = FIRST
+        self._driven_this_load = 0.0
+        self._learn_at = FIRST
         self._tared: float | None = None
-        self._needed = _needed(vehicle)
 
     def update(self, time: float | Floats, signal: str, value: float | Floats) -> None:
         """Take one sample of a signal, or several.
@@ -130,10 +127,9 @@ class LiveScale:
         content = {
             "setup": self._setup,
             "state": self._state,
-            "weighed": self._weighed,
             "next": self._next,
             "driven": self._driven,
-            "informed": self._informed,
+            "driven_this_load": self._driven_this_load,
             "tared": self._tared,
             "learns": self._learns,
             "lateness": self._records.lateness,
@@ -161,15 +157,15 @@ class LiveScale:
         try:
             scale = cls(vehicle, lateness=content["lateness"], info=content["info"])
             scale._setup, scale._state = content["setup"], content["state"]
-            scale._weighed, scale._next = content["weighed"], content["next"]
-            scale._driven, scale._informed = content["driven"], content["informed"]
+            scale._next = content["next"]
+            scale._driven, scale._driven_this_load = content["driven"], content["driven_this_load"]
             scale._tared, scale._learns = content["tared"], content["learns"]
             scale._records.add_block(content["samples"])
             if scale._next is not None:
                 scale._records.seal(scale._next - STEP)
         except (KeyError, TypeError, AttributeError) as error:
             raise ConfigError(f"the checkpoint is not used: {error}") from None
-        scale._look = scale._driven + FIRST
+        scale._learn_at = scale._driven + FIRST
         mass, std, _, _ = scale._mass()
         if (
             scale._state is not None
@@ -206,7 +202,7 @@ class LiveScale:
         """Tell that the load has changed: what was weighed before says nothing of it any more."""
         if self._state is not None:
             self._state = forward.unloaded(self._state)
-        self._informed = 0.0
+        self._driven_this_load = 0.0
 
     def weighing(self) -> LiveWeighing:
         """Return the mass as it is known now, and what would make it surer."""
@@ -256,7 +252,13 @@ class LiveScale:
         silent = [s.name for s in self._health() if s.needed and not s.fresh]
         reason = learned.reason if learned is not None else ""
         return outlook(
-            mass, std, floor, driven=self._informed, reason=reason, silent=silent, first=FIRST
+            mass,
+            std,
+            floor,
+            driven=self._driven_this_load,
+            reason=reason,
+            silent=silent,
+            first=FIRST,
         )
 
     def _advance(self, until: float | None = None) -> None:
@@ -271,7 +273,7 @@ class LiveScale:
                 self._state = forward.begin(self._setup, oldest)
         while self._next <= end:
             self._records.seal(self._next)
-            if self._records.sealed_until >= self._next - STEP - BEHIND:
+            if self._records.newest_sealed >= self._next - STEP - BEHIND:
                 self._step(self._next)
                 self._next += STEP
             else:
@@ -283,21 +285,21 @@ class LiveScale:
         seen = recent(drive, until)
         moved = _moved(seen, until)
         self._driven += moved
-        self._informed += moved
+        self._driven_this_load += moved
         if self._setup is not None and self._state is not None:
-            self._state, _ = forward.step(self._state, seen, until, self._weighed, self._setup)
+            self._state, _ = forward.step(self._state, seen, until, self._setup)
         keep = BEHIND + 2.0 * STEP
         if self._learns:
             keep += LONGEST
-            if self._driven >= self._look:
+            if self._driven >= self._learn_at:
                 self._learn(drive, until)
         self._records.forget(until - keep, FEWEST)
 
     def _learn(self, drive: Drive, until: float) -> None:
         """Look at all that is kept, and go on from it where it tells more than is known."""
-        self._look = min(self._driven * GROWTH, self._driven + PERIOD)
+        self._learn_at = min(self._driven * GROWTH, self._driven + PERIOD)
         if drive.duration < LONGEST:
-            self._look = self._driven * GROWTH
+            self._learn_at = self._driven * GROWTH
         learned = learn(drive, self.vehicle, until)
         _LOG.info("looked at %.0f s: %.0f kg %s", drive.duration, learned.mass, learned.reason)
         mass, std, _, _ = self._mass()
@@ -309,11 +311,11 @@ class LiveScale:
         )
         if math.isnan(mass) or far or learned.std <= 1.05 * std or self._setup is None:
             self._setup, self._state = learned.setup, learned.state
-            self._weighed = learned.vehicle
 
     def _health(self) -> Iterable[SignalHealth]:
         records = self._records
-        for name in dict.fromkeys((*self._needed, *records.names())):
+        needed = needed_signals(self.vehicle, records.names())
+        for name in dict.fromkeys((*needed, *records.names())):
             yield SignalHealth(
                 name=name,
                 rate=records.rate(name, RATE_SPAN),
@@ -322,7 +324,7 @@ class LiveScale:
                 else math.inf,
                 late=records.late.get(name, 0),
                 unfit=records.unfit.get(name, 0),
-                needed=name in self._needed,
+                needed=name in needed,
             )
 
     def _notes(self, learned: tuple[str, ...]) -> tuple[str, ...]:
@@ -335,17 +337,9 @@ class LiveScale:
         return (told, *learned)
 
 
-def _needed(vehicle: Vehicle) -> tuple[str, ...]:
-    """Signals without which a vehicle is not weighed on the way."""
-    names = ["vehicle_speed", *source_of(vehicle).signals]
-    if not vehicle.driveline.single_speed:
-        names.append("engine_speed")
-    return (*dict.fromkeys(names), *IMU_SIGNALS)
-
-
 def _moved(seen: Drive, until: float) -> float:
     """Time on the move within the last step [s]."""
     speed = seen.speed
     if speed is None:
         return 0.0
-    return STEP if float(speed.held(np.array([until]))[0]) > MOVES else 0.0
+    return STEP if float(speed.held(np.array([until]))[0]) > MOVING else 0.0

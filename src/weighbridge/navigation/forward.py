@@ -79,7 +79,7 @@ class Level(NamedTuple):
     lifted: float = 0.0
 
 
-class ForwardState(NamedTuple):
+class NavigationState(NamedTuple):
     """What the stage goes on from.
 
     Attributes
@@ -100,11 +100,11 @@ class ForwardState(NamedTuple):
     level: Level
 
 
-def begin(setup: Setup, start: float) -> ForwardState:
+def begin(setup: Setup, start: float) -> NavigationState:
     """Return the state before the first sample, which comes at ``start`` [s] or later."""
     nothing = Nodes(np.empty(0), np.empty((0, SHOWN)), np.empty(0))
     row = math.ceil(start * setup.rate)
-    return ForwardState(setup.start, -math.inf, nothing, None, row, Level())
+    return NavigationState(setup.start, -math.inf, nothing, None, row, Level())
 
 
 def lateness(setup: Setup) -> float:
@@ -113,8 +113,8 @@ def lateness(setup: Setup) -> float:
 
 
 def step(
-    state: ForwardState, records: Drive, until: float, setup: Setup
-) -> tuple[ForwardState, Motion | None]:
+    state: NavigationState, records: Drive, until: float, setup: Setup
+) -> tuple[NavigationState, Motion | None]:
     """Fold what came since the last step, and lay the rows out that it makes known.
 
     A row knows its records up to `AHEAD` past its instant, delays taken off, and what the setup
@@ -176,8 +176,8 @@ def _followed(nodes: Nodes, new: Nodes) -> Nodes:
 
 
 def _laid_out(
-    state: ForwardState, found: Found | None, ends: tuple[int, int], setup: Setup
-) -> tuple[ForwardState, Motion]:
+    state: NavigationState, found: Found | None, ends: tuple[int, int], setup: Setup
+) -> tuple[NavigationState, Motion]:
     """Lay out the rows from ``state.row`` up to the first of ``ends``; the second is known."""
     nodes, before = state.nodes, state.motion
     numbers = np.arange(state.row, ends[1])

@@ -22,7 +22,7 @@ def inertial_motion(
     The drive is identified, folded, smoothed and laid out. The mounting is found from the drive,
     or refined where given. The filter runs forward twice, first to find the constants, then from
     these with their uncertainty as it was, and once backward. The identification ends in the
-    smoothed motion, since this shows the accelerometer's scale: it is not done again.
+    smoothed motion, since this shows the accelerometer's scale.
 
     The specific force is low-passed without delay at 0.4 of ``rate`` before it is taken to the
     even clock, so that road and engine vibration does not fold.

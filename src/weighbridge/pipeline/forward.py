@@ -48,11 +48,13 @@ class ForwardSetup:
 
     Attributes
     ----------
+    vehicle : as the weighing took it
     navigation, force, joint : of the stages
     delay : lateness of the torque [s]
     period : between its readings [s]
     """
 
+    vehicle: Vehicle
     navigation: Setup
     force: ForceSetup
     joint: JointSetup
@@ -93,7 +95,7 @@ def identify_forward(weighing: Weighing) -> ForwardSetup:
     """
     result = weighing.result
     force = None if result is None else result.balance.setup
-    if result is None or force is None or result.sizes is None or result.filtered is None:
+    if result is None or force is None or result.sizes is None or result.filter_input is None:
         raise ConfigError(
             f"{weighing.drive.name}: a forward pass is set up by a weighing of method joint that "
             f"found a mass, not by one of {weighing.method}: {weighing.reason or 'no sizes'}"
@@ -107,9 +109,10 @@ def identify_forward(weighing: Weighing) -> ForwardSetup:
     time = result.balance.merged.time
     navigation = identify(scaled_for_navigation(drive, vehicle), vehicle.mounting)
     return ForwardSetup(
+        vehicle=vehicle,
         navigation=_holding(navigation, motion.squat),
         force=replace(force, foot=replace(force.foot, ahead=AHEAD)),
-        joint=identify_joint(result.filtered, result.sizes),
+        joint=identify_joint(result.filter_input, result.sizes),
         delay=result.balance.delay,
         period=float(np.median(np.diff(time))),
     )
@@ -139,7 +142,7 @@ class ForwardState(NamedTuple):
     begun : instant at which the vehicle first moved; None before [s]
     """
 
-    motion: forward.ForwardState
+    motion: forward.NavigationState
     windows: window_means.WindowState
     joint: JointState
     read: float
@@ -189,7 +192,7 @@ def lateness(setup: ForwardSetup) -> float:
 
 
 def step(
-    state: ForwardState, records: Drive, until: float, vehicle: Vehicle, setup: ForwardSetup
+    state: ForwardState, records: Drive, until: float, setup: ForwardSetup
 ) -> tuple[ForwardState, Running]:
     """Weigh by what came since the last step.
 
@@ -198,7 +201,6 @@ def step(
     state : before it
     records : those of `weighbridge.signals.recent.recent`, up to ``until``
     until : instant up to which records are complete [s]
-    vehicle
     setup : of `identify_forward`
 
     Returns
@@ -206,6 +208,7 @@ def step(
     state : after it
     running : mass after each window that became complete
     """
+    vehicle = setup.vehicle
     seen = records if setup.navigation.origin is not None else true_speed(records, vehicle)
     moved, _ = forward.step(state.motion, seen, until, setup.navigation)
     state = state._replace(motion=moved)
@@ -223,11 +226,11 @@ def step(
     first, last = view.time.searchsorted([state.read, horizon], side="right")
     if last <= first:
         return state, NO_WINDOWS
-    return _folded(state, view, slice(int(first), int(last)), vehicle, setup)
+    return _folded(state, view, slice(int(first), int(last)), setup)
 
 
 def _folded(
-    state: ForwardState, view: MergedView, new: slice, vehicle: Vehicle, setup: ForwardSetup
+    state: ForwardState, view: MergedView, new: slice, setup: ForwardSetup
 ) -> tuple[ForwardState, Running]:
     """Fold new rows of the table into windows, and complete windows into the filter."""
     sizes = setup.joint
@@ -237,7 +240,7 @@ def _folded(
     if begun is None and moving[new].any():
         begun = float(view.time[new][np.argmax(moving[new])])
     view = replace(view, fuel_burnt=burnt, begun=begun)
-    rows, y = design(view, vehicle, squat_accel=sizes.body.squat_accel(view.accel))
+    rows, y = design(view, setup.vehicle, squat_accel=sizes.body.squat_accel(view.accel))
     values = np.column_stack([view.time, y, view.force_std**2, rows])
     windows, means, count, stood = window_means.run(
         state.windows,
@@ -268,18 +271,17 @@ def _folded(
     return after, Running(means[:, 0], mass - light, std)
 
 
-def forward_weigh(drive: Drive, vehicle: Vehicle, setup: ForwardSetup) -> ForwardTrack:
+def forward_weigh(drive: Drive, setup: ForwardSetup) -> ForwardTrack:
     """Weigh a drive, or the beginning of one, as it would have been weighed on the way.
 
     Parameters
     ----------
     drive : as settled for the weighing of ``setup``
-    vehicle
     setup : of `identify_forward`
     """
     state, parts = begin(setup, drive.start), [NO_WINDOWS]
     for until in instants(drive):
-        state, running = step(state, recent(drive, until), until, vehicle, setup)
+        state, running = step(state, recent(drive, until), until, setup)
         parts.append(running)
     time, mass, std = (np.concatenate(rows) for rows in zip(*parts, strict=True))
     return ForwardTrack(time, mass, std, state.joint)

@@ -193,11 +193,11 @@ def weigh_balance(
     ):
         status, reason = Status.INCONSISTENT, why
     if status is Status.CONVERGED and not estimator.speed_alone:
-        if result.filtered is not None:
+        if result.filter_input is not None:
             joined = result
         joined = joined or joint.estimate(balance, vehicle)
         refused, doubt = of_another(vehicle, joined)
-        change = largest(joined.filtered) if joined.filtered is not None else None
+        change = largest(joined.filter_input) if joined.filter_input is not None else None
         if change is not None and change.sure:
             status, reason = Status.INCONSISTENT, change.text
         elif refused:

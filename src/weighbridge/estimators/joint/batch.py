@@ -208,7 +208,7 @@ def _ask(
         return _Asked(problem=problem, body=body, rows=rows, y=y, stood=stood)
 
     # They should not hang on the guess.
-    return of(_sensible(of(None).problem.filtered()))
+    return of(_sensible(of(None).problem.mass_unchanged()))
 
 
 def _solve(asked: _Asked) -> _Solved:
@@ -307,7 +307,7 @@ def _track(
         slow_errors=SlowErrors.from_states(
             time, solved.x, solved.var, solved.running_var, problem.rows[:, 1]
         ),
-        filtered=_given(asked, solved, cut.mean(view.traction_force - asked.y)),
+        filter_input=_given(asked, solved, cut.mean(view.traction_force - asked.y)),
         sizes=JointSizes(
             std=problem.std,
             fast=solved.fast,

@@ -94,7 +94,8 @@ class Window(NamedTuple):
 def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     """Fold in one window.
 
-    The load may change at stops of `STOP` and longer. The mass is raised by what noise of the
+    The load may change at stops of `STOP` and longer; whether so much can be loaded in a shorter
+    one is judged of a whole drive only. The mass is raised by what noise of the
     motion draws it down, as far as the windows until then can.
 
     Parameters

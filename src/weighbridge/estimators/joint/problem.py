@@ -111,7 +111,7 @@ class Problem:
         fast, slow = np.exp(found.x)
         return float(fast), float(slow)
 
-    def filtered(self) -> float:
+    def mass_unchanged(self) -> float:
         """Mass after all windows, as if the load had never changed [kg]."""
         start, noise, params = self.kernel_input(1.0, 1.0)
         none = np.zeros(self.rows.shape)
