@@ -697,3 +697,19 @@ def test_what_to_expect_follows_the_rate_of_the_torque():
 
 def every_fourth(signal):
     return Signal(signal.name, signal.time[::4], signal.values[::4])
+
+
+def retarded(sign, trusted=()):
+    """A drive whose retarder works every now and then."""
+    t = np.arange(0.0, 900.0, 0.2)
+    works = sign * np.clip(np.sin(t / 30.0) - 0.8, 0.0, None)
+    drive = make_drive().with_signals(Signal("retarder_torque", t, works))
+    return replace(drive, info=DriveInfo(trusted=frozenset(trusted)))
+
+
+def test_a_retarder_that_counts_braking_positive_is_refused_until_it_is_turned():
+    assert only(retarded(1.0)).signal == "retarder_torque"
+    assert "factor = -1" in only(retarded(1.0)).text
+    assert serious(retarded(-1.0)) == []
+    assert serious(retarded(1.0, trusted=["retarder_torque"])) == []
+    assert serious(retarded(0.0)) == []

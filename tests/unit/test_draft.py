@@ -233,3 +233,17 @@ def test_a_time_of_another_name_is_found(tmp_path, name):
     assert (found.time, found.time_unit) == (name, "ms")
     assert found.rate == pytest.approx(5.0)
     assert any("rises as one" in d for d in found.doubts)
+
+
+@pytest.mark.parametrize(("sign", "doubted"), [(-1.0, False), (1.0, True)])
+def test_the_torque_of_a_retarder_is_taken_and_its_sign_doubted(tmp_path, sign, doubted):
+    path = tmp_path / "day.parquet"
+    columns = {
+        "timestamp_ms": 1_741_000_000_000 + 200 * np.arange(100),
+        "WheelBasedVehicleSpeed": np.linspace(0.0, 80.0, 100),
+        "ActualRetarderPercentTorque": sign * np.clip(np.arange(100.0) - 60.0, 0.0, 50.0),
+    }
+    pl.DataFrame(columns).write_parquet(path)
+    found = {c.quantity: c for c in draft(path).known}["retarder_torque"]
+    assert found.unit == "pct"
+    assert ("factor = -1" in found.doubt) == doubted

@@ -58,6 +58,9 @@ def test_most_columns_of_buses_are_named_right_that_nothing_was_made_for():
 @pytest.mark.parametrize(
     ("name", "meant"),
     [
+        ("ActualRetarderPercentTorque", "retarder_torque"),
+        ("DriversDemandRetarderPercentTorque", ""),
+        ("ActualMaximumAvailableRetarderPercentTorque", ""),
         ("IMU_RateX", "gyro_x"),
         ("IMU_AccelX", "accel_x"),
         ("GNSS_Latitude", "latitude"),

@@ -20,7 +20,7 @@ from weighbridge.checks.ranges import check_range, within_ranges, without_strays
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
 from weighbridge.checks.travel import check_sign, check_standstill
-from weighbridge.checks.values import check_load, check_pressure, check_stuck
+from weighbridge.checks.values import check_load, check_pressure, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.checks.witnesses import check_witnesses
 from weighbridge.errors import DriveError
@@ -41,6 +41,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_limit,
     check_load,
     check_pressure,
+    check_retarder,
     check_whole_torque,
     check_friction,
     check_engine_speed,

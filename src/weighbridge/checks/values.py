@@ -31,6 +31,9 @@ _PERCENT: Final = (
 # with its boost below 2 %.
 _LEAST_PERCENT: Final = 0.02
 
+_RETARDS: Final = 0.05
+"""Retarder torque over its reference that is no noise about zero [-]."""
+
 
 def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Find signals that never change."""
@@ -82,6 +85,22 @@ def check_load(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 f"the column {column}_ratio or set the unit ratio in the mapping{SETTLED}",
                 serious=name in made_of,
             )
+
+
+def check_retarder(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find a retarder's torque that counts braking positive: its rows would pass for unbraked."""
+    s = drive.get("retarder_torque")
+    if s is None or not len(s):
+        return
+    if float(np.min(s.values)) < 0.0 or float(np.max(s.values)) < _RETARDS:
+        return
+    yield Problem(
+        s.name,
+        f"retarder_torque goes up to {show(s.name, float(np.max(s.values)))} and never below 0, "
+        "but SPN 520 counts braking negative: write factor = -1 under [signals.retarder_torque] of "
+        f"the mapping, or leave the column out{SETTLED}",
+        serious=True,
+    )
 
 
 def check_pressure(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:

@@ -44,7 +44,7 @@ class DraftColumn:
 
 def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Say what the columns of one log tell of each other's units."""
-    return percent_checked(gravity_checked(columns))
+    return retarder_checked(percent_checked(gravity_checked(columns)))
 
 
 def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
@@ -66,6 +66,17 @@ def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]
             "accelerometer"
         )
     return tuple(replace(c, unit=unit, doubt=doubt or c.doubt) if c in axes else c for c in columns)
+
+
+def retarder_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Doubt a retarder's torque that counts braking positive: SPN 520 counts it negative."""
+    doubt = "counts braking positive, SPN 520 negative: add factor = -1, or leave it out"
+    return tuple(
+        replace(c, doubt=doubt)
+        if c.quantity == "retarder_torque" and c.low >= 0.0 and c.high > 0.0
+        else c
+        for c in columns
+    )
 
 
 def percent_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:

@@ -72,6 +72,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "reference_torque": (
         "engine reference torque", "reference torque", "referenzmoment", "reference engine torque",
     ),
+    "retarder_torque": ("actual retarder percent torque", "retarder percent torque", "actual retarder torque", "retarder torque"),
     "mass_air_flow": (
         "mass air flow", "mass air flow rate", "maf", "air flow", "maf rate", "maf air flow rate", "air flow rate",
         "luftmassenstrom", "luftmasse", "debit air", "debit massique air", "flujo masa aire", "flujo aire",
@@ -248,6 +249,7 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
             *((f"_{w}", ()) for w in ("fl", "fr", "rl", "rr")),
         )
     },
+    "retarder_torque": frozenset(("reference", "demand", "demanded", "intended", "driver", "drivers", "coolant", "mode", "speed", "point", "axle", "wheel", "engine", "brake")),
     "throttle": frozenset(("relative", "commanded", "b", "c", "pedal", "accelerator", "volts", "voltage")),
     "accelerator_pedal": frozenset(("relative", "e", "f", "brake", "clutch", "x", "y", "z")),
     "fuel_rate": frozenset(("level", "trim", "pressure", "rail", "average")),
