@@ -11,7 +11,11 @@ from numba import config
 from weighbridge import CalibrationSettings, Vehicle, calibrate, weigh
 from weighbridge.balance import force_balance
 from weighbridge.calibration import joint as joint_fit
-from weighbridge.calibration.run import run_calibration, run_speed_calibration
+from weighbridge.calibration.run import (
+    run_calibration,
+    run_speed_calibration,
+    unfound_gears,
+)
 from weighbridge.cli.calibrate import speed_table, table
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.regression import regression
@@ -135,6 +139,16 @@ def test_measured_gear_signal(empty):
     drive = empty.drive.with_signals(Signal("gear", truth.time[::5].copy(), told[::5].copy()))
     car = calibrate(drive)
     assert weigh(drive, car).mass == pytest.approx(truth.mass.mean(), rel=0.02)
+
+
+def test_gears_that_are_named_and_not_found_are_told(empty):
+    time = np.arange(100.0)
+    gears = np.where(time < 2, 9, 1 + np.arange(100) % 8)
+    drive = empty.drive.with_signals(Signal("gear", time, gears.astype(float)))
+    assert unfound_gears([drive, drive], 8) == unfound_gears([drive], 8) == ""
+    said = unfound_gears([drive], 7)
+    assert said == "the log names 8 gears, 7 were found; rows in the others are left out"
+    assert unfound_gears([empty.drive.without("gear")], 3) == ""
 
 
 def test_percent_of_a_reference_torque(empty):

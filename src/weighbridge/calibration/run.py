@@ -47,6 +47,10 @@ MASSES_APART: Final = 0.01
 """A mass given and one that a drive states differ by more, and a note says so [-]."""
 
 
+FEW_IN_GEAR: Final = 5
+"""Fewer samples name no gear: gearboxes tell odd numbers while they shift."""
+
+
 def calibrate(
     drives: GivenDrive | Sequence[GivenDrive],
     mass: float | Sequence[float] | None = None,
@@ -125,10 +129,12 @@ def run_calibration(
     others = [
         *([few] if rows.time.size < FEW_SAMPLES else []),
         *_other_masses(recorded, problem.masses),
+        *([unfound_gears(recorded, problem.gears.gearings.size)] if problem.gears else []),
         *doubts,
         *contradictions,
     ]
-    done = _with_notes(done, balances, [*others, *unbacked_scale(done)])
+    notes = [note for note in (*others, *unbacked_scale(done)) if note]
+    done = _with_notes(done, balances, notes)
     done = with_doubts(done, doubts)
     if problem.source.gearing is not None:
         done = _with_gears(done, problem.given)
@@ -184,6 +190,24 @@ def _with_gears(vehicle: Vehicle, given: Driveline) -> Vehicle:
         idle_speed=given.idle_speed,
     )
     return replace(vehicle, driveline=line)
+
+
+def unfound_gears(drives: Sequence[Drive], found: int) -> str:
+    """Say that gearboxes name more gears than ratios were found; empty where they do not.
+
+    Parameters
+    ----------
+    drives : of the calibration
+    found : gearings that stand out from engine over vehicle speed
+    """
+    told = [drive.signals["gear"].values for drive in drives if drive.has("gear")]
+    if found < 2 or not told:
+        return ""
+    gears, counts = np.unique(np.round(np.concatenate(told)), return_counts=True)
+    named = int(np.count_nonzero((gears >= 1.0) & (counts >= FEW_IN_GEAR)))
+    if named <= found:
+        return ""
+    return f"the log names {named} gears, {found} were found; rows in the others are left out"
 
 
 def _other_masses(drives: Sequence[Drive], masses: Sequence[float]) -> list[str]:

@@ -39,6 +39,9 @@ LEAST: Final = 0.08
 """Smaller changes of the scale are not told [-]: two of 118 undamaged motorways of the accuracy
 study showed one of 0.07."""
 
+LAUNCH: Final = 1e6
+"""Variance of the first window after a stop over that of the others [-]: it tells nothing."""
+
 SCALE_STD: Final = 0.3
 """Standard deviation of a change of scale before the drive has told [-]."""
 
@@ -112,6 +115,7 @@ def largest(given: FilterInput) -> ScaleChange | None:
     Generalised likelihood ratio of a change: Willsky, Jones, IEEE Trans. Automatic
     Control 21, 1976.
     """
+    given = _without_launches(given)
     time = given.time
     if time.size < 4 * STEPS:
         return None
@@ -138,6 +142,16 @@ def largest(given: FilterInput) -> ScaleChange | None:
     if best is None or not best.sure:
         return best
     return replace(best, gain=best.gain + same - _with_stops(given, same))
+
+
+def _without_launches(given: FilterInput) -> FilterInput:
+    """Leave out the first window after each stop, whose clutch may slip.
+
+    The engine's inertia is then not the vehicle's to accelerate, and in the first gear of a truck
+    it weighs as much as the load: one launch is short of half its force, the next has it over.
+    """
+    launch = given.stood > 0.0
+    return replace(given, noise=np.where(launch, LAUNCH * given.noise, given.noise))
 
 
 def _with_stops(given: FilterInput, same: float) -> float:
