@@ -16,14 +16,14 @@ from weighbridge.balance import force_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import uncalibrated_std
 from weighbridge.estimators.rls import estimate
-from weighbridge.pipeline.weighing import Weighing, overload
+from weighbridge.pipeline.weighing import Weighing, overload, without_mass
 from weighbridge.results.row import unread_row
 from weighbridge.results.weighing import TRACK_COLUMNS
-from weighbridge.signals import Signal
+from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.vehicle.model import Provenance
 
 FIELDS = {
-    "drive", "vehicle", "method", "status", "reason", "mass_kg", "std_kg", "interval95_kg",
+    "drive", "vehicle", "start", "method", "status", "reason", "mass_kg", "std_kg", "interval95_kg",
     "payload_kg", "duration_s", "used_s", "converged_at_s", "bound_std_kg", "segments", "warnings",
 }  # fmt: skip
 
@@ -223,3 +223,21 @@ def test_overload_is_told(good):
         assert told.startswith(f"{word} above the permitted mass of {gross:.0f} kg")
     assert overload(replace(CAR, gross=mass + std), good.result) == ()
     assert overload(CAR, good.result) == ()
+
+
+@pytest.mark.parametrize(
+    ("start_time", "begins"),
+    [
+        ("2025-06-10T08:00:00+02:00", "2025-06-10T06:00:10.500+00:00"),
+        ("2025-06-10T08:00:00", "2025-06-10T08:00:10.500+00:00"),
+        ("9999-12-31T23:59:59+00:00", None),
+        ("this morning", None),
+        (None, None),
+    ],
+)
+def test_the_start_is_a_wall_clock_time(start_time, begins):
+    time = 10.5 + np.arange(5.0)
+    signals = {"vehicle_speed": Signal("vehicle_speed", time, time)}
+    made = Drive("day part 2 of 3", signals, DriveInfo(start_time=start_time))
+    none = without_mass(made, CAR, "rls", "why")
+    assert json.loads(none.to_json())["start"] == begins

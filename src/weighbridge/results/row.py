@@ -19,6 +19,7 @@ class WeighingRow:
     Attributes
     ----------
     drive, vehicle : names
+    start : wall-clock time at which the drive begins, ISO 8601 in UTC; None where it has no date
     method : name of the estimator
     status, reason, warnings, segments : as of `MassResult`
     mass, std : [kg]; NaN where there is no mass
@@ -33,6 +34,7 @@ class WeighingRow:
     method: str
     status: Status
     reason: str
+    start: str | None = None
     mass: float = math.nan
     std: float = math.nan
     interval: tuple[float, float] = (math.nan, math.nan)
@@ -49,6 +51,7 @@ class WeighingRow:
         return {
             "drive": self.drive,
             "vehicle": self.vehicle,
+            "start": self.start,
             "method": self.method,
             "status": str(self.status),
             "reason": self.reason,

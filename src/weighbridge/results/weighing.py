@@ -173,6 +173,7 @@ class MassResult:
         return WeighingRow(
             drive=self.drive.name,
             vehicle=self.vehicle.name,
+            start=self.drive.began,
             method=self.method,
             status=self.status,
             reason=self.reason,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime, timedelta
 
 from weighbridge.signals.shown import at_rate, in_html, in_lines, plural
 from weighbridge.signals.signal import Signal
@@ -16,7 +17,7 @@ class DriveInfo:
 
     Attributes
     ----------
-    start_time : when it began, ISO 8601
+    start_time : when its clock was at 0 s, ISO 8601; in UTC where it names no zone
     vehicle : name of the vehicle
     mass : known mass [kg]
     ambient_temperature : [K]
@@ -122,6 +123,17 @@ class Drive:
     def start(self) -> float:
         """First time stamp [s]; 0 without signals."""
         return min((float(s.time[0]) for s in self.signals.values() if len(s)), default=0.0)
+
+    @property
+    def began(self) -> str | None:
+        """Wall-clock time of the first stamp, ISO 8601 in UTC; None where no date is known."""
+        try:
+            zero = datetime.fromisoformat(self.info.start_time or "")
+            zero = zero if zero.tzinfo is not None else zero.replace(tzinfo=UTC)
+            first = zero.astimezone(UTC) + timedelta(seconds=self.start)
+        except (ValueError, OverflowError):
+            return None
+        return first.isoformat(timespec="milliseconds")
 
     @property
     def end(self) -> float:
