@@ -1,5 +1,7 @@
 """Two vehicles in one recording, and friction in a torque, are told; one car is left alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from weighbridge.checks import check_drive
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.errors import DriveError
 from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
+from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 SMALL = (42.6, 21.96, 14.04, 9.708, 7.634, 6.315)
@@ -157,6 +159,20 @@ def test_friction_in_the_torque_shows_at_idle():
     assert friction(idling(0.07), car("measured")) == []
     assert friction(idling(0.01)) == []
     assert friction(idling(0.07, coolant=300.0)) == []
+
+
+def test_friction_is_told_by_the_bus_it_is_of_and_not_after_a_calibration():
+    made = idling(0.07)
+    assert "PID 62 may have it" in friction(made, car())[0].text
+    truck = replace(car(), kind="truck")
+    for drive, vehicle in ((made, truck), (idling(0.07, retarder_torque=-0.1), None)):
+        (problem,) = friction(drive, vehicle)
+        assert "J1939 (SPN 513)" in problem.text
+        assert "PID 62" not in problem.text
+        assert "a calibration finds it" in problem.text
+    fitted = Provenance(masses=(1500.0,), method="joint")
+    assert fitted.torque_fitted
+    assert friction(made, replace(truck, provenance=fitted)) == []
 
 
 def test_indicated_torque_is_refused_until_its_friction_is_stated():

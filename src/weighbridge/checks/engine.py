@@ -52,11 +52,16 @@ def check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             f"friction (EEC3), or {remedy}",
             serious=vehicle is not None,
         )
+    elif vehicle is not None and vehicle.provenance.torque_fitted:
+        return
     elif idle is not None and idle > _IDLE_TORQUE:
+        by_bus = drive.has("retarder_torque") or (vehicle is not None and vehicle.of_class.retarded)
+        whose = "the percent torque of J1939 (SPN 513)" if by_bus else "PID 62"
         yield Problem(
             "engine_torque_fraction",
             f"warm at idle and standing the torque reads {100.0 * idle:.0f} %: friction seems to "
-            f"be in it, as PID 62 may have it, beside what alternator and pumps take; {remedy}",
+            f"be in it, as {whose} may have it, beside what alternator and pumps take; a "
+            f"calibration finds it, and without one {remedy}",
         )
 
 
