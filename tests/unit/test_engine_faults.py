@@ -386,7 +386,9 @@ def test_a_payload_below_nothing_is_told_or_refused(fleet):
     vehicle = fleet.files["truck"]
     (told,) = below_tare(replace(vehicle, tare=result.mass + 273.0), replace(result, std=32.0))
     assert "the payload is -273 kg" in told
-    assert below_tare(replace(vehicle, tare=result.mass + 50.0), replace(result, std=32.0)) == ()
+    (told,) = below_tare(replace(vehicle, tare=result.mass + 50.0), replace(result, std=32.0))
+    assert told == "the payload of -50 kg is below nothing, within the uncertainty"
+    assert below_tare(replace(vehicle, tare=result.mass - 1.0), replace(result, std=32.0)) == ()
     evidence = Evidence(
         view=result.balance.merged,
         used=result.used,

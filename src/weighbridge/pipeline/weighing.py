@@ -393,10 +393,14 @@ def overload(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
 
 
 def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
-    """Say in a sentence whether a mass is surely below the empty one; nothing if not."""
+    """Say in a sentence whether a mass is below the empty one; nothing if not."""
     tare = vehicle.tare
-    if tare is None or result.status is not Status.CONVERGED or result.mass + 2 * result.std > tare:
+    if tare is None or result.status is not Status.CONVERGED or result.mass >= tare:
         return ()
+    if result.mass + 2 * result.std > tare:
+        return (
+            f"the payload of {result.mass - tare:.0f} kg is below nothing, within the uncertainty",
+        )
     return (
         f"the payload is {result.mass - tare:.0f} kg, which is below nothing: tank and driver's "
         f"seat are empty, or the tare of {tare:.0f} kg, the vehicle file or the torque is wrong",
