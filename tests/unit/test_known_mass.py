@@ -59,3 +59,11 @@ def test_a_torque_twice_too_strong_is_pounds():
         scale_doubt(vehicle, [4630.0], "drive")
     load = replace(vehicle, torque=TorqueModel(source="load", coefficients=(0.0, 205.0)))
     assert scale_doubt(load, [4630.0], "drive") == ""
+
+
+def test_a_mass_of_a_truck_leads_to_its_class():
+    words = r"drive: taken for a car, .* weighbridge vehicle new --class truck -o base.toml"
+    for kg in (10_203.0, 4000.0):
+        with pytest.raises(ConfigError, match=words):
+            check_mass(DRIVE, kg, Vehicle(kind="car"))
+    check_mass(DRIVE, 10_203.0, Vehicle(kind="truck"))

@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.signals import Drive
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import scale_std, usual_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
@@ -43,8 +44,14 @@ def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:
         The sentence says what is plausible, and what the number would be from pounds.
     """
     (low, high), untowed = base.of_class.mass_range, base.of_class.untowed
+    heavier = list(VEHICLE_CLASSES)[::-1]
+    other = (
+        f"of a {heavier[0]} (or {', '.join(k for k in heavier[1:] if k != base.kind)}) write its "
+        f"file first, weighbridge vehicle new --class {heavier[0]} -o base.toml, and give it by "
+        "--vehicle base.toml"
+    )
     why = f"is no {base.kind}'s, which is between {low:g} and {high:g} kg"
-    remedy = "give the mass in kg, and the class under [vehicle] of --vehicle"
+    remedy = f"{other}; else give the mass in kg"
     if base.tare is not None or base.gross is not None:
         low = LIGHTEST * base.tare if base.tare is not None else low
         if base.gross is not None:
@@ -61,14 +68,16 @@ def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:
     elif untowed is not None and untowed < kg <= high:
         high = untowed
         why = f"is more than the {high:g} kg a {base.kind} may have without a trailer"
-        remedy = "give the mass in kg, or state tare_kg and gross_kg under [vehicle] of --vehicle"
+        remedy = f"{other}; else give the mass in kg, or state tare_kg and gross_kg under [vehicle]"
     if low <= kg <= high:
         return
     pounds = kg * POUND
     stated = drive.info.mass
     likely = low <= pounds <= high if stated is None else abs(pounds / stated - 1.0) < 0.05
     hint = f"; {kg:g} lb are {pounds:.0f} kg" if likely and kg > high else ""
-    raise ConfigError(f"{drive.name}: a mass of {kg:g} kg {why}{hint}; {remedy}")
+    raise ConfigError(
+        f"{drive.name}: taken for a {base.kind}, and a mass of {kg:g} kg {why}{hint}; {remedy}"
+    )
 
 
 def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
