@@ -2,8 +2,10 @@
 
 import io
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -134,3 +136,48 @@ def test_a_narrow_terminal_shows_whole_numbers():
         assert "…" not in shown
         assert "251" in shown
         assert ("jitter ms" in shown) == (width == 140)
+
+
+def test_a_log_with_a_retarder_leads_to_a_truck_file():
+    from weighbridge.cli.inspect import _Given, _next
+    from weighbridge.io import read_drive
+    from weighbridge.pipeline.inspection import inspect_drive
+    from weighbridge.signals import Signal
+
+    time = np.arange(3.0)
+    drive = read_drive(GOLDEN / "csv")
+    found = inspect_drive(drive)
+    given = _Given(None, None, Path("map.toml"), None, False)
+    (only,) = _next(replace(found, problems=()), Path("day"), 1, given)
+    assert only == "next: weighbridge calibrate day --mass KG -o vehicle.toml --mapping map.toml"
+    truck = drive.with_signals(Signal("retarder_torque", time, -0.1 * time))
+    found = replace(found, drive=truck, problems=())
+    first, then = _next(found, Path("day"), 1, given)
+    assert first.startswith(
+        "next: weighbridge vehicle new --class truck --mapping map.toml -o base"
+    )
+    assert then.startswith("then: weighbridge calibrate day --mass KG -o vehicle.toml")
+    assert then.endswith("--vehicle base.toml")
+
+
+def test_warnings_of_several_drives_are_a_few_lines():
+    from weighbridge.cli.weigh import result_table, warning_lines
+    from weighbridge.pipeline.weighing import without_mass
+    from weighbridge.signals import Drive
+    from weighbridge.vehicle.known import Known, describe
+
+    def day(k, *warnings):
+        parted = f"day holds 2 drives, parted by pauses; this is drive {k}"
+        name = f"day part {k} of 2"
+        return without_mass(Drive(name, {}), truck, "joint", "why", (parted, "heights", *warnings))
+
+    truck = describe(Known(kind="truck", torque="percent")).vehicle
+    drives = [day(1), day(2, "a", "b", "c", "d", "e")]
+    assert warning_lines(drives) == [
+        "every drive: heights",
+        *(f"day part 2 of 2: {x}" for x in "abc"),
+        "day part 2 of 2: 2 more, told by --json",
+    ]
+    assert warning_lines([]) == []
+    assert "never calibrated" in result_table(drives, []).title
+    assert result_table([], [("day", "why")]).title is None

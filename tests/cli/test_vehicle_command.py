@@ -1,5 +1,6 @@
 """``weighbridge vehicle``: written from papers, told in words."""
 
+import polars as pl
 import pytest
 
 from weighbridge.vehicle.model import Vehicle
@@ -72,3 +73,34 @@ def test_a_vehicle_file_is_made_for_every_torque_source(weighbridge, tmp_path, n
     told = weighbridge("vehicle", "show", path)
     assert told.code == 0
     assert name in path.read_text() or name.replace("_", " ") in path.read_text()
+
+
+def test_a_mapping_is_kept_in_the_file_and_both_ways_on_are_told(weighbridge, tmp_path):
+    (tmp_path / "map.toml").write_text('[time]\ncolumn = "t"\n')
+    (tmp_path / "files").mkdir()
+    path = tmp_path / "files" / "truck.toml"
+    ran = weighbridge(
+        "vehicle", "new", "--class", "truck", "--torque", "percent", "--radius", 0.49,
+        "--driven", "rear", "--mapping", tmp_path / "map.toml", "-o", path,
+    )  # fmt: skip
+    assert ran.code == 0
+    assert Vehicle.load(path).mapping == "../map.toml"
+    assert f"next: weighbridge weigh DRIVE --vehicle {path}" in ran.out
+    assert f"better: weighbridge calibrate DRIVE --mass KG --vehicle {path}" in ran.out
+
+
+def test_a_calibration_keeps_the_mapping_it_read_with(weighbridge, known, tmp_path):
+    day = tmp_path / "day.parquet"
+    speed = pl.read_parquet(known.folder / "obd.parquet").drop_nulls("vehicle_speed_kmh")
+    slope = 0.01 * pl.col("time_s").mul(0.02).sin()
+    speed.select(t="time_s", Tacho="vehicle_speed_kmh", Slope=slope).write_parquet(day)
+    (tmp_path / "map.toml").write_text(
+        '[time]\ncolumn = "t"\n[signals.vehicle_speed]\ncolumn = "Tacho"\nunit = "kmh"\n'
+        '[signals.grade]\ncolumn = "Slope"\nunit = "rad"\n'
+    )
+    (tmp_path / "files").mkdir()
+    path = tmp_path / "files" / "car.toml"
+    words = ("--mapping", tmp_path / "map.toml", "--method", "speed-ekf", "--mass", 1580)
+    ran = weighbridge("calibrate", day, *words, "-o", path)
+    assert ran.code == 0, ran.err
+    assert Vehicle.load(path).mapping == "../map.toml"

@@ -88,8 +88,24 @@ def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
         ({"tyre": "winter"}, "tyre size"),
         ({"engine": "steam"}, "engine must be petrol, diesel, electric"),
         ({"torque": "guess"}, "torque must be"),
+        ({"radius": 0.49, "tyre": "315/80 R22.5"}, "give the tyre or the radius"),
+        ({"radius": 49.0}, "radius must be between 0.15 and 0.9 m"),
+        ({"driven": "left"}, "driven must be front, rear or all"),
     ],
 )
 def test_what_cannot_be_is_refused(known, words):
     with pytest.raises(ConfigError, match=words):
         describe(Known(**known))
+
+
+def test_a_truck_by_radius_and_axles_weighs_by_data_sheet(tmp_path):
+    made = describe(Known(kind="truck", radius=0.49, driven="rear", torque="percent"))
+    path = tmp_path / "v.toml"
+    save_vehicle(made.vehicle, path, made.origins)
+    loaded = Vehicle.load(path)
+    assert (loaded.driveline.wheel_radius, loaded.driveline.driven) == (0.49, "rear")
+    # No gears are given: engine and vehicle speed show them.
+    assert not loaded.driveline.gearings
+    assert can_weigh(loaded)
+    assert "weighs by data sheet, never calibrated: ±" in dict(tell(loaded))["worth"]
+    assert not can_weigh(describe(Known(kind="truck", torque="load")).vehicle)

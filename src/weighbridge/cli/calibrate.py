@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Optional
 
@@ -84,7 +85,7 @@ def calibrate(
     from weighbridge.calibration.run import run_calibration, run_speed_calibration
     from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError
-    from weighbridge.pipeline.given import mapping_of
+    from weighbridge.pipeline.given import mapping_beside, mapping_of
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -119,6 +120,8 @@ def calibrate(
         lightest = min(car.provenance.masses)
     if tare is not None:
         car = _with_tare(car, tare, lightest)
+    if chosen is not None:
+        car = replace(car, mapping=mapping_beside(chosen, output))
     car.save(output)
     console().print(found)
     for doubt in doubts:
@@ -128,8 +131,6 @@ def calibrate(
 
 def _with_tare(car: Vehicle, tare: float, lightest: float) -> Vehicle:
     """Return a vehicle with its mass without payload, checked by the lightest known mass [kg]."""
-    from dataclasses import replace
-
     from weighbridge.errors import ConfigError
 
     if not 0.3 * lightest <= tare <= 1.02 * lightest:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated, NamedTuple, Optional
 
 import typer
 
@@ -16,9 +16,12 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from weighbridge.pipeline.inspection import Inspection, Way
+    from weighbridge.vehicle.model import Vehicle
 
 # Width of tables where no terminal gives one.
 _WIDTH = 140
+# Reference torque above those of cars and vans [N m].
+_STRONG = 900.0
 # Narrower, the rarer columns of the signals are left out.
 _WHOLE = 116
 
@@ -46,7 +49,6 @@ def inspect(
     from weighbridge.pipeline.given import mapping_of
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.vehicle.model import Vehicle
-    from weighbridge.vehicle.telling import can_weigh
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = mapping_of(car, vehicle, mapping)
@@ -59,21 +61,28 @@ def inspect(
         for one in found:
             _show(screen, one, every_way)
         best = next((one for one in found if _weighable(one)), found[0])
-        options = _options(mapping, vehicle, dbc, whole=whole)
-        weighs = car is not None and can_weigh(car)
-        say(_next(best, path, len(parts), options, weighs=weighs))
+        for line in _next(best, path, len(parts), _Given(car, vehicle, mapping, dbc, whole)):
+            say(line)
 
 
-def _options(
-    mapping: Path | None, vehicle: Path | None, dbc: list[str] | None, *, whole: bool
-) -> list[str]:
-    """Options that the next command takes as this one did."""
-    return [
-        *([f"--vehicle {vehicle}"] if vehicle is not None else []),
-        *([f"--mapping {mapping}"] if mapping is not None else []),
-        *(f"--dbc {d}" for d in dbc or ()),
-        *(["--whole"] if whole else []),
-    ]
+class _Given(NamedTuple):
+    """What the command was given beside the drives."""
+
+    car: Vehicle | None
+    vehicle: Path | None
+    mapping: Path | None
+    dbc: list[str] | None
+    whole: bool
+
+    def options(self, vehicle: Path | None = None) -> list[str]:
+        """Options that the next command takes as this one did, perhaps of another vehicle file."""
+        named = vehicle or self.vehicle
+        return [
+            *([f"--vehicle {named}"] if named is not None else []),
+            *([f"--mapping {self.mapping}"] if self.mapping is not None else []),
+            *(f"--dbc {d}" for d in self.dbc or ()),
+            *(["--whole"] if self.whole else []),
+        ]
 
 
 def _weighable(found: Inspection) -> bool:
@@ -81,20 +90,44 @@ def _weighable(found: Inspection) -> bool:
     return not serious and any(w.possible and w.torque != "speed" for w in found.ways)
 
 
-def _next(found: Inspection, path: Path, parts: int, options: list[str], *, weighs: bool) -> str:
+def _next(found: Inspection, path: Path, parts: int, given: _Given) -> list[str]:
     """Say what to type next, by whether the vehicle file weighs or has to be calibrated first."""
+    from weighbridge.vehicle.data_sheet import by_data_sheet
+    from weighbridge.vehicle.telling import can_weigh
+
     if any(p.serious for p in found.problems):
-        return "next: settle what is serious above, then inspect again"
+        return ["next: settle what is serious above, then inspect again"]
     if not _weighable(found):
-        return "next: record what the nearest way lacks"
+        return ["next: record what the nearest way lacks"]
+    car, base = given.car, None
+    lines = []
+    if car is None and _heavy(found):
+        base = Path("base.toml")
+        named = f" --mapping {given.mapping}" if given.mapping is not None else ""
+        lines.append(
+            f"next: weighbridge vehicle new --class truck{named} -o {base} "
+            "(or bus, van): the log is none of a car"
+        )
+    weighs = car is not None and can_weigh(car)
     if weighs:
-        words = ["weigh", str(path), *options]
-    else:
+        lines.append(" ".join(["next: weighbridge weigh", str(path), *given.options()]))
+    if car is None or not weighs or by_data_sheet(car):
         masses = (
             "--mass KG" if parts == 1 else " ".join(f"--mass KG{k}" for k in range(1, parts + 1))
         )
-        words = ["calibrate", str(path), masses, "-o vehicle.toml", *options]
-    return f"next: weighbridge {' '.join(words)}"
+        lead = "better" if weighs else "then" if base is not None else "next"
+        words = [f"{lead}: weighbridge calibrate", str(path), masses, "-o vehicle.toml"]
+        # The new file names the mapping.
+        left = given if base is None else given._replace(mapping=None)
+        lines.append(" ".join([*words, *left.options(base)]))
+    return lines
+
+
+def _heavy(found: Inspection) -> bool:
+    """Whether a drive without a vehicle file seems to be of a truck or bus."""
+    reference = found.drive.get("reference_torque")
+    strong = reference is not None and len(reference) and float(reference.values.max()) > _STRONG
+    return found.drive.has("retarder_torque") or bool(strong)
 
 
 def _show(screen: Console, found: Inspection, every_way: bool) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
+from weighbridge.cli.options import MappingPath
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say, shown
 from weighbridge.cli.torque_help import TellsSources
@@ -33,6 +34,18 @@ _Gross = Annotated[
 ]
 _Tyre = Annotated[
     _Text, typer.Option("--tyre", help="Size, such as '205/55 R16'.", show_default=False)
+]
+_Radius = Annotated[
+    _Number,
+    typer.Option(
+        "--radius",
+        help="Rolling radius of the driven wheels in m, in place of the tyre.",
+        show_default=False,
+    ),
+]
+_DrivenAxles = Annotated[
+    _Text,
+    typer.Option("--driven", help="Driven axles: front, rear or all.", show_default=False),
 ]
 _GearRatios = Annotated[
     _Text,
@@ -69,6 +82,8 @@ def new(
     tare: _Tare = None,
     gross: _Gross = None,
     tyre: _Tyre = None,
+    radius: _Radius = None,
+    driven: _DrivenAxles = None,
     gear_ratios: _GearRatios = None,
     final_drive: Annotated[
         _Number, typer.Option("--final-drive", help="Ratio of the axle.", show_default=False)
@@ -85,6 +100,7 @@ def new(
         _Number, typer.Option("--frontal-area", help="In m².", show_default=False)
     ] = None,
     layout: _Layout = None,
+    mapping: MappingPath = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Write a vehicle file from what an owner knows; the rest is usual for the class.
@@ -92,10 +108,11 @@ def new(
     Example: weighbridge vehicle new --class van --tare 2150 --gross 3500 --tyre "235/65 R16"
     -o van.toml
     """
+    from weighbridge.pipeline.given import mapping_beside
     from weighbridge.vehicle.file import save_vehicle
     from weighbridge.vehicle.known import Known, describe
 
-    refuse_results(inputs(), [Result("--output", output, "vehicle file")])
+    refuse_results(inputs(mapping=mapping), [Result("--output", output, "vehicle file")])
     refuse_overwriting(output, force, "vehicle file")
     made = describe(
         Known(
@@ -105,6 +122,8 @@ def new(
             tare=tare,
             gross=gross,
             tyre=tyre,
+            radius=radius,
+            driven=driven,  # type: ignore[arg-type]
             gear_ratios=_ratios(gear_ratios),
             final_drive=final_drive,
             torque=torque,
@@ -112,6 +131,7 @@ def new(
             drag_coefficient=drag_coefficient,
             frontal_area=frontal_area,
             layout=layout,  # type: ignore[arg-type]
+            mapping=mapping_beside(mapping, output) if mapping is not None else None,
         )
     )
     save_vehicle(made.vehicle, output, made.origins)
@@ -148,14 +168,16 @@ def _ratios(text: str | None) -> tuple[float, ...]:
 def _print(path: Path, vehicle: Vehicle) -> None:
     from rich.table import Table
 
+    from weighbridge.vehicle.data_sheet import by_data_sheet
     from weighbridge.vehicle.telling import can_weigh, tell
 
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for heading, sentence in tell(vehicle):
         table.add_row(heading, shown(sentence))
     console().print(table)
-    say(
-        f"next: weighbridge weigh DRIVE --vehicle {path}"
-        if can_weigh(vehicle)
-        else f"next: weighbridge calibrate DRIVE --mass KG --vehicle {path} -o calibrated.toml"
-    )
+    weighs = can_weigh(vehicle)
+    if weighs:
+        say(f"next: weighbridge weigh DRIVE --vehicle {path}")
+    if not weighs or by_data_sheet(vehicle):
+        lead = "better" if weighs else "next"
+        say(f"{lead}: weighbridge calibrate DRIVE --mass KG --vehicle {path} -o calibrated.toml")

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 # Width of the table where no terminal gives one: a reason needs room.
 _WIDTH = 160
 
+# Warnings of one drive that are printed below a table of several.
+_NOTED = 3
+
 _METHODS = "Estimator: joint, rls, robust-rls, ekf, hybrid or speed-ekf."
 
 
@@ -163,6 +166,8 @@ def _show(
         _show_one(weighed[0])
     else:
         screen.print(result_table(weighed, failed))
+        for line in warning_lines(weighed):
+            screen.print(f"  note: {shown(line)}", no_wrap=True, overflow="ellipsis")
     for methods in compared:
         screen.print(method_table(methods))
 
@@ -207,11 +212,37 @@ def _outcome(w: Weighing) -> str:
     return str(w.status) if w.status == "converged" else shown(f"{w.status}: {w.reason}")
 
 
+def warning_lines(weighed: list[Weighing]) -> list[str]:
+    """Warnings of several drives, one line each: what all share once, at most `_NOTED` of each.
+
+    How a recording was parted is not repeated: the names of its drives say it.
+    """
+    if not weighed:
+        return []
+    shared = set.intersection(*(set(w.warnings) for w in weighed)) if len(weighed) > 1 else set()
+    lines = [
+        f"every drive: {text}" for text in dict.fromkeys(weighed[0].warnings) if text in shared
+    ]
+    for w in weighed:
+        parted = f"{w.drive.name.rsplit(' part ', 1)[0]} holds "
+        own = [t for t in w.warnings if t not in shared and not t.startswith(parted)]
+        lines += [f"{w.drive.name}: {text}" for text in own[:_NOTED]]
+        if len(own) > _NOTED:
+            lines.append(f"{w.drive.name}: {len(own) - _NOTED} more, told by --json")
+    return lines
+
+
 def result_table(weighed: list[Weighing], failed: list[tuple[str, str]]) -> Table:
     """One row a drive: its mass, or why there is none."""
     from rich.table import Table
 
-    table = Table()
+    from weighbridge.vehicle.data_sheet import by_data_sheet
+    from weighbridge.vehicle.telling import worth
+
+    table = Table(title_justify="left")
+    if weighed and by_data_sheet(weighed[0].vehicle):
+        car = weighed[0].vehicle
+        table.title = shown(f"{car.name} {worth(car)}")
     table.add_column("drive", no_wrap=True)
     table.add_column("min", justify="right")
     table.add_column("used", justify="right")

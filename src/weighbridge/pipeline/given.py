@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -38,6 +39,22 @@ def mapping_of(
         return None
     named = Path(vehicle.mapping)
     return named if named.is_absolute() or home is None else home.parent / named
+
+
+def mapping_beside(mapping: Path, home: Path) -> str:
+    """Path of a mapping as a vehicle file names it: seen from that file's folder where it can be.
+
+    Parameters
+    ----------
+    mapping : as a command was given it
+    home : path of the vehicle file
+    """
+    whole = mapping.resolve()
+    try:
+        return Path(os.path.relpath(whole, home.parent.resolve())).as_posix()
+    except ValueError:
+        # On another drive of the machine.
+        return whole.as_posix()
 
 
 def home_of(given: GivenVehicle | None) -> Path | None:

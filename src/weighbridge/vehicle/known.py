@@ -5,23 +5,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import Final, Literal, get_args
 
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import RADIUS_STD, usual_efficiency
 from weighbridge.vehicle.model import (
     Driveline,
+    Driven,
     Layout,
     Provenance,
     RoadLoad,
     TorqueModel,
     Vehicle,
 )
+from weighbridge.vehicle.possible import within
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
 
 EngineKind = Literal["petrol", "diesel", "electric"]
+
+RADII: Final = (0.15, 0.9)
+"""Rolling radii of road vehicles, wide enough for any [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,12 +42,15 @@ class Known:
         fuel included [kg]
     gross : permitted mass, field F.1 or F.2 [kg]
     tyre : size as on its side, such as ``205/55 R16``
+    radius : rolling radius of the driven wheels, in place of the tyre [m]
+    driven : which axles are: "front", "rear" or "all"
     gear_ratios : of the gears, falling; of an electric car 1 alone where ``final_drive`` has all
     final_drive : ratio behind the gearbox; 1 when None
     torque : how the drives tell torque, by the name of its source
     reference_torque : 100 % of a torque in percent [N m]
     drag_coefficient, frontal_area : [-], [m^2]
     layout : how the engine lies, "transverse" or "longitudinal"
+    mapping : path of the mapping of its logs, as seen from the vehicle file
     """
 
     name: str = "vehicle"
@@ -51,6 +59,8 @@ class Known:
     tare: float | None = None
     gross: float | None = None
     tyre: str | None = None
+    radius: float | None = None
+    driven: Driven | None = None
     gear_ratios: Sequence[float] = ()
     final_drive: float | None = None
     torque: str | None = None
@@ -58,6 +68,7 @@ class Known:
     drag_coefficient: float | None = None
     frontal_area: float | None = None
     layout: Layout | None = None
+    mapping: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +113,7 @@ def describe(known: Known) -> Described:
     vehicle = Vehicle(
         name=known.name,
         kind=known.kind,
+        mapping=known.mapping,
         tare=known.tare,
         gross=known.gross,
         driveline=driveline,
@@ -153,6 +165,10 @@ def _refuse(known: Known) -> None:
         raise ConfigError("gear ratios and final drive must be positive")
     if known.final_drive is not None and not known.gear_ratios and known.engine != "electric":
         raise ConfigError("a final drive needs gear ratios, such as 3.8,2.1,1.4,1.0")
+    if known.radius is not None:
+        if known.tyre is not None:
+            raise ConfigError("a tyre tells its rolling radius; give the tyre or the radius")
+        within("radius", known.radius, *RADII, "m")
     if (known.drag_coefficient is None) != (known.frontal_area is None):
         raise ConfigError("drag coefficient and frontal area belong together; give both or none")
     source = TORQUE_SOURCES[known.torque] if known.torque is not None else None
@@ -160,20 +176,27 @@ def _refuse(known: Known) -> None:
         raise ConfigError("a reference torque is that of a torque in percent; name percent as well")
 
 
-def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
+def _radius(known: Known, origins: dict[tuple[str, str], str]) -> float:
+    """Rolling radius [m]: given, else of the tyre, else of the usual one."""
     tyre = known.tyre or VEHICLE_CLASSES[known.kind].tyre
-    radius = round(rolling_radius(tyre), 4)
     origins["driveline", "wheel_radius"] = (
-        f"of {tyre}, ± {100.0 * RADIUS_STD:.1f} %"
+        "given"
+        if known.radius is not None
+        else f"of {tyre}, ± {100.0 * RADIUS_STD:.1f} %"
         if known.tyre
         else f"of {tyre}, usual for a {known.kind}, ± 6 %"
     )
+    return known.radius if known.radius is not None else round(rolling_radius(tyre), 4)
+
+
+def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
+    radius = _radius(known, origins)
     ratios = tuple(known.gear_ratios)
     if not ratios and known.engine == "electric" and known.final_drive is not None:
         ratios = (1.0,)
     factor = (known.final_drive or 1.0) / radius
     if ratios:
-        origins["driveline", "gearings"] = "of ratios and tyre"
+        origins["driveline", "gearings"] = "of ratios and rolling radius"
     single = known.engine == "electric" or len(ratios) == 1
     mean, std = VEHICLE_CLASSES[known.kind].road_prior(single_speed=single)
     for name, k in (("engine_inertia", 2), ("wheel_inertia", 3)):
@@ -184,6 +207,7 @@ def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
         wheel_inertia=float(mean[3]),
         wheel_radius=radius,
         layout=known.layout,
+        driven=known.driven,
     )
 
 

@@ -50,8 +50,13 @@ def tell(vehicle: Vehicle) -> list[tuple[str, str]]:
 
 
 def can_weigh(vehicle: Vehicle) -> bool:
-    """Whether a drive can be weighed with it: gears are known, and what the torque is worth."""
+    """Whether a drive can be weighed with it: it says what the torque is worth.
+
+    A torque that the vehicle tells needs no gears in the file: engine and vehicle speed show them.
+    """
     if vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None:
+        return True
+    if vehicle.torque.source is not None and by_data_sheet(vehicle):
         return True
     geared = bool(vehicle.driveline.gearings) or source_of(vehicle).gearing is not None
     return geared and (vehicle.torque.stated or by_data_sheet(vehicle))
@@ -64,8 +69,9 @@ def worth(vehicle: Vehicle) -> str:
         return "cannot weigh yet: calibrate it on a drive of known mass"
     if scale is None:
         return (
-            f"never calibrated: ± {100.0 * scale_std(vehicle):.1f} % of any mass for torque, "
-            "efficiency and rolling radius, and 3 % more where the sensor's lean is not known"
+            f"weighs by data sheet, never calibrated: ± {100.0 * scale_std(vehicle):.1f} % of any "
+            "mass for torque, efficiency and rolling radius, and 3 % more where the sensor's lean "
+            "is not known"
         )
     text = f"± {100.0 * scale:.1f} % of any mass is left by the calibration (one std)"
     if len(vehicle.provenance.drives) < _FEWEST_RELIABLE:
