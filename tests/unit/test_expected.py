@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from weighbridge.pipeline.expected import EXPECTED, MOTIONS
+from weighbridge.pipeline.expected import EXPECTED, MOTIONS, expected
+from weighbridge.vehicle.model import Provenance, Vehicle
 
 README = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
 
@@ -36,6 +37,7 @@ def test_the_readme_has_what_inspect_tells(motion):
             "OBD at 4 Hz, at 1 Hz, with GNSS, no IMU",
             [("speed_grade", True), ("speed_grade", False)],
         ),
+        ("a truck: speed, torque in percent", [("speed_grade", True)]),
         ("OBD at 2 Hz alone", [("speed", False)]),
     ],
 )
@@ -44,4 +46,18 @@ def test_what_was_measured_is_within_what_inspect_tells(row, ways):
     assert len(told) == len(ways)
     for (low, high), way in zip(told, ways, strict=True):
         best, worst, _ = EXPECTED[way]
+        assert expected(way[0], fast=way[1]) == (best, worst)
         assert best <= low <= high <= worst
+
+
+def test_a_calibrated_file_promises_no_more_than_it_leaves():
+    def promised(scale):
+        made = Vehicle(provenance=Provenance(mass_scale_std=scale))
+        return expected("speed_grade", fast=True, vehicle=made)
+
+    assert promised(None) == expected("speed_grade", fast=True)
+    # 2.5 % of the motion beside it.
+    assert promised(0.016) == (3.0, 6.0)
+    low, high = promised(0.06)
+    assert low == pytest.approx(6.5)
+    assert high > low

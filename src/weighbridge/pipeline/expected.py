@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
+from weighbridge.estimators.joint.batch import MOTION_STD
 from weighbridge.navigation.motion import MotionSource
+from weighbridge.vehicle.model import Vehicle
 
 MOTIONS: Final[dict[MotionSource, str]] = {
     "inertial": "IMU with speed",
@@ -22,8 +25,8 @@ EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
     ("inertial", False): (1.0, 2.0, "how late slow readings are"),
     ("longitudinal_accel", True): (1.5, 3.5, "the lean of the accelerometer, the torque's scale"),
     ("longitudinal_accel", False): (2.0, 4.0, "how late slow readings are, the sensor's lean"),
-    ("speed_grade", True): (2.0, 3.0, "acceleration and grade come from smoothed speed and height"),
-    ("speed_grade", False): (3.0, 5.0, "acceleration comes from slowly polled speed"),
+    ("speed_grade", True): (2.0, 6.0, "acceleration and grade come from smoothed speed and height"),
+    ("speed_grade", False): (3.0, 6.0, "acceleration comes from slowly polled speed"),
     ("speed", True): (4.0, 5.0, "no grade is measured"),
     ("speed", False): (4.0, 8.0, "no grade is measured, and speed is slowly polled"),
 }
@@ -31,3 +34,23 @@ EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
 torque is read at `FAST` or more: it holds what the README says was measured. Of fast speed alone,
 of speed alone below 2 Hz and of a slow longitudinal accelerometer nothing was measured; theirs are
 graded from the others."""
+
+
+def expected(
+    motion: MotionSource, *, fast: bool, vehicle: Vehicle | None = None
+) -> tuple[float, float]:
+    """Return the standard deviation of a mass, best to worst [%].
+
+    Parameters
+    ----------
+    motion : source of the motion
+    fast : the torque is read at `FAST` or more
+    vehicle : a file that was calibrated; what it leaves in every mass is the least
+    """
+    best, worst, _ = EXPECTED[motion, fast]
+    scale = vehicle.provenance.mass_scale_std if vehicle is not None else None
+    if scale is None:
+        return best, worst
+    left = 100.0 * math.hypot(scale, MOTION_STD[motion])
+    best = max(best, round(left, 1))
+    return best, max(worst, round(math.hypot(best, left), 1))

@@ -11,7 +11,7 @@ import numpy as np
 from weighbridge.balance.speed_balance import SPEEDS
 from weighbridge.checks import settle_drive
 from weighbridge.navigation.motion import MotionSource
-from weighbridge.pipeline.expected import EXPECTED, FAST, MOTIONS
+from weighbridge.pipeline.expected import EXPECTED, FAST, MOTIONS, expected
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -218,7 +218,9 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
     for motion in MOTIONS:
         for torque in TORQUE_SOURCES.values():
             needs = (*_motion_needs(drive, motion), *_torque_needs(drive, torque, vehicle))
-            best, worst, reason = EXPECTED[motion, _is_fast(drive, torque)]
+            fast = _is_fast(drive, torque)
+            best, worst = expected(motion, fast=fast, vehicle=_made_for(torque, vehicle))
+            reason = EXPECTED[motion, fast][2]
             if torque.expected:
                 best, worst, reason = best + torque.expected, worst + torque.expected, torque.limit
             # Nobody records torque at the wheels for want of another signal.
@@ -238,6 +240,11 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
             )
     ways.sort(key=lambda w: w[0])
     return _mark_chosen([*(w for _, w in ways), _by_speed_alone(drive)], vehicle)
+
+
+def _made_for(torque: TorqueSource, vehicle: Vehicle | None) -> Vehicle | None:
+    """Return the vehicle where its file is of that torque, else None."""
+    return vehicle if vehicle is not None and vehicle.torque.of_source == torque else None
 
 
 def _is_fast(drive: Drive, torque: TorqueSource) -> bool:
