@@ -61,3 +61,10 @@ def test_a_calibrated_file_promises_no_more_than_it_leaves():
     low, high = promised(0.06)
     assert low == pytest.approx(6.5)
     assert high > low
+
+
+@pytest.mark.parametrize("fast", [True, False])
+def test_a_better_motion_promises_more(fast):
+    worst = [EXPECTED[motion, fast][1] for motion in MOTIONS]
+    assert worst == sorted(worst)
+    assert len(set(worst)) == len(worst)

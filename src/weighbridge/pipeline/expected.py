@@ -27,7 +27,7 @@ EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
     ("longitudinal_accel", False): (2.0, 4.0, "how late slow readings are, the sensor's lean"),
     ("speed_grade", True): (2.0, 6.0, "acceleration and grade come from smoothed speed and height"),
     ("speed_grade", False): (3.0, 6.0, "acceleration comes from slowly polled speed"),
-    ("speed", True): (4.0, 5.0, "no grade is measured"),
+    ("speed", True): (4.0, 7.0, "no grade is measured"),
     ("speed", False): (4.0, 8.0, "no grade is measured, and speed is slowly polled"),
 }
 """Standard deviation of a mass, best to worst [%], and what sets it, by motion and whether the
