@@ -26,6 +26,7 @@ from weighbridge.report.information_section import (
 from weighbridge.report.methods_section import METHOD_STYLE, methods_section
 from weighbridge.report.residual_section import bin_width, binned, residual_section
 from weighbridge.report.slow_section import slow_section, wind_at_vehicle
+from weighbridge.report.style import band, blank
 from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.vehicle.model import Provenance
 
@@ -378,7 +379,30 @@ def test_disturbance_keeps_its_unit_and_band(tmp_path, round_trip):
         (slow.disturbance_std, slow.resistance_std),
         strict=True,
     ):
-        low, high, middle = (numbers(trace["y"]) for trace in figure["data"])
+        area, middle = (numbers(trace["y"]) for trace in figure["data"])
+        # There along the low edge, back along the high one.
+        low, high = area[: area.size // 2], area[area.size // 2 :][::-1]
         assert_allclose(0.5 * (low + high), middle, atol=0.02)
         assert np.nanmax(middle) == pytest.approx(force.max(), rel=1e-4, abs=0.02)
         assert np.nanmedian(high - low) == pytest.approx(2 * 1.96 * np.median(std), rel=0.1)
+
+
+def test_a_band_is_one_closed_area_for_each_stretch_that_is_known():
+    """A gap in the grade once drew one wedge across the whole plot."""
+    x = np.arange(8.0)
+    low = np.array([1.0, 2.0, np.nan, 3.0, 4.0, 5.0, np.nan, np.nan])
+    high = low + 10.0
+    high[5] = np.nan
+    figure = blank("x", "y")
+    band(figure, x, low, high, "95 % band")
+    (area,) = figure.data
+    assert area.fill == "toself"
+    gap = np.nan
+    assert_array_equal(area.x, [0.0, 1.0, 1.0, 0.0, gap, 3.0, 4.0, 4.0, 3.0])
+    assert_array_equal(area.y, [1.0, 2.0, 12.0, 11.0, gap, 3.0, 4.0, 14.0, 13.0])
+
+
+def test_a_band_of_nothing_is_empty():
+    figure = blank("x", "y")
+    band(figure, np.arange(3.0), np.full(3, np.nan), np.ones(3), "95 % band")
+    assert len(figure.data[0].x) == 0

@@ -12,7 +12,7 @@ import numpy as np
 from weighbridge.inertia.filter import AXES, InertiaTrack
 from weighbridge.inertia.suspension import PARTS, SuspensionCheck
 from weighbridge.report.study import write_study
-from weighbridge.report.style import BAND, BLUE, GREY, VERMILLION, Panel, blank, dots, line
+from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, band, blank, dots, line
 from weighbridge.report.table import Table
 from weighbridge.report.thinning import thin_line
 from weighbridge.signals import Floats
@@ -45,10 +45,7 @@ def parameter_panels(
         high = np.where(reach < 0.9, values / np.maximum(1.0 - reach, 0.1), 10.0 * values)
         x, y, bottom, top = thin_line(track.time, values, low, high)
         figure = blank("time [s]", f"{name} [{unit}]")
-        figure.add_scatter(x=x, y=bottom, mode="lines", line={"width": 0}, showlegend=False,
-                           hoverinfo="skip")  # fmt: skip
-        figure.add_scatter(x=x, y=top, name="95 %", mode="lines", line={"width": 0},
-                           fill="tonexty", fillcolor=BAND, hoverinfo="skip")  # fmt: skip
+        band(figure, x, bottom, top, "95 %")
         line(figure, x, y, "estimated", BLUE)
         seen = values if truth is None else np.concatenate((truth[:, k], values[-1:]))
         if truth is not None:

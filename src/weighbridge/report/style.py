@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
 import plotly.graph_objects as go
 
 from weighbridge.balance import REASON_TEXT, Reason
@@ -13,7 +14,6 @@ from weighbridge.signals import Drive, Floats
 from weighbridge.signals.units import from_si
 
 BLUE: Final = "#2b7bba"
-BAND: Final = "rgba(43,123,186,0.22)"
 VERMILLION: Final = "#d55e00"
 GREEN: Final = "#009e73"
 GREY: Final = "#8a8a8a"
@@ -159,13 +159,38 @@ def tint(colour: str, opacity: float = 0.22) -> str:
 def band(
     figure: go.Figure, x: Any, low: Any, high: Any, name: str, colour: str = BLUE, **more: Any
 ) -> None:
-    """Add the area between two lines."""
-    fill = tint(colour)
-    line(figure, x, low, "", fill, showlegend=False, hoverinfo="skip", line_width=0, **more)
+    """Add the area between two lines; where one of them is not known there is none."""
+    along, edge = outline(x, low, high)
     line(
-        figure, x, high, name, fill,
-        fill="tonexty", fillcolor=fill, hoverinfo="skip", line_width=0, **more,
+        figure, along, edge, name, tint(colour),
+        fill="toself", fillcolor=tint(colour), hoverinfo="skip", line_width=0, **more,
     )  # fmt: skip
+
+
+def outline(x: Any, low: Any, high: Any) -> tuple[Any, Any]:
+    """Go round the area between two lines, run by run of values that are known.
+
+    Parameters
+    ----------
+    x : (n,) along the lines
+    low, high : (n,) NaN where unknown
+
+    Returns
+    -------
+    x, y : (m,) there along ``low`` and back along ``high``; NaN between two runs
+    """
+    known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
+    along: list[Any] = []
+    edge: list[Any] = []
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        gap = np.full(min(len(along), 1), np.nan, dtype=x.dtype)
+        run = slice(first, end)
+        along += [gap, x[run], x[run][::-1]]
+        edge += [gap, low[run], high[run][::-1]]
+    if not along:
+        return x[:0], x[:0]
+    return np.concatenate(along), np.concatenate(edge)
 
 
 def minutes(drive: Drive, time: Floats) -> Floats:
