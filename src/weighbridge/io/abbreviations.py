@@ -42,8 +42,11 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
 _LONG: Final = {short: word for word, shorts in _SHORT.items() for short in shorts}
 
 SOURCES: Final = frozenset(
-    ("imu", "vcu", "esp", "esc", "ins", "sg", "sig", "hsc", "act", "actl", "actual", "phys")
-)
+    (
+        "imu", "vcu", "esp", "esc", "tcu", "tcm", "ecm", "pcm", "egs", "dme", "ins", "sg", "sig",
+        "hsc", "act", "actl", "actual", "phys",
+    )
+)  # fmt: skip
 """Prefixes and endings that name who sends a signal, or that it is measured."""
 
 OF_ANOTHER: Final = frozenset(
