@@ -3,6 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
+import pytest
+
 import weighbridge as wb
 from weighbridge import Vehicle
 from weighbridge.io import to_frames
@@ -43,3 +46,88 @@ def test_a_mapping_is_named_as_the_vehicle_file_sees_it(tmp_path, monkeypatch):
     assert named == "../map.toml"
     car = Vehicle(mapping=named)
     assert mapping_of(car, Path("files/car.toml")).resolve() == (tmp_path / "map.toml").resolve()
+
+
+OWN = {
+    "vehicle_speed_kmh": "VCU_VehSpd",
+    "engine_speed_rpm": "ECM_EngSpd",
+    "engine_load_pct": "ECM_Load",
+    "latitude_deg": "GNSS_Latitude",
+    "longitude_deg": "GNSS_Longitude",
+    "altitude_m": "GNSS_Altitude",
+    **{f"accel_{a}_mps2": f"IMU_Accel{a.upper()}" for a in "xyz"},
+    **{f"gyro_{a}_radps": f"IMU_Rate{a.upper()}" for a in "xyz"},
+}
+
+
+def own_frames(drive):
+    """Tables of a drive under foreign names, and one flat mapping for all, as `map` writes it."""
+    tables = to_frames(drive)
+    kept = {k: [c for c in f.columns if c in OWN or c == "time_s"] for k, f in tables.items()}
+    frames = {k: f.select(kept[k]).rename(OWN, strict=False) for k, f in tables.items()}
+    named = [c for columns in kept.values() for c in columns if c != "time_s"]
+    signals = {}
+    for column in named:
+        name, _, unit = column.rpartition("_")
+        signals[name] = {"column": OWN[column], "unit": unit}
+    return frames, {"signals": signals}
+
+
+def test_a_flat_mapping_is_for_all_frames_without_a_word(short_drive):
+    frames, mapping = own_frames(short_drive.drive)
+    assert len(frames) == 3
+    drive = wb.read_frame(frames, mapping)
+    assert set(drive.signals) == set(mapping["signals"])
+    assert not [p for p in drive.problems if "is not there" in p.text]
+
+
+def test_what_no_frame_has_is_told_once(short_drive):
+    frames, mapping = own_frames(short_drive.drive)
+    mapping["signals"]["gear"] = {"column": "TCU_GearAct"}
+    told = [p for p in wb.read_frame(frames, mapping).problems if "is not there" in p.text]
+    assert [p.signal for p in told] == ["gear"]
+
+
+def test_frames_are_read_with_the_mapping_that_the_vehicle_file_names(
+    tmp_path, short_drive, short_car
+):
+    frames, mapping = own_frames(short_drive.drive)
+    lines = [
+        f'[signals.{name}]\ncolumn = "{s["column"]}"\nunit = "{s["unit"]}"'
+        for name, s in mapping["signals"].items()
+    ]
+    (tmp_path / "map.toml").write_text("\n".join(lines))
+    short_car.save(tmp_path / "car.toml")
+    replace(short_car, mapping="map.toml").save(tmp_path / "named.toml")
+    weighed = wb.weigh(frames, tmp_path / "named.toml")
+    for given in (mapping, tmp_path / "map.toml", str(tmp_path / "map.toml")):
+        assert wb.weigh(frames, tmp_path / "car.toml", mapping=given).mass == weighed.mass
+    # Canonical names need none.
+    assert wb.weigh(to_frames(short_drive.drive), tmp_path / "named.toml").mass == pytest.approx(
+        weighed.mass, rel=0.02
+    )
+
+
+def test_a_mapping_for_a_drive_that_is_read_is_refused(short_drive, short_car):
+    with pytest.raises(wb.ConfigError, match="read already; give mapping to read_drive"):
+        wb.weigh(short_drive.drive, short_car, mapping="map.toml")
+    with pytest.raises(wb.ConfigError, match="read already"):
+        wb.calibrate(short_drive.drive, mass=1500.0, mapping="map.toml")
+
+
+@pytest.mark.parametrize("line", [0, None])
+def test_a_mapping_outside_of_its_section_is_told_where_it_belongs(tmp_path, short_car, line):
+    path = tmp_path / "car.toml"
+    short_car.save(path)
+    lines = path.read_text().splitlines()
+    lines.insert(len(lines) if line is None else line, 'mapping = "map.toml"')
+    path.write_text("\n".join(lines))
+    with pytest.raises(wb.ConfigError, match=r"mapping belongs into \[vehicle\]: move the line"):
+        wb.Vehicle.load(path)
+
+
+def test_the_index_of_asammdf_is_the_time():
+    index = pd.Index([0.0, 0.5], name="timestamps")
+    frame = pd.DataFrame({"VCU_VehSpd": [36.0, 72.0]}, index=index)
+    mapping = {"signals": {"vehicle_speed": {"column": "VCU_VehSpd", "unit": "kmh"}}}
+    assert wb.read_frame(frame, mapping).signals["vehicle_speed"].time.tolist() == [0.0, 0.5]

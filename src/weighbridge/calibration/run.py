@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from weighbridge.signals import Drive
 from weighbridge.vehicle.fits import JOINT, RLS
 from weighbridge.vehicle.model import Driveline, Vehicle
 
+if TYPE_CHECKING:
+    from weighbridge.io.mapping import MappingSource
+
 FITTERS: Final[dict[str, Callable[[Problem], Fitted]]] = {
     JOINT.name: fit_joint,
     RLS.name: fit_rls,
@@ -57,6 +60,7 @@ def calibrate(
     *,
     vehicle: GivenVehicle | None = None,
     settings: CalibrationSettings | None = None,
+    mapping: MappingSource | None = None,
 ) -> Vehicle:
     """Calibrate a vehicle from one or more drives of known mass.
 
@@ -68,6 +72,8 @@ def calibrate(
     vehicle : what is known already (class, wheel radius, gearings, tare), or the path of a vehicle
         file that says it
     settings : see `CalibrationSettings`
+    mapping : for paths or data frames with names of their own: mapping TOML, or a dictionary of
+        the same form; the one that ``vehicle`` names when None
 
     Raises
     ------
@@ -75,7 +81,7 @@ def calibrate(
         A drive or an argument cannot be used; the sentence says why.
     """
     base = as_vehicle(vehicle) if vehicle is not None else None
-    known = as_drives(drives, mapping_of(base, home_of(vehicle)))
+    known = as_drives(drives, mapping_of(base, home_of(vehicle)), mapping)
     if settings is not None and not settings.fit.torque:
         return run_speed_calibration(known, mass, vehicle=base).vehicle
     return run_calibration(known, mass, vehicle=base, settings=settings).vehicle

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import polars as pl
 
 from weighbridge.errors import ConfigError
-from weighbridge.io.mapping import MappingSource, load_mapping, mapping_for
+from weighbridge.io.columns import UnitlessColumnError, parse_column, time_unit
+from weighbridge.io.log import Log
+from weighbridge.io.mapping import (
+    MappedSignal,
+    MappingSource,
+    TableMapping,
+    load_mapping,
+    mapping_for,
+)
 from weighbridge.io.quiet import PARSE_ERRORS
 from weighbridge.io.read import joined_drive
 from weighbridge.io.table import RawTable, column_list
@@ -22,6 +32,9 @@ if TYPE_CHECKING:
     import pandas
 
 Frame: TypeAlias = "pl.DataFrame | pandas.DataFrame"
+
+ASAMMDF_INDEX: Final = "timestamps"
+"""Name of the index, in seconds, of frames that asammdf makes of MF4 files."""
 
 
 def is_frame(given: object) -> bool:
@@ -42,8 +55,10 @@ def read_frame(
     ----------
     frame : of pandas or polars, with the columns of a table on disk: canonical names with units
         (``time_s``, ``vehicle_speed_kmh``, …) or those of ``mapping``. An index of pandas that has
-        a name is a column as well; one of dates is the time. Several: by names such as
-        ``imu``, ``obd`` and ``gnss``, for which a mapping's ``files`` are patterns
+        a name is a column as well; one of dates, and asammdf's ``timestamps``, is the time.
+        Several: by names such as ``imu``, ``obd`` and ``gnss``, for which a mapping's ``files``
+        are patterns; a mapping without ``files`` is for all, and each signal is looked for in
+        every frame
     mapping : mapping TOML, or a dictionary of the same form
     name : of the drive
 
@@ -56,15 +71,52 @@ def read_frame(
     """
     frames = dict(frame) if isinstance(frame, Mapping) else {name: frame}
     mappings = load_mapping(mapping) if mapping is not None else ()
+    raws = [_raw(str(table), one, mapped=bool(mappings)) for table, one in frames.items()]
+    return joined_drive(name, _read(raws, mappings), DriveInfo(), mappings, ())
+
+
+def _read(raws: list[RawTable], mappings: tuple[TableMapping, ...]) -> list[Log]:
+    """Read each table by the mapping that is for it, else by canonical names."""
+    known = [mapping_for(raw.path, mappings) for raw in raws]
     logs = []
-    for table, one in frames.items():
-        raw = _raw(str(table), one, mapped=bool(mappings))
-        found = mapping_for(raw.path, mappings)
-        if found is not None and found.signals:
-            logs.append(read_mapped(raw, found))
-        else:
-            logs.append(read_canonical(raw, str(table) if table in TABLES else None))
-    return joined_drive(name, logs, DriveInfo(), mappings, ())
+    for raw, mapping in zip(raws, known, strict=True):
+        own = raw.path.name if raw.path.name in TABLES else None
+        named = mapping is not None and any(_has(raw, s) for s in mapping.signals)
+        if mapping is None or not mapping.signals or (not named and _is_canonical(raw, own)):
+            logs.append(read_canonical(raw, own))
+            continue
+        alike = [r for r, m in zip(raws, known, strict=True) if m is mapping]
+        logs.append(read_mapped(raw, _part_of(mapping, raw, alike) if named else mapping))
+    return logs
+
+
+def _part_of(mapping: TableMapping, raw: RawTable, alike: list[RawTable]) -> TableMapping:
+    """What of a mapping is for one of the tables that it is for.
+
+    That is what the table has; for the first also what none has, to be told once.
+    """
+    first = next(r for r in alike if any(_has(r, s) for s in mapping.signals))
+    taken = (
+        s
+        for s in mapping.signals
+        if _has(raw, s) or (raw is first and not any(_has(r, s) for r in alike))
+    )
+    return replace(mapping, signals=tuple(taken))
+
+
+def _has(raw: RawTable, signal: MappedSignal) -> bool:
+    return raw.index(signal.column) is not None
+
+
+def _is_canonical(raw: RawTable, table: str | None) -> bool:
+    """Tell whether a table has a time and a column of canonical names."""
+    if not any(time_unit(name) for name in raw.names):
+        return False
+    for name in raw.names:
+        with contextlib.suppress(UnitlessColumnError):
+            if parse_column(name, table) is not None:
+                return True
+    return False
 
 
 def _raw(name: str, frame: Any, *, mapped: bool) -> RawTable:
@@ -78,6 +130,8 @@ def _raw(name: str, frame: Any, *, mapped: bool) -> RawTable:
         dates = frame.index.dtype.kind == "M"
         if dates or frame.index.name is not None:
             own = frame.index.name if mapped or not dates else None
+            if own == ASAMMDF_INDEX and not any(map(time_unit, map(str, frame.columns))):
+                own = None
             index = str(own or TIME_COLUMN)
             if index in map(str, frame.columns):
                 raise ConfigError(

@@ -13,6 +13,7 @@ from weighbridge.signals.shown import type_name
 from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
+    from weighbridge.io.mapping import MappingSource
     from weighbridge.io.read_frames import Frame
 
 GivenDrive: TypeAlias = "Drive | str | Path | Frame | Mapping[str, Frame]"
@@ -62,22 +63,31 @@ def home_of(given: GivenVehicle | None) -> Path | None:
     return Path(given) if isinstance(given, str | Path) else None
 
 
-def as_drive(given: GivenDrive, mapping: Path | None = None) -> Drive:
+def as_drive(
+    given: GivenDrive, named: Path | None = None, asked: MappingSource | None = None
+) -> Drive:
     """Return a drive, read where it is a path or a table.
 
     Parameters
     ----------
     given
-    mapping : for a path, what its files are read with
+    named : mapping that the vehicle file names
+    asked : mapping that the caller gives, which goes before it
 
     Raises
     ------
     ConfigError
-        It is neither.
+        It is neither, or a mapping is given for a drive that is read already.
     DriveError
         It cannot be read.
     """
+    mapping = asked if asked is not None else named
     if isinstance(given, Drive):
+        if asked is not None:
+            raise ConfigError(
+                f"{given.name}: the drive is read already; give mapping to read_drive or "
+                "read_frame, or the path or the data frames here"
+            )
         return given
     if isinstance(given, str | Path):
         from weighbridge.io import read_drive
@@ -88,18 +98,24 @@ def as_drive(given: GivenDrive, mapping: Path | None = None) -> Drive:
     if is_frame(given) or (
         isinstance(given, Mapping) and given and all(map(is_frame, given.values()))
     ):
-        return read_frame(given)
+        # Data frames with canonical names need no mapping, wherever the vehicle file was copied to.
+        there = asked is not None or (named is not None and named.is_file())
+        return read_frame(given, mapping if there else None)
     raise ConfigError(
         f"a drive is expected, got {type_name(given)}: give what read_drive returns, the path of a "
-        "folder or file, or data frames with canonical columns"
+        "folder or file, or data frames"
     )
 
 
-def as_drives(given: GivenDrive | Sequence[GivenDrive], mapping: Path | None = None) -> list[Drive]:
+def as_drives(
+    given: GivenDrive | Sequence[GivenDrive],
+    named: Path | None = None,
+    asked: MappingSource | None = None,
+) -> list[Drive]:
     """Return one or several drives, as of `as_drive`."""
     if isinstance(given, list | tuple):
-        return [as_drive(one, mapping) for one in given]
-    return [as_drive(given, mapping)]
+        return [as_drive(one, named, asked) for one in given]
+    return [as_drive(given, named, asked)]
 
 
 def as_vehicle(given: GivenVehicle) -> Vehicle:

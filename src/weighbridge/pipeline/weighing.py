@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
@@ -42,6 +42,9 @@ from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
 from weighbridge.vehicle.torque import source_of
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+if TYPE_CHECKING:
+    from weighbridge.io.mapping import MappingSource
 
 DEFAULT_METHOD = "joint"
 """Estimator used unless one is named."""
@@ -89,17 +92,19 @@ def weigh(
     method: str = DEFAULT_METHOD,
     *,
     settings: Mapping[str, object] | None = None,
+    mapping: MappingSource | None = None,
 ) -> Weighing:
     """Weigh a vehicle from one drive.
 
     Parameters
     ----------
-    drive : as of `read_drive`, or the path or data frame that it is to be read from; a path
-        with the mapping that the vehicle file names
+    drive : as of `read_drive`, or the path or data frames that it is to be read from
     vehicle : as of `calibrate` or `Vehicle.load`, or the path of a vehicle file
     method : name of an estimator in `weighbridge.estimators.ESTIMATORS`
     settings : values of its settings that differ from their defaults, by name, such as
         ``{"forgetting": 0.999}``; the settings class of the estimator lists them
+    mapping : for a path or data frames with names of their own: mapping TOML, or a dictionary of
+        the same form; the one that the vehicle file names when None
 
     Returns
     -------
@@ -120,7 +125,7 @@ def weigh(
     from weighbridge.checks import refuse_serious, settle_drive
 
     home, vehicle = home_of(vehicle), as_vehicle(vehicle)
-    drive = settle_drive(as_drive(drive, mapping_of(vehicle, home)), vehicle)
+    drive = settle_drive(as_drive(drive, mapping_of(vehicle, home), mapping), vehicle)
     refuse_serious(drive.name, drive.problems)
     return weigh_checked(drive, vehicle, method, chosen)
 

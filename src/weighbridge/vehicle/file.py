@@ -59,6 +59,7 @@ def load_vehicle(path: str | Path, build: type[Made]) -> Made:
     path = Path(path)
     root = read_toml(path)
     _check_version(root)
+    _refuse_lost_mapping(root)
     sections: dict[str, Any] = {}
     for name, (part, keys) in SECTIONS.items():
         section = root.section(name)
@@ -83,6 +84,16 @@ def load_vehicle(path: str | Path, build: type[Made]) -> Made:
     root.done()
     made: Made = _built(build, section, {**values, **sections})
     return made
+
+
+def _refuse_lost_mapping(root: Section) -> None:
+    """Say where the mapping of a vehicle's logs belongs, where it stands in another section."""
+    remedy = "belongs into [vehicle]: move the line there"
+    if "mapping" in root.data:
+        root.fail("mapping", remedy)
+    for name, data in root.data.items():
+        if isinstance(data, dict) and name != "vehicle" and "mapping" in data:
+            Section(data, root.name, root.lines, (name,)).fail("mapping", remedy)
 
 
 def _witnesses(root: Section) -> tuple[WitnessRelation, ...]:
