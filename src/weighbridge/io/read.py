@@ -18,6 +18,7 @@ from weighbridge.io import tabular
 from weighbridge.io.bus import decode
 from weighbridge.io.clocks import settle_clocks, shift_clock
 from weighbridge.io.dbc import Database, DbcSource, load_dbcs
+from weighbridge.io.filled_positions import true_fixes
 from weighbridge.io.format import Format, Takes
 from weighbridge.io.formats import format_of, is_log, suffixes
 from weighbridge.io.frames import Frames, join_frames, settle_clock
@@ -354,6 +355,8 @@ def joined_drive(
         )
     joined: dict[tuple[int, ...], Floats] = {}
     signals = {n: p[0][1] if len(p) == 1 else _joined(n, p, joined) for n, p in parts.items()}
+    signals, filled = true_fixes(signals)
+    problems += filled
     drive = Drive(
         name=visible(name), signals=signals, info=info, problems=tuple(problems), contents=contents
     )
