@@ -8,6 +8,7 @@ from make_logs import truth
 from numpy.testing import assert_allclose
 
 from weighbridge.io import read_drive
+from weighbridge.io.mdf import draft
 
 HERE = Path(__file__).parent
 
@@ -82,3 +83,7 @@ def test_formats_of_one_drive_can_be_joined():
     drive = read_drive([HERE / "log.mf4", gnss])
     assert drive.name == "log+1"
     assert drive.has("accel_x", "latitude", "gnss_speed")
+
+
+def test_a_draft_tells_the_rate_of_each_clock():
+    assert draft(HERE / "log.mf4").rates == (4.0, 50.0)

@@ -225,7 +225,8 @@ def test_missing_time_column(tmp_path):
 
 
 def test_foreign_columns_without_a_mapping(tmp_path):
-    with pytest.raises(DriveError, match=r"it has 'Zeit', 'Tempo': name them in a mapping"):
+    said = r"it has 'Zeit', 'Tempo': name them by a mapping: weighbridge map .*log.csv -o map.toml$"
+    with pytest.raises(DriveError, match=said):
         read_drive(write(tmp_path / "log.csv", "Zeit;Tempo\n0;1\n"))
 
 

@@ -151,8 +151,7 @@ def _show(found: Draft, screen: Console) -> None:
     clock = f"time '{shown(found.time)}' ({taken})" if found.time else "a clock of its own"
     more = f" and {found.files - 1} that read alike" if found.files > 1 else ""
     table = Table(
-        title=f"{shown(found.path.name)}{more}: {clock}, "
-        f"{found.rate:.3g} rows per second for {found.duration:.0f} s",
+        title=f"{shown(found.path.name)}{more}: {clock}, {_rate(found)} for {found.duration:.0f} s",
         title_justify="left",
     )
     for heading in ("column", "is", "unit"):
@@ -171,6 +170,14 @@ def _show(found: Draft, screen: Console) -> None:
         screen.print(f"  not taken: {names}{more}", highlight=False)
     for doubt in found.all_doubts:
         screen.print(f"  doubtful: {shown(doubt)}", highlight=False)
+
+
+def _rate(found: Draft) -> str:
+    """Rows per second, or values per second where clocks differ."""
+    if not found.rates:
+        return f"{found.rate:.3g} rows per second"
+    *others, last = (f"{rate:g}" for rate in found.rates)
+    return f"{', '.join(others)} and {last} values per second"
 
 
 def _asked(found: Draft) -> Draft:

@@ -21,7 +21,14 @@ from weighbridge.io.draft import Draft, draft_column
 from weighbridge.io.draft_column import checked
 from weighbridge.io.frames import Frames
 from weighbridge.io.log import Log, Reader
-from weighbridge.io.mapping import MappedSignal, TableMapping, TimeColumn, lacking, resolved_unit
+from weighbridge.io.mapping import (
+    MappedSignal,
+    TableMapping,
+    TimeColumn,
+    how_to_name,
+    lacking,
+    resolved_unit,
+)
 from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import column_list
 from weighbridge.signals import Floats, Problem
@@ -160,10 +167,7 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
     if not wanted and (found.frames is None or not len(found.frames)):
         names = column_list(c.name for c in found.channels) if found.channels else "no channels"
         source = f"that {mapping.source} names" if mapping and mapping.signals else "that is known"
-        raise DriveError(
-            f"{path} has no channel {source}; it has {names}: name its channels in a mapping file "
-            f"(weighbridge map {path.name} drafts one)"
-        )
+        raise DriveError(f"{path} has no channel {source}; it has {names}: {how_to_name(path)}")
     offset = mapping.time.offset if mapping is not None else 0.0
     clocks: dict[int, tuple[Floats, list[tuple[str, Floats]]]] = {}
     for name, (channel, suffix, signal) in wanted.items():
@@ -289,7 +293,16 @@ def draft_of(path: Path, found: Recording) -> Draft:
         time_unit=found.time_unit,
         time_format=found.time_format,
         rate=float(np.median(rates)) if rates else float("nan"),
+        rates=_rates(channels),
         duration=max(b for _, b in ends) - min(a for a, _ in ends),
         columns=columns,
         doubts=tuple(doubts),
     )
+
+
+def _rates(channels: list[Channel]) -> tuple[float, ...]:
+    """Values per second of each clock, pauses left out, alike ones once [Hz]."""
+    clocks = {id(c.time): c.time for c in channels if c.time.size > 2}
+    periods = (float(np.median(np.diff(time))) for time in clocks.values())
+    rates = {float(f"{1.0 / period:.2g}") for period in periods if period > 0.0}
+    return tuple(sorted(rates)) if len(rates) > 1 else ()

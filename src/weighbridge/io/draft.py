@@ -85,6 +85,7 @@ class Draft:
     time_unit : suffix of a time in numbers; empty for a text
     time_format : "clock", "iso" or a `strptime` format; empty for numbers
     rate : rows per second in the median; NaN where it is not known
+    rates : values per second of each clock, rising; empty where all have one
     duration : from the first to the last row [s]
     columns : all but the time
     doubts : of the file and its time, one sentence each
@@ -101,6 +102,7 @@ class Draft:
     columns: tuple[DraftColumn, ...]
     doubts: tuple[str, ...] = ()
     files: int = 1
+    rates: tuple[float, ...] = ()
 
     @property
     def known(self) -> tuple[DraftColumn, ...]:

@@ -36,6 +36,7 @@ names, such as a GPX or one with canonical columns, may have ``[time]`` or ``[cs
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
@@ -309,6 +310,18 @@ def _signal(parent: Section, name: str) -> MappedSignal:
     )
     section.done()
     return signal
+
+
+def how_to_name(path: Path) -> str:
+    """Say how names of a log's own become known, with the command that does most of it.
+
+    Parameters
+    ----------
+    path : of the log; of a data frame, its name
+    """
+    if not path.is_file():
+        return "name them by a mapping (mapping=)"
+    return f"name them by a mapping: weighbridge map {shlex.quote(str(path))} -o map.toml"
 
 
 def lacking(where: str, signal: MappedSignal, source: str, hint: str = "") -> Problem:

@@ -26,7 +26,13 @@ from weighbridge.io.draft import Draft
 from weighbridge.io.frames import Frames
 from weighbridge.io.info import MDF_INFO_MARK, parse_info
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
+from weighbridge.io.mapping import (
+    MappedSignal,
+    TableMapping,
+    how_to_name,
+    lacking,
+    resolved_unit,
+)
 from weighbridge.io.mdf_bus import bus_frames, check_places
 from weighbridge.io.mdf_check import check_links, guard, settle
 from weighbridge.io.mdf_salvage import Salvaged, salvage
@@ -199,9 +205,7 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
             )
         names = column_list(channels) if channels else "no channels"
         hint = f"named in {mapping.source}" if mapping else "with a canonical name"
-        raise DriveError(
-            f"{path} has no channel {hint}; it has {names}: name its channels in a mapping file"
-        )
+        raise DriveError(f"{path} has no channel {hint}; it has {names}: {how_to_name(path)}")
     clocks: dict[int, list[tuple[str, Floats]]] = {}
     times: dict[int, Floats] = {}
     offset = mapping.time.offset if mapping else 0.0

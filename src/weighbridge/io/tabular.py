@@ -15,7 +15,7 @@ from weighbridge.io.columns import (
     time_unit,
 )
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import TableMapping, lacking, resolved_unit
+from weighbridge.io.mapping import TableMapping, how_to_name, lacking, resolved_unit
 from weighbridge.io.table import (
     SEPARATORS,
     RawTable,
@@ -85,8 +85,7 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
     if not wanted:
         raise DriveError(
             f"{raw.path} has no column with a canonical name and unit (such as vehicle_speed_kmh); "
-            f"it has {column_list(raw.names)}: name its columns in a mapping file"
-            f"{_separator_hint(raw)}"
+            f"it has {column_list(raw.names)}: {how_to_name(raw.path)}"
         )
     if unknown:
         log.problems.append(Problem("", f"{raw.path.name}: {_unknown_text(unknown)}"))
@@ -197,8 +196,7 @@ def _no_time(raw: RawTable, known: bool) -> str:
         )
     return (
         f"{raw.path} has no canonical columns ({TIME_COLUMN}, vehicle_speed_kmh …); "
-        f"it has {column_list(raw.names)}: name them in a mapping file{_separator_hint(raw)} "
-        f"(weighbridge map {raw.path} drafts one)"
+        f"it has {column_list(raw.names)}: {how_to_name(raw.path)}"
     )
 
 
