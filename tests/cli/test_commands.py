@@ -8,7 +8,8 @@ from dataclasses import replace
 import polars as pl
 import pytest
 
-from weighbridge import Vehicle, __version__
+from weighbridge import Vehicle, __version__, read_drive
+from weighbridge.cli.own_masses import own_mass_lines
 from weighbridge.papers import jensen2022
 from weighbridge.results.weighing import TRACK_COLUMNS
 from weighbridge.vehicle.model import Driveline
@@ -97,6 +98,8 @@ def test_calibrate_refuses_to_overwrite(weighbridge, car, known):
     [
         (["--mass", "1.58"], "1.58 kg"),
         (["--mass", "1580", "--mass", "1600"], "2 masses for 1 drives"),
+        (["--mass", "1580,1600"], "repeat --mass, as --mass 1580 --mass 1600"),
+        (["--mass", "1580,5"], "give a number of kg"),
         (["--torque", "measured"], "no engine_torque"),
         (["--torque", "guess"], "--torque guess"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
@@ -108,6 +111,24 @@ def test_calibrate_refuses(weighbridge, known, tmp_path, words, said):
     assert said in ran.err
     assert ran.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_calibration_weighs_its_own_drives(weighbridge, car, known):
+    drive = read_drive(known.folder)
+    first, told, *notes = own_mass_lines(Vehicle.load(car), [drive])
+    assert "no proof" in first
+    ran = weighbridge("weigh", known.folder, "--vehicle", car, "--json", "-")
+    weighed = json.loads(ran.out)
+    percent = 100.0 * (weighed["mass_kg"] / 1580.0 - 1.0)
+    assert f"{known.folder.name}: {weighed['mass_kg']:.0f} kg, {percent:+.1f} % of the 1580" in told
+    assert [n.removeprefix("    note: ") for n in notes] == weighed["warnings"]
+
+
+def test_what_weigh_would_note_of_a_drive_of_a_calibration_is_told(car, known):
+    drive = read_drive(known.folder)
+    later = replace(drive.signals["engine_load"], time=drive.signals["engine_load"].time + 0.3)
+    lines = list(own_mass_lines(Vehicle.load(car), [drive.with_signals(later)]))
+    assert any("its clock was moved by that" in line for line in lines)
 
 
 def test_weigh_in_words(weighbridge, car, loaded):
@@ -136,7 +157,12 @@ def test_weigh_writes_everything(weighbridge, car, loaded, tmp_path):
         *words, "--json", outputs[".json"], "--track", outputs[".csv"], "--report", outputs[".html"]
     )
     assert ran.code == 0
-    assert weighbridge(*words, "--track", outputs[".parquet"]).code == 0
+    for suffix in (".json", ".csv", ".html"):
+        assert f"written: {outputs[suffix]}" in ran.out.splitlines()
+    ran = weighbridge(*words, "--track", outputs[".parquet"], "--json", "-")
+    assert ran.code == 0
+    assert json.loads(ran.out)["status"] == "converged"
+    assert ran.err == f"written: {outputs['.parquet']}\n"
     csv, parquet = pl.read_csv(outputs[".csv"]), pl.read_parquet(outputs[".parquet"])
     assert csv.columns == parquet.columns == list(TRACK_COLUMNS)
     assert csv.height == parquet.height > 1000
@@ -154,6 +180,8 @@ def test_weigh_compares_every_method(weighbridge, car, loaded, tmp_path):
     assert {"joint", "rls", "robust-rls", "ekf", "hybrid", "speed-ekf"} <= set(rows)
     assert "converged" in rows["hybrid"]
     assert "[speed_model]" in rows["speed-ekf"]
+    note = "calibrated for joint: rls, robust-rls, ekf, hybrid were run with the torque of another"
+    assert note in ran.out
     alone = json.loads(weighbridge(*words[:-1], "--method", "hybrid", "--json", "-").out)
     assert f"{alone['mass_kg']:.0f}" in rows["hybrid"]
     assert "All methods on this drive" in page.read_text(encoding="utf-8")

@@ -92,7 +92,13 @@ def fit_rls(problem: Problem) -> Fitted:
         if is_free and name in fitted.at_bound
     )
     if held:
-        vehicle = noted(vehicle, "held by a bound: " + ", ".join(held))
+        vehicle = noted(
+            vehicle,
+            f"held by a bound: {', '.join(held)}: the regression could not tell "
+            f"{'these' if len(held) > 1 else 'this'} from the torque, and masses lean on "
+            f"{'these bounds' if len(held) > 1 else 'this bound'}; "
+            "calibrate by method joint, or on drives with more hills, speeds and gears",
+        )
     if not found:
         vehicle = noted(vehicle, NOT_TOLD)
     return Fitted(

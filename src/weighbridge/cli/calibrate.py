@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Optional
@@ -15,6 +16,7 @@ from weighbridge.cli.options import (
     Whole,
     load_parts,
 )
+from weighbridge.cli.own_masses import own_mass_lines
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import complain, console, say
 from weighbridge.cli.terminal import shown as _shown
@@ -30,6 +32,19 @@ if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
 
 
+def _kilograms(text: str) -> float:
+    """Read one mass; several in one text are told apart from what is no number."""
+    try:
+        return float(text)
+    except ValueError:
+        parts = text.replace(";", ",").split(",")
+        # A comma may be that of a decimal: no vehicle is lighter than 100 kg.
+        several = len(parts) > 1 and all(re.fullmatch(r"\s*\d{3,}(\.\d+)?\s*", p) for p in parts)
+        more = " ".join(f"--mass {p.strip()}" for p in parts)
+        remedy = f"repeat --mass, as {more}" if several else "give a number of kg"
+        raise typer.BadParameter(f"{text!r} is no mass: {remedy}") from None
+
+
 def calibrate(
     drives: DrivePaths,
     output: Annotated[
@@ -42,6 +57,8 @@ def calibrate(
             help="Known mass in kg as the drive begins; repeat it where they differ, one for each "
             "recording, or one for each drive that recordings hold. Without it, mass_kg of each "
             "drive.toml.",
+            parser=_kilograms,
+            metavar="KG",
         ),
     ] = None,
     vehicle: Annotated[
@@ -126,6 +143,9 @@ def calibrate(
     console().print(found)
     for doubt in doubts:
         say(f"  note: {doubt}")
+    if settings.fit.torque:
+        for line in own_mass_lines(car, recorded):
+            say(line)
     say(f"written: {output}")
 
 

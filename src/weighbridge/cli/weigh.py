@@ -17,7 +17,8 @@ from weighbridge.cli.options import (
     load_parts,
 )
 from weighbridge.cli.results import asked_for, inputs, refuse_results
-from weighbridge.cli.terminal import console, say, say_json, shown
+from weighbridge.cli.terminal import complain, console, say, say_json, shown
+from weighbridge.whole import is_stream
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -131,10 +132,18 @@ def weigh(
         if json_path is not None:
             write_whole(json_path, "\n".join(lines) + "\n")
         _show(weighed, failed, compared)
+    _tell_written([json_path, track, report], beside_json=json_path == "-")
     if failed:
         raise typer.Exit(2)
     if any(w.status != "converged" for w in weighed):
         raise typer.Exit(1)
+
+
+def _tell_written(paths: list[str | Path | None], *, beside_json: bool) -> None:
+    """Name the files that were written, out of the way of JSON on standard output."""
+    for path in paths:
+        if path is not None and str(path) != "-" and not is_stream(path):
+            (complain if beside_json else say)(f"written: {path}")
 
 
 def _progress(drives: list[Path]) -> Any:
@@ -170,6 +179,8 @@ def _show(
             screen.print(f"  note: {shown(line)}", no_wrap=True, overflow="ellipsis")
     for methods in compared:
         screen.print(method_table(methods))
+        if note := made_for(methods):
+            say(f"  note: {note}")
 
 
 def _show_one(w: Weighing) -> None:
@@ -201,6 +212,25 @@ def method_table(methods: tuple[Weighing, ...]) -> Table:
     for w in methods:
         table.add_row(w.method, *_numbers(w), _outcome(w))
     return table
+
+
+def made_for(methods: tuple[Weighing, ...]) -> str:
+    """Say which of the methods were run with a file made for another; empty where none was."""
+    from weighbridge.estimators import ESTIMATORS
+
+    fit = methods[0].vehicle.provenance.fit
+    if fit is None or not fit.torque:
+        return ""
+    found = [w.method for w in methods if w.result is not None]
+    others = [name for name in found if fit.name != ESTIMATORS[name].fits[0]]
+    others = [name for name in others if not ESTIMATORS[name].speed_alone]
+    if not others:
+        return ""
+    return (
+        f"the vehicle file was calibrated for {fit.name}: {', '.join(others)} "
+        f"{'were' if len(others) > 1 else 'was'} run with the torque of another method, which may "
+        f"shift their masses; trust {fit.name}"
+    )
 
 
 def _numbers(w: Weighing) -> list[str]:
