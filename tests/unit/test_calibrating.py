@@ -71,6 +71,14 @@ def test_one_drive_by_load(car, empty):
     assert max(nearest) < 0.02
 
 
+def test_the_engine_speed_at_standstill_is_the_idle_speed(car, empty):
+    assert car.driveline.idle_speed == pytest.approx(empty.scenario.car.idle_speed, rel=0.03)
+
+
+def test_a_motor_that_stands_has_no_idle_speed(electric):
+    assert calibrate(electric).driveline.idle_speed == 0.0
+
+
 def test_it_weighs_its_own_drive_and_another(car, empty, loaded):
     assert weigh(empty.drive, car).mass == pytest.approx(empty.truth.mass.mean(), rel=0.01)
     assert weigh(loaded.drive, car).mass == pytest.approx(loaded.truth.mass.mean(), rel=0.05)

@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from weighbridge.checks import check_drive, settle_drive
+from weighbridge.checks.clocks import check_pauses
 from weighbridge.checks.inertial import check_imu
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
@@ -608,8 +609,24 @@ def test_one_table_that_pauses_is_told(sane):
                 values=s.values[(s.time < 300.0) | (s.time > 420.0)])
         for s in cut.values()
     ]  # fmt: skip
-    (note,) = check_drive(sane.with_signals(*kept), CAR)
+    # As far apart as the vehicle went: a tunnel, and no word.
+    assert list(check_drive(sane.with_signals(*kept), CAR)) == []
+    # The same without a speed to tell the way by.
+    (note,) = check_pauses(
+        Drive("made", {s.name: s for s in (*kept, sane.signals["accel_x"])}), CAR
+    )
     assert "gnss pauses for 122 s from 299 s while the rest goes on" in note.text
+    assert "a tunnel or a car park is harmless" in note.text
+
+
+def test_a_clock_of_gnss_that_was_set_forward_is_no_tunnel(sane):
+    late = [
+        replace(s, time=np.where(s.time < 300.0, s.time, s.time + 120.0))
+        for n, s in sane.signals.items()
+        if n in GNSS
+    ]
+    (note,) = check_pauses(sane.with_signals(*late), CAR)
+    assert "if its clock was set there, cut the recording" in note.text
 
 
 def test_weigh_refuses_a_serious_problem(sane):

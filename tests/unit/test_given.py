@@ -7,6 +7,7 @@ import pytest
 import weighbridge as wb
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import to_frames, write_drive
+from weighbridge.pipeline.given import as_drives
 from weighbridge.signals import Drive, Problem, Signal
 
 
@@ -42,6 +43,12 @@ def test_data_frames_go_out_and_come_back(short_drive, short_car, library):
         np.testing.assert_array_equal(back.signals[name].time, signal.time)
         np.testing.assert_allclose(back.signals[name].values, signal.values, rtol=1e-12)
     assert wb.weigh(frames, short_car).mass == wb.weigh(back, short_car).mass
+
+
+def test_drives_of_frames_are_numbered(short_drive):
+    frames = to_frames(short_drive.drive)
+    assert [d.name for d in as_drives([frames, frames])] == ["frame 1", "frame 2"]
+    assert as_drives(frames)[0].name == "frame"
 
 
 def test_an_index_is_a_column_and_dates_are_the_time():

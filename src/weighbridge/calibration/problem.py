@@ -20,7 +20,7 @@ from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.classes import VehicleClass
-from weighbridge.vehicle.gear import GearDetection, detect_gearings
+from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling
 from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
@@ -174,6 +174,10 @@ def _draft(
             gearings=tuple(float(g) for g in gears.gearings),
             gearing_stds=tuple(float(g) for g in gears.stds),
         )
+    turning = all(len(drive.get("engine_speed") or ()) for drive in drives)
+    if turning and not driveline.single_speed and not driveline.idle_speed:
+        _, engine_speed, speed = _engine_and_speed(drives, motions)
+        driveline = replace(driveline, idle_speed=idling(engine_speed, speed))
     model = TorqueModel(
         source="measured" if source.needs_map else source.name,
         reference_torque=base.torque.reference_torque,
@@ -222,27 +226,31 @@ def find_gears(
     DriveError
         No engine speed, or no ratio stands out.
     """
-    times, engine, speeds = [], [], []
-    offset = 0.0
-    for drive, motion in zip(drives, motions, strict=True):
+    for drive in drives:
         signal = drive.get("engine_speed")
         if signal is None or len(signal) < 30:
             raise DriveError(
                 f"{drive.name}: no engine_speed, so no gear can be found; give gearings in the "
                 "vehicle file"
             )
+    return detect_gearings(*_engine_and_speed(drives, motions), idle_speed=idle_speed)
+
+
+def _engine_and_speed(
+    drives: Sequence[Drive], motions: Sequence[Motion]
+) -> tuple[Floats, Floats, Floats]:
+    """Instants of all drives [s], engine speed [rad/s] and speed of the vehicle there [m/s]."""
+    times, engine, speeds = [], [], []
+    offset = 0.0
+    for drive, motion in zip(drives, motions, strict=True):
+        signal = drive.signals["engine_speed"]
         instants = signal.time - motion.speed_delay
         inside = (instants >= motion.time[0]) & (instants <= motion.time[-1])
         times.append(instants[inside] + offset)
         engine.append(signal.values[inside])
         speeds.append(np.interp(instants[inside], motion.time, motion.speed))
         offset += float(signal.time[-1]) + 100.0
-    return detect_gearings(
-        np.concatenate(times),
-        np.concatenate(engine),
-        np.concatenate(speeds),
-        idle_speed=idle_speed,
-    )
+    return np.concatenate(times), np.concatenate(engine), np.concatenate(speeds)
 
 
 def _name(drives: Sequence[Drive]) -> str:

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.constants import EARTH_RADIUS
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
@@ -16,6 +17,12 @@ from weighbridge.vehicle.model import Vehicle
 
 # A pause in which nothing was recorded is told [s].
 _PAUSE: Final = 60.0
+
+# Way in a pause that is long enough to be compared with positions [m].
+_WENT: Final = 200.0
+
+# Straight distance over the way, of a tunnel that bends [-].
+_BENT: Final = 0.5
 
 
 def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -99,13 +106,16 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         )
     for table, time in tables.items():
         own = [p for p in _pauses(time) if not any(abs(p[0] - w[0]) < _PAUSE for w in whole)]
+        if table == "gnss":
+            own = [p for p in own if not _way_agrees(drive, *p)]
         if own:
             start, length = max(own, key=lambda p: p[1])
             several = f"{len(own)} times, the longest time " if len(own) > 1 else ""
+            harmless = "a tunnel or a car park is harmless, but " if table == "gnss" else ""
             yield Problem(
                 "",
                 f"{table} pauses {several}for {length:.0f} s from {start:.6g} s while the rest "
-                "goes on; if its clock was set there, cut the recording",
+                f"goes on; {harmless}if its clock was set there, cut the recording",
             )
 
 
@@ -118,6 +128,25 @@ def check_splices(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             f"there are {found[0].why}, {times} at {found[0].end:.6g} s, as where recordings are "
             "put one behind another: weighbridge weigh parts them, and read_drives in Python",
         )
+
+
+def _way_agrees(drive: Drive, start: float, length: float) -> bool:
+    """Tell whether positions before and after a pause are as far apart as the vehicle went.
+
+    A tunnel bends less than `_BENT`; a clock set forward leaves the two side by side.
+    """
+    speed, lat, lon = drive.get("vehicle_speed"), drive.get("latitude"), drive.get("longitude")
+    if speed is None or lat is None or lon is None or not (len(speed) and len(lat) and len(lon)):
+        return False
+    grid = np.linspace(start, start + length, max(int(length), 2))
+    if np.any(speed.age(grid) > 5.0):
+        return False
+    gone = float(np.trapezoid(np.abs(speed.at(grid)), grid))
+    ends = grid[[0, -1]]
+    north = float(np.ptp(lat.at(ends)))
+    east = float(np.ptp(lon.at(ends))) * float(np.cos(lat.at(ends)[0]))
+    apart = EARTH_RADIUS * float(np.hypot(north, east))
+    return gone > _WENT and _BENT * gone < apart < 1.1 * gone + 30.0
 
 
 def _pauses(time: Floats) -> list[tuple[float, float]]:

@@ -64,7 +64,10 @@ def home_of(given: GivenVehicle | None) -> Path | None:
 
 
 def as_drive(
-    given: GivenDrive, named: Path | None = None, asked: MappingSource | None = None
+    given: GivenDrive,
+    named: Path | None = None,
+    asked: MappingSource | None = None,
+    name: str = "frame",
 ) -> Drive:
     """Return a drive, read where it is a path or a table.
 
@@ -73,6 +76,7 @@ def as_drive(
     given
     named : mapping that the vehicle file names
     asked : mapping that the caller gives, which goes before it
+    name : of a drive that data frames make
 
     Raises
     ------
@@ -100,7 +104,7 @@ def as_drive(
     ):
         # Data frames with canonical names need no mapping, wherever the vehicle file was copied to.
         there = asked is not None or (named is not None and named.is_file())
-        return read_frame(given, mapping if there else None)
+        return read_frame(given, mapping if there else None, name=name)
     raise ConfigError(
         f"a drive is expected, got {type_name(given)}: give what read_drive returns, the path of a "
         "folder or file, or data frames"
@@ -112,9 +116,9 @@ def as_drives(
     named: Path | None = None,
     asked: MappingSource | None = None,
 ) -> list[Drive]:
-    """Return one or several drives, as of `as_drive`."""
+    """Return one or several drives, as of `as_drive`; those of data frames are numbered."""
     if isinstance(given, list | tuple):
-        return [as_drive(one, named, asked) for one in given]
+        return [as_drive(one, named, asked, f"frame {k}") for k, one in enumerate(given, 1)]
     return [as_drive(given, named, asked)]
 
 

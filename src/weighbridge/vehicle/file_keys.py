@@ -107,7 +107,12 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "wheel over engine power; 1 where torque was calibrated at the wheels",
             ),
             Key("speed_scale", "speed_scale", "indicated over true speed"),
-            Key("idle_speed", "idle_speed", "0 for a motor that stands", suffix="rpm"),
+            Key(
+                "idle_speed",
+                "idle_speed",
+                "0 for a motor that stands, or where no drive shows it",
+                suffix="rpm",
+            ),
         ),
     ),
     "torque": (

@@ -289,10 +289,17 @@ def shifting(time: Floats, gear: Ints, *, margin: float) -> Bools:
     return np.asarray(near <= margin)
 
 
-def _idle_speed(engine_speed: Floats, speed: Floats) -> float:
+def idling(engine_speed: Floats, speed: Floats) -> float:
+    """Usual speed of an engine that runs while the vehicle stands [rad/s]; 0 where none is seen."""
     standing = (speed < 0.3) & (engine_speed > 30.0)
-    if np.count_nonzero(standing) >= 10:
-        return float(np.median(engine_speed[standing]))
+    if np.count_nonzero(standing) < 10:
+        return 0.0
+    return float(np.median(engine_speed[standing]))
+
+
+def _idle_speed(engine_speed: Floats, speed: Floats) -> float:
+    if found := idling(engine_speed, speed):
+        return found
     running = engine_speed[engine_speed > 30.0]
     return float(np.percentile(running, 1)) if running.size else 0.0
 
