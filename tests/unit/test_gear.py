@@ -6,6 +6,7 @@ import pytest
 from weighbridge.errors import DriveError
 from weighbridge.vehicle.gear import (
     detect_gearings,
+    idling,
     number_reported_gears,
     predict_gear,
     reported_gear_numbers,
@@ -98,3 +99,12 @@ def test_a_gear_told_that_slips_keeps_its_number():
     numbers = reported_gear_numbers(told, np.full(10, 17.0), np.array([18.9, 14.7, 10.5]))
     gear = number_reported_gears(told, numbers)
     assert gear.tolist() == [2] * 10
+
+
+def test_idle_is_the_usual_speed_at_standstill_not_that_of_starts_and_feet():
+    standing = np.concatenate((np.linspace(32.0, 85.0, 300), np.linspace(84.0, 180.0, 900)))
+    idle = 83.0 + 0.3 * np.sin(np.arange(500.0))
+    engine = np.concatenate((standing, idle, np.full(900, 250.0), np.zeros(400)))
+    speed = np.concatenate((np.zeros(1700), np.full(900, 20.0), np.zeros(400)))
+    assert idling(engine, speed) == pytest.approx(83.0, rel=0.01)
+    assert idling(engine[2600:], speed[2600:]) == 0.0

@@ -176,8 +176,7 @@ def _draft(
         )
     turning = all(len(drive.get("engine_speed") or ()) for drive in drives)
     if turning and not driveline.single_speed and not driveline.idle_speed:
-        _, engine_speed, speed = _engine_and_speed(drives, motions)
-        driveline = replace(driveline, idle_speed=idling(engine_speed, speed))
+        driveline = replace(driveline, idle_speed=_warm_idle(drives, motions))
     model = TorqueModel(
         source="measured" if source.needs_map else source.name,
         reference_torque=base.torque.reference_torque,
@@ -234,6 +233,15 @@ def find_gears(
                 "vehicle file"
             )
     return detect_gearings(*_engine_and_speed(drives, motions), idle_speed=idle_speed)
+
+
+def _warm_idle(drives: Sequence[Drive], motions: Sequence[Motion]) -> float:
+    """Lowest of the idle speeds of the drives, as a cold engine idles faster [rad/s]; 0 if none."""
+    found = []
+    for drive, motion in zip(drives, motions, strict=True):
+        _, engine_speed, speed = _engine_and_speed([drive], [motion])
+        found.append(idling(engine_speed, speed))
+    return min((idle for idle in found if idle > 0.0), default=0.0)
 
 
 def _engine_and_speed(
