@@ -27,10 +27,6 @@ MOTION: Final = frozenset(
 """Signals a mass is made from beside the torque's: what is wrong with them is serious."""
 
 
-STEADY: Final = frozenset(("battery_voltage",))
-"""Signals that may stay the same for long, whatever the vehicle does."""
-
-
 def of_torque() -> frozenset[str]:
     """Signals of torque: only what is wrong with those of the source in use is serious."""
     return frozenset(
@@ -38,7 +34,8 @@ def of_torque() -> frozenset[str]:
         for source in TORQUE_SOURCES.values()
         for names in (source.signals, *source.others)
         for name in names
-    ).difference(MOTION, STEADY)
+        if name not in source.steady
+    ).difference(MOTION)
 
 
 def needed(drive: Drive, vehicle: Vehicle | None) -> frozenset[str]:

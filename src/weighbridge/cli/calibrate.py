@@ -45,48 +45,59 @@ def _kilograms(text: str) -> float:
         raise typer.BadParameter(f"{text!r} is no mass: {remedy}") from None
 
 
+_Output = Annotated[
+    Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
+]
+_Masses = Annotated[
+    Optional[list[float]],  # noqa: UP045
+    typer.Option(
+        "--mass",
+        help="Known mass in kg as the drive begins; repeat it where they differ, one for each "
+        "recording, or one for each drive that recordings hold. Without it, mass_kg of each "
+        "drive.toml.",
+        parser=_kilograms,
+        metavar="KG",
+    ),
+]
+_Base = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--vehicle", help="What is known already: class, wheel radius, gearings."),
+]
+_Tare = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--tare", help="Mass without payload in kg; payloads count from it."),
+]
+_Method = Annotated[
+    str, typer.Option("--method", help="Estimator to calibrate for: rls, joint or speed-ekf.")
+]
+_Order = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option("--order", min=0, max=4, help="Power of engine speed in the torque fit."),
+]
+_Torque = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--torque", help="What the drives tell: a torque source."),
+]
+_Grid = Annotated[
+    bool, typer.Option("--grid", help="Search the grid of Jensen 2022, Table 5, instead.")
+]
+_Straight = Annotated[
+    bool,
+    typer.Option("--straight", help="Torque linear in load, as eq. 49 of Jensen 2022 prints."),
+]
+
+
 def calibrate(
     drives: DrivePaths,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
-    ],
-    mass: Annotated[
-        Optional[list[float]],  # noqa: UP045
-        typer.Option(
-            "--mass",
-            help="Known mass in kg as the drive begins; repeat it where they differ, one for each "
-            "recording, or one for each drive that recordings hold. Without it, mass_kg of each "
-            "drive.toml.",
-            parser=_kilograms,
-            metavar="KG",
-        ),
-    ] = None,
-    vehicle: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--vehicle", help="What is known already: class, wheel radius, gearings."),
-    ] = None,
-    tare: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--tare", help="Mass without payload in kg; payloads count from it."),
-    ] = None,
-    method: Annotated[
-        str, typer.Option("--method", help="Estimator to calibrate for: rls, joint or speed-ekf.")
-    ] = "joint",
-    order: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option("--order", min=0, max=4, help="Power of engine speed in the torque fit."),
-    ] = None,
-    torque: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--torque", help="What the drives tell: a torque source."),
-    ] = None,
-    grid: Annotated[
-        bool, typer.Option("--grid", help="Search the grid of Jensen 2022, Table 5, instead.")
-    ] = False,
-    straight: Annotated[
-        bool,
-        typer.Option("--straight", help="Torque linear in load, as eq. 49 of Jensen 2022 prints."),
-    ] = False,
+    output: _Output,
+    mass: _Masses = None,
+    vehicle: _Base = None,
+    tare: _Tare = None,
+    method: _Method = "joint",
+    order: _Order = None,
+    torque: _Torque = None,
+    grid: _Grid = False,
+    straight: _Straight = False,
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,

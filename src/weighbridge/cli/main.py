@@ -29,8 +29,8 @@ from weighbridge.cli import (
     vehicle,
     weigh,
 )
+from weighbridge.cli.listed import TellsMethods, TellsSources
 from weighbridge.cli.terminal import STREAM, complain, guarded, leave_quietly, say
-from weighbridge.cli.torque_help import TellsSources
 from weighbridge.errors import WeighbridgeError
 from weighbridge.visible import visible_text
 
@@ -50,7 +50,7 @@ app = typer.Typer(
 app.command()(demo.demo)
 app.command()(inspect.inspect)
 app.command(cls=TellsSources)(calibrate.calibrate)
-app.command()(weigh.weigh)
+app.command(cls=TellsMethods)(weigh.weigh)
 app.command()(live.live)
 app.command()(inertia.inertia)
 app.command()(simulate.simulate)

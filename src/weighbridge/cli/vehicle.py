@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
+from weighbridge.cli.listed import TellsSources
 from weighbridge.cli.options import MappingPath
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say, shown
-from weighbridge.cli.torque_help import TellsSources
 
 if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle

@@ -32,38 +32,44 @@ _WIDTH = 160
 # Warnings of one drive that are printed below a table of several.
 _NOTED = 3
 
-_METHODS = "Estimator: joint, rls, robust-rls, ekf, hybrid or speed-ekf."
+
+_VehiclePath = Annotated[
+    Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
+]
+_Method = Annotated[str, typer.Option("--method", help="Estimator.")]
+_Changes = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--set",
+        help="Change a setting of the estimator, such as forgetting=0.999; repeat it for more.",
+        metavar="NAME=VALUE",
+    ),
+]
+_Json = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--json", help="Write one JSON object per drive to a file, or - for here."),
+]
+_Track = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--track", help="Write the mass over time: .csv or .parquet. One drive."),
+]
+_Compare = Annotated[
+    bool,
+    typer.Option(
+        "--compare", help="Weigh by every method; show them side by side, in the report too."
+    ),
+]
 
 
 def weigh(
     drives: DrivePaths,
-    vehicle: Annotated[
-        Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
-    ],
-    method: Annotated[str, typer.Option("--method", help=_METHODS)] = "joint",
-    changes: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(
-            "--set",
-            help="Change a setting of the estimator, such as forgetting=0.999; repeat it for more.",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
-    json_path: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--json", help="Write one JSON object per drive to a file, or - for here."),
-    ] = None,
-    track: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--track", help="Write the mass over time: .csv or .parquet. One drive."),
-    ] = None,
+    vehicle: _VehiclePath,
+    method: _Method = "joint",
+    changes: _Changes = None,
+    json_path: _Json = None,
+    track: _Track = None,
     report: ReportPath = None,
-    compare: Annotated[
-        bool,
-        typer.Option(
-            "--compare", help="Weigh by every method; show them side by side, in the report too."
-        ),
-    ] = False,
+    compare: _Compare = False,
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,

@@ -61,13 +61,13 @@ def row_noise_std(view: MergedView, phi: Floats, used: Bools, method: str) -> fl
     view : the rows
     phi : (n,) regressor of the mass [m/s^2]
     used : (n,)
-    method : of `ROW_SHARE`
+    method : of `ROW_SHARE`; another one is taken to lose the most
     """
     moving = view.specific_force[np.isfinite(view.specific_force) & (view.speed > ROW_FAST)]
     if not used.any() or moving.size < 10:
         return 0.0
     part = noise_level(moving) ** 2 / float(np.mean(phi[used] ** 2))
-    std = ROW_SHARE[method] * part
+    std = ROW_SHARE.get(method, max(ROW_SHARE.values())) * part
     return std if std > LEAST else 0.0
 
 

@@ -75,6 +75,7 @@ class Recording:
     channels : in the order of the log
     absolute : whether their time counts from 1970
     start : where it begins [s since 1970], if it does not count from there and the log tells
+    of_day : its clock counts from midnight, of a day that the log does not tell
     time : what a mapping has to call the time; empty where the format has a clock of its own
     time_unit : suffix of that time's unit, where the log does not state it
     time_format : how that time is written, as a mapping tells it; empty for numbers
@@ -85,6 +86,7 @@ class Recording:
     channels: list[Channel]
     absolute: bool = False
     start: float | None = None
+    of_day: bool = False
     time: str = ""
     time_unit: str = ""
     time_format: str = ""
@@ -155,7 +157,13 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
     ConfigError
         A mapped channel has no unit, or one that it cannot be in.
     """
-    log = Log(path, absolute=found.absolute, start=found.start, frames=found.frames)
+    log = Log(
+        path,
+        absolute=found.absolute,
+        start=found.start,
+        of_day=found.of_day,
+        frames=found.frames,
+    )
     log.problems += [Problem("", f"{path.name}: {note}") for note in found.notes]
     wanted = _mapped(log, found, mapping) if mapping is not None and mapping.signals else {}
     # What a mapping names and is no channel may be a signal of the frames.

@@ -278,9 +278,11 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
 
 _WANTED: Final = {
     quantity: tuple(dict.fromkeys(frozenset(spelled(p.split())) for p in phrases))
-    for quantity, phrases in PHRASES.items()
+    for quantity, phrases in (
+        {q: (q.replace("_", " "),) for q in QUANTITIES if q not in PHRASES} | PHRASES
+    ).items()
 }
-"""The words of `PHRASES`, spelled out."""
+"""The words of `PHRASES`, spelled out; a quantity that is not in it goes by its name."""
 
 _NOT: Final = {q: frozenset(spelled(words)) | words for q, words in _AGAINST.items()}
 

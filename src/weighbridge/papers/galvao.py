@@ -40,7 +40,6 @@ from weighbridge.papers.galvao_drives import (
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
 from weighbridge.report.study import write_study
 from weighbridge.report.style import (
-    BAND,
     BLUE,
     GREEN,
     GREY,
@@ -48,6 +47,7 @@ from weighbridge.report.style import (
     PURPLE,
     VERMILLION,
     Panel,
+    band,
     blank,
     dots,
     line,
@@ -323,7 +323,7 @@ def reproduced(seed: int, progress: Progress | None) -> Reproduced:
 def tests_table(done: Reproduction) -> Table:
     """Put the three tests beside the paper's Tables 1 and 2."""
     rows = []
-    for test, theirs, error, band in zip(
+    for test, theirs, error, half in zip(
         done.tests, PAPER_MASSES, PAPER_ERRORS, PAPER_BANDS, strict=True
     ):
         rows.append(
@@ -331,7 +331,7 @@ def tests_table(done: Reproduction) -> Table:
                 f"Test {test.number:02d}",
                 f"{theirs:.2f}",
                 error,
-                f"± {band:.0f}",
+                f"± {half:.0f}",
                 f"{test.mass:.1f}",
                 f"{mean_mass(test.ours.mass, test.ours.used):.2f}",
                 f"{100.0 * abs(test.error(test.ours)):.4f}",
@@ -463,11 +463,7 @@ def _panels(test: Test) -> list[Panel]:
 
 def _banded(figure: go.Figure, minutes: Floats, run: FilterRun, used: Bools) -> None:
     x, mass, half = minutes[used], run.mass[used], 1.96 * run.std[used]
-    line(figure, x, mass - half, "", BAND, showlegend=False, hoverinfo="skip", line_width=0)
-    line(
-        figure, x, mass + half, "95 % band", BAND,
-        fill="tonexty", fillcolor=BAND, hoverinfo="skip", line_width=0,
-    )  # fmt: skip
+    band(figure, x, mass - half, mass + half, "95 % band")
     line(figure, x, mass, "started at the calibration's mass", BLUE)
 
 

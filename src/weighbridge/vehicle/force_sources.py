@@ -233,6 +233,7 @@ BATTERY: Final = REPORTED(
     name="battery",
     signals=("battery_current", "battery_voltage", "vehicle_speed"),
     others=(("battery_current", "battery_voltage", "gnss_speed"),),
+    steady=("battery_voltage",),
     combined=_driving_power,
     gearing=_per_distance,
     before_motor=True,

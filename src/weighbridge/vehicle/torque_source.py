@@ -67,6 +67,8 @@ class TorqueSource:
     name : in vehicle files and options
     signals : what a drive must hold; the first carries the clock
     others : sets of signals that do instead, the better first
+    steady : those of them that may stay the same for long whatever the vehicle does, such as a gear
+        or a voltage: they do not count as frozen then
     combined : makes the signal that carries the torque of several; None where the first of a set
         does
     gearing : angle of the reading's shaft per distance travelled [1/m] by rolling radius [m]: what
@@ -101,6 +103,7 @@ class TorqueSource:
     name: str
     signals: tuple[str, ...]
     others: tuple[tuple[str, ...], ...] = ()
+    steady: tuple[str, ...] = ()
     combined: Callable[[Drive], Signal] | None = None
     gearing: Callable[[float], float] | None = None
     before_motor: bool = False

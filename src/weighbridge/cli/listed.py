@@ -7,6 +7,19 @@ from typing import Any
 from typer.core import TyperCommand, TyperOption
 
 
+class TellsMethods(TyperCommand):
+    """A command whose help lists the estimators, read only where help is asked for."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help page."""
+        from weighbridge.estimators import ESTIMATORS
+
+        for option in self.params:
+            if isinstance(option, TyperOption) and option.name == "method":
+                option.help = f"Estimator: {ESTIMATORS.names}."
+        super().format_help(ctx, formatter)
+
+
 class TellsSources(TyperCommand):
     """A command whose help lists the torque sources, read only where help is asked for."""
 
