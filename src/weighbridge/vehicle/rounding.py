@@ -27,6 +27,13 @@ COVARIANCE_DIGITS: Final = 6
 SHARE: Final = 0.01
 """Part of a covariance's smallest variance by which rounding may move any [-]."""
 
+PINNED: Final = 1e-9
+"""Variance of a correlation that is zero but for rounding [-]: a combination is known exactly."""
+
+PINNED_DIGITS: Final = 8
+"""Digits of such a covariance at least: that combination then moves by 0.0001 of what its parts
+do, each by itself."""
+
 _MOST_DIGITS: Final = 17
 
 
@@ -64,8 +71,8 @@ def covariance_texts(triangle: tuple[float, ...], *, exact: bool) -> list[str]:
     std = np.sqrt(np.maximum(np.diag(cov), 0.0))
     scale = np.outer(std, std)[rows, columns]
     correlation = np.divide(cov[rows, columns], scale, where=scale > 0.0, out=np.zeros(rows.size))
-    least = _smallest(correlation, rows, columns, std > 0.0)
-    for digits in range(COVARIANCE_DIGITS, _MOST_DIGITS):
+    least, pinned = _smallest(correlation, rows, columns, std > 0.0)
+    for digits in range(PINNED_DIGITS if pinned else COVARIANCE_DIGITS, _MOST_DIGITS):
         texts = [
             _to_step(v, s * 10.0**-digits) if s > 0.0 else exact_text(v, "ratio")
             for v, s in zip(triangle, scale, strict=True)
@@ -75,12 +82,17 @@ def covariance_texts(triangle: tuple[float, ...], *, exact: bool) -> list[str]:
     return [exact_text(v, "ratio") for v in triangle]
 
 
-def _smallest(correlation: Any, rows: Any, columns: Any, there: Any) -> float:
-    """Smallest eigenvalue of a correlation, of the parameters that are there."""
+def _smallest(correlation: Any, rows: Any, columns: Any, there: Any) -> tuple[float, bool]:
+    """Smallest eigenvalue of a correlation that is not zero, and whether one is zero.
+
+    Of the parameters that are there.
+    """
     whole = np.zeros((there.size, there.size))
     whole[rows, columns] = whole[columns, rows] = correlation
     kept = whole[np.ix_(there, there)]
-    return float(np.linalg.eigvalsh(kept)[0]) if kept.size else 0.0
+    values = np.linalg.eigvalsh(kept) if kept.size else np.zeros(0)
+    free = values[values > PINNED]
+    return float(free.min(initial=np.inf)), bool(free.size < values.size)
 
 
 def _stds(field: str, part: Any, many: int) -> tuple[float, ...]:
