@@ -1,5 +1,7 @@
 """What README and docs tell to type and to call works as it stands there."""
 
+import ast
+import inspect
 import re
 import shlex
 from pathlib import Path
@@ -73,13 +75,30 @@ def test_the_five_minutes_in_python(five_minutes, monkeypatch):
     for made in (five_minutes / "loaded.html", five_minutes / "car.toml"):
         made.unlink(missing_ok=True)
     frames = to_frames(wb.read_drive("loaded/"))
-    (code,) = blocks(Path("README.md"), "python")
+    (code,) = (b for b in blocks(Path("README.md"), "python") if "calib/" in b)
     names = {"obd": frames["obd"], "imu": frames["imu"].to_pandas()}
     exec(code, names)
     assert names["w"].interval(0.99)[0] < 1790.0 < names["w"].interval(0.99)[1]
     assert names["drive"].has("accel_x", "vehicle_speed")
     assert (five_minutes / "loaded.html").is_file()
     assert (five_minutes / "car.toml").is_file()
+
+
+def test_functions_of_the_readme_take_what_it_gives_them():
+    """Calls on files that only a reader has, by their signatures."""
+    calls = [
+        node
+        for code in blocks(Path("README.md"), "python")
+        for node in ast.walk(ast.parse(code))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and isinstance(node.func.value, ast.Name)
+        and node.func.value.id == "wb"
+    ]
+    assert {"mapping"} <= {k.arg for call in calls for k in call.keywords}
+    for call in calls:
+        keywords = {k.arg: None for k in call.keywords}
+        inspect.signature(getattr(wb, call.func.attr)).bind(*call.args, **keywords)
 
 
 @pytest.mark.parametrize(
