@@ -121,6 +121,19 @@ def test_grid_of_table_5_ends_near(empty):
     assert steps == pytest.approx(round(steps), abs=1e-6)
 
 
+def test_what_lies_on_a_bound_is_told_with_what_it_means():
+    # Of an air that brakes nothing the least drag area is still too much.
+    slow = replace(make_scenario("car-short", seed=31).car, drag_area=0.02)
+    made = simulate_car(
+        replace(make_scenario("car-short", seed=31, without=("warm_up",)), car=slow)
+    )
+    done = run_calibration(made.drive, settings=CalibrationSettings(method="rls"))
+    assert "drag_area" in done.held
+    notes = done.vehicle.provenance.notes
+    assert f"held by a bound: {', '.join(done.held)}: the regression could not tell" in notes
+    assert "calibrate by method joint" in notes
+
+
 def test_straight_regression_has_no_curvature(empty):
     car = calibrate(empty.drive, settings=CalibrationSettings(order=1, curved=False))
     assert len(car.torque.coefficients) == 3

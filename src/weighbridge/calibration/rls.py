@@ -92,13 +92,7 @@ def fit_rls(problem: Problem) -> Fitted:
         if is_free and name in fitted.at_bound
     )
     if held:
-        vehicle = noted(
-            vehicle,
-            f"held by a bound: {', '.join(held)}: the regression could not tell "
-            f"{'these' if len(held) > 1 else 'this'} from the torque, and masses lean on "
-            f"{'these bounds' if len(held) > 1 else 'this bound'}; "
-            "calibrate by method joint, or on drives with more hills, speeds and gears",
-        )
+        vehicle = noted(vehicle, bound_note(held))
     if not found:
         vehicle = noted(vehicle, NOT_TOLD)
     return Fitted(
@@ -106,6 +100,16 @@ def fit_rls(problem: Problem) -> Fitted:
         rows=rows,
         search=search.result(fitted.independent_rows),
         held=held,
+    )
+
+
+def bound_note(held: Sequence[str]) -> str:
+    """Say what it means that parameters of the road lie on a bound."""
+    these, bounds = ("these", "these bounds") if len(held) > 1 else ("this", "this bound")
+    return (
+        f"held by a bound: {', '.join(held)}: the regression could not tell {these} from the "
+        f"torque, and masses lean on {bounds}; calibrate by method joint, or on drives with more "
+        "hills, speeds and gears"
     )
 
 
