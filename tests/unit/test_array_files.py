@@ -187,7 +187,7 @@ def test_a_time_that_is_not_there_is_refused(files):
 
 def test_without_a_mapping_the_next_step_is_named(tmp_path):
     savemat(tmp_path / "a.mat", {"time": SLOW, "v": SPEED})
-    with pytest.raises(DriveError, match=r"no channel that is known.*weighbridge map a\.mat"):
+    with pytest.raises(DriveError, match=r"channel that is known.*weighbridge map .*a\.mat -o map"):
         read_drive(tmp_path / "a.mat")
 
 
