@@ -247,3 +247,25 @@ def test_the_torque_of_a_retarder_is_taken_and_its_sign_doubted(tmp_path, sign, 
     found = {c.quantity: c for c in draft(path).known}["retarder_torque"]
     assert found.unit == "pct"
     assert ("factor = -1" in found.doubt) == doubted
+
+
+@pytest.mark.parametrize(
+    ("unit", "step", "seconds"), [("ms", 10.0, 0.01), ("s", 0.1, 0.1), ("µs", 1e4, 0.01)]
+)
+def test_a_row_of_units_tells_that_of_the_time(tmp_path, unit, step, seconds):
+    path = tmp_path / "log.csv"
+    rows = [f"{k * step:.1f},{20 + k % 5},{1500 + k % 7}" for k in range(300)]
+    path.write_text("\n".join(["Time,Speed,RPM", f"{unit},km/h,1/min", *rows]), encoding="utf-8")
+    (tmp_path / "map.toml").write_text(mapping_text([draft(path)]), encoding="utf-8")
+    drive = read_drive(path, tmp_path / "map.toml")
+    assert drive.signals["vehicle_speed"].period == pytest.approx(seconds)
+
+
+def test_parquet_by_its_short_suffix_is_drafted(tmp_path):
+    frame = pl.DataFrame({"time": np.arange(100) * 0.1, "Speed [km/h]": np.full(100, 30.0)})
+    texts = []
+    for suffix in (".parquet", ".pq"):
+        path = tmp_path / f"log{suffix}"
+        frame.write_parquet(path)
+        texts.append(mapping_text([draft(path)]).replace(suffix, ""))
+    assert texts[0] == texts[1]

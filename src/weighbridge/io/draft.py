@@ -6,7 +6,7 @@ Nothing is asked and nothing is guessed silently: what is doubtful is told with 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -138,14 +138,14 @@ def draft(path: Path) -> Draft:
         It is no table, has no time, or none of its columns is known.
     """
     units: dict[str, str] = {}
-    if path.suffix.lower() == ".parquet":
+    if path.suffix.lower() in (".parquet", ".pq"):
         text, raw = TextFormat(), read_parquet(path)
     else:
         text, units = _text_format(path)
         raw = read_text(path, text)
     if raw.rows == 0:
         raise DriveError(f"{path} has a header and no rows; nothing can be told of its columns")
-    time = _find_time(raw)
+    time = _find_time(raw, units)
     names = [n for k, n in enumerate(raw.names) if k != time.index]
     named = recognise_all(names, [units.get(n) for n in names])
     columns = tuple(
@@ -237,13 +237,16 @@ def _separator(lines: Sequence[str]) -> str:
     return max(SEPARATORS, key=lambda s: sum(line.count(s) for line in lines))
 
 
-def _find_time(raw: RawTable) -> _Time:
+def _find_time(raw: RawTable, units: Mapping[str, str]) -> _Time:
+    """Find the column of the time; ``units`` are those that a row of the file states."""
     places = [k for k, name in enumerate(raw.names) if is_time(name)]
     places += [
         k for k in range(len(raw.names)) if raw.column(k).dtype.is_temporal() and k not in places
     ]
-    found = [t for k in places if (t := _as_time(raw, k)) is not None]
-    found = found or [t for k in range(len(raw.names)) if (t := _likely_time(raw, k)) is not None]
+    found = [t for k in places if (t := _as_time(raw, k, units)) is not None]
+    found = found or [
+        t for k in range(len(raw.names)) if (t := _likely_time(raw, k, units)) is not None
+    ]
     if not found:
         raise DriveError(
             f"{raw.path} has no column that can be its time; it has {column_list(raw.names)}: name "
@@ -257,10 +260,10 @@ def _find_time(raw: RawTable) -> _Time:
     return best
 
 
-def _likely_time(raw: RawTable, index: int) -> _Time | None:
+def _likely_time(raw: RawTable, index: int, units: Mapping[str, str]) -> _Time | None:
     """Read a column that rises as a time where part of its name, or its size, says so."""
     named = bool(TIME_WORDS & set(words_of(raw.names[index])))
-    found = _as_time(raw, index)
+    found = _as_time(raw, index, units)
     if found is None or not (named or since_1970(found.seconds)):
         return None
     steps = np.diff(found.seconds[np.isfinite(found.seconds)])
@@ -276,7 +279,7 @@ def _resolution(seconds: Floats) -> float:
     return np.unique(known).size / max(seconds.size, 1)
 
 
-def _as_time(raw: RawTable, index: int) -> _Time | None:
+def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> _Time | None:
     """Read a column as a time; None where it cannot be one."""
     series, name = raw.column(index), raw.names[index]
     if series.dtype.is_temporal():
@@ -296,6 +299,8 @@ def _as_time(raw: RawTable, index: int) -> _Time | None:
         return None
     doubts = []
     stated, _ = unit_of(name)
+    if stated is None and name in units:
+        stated, _ = unit_of(f"{name} [{units[name]}]")
     if stated is not None and UNITS[stated].dimension == "s":
         unit = stated
     else:

@@ -50,7 +50,7 @@ def true_fixes(signals: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[P
     if not np.array_equal(time, longitude.time):
         return found, []
     fixes = fix_rows(time, np.column_stack((latitude.values, longitude.values)))
-    if fixes is None:
+    if fixes is None or fixes.size < 2:
         return found, []
     stamps = time[fixes]
     for name, signal in signals.items():
