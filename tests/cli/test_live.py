@@ -77,6 +77,8 @@ def test_nothing_that_is_read_is_replaced(weighbridge, loaded, car):
         ("--json", car),
         ("--json", loaded.folder / "imu.parquet"),
         ("--ticket", 1700, "-o", car),
+        ("--state", car),
+        ("--state", loaded.folder / "drive.toml"),
     ):
         before = car.read_bytes()
         ran = weighbridge("live", "--vehicle", car, "--replay", loaded.folder, *words)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import weighbridge as wb
 from tests.live.conftest import SHORT
 from weighbridge.errors import ConfigError
+from weighbridge.live.learning import _nothing
 from weighbridge.live.weighing import LiveStatus
 from weighbridge.pipeline.forward import forward_weigh
 
@@ -190,6 +191,29 @@ def test_a_signal_that_stays_away_is_named(short, weighing):
     assert told.status is LiveStatus.LEARNING
     assert np.isnan(told.mass)
     assert "engine_load" in told.reason
+
+
+def test_a_change_of_load_forgets_the_learned_mass_and_its_records(car, loaded):
+    """Records of the load before are neither shown nor weighed again."""
+    scale = wb.LiveScale(car, info=loaded.drive.info)
+    part = loaded.drive.between(loaded.drive.start, loaded.drive.start + 400.0)
+    for block in blocks(part, even(part, 20.0)):
+        scale.update_block(block)
+    assert scale.weighing().mass > 0.0
+    scale.load_changed()
+    assert np.isnan(scale.weighing().mass)
+    assert scale.recorded().signals["accel_x"].duration < 1.0
+
+
+def test_a_withdrawn_mass_stays_withdrawn_over_a_power_cut(weighing, setup, short):
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    fed(scale, short, even(short, 20.0))
+    scale._learned = _nothing(short.end, "the records contradict themselves", inconsistent=True)
+    again = wb.LiveScale.restore(weighing.vehicle, scale.checkpoint())
+    assert again.weighing().status is LiveStatus.INCONSISTENT
+    assert "contradict" in again.weighing().reason
+    again.load_changed()
+    assert np.isnan(again.weighing().mass)
 
 
 def test_tare_and_change_of_load(short, weighing, setup):

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 _NO_STATE = "none"
 
-
 _VehiclePath = Annotated[
     Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
 ]
@@ -161,16 +160,19 @@ def live(
     if bool(source) == (replay is not None):
         raise ConfigError("give --source KIND:PLACE once or more, or --replay DRIVE")
     car = Vehicle.load(vehicle)
-    read = [replay] if replay is not None else []
     chosen = mapping_of(car, vehicle, mapping)
+    kept = _state_file(state, replay, vehicle)
     results = asked_for(track=None, report=None, json=json_path)
     if out is not None:
         refuse_overwriting(out, force, "vehicle file")
         results.append(Result("--out", out, "vehicle file"))
-    refuse_results(inputs(read, vehicle, chosen, dbc), results)
+    if kept is not None and (state is not None or kept == vehicle):
+        results.append(Result("--state", kept, "state"))
+    read = inputs([replay] if replay is not None else [], vehicle, chosen, dbc)
+    refuse_results(read, results)
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     sources, info = _sources(source or (), replay, rate, chosen, dbc, listen_only)
-    scale, keeper = _scale(car, _state_file(state, replay, vehicle), lateness, info)
+    scale, keeper = _scale(car, kept, lateness, info)
     with (
         keys(wanted=not any(s.name == "lines:-" for s in sources)) as pressed,
         Outputs(_outputs(json_path, mqtt, page, car, vehicle)) as outputs,
@@ -188,10 +190,15 @@ def live(
         last = _run(session, pressed)
     if ticket is not None and out is not None:
         _calibrate(scale, ticket, car, out)
+    _conclude(last, aloud=json_path != "-")
+
+
+def _conclude(last: LiveWeighing, *, aloud: bool) -> None:
+    """Say the mass at the end; exit with 1 where there is none."""
     if math.isnan(last.mass):
         complain(f"{last.status}: {last.reason}")
         raise typer.Exit(1)
-    if json_path != "-":
+    if aloud:
         low, high = last.interval()
         say(f"{last.mass:.0f} kg, {low:.0f} to {high:.0f} kg with 95 % probability")
 
@@ -252,11 +259,11 @@ def _scale(
 def _outputs(
     json_path: str | None, mqtt: str | None, page: str | None, car: Vehicle, vehicle: Path
 ) -> list[Output]:
-    """Make the outputs that were asked for, the terminal first."""
+    """Make the outputs that were asked for; the terminal's view begins when all others stand."""
     from weighbridge.live.outputs.lines import Lines
     from weighbridge.live.outputs.terminal import terminal
 
-    made: list[Output] = [terminal(console(stderr=True))]
+    made: list[Output] = []
     if json_path is not None:
         made.append(Lines(json_path))
     if mqtt is not None:
@@ -269,7 +276,7 @@ def _outputs(
         shown = Page(*_address(page))
         complain(f"page: {shown.name}")
         made.append(shown)
-    return made
+    return [*made, terminal(console(stderr=True))]
 
 
 def _address(text: str) -> tuple[str, int]:

@@ -13,7 +13,7 @@ from typing import Final, Literal
 from weighbridge.errors import ConfigError
 from weighbridge.whole import is_stream
 
-Kind = Literal["report", "JSON file", "track", "vehicle file", "mapping", "MF4"]
+Kind = Literal["report", "JSON file", "track", "vehicle file", "mapping", "MF4", "state"]
 
 # What a file of each kind shows at its beginning.
 _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
@@ -25,6 +25,7 @@ _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
         rb"^[ \t]*\[[ \t]*(?:vehicle|driveline|torque|road_load|provenance)[ \t]*\]", re.MULTILINE
     ),
     "mapping": re.compile(rb"^[ \t]*\[[ \t]*(?:csv|time|signals|tables)\b", re.MULTILINE),
+    "state": re.compile(rb'\A\{"weighbridge_checkpoint"'),
     "MF4": re.compile(rb"\A(?:MDF     |UnFinMF )"),
 }
 

@@ -82,10 +82,9 @@ def weigh(
 
     Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
     """
-    from weighbridge.errors import ConfigError, WeighbridgeError
+    from weighbridge.errors import ConfigError
     from weighbridge.estimators.settings import parsed
     from weighbridge.pipeline.given import mapping_of
-    from weighbridge.pipeline.weighing import weigh as weigh_drive
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.whole import write_whole
 
@@ -96,30 +95,16 @@ def weigh(
     refuse_results(
         inputs(drives, vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
     )
-    settings = parsed(changes or [])
-    weighed: list[Weighing] = []
-    failed: list[tuple[str, str]] = []
-    for path in _progress(drives):
-        try:
-            parts = load_parts(path, chosen, dbc, whole=whole)
-        except WeighbridgeError as error:
-            if len(drives) == 1:
-                raise
-            failed.append((path.name, str(error)))
-            continue
-        if track is not None and len(parts) > 1:
-            raise ConfigError(
-                f"--track takes one drive, and {path} holds {len(parts)}: use --json, or --whole "
-                "to take them as one"
-            )
-        for drive in parts:
-            try:
-                weighed.append(weigh_drive(drive, car, method, settings=settings))
-            except WeighbridgeError as error:
-                if len(drives) == len(parts) == 1:
-                    raise
-                failed.append((drive.name if len(parts) > 1 else path.name, str(error)))
-
+    weighed, failed = _weighed(
+        drives,
+        car,
+        method,
+        parsed(changes or []),
+        chosen,
+        dbc,
+        whole=whole,
+        alone=track is not None,
+    )
     compared = [w.compare() for w in weighed] if compare else []
     if track is not None:
         weighed[0].write_track(track)
@@ -143,6 +128,49 @@ def weigh(
         raise typer.Exit(2)
     if any(w.status != "converged" for w in weighed):
         raise typer.Exit(1)
+
+
+def _weighed(
+    drives: list[Path],
+    car: Vehicle,
+    method: str,
+    settings: dict[str, object],
+    mapping: Path | None,
+    dbc: list[str] | None,
+    *,
+    whole: bool,
+    alone: bool,
+) -> tuple[list[Weighing], list[tuple[str, str]]]:
+    """Weigh every drive of the recordings; name those that could not be, and why.
+
+    ``alone`` refuses a recording of several drives.
+    """
+    from weighbridge.errors import ConfigError, WeighbridgeError
+    from weighbridge.pipeline.weighing import weigh as weigh_drive
+
+    weighed: list[Weighing] = []
+    failed: list[tuple[str, str]] = []
+    for path in _progress(drives):
+        try:
+            parts = load_parts(path, mapping, dbc, whole=whole)
+        except WeighbridgeError as error:
+            if len(drives) == 1:
+                raise
+            failed.append((path.name, str(error)))
+            continue
+        if alone and len(parts) > 1:
+            raise ConfigError(
+                f"--track takes one drive, and {path} holds {len(parts)}: use --json, or --whole "
+                "to take them as one"
+            )
+        for drive in parts:
+            try:
+                weighed.append(weigh_drive(drive, car, method, settings=settings))
+            except WeighbridgeError as error:
+                if len(drives) == len(parts) == 1:
+                    raise
+                failed.append((drive.name if len(parts) > 1 else path.name, str(error)))
+    return weighed, failed
 
 
 def _tell_written(paths: list[str | Path | None], *, beside_json: bool) -> None:

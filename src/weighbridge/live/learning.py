@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from weighbridge.errors import WeighbridgeError
@@ -20,11 +20,11 @@ FIRST: Final = 60.0
 GROWTH: Final = 1.5
 """It is looked at again after so many times as much."""
 
-LONGEST: Final = 2700.0
-"""No more of it is kept and looked at [s],"""
-
 PERIOD: Final = 900.0
-"""and once it is as long, so often [s]."""
+"""At the latest it is looked at after so long on the move [s]."""
+
+LONGEST: Final = 2700.0
+"""No more of it is kept and looked at [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +52,10 @@ class Learned:
     inconsistent: bool
     reason: str
     notes: tuple[str, ...]
+
+    def answer(self) -> Learned:
+        """Return what they tell of the mass alone, without what the stages go on from."""
+        return replace(self, setup=None, state=None)
 
 
 def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:

@@ -134,6 +134,7 @@ class LiveScale:
             "learns": self._learns,
             "lateness": self._records.lateness,
             "info": self.info,
+            "learned": None if self._learned is None else self._learned.answer(),
             "samples": self._records.last(BEHIND + 2.0 * STEP, FEWEST),
         }
         return packed(content, self.vehicle)
@@ -157,7 +158,7 @@ class LiveScale:
         try:
             scale = cls(vehicle, lateness=content["lateness"], info=content["info"])
             scale._setup, scale._state = content["setup"], content["state"]
-            scale._next = content["next"]
+            scale._next, scale._learned = content["next"], content["learned"]
             scale._driven, scale._driven_this_load = content["driven"], content["driven_this_load"]
             scale._tared, scale._learns = content["tared"], content["learns"]
             scale._records.add_block(content["samples"])
@@ -166,12 +167,11 @@ class LiveScale:
         except (KeyError, TypeError, AttributeError) as error:
             raise ConfigError(f"the checkpoint is not used: {error}") from None
         scale._learn_at = scale._driven + FIRST
-        mass, std, _, _ = scale._mass()
-        if (
-            scale._state is not None
-            and scale._state.joint.windows
-            and not (LIGHTEST < mass < HEAVIEST and 0.0 < std < mass)
-        ):
+        state, setup = scale._state, scale._setup
+        if state is None or setup is None or not state.joint.windows:
+            return scale
+        mass, std = state.joint.mass, state.joint.std(setup.joint)
+        if not (LIGHTEST < mass < HEAVIEST and 0.0 < std < mass):
             raise ConfigError(f"the checkpoint is not used: it holds {mass:.0f} ± {std:.0f} kg")
         return scale
 
@@ -199,15 +199,23 @@ class LiveScale:
         return mass
 
     def load_changed(self) -> None:
-        """Tell that the load has changed: what was weighed before says nothing of it any more."""
+        """Tell that the load has changed: what was weighed before says nothing of it any more.
+
+        What the records have told of sensors and noise stays, and so does a contradiction.
+        """
         if self._state is not None:
             self._state = forward.unloaded(self._state)
+        if self._learned is not None and not self._learned.inconsistent:
+            self._learned = None
+        self._records.forget(self._records.newest, FEWEST)
         self._driven_this_load = 0.0
+        self._learn_at = self._driven + FIRST
 
     def weighing(self) -> LiveWeighing:
         """Return the mass as it is known now, and what would make it surer."""
         mass, std, floor, at = self._mass()
-        found = self._outlook(mass, std, floor)
+        health = tuple(self._health())
+        found = self._outlook(mass, std, floor, health)
         newest = self._records.newest
         learned = self._learned
         return LiveWeighing(
@@ -227,7 +235,7 @@ class LiveScale:
             minutes_to_5=found.minutes_to_5,
             minutes_to_2=found.minutes_to_2,
             advice=found.advice,
-            signals=tuple(self._health()),
+            signals=health,
             notes=self._notes(learned.notes if learned is not None else ()),
         )
 
@@ -245,11 +253,13 @@ class LiveScale:
             return learned.mass, learned.std, learned.floor, learned.until
         return nothing
 
-    def _outlook(self, mass: float, std: float, floor: float) -> Outlook:
+    def _outlook(
+        self, mass: float, std: float, floor: float, health: tuple[SignalHealth, ...]
+    ) -> Outlook:
         learned = self._learned
         if learned is not None and learned.inconsistent:
             return Outlook(status=LiveStatus.INCONSISTENT, reason=learned.reason)
-        silent = [s.name for s in self._health() if s.needed and not s.fresh]
+        silent = [s.name for s in health if s.needed and not s.fresh]
         reason = learned.reason if learned is not None else ""
         return outlook(
             mass,
@@ -298,8 +308,6 @@ class LiveScale:
     def _learn(self, drive: Drive, until: float) -> None:
         """Look at all that is kept, and go on from it where it tells more than is known."""
         self._learn_at = min(self._driven * GROWTH, self._driven + PERIOD)
-        if drive.duration < LONGEST:
-            self._learn_at = self._driven * GROWTH
         learned = learn(drive, self.vehicle, until)
         _LOG.info("looked at %.0f s: %.0f kg %s", drive.duration, learned.mass, learned.reason)
         mass, std, _, _ = self._mass()
