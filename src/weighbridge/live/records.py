@@ -29,6 +29,8 @@ _FIRST: Final = 1e10
 
 _ROOM: Final = 256
 
+_NONE: Final = np.empty(0)
+
 
 class _Column:
     """Sealed samples of one signal in rising order, and those that are still open."""
@@ -36,24 +38,41 @@ class _Column:
     def __init__(self) -> None:
         self.time, self.values = np.empty(_ROOM), np.empty(_ROOM)
         self.first = self.last = 0
-        self.open_time: list[float] = []
-        self.open_values: list[float] = []
+        self.single_times: list[float] = []
+        self.single_values: list[float] = []
+        self.blocks: list[tuple[Floats, Floats]] = []
         self.newest = -math.inf
+
+    @property
+    def is_open(self) -> bool:
+        """Whether samples wait to be sealed."""
+        return bool(self.blocks or self.single_times)
+
+    def waiting(self) -> tuple[Floats, Floats]:
+        """Times (n,) and values of the open samples, in no order."""
+        if self.single_times:
+            self.blocks.append((np.array(self.single_times), np.array(self.single_values)))
+            self.single_times, self.single_values = [], []
+        if len(self.blocks) != 1:
+            times, values = zip(*self.blocks, strict=True) if self.blocks else ((), ())
+            self.blocks = [(np.concatenate([*times, _NONE]), np.concatenate([*values, _NONE]))]
+        return self.blocks[0]
 
     def seal(self, until: float) -> None:
         """Put the open samples before ``until`` in order behind the sealed ones."""
-        time = np.array(self.open_time)
+        time, values = self.waiting()
         old = time < until
         if not old.any():
             return
-        values = np.array(self.open_values)
-        self.open_time, self.open_values = time[~old].tolist(), values[~old].tolist()
+        self.blocks = [] if old.all() else [(time[~old], values[~old])]
         time, values = time[old], values[old]
-        # Of two samples with one stamp the order they came in must not choose.
-        order = np.lexsort((values, time))
-        time, values = time[order], values[order]
-        keep = np.concatenate(([True], np.diff(time) > 0.0))
-        self._append(time[keep], values[keep])
+        if (np.diff(time) <= 0.0).any():
+            # Of two samples with one stamp the order they came in must not choose.
+            order = np.lexsort((values, time))
+            time, values = time[order], values[order]
+            keep = np.concatenate(([True], np.diff(time) > 0.0))
+            time, values = time[keep], values[keep]
+        self._append(time, values)
 
     def _append(self, time: Floats, values: Floats) -> None:
         count = self.last - self.first
@@ -125,8 +144,8 @@ class Records:
             self.add_block({name: (np.array([time]), np.array([value]))})
             return
         column = self._columns.get(name) or self._column(name)
-        column.open_time.append(at)
-        column.open_values.append(value)
+        column.single_times.append(at)
+        column.single_values.append(value)
         column.newest = max(column.newest, at)
         self._strange = 0
         self.newest, self.oldest = max(self.newest, at), min(self.oldest, at)
@@ -161,8 +180,7 @@ class Records:
             self._watch(at[finite & ~near], bool(near.any()))
             if fresh.any():
                 at = at[fresh]
-                column.open_time += at.tolist()
-                column.open_values += values[fresh].tolist()
+                column.blocks.append((at, values[fresh]))
                 column.newest = max(column.newest, float(at.max()))
                 newest = max(newest, float(at.max()))
                 self.oldest = min(self.oldest, float(at.min()))
@@ -192,7 +210,7 @@ class Records:
         """Put all samples before ``until`` in order; none of them comes any more."""
         self._sealed_to = max(self._sealed_to, until)
         for column in self._columns.values():
-            if column.open_time:
+            if column.is_open:
                 column.seal(until)
 
     @property
@@ -204,7 +222,7 @@ class Records:
     @property
     def waiting_from(self) -> float:
         """Instant of the first sample that is not sealed [s]; inf without any."""
-        waiting = [min(c.open_time) for c in self._columns.values() if c.open_time]
+        waiting = [float(c.waiting()[0].min()) for c in self._columns.values() if c.is_open]
         return min(waiting, default=math.inf)
 
     def forget(self, before: float, fewest: int) -> None:
@@ -220,9 +238,10 @@ class Records:
         for name, column in self._columns.items():
             time, values = column.sealed
             keep = max(min(int(time.searchsorted(self.newest - span)), time.size - fewest), 0)
+            more = column.waiting()
             found[name] = (
-                np.concatenate([time[keep:], column.open_time]),
-                np.concatenate([values[keep:], column.open_values]),
+                np.concatenate([time[keep:], more[0]]),
+                np.concatenate([values[keep:], more[1]]),
             )
         return found
 

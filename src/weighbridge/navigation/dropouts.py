@@ -101,6 +101,8 @@ def _spikes(x: Floats, least: float) -> Bools:
     inner *= -0.5
     inner += x[1:-1]
     np.abs(off, out=off)
+    if not off.max(initial=0.0) > least:
+        return np.zeros(x.size, dtype=bool)
     limit = max(_SPIKE * 1.4826 * float(np.median(off)), least)
     found = off > limit
     # The neighbours of a spike are off by half of it.
@@ -111,6 +113,8 @@ def _spikes(x: Floats, least: float) -> Bools:
 
 def _zeros(x: Floats, moving: Bools) -> Bools:
     zero = x == 0.0
+    if not zero.any():
+        return np.asarray(zero)
     here = int(np.count_nonzero(zero & moving))
     if here <= _ZEROS * np.count_nonzero(moving):
         return np.zeros(x.size, dtype=bool)
@@ -126,14 +130,15 @@ def _zeros(x: Floats, moving: Bools) -> Bools:
 
 
 def _clipped(x: Floats, width: int) -> Bools:
+    width = max(width, 3)
     lost = np.zeros(x.size, dtype=bool)
     for limit in (float(x.max()), float(x.min())):
         at = x == limit
-        share = float(np.mean(at))
-        if not _AT_LIMIT[0] < share < _AT_LIMIT[1]:
+        count = int(np.count_nonzero(at))
+        if not _AT_LIMIT[0] * x.size < count < _AT_LIMIT[1] * x.size or count <= _CLIPPED * width:
             continue
         inner = 0.98 * limit if abs(limit) > 0.0 else 0.0
         near = int(np.count_nonzero((x > min(inner, limit)) & (x < max(inner, limit))))
-        if np.count_nonzero(at) > _MORE * near:
-            lost |= uniform_filter1d(at.astype(np.float64), max(width, 3)) > _CLIPPED
+        if count > _MORE * near:
+            lost |= uniform_filter1d(at.astype(np.float64), width) > _CLIPPED
     return lost
