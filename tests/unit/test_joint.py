@@ -218,19 +218,25 @@ def test_a_table_that_is_late_as_a_whole_is_moved_and_told(made, car, balance, l
 
 def forward(track, stops=1.0):
     """Fold the windows of a track into the forward filter, standing so many times as long."""
+    *_, state = folded(track, stops)
+    return state
+
+
+def folded(track, stops=1.0, state=None, **sizes):
+    """States after each window of a track from that on that ``state`` comes before."""
     given = track.filter_input
-    setup = joint_forward.identify_joint(given, track.sizes)
-    state = joint_forward.JointState()
+    setup = replace(joint_forward.identify_joint(given, track.sizes), **sizes)
+    state = state or joint_forward.JointState()
     torque_var = given.noise / setup.fast**2 - setup.mass**2 * setup.motion_var
-    for k, time in enumerate(given.time):
+    for k in range(state.windows, given.time.size):
         state = joint_forward.step(
             state,
             joint_forward.Window(
-                time, given.rows[k], given.y[k], torque_var[k], stops * given.stood[k]
+                given.time[k], given.rows[k], given.y[k], torque_var[k], stops * given.stood[k]
             ),
             setup,
         )
-    return state
+        yield state
 
 
 def test_forward_ends_where_the_smoother_does(balance, car):
@@ -240,6 +246,35 @@ def test_forward_ends_where_the_smoother_does(balance, car):
     assert state.mass == pytest.approx(end, rel=1e-9)
     assert state.std(track.sizes) == pytest.approx(track.std, rel=1e-3)
     assert state.windows == track.filter_input.time.size
+
+
+def test_forward_stays_between_its_hypotheses_of_the_load(balance, car):
+    """Their spread is no noise that draws the mass down."""
+    track = joint.estimate(with_stops(balance, car, load=LOADED), car)
+    tried = [s for s in folded(track, attenuating_var=0.03) if s.load.open]
+    assert len(tried) > 5
+    for state in tried:
+        both = state.load.same.x[0], state.load.changed.x[0]
+        low = state.load.same.cov[0, 0] * 0.03 * (state.total - state.begun)
+        assert min(both) <= state.mass <= max(both) * (1.0 + low) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("load", [0.0, LOADED])
+def test_forward_goes_on_from_a_drive_weighed_as_a_whole(balance, car, load):
+    loaded = with_stops(balance, car, load=load) if load else balance
+    track = joint.estimate(loaded, car)
+    given = track.filter_input
+    setup = joint_forward.identify_joint(given, track.sizes)
+    end = track.mass + balance.merged.fuel_burnt[-1]
+    whole = joint_forward.resumed(given, setup, np.inf)
+    assert whole.mass == pytest.approx(end, rel=1e-5)
+    assert whole.std(track.sizes) == pytest.approx(track.std, rel=1e-3)
+    nearly = joint_forward.resumed(given, setup, float(given.time[-6]))
+    assert nearly.windows == given.time.size - 5
+    *_, after = folded(track, stops=0.0, state=nearly)
+    assert after.mass == pytest.approx(end, rel=1e-5)
+    assert after.windows == whole.windows
+    assert joint_forward.resumed(given, setup, -np.inf) == joint_forward.JointState()
 
 
 def test_forward_follows_a_load_that_changes_at_a_stop(balance, car):

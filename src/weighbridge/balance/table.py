@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from weighbridge.balance.foot_setup import FootSetup
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.air import Air, dynamic_pressure
+
+if TYPE_CHECKING:
+    from weighbridge.navigation.identify.setup import Setup
 
 MOVING: Final = 0.5
 """Slower a vehicle stands [m/s]."""
@@ -181,6 +184,7 @@ class ForceBalance:
     coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
     setup : what a whole drive tells of its force side; None where it was not looked for
     delay : lateness of the torque, which is off its instants [s]
+    navigation : what the motion was found by; None where it was not from an inertial sensor
     """
 
     merged: MergedView
@@ -190,6 +194,7 @@ class ForceBalance:
     coarse_std: float = 0.0
     setup: ForceSetup | None = None
     delay: float = 0.0
+    navigation: Setup | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:

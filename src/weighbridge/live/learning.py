@@ -20,8 +20,11 @@ FIRST: Final = 60.0
 GROWTH: Final = 1.5
 """It is looked at again after so many times as much."""
 
-PERIOD: Final = 900.0
+PERIOD: Final = 600.0
 """At the latest it is looked at after so long on the move [s]."""
+
+REST: Final = 30.0
+"""It is looked at too when the vehicle has stood for so long [s]: most such stops end a drive."""
 
 LONGEST: Final = 2700.0
 """No more of it is kept and looked at [s]."""
@@ -34,6 +37,7 @@ class Learned:
     Attributes
     ----------
     until : that instant [s]
+    since : instant from which the load is what was weighed [s]
     setup : by which the drive is weighed on; None where no forward pass is possible
     state : of a forward pass, at ``until``
     mass, std : of these records as a whole [kg]; NaN where they carry none
@@ -44,6 +48,7 @@ class Learned:
     """
 
     until: float
+    since: float
     setup: ForwardSetup | None
     state: ForwardState | None
     mass: float
@@ -77,6 +82,7 @@ def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:
     setup, state, notes = _set_up(weighing, drive, until)
     return Learned(
         until=until,
+        since=weighing.segments[-1].start if weighing.load_changed else drive.start,
         setup=setup,
         state=state,
         mass=weighing.mass,
@@ -99,9 +105,7 @@ def _set_up(
         setup = forward.identify_forward(weighing)
     except WeighbridgeError as error:
         return None, None, (*weighing.warnings, str(error))
-    begin = forward.begin(setup, drive.start)
-    state, _ = forward.step(begin, drive, until, setup)
-    return setup, state, weighing.warnings
+    return setup, forward.resume(weighing, drive, until, setup), weighing.warnings
 
 
 def _floor(weighing: Weighing) -> float:
@@ -117,6 +121,7 @@ def _nothing(
 ) -> Learned:  # fmt: skip
     return Learned(
         until=until,
+        since=math.nan,
         setup=None,
         state=None,
         mass=math.nan,

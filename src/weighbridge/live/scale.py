@@ -13,7 +13,7 @@ from weighbridge.balance.table import MOVING
 from weighbridge.errors import ConfigError
 from weighbridge.live.arrival import needed_signals
 from weighbridge.live.checkpoint import packed, unpacked
-from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, Learned, learn
+from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, REST, Learned, learn
 from weighbridge.live.outlook import Outlook, outlook
 from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.source import Samples
@@ -83,6 +83,9 @@ class LiveScale:
         self._driven = 0.0
         self._driven_this_load = 0.0
         self._learn_at = FIRST
+        self._learned_at = 0.0
+        self._stood = 0.0
+        self._since = self._kept_from = -math.inf
         self._tared: float | None = None
 
     def update(self, time: float | Floats, signal: str, value: float | Floats) -> None:
@@ -118,9 +121,15 @@ class LiveScale:
         self._advance()
 
     def finish(self) -> None:
-        """Take it that no more samples come: weigh what still waits for late ones."""
-        if math.isfinite(self._records.newest):
-            self._advance(self._records.newest)
+        """Take it that no more samples come: weigh what still waits for late ones.
+
+        Where the scale learns, all records are looked at once more.
+        """
+        if not math.isfinite(self._records.newest):
+            return
+        self._advance(self._records.newest)
+        if self._learns and self._driven > max(self._learned_at, FIRST) and self._next is not None:
+            self._learn(self._records.drive("live", self.info), self._next - STEP)
 
     def checkpoint(self) -> str:
         """Return all that the scale goes on from, for `restore`, as text."""
@@ -130,6 +139,7 @@ class LiveScale:
             "next": self._next,
             "driven": self._driven,
             "driven_this_load": self._driven_this_load,
+            "since": self._since,
             "tared": self._tared,
             "learns": self._learns,
             "lateness": self._records.lateness,
@@ -160,12 +170,15 @@ class LiveScale:
             scale._setup, scale._state = content["setup"], content["state"]
             scale._next, scale._learned = content["next"], content["learned"]
             scale._driven, scale._driven_this_load = content["driven"], content["driven_this_load"]
+            scale._since = content["since"]
             scale._tared, scale._learns = content["tared"], content["learns"]
             scale._records.add_block(content["samples"])
             if scale._next is not None:
                 scale._records.seal(scale._next - STEP)
+                scale._kept_from = scale._next - STEP
         except (KeyError, TypeError, AttributeError) as error:
             raise ConfigError(f"the checkpoint is not used: {error}") from None
+        scale._learned_at = scale._driven
         scale._learn_at = scale._driven + FIRST
         state, setup = scale._state, scale._setup
         if state is None or setup is None or not state.joint.windows:
@@ -207,9 +220,10 @@ class LiveScale:
             self._state = forward.unloaded(self._state)
         if self._learned is not None and not self._learned.inconsistent:
             self._learned = None
-        self._records.forget(self._records.newest, FEWEST)
+        self._forget(self._records.newest)
         self._driven_this_load = 0.0
-        self._learn_at = self._driven + FIRST
+        self._since = self._records.newest
+        self._learned_at, self._learn_at = self._driven, self._driven + FIRST
 
     def weighing(self) -> LiveWeighing:
         """Return the mass as it is known now, and what would make it surer."""
@@ -279,6 +293,7 @@ class LiveScale:
             if not end >= oldest:
                 return
             self._next = first_instant(oldest)
+            self._since = max(self._since, oldest)
             if self._setup is not None and self._state is None:
                 self._state = forward.begin(self._setup, oldest)
         while self._next <= end:
@@ -296,17 +311,24 @@ class LiveScale:
         moved = _moved(seen, until)
         self._driven += moved
         self._driven_this_load += moved
+        self._stood = 0.0 if moved else self._stood + STEP
         if self._setup is not None and self._state is not None:
             self._state, _ = forward.step(self._state, seen, until, self._setup)
         keep = BEHIND + 2.0 * STEP
         if self._learns:
             keep += LONGEST
-            if self._driven >= self._learn_at:
+            rests = self._stood == REST and self._driven >= self._learned_at + FIRST
+            if self._driven >= self._learn_at or rests:
                 self._learn(drive, until)
-        self._records.forget(until - keep, FEWEST)
+        self._forget(until - keep)
+
+    def _forget(self, before: float) -> None:
+        self._kept_from = max(self._kept_from, before)
+        self._records.forget(before, FEWEST)
 
     def _learn(self, drive: Drive, until: float) -> None:
         """Look at all that is kept, and go on from it where it tells more than is known."""
+        self._learned_at = self._driven
         self._learn_at = min(self._driven * GROWTH, self._driven + PERIOD)
         learned = learn(drive, self.vehicle, until)
         _LOG.info("looked at %.0f s: %.0f kg %s", drive.duration, learned.mass, learned.reason)
@@ -317,8 +339,14 @@ class LiveScale:
         far = abs(learned.mass - mass) > max(
             FAR * math.hypot(std, learned.std), LEAST_FAR * learned.mass
         )
-        if math.isnan(mass) or far or learned.std <= 1.05 * std or self._setup is None:
+        # Where the records hold all of this load, nothing is known beside them.
+        whole = self._kept_from <= max(self._since, learned.since)
+        if math.isnan(mass) or far or whole or learned.std <= 1.05 * std or self._setup is None:
             self._setup, self._state = learned.setup, learned.state
+        if learned.since > max(drive.start, self._since):
+            # The load has changed on the way.
+            self._since = learned.since
+            self._driven_this_load = _time_on_the_move(drive, learned.since)
 
     def _health(self) -> Iterable[SignalHealth]:
         records = self._records
@@ -343,6 +371,15 @@ class LiveScale:
             f"the clock of the samples jumped {jumps} times, by {self._records.offset:.0f} s in all"
         )
         return (told, *learned)
+
+
+def _time_on_the_move(drive: Drive, since: float) -> float:
+    """Time on the move since an instant, gaps left out [s]."""
+    speed = drive.speed
+    if speed is None:
+        return 0.0
+    moved = (speed.values[1:] > MOVING) & (speed.time[1:] > since)
+    return float(np.minimum(np.diff(speed.time), STEP)[moved].sum())
 
 
 def _moved(seen: Drive, until: float) -> float:

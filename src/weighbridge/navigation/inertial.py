@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from weighbridge.navigation.identify.rounds import settle
 from weighbridge.navigation.motion import Motion
-from weighbridge.navigation.settings import NavigationSettings
+from weighbridge.navigation.settings import RATE, NavigationSettings
 from weighbridge.navigation.sources import read_sources
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Mounting
@@ -15,7 +15,7 @@ def inertial_motion(
     mounting: Mounting | None = None,
     *,
     settings: NavigationSettings | None = None,
-    rate: float = 20.0,
+    rate: float = RATE,
 ) -> Motion:
     """Find how the vehicle moved from its inertial sensor, aided by speed and GNSS.
 

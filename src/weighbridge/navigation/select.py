@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from weighbridge.errors import DriveError
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.settings import RATE, NavigationSettings
+from weighbridge.navigation.sources import read_sources
 from weighbridge.navigation.speed import speed_motion
 from weighbridge.signals import Drive, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.vehicle.model import Vehicle
 
+if TYPE_CHECKING:
+    from weighbridge.navigation.identify.setup import Setup
+
 
 def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
-    """Find the motion of a drive the best way its signals allow.
+    """Find the motion of a drive the best way its signals allow; see `identify_motion`."""
+    return identify_motion(drive, vehicle)[0]
+
+
+def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motion, Setup | None]:
+    """Find the motion of a drive the best way its signals allow, and what it was found by.
 
     In this order: IMU with speed or GNSS, one accelerometer along the vehicle
     with speed, speed with grade or height, speed alone. Where the drive itself
     does not show the scale of its vehicle speed, the vehicle's is taken off.
+
+    Returns
+    -------
+    motion
+    setup : of the inertial navigation; None where it was found another way
 
     Raises
     ------
@@ -25,14 +42,16 @@ def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
     """
     has_speed = drive.has("vehicle_speed") or drive.has("gnss_speed")
     if drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude")):
-        from weighbridge.navigation.inertial import inertial_motion
+        from weighbridge.navigation.identify.rounds import settle
 
         mounting = vehicle.mounting if vehicle is not None else None
-        return inertial_motion(scaled_for_navigation(drive, vehicle), mounting)
+        sources = read_sources(scaled_for_navigation(drive, vehicle))
+        setup, motion = settle(sources, mounting, NavigationSettings(), RATE)
+        return motion, setup
     if drive.has("longitudinal_accel", "vehicle_speed"):
-        return longitudinal_motion(true_speed(drive, vehicle))
+        return longitudinal_motion(true_speed(drive, vehicle)), None
     if has_speed:
-        return speed_motion(true_speed(drive, vehicle))
+        return speed_motion(true_speed(drive, vehicle)), None
     raise DriveError(
         f"{drive.name}: no vehicle_speed and no GNSS; without a speed no vehicle can be weighed"
     )

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Final
 
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.kernels.ins_model import Noise
+
+RATE: Final = 20.0
+"""Of the nodes and of the motion [Hz]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,14 +20,19 @@ from weighbridge.balance.averaging import FEWEST, PAUSE, WINDOW
 from weighbridge.balance.table import MOVING, MergedView
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.joint import forward as joint_forward
-from weighbridge.estimators.joint.forward import JointSetup, JointState, Window, identify_joint
+from weighbridge.estimators.joint.forward import (
+    JointSetup,
+    JointState,
+    Window,
+    identify_joint,
+    resumed,
+)
 from weighbridge.estimators.joint.slow_errors import design, usable_rows
 from weighbridge.estimators.judging import STOP
 from weighbridge.kernels import window_means
 from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
 from weighbridge.navigation import forward
-from weighbridge.navigation.identify import identify
-from weighbridge.navigation.select import scaled_for_navigation, true_speed
+from weighbridge.navigation.select import true_speed
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.recent import instants, recent
 from weighbridge.vehicle.model import Vehicle
@@ -101,13 +106,13 @@ def identify_forward(weighing: Weighing) -> ForwardSetup:
             f"found a mass, not by one of {weighing.method}: {weighing.reason or 'no sizes'}"
         )
     drive, vehicle, motion = weighing.drive, weighing.vehicle, result.balance.motion
-    if motion.source != "inertial":
+    navigation = result.balance.navigation
+    if navigation is None:
         raise DriveError(
             f"{drive.name}: a forward pass needs accel_x..z and gyro_x..z, and this drive was "
             f"weighed by {motion.source}"
         )
     time = result.balance.merged.time
-    navigation = identify(scaled_for_navigation(drive, vehicle), vehicle.mounting)
     return ForwardSetup(
         vehicle=vehicle,
         navigation=_holding(navigation, motion.squat),
@@ -184,6 +189,27 @@ def begin(setup: ForwardSetup, start: float) -> ForwardState:
 def unloaded(state: ForwardState) -> ForwardState:
     """Forget the mass, for the load has changed; motion and windows go on."""
     return state._replace(joint=JointState())
+
+
+def resume(weighing: Weighing, records: Drive, until: float, setup: ForwardSetup) -> ForwardState:
+    """Return the state after a drive that was weighed as a whole, to go on from.
+
+    Motion and open window are those of the stages, the mass that of the weighing.
+
+    Parameters
+    ----------
+    weighing : of the records
+    records : as they came, up to ``until``
+    until : instant up to which they are complete [s]
+    setup : of `identify_forward`, from the weighing
+    """
+    state, _ = step(begin(setup, records.start), records, until, setup)
+    load, result = state.joint.load, weighing.result
+    if load is None or result is None or result.filter_input is None:
+        return state
+    # What was recorded after the last whole window is in the open one.
+    last = load.same.time + 0.5 * WINDOW
+    return state._replace(joint=resumed(result.filter_input, setup.joint, last))
 
 
 def lateness(setup: ForwardSetup) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -25,7 +25,7 @@ from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation.select import identify_motion
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -293,7 +293,8 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     DriveError
         Torque and motion are on clocks that differ.
     """
-    motion = of_vehicle(find_motion(drive, vehicle), vehicle)
+    found, navigation = identify_motion(drive, vehicle)
+    motion = of_vehicle(found, vehicle)
     delay = vehicle.timing.torque_delay
     drive, drifted = steadied(drive, vehicle, motion, delay or 0.0)
     notes = motion.notes + drifted
@@ -312,7 +313,7 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
                 f"torque is {_later(later)} against the motion than in the calibration; "
                 "its clock was moved by that",
             )
-    balance = force_balance(drive, vehicle, motion, delay=delay)
+    balance = replace(force_balance(drive, vehicle, motion, delay=delay), navigation=navigation)
     if behind := far_shift(balance, vehicle):
         raise DriveError(
             f"{drive.name}: its torque lies {_later(-behind)} than the motion it makes, though "

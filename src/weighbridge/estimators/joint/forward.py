@@ -72,6 +72,43 @@ class JointState(NamedTuple):
         return float(np.hypot(UNMODELLED * np.sqrt(self.var), self.mass * sizes.left))
 
 
+def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
+    """Return the state after the windows of a drive that was weighed as a whole.
+
+    Its motion was smoothed, and its changes of load are those found with hindsight.
+
+    Parameters
+    ----------
+    given : what the smoother was given
+    setup : of `identify_joint`, from the same
+    until : later windows are left out [s]
+    """
+    seen = int(given.time.searchsorted(until, side="right"))
+    if not seen:
+        return JointState()
+
+    def rows(end: int) -> tuple[Floats, ...]:
+        columns = (given.time, given.rows, given.y, given.noise, given.added)
+        return tuple(column[:end] for column in columns)
+
+    same, *_ = disturbance.run(given.start, *rows(seen), given.params)
+    total = disturbance.weights(given.start, *rows(seen), given.params)
+    jumps = np.flatnonzero(given.added[:seen].any(axis=1))
+    last = int(jumps[-1]) if jumps.size else 0
+    begun = disturbance.weights(given.start, *rows(last), given.params) if last else 0.0
+    mass, var = float(same.x[0]), float(same.cov[0, 0])
+    load = load_change.initial_state(same)  # type: ignore[no-untyped-call]
+    return JointState(
+        load=load._replace(rows=seen),
+        total=total,
+        begun=begun,
+        tried=begun,
+        windows=seen,
+        mass=mass * (1.0 + var * setup.attenuating_var * (total - begun)),
+        var=var,
+    )
+
+
 class Window(NamedTuple):
     """Means of the rows of one window.
 
@@ -127,7 +164,8 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     if load.open and load.begun != opened:
         tried = state.total
     total = state.total + weight
-    low = var * setup.attenuating_var * (total - begun)
+    # While a change is tried, the spread between both hypotheses is no noise that attenuates.
+    low = load.same.cov[0, 0] * setup.attenuating_var * (total - begun)
     return JointState(
         load=load,
         total=total,

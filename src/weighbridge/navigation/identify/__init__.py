@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from weighbridge.navigation.identify.rounds import settle
 from weighbridge.navigation.identify.setup import Setup
-from weighbridge.navigation.settings import NavigationSettings
+from weighbridge.navigation.settings import RATE, NavigationSettings
 from weighbridge.navigation.sources import read_sources
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Mounting
@@ -17,7 +17,7 @@ def identify(
     mounting: Mounting | None = None,
     *,
     settings: NavigationSettings | None = None,
-    rate: float = 20.0,
+    rate: float = RATE,
 ) -> Setup:
     """Find mounting, delays, noise, scale and start of a drive, for its samples to be folded with.
 
