@@ -8,7 +8,8 @@ from typing import Final
 from weighbridge.io.nmea import SENTENCE, Sentence, UnfitSentenceError, read_sentence
 from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.sources.kind import SourceOptions
-from weighbridge.live.sources.receiver import ReceiverSource, receiver_link
+from weighbridge.live.sources.links import serial_or_tcp
+from weighbridge.live.sources.receiver import ReceiverSource
 from weighbridge.signals.units import scalar_to_si
 
 BAUD: Final = 9600
@@ -26,7 +27,7 @@ def make_nmea(text: str, options: SourceOptions) -> ReceiverSource:
     ConfigError
         The place cannot be used.
     """
-    open_link = receiver_link("nmea", text, BAUD)
+    open_link = serial_or_tcp("nmea", text, BAUD)
     return ReceiverSource(f"nmea:{text}", open_link, SentenceReader, "NMEA sentence such as RMC")
 
 

@@ -7,12 +7,10 @@ from threading import Event
 from time import monotonic
 from typing import Final, Protocol
 
-from weighbridge.errors import ConfigError
 from weighbridge.live.clock import now
 from weighbridge.live.source import Samples
 from weighbridge.live.sources.gathered import BLOCK, Gathered
-from weighbridge.live.sources.kind import checked_port, parted_rate
-from weighbridge.live.sources.links import Link, SerialLink, TcpLink
+from weighbridge.live.sources.links import Link
 from weighbridge.live.sources.lock import DeviceLock
 
 SILENT: Final = 5.0
@@ -33,34 +31,6 @@ class FixReader(Protocol):
         arrived : when, by the host's clock [s]
         """
         ...
-
-
-def receiver_link(kind: str, text: str, baud: int) -> Callable[[], Link]:
-    """Return what opens the way to a receiver at ``PATH[@BAUD]`` or ``tcp:HOST:PORT``.
-
-    Parameters
-    ----------
-    kind : of the source, for messages
-    text : the place
-    baud : rate of a serial port where none is said [bit/s]
-
-    Raises
-    ------
-    ConfigError
-        The place cannot be used.
-    """
-    name = f"{kind}:{text}"
-    before, _, rest = text.partition(":")
-    if before == "tcp":
-        host, _, port = rest.rpartition(":")
-        if not host:
-            raise ConfigError(f"source {name!r} names no host; write {kind}:tcp:localhost:10110")
-        number = checked_port(port, name)
-        return lambda: TcpLink(host, number)
-    path, rate = parted_rate(text, "baud rate")
-    if not path:
-        raise ConfigError(f"source {name!r} names no port; write {kind}:/dev/ttyACM0")
-    return lambda: SerialLink(path, rate or baud)
 
 
 class ReceiverSource:

@@ -9,8 +9,9 @@ from typing import Any, Final
 from weighbridge.errors import MissingExtraError
 from weighbridge.live.device_clock import DeviceClock
 from weighbridge.live.sources.kind import SourceOptions
+from weighbridge.live.sources.links import serial_or_tcp
 from weighbridge.live.sources.nmea import SentenceReader
-from weighbridge.live.sources.receiver import SILENT, ReceiverSource, receiver_link
+from weighbridge.live.sources.receiver import SILENT, ReceiverSource
 
 BAUD: Final = 38_400
 """Rate of the serial port of receivers from the ninth generation on [bit/s]."""
@@ -34,7 +35,7 @@ def make_ubx(text: str, options: SourceOptions) -> ReceiverSource:
     ConfigError
         The place cannot be used.
     """
-    open_link = receiver_link("ubx", text, BAUD)
+    open_link = serial_or_tcp("ubx", text, BAUD)
     return ReceiverSource(
         f"ubx:{text}", open_link, UbxReader, "UBX message NAV-PVT and no NMEA sentence"
     )
