@@ -44,8 +44,9 @@ FILES = {
     "rickshaw_class": CLASS,
     "median_estimator": code("median_estimator.py"),
 }
+TRIED_ELSEWHERE = {"weighbridge.formats", "weighbridge.sources"}
 POINTS = {
-    **entry_points(),
+    **{group: line for group, line in entry_points().items() if group not in TRIED_ELSEWHERE},
     "weighbridge.vehicle_classes": "rickshaw = rickshaw_class:rickshaw",
 }
 
@@ -61,7 +62,7 @@ def package(tmp_path, monkeypatch):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: weighbridge-more\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(
-        "".join(f"[{group}]\n{line}\n" for group, line in POINTS.items() if "formats" not in group)
+        "".join(f"[{group}]\n{line}\n" for group, line in POINTS.items())
     )
     monkeypatch.syspath_prepend(tmp_path)
     for table in TABLES:

@@ -13,8 +13,8 @@ from weighbridge.errors import ConfigError
 from weighbridge.io.nmea import UnfitSentenceError, read_sentence
 from weighbridge.live.feed import Feed
 from weighbridge.live.sources import gpsd as gpsd_module
-from weighbridge.live.sources import nmea as nmea_module
 from weighbridge.live.sources import parse_source
+from weighbridge.live.sources import receiver as receiver_module
 from weighbridge.live.sources.gpsd import read_report
 from weighbridge.live.sources.nmea import SentenceReader
 
@@ -89,7 +89,7 @@ def test_wrong_checksum():
 
 def test_receiver_in_a_pseudo_terminal(monkeypatch):
     pytest.importorskip("serialx")
-    monkeypatch.setattr(nmea_module, "SILENT", 0.3)
+    monkeypatch.setattr(receiver_module, "SILENT", 0.3)
     master, slave = os.openpty()
     tty.setraw(slave)
     with Feed([parse_source(f"nmea:{os.ttyname(slave)}")]) as feed:
@@ -185,7 +185,10 @@ def test_reports_of_gpsd():
     assert "latitude" not in read_report(json.dumps(TPV | {"lat": None}).encode())[1]
 
 
-@pytest.mark.parametrize("text", ["gpsd:2947", "gpsd:host:x", "nmea:@9600", "gpsd:host:0"])
+@pytest.mark.parametrize(
+    "text",
+    ["gpsd:2947", "gpsd:host:x", "nmea:@9600", "gpsd:host:0", "nmea:tcp:10110", "ubx:tcp:host:0"],
+)
 def test_places_that_cannot_be(text):
     with pytest.raises(ConfigError):
         parse_source(text)

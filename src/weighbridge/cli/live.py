@@ -54,7 +54,11 @@ _Replay = Annotated[
 ]
 _Rate = Annotated[
     str,
-    typer.Option("--rate", help="Of the replay: 1 as recorded, 10 tenfold, or max."),
+    typer.Option(
+        "--rate",
+        help="Of the replay: 1 as recorded, 10 tenfold, or max. Of emulated sources: that of "
+        "emulate; a vehicle that is there has 1.",
+    ),
 ]
 _Json = Annotated[
     Optional[str],  # noqa: UP045
@@ -145,6 +149,7 @@ def live(
     import logging
 
     from weighbridge.errors import ConfigError
+    from weighbridge.live.clock import at_rate
     from weighbridge.live.feed import Feed
     from weighbridge.live.keys import keys
     from weighbridge.live.outputs import Outputs
@@ -171,9 +176,11 @@ def live(
     read = inputs([replay] if replay is not None else [], vehicle, chosen, dbc)
     refuse_results(read, results)
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
-    sources, info = _sources(source or (), replay, rate, chosen, dbc, listen_only)
+    speed = _speed(rate, replayed=replay is not None)
+    sources, info = _sources(source or (), replay, speed, chosen, dbc, listen_only)
     scale, keeper = _scale(car, kept, lateness, info)
     with (
+        at_rate(1.0 if replay is not None else speed),
         keys(wanted=not any(s.name == "lines:-" for s in sources)) as pressed,
         Outputs(_outputs(json_path, mqtt, page, car, vehicle)) as outputs,
         Feed(sources) as feed,
@@ -206,13 +213,12 @@ def _conclude(last: LiveWeighing, *, aloud: bool) -> None:
 def _sources(
     texts: Sequence[str],
     replay: Path | None,
-    rate: str,
+    speed: float,
     mapping: Path | None,
     dbc: list[str] | None,
     listen_only: bool,
 ) -> tuple[list[Source], DriveInfo]:
     """Make the sources, and tell what is known beside their samples."""
-    from weighbridge.errors import ConfigError
     from weighbridge.live.replay import Replay
     from weighbridge.signals import DriveInfo
 
@@ -224,12 +230,23 @@ def _sources(
             for text in texts
         ]
         return made, DriveInfo()
+    drive = load(replay, mapping, dbc)
+    return [Replay(drive, speed)], drive.info
+
+
+def _speed(rate: str, *, replayed: bool) -> float:
+    """Read a rate: seconds of the drive per second."""
+    from weighbridge.errors import ConfigError
+
     try:
         speed = math.inf if rate == "max" else float(rate)
     except ValueError:
         raise ConfigError(f"--rate {rate}: give 1 as recorded, 10 for tenfold, or max") from None
-    drive = load(replay, mapping, dbc)
-    return [Replay(drive, speed)], drive.info
+    if not replayed and not 0.0 < speed < math.inf:
+        raise ConfigError(f"--rate {rate}: sources have that of weighbridge emulate, such as 5")
+    if not replayed and speed != 1.0:
+        complain(f"the clock goes at {speed:g} times its rate: only emulated sources do, too")
+    return speed
 
 
 def _state_file(state: str | None, replay: Path | None, vehicle: Path) -> Path | None:

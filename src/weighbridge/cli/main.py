@@ -19,6 +19,7 @@ from weighbridge.cli import (
     calibrate,
     convert,
     demo,
+    emulate,
     inertia,
     inspect,
     live,
@@ -56,6 +57,7 @@ app.command()(inertia.inertia)
 app.command()(simulate.simulate)
 app.command()(convert.convert)
 app.command()(record.record)
+app.command()(emulate.emulate)
 app.command()(reproduce.reproduce)
 app.command("map")(map.map_log)
 app.add_typer(vehicle.app, name="vehicle")

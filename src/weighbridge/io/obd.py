@@ -7,6 +7,7 @@ Requests are not needed: an answer says what it answers, and when.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -17,7 +18,7 @@ from weighbridge.io.frames import Frames
 from weighbridge.io.isotp import Messages, assemble
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_signal
-from weighbridge.signals.units import scalar_to_si, to_si
+from weighbridge.signals.units import scalar_from_si, scalar_to_si, to_si
 from weighbridge.signals.words import counted
 
 SOURCE: Final = "SAE J1979"
@@ -161,6 +162,25 @@ def values_of(number: int, raw: bytes) -> dict[str, float]:
             value += p.offset
             found[p.name] = scalar_to_si(value, p.unit) if p.unit else value
     return found
+
+
+def bytes_of(number: int, values: Mapping[str, float]) -> bytes:
+    """Bytes of one parameter that say what is nearest to some values [SI]; `values_of` reads them.
+
+    Parameters
+    ----------
+    number : parameter identifier (PID) of service 01
+    values : by canonical name; those that the parameter has not are passed over
+    """
+    raw = bytearray(LENGTHS[number])
+    for p in PIDS:
+        if p.number == number and p.name in values:
+            value = scalar_from_si(values[p.name], p.unit) if p.unit else values[p.name]
+            most = (1 << 8 * p.count - p.shift) - 1
+            count = min(max(round((value - p.offset) / p.scale), 0), most) << p.shift
+            raw[p.first : p.first + p.count] = count.to_bytes(p.count)
+            raw[0] |= p.needs
+    return bytes(raw)
 
 
 @dataclass(frozen=True, slots=True)

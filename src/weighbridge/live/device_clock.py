@@ -18,9 +18,16 @@ class DeviceClock:
 
     A message is never early: of the differences between arrival and stamp the smallest is nearest
     to the truth. The stamps keep their spacing, which arrivals over a serial line do not.
+
+    Parameters
+    ----------
+    period : after which the device counts from 0 again, such as a day [s]; infinite for never
     """
 
-    def __init__(self) -> None:
+    def __init__(self, period: float = math.inf) -> None:
+        self._period = period
+        self._told = -math.inf
+        self._turns = 0
         self._best = math.inf
         self._before = math.inf
         self._begun = -math.inf
@@ -34,6 +41,7 @@ class DeviceClock:
         stamp : by the device's clock [s]
         arrived : when its message came, by the host's clock [s]
         """
+        stamp = self._running(stamp)
         difference = arrived - stamp
         if not math.isfinite(difference):
             return arrived
@@ -47,3 +55,11 @@ class DeviceClock:
             self._before, self._best, self._begun = self._best, math.inf, arrived
         self._best = min(self._best, difference)
         return stamp + min(self._best, self._before)
+
+    def _running(self, stamp: float) -> float:
+        """Let a stamp go on where the device counts from 0 again [s]."""
+        if math.isinf(self._period):
+            return stamp
+        self._turns += stamp - self._told < -0.5 * self._period
+        self._told = stamp
+        return stamp + self._turns * self._period

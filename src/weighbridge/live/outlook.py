@@ -94,7 +94,9 @@ def _allowed(half: float, mass: float, floor: float) -> float:
 
 
 def _minutes(half: float, mass: float, noise: float, floor: float, driven: float) -> float:
-    """Time on the move until the interval is as narrow [min]."""
+    """Time on the move until the interval is as narrow [min]; NaN where there is no interval."""
+    if math.isinf(noise):
+        return math.nan
     allowed = _allowed(half, mass, floor)
     if noise <= allowed:
         return 0.0

@@ -118,7 +118,11 @@ class LiveWeighing:
         return None if self.gross is None or math.isnan(self.mass) else self.mass / self.gross
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is written as JSON; what is not known is None."""
+        """Return what is written as JSON; what is not known is None.
+
+        Minutes that are infinite are None too: ``reach_percent`` is not below 5 or 2 then, and
+        None or below where they are not known.
+        """
         low, high = self.interval()
         return {
             "vehicle": self.vehicle,

@@ -13,7 +13,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.io.dbc import DbcSource
 from weighbridge.io.mapping import MappingSource
 from weighbridge.live.source import Source
-from weighbridge.live.sources import canbus, elm, gpsd, iio, lines, nmea, obd
+from weighbridge.live.sources import canbus, elm, gpsd, iio, lines, nmea, obd, ubx
 from weighbridge.live.sources.kind import SourceKind, SourceOptions
 from weighbridge.registry import Registry
 
@@ -63,10 +63,18 @@ SOURCES: Final[Registry[SourceKind]] = Registry(
         ),
         SourceKind(
             name="nmea",
-            form="nmea:PATH[@BAUD]",
+            form="nmea:PATH[@BAUD] or nmea:tcp:HOST:PORT",
             about="takes position, speed and course from a GNSS receiver that sends NMEA 0183",
             make=nmea.make_nmea,
             package="serialx",
+        ),
+        SourceKind(
+            name="ubx",
+            form="ubx:PATH[@BAUD] or ubx:tcp:HOST:PORT",
+            about="takes position and velocity from a GNSS receiver of u-blox that sends UBX, "
+            "NMEA 0183 or both",
+            make=ubx.make_ubx,
+            package="pyubx2",
         ),
         SourceKind(
             name="lines",

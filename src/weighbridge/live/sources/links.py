@@ -5,13 +5,15 @@ from __future__ import annotations
 import asyncio
 import queue
 import socket
+from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
 from threading import Thread
 from time import monotonic
 from typing import Any, Final, Protocol
 
-from weighbridge.errors import MissingExtraError, SourceError
+from weighbridge.errors import ConfigError, MissingExtraError, SourceError
+from weighbridge.live.sources.kind import checked_port, parted_rate
 
 _MOST: Final = 4096
 _CONNECTING: Final = 5.0
@@ -250,3 +252,31 @@ class BleLink:
         self._thread.join(0.5)
         if not self._loop.is_running():
             self._loop.close()
+
+
+def serial_or_tcp(kind: str, text: str, baud: int) -> Callable[[], Link]:
+    """Return what opens the way to a device at ``PATH[@BAUD]`` or ``tcp:HOST:PORT``.
+
+    Parameters
+    ----------
+    kind : of the source, for messages
+    text : the place
+    baud : rate of a serial port where none is said [bit/s]
+
+    Raises
+    ------
+    ConfigError
+        The place cannot be used.
+    """
+    name = f"{kind}:{text}"
+    before, _, rest = text.partition(":")
+    if before == "tcp":
+        host, _, port = rest.rpartition(":")
+        if not host:
+            raise ConfigError(f"source {name!r} names no host; write {kind}:tcp:localhost:10110")
+        number = checked_port(port, name)
+        return lambda: TcpLink(host, number)
+    path, rate = parted_rate(text, "baud rate")
+    if not path:
+        raise ConfigError(f"source {name!r} names no port; write {kind}:/dev/ttyACM0")
+    return lambda: SerialLink(path, rate or baud)

@@ -1,36 +1,25 @@
-"""GNSS receivers that send NMEA 0183 over a serial line."""
+"""GNSS receivers that send NMEA 0183."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from threading import Event
-from time import monotonic
 from typing import Final
 
-from weighbridge.errors import ConfigError
 from weighbridge.io.nmea import SENTENCE, Sentence, UnfitSentenceError, read_sentence
-from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
-from weighbridge.live.source import Samples
-from weighbridge.live.sources.gathered import BLOCK, Gathered
-from weighbridge.live.sources.kind import SourceOptions, parted_rate
-from weighbridge.live.sources.links import Link, SerialLink
-from weighbridge.live.sources.lock import DeviceLock
+from weighbridge.live.sources.kind import SourceOptions
+from weighbridge.live.sources.links import serial_or_tcp
+from weighbridge.live.sources.receiver import ReceiverSource
 from weighbridge.signals.units import scalar_to_si
 
 BAUD: Final = 9600
 """Rate that receivers leave the works with [bit/s]."""
 
-SILENT: Final = 5.0
-"""A receiver that sends no sentence with a fix for so long has a trouble [s]."""
-
-_SLICE: Final = 0.1
 _MOST_TEXT: Final = 4096
 _DAY: Final = 86_400.0
 
 
-def make_nmea(text: str, options: SourceOptions) -> NmeaSource:
+def make_nmea(text: str, options: SourceOptions) -> ReceiverSource:
     """Make a source of a receiver; see `weighbridge.live.sources.kind.SourceKind`.
 
     Raises
@@ -38,55 +27,8 @@ def make_nmea(text: str, options: SourceOptions) -> NmeaSource:
     ConfigError
         The place cannot be used.
     """
-    path, baud = parted_rate(text, "baud rate")
-    if not path:
-        raise ConfigError(f"source 'nmea:{text}' names no port; write nmea:/dev/ttyACM0")
-    return NmeaSource(f"nmea:{text}", lambda: SerialLink(path, baud or BAUD))
-
-
-class NmeaSource:
-    """Listens to a receiver.
-
-    Parameters
-    ----------
-    name : as on the command line
-    open_link : opens the way to it
-    """
-
-    def __init__(self, name: str, open_link: Callable[[], Link]) -> None:
-        self.name = name
-        self.trouble = ""
-        self._open = open_link
-
-    def run(self, put: Callable[[Samples], None], stop: Event) -> None:
-        """Hand over fixes until told to stop; see `weighbridge.live.source.Source.run`."""
-        self.trouble = ""
-        with DeviceLock(self.name):
-            link = self._open()
-            try:
-                self._listen(link, put, stop)
-            finally:
-                self.trouble = ""
-                link.close()
-
-    def _listen(self, link: Link, put: Callable[[Samples], None], stop: Event) -> None:
-        gathered = Gathered(put)
-        reader = SentenceReader()
-        heard = monotonic()
-        fixed = heard
-        while not stop.is_set():
-            data = link.read(_SLICE)
-            if data:
-                heard = monotonic()
-            for time, values in reader.read(data, now()):
-                fixed, self.trouble = monotonic(), ""
-                gathered.add(time, values)
-            gathered.flush(BLOCK)
-            if monotonic() - heard > SILENT:
-                self.trouble = f"the receiver sent nothing for {SILENT:g} s; check cable and rate"
-            elif monotonic() - fixed > SILENT:
-                self.trouble = "the receiver has no fix, or sends no NMEA sentence such as RMC"
-        gathered.flush()
+    open_link = serial_or_tcp("nmea", text, BAUD)
+    return ReceiverSource(f"nmea:{text}", open_link, SentenceReader, "NMEA sentence such as RMC")
 
 
 class SentenceReader:
@@ -94,9 +36,7 @@ class SentenceReader:
 
     def __init__(self) -> None:
         self._text = b""
-        self._clock = DeviceClock()
-        self._before = math.nan
-        self._days = 0.0
+        self._clock = DeviceClock(_DAY)
         self._time = math.nan
         self._motion_told = False
 
@@ -118,18 +58,11 @@ class SentenceReader:
             except UnfitSentenceError:
                 continue
             if said.clock is not None:
-                self._time = self._clock.host(self._running(said.clock), arrived)
+                self._time = self._clock.host(said.clock, arrived)
             values = self._values(said)
             if values and math.isfinite(self._time):
                 rows.append((self._time, values))
         return rows
-
-    def _running(self, clock: float) -> float:
-        """Time of day that goes on over midnight [s]."""
-        if clock - self._before < -0.5 * _DAY:
-            self._days += _DAY
-        self._before = clock
-        return clock + self._days
 
     def _values(self, said: Sentence) -> dict[str, float]:
         """Values of one sentence; as in a file, RMC tells the speed and GGA the place."""

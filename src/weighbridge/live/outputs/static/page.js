@@ -104,13 +104,15 @@ function draw() {
 }
 
 function needed(w) {
+  // Without a number of minutes: never where the mass cannot get so sure, else not known.
+  const never = (p) => w.reach_percent !== null && w.reach_percent >= p;
   const one = (m, p) => {
-    if (m === null) return `± ${p} %: not yet in sight`;
+    if (m === null) return `± ${p} %: ${never(p) ? "not by driving like this" : "not known yet"}`;
     if (m === 0) return `± ${p} %: reached`;
     return `± ${p} %: ${m < 1 ? "less than 1" : Math.round(m)} min more`;
   };
   const [five, two] = [w.minutes_to_5_percent, w.minutes_to_2_percent];
-  if (five === null && two === null) return "time left not known yet";
+  if (five === null && two === null && !never(2)) return "time left not known yet";
   return two === 0 ? one(two, 2) : `${one(five, 5)}, ${one(two, 2)}`;
 }
 

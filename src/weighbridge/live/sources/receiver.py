@@ -1,0 +1,88 @@
+"""GNSS receivers that send by themselves, on a serial line or over TCP."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from threading import Event
+from time import monotonic
+from typing import Final, Protocol
+
+from weighbridge.live.clock import now
+from weighbridge.live.source import Samples
+from weighbridge.live.sources.gathered import BLOCK, Gathered
+from weighbridge.live.sources.links import Link
+from weighbridge.live.sources.lock import DeviceLock
+
+SILENT: Final = 5.0
+"""A receiver that sends nothing with a fix for so long has a trouble [s]."""
+
+_SLICE: Final = 0.1
+
+
+class FixReader(Protocol):
+    """Turns the bytes of a receiver into fixes."""
+
+    def read(self, data: bytes, arrived: float) -> list[tuple[float, dict[str, float]]]:
+        """Return instants [s] and values [SI] of what is whole now.
+
+        Parameters
+        ----------
+        data : what came
+        arrived : when, by the host's clock [s]
+        """
+        ...
+
+
+class ReceiverSource:
+    """Listens to a receiver.
+
+    Parameters
+    ----------
+    name : as on the command line
+    open_link : opens the way to it
+    make_reader : makes what reads its bytes
+    sends : what it should send, for messages
+    """
+
+    def __init__(
+        self,
+        name: str,
+        open_link: Callable[[], Link],
+        make_reader: Callable[[], FixReader],
+        sends: str,
+    ) -> None:
+        self.name = name
+        self.trouble = ""
+        self._open = open_link
+        self._make_reader = make_reader
+        self._sends = sends
+
+    def run(self, put: Callable[[Samples], None], stop: Event) -> None:
+        """Hand over fixes until told to stop; see `weighbridge.live.source.Source.run`."""
+        self.trouble = ""
+        with DeviceLock(self.name):
+            link = self._open()
+            try:
+                self._listen(link, put, stop)
+            finally:
+                self.trouble = ""
+                link.close()
+
+    def _listen(self, link: Link, put: Callable[[Samples], None], stop: Event) -> None:
+        gathered = Gathered(put)
+        reader = self._make_reader()
+        heard = monotonic()
+        fixed = heard
+        while not stop.is_set():
+            data = link.read(_SLICE)
+            if data:
+                heard = monotonic()
+            for time, values in reader.read(data, now()):
+                fixed, self.trouble = monotonic(), ""
+                gathered.add(time, values)
+            gathered.flush(BLOCK)
+            if monotonic() - heard > SILENT:
+                self.trouble = f"the receiver sent nothing for {SILENT:g} s; check cable and rate"
+            elif monotonic() - fixed > SILENT:
+                self.trouble = f"the receiver has no fix, or sends no {self._sends}"
+        gathered.flush()

@@ -1,0 +1,86 @@
+"""From an emulated dongle to a mass, as docs/live.md says: two programs, and sockets between."""
+
+import json
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+RATE = 8.0
+PROGRAM = (sys.executable, "-m", "weighbridge")
+
+
+def free_ports():
+    with (
+        socket.create_server(("127.0.0.1", 0)) as a,
+        socket.create_server(("127.0.0.1", 0)) as b,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as c,
+    ):
+        c.bind(("127.0.0.1", 0))
+        return tuple(s.getsockname()[1] for s in (a, b, c))
+
+
+def newest(lines):
+    """Return the last whole weighing of a file; none where there is none."""
+    text = lines.read_text() if lines.exists() else ""
+    whole = [line for line in text.splitlines(keepends=True) if line.endswith("\n")]
+    return json.loads(whole[-1]) if whole else {}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_from_an_emulated_dongle_to_a_mass(loaded, car, tmp_path):
+    elm, nmea, lines = free_ports()
+    told = tmp_path / "live.jsonl"
+    emulate = [*PROGRAM, "emulate", str(loaded.folder), "--rate", f"{RATE:g}"]
+    emulate += ["--elm", f"{elm}", "--nmea", f"{nmea}", "--lines", f"{lines}"]
+    with subprocess.Popen(emulate, stdout=subprocess.PIPE, text=True) as devices:
+        try:
+            # What it prints is what is to be typed.
+            words = shlex.split(devices.stdout.readline().replace("VEHICLE.toml", str(car)))
+            assert words[:2] == ["weighbridge", "live"]
+            assert f"elm:tcp:127.0.0.1:{elm}" in words
+            live = [*PROGRAM, *words[1:], "--json", str(told), "--state", "none"]
+            with subprocess.Popen(
+                live, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            ) as scale:
+                until = time.monotonic() + 90.0
+                while newest(told).get("mass_kg") is None and time.monotonic() < until:
+                    assert scale.poll() is None, scale.stderr.read()
+                    time.sleep(0.2)
+                scale.send_signal(signal.SIGINT)
+                out, err = scale.communicate(timeout=30.0)
+        finally:
+            devices.kill()
+    assert scale.returncode == 0, err
+    assert "only emulated sources do" in err
+    last = newest(told)
+    low, high = last["interval95_kg"]
+    # A busy machine shifts stamps by so many times its own delay: more than the interval knows.
+    assert last["mass_kg"] == pytest.approx(loaded.mass, rel=0.06)
+    assert low < last["mass_kg"] < high < 1.2 * low
+    assert f"{last['mass_kg']:.0f} kg" in out
+    rates = {s["name"]: s["rate_hz"] for s in last["signals"]}
+    assert rates["accel_x"] > 50.0
+    assert rates["vehicle_speed"] > 1.0
+
+
+def test_a_drive_that_no_dongle_has(weighbridge, changed):
+    without = changed(obd=lambda t: t.drop("vehicle_speed_kmh"))
+    ran = weighbridge("emulate", without)
+    assert ran.code == 2
+    assert "has no vehicle_speed, which an OBD-II adapter sends" in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("rate", ["0", "max", "fast"])
+def test_sources_have_a_rate(weighbridge, car, rate):
+    ran = weighbridge(
+        "live", "--vehicle", car, "--source", "elm:tcp:127.0.0.1:1", "--rate", rate,
+        "--state", "none",
+    )  # fmt: skip
+    assert ran.code == 2
+    assert f"--rate {rate}" in ran.err

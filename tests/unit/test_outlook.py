@@ -1,0 +1,51 @@
+import json
+import math
+from dataclasses import asdict
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from tests.unit.made_weighings import weighing
+
+from weighbridge.live.outlook import outlook
+from weighbridge.live.outputs.lines import json_line
+from weighbridge.live.outputs.words import remaining_text
+
+
+def told(mass, std, floor):
+    """What JSON and words say of a mass."""
+    found = outlook(mass, std, floor, driven=300.0, reason="", silent=(), first=60.0)
+    said = {k: v for k, v in asdict(found).items() if k not in ("status", "reason", "advice")}
+    made = weighing(mass=mass, std=std, **said)
+    return json.loads(json_line(made)), made
+
+
+@pytest.mark.parametrize(
+    ("mass", "std", "floor", "never", "known"),
+    [
+        (2000.0, 60.0, 0.005, (), (2, 5)),
+        (2000.0, 60.0, 0.012, (2,), (5,)),
+        (2000.0, 90.0, 0.03, (2, 5), ()),
+        (2000.0, 8.0, 0.003, (), (2, 5)),
+        (2000.0, math.inf, 0.005, (), ()),
+        (math.nan, math.nan, 0.0, (), ()),
+    ],
+)
+def test_never_is_told_from_not_known(mass, std, floor, never, known):
+    line, made = told(mass, std, floor)
+    for percent in (2, 5):
+        minutes, reach = line[f"minutes_to_{percent}_percent"], line["reach_percent"]
+        assert (minutes is not None) == (percent in known)
+        assert math.isnan(getattr(made, f"minutes_to_{percent}")) == (percent not in never + known)
+        assert (minutes is None and reach is not None and reach >= percent) == (percent in never)
+
+
+@given(st.floats(1.0, 200.0), st.floats(0.0, 0.06))
+@example(2000.0 * 0.05 / 1.96, 0.05 / 1.96)
+def test_json_says_what_the_words_say(noise, floor):
+    mass = 2000.0
+    line, made = told(mass, math.hypot(noise, floor * mass), floor)
+    for percent, minutes in ((2, made.minutes_to_2), (5, made.minutes_to_5)):
+        by_json = line[f"minutes_to_{percent}_percent"] is None
+        by_json = by_json and line["reach_percent"] >= percent
+        assert by_json == ("not by driving like this" in remaining_text(minutes, percent))
