@@ -181,8 +181,8 @@ def beside_batch(runs: list[Run]) -> str:
     text = (
         f"At the end live and recorded mass lie {np.median(apart):.2f} % apart (median of "
         f"{len(both)}); {share([a <= 0.3 for a in apart.tolist()])} within 0.3 %, the farthest "
-        f"{apart.max():.2f} %. Just before that last look they lie {np.nanmedian(before):.2f} % apart; "
-        f"{share([a <= 0.3 for a in before.tolist()])} within 0.3 %, the farthest "
+        f"{apart.max():.2f} %. Just before that last look they lie {np.nanmedian(before):.2f} % "
+        f"apart; {share([a <= 0.3 for a in before.tolist()])} within 0.3 %, the farthest "
         f"{np.nanmax(before):.2f} %."
     )
     if alone:

@@ -43,6 +43,9 @@ SLOW_PERIOD: Final = 1.0
 BLOCKS: Final = 12
 """Parts of a drive that are left out one after another for a standard deviation."""
 
+ROUNDS: Final = 12
+"""Rounds of weights of a robust fit."""
+
 FEWEST: Final = 40
 """Means from which a drive, or a part of it, can tell."""
 
@@ -300,33 +303,48 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
     """
     middle = float(np.mean(predicted))
     columns = np.column_stack([predicted - middle, np.ones_like(predicted)])
-    (scale, level), weight = robust_fit(columns, reading)
-    part = np.arange(predicted.size) * BLOCKS // predicted.size
-    left_out = []
-    for k in range(BLOCKS):
-        kept = part != k
-        weighted = columns[kept] * weight[kept, None]
-        left_out.append(
-            np.linalg.lstsq(weighted.T @ columns[kept], weighted.T @ reading[kept], rcond=None)[0]
-        )
-    spread = (BLOCKS - 1) / BLOCKS * np.sum((np.array(left_out) - np.mean(left_out, 0)) ** 2, 0)
+    scale, level = robust_fit(columns, reading)
+    # Each is fitted anew: which of two clusters of rows is the outlier may hang on one part.
+    size = -(-reading.size // BLOCKS)
+    begin = (np.arange(BLOCKS) * (reading.size - size)) // (BLOCKS - 1)
+    row = np.arange(reading.size - size)
+    kept = row + np.where(row >= begin[:, None], size, 0)
+    left_out = _robust_lines((predicted - middle)[kept], reading[kept])
+    spread = (BLOCKS - 1) / BLOCKS * np.sum((left_out - np.mean(left_out, 0)) ** 2, 0)
     scale_std, level_std = np.sqrt(spread)
     return Comparison(float(scale), float(scale_std), float(level), float(level_std), middle)
 
 
-def robust_fit(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Least squares with Huber's weights: parameters (k,) and weights (m,)."""
+def _robust_lines(x: Floats, y: Floats) -> Floats:
+    """Slope and level (k, 2) of each of k lines through points (k, m), with Huber's weights."""
+    weight = np.ones_like(y)
+    least = 1e-12 * float(np.abs(y).max())
+    found = np.zeros((y.shape[0], 2))
+    for _ in range(ROUNDS):
+        total = weight.sum(axis=1)
+        x_mean, y_mean = (weight * x).sum(axis=1) / total, (weight * y).sum(axis=1) / total
+        dx = x - x_mean[:, None]
+        slope = (weight * dx * y).sum(axis=1) / np.maximum((weight * dx * dx).sum(axis=1), 1e-300)
+        found = np.column_stack([slope, y_mean - slope * x_mean])
+        off = np.abs(y - found[:, :1] * x - found[:, 1:])
+        limit = 2.0 * np.median(off, axis=1)[:, None] + least
+        weight = np.minimum(1.0, limit / np.maximum(off, 1e-300))
+    return found
+
+
+def robust_fit(columns: Floats, y: Floats) -> Floats:
+    """Least squares with Huber's weights: parameters (k,)."""
     size = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
     scaled = columns / size
     weight = np.ones_like(y)
     found = np.zeros(size.size)
-    for _ in range(12):
+    for _ in range(ROUNDS):
         root = np.sqrt(weight)
         found = np.linalg.lstsq(scaled * root[:, None], y * root, rcond=None)[0]
         off = np.abs(y - scaled @ found)
         limit = 2.0 * float(np.median(off)) + 1e-12 * float(np.abs(y).max())
         weight = np.minimum(1.0, limit / np.maximum(off, 1e-300))
-    return found / size, weight
+    return np.asarray(found / size)
 
 
 def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following | None:

@@ -22,13 +22,22 @@ from weighbridge.balance.witness import (
     robust_fit,
     rows_of,
 )
-from weighbridge.signals import Drive
+from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
 from weighbridge.vehicle.torque import source_of
 
 CLOSED: Final = 0.15
 """Part of the witness's range, from its low end, where fuel is cut or the throttle closed [-]:
 there air still passes, and the reading lies on its floor."""
+
+OUTLYING: Final = 6.0
+"""A mean so many usual scatters off the relation belongs to another state of the engine [-]."""
+
+STRAY: Final = 0.1
+"""A witness tells nothing where more of its means are of another state [-],"""
+
+BLIND_STEP: Final = 0.05
+"""by parts of its range from the low end [-]."""
 
 FEWEST_LEARNT: Final = 100
 """Means from which a relation is learnt: five minutes of pulling."""
@@ -77,6 +86,25 @@ def learn_witnesses(
         if (relation := learn(rows, airs, witness)) is not None:
             relations.append(relation)
     return tuple(relations), tuple(doubts)
+
+
+def _blind(w: Floats, off: Floats, value_range: tuple[float, float]) -> float:
+    """How much further up a witness begins to tell its reading [SI]; 0 where it does already.
+
+    Where the clutch is open or fuel is cut the engine breathes, and the reading lies on its floor.
+
+    Parameters
+    ----------
+    w : (m,) of the witness over the largest of its range
+    off : (m,) reading less the relation
+    value_range : of the witness [SI]
+    """
+    low, high = value_range
+    scatter = 1.4826 * float(np.median(np.abs(off)))
+    step = BLIND_STEP * (high - low)
+    lowest = np.abs(off[w * max(abs(low), abs(high)) < low + step])
+    stray = int(np.count_nonzero(lowest > OUTLYING * scatter))
+    return step if stray > max(STRAY * lowest.size, 2) else 0.0
 
 
 def contradiction(
@@ -136,13 +164,19 @@ def learn(
     value_range = (float(low + closed * (high - low)), float(high + 0.05 * (high - low)))
     slow, fast = np.percentile(turning, [1.0, 99.0])
     speed_range = (float(0.95 * slow), float(1.05 * fast))
-    parts = [means(r, witness, (value_range, speed_range)) for r in rows]
-    reading = np.concatenate([p.reading for p in parts])
-    if reading.size < FEWEST_LEARNT:
-        return None
-    columns = np.vstack([p.terms for p in parts])
-    found, _ = robust_fit(columns, reading)
-    predicted = columns @ found
+    while True:
+        ranges = value_range, speed_range
+        parts = [means(r, witness, ranges) for r in rows]
+        reading = np.concatenate([p.reading for p in parts])
+        if reading.size < FEWEST_LEARNT:
+            return None
+        columns = np.vstack([p.terms for p in parts])
+        predicted = columns @ robust_fit(columns, reading)
+        blind = 0.0 if witness.battery else _blind(columns[:, 1], reading - predicted, ranges[0])
+        if not blind:
+            break
+        value_range = (value_range[0] + blind, value_range[1])
+    found = robust_fit(columns, reading)
     bottom, top = np.percentile(reading, [2.0, 98.0])
     span = float(top - bottom)
     scatter = 1.4826 * float(np.median(np.abs(reading - predicted)))
