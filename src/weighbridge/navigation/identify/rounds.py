@@ -89,7 +89,11 @@ def settle(
         if gain.off > _CLOSER * before:
             break
         before = gain.off
-        scale = _Scale((*setup.gains, gain), euler_to_matrix(*motion.mounting)[0].copy(), gain.std)
+        scale = _Scale(
+            (*setup.gains, gain),
+            euler_to_matrix(*motion.mounting)[0].copy(),
+            max(gain.std, setup.scale_std),
+        )
         found = _identified(sources, mounting, settings, rate, scale)
     setup, motion = found
     if setup.scale_std == 0.0:
