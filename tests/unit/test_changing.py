@@ -35,6 +35,7 @@ def truck(*, launch_error=0.0, late_scale=1.0, told=True):
         noise=np.full(WINDOWS, NOISE**2),
         added=np.zeros((WINDOWS, 7)),
         stood=np.where(launch & told, 2.0, 0.0),
+        odds=np.full(WINDOWS, np.nan),
         traction=traction,
     )
 

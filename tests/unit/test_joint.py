@@ -272,7 +272,7 @@ def test_forward_goes_on_from_a_drive_weighed_as_a_whole(balance, car, load):
     nearly = joint_forward.resumed(given, setup, float(given.time[-6]))
     assert nearly.windows == given.time.size - 5
     *_, after = folded(track, stops=0.0, state=nearly)
-    assert after.mass == pytest.approx(end, rel=1e-5)
+    assert after.mass == pytest.approx(end, rel=1e-4)
     assert after.windows == whole.windows
     assert joint_forward.resumed(given, setup, -np.inf) == joint_forward.JointState()
 

@@ -210,7 +210,12 @@ def weigh_balance(
         elif why := contradicted(result, joined):
             status, reason = Status.INCONSISTENT, why
         else:
-            doubts = (doubt, change.doubt if change is not None else "")
+            possible = result.possible_change
+            doubts = (
+                doubt,
+                change.doubt if change is not None else "",
+                possible.note if possible is not None else "",
+            )
             warnings += tuple(d for d in doubts if d)
     return Weighing(
         drive=drive,

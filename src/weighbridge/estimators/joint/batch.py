@@ -16,6 +16,7 @@ from weighbridge.balance.table import MergedView
 from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.load_stops import change_odds, stood_before, too_hasty
+from weighbridge.estimators.joint.possible import averaged
 from weighbridge.estimators.joint.problem import (
     UNMODELLED,
     FilterInput,
@@ -263,6 +264,10 @@ def _track(
     used = reason == Reason.USED
     burnt = view.fuel_burnt
     smoothed, running = solved.x[:, 0] * (1.0 + low), solved.running * (1.0 + low)
+    given = _given(asked, solved, cut.mean(view.traction_force - asked.y))
+    end, _, possible = averaged(given, problem.std, problem.settings)
+    stds = np.sqrt(solved.var[:, 0])
+    smoothed[-1], stds[-1] = end.x[0] * (1.0 + low[-1]), np.sqrt(end.cov[0, 0])
     mass, bound = float(smoothed[-1] - burnt[-1]), float(np.sqrt(solved.var[-1, 0]))
     columns = cut.mean(force_columns(balance, vehicle, float(smoothed[-1])))
     moved = sensitivity(
@@ -277,7 +282,7 @@ def _track(
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         LEVEL_STD * float(low[-1]),
     )
-    std = float(np.hypot(UNMODELLED * bound, mass * left))
+    std = float(np.hypot(UNMODELLED * stds[-1], mass * left))
     last = np.searchsorted(time, view.time, side="right") - 1
     seen = np.maximum(last, 0)
     track = np.where(last >= 0, running[seen] - burnt, np.nan)
@@ -286,7 +291,6 @@ def _track(
         view=view, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size, left=mass * left
     )
     status, why = judge(evidence, vehicle)
-    stds = np.sqrt(solved.var[:, 0])
     return MassTrack(
         method="joint",
         balance=balance,
@@ -307,7 +311,8 @@ def _track(
         slow_errors=SlowErrors.from_states(
             time, solved.x, solved.var, solved.running_var, problem.rows[:, 1]
         ),
-        filter_input=_given(asked, solved, cut.mean(view.traction_force - asked.y)),
+        filter_input=given,
+        possible_change=possible,
         sizes=JointSizes(
             std=problem.std,
             fast=solved.fast,
@@ -333,6 +338,7 @@ def _given(asked: _Asked, solved: _Solved, beside: Floats) -> FilterInput:
         noise=solved.noise,
         added=solved.added,
         stood=asked.stood,
+        odds=problem.odds,
         traction=problem.rows[:, 0] * solved.x[:, 0] + beside,
     )
 

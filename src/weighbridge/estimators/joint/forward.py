@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from weighbridge.estimators.joint.load_stops import change_odds
+from weighbridge.estimators.joint.possible import averaged
 from weighbridge.estimators.joint.problem import (
     UNMODELLED,
     FilterInput,
@@ -91,21 +92,23 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
         columns = (given.time, given.rows, given.y, given.noise, given.added)
         return tuple(column[:end] for column in columns)
 
-    same, *_ = disturbance.run(given.start, *rows(seen), given.params)
+    by_row = ("time", "rows", "y", "noise", "added", "stood", "odds", "traction")
+    part = replace(given, **{name: getattr(given, name)[:seen] for name in by_row})
+    end, same, _ = averaged(part, setup.std, setup.settings)
     total = disturbance.weights(given.start, *rows(seen), given.params)
     jumps = np.flatnonzero(given.added[:seen].any(axis=1))
     last = int(jumps[-1]) if jumps.size else 0
     begun = disturbance.weights(given.start, *rows(last), given.params) if last else 0.0
-    mass, var = float(same.x[0]), float(same.cov[0, 0])
-    load = load_change.initial_state(same)  # type: ignore[no-untyped-call]
+    low = same.cov[0, 0] * setup.attenuating_var * (total - begun)
+    load = load_change.initial_state(end)  # type: ignore[no-untyped-call]
     return JointState(
         load=load._replace(rows=seen),
         total=total,
         begun=begun,
         tried=begun,
         windows=seen,
-        mass=mass * (1.0 + var * setup.attenuating_var * (total - begun)),
-        var=var,
+        mass=float(end.x[0] * (1.0 + low)),
+        var=float(end.cov[0, 0]),
     )
 
 

@@ -146,6 +146,7 @@ class FilterInput:
     y, noise : (m,) force [N] and its noise variance [N^2]
     added : (m, k) variance by which states jump where the load changes
     stood : (m,) how long the vehicle stood before each window [s]
+    odds : (m,) logarithm of the odds that the load changed before a window; NaN where it cannot
     traction : (m,) what the whole model says of the force at the wheels [N]
     """
 
@@ -157,6 +158,7 @@ class FilterInput:
     noise: Floats
     added: Floats
     stood: Floats
+    odds: Floats
     traction: Floats
 
 
