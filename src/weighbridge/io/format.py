@@ -70,7 +70,7 @@ class Format:
         if text and self.takes is not Takes.TEXT and not plain:
             return "[csv]"
         if mapping.time != clock and self.takes in (Takes.CHANNELS, Takes.CLOCK):
-            return "column, unit or format of [time]"
+            return "column, unit, format or rate_hz of [time]"
         if mapping.time.format is not None and self.takes is Takes.NUMBERS:
             return "format of [time]"
         if mapping.signals and self.takes is Takes.CLOCK:
