@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal, get_args
 
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
@@ -24,6 +25,8 @@ from weighbridge.vehicle.torque_model import (
 )
 from weighbridge.visible import visible
 
+EngineKind = Literal["petrol", "diesel", "electric"]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
@@ -33,6 +36,7 @@ class Vehicle:
     ----------
     name : for people
     kind : name of one of `weighbridge.vehicle.classes.VEHICLE_CLASSES`
+    engine : "petrol", "diesel" or "electric"; None where it is not known
     tare : mass without payload [kg]
     gross : permitted mass [kg]
     mapping : path of a mapping TOML for its logs
@@ -44,6 +48,7 @@ class Vehicle:
 
     name: str = "vehicle"
     kind: str = "car"
+    engine: EngineKind | None = None
     tare: float | None = None
     gross: float | None = None
     mapping: str | None = None
@@ -61,6 +66,9 @@ class Vehicle:
     def __post_init__(self) -> None:
         if self.kind not in VEHICLE_CLASSES:
             raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {self.kind!r}")
+        if self.engine is not None and self.engine not in get_args(EngineKind):
+            kinds = ", ".join(get_args(EngineKind))
+            raise ConfigError(f"engine must be one of {kinds}, got {self.engine!r}")
         for name in ("tare", "gross"):
             positive(name, getattr(self, name))
             within(name, getattr(self, name), *MASSES, "kg")
@@ -117,6 +125,7 @@ __all__ = [
     "DraggedReading",
     "Driveline",
     "Driven",
+    "EngineKind",
     "Layout",
     "Mounting",
     "Provenance",
