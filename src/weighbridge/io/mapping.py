@@ -44,6 +44,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, Final
 
+from weighbridge.arguments import check_texts, check_type
 from weighbridge.errors import ConfigError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
 from weighbridge.io.table import MOST_COLUMNS, TextFormat
@@ -152,8 +153,12 @@ def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
         The file, keys or values cannot be used; all that is wrong is told at once.
     """
     if isinstance(source, Mapping):
+        check_texts("keys of mapping", source)
         root = Section(source, "mapping", {})
     else:
+        check_type(
+            "mapping", source, (str, Path), "the path of a mapping file, or a dictionary like one"
+        )
         root = read_toml(Path(source))
     faults = Faults()
     version = root.count("format_version")

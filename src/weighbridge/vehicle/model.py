@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Final, Literal, get_args
 
+from weighbridge.arguments import check_all, check_text, check_type
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
 from weighbridge.vehicle.driveline import Driveline, Driven, Layout, Mounting, RoadLoad
@@ -26,6 +27,19 @@ from weighbridge.vehicle.torque_model import (
 from weighbridge.visible import visible
 
 EngineKind = Literal["petrol", "diesel", "electric"]
+
+_PARTS: Final[dict[str, tuple[type, bool]]] = {
+    "driveline": (Driveline, False),
+    "torque": (TorqueModel, False),
+    "road_load": (RoadLoad, False),
+    "mounting": (Mounting, True),
+    "timing": (Timing, False),
+    "dragged": (DraggedReading, True),
+    "speed_model": (SpeedModel, True),
+    "ride": (Ride, True),
+    "provenance": (Provenance, False),
+}
+"""Parts of a vehicle by field: their type, and whether they may be None."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +78,14 @@ class Vehicle:
     provenance: Provenance = field(default_factory=Provenance)
 
     def __post_init__(self) -> None:
+        check_text("name", self.name)
+        check_text("kind", self.kind)
+        for name in ("engine", "mapping"):
+            check_text(name, getattr(self, name), optional=True)
+        for name, (part, optional) in _PARTS.items():
+            if not (optional and getattr(self, name) is None):
+                check_type(name, getattr(self, name), part, f"a {part.__name__}")
+        check_all("witnesses", self.witnesses, WitnessRelation, "WitnessRelation")
         if self.kind not in VEHICLE_CLASSES:
             raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {self.kind!r}")
         if self.engine is not None and self.engine not in get_args(EngineKind):
