@@ -156,10 +156,10 @@ def test_what_cannot_be_drafted_is_one_sentence(lines, words, tmp_path):
 
 def test_a_unit_that_is_not_known_is_told_and_the_column_left_out(tmp_path):
     rows = [f"{t:.2f},{2.0 + 0.01 * t:.3f},50,7" for t in T]
-    head = "Time (s),MAF air flow rate (lb/min),Vehicle speed (km/h),Wheel speed FL (km/h)"
+    head = "Time (s),MAF air flow rate (lb/day),Vehicle speed (km/h),Wheel speed FL (km/h)"
     found = draft(written(tmp_path / "maf.csv", [head, *rows]))
     assert [c.quantity for c in found.known] == ["vehicle_speed"]
-    assert "its unit 'lb/min' is not known" in " ".join(found.all_doubts)
+    assert "its unit 'lb/day' is not known" in " ".join(found.all_doubts)
 
 
 def test_empty_columns_and_text_are_told(tmp_path):

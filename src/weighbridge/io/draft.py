@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import dimension_of, suffixes_of, unit_suffix
+from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, stated_unit, suffixes_of
 from weighbridge.io.draft_column import DraftColumn, checked
 from weighbridge.io.draft_time import DraftTime, find_times, is_number
 from weighbridge.io.naming import Named, recognise_all
@@ -200,9 +200,10 @@ def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
     header, units, after = rows[first], {}, 0
     if first + 1 < len(rows) and not any(map(is_number, rows[first + 1])):
         below = rows[first + 1]
-        stated = {n: unit_suffix(c.strip("[]()")) for n, c in zip(header, below, strict=False)}
+        stated = {n: stated_unit(c) for n, c in zip(header, below, strict=False)}
         units = {n: u for n, u in stated.items() if u is not None}
-        after = 1 if len(units) >= 0.3 * len(header) else 0
+        known = sum(u != UNKNOWN_UNIT for u in units.values())
+        after = 1 if known >= 0.3 * len(header) else 0
         units = units if after else {}
     body = [c for r in rows[first + 1 + after :] for c in r if c]
     commas = sum(_COMMA.match(c) is not None for c in body)
