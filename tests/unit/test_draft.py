@@ -358,3 +358,44 @@ def test_the_speed_of_a_table_with_positions_is_doubted_where_its_name_does_not_
         head = f"Time (s),{name} (km/h),Latitude (deg),Longitude (deg)"
         found = draft(written(tmp_path / "x.csv", [head, *rows]))
         assert any("does not tell which" in d for d in found.all_doubts) == doubts
+
+
+def hp_tuners(folder):
+    """As VCM Scanner writes it: numbers of the channels above their names, marks below."""
+    head = [
+        "HP Tuners CSV Log File", "Version: 1.0", "", "[Log Information]", "Notes: ", "",
+        "[Channel Information]", "0,12,13,4,50050",
+        "Offset,Engine RPM (SAE),Vehicle Speed (SAE),Calculated Load (SAE),Mass Airflow Sensor",
+        "s,rpm,mph,%,Hz", "", "[Channel Data]",
+    ]  # fmt: skip
+    rows = [
+        f"{t:.2f},{n:.0f},{v / 1.609344:.3f},{x:.1f},2301"
+        for t, v, n, x in zip(T, SPEED, RPM, LOAD, strict=True)
+    ]
+    return written(folder / "vcm.csv", [*head, *rows])
+
+
+def aim_race_studio(folder):
+    """As Race Studio exports it: what is known of the session, names, units, a blank line."""
+    head = [
+        '"Format","AiM CSV File"', '"Venue","Fuji"', '"Sample Rate","4"', '"Duration","99.75"', "",
+        '"Time","Speed OBD","RPM","Engine Load","GPS Nsat"', '"s","km/h","rpm","%","#"', "",
+    ]  # fmt: skip
+    rows = [
+        f'"{t:.2f}","{v:.2f}","{n:.0f}","{x:.1f}","9"'
+        for t, v, n, x in zip(T, SPEED, RPM, LOAD, strict=True)
+    ]
+    return written(folder / "aim.csv", [*head, *rows])
+
+
+@pytest.mark.parametrize("make", [hp_tuners, aim_race_studio])
+def test_what_stands_around_the_names_is_left_out(make, tmp_path):
+    path = make(tmp_path)
+    found = draft(path)
+    assert "mass_air_flow" not in {c.quantity for c in found.known}
+    (tmp_path / "map.toml").write_text(mapping_text([found]), encoding="utf-8")
+    drive = read_drive(path, tmp_path / "map.toml")
+    assert not drive.problems
+    for name, true in (("vehicle_speed", SPEED / 3.6), ("engine_speed", RPM * np.pi / 30.0)):
+        assert np.abs(drive.signals[name].values - true).max() < 0.02 * true.max()
+    assert drive.signals["engine_load"].duration == pytest.approx(T[-1])

@@ -192,27 +192,44 @@ def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
     first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
     if first is None:
         raise DriveError(f"{path} is no table: its lines have no common separator")
-    if sum(map(is_number, rows[first])) > 0.5 * len(rows[first]):
+    # Numbers of the channels may stand above their names.
+    if _of_numbers(rows[first]) and first + 1 < len(rows):
+        below = rows[first + 1]
+        first += abs(len(below) - width) <= 1 and not any(map(is_number, below))
+    if _of_numbers(rows[first]):
         raise DriveError(
             f"{path} has no header line: its first row is {lines[first][:60]!r}; write the names "
             "of its columns as columns in [csv] of a mapping"
         )
-    header, units, after = rows[first], {}, 0
+    header, units = rows[first], {}
     if first + 1 < len(rows) and not any(map(is_number, rows[first + 1])):
         below = rows[first + 1]
         stated = {n: stated_unit(c) for n, c in zip(header, below, strict=False)}
         units = {n: u for n, u in stated.items() if u is not None}
         known = sum(u != UNKNOWN_UNIT for u in units.values())
-        after = 1 if known >= 0.3 * len(header) else 0
-        units = units if after else {}
-    body = [c for r in rows[first + 1 + after :] for c in r if c]
+        units = units if known >= 0.3 * len(header) else {}
+    skipped = found.index(lines[first])
+    after = _until_rows(found[skipped + 1 :], separator, width) if units else 0
+    body = [c for r in rows[first + 1 + bool(units) :] for c in r if c]
     commas = sum(_COMMA.match(c) is not None for c in body)
     decimal = "," if separator != "," and commas > 0.2 * max(len(body), 1) else "."
-    skipped = found.index(lines[first])
     text = TextFormat(
         separator=separator, decimal=decimal, skip_rows=skipped, skip_after_header=after
     )
     return text, units
+
+
+def _of_numbers(row: Sequence[str]) -> bool:
+    return sum(map(is_number, row)) > 0.5 * len(row)
+
+
+def _until_rows(lines: Sequence[str], separator: str, width: int) -> int:
+    """Lines from the header to the first row with a number: of units, blank ones and marks."""
+    for k, line in enumerate(lines):
+        row = cells(line, separator)
+        if abs(len(row) - width) <= 1 and any(map(is_number, row)):
+            return k
+    return 1
 
 
 def _separator(lines: Sequence[str]) -> str:
