@@ -228,7 +228,12 @@ def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
     if mass + reach < low or mass - reach > high:
         return _possible(found, vehicle)
     cause = found.slow_speed or "more starts and hills are needed"
-    if not found.slow_speed and found.left > found.drive_std:
+    if not found.slow_speed and found.used_time < LEAST_TIME:
+        cause = (
+            f"only {found.used_time:.0f} s of the drive could be used: drive longer, with starts "
+            "and hills"
+        )
+    elif not found.slow_speed and found.left > found.drive_std:
         cause = (
             f"{100.0 * found.left / abs(mass):.0f} % of it is left open by the vehicle file and "
             "the equipment, whatever the drive: calibrate again"
