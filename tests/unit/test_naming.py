@@ -74,6 +74,8 @@ def test_apps_that_nothing_was_made_for():
         ("ActualRetarderPercentTorque", "retarder_torque"),
         ("DriversDemandRetarderPercentTorque", ""),
         ("ActualMaximumAvailableRetarderPercentTorque", ""),
+        ("STEER_TORQUE_MOTOR", ""),
+        ("EngResv_Tq_Actl", ""),
         ("IMU_RateX", "gyro_x"),
         ("IMU_AccelX", "accel_x"),
         ("GNSS_Latitude", "latitude"),

@@ -80,7 +80,7 @@ class Format:
     @property
     def holds_frames(self) -> bool:
         """Whether a DBC may name signals of its frames."""
-        return self.takes is Takes.CHANNELS and (self.extra in ("can", "mdf"))
+        return self.takes is Takes.CHANNELS and (self.extra in ("can", "mdf", "openpilot"))
 
     def ends(self, name: str) -> int:
         """Length of the longest of the suffixes that a file's name ends in; 0 for none."""
