@@ -84,20 +84,20 @@ def test_units_are_asked_for_where_asked_to(weighbridge, foreign, tmp_path, monk
 
 
 def test_what_is_doubted_is_asked_for_and_nothing_else(weighbridge, tmp_path, monkeypatch):
-    rows = (f"{k},{0.2 * k:.1f},{1.7e9 + 0.2 * k:.1f},{9 + k % 7},48.1,11.5" for k in range(300))
-    head = "n,Time (s),Unix time,Speed (km/h),Latitude (deg),Longitude (deg)"
+    rows = (f"{k},{k / 5:.1f},{1.7e9 + k / 5:.1f},{9 + k % 7},48.1,11.5,900" for k in range(300))
+    head = "n,Time (s),Unix time,Speed (km/h),Latitude (deg),Longitude (deg),RPM (rpm)"
     (tmp_path / "x.csv").write_text("\n".join([head, *rows]))
-    asked = answers(monkeypatch, {"the time": "Unix time", "Speed": "vehicle_speed"})
+    asked = answers(monkeypatch, {"the time": "Unix time", "Speed": "gnss_speed"})
     ran = weighbridge("map", tmp_path / "x.csv", "-o", tmp_path / "m.toml", "--ask")
     assert ran.code == 0
     assert len(asked) == 2
     assert "which column is the time (Time (s), Unix time)" in asked[0]
-    assert "Speed (km/h), 9 to 15 kmh, is taken for gnss_speed" in asked[1]
+    assert "Speed (km/h), 9 to 15 kmh, is taken for vehicle_speed" in asked[1]
     text = (tmp_path / "m.toml").read_text()
     assert 'column = "Unix time"' in text
-    assert "signals.vehicle_speed" in text
+    assert "signals.gnss_speed" in text
     assert "doubtful" not in text
-    assert "vehicle_speed" in read_drive(tmp_path / "x.csv", tmp_path / "m.toml").signals
+    assert "gnss_speed" in read_drive(tmp_path / "x.csv", tmp_path / "m.toml").signals
 
 
 def test_a_log_without_a_clock_is_mapped_by_its_rate(weighbridge, tmp_path, monkeypatch):

@@ -353,11 +353,16 @@ def test_a_rate_that_cannot_be_is_refused(time, words, tmp_path):
 
 
 def test_the_speed_of_a_table_with_positions_is_doubted_where_its_name_does_not_tell(tmp_path):
-    rows = [f"{t},{v:.1f},48.1,11.5" for t, v in zip(T, SPEED, strict=True)]
+    rows = [f"{t},{v:.1f},48.1,11.5,1500" for t, v in zip(T, SPEED, strict=True)]
     for name, doubts in (("Speed", True), ("GPS Speed", False), ("OBD Speed", False)):
-        head = f"Time (s),{name} (km/h),Latitude (deg),Longitude (deg)"
+        head = f"Time (s),{name} (km/h),Latitude (deg),Longitude (deg),Engine RPM"
         found = draft(written(tmp_path / "x.csv", [head, *rows]))
         assert any("does not tell which" in d for d in found.all_doubts) == doubts
+    head = "Time (s),Speed (km/h),Latitude (deg),Longitude (deg),comment"
+    # Of a table that has nothing else of the vehicle it is the satellites'.
+    found = draft(written(tmp_path / "x.csv", [head, *rows]))
+    assert "gnss_speed" in {c.quantity for c in found.known}
+    assert not found.all_doubts
 
 
 def hp_tuners(folder):

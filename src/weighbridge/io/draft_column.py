@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.constants import GRAVITY
 from weighbridge.io.naming import words_of
+from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
 PERCENT: Final = (-130.0, 130.0)
@@ -61,8 +62,9 @@ def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
 
 
 def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Doubt whose the one speed of a table with positions is, where its name does not tell."""
-    if not any(c.quantity == "latitude" for c in columns):
+    """Doubt whose the one speed of a table of car and position is, if its name does not tell."""
+    tables = {QUANTITIES[c.quantity].table for c in columns if c.quantity not in ("", *_SPEEDS)}
+    if not {"obd", "gnss"} <= tables:
         return columns
     speeds = [c for c in columns if c.quantity in _SPEEDS]
     if len(speeds) != 1 or _TELLING & set(words_of(speeds[0].name)):

@@ -240,7 +240,7 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
     "engine_speed": frozenset(("idle", "max", "min", "target", "wheel", "shaft", "turbo", "vehicle", "fan", "limit", "desired", "average")),
     "engine_load": frozenset(("absolute", "sensor", "cpu", "axle", "torque")),
     "engine_torque": frozenset(("steer", "eps", "reserve", "resv", "reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder", "axle")),
-    "engine_torque_fraction": frozenset(("reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "nominal", "converter")),
+    "engine_torque_fraction": frozenset(("steer", "eps", "reserve", "resv", "reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "nominal", "converter")),
     "engine_power": frozenset(("max", "min", "limit", "available", "charge", "charger", "charging", "battery", "heater", "ac", "steering", "window", "supply", "seat",
                                "mode", "state", "level", "demand", "demanded", "request", "requested", "target", "regen", "rated", "reference", "accessory", "hvac", "front", "rear", "ecu")),
     **{
