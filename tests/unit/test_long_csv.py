@@ -173,3 +173,13 @@ def test_a_datalog_of_wican(tmp_path):
     assert_allclose(drive.signals["vehicle_speed"].values * 3.6, 36.0 + np.arange(50))
     assert_allclose(drive.signals["engine_speed"].time, 12.345 + 0.2 * np.arange(50))
     assert drive.has("engine_load", "coolant_temperature")
+
+
+def test_a_rate_is_no_clock_of_a_long_table(tmp_path):
+    (tmp_path / "trip.csv").write_text(scanner())
+    mapping = {
+        "time": {"rate_hz": 5.0},
+        "signals": {"vehicle_speed": {"column": "Vehicle speed"}},
+    }
+    with pytest.raises(DriveError, match="has one row for each value, so that rate_hz"):
+        read_drive(tmp_path / "trip.csv", mapping)
