@@ -22,6 +22,10 @@ class ConfigError(WeighbridgeError):
     """A vehicle file, a mapping or an argument holds an impossible value."""
 
 
+class ArgumentTypeError(ConfigError, TypeError):
+    """An argument is of another type than expected."""
+
+
 class DriveError(WeighbridgeError):
     """A drive cannot be read, or what it says cannot be so."""
 

@@ -1,5 +1,6 @@
 """``weighbridge map``: from a foreign log to a mapping that reads it."""
 
+import json
 import os
 
 import polars as pl
@@ -51,6 +52,39 @@ def test_from_foreign_tables_to_a_mass_in_three_commands(
         )
 
 
+def test_a_dongle_and_a_phone_on_clocks_of_their_own(weighbridge, loaded, car, tmp_path):
+    """README's: the adapter's app writes times of day, the phone seconds since its start."""
+    trip, mapping = tmp_path / "trip", tmp_path / "map.toml"
+    trip.mkdir()
+    tables = {n: pl.read_parquet(loaded.folder / f"{n}.parquet") for n in ("obd", "imu", "gnss")}
+    clock = (1e3 * (pl.col("time_s") + 50_000.0)).round().cast(pl.Int64) * 1_000_000
+    tables["obd"].select(
+        clock.cast(pl.Time).dt.to_string("%H:%M:%S%.3f").alias("time"),
+        pl.col("vehicle_speed_kmh").alias("Vehicle speed (km/h)"),
+        pl.col("engine_speed_rpm").alias("Engine RPM (rpm)"),
+        pl.col("engine_load_pct").alias("Calculated engine load value (%)"),
+    ).write_csv(trip / "elm327.csv")
+    phone = (pl.col("time_s") + 11.0).alias("Time (s)")
+    tables["imu"][::4].select(
+        phone,
+        *(pl.col(f"accel_{a}_mps2").alias(f"Acceleration {a} (m/s^2)") for a in "xyz"),
+        *(pl.col(f"gyro_{a}_radps").alias(f"Gyroscope {a} (rad/s)") for a in "xyz"),
+    ).write_csv(trip / "phone_imu.csv")
+    tables["gnss"].select(
+        phone,
+        pl.col("latitude_deg").alias("Latitude (°)"),
+        pl.col("longitude_deg").alias("Longitude (°)"),
+        pl.col("altitude_m").alias("Height (m)"),
+        pl.col("speed_mps").alias("Velocity (m/s)"),
+    ).write_csv(trip / "phone_location.csv")
+    assert weighbridge("map", trip, "-o", mapping).code == 0
+    ran = weighbridge("weigh", trip, "--mapping", mapping, "--vehicle", car, "--json", "-")
+    assert ran.code == 0, ran.err
+    low, high = json.loads(ran.out)["interval95_kg"]
+    assert low < loaded.mass < high
+    assert "elm327.csv: the clock was moved by -49989" in ran.out
+
+
 def test_without_a_name_the_mapping_is_all_of_standard_output(weighbridge, foreign, tmp_path):
     ran = weighbridge("map", foreign / "auto.csv")
     (tmp_path / "printed.toml").write_text(ran.out, encoding="utf-8")
@@ -58,12 +92,66 @@ def test_without_a_name_the_mapping_is_all_of_standard_output(weighbridge, forei
     assert "Geschwindigkeit" in ran.err
 
 
+def answers(monkeypatch, told):
+    """Answer what is asked by what the question has in it; return the questions."""
+    asked = []
+
+    def prompt(question, *, default, err):
+        assert err
+        asked.append(question)
+        found = next((a for words, a in told.items() if words in question), default)
+        return found.pop(0) if isinstance(found, list) else found
+
+    monkeypatch.setattr("typer.prompt", prompt)
+    return asked
+
+
 def test_units_are_asked_for_where_asked_to(weighbridge, foreign, tmp_path, monkeypatch):
-    answers = iter(["mph", "furlong", "rpm", "pct"])
-    monkeypatch.setattr("typer.prompt", lambda *_, **__: next(answers))
+    asked = answers(monkeypatch, {"Geschwindigkeit": ["furlong", "mph"], "Motorlast": "none"})
     ran = weighbridge("map", foreign / "auto.csv", "-o", tmp_path / "m.toml", "--ask")
     assert ran.code == 0
-    assert 'unit = "mph"' in (tmp_path / "m.toml").read_text()
+    text = (tmp_path / "m.toml").read_text()
+    assert 'unit = "mph"' in text
+    assert "engine_load" not in text
+    assert "'furlong' is none of them" in ran.err
+    assert [q for q in asked if q.startswith("unit of Zeit")]
+
+
+def test_what_is_doubted_is_asked_for_and_nothing_else(weighbridge, tmp_path, monkeypatch):
+    rows = (f"{k},{k / 5:.1f},{1.7e9 + k / 5:.1f},{9 + k % 7},48.1,11.5,900" for k in range(300))
+    head = "n,Time (s),Unix time,Speed (km/h),Latitude (deg),Longitude (deg),RPM (rpm)"
+    (tmp_path / "x.csv").write_text("\n".join([head, *rows]))
+    asked = answers(monkeypatch, {"the time": "Unix time", "Speed": "gnss_speed"})
+    ran = weighbridge("map", tmp_path / "x.csv", "-o", tmp_path / "m.toml", "--ask")
+    assert ran.code == 0
+    assert len(asked) == 2
+    assert "which column is the time (Time (s), Unix time)" in asked[0]
+    assert "Speed (km/h), 9 to 15 kmh, is taken for vehicle_speed" in asked[1]
+    text = (tmp_path / "m.toml").read_text()
+    assert 'column = "Unix time"' in text
+    assert "signals.gnss_speed" in text
+    assert "doubtful" not in text
+    assert "gnss_speed" in read_drive(tmp_path / "x.csv", tmp_path / "m.toml").signals
+
+
+def test_a_log_without_a_clock_is_mapped_by_its_rate(weighbridge, tmp_path, monkeypatch):
+    log, mapping = tmp_path / "x.csv", tmp_path / "m.toml"
+    log.write_text("Index,Vehicle Speed (km/h)\n" + "".join(f"{k},{k % 9}\n" for k in range(300)))
+    ran = weighbridge("map", log, "-o", mapping)
+    assert ran.code == 0
+    told = " ".join(ran.out.split())
+    assert "300 of them, how many per second is not known" in told
+    assert f"next: weighbridge map {log} --rate HZ -o {mapping} --force" in told
+    refused = weighbridge("inspect", log, "--mapping", mapping)
+    assert refused.code == 2
+    assert "rate_hz is not known yet" in refused.err
+    assert weighbridge("map", log, "--rate", "10", "-o", mapping, "--force").code == 0
+    assert read_drive(log, mapping).signals["vehicle_speed"].duration == pytest.approx(29.9)
+    asked = answers(monkeypatch, {"how many rows per second": ["many", "5"]})
+    assert weighbridge("map", log, "--ask", "-o", mapping, "--force").code == 0
+    assert len(asked) == 2
+    assert "rate_hz = 5.0" in mapping.read_text()
+    assert weighbridge("map", log, "--rate", "-1").code == 2
 
 
 def test_what_is_no_table_is_one_sentence(weighbridge, tmp_path):

@@ -12,6 +12,9 @@ from numpy.testing import assert_allclose
 
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io import read_drive
+from weighbridge.io.bus_draft import draft_bus
+from weighbridge.io.dbc import load_dbcs
+from weighbridge.io.formats import format_of
 
 pytest.importorskip("capnp")
 zstandard = pytest.importorskip("zstandard")
@@ -69,6 +72,13 @@ def test_a_dbc_names_what_is_in_the_frames(tmp_path):
     revs = drive.signals["engine_speed"].values * 30 / np.pi
     assert_allclose(revs, 2 * truth("engineRpm", TIME), rtol=1e-9)
     assert drive.has("vehicle_speed")
+
+
+def test_map_drafts_what_a_dbc_names_in_the_frames(tmp_path):
+    (tmp_path / "car.dbc").write_text(DBC.replace(" Revs ", " EngSpd "))
+    assert format_of(LOG).holds_frames
+    found = draft_bus(LOG, load_dbcs([tmp_path / "car.dbc"]))
+    assert [(c.name, c.quantity) for c in found.known] == [("Answer.EngSpd", "engine_speed")]
 
 
 def test_a_channel_can_be_mapped_to_another_quantity():

@@ -255,3 +255,15 @@ def test_missing_package_names_the_extra(files, monkeypatch, name, package, extr
 @given(part=st.floats(0.0, 1.0), at=st.floats(0.0, 1.0), junk=st.binary(min_size=0, max_size=16))
 def test_damage_leaves_signals_or_one_sentence(files, assert_damage_is_told, name, part, at, junk):
     assert_damage_is_told(name, (files / name).read_bytes(), part, at, junk)
+
+
+def test_arrays_without_a_time_are_read_by_a_rate(tmp_path):
+    path = tmp_path / "drive.mat"
+    savemat(path, {"speed": 3.6 * SPEED, "n": 7.0 + np.arange(SLOW.size)}, oned_as="column")
+    signals = {"vehicle_speed": {"column": "speed", "unit": "kmh"}}
+    with pytest.raises(DriveError, match="no channels"):
+        read_drive(path, {"signals": signals})
+    for time, start in (({"rate_hz": 10.0}, 0.0), ({"rate_hz": 10.0, "column": "n"}, 0.7)):
+        speed = read_drive(path, {"time": time, "signals": signals}).signals["vehicle_speed"]
+        assert_allclose(speed.time, start + SLOW)
+        assert_allclose(speed.values, SPEED)

@@ -245,6 +245,24 @@ def test_a_source_that_says_nothing_is_refused(empty):
         calibrate(useless, settings=CalibrationSettings(source="load"))
 
 
+@pytest.mark.parametrize(
+    ("engine", "words"),
+    [
+        ("diesel", "its air flow tells no torque .* log its engine load"),
+        (None, "does not rise with its source mass_air_flow .* a diesel takes in air without"),
+    ],
+)
+def test_the_air_flow_of_a_diesel_is_refused_by_its_cause(empty, engine, words):
+    # Without a throttle each turn of the engine takes in the same air.
+    speed = empty.drive.signals["engine_speed"]
+    air = Signal("mass_air_flow", speed.time, 3e-4 * speed.values)
+    drive = empty.drive.with_signals(air)
+    with pytest.raises(DriveError, match=words):
+        calibrate(
+            drive, vehicle=Vehicle(engine=engine), settings=CalibrationSettings(source="air_flow")
+        )
+
+
 def test_an_order_for_measured_torque_is_refused(electric):
     with pytest.raises(ConfigError, match="offset and a scale only"):
         calibrate(electric, settings=CalibrationSettings(order=1))

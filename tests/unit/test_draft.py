@@ -1,10 +1,12 @@
 """Mappings drafted from logs as loggers write them, read back with what was drafted."""
 
+import tomllib
+
 import numpy as np
 import polars as pl
 import pytest
 
-from weighbridge.errors import DriveError
+from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.io import read_drive
 from weighbridge.io.draft import HEAD_LINES, draft
 from weighbridge.io.mapping import load_mapping
@@ -139,7 +141,7 @@ def test_several_files_of_a_drive_get_a_table_each(tmp_path):
         ([""], "is empty"),
         (["hello world"], "no common separator"),
         (["a,b", "1,2", "3,4"], "no column that can be its time"),
-        (["time,b", "1,2", "3,4"], "none of its columns is known"),
+        (["time,b", "1,2", "3,4"], "no column that is known by its name"),
         (["1,2,3", "2,3,4"], "no header line"),
         (["time,Speed (km/h)"], "no rows"),
     ],
@@ -154,10 +156,10 @@ def test_what_cannot_be_drafted_is_one_sentence(lines, words, tmp_path):
 
 def test_a_unit_that_is_not_known_is_told_and_the_column_left_out(tmp_path):
     rows = [f"{t:.2f},{2.0 + 0.01 * t:.3f},50,7" for t in T]
-    head = "Time (s),MAF air flow rate (lb/min),Vehicle speed (km/h),Wheel speed FL (km/h)"
+    head = "Time (s),MAF air flow rate (lb/day),Vehicle speed (km/h),Wheel speed FL (km/h)"
     found = draft(written(tmp_path / "maf.csv", [head, *rows]))
     assert [c.quantity for c in found.known] == ["vehicle_speed"]
-    assert "its unit 'lb/min' is not known" in " ".join(found.all_doubts)
+    assert "its unit 'lb/day' is not known" in " ".join(found.all_doubts)
 
 
 def test_empty_columns_and_text_are_told(tmp_path):
@@ -269,3 +271,136 @@ def test_parquet_by_its_short_suffix_is_drafted(tmp_path):
         frame.write_parquet(path)
         texts.append(mapping_text([draft(path)]).replace(suffix, ""))
     assert texts[0] == texts[1]
+
+
+def counted(folder, name="Sample", above=(), lost=()):
+    head = [*above, f"{name},Vehicle Speed (km/h),Engine RPM (rpm),Engine Load (%)"]
+    rows = [
+        f"{k + 7},{v:.2f},{n:.0f},{x:.1f}"
+        for k, (v, n, x) in enumerate(zip(SPEED, RPM, LOAD, strict=True))
+        if k not in lost
+    ]
+    return written(folder / "counted.csv", [*head, *rows])
+
+
+def test_rows_that_are_counted_are_a_clock_once_their_rate_is_known(tmp_path):
+    path = counted(tmp_path, lost=(50, 51, 52))
+    found = draft(path)
+    assert found.time == "Sample"
+    assert found.rate_unknown
+    assert "does not tell how many there are per second" in found.doubts[0]
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(mapping_text([found]), encoding="utf-8")
+    with pytest.raises(ConfigError, match="rate_hz is not known yet: write how many rows"):
+        read_drive(path, mapping)
+    mapping.write_text(mapping.read_text().replace('"unknown"', "4.0"), encoding="utf-8")
+    speed = read_drive(path, mapping).signals["vehicle_speed"]
+    assert len(speed) == ROWS - 3
+    # Rows that were lost leave a gap: the counter goes on over them.
+    assert speed.duration == pytest.approx(T[-1])
+
+
+def test_a_rate_above_the_header_is_taken(tmp_path):
+    for line in ("Sample Rate: 4 Hz", '"Sample Rate","4.000"', "Logging rate = 4,0 Hz;"):
+        found = draft(counted(tmp_path, above=["Session,12", line]))
+        assert (found.row_rate, found.rate) == (4.0, 4.0)
+        assert found.duration == pytest.approx(T[-1])
+        text = mapping_text([found])
+        assert "rate_hz = 4.0" in text
+        assert load_mapping(tomllib.loads(text))[0].time.rate == 4.0
+
+
+def test_a_table_without_any_time_has_the_number_of_its_rows(tmp_path):
+    rows = [f"{v:.2f},{n:.0f}" for v, n in zip(SPEED, RPM, strict=True)]
+    path = written(tmp_path / "x.csv", ["Vehicle Speed (km/h),Engine RPM", *rows])
+    found = draft(path)
+    assert (found.time, found.rate_unknown, found.rows) == ("", True, ROWS)
+    assert "no column can be its time" in found.doubts[0]
+    signals = {"vehicle_speed": {"column": "Vehicle Speed (km/h)"}}
+    drive = read_drive(path, {"time": {"rate_hz": 4.0}, "signals": signals})
+    assert drive.signals["vehicle_speed"].duration == pytest.approx(T[-1])
+    with pytest.raises(DriveError, match="or rate_hz where the rows are even"):
+        read_drive(path, {"signals": signals})
+
+
+def test_a_clock_goes_before_a_counter(tmp_path):
+    rows = [f"{k},{t},{v:.1f}" for k, (t, v) in enumerate(zip(T, SPEED, strict=True))]
+    found = draft(written(tmp_path / "x.csv", ["Index,Time (s),Speed (km/h)", *rows]))
+    assert found.time == "Time (s)"
+    assert found.row_rate is None
+
+
+def test_a_counter_that_falls_or_leaps_counts_no_rows(tmp_path):
+    for numbers in (np.arange(ROWS) % 256, 3 * np.arange(ROWS)):
+        rows = [f"{k},{v:.1f}" for k, v in zip(numbers, SPEED, strict=True)]
+        found = draft(written(tmp_path / "x.csv", ["Counter,Speed (km/h)", *rows]))
+        assert found.time == ""
+
+
+@pytest.mark.parametrize(
+    ("time", "words"),
+    [
+        ({"column": "Sample", "rate_hz": 0}, "must be more than 0 rows per second, got 0"),
+        ({"column": "Sample", "rate_hz": 4, "unit": "ms"}, "stands beside rate_hz"),
+        ({"column": "Sample", "rate_hz": 4, "format": "iso"}, "stands beside rate_hz"),
+        ({"column": "Samples", "rate_hz": 4}, "has no time column 'Samples'"),
+    ],
+)
+def test_a_rate_that_cannot_be_is_refused(time, words, tmp_path):
+    signals = {"vehicle_speed": {"column": "Vehicle Speed (km/h)"}}
+    with pytest.raises(WeighbridgeError, match=words):
+        read_drive(counted(tmp_path), {"time": time, "signals": signals})
+
+
+def test_the_speed_of_a_table_with_positions_is_doubted_where_its_name_does_not_tell(tmp_path):
+    rows = [f"{t},{v:.1f},48.1,11.5,1500" for t, v in zip(T, SPEED, strict=True)]
+    for name, doubts in (("Speed", True), ("GPS Speed", False), ("OBD Speed", False)):
+        head = f"Time (s),{name} (km/h),Latitude (deg),Longitude (deg),Engine RPM"
+        found = draft(written(tmp_path / "x.csv", [head, *rows]))
+        assert any("does not tell which" in d for d in found.all_doubts) == doubts
+    head = "Time (s),Speed (km/h),Latitude (deg),Longitude (deg),comment"
+    # Of a table that has nothing else of the vehicle it is the satellites'.
+    found = draft(written(tmp_path / "x.csv", [head, *rows]))
+    assert "gnss_speed" in {c.quantity for c in found.known}
+    assert not found.all_doubts
+
+
+def hp_tuners(folder):
+    """As VCM Scanner writes it: numbers of the channels above their names, marks below."""
+    head = [
+        "HP Tuners CSV Log File", "Version: 1.0", "", "[Log Information]", "Notes: ", "",
+        "[Channel Information]", "0,12,13,4,50050",
+        "Offset,Engine RPM (SAE),Vehicle Speed (SAE),Calculated Load (SAE),Mass Airflow Sensor",
+        "s,rpm,mph,%,Hz", "", "[Channel Data]",
+    ]  # fmt: skip
+    rows = [
+        f"{t:.2f},{n:.0f},{v / 1.609344:.3f},{x:.1f},2301"
+        for t, v, n, x in zip(T, SPEED, RPM, LOAD, strict=True)
+    ]
+    return written(folder / "vcm.csv", [*head, *rows])
+
+
+def aim_race_studio(folder):
+    """As Race Studio exports it: what is known of the session, names, units, a blank line."""
+    head = [
+        '"Format","AiM CSV File"', '"Venue","Fuji"', '"Sample Rate","4"', '"Duration","99.75"', "",
+        '"Time","Speed OBD","RPM","Engine Load","GPS Nsat"', '"s","km/h","rpm","%","#"', "",
+    ]  # fmt: skip
+    rows = [
+        f'"{t:.2f}","{v:.2f}","{n:.0f}","{x:.1f}","9"'
+        for t, v, n, x in zip(T, SPEED, RPM, LOAD, strict=True)
+    ]
+    return written(folder / "aim.csv", [*head, *rows])
+
+
+@pytest.mark.parametrize("make", [hp_tuners, aim_race_studio])
+def test_what_stands_around_the_names_is_left_out(make, tmp_path):
+    path = make(tmp_path)
+    found = draft(path)
+    assert "mass_air_flow" not in {c.quantity for c in found.known}
+    (tmp_path / "map.toml").write_text(mapping_text([found]), encoding="utf-8")
+    drive = read_drive(path, tmp_path / "map.toml")
+    assert not drive.problems
+    for name, true in (("vehicle_speed", SPEED / 3.6), ("engine_speed", RPM * np.pi / 30.0)):
+        assert np.abs(drive.signals[name].values - true).max() < 0.02 * true.max()
+    assert drive.signals["engine_load"].duration == pytest.approx(T[-1])

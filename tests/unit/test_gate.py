@@ -73,6 +73,7 @@ def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
         squat=0.003,
         squat_std=0.0,
         unmeasured_grade=0.0,
+        recorded_speed=None,
         specific_force_std=0.02,
         specific_force_scale_std=0.0,
         mean_accel_std=lambda _: 0.0,

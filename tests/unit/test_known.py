@@ -1,14 +1,19 @@
 """A vehicle from papers, tyres and data sheet."""
 
+from pathlib import Path
+
 import pytest
 
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
+from weighbridge.vehicle.data_sheet import RADIUS_STD
 from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.telling import can_weigh, tell
 from weighbridge.vehicle.tyre import rolling_radius
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.mark.parametrize(
@@ -22,6 +27,8 @@ from weighbridge.vehicle.tyre import rolling_radius
         ("315/80 R22,5 156/150L", 3.280),
         ("195 R14 C", 2.058),
         ("195R14C", 2.058),
+        ("11R22.5", 3.203),
+        ("11 R 22,5 148/145L", 3.203),
     ],
 )
 def test_radius_of_a_tyre_size(size, circumference):
@@ -29,7 +36,35 @@ def test_radius_of_a_tyre_size(size, circumference):
 
 
 @pytest.mark.parametrize(
-    "size", ["", "16", "205/55", "205/555 R16", "205/55 R99", "R16 205/55", "²"]
+    ("size", "diameter"),
+    # Overall diameters that makers print [mm]; those in inches state no height.
+    [
+        ("315/80 R22.5", 1076), ("12R22.5", 1085), ("10R22.5", 1020), ("11R24.5", 1104),
+        ("10.00R20", 1053), ("11.00 R 20", 1085), ("12.00R20", 1125), ("31x10.50R15LT", 775),
+    ],
+)  # fmt: skip
+def test_radius_of_a_truck_tyre_is_that_of_its_diameter(size, diameter):
+    assert rolling_radius(size) == pytest.approx(
+        3.05 * diameter / 2000.0 / 3.14159265, rel=2.0 * RADIUS_STD
+    )
+
+
+@pytest.mark.parametrize(
+    "size",
+    [
+        "",
+        "16",
+        "11",
+        "R22.5",
+        "110R22.5",
+        "11R99",
+        "99x10R15",
+        "205/55",
+        "205/555 R16",
+        "205/55 R99",
+        "R16 205/55",
+        "²",
+    ],
 )
 def test_what_is_no_tyre_size_is_told(size):
     with pytest.raises(ConfigError, match="tyre size"):
@@ -109,3 +144,21 @@ def test_a_truck_by_radius_and_axles_weighs_by_data_sheet(tmp_path):
     assert can_weigh(loaded)
     assert "weighs by data sheet, never calibrated: ±" in dict(tell(loaded))["worth"]
     assert not can_weigh(describe(Known(kind="truck", torque="load")).vehicle)
+
+
+def test_the_engine_is_kept_in_the_file_and_told(tmp_path):
+    path = tmp_path / "v.toml"
+    save_vehicle(describe(Known(engine="diesel")).vehicle, path)
+    assert Vehicle.load(path).engine == "diesel"
+    assert "car 'vehicle', diesel engine" in dict(tell(Vehicle.load(path)))["vehicle"]
+    path.write_text('[vehicle]\nengine = "steam"\n')
+    with pytest.raises(ConfigError, match="engine must be one of petrol, diesel, electric"):
+        Vehicle.load(path)
+
+
+def test_a_file_that_was_never_calibrated_says_so_throughout():
+    truck = Vehicle.load(EXAMPLES / "j1939-truck" / "vehicle.toml")
+    told = dict(tell(truck))
+    assert "never calibrated" in told["made"]
+    assert "never calibrated: ± 12.0 % of any mass" in told["worth"]
+    assert "drive made it" not in told["worth"]

@@ -152,3 +152,34 @@ def test_damage_leaves_signals_or_one_sentence(tmp_path_factory, assert_salvaged
 
 def test_a_vertical_tab_stays_out_of_the_sentence():
     assert first_line(ValueError("could not parse \x0b here\nmore")) == r"could not parse \x0b here"
+
+
+def test_a_datalog_of_wican(tmp_path):
+    """In the form of its documentation: milliseconds since boot, source, name, value, unit."""
+    lines = ["timestamp_ms,source,name,value,unit"]
+    for k in range(50):
+        t = 12345 + 200 * k
+        lines += [
+            f"{t},CANFLT,EngineRPM,{1500 + 10 * k}.000,rpm",
+            f"{t + 5},STD,VehicleSpeed,{36 + k}.000,km/h",
+            f"{t + 9},STD,CalcEngineLoad,40.000,%",
+            f"{t + 11},PID,CoolantTemp,90.000,c",
+        ]
+    path = tmp_path / "20260101_120000.csv"
+    path.write_text("\n".join(lines) + "\n")
+    assert format_of(path).name == "long CSV"
+    drive = mapped(path, tmp_path)
+    assert not drive.problems
+    assert_allclose(drive.signals["vehicle_speed"].values * 3.6, 36.0 + np.arange(50))
+    assert_allclose(drive.signals["engine_speed"].time, 12.345 + 0.2 * np.arange(50))
+    assert drive.has("engine_load", "coolant_temperature")
+
+
+def test_a_rate_is_no_clock_of_a_long_table(tmp_path):
+    (tmp_path / "trip.csv").write_text(scanner())
+    mapping = {
+        "time": {"rate_hz": 5.0},
+        "signals": {"vehicle_speed": {"column": "Vehicle speed"}},
+    }
+    with pytest.raises(DriveError, match="has one row for each value, so that rate_hz"):
+        read_drive(tmp_path / "trip.csv", mapping)

@@ -296,3 +296,39 @@ def test_a_mapping_in_another_encoding_is_told_with_its_line(tmp_path):
     path = write(tmp_path / "m.toml", '[signals.vehicle_speed]\ncolumn = "Größe"\n', "latin-1")
     with pytest.raises(ConfigError, match=r"m\.toml is not UTF-8 \(line 2\): save it as UTF-8"):
         load_mapping(path)
+
+
+def test_all_mistakes_of_a_mapping_are_told_at_once(tmp_path):
+    (tmp_path / "map.toml").write_text(
+        """[csv]
+separatr = ";"
+decimals = ","
+[time]
+unit = "fortnight"
+[signals.vehicle_sped]
+column = "v"
+[signals.engine_speed]
+column = "n"
+unit = "kmh"
+[signals.engine_load]
+unit = "pct"
+"""
+    )
+    with pytest.raises(ConfigError) as told:
+        load_mapping(tmp_path / "map.toml")
+    for words in (
+        "line 2: csv.separatr is not known; did you mean",
+        "line 3: csv.decimals is not known",
+        "line 5: time.unit 'fortnight' is no unit of time",
+        "line 6: signals.vehicle_sped is no quantity; did you mean",
+        "line 10: signals.engine_speed.unit 'kmh' is no unit of engine_speed",
+        "line 11: signals.engine_load.column is missing",
+    ):
+        assert words in str(told.value)
+
+
+def test_all_units_that_are_lacking_are_told_at_once(tmp_path):
+    (tmp_path / "x.csv").write_text("t,v,n\n0,1,2\n1,2,3\n")
+    signals = {"vehicle_speed": {"column": "v"}, "engine_speed": {"column": "n"}}
+    with pytest.raises(ConfigError, match=r"vehicle_speed has no unit.*engine_speed has no unit"):
+        read_drive(tmp_path / "x.csv", {"time": {"column": "t"}, "signals": signals})

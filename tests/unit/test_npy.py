@@ -108,3 +108,11 @@ def test_any_damage_leaves_signals_or_one_sentence(tmp_path_factory, at, junk, c
     except WeighbridgeError as e:
         said = str(e)
     assert len(said.splitlines()) == 1
+
+
+def test_rows_at_a_rate_and_a_counter(tmp_path):
+    speed = read_drive(folder(tmp_path), mapping(None, rate_hz=2.0)).signals["vehicle_speed"]
+    assert_array_equal(speed.time, 0.5 * np.arange(10))
+    found = folder(tmp_path, np.column_stack([np.arange(10.0), 7 + np.arange(10)]))
+    speed = read_drive(found, mapping("1", rate_hz=2.0)).signals["vehicle_speed"]
+    assert_array_equal(speed.time, 3.5 + 0.5 * np.arange(10))

@@ -103,6 +103,29 @@ def test_a_splice_on_one_clock_is_found(trips):
     assert not any(find_splices(t) for t in trips)
 
 
+@pytest.mark.parametrize(("period", "least"), [(0.25, 20.0), (0.5, 25.0), (1.0, 36.0)])
+def test_a_splice_of_steady_speeds_is_found_from_what_tyres_can_do_on(period, least):
+    time = np.arange(0.0, 600.0, period)
+    wave = 4.0 * np.sin(0.05 * time) / 3.6
+    for jump, found in ((least, True), (-least, period < 0.5), (0.5 * least, False)):
+        values = 60.0 / 3.6 + wave + np.where(time < 300.0, 0.0, jump / 3.6)
+        cuts = find_splices(wb.Drive("d", {"vehicle_speed": Signal("vehicle_speed", time, values)}))
+        assert bool(cuts) == found, (period, jump)
+        assert all(c.begin == 300.0 for c in cuts)
+
+
+def test_a_held_speed_that_catches_up_is_no_splice():
+    time = np.arange(0.0, 600.0, 1.0)
+    values = np.clip(0.1 * (time - 20.0), 2.0, 30.0)
+    held = (time >= 150.0) & (time < 170.0)
+    steep = np.where(time > 160.0, 12.0, 0.0)
+    truth = values + steep
+    values = np.where(held, truth[150], truth)
+    assert np.abs(np.diff(values)).max() > 13.0
+    drive = wb.Drive("d", {"vehicle_speed": Signal("vehicle_speed", time, values)})
+    assert not find_splices(drive)
+
+
 def test_speed_that_freezes_or_drops_out_is_no_splice(trips):
     speed = trips[0].signals["vehicle_speed"]
     top = int(np.argmax(speed.values))

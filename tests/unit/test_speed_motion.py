@@ -1,14 +1,19 @@
 """Motion from speed, with grade and height where they are, against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import weighbridge as wb
+from weighbridge.balance import force_balance
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
+from weighbridge.estimators.judging import Evidence
 from weighbridge.navigation.select import find_motion
 from weighbridge.navigation.speed import speed_motion
-from weighbridge.signals import Drive, Signal
+from weighbridge.signals import QUANTITIES, Drive, Signal
 from weighbridge.vehicle.model import Driveline, Vehicle
 
 TIME = np.arange(0.0, 200.0, 0.25)
@@ -97,3 +102,48 @@ def test_gnss_speed_has_no_scale():
 def test_nothing_moves_without_a_speed():
     with pytest.raises(DriveError, match="no vehicle_speed and no GNSS"):
         find_motion(made(engine_speed=SPEED))
+
+
+def thinned(drive, period, *, gnss):
+    """The drive as a dongle without an accelerometer has it: slow, in whole km/h."""
+    kept = {}
+    for name, s in drive.signals.items():
+        table = QUANTITIES[name].table
+        if table == "imu" or (table == "gnss" and not gnss):
+            continue
+        if table == "obd":
+            k = np.unique(np.searchsorted(s.time, np.arange(s.time[0], s.time[-1], period)))
+            values = s.values[k]
+            if name == "vehicle_speed":
+                values = np.round(3.6 * values) / 3.6
+            s = Signal(name, s.time[k], values)
+        kept[name] = s
+    return replace(drive, signals=kept)
+
+
+@pytest.mark.parametrize("method", ["joint", "rls"])
+@pytest.mark.parametrize("gnss", [True, False])
+def test_a_refusal_names_the_slow_speed_that_is_its_cause(short_drive, short_car, method, gnss):
+    weighed = wb.weigh(thinned(short_drive.drive, 3.0, gnss=gnss), short_car, method)
+    assert weighed.status is wb.Status.NOT_EXCITED
+    assert "speed of 0.33 values per second in steps of 1.0 km/h" in weighed.reason
+    assert "log the speed 3 times per second or more, or an inertial sensor" in weighed.reason
+    assert "starts and hills" not in weighed.reason
+
+
+def test_a_slow_cruise_lacks_starts_and_hills(short_drive, short_car):
+    slow = thinned(short_drive.drive, 1.0, gnss=True)
+    speed = slow.signals["vehicle_speed"]
+    # A cruise at 90 km/h that a driver holds within 1 km/h.
+    cruise = Signal(speed.name, speed.time, 25.0 + np.round(np.sin(speed.time / 20.0)) / 3.6)
+    motion = speed_motion(slow.with_signals(cruise).without("altitude"))
+    evidence = Evidence(
+        view=force_balance(slow, short_car, motion).merged,
+        used=np.ones(1, dtype=bool), phi=np.ones(1), mass=1.0, std=1.0, blocks=1, motion=motion,
+    )  # fmt: skip
+    assert motion.recorded_speed.slow_text
+    assert evidence.slow_speed == ""
+
+
+def test_a_fast_speed_is_no_cause():
+    assert speed_motion(made(vehicle_speed=SPEED)).recorded_speed.slow_text == ""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Final
 
 import numpy as np
 
+from weighbridge.arguments import check_number, check_type
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.known_mass import check_mass
 from weighbridge.calibration.recording import Recording
@@ -271,15 +273,19 @@ def _masses(
 ) -> list[float]:
     if not drives:
         raise ConfigError("no drive to calibrate with")
+    if mass is not None:
+        kinds = (Real, list, tuple, np.ndarray)
+        check_type("mass", mass, kinds, "a number of kg, or a list of one for each drive")
     if mass is None:
         known = [drive.info.mass for drive in drives]
-    elif isinstance(mass, Sequence):
+    elif isinstance(mass, Sequence | np.ndarray):
         known = list(mass)
         if len(known) != len(drives):
             raise ConfigError(f"{len(known)} masses for {len(drives)} drives; give one for each")
     else:
         known = [mass] * len(drives)
     for drive, kg in zip(drives, known, strict=True):
+        check_number("mass", kg, optional=True)
         if kg is None:
             raise ConfigError(
                 f"{drive.name}: its mass is not known; give --mass, or mass_kg in its drive.toml"

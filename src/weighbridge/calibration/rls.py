@@ -227,11 +227,20 @@ def _own_masses(
 def refuse_nonsense(problem: Problem, slope: float, std: float) -> None:
     """Raise where torque does not rise with its source: nothing can be weighed by it."""
     if not slope > 3.0 * std:
+        diesel = "a diesel takes in air without a throttle: its air flow tells no torque"
+        by_air, engine = problem.source.name == "air_flow", problem.base.engine
+        if by_air and engine == "diesel":
+            raise DriveError(
+                f"{problem.names}: {diesel} ({slope:.3g} ± {std:.2g} N m per unit of "
+                "mass_air_flow); log its engine load (PID 04) or torque (PID 62 and 63), and "
+                "calibrate with that --torque"
+            )
+        unsaid = f"; {diesel}" if by_air and engine is None else ""
         raise DriveError(
             f"{problem.names}: torque does not rise with its source "
             f"{problem.source.signals[0]} ({slope:.3g} ± {std:.2g} N m per unit at the loads and "
             "engine speeds driven); check the signal, its unit and the known mass, or calibrate "
-            "with another --torque"
+            f"with another --torque{unsaid}"
         )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from weighbridge.arguments import check_type
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.witness_learning import learn_witnesses
 from weighbridge.calibration.doubted_masses import doubted_masses, unbacked_scale, with_doubts
@@ -80,6 +81,8 @@ def calibrate(
     DriveError, ConfigError
         A drive or an argument cannot be used; the sentence says why.
     """
+    if settings is not None:
+        check_type("settings", settings, CalibrationSettings, "a weighbridge.CalibrationSettings")
     base = as_vehicle(vehicle) if vehicle is not None else None
     known = as_drives(drives, mapping_of(base, home_of(vehicle)), mapping)
     if settings is not None and not settings.fit.torque:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
+from weighbridge.arguments import check_flag, check_number, check_text, check_type
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -32,6 +34,13 @@ class CalibrationSettings:
     method: str = JOINT.name
 
     def __post_init__(self) -> None:
+        if self.order is not None:
+            check_number("order", self.order)
+            check_type("order", self.order, Integral, "a whole number")
+        check_text("source", self.source, optional=True)
+        check_flag("grid", self.grid)
+        check_flag("curved", self.curved)
+        check_text("method", self.method)
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
         if self.source is not None and self.source not in TORQUE_SOURCES:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from weighbridge.io.dbc import Database
     from weighbridge.io.draft import Draft
-    from weighbridge.io.draft_column import DraftColumn
 
 _SHOWN = 12
 """Columns that are not taken, named at most."""
@@ -40,8 +40,18 @@ def map_log(
         typer.Option("-o", "--output", help="Mapping to write; else it is printed."),
     ] = None,
     ask: Annotated[
-        bool, typer.Option("--ask", help="Ask for each unit that the log does not state.")
+        bool,
+        typer.Option("--ask", help="Ask about what is not sure: time, columns, units, rate."),
     ] = False,
+    rate: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(
+            "--rate",
+            help="Rows per second, of a log without a clock.",
+            metavar="HZ",
+            show_default=False,
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     dbc: DbcPaths = None,
 ) -> None:
@@ -74,7 +84,7 @@ def map_log(
     one = merged(drafts)
     alike = one is not None and len(drafts) > 1
     drafts = [one] if one is not None else drafts
-    drafts = [_asked(found) for found in drafts] if ask else drafts
+    drafts = _settled(drafts, rate, ask)
     screen = console(stderr=output is None)
     for found in drafts:
         _show(found, screen)
@@ -87,6 +97,9 @@ def map_log(
     with whole_file(output) as part:
         part.write_text(text, encoding="utf-8")
     say(f"written: {output}")
+    if any(found.rate_unknown for found in drafts):
+        say(f"next: weighbridge map {shlex.join(map(str, logs))} --rate HZ -o {output} --force")
+        return
     more = "".join(f" --dbc {d}" for d in dbc or ())
     drive = logs[0] if alike else _drive(logs)
     say(f"next: weighbridge inspect {drive} --mapping {output}{more}")
@@ -139,6 +152,28 @@ def _draft(path: Path, databases: tuple[Database, ...]) -> Callable[[Path], Draf
     return form.draft
 
 
+def _settled(drafts: list[Draft], rate: float | None, ask: bool) -> list[Draft]:
+    """Give the drafts what the user states, and ask for the rest where that is wanted."""
+    from weighbridge.cli.map_asking import asked
+    from weighbridge.errors import ConfigError
+
+    if rate is not None:
+        if not 0.0 < rate < float("inf"):
+            raise ConfigError(f"--rate must be more than 0 rows per second, got {rate:g}")
+        drafts = [_rated(found, rate) for found in drafts]
+    return [asked(found) for found in drafts] if ask else drafts
+
+
+def _rated(found: Draft, rate: float) -> Draft:
+    """State the rate of a draft whose time counts rows; a clock stays one."""
+    from weighbridge.io.draft import timed
+
+    counted = [time for time in found.times if time.row_rate is not None]
+    if not counted:
+        return found
+    return timed(found, replace(counted[0], row_rate=rate, doubts=[]))
+
+
 def _drive(logs: list[Path]) -> Path:
     return logs[0] if len(logs) == 1 else logs[0].parent
 
@@ -149,9 +184,11 @@ def _show(found: Draft, screen: Console) -> None:
 
     taken = found.time_format or found.time_unit or "date"
     clock = f"time '{shown(found.time)}' ({taken})" if found.time else "a clock of its own"
+    if found.row_rate is not None:
+        clock = f"rows counted by '{shown(found.time)}'" if found.time else "rows counted"
     more = f" and {found.files - 1} that read alike" if found.files > 1 else ""
     table = Table(
-        title=f"{shown(found.path.name)}{more}: {clock}, {_rate(found)} for {found.duration:.0f} s",
+        title=f"{shown(found.path.name)}{more}: {clock}, {_rate(found)}",
         title_justify="left",
     )
     for heading in ("column", "is", "unit"):
@@ -173,37 +210,10 @@ def _show(found: Draft, screen: Console) -> None:
 
 
 def _rate(found: Draft) -> str:
-    """Rows per second, or values per second where clocks differ."""
+    """Rows per second, or values per second where clocks differ, and how long."""
+    if found.rate_unknown:
+        return f"{found.rows} of them, how many per second is not known"
     if not found.rates:
-        return f"{found.rate:.3g} rows per second"
+        return f"{found.rate:.3g} rows per second for {found.duration:.0f} s"
     *others, last = (f"{rate:g}" for rate in found.rates)
-    return f"{', '.join(others)} and {last} values per second"
-
-
-def _asked(found: Draft) -> Draft:
-    """Ask for the unit of each column whose log states none."""
-    return replace(found, columns=tuple(_asked_unit(c) for c in found.columns))
-
-
-def _asked_unit(column: DraftColumn) -> DraftColumn:
-    from weighbridge.io.columns import suffixes_of
-    from weighbridge.signals import QUANTITIES
-
-    if not column.quantity or column.stated or not column.unit:
-        return column
-    allowed = suffixes_of(QUANTITIES[column.quantity])
-    while True:
-        try:
-            told = typer.prompt(
-                f"{shown(column.name)} is {column.quantity}, {column.low:.4g} to {column.high:.4g};"
-                f" unit ({', '.join(allowed)}, or none to leave it out)",
-                default=column.unit,
-                err=True,
-            ).strip()
-        except typer.Abort:
-            # Nobody is there to answer: the doubt stays.
-            return column
-        if told == "none":
-            return replace(column, quantity="")
-        if told in allowed:
-            return replace(column, unit=told, stated=True, doubt="")
+    return f"{', '.join(others)} and {last} values per second for {found.duration:.0f} s"

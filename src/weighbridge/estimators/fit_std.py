@@ -183,6 +183,7 @@ def judged(
         blocks=fitted.blocks,
         left=left,
         degrees_of_freedom=freedom,
+        motion=balance.motion,
     )
     status, why = judge(evidence, vehicle)
     # Of a cruise the noise is not the first thing to say.

@@ -148,6 +148,7 @@ class Evidence:
     blocks : stretches of time that say something of their own
     left : part of ``std`` that the vehicle file leaves, whatever the drive [kg]
     degrees_of_freedom : behind ``std``
+    motion : the rows are of; tells why few of them count
     """
 
     view: MergedView
@@ -158,6 +159,13 @@ class Evidence:
     blocks: int
     left: float = 0.0
     degrees_of_freedom: float = float("inf")
+    motion: Motion | None = None
+
+    @property
+    def slow_speed(self) -> str:
+        """What a slow speed spoils, where it shows starts and hills enough; else empty."""
+        speed = self.motion.recorded_speed if self.motion is not None else None
+        return speed.slow_text if speed is not None and speed.spread >= LEAST_SPREAD else ""
 
     @property
     def reach(self) -> float:
@@ -207,7 +215,7 @@ def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, str]:
     most = Reason(int(reasons[np.argmax(share)])).text if reasons.size else "too short"
     return Status.NOT_EXCITED, (
         f"only {count} usable samples, in {found.blocks} stretch(es) of time; "
-        f"most of the others: {most}"
+        + (found.slow_speed or f"most of the others: {most}")
     )
 
 
@@ -219,16 +227,20 @@ def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
     low, high = vehicle.of_class.mass_range
     if mass + reach < low or mass - reach > high:
         return _possible(found, vehicle)
-    by_file = found.left > found.drive_std
-    return Status.NOT_EXCITED, (
-        f"the drive says {mass:.0f} kg, {max(mass - reach, 0.0):.0f} to "
-        f"{mass + reach:.0f} kg with 95 % probability, which is no weighing; "
-        + (
+    cause = found.slow_speed or "more starts and hills are needed"
+    if not found.slow_speed and found.used_time < LEAST_TIME:
+        cause = (
+            f"only {found.used_time:.0f} s of the drive could be used: drive longer, with starts "
+            "and hills"
+        )
+    elif not found.slow_speed and found.left > found.drive_std:
+        cause = (
             f"{100.0 * found.left / abs(mass):.0f} % of it is left open by the vehicle file and "
             "the equipment, whatever the drive: calibrate again"
-            if by_file
-            else "more starts and hills are needed"
         )
+    return Status.NOT_EXCITED, (
+        f"the drive says {mass:.0f} kg, {max(mass - reach, 0.0):.0f} to "
+        f"{mass + reach:.0f} kg with 95 % probability, which is no weighing; {cause}"
     )
 
 
@@ -248,7 +260,8 @@ def _long_enough(found: Evidence, _: Vehicle) -> tuple[Status, str]:
         return _PASSED
     return Status.NOT_EXCITED, (
         f"only {found.used_time:.0f} s of the drive could be used, and {LEAST_TIME:.0f} s are "
-        "needed: wind, grade and torque errors last as long; drive longer"
+        "needed: wind, grade and torque errors last as long; "
+        + (found.slow_speed or "drive longer")
     )
 
 
@@ -256,6 +269,11 @@ def _excited(found: Evidence, _: Vehicle) -> tuple[Status, str]:
     spread = found.spread
     if spread >= LEAST_SPREAD:
         return _PASSED
+    if found.slow_speed:
+        return Status.NOT_EXCITED, (
+            f"the rows used vary the specific force by only {spread:.3f} m/s^2, and the mass needs "
+            f"{LEAST_SPREAD:.3f}; {found.slow_speed}"
+        )
     return Status.NOT_EXCITED, (
         f"acceleration and hills vary the specific force by only {spread:.3f} m/s^2, as a cruise "
         f"on the flat does, and the mass needs {LEAST_SPREAD:.3f}; more starts and hills are needed"
@@ -361,6 +379,7 @@ def nothing(
         mass=float("nan"),
         std=float("inf"),
         blocks=stretches,
+        motion=balance.motion,
     )
     _, why = judge(none, vehicle)
     return MassTrack(

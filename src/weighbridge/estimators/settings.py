@@ -7,8 +7,8 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from weighbridge.arguments import type_name
 from weighbridge.errors import ConfigError
-from weighbridge.signals.shown import type_name
 
 
 def changed(settings: Any, given: Mapping[str, object]) -> Any:

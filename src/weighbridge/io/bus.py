@@ -18,6 +18,7 @@ from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved
 from weighbridge.io.obd import decode_obd
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.tomlfile import Faults
 from weighbridge.signals.units import to_si
 from weighbridge.signals.words import counted
 
@@ -295,6 +296,7 @@ def mapped_signals(
 ) -> Wanted:
     """Find what a mapping names in databases, of the messages that are carried."""
     wanted: Wanted = {}
+    faults = Faults()
     for s in mapping.signals:
         found = find_signal(s.column, databases, carried)
         if not found:
@@ -309,7 +311,9 @@ def mapped_signals(
                 f"name one of {names}"
             )
         stated = unit_suffix(found[0].signal.unit or "")
-        wanted[s.name] = (found[0], resolved_unit(s, stated, mapping.source), s)
+        with faults.gathered():
+            wanted[s.name] = (found[0], resolved_unit(s, stated, mapping.source), s)
+    faults.refuse()
     return wanted
 
 

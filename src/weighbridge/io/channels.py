@@ -33,6 +33,7 @@ from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import column_list
 from weighbridge.signals import Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.tomlfile import Faults
 from weighbridge.signals.units import to_si
 
 # Last parts of a name that say nothing of the quantity without the part before.
@@ -197,15 +198,18 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
 
 def _mapped(log: Log, found: Recording, mapping: TableMapping) -> _Wanted:
     wanted: _Wanted = {}
+    faults = Faults()
     for s in mapping.signals:
         channel = channel_named(found.channels, s.column)
         if channel is not None:
             stated = unit_suffix(channel.unit)
-            wanted[s.name] = (channel, resolved_unit(s, stated, mapping.source), s)
+            with faults.gathered():
+                wanted[s.name] = (channel, resolved_unit(s, stated, mapping.source), s)
         elif not s.optional and found.frames is None:
             near = difflib.get_close_matches(s.column, [c.name for c in found.channels], n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             log.lacking.append(lacking(f"{log.path.name}: channel", s, mapping.source, hint))
+    faults.refuse()
     return wanted
 
 

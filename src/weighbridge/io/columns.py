@@ -14,7 +14,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "km/h": "kmh", "kph": "kmh", "km/hr": "kmh", "kmph": "kmh", "mi/h": "mph", "m/s": "mps",
     "meters/second": "mps", "knots": "kn",
     "m/s^2": "mps2", "m/s²": "mps2", "m/s2": "mps2", "m/s/s": "mps2", "gn": "g",
-    "1/min": "rpm", "r/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
+    "1/min": "rpm", "rev/min": "rpm", "r/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
     "rad/s": "radps", "deg/s": "degps", "°/s": "degps", "dps": "degps",
     "°": "deg", "degrees": "deg", "radians": "rad",
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
@@ -24,9 +24,13 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
     "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
     "tr/min": "rpm",
+    "kg/h": "kgph", "kg/hr": "kgph", "lb/min": "lbpmin", "lbs/min": "lbpmin", "msec": "ms",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""
+
+UNKNOWN_UNIT: Final = "?"
+"""Stands for a unit that a log states and nobody knows: no quantity is in it."""
 
 # Letters of a name that may resemble a canonical one; comparing takes their square.
 _LONGEST_NAME: Final = 200
@@ -57,6 +61,17 @@ def unit_suffix(text: str) -> str | None:
     if word in UNITS:
         return word
     return UNIT_TEXTS.get(word)
+
+
+def stated_unit(text: str) -> str | None:
+    """Unit suffix of a unit that a log states: `UNKNOWN_UNIT` for one that is not known; or None.
+
+    Parameters
+    ----------
+    text : what stands in a row or column of units; empty, or a mark such as - for none
+    """
+    word = text.strip().strip("[]()").strip()
+    return (unit_suffix(word) or UNKNOWN_UNIT) if word else None
 
 
 def bracketed_unit(column: str) -> str | None:

@@ -6,25 +6,18 @@ Nothing is asked and nothing is guessed silently: what is doubtful is told with 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-import polars as pl
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import dimension_of, suffixes_of, unit_suffix
+from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, stated_unit, suffixes_of
 from weighbridge.io.draft_column import DraftColumn, checked
-from weighbridge.io.naming import (
-    TIME_WORDS,
-    Named,
-    is_time,
-    recognise_all,
-    unit_of,
-    words_of,
-)
+from weighbridge.io.draft_time import DraftTime, find_times, is_number
+from weighbridge.io.naming import Named, recognise_all
 from weighbridge.io.table import (
     SEPARATORS,
     RawTable,
@@ -34,8 +27,6 @@ from weighbridge.io.table import (
     head,
     read_parquet,
     read_text,
-    since_1970,
-    time_seconds,
 )
 from weighbridge.signals import QUANTITIES, Floats
 from weighbridge.signals.units import UNITS, to_si
@@ -46,31 +37,10 @@ HEAD_LINES: Final = 60
 EVEN: Final = 0.7
 """Part of the lines that a separator cuts alike [-]."""
 
-DATE_FORMATS: Final = (
-    "%d.%m.%Y %H:%M:%S%.f",
-    "%d/%m/%Y %H:%M:%S%.f",
-    "%m/%d/%Y %H:%M:%S%.f",
-    "%m/%d/%Y %I:%M:%S%.f %p",
-    "%d-%b-%Y %H:%M:%S%.f",
-    "%Y/%m/%d %H:%M:%S%.f",
-    "%Y-%m-%d %H-%M-%S%.f",
-    "%Y%m%d %H%M%S%.f",
-)
-"""Dates that loggers write beside ISO 8601; day before month where both would fit."""
-
-_EPOCHS: Final = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-"""Least number of a clock that counts from 1970, and its unit."""
-
 _STRANGE_UNIT: Final = re.compile(r"[\[(]\s*([^\])\s]*[/•*·][^\])]*?)\s*[\])]\s*$")
 """A unit of two at the end of a name, such as lb/min."""
 
-_NUMBER: Final = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?$")
 _COMMA: Final = re.compile(r"[-+]?\d+,\d+$")
-_CLOCK: Final = re.compile(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?$")
-_ISO: Final = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
-
-_USUAL_STEP: Final = (1e-3, 20.0)
-"""Time between rows of loggers [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +60,10 @@ class Draft:
     columns : all but the time
     doubts : of the file and its time, one sentence each
     files : how many files it is of, that read alike
+    row_rate : rows per second of a time that counts rows [Hz], NaN where nobody knows; None for
+        a clock
+    rows : of a table
+    times : columns of a table that can be its time, the one taken first
     """
 
     path: Path
@@ -103,6 +77,14 @@ class Draft:
     doubts: tuple[str, ...] = ()
     files: int = 1
     rates: tuple[float, ...] = ()
+    row_rate: float | None = None
+    rows: int = 0
+    times: tuple[DraftTime, ...] = ()
+
+    @property
+    def rate_unknown(self) -> bool:
+        """Whether its time counts rows of which nobody knows how many there are per second."""
+        return self.row_rate is not None and not self.row_rate > 0.0
 
     @property
     def known(self) -> tuple[DraftColumn, ...]:
@@ -113,16 +95,6 @@ class Draft:
     def all_doubts(self) -> tuple[str, ...]:
         """Doubts of the file and of its columns."""
         return (*self.doubts, *(f"{c.name!r}: {c.doubt}" for c in self.columns if c.doubt))
-
-
-@dataclass(slots=True)
-class _Time:
-    column: str
-    index: int
-    unit: str
-    format: str
-    seconds: Floats
-    doubts: list[str] = field(default_factory=list)
 
 
 def draft(path: Path) -> Draft:
@@ -145,7 +117,9 @@ def draft(path: Path) -> Draft:
         raw = read_text(path, text)
     if raw.rows == 0:
         raise DriveError(f"{path} has a header and no rows; nothing can be told of its columns")
-    time = _find_time(raw, units)
+    above = head(path, text.skip_rows) if text.skip_rows else []
+    times = find_times(raw, units, above)
+    time = times[0]
     names = [n for k, n in enumerate(raw.names) if k != time.index]
     named = recognise_all(names, [units.get(n) for n in names])
     columns = tuple(
@@ -156,32 +130,48 @@ def draft(path: Path) -> Draft:
     if not any(c.quantity for c in columns):
         if doubts := [f"{c.name!r} is {c.doubt}" for c in columns if c.doubt]:
             raise DriveError(f"{path}: none of its columns can be taken: {'; '.join(doubts[:3])}")
+        timeless = "no column that can be its time, and " if time.row_rate is not None else ""
         raise DriveError(
-            f"{path}: none of its columns is known by its name; it has {column_list(raw.names)}: "
-            "write [signals] of a mapping by hand"
+            f"{path} has {timeless}no column that is known by its name; it has "
+            f"{column_list(raw.names)}: write [time] and [signals] of a mapping by hand"
         )
-    step = np.diff(time.seconds[np.isfinite(time.seconds)])
+    found = Draft(
+        path=path,
+        text=text,
+        time="",
+        time_unit="",
+        time_format="",
+        rate=float("nan"),
+        duration=float("nan"),
+        columns=columns,
+        rows=raw.rows,
+        times=tuple(times),
+    )
+    return timed(found, time)
+
+
+def timed(found: Draft, time: DraftTime) -> Draft:
+    """Give the draft of a table its time: what it says of rate and length goes by it."""
+    known = time.seconds[np.isfinite(time.seconds)]
+    step = np.diff(known)
     rising = step[step > 0.0]
     doubts = list(time.doubts)
     if step.size and np.mean(step == 0.0) > 0.2:
         doubts.append("several rows share one time stamp; they are spread over the step in reading")
     if step.size and np.any(step < 0.0):
         doubts.append("the time goes back in places; rows there are left out in reading")
-    return Draft(
-        path=path,
-        text=text,
+    per_second = 1.0 if time.row_rate is None else time.row_rate
+    return replace(
+        found,
         time=time.column,
         time_unit=time.unit,
         time_format=time.format,
-        rate=float(1.0 / np.median(rising)) if rising.size else float("nan"),
-        duration=float(np.nanmax(time.seconds) - np.nanmin(time.seconds)),
-        columns=columns,
+        rate=float(per_second / np.median(rising)) if rising.size else float("nan"),
+        duration=float(known.max() - known.min()) / per_second if known.size else float("nan"),
         doubts=tuple(doubts),
+        row_rate=time.row_rate,
+        columns=tuple(c for c in found.columns if c.name != time.column),
     )
-
-
-def _is_number(cell: str) -> bool:
-    return _NUMBER.match(cell) is not None
 
 
 def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
@@ -202,26 +192,44 @@ def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
     first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
     if first is None:
         raise DriveError(f"{path} is no table: its lines have no common separator")
-    if sum(map(_is_number, rows[first])) > 0.5 * len(rows[first]):
+    # Numbers of the channels may stand above their names.
+    if _of_numbers(rows[first]) and first + 1 < len(rows):
+        below = rows[first + 1]
+        first += abs(len(below) - width) <= 1 and not any(map(is_number, below))
+    if _of_numbers(rows[first]):
         raise DriveError(
             f"{path} has no header line: its first row is {lines[first][:60]!r}; write the names "
             "of its columns as columns in [csv] of a mapping"
         )
-    header, units, after = rows[first], {}, 0
-    if first + 1 < len(rows) and not any(map(_is_number, rows[first + 1])):
+    header, units = rows[first], {}
+    if first + 1 < len(rows) and not any(map(is_number, rows[first + 1])):
         below = rows[first + 1]
-        stated = {n: unit_suffix(c.strip("[]()")) for n, c in zip(header, below, strict=False)}
+        stated = {n: stated_unit(c) for n, c in zip(header, below, strict=False)}
         units = {n: u for n, u in stated.items() if u is not None}
-        after = 1 if len(units) >= 0.3 * len(header) else 0
-        units = units if after else {}
-    body = [c for r in rows[first + 1 + after :] for c in r if c]
+        known = sum(u != UNKNOWN_UNIT for u in units.values())
+        units = units if known >= 0.3 * len(header) else {}
+    skipped = found.index(lines[first])
+    after = _until_rows(found[skipped + 1 :], separator, width) if units else 0
+    body = [c for r in rows[first + 1 + bool(units) :] for c in r if c]
     commas = sum(_COMMA.match(c) is not None for c in body)
     decimal = "," if separator != "," and commas > 0.2 * max(len(body), 1) else "."
-    skipped = found.index(lines[first])
     text = TextFormat(
         separator=separator, decimal=decimal, skip_rows=skipped, skip_after_header=after
     )
     return text, units
+
+
+def _of_numbers(row: Sequence[str]) -> bool:
+    return sum(map(is_number, row)) > 0.5 * len(row)
+
+
+def _until_rows(lines: Sequence[str], separator: str, width: int) -> int:
+    """Lines from the header to the first row with a number: of units, blank ones and marks."""
+    for k, line in enumerate(lines):
+        row = cells(line, separator)
+        if abs(len(row) - width) <= 1 and any(map(is_number, row)):
+            return k
+    return 1
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -235,142 +243,6 @@ def _separator(lines: Sequence[str]) -> str:
         if usual > 0 and np.mean(counts == usual) >= EVEN:
             return separator
     return max(SEPARATORS, key=lambda s: sum(line.count(s) for line in lines))
-
-
-def _find_time(raw: RawTable, units: Mapping[str, str]) -> _Time:
-    """Find the column of the time; ``units`` are those that a row of the file states."""
-    places = [k for k, name in enumerate(raw.names) if is_time(name)]
-    places += [
-        k for k in range(len(raw.names)) if raw.column(k).dtype.is_temporal() and k not in places
-    ]
-    found = [t for k in places if (t := _as_time(raw, k, units)) is not None]
-    found = found or [
-        t for k in range(len(raw.names)) if (t := _likely_time(raw, k, units)) is not None
-    ]
-    if not found:
-        raise DriveError(
-            f"{raw.path} has no column that can be its time; it has {column_list(raw.names)}: name "
-            "it as column in [time] of a mapping"
-        )
-    # The finer of several clocks; where they are alike, the first.
-    best = max(found, key=lambda t: (round(_resolution(t.seconds), 3), -t.index))
-    others = [t.column for t in found if t is not best]
-    if others:
-        best.doubts.append(f"{best.column!r} is taken for the time, not {column_list(others)}")
-    return best
-
-
-def _likely_time(raw: RawTable, index: int, units: Mapping[str, str]) -> _Time | None:
-    """Read a column that rises as a time where part of its name, or its size, says so."""
-    named = bool(TIME_WORDS & set(words_of(raw.names[index])))
-    found = _as_time(raw, index, units)
-    if found is None or not (named or since_1970(found.seconds)):
-        return None
-    steps = np.diff(found.seconds[np.isfinite(found.seconds)])
-    if np.mean(steps >= 0.0) < EVEN:
-        return None
-    found.doubts.append(f"{found.column!r} is taken for the time, for it rises as one")
-    return found
-
-
-def _resolution(seconds: Floats) -> float:
-    """Part of the rows that have a stamp of their own."""
-    known = seconds[np.isfinite(seconds)]
-    return np.unique(known).size / max(seconds.size, 1)
-
-
-def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> _Time | None:
-    """Read a column as a time; None where it cannot be one."""
-    series, name = raw.column(index), raw.names[index]
-    if series.dtype.is_temporal():
-        seconds, _, _ = time_seconds(raw, index, 1.0, None)
-        return _Time(name, index, "", "", seconds)
-    if series.dtype == pl.String:
-        texts = [t.strip() for t in series.drop_nulls().head(200).to_list() if t.strip()]
-        numbers = sum(map(_is_number, texts))
-        if texts and numbers < 0.5 * len(texts):
-            return _text_time(raw, index, texts)
-    try:
-        values, _ = raw.numbers(index)
-    except DriveError:
-        return None
-    known = values[np.isfinite(values)]
-    if known.size < 2 or known[-1] <= known[0]:
-        return None
-    doubts = []
-    stated, _ = unit_of(name)
-    if stated is None and name in units:
-        stated, _ = unit_of(f"{name} [{units[name]}]")
-    if stated is not None and UNITS[stated].dimension == "s":
-        unit = stated
-    else:
-        unit, doubt = guessed_time_unit(name, known)
-        doubts += [doubt] if doubt else []
-    return _Time(name, index, unit, "", values * UNITS[unit].factor, doubts)
-
-
-def guessed_time_unit(name: str, values: Floats) -> tuple[str, str]:
-    """Unit of a time in numbers, by its size and its steps, and a doubt."""
-    usual = float(np.median(np.abs(values)))
-    for least, unit in _EPOCHS:
-        if usual >= least:
-            return unit, ""
-    step = np.diff(values)
-    step = step[step > 0.0]
-    usual_step = float(np.median(step)) if step.size else 1.0
-    whole = bool(np.all(values == np.round(values)))
-    if whole and usual_step >= 5.0:
-        for unit in ("ms", "us", "ns"):
-            low, high = _USUAL_STEP
-            if low <= usual_step * UNITS[unit].factor <= high:
-                return unit, (
-                    f"time {name!r} states no unit; its steps of {usual_step:g} are taken as {unit}"
-                )
-    if whole and usual_step == 1.0 and name.strip().lower() in ("index", "row", "sample", "n"):
-        return "s", f"{name!r} counts rows; it is taken as seconds"
-    return "s", f"time {name!r} states no unit; taken as seconds, {usual_step:g} s from row to row"
-
-
-def _text_time(raw: RawTable, index: int, texts: Sequence[str]) -> _Time | None:
-    name = raw.names[index]
-    form, doubts = text_time_format(texts)
-    if not form:
-        return None
-    try:
-        seconds, _, _ = time_seconds(raw, index, 1.0, form)
-    except DriveError:
-        return None
-    return _Time(name, index, "", form, seconds, doubts)
-
-
-def text_time_format(texts: Sequence[str]) -> tuple[str, list[str]]:
-    """Find how times are written, as ``format`` of a mapping names it.
-
-    Parameters
-    ----------
-    texts : some of them, without blanks around
-
-    Returns
-    -------
-    format : empty where they are no times, or numbers
-    doubts : what is not sure, one sentence each
-    """
-    if not texts:
-        return "", []
-    if all(_CLOCK.match(t) for t in texts):
-        return "clock", []
-    if all(_ISO.match(t) for t in texts):
-        return "iso", []
-    fits = [f for f in DATE_FORMATS if _fits(texts, f)]
-    doubts = []
-    if len(fits) > 1 and {f[:5] for f in fits} >= {"%d/%m", "%m/%d"}:
-        doubts.append(f"{texts[0]!r} is read with the day before the month")
-    return (fits[0] if fits else ""), doubts
-
-
-def _fits(texts: Sequence[str], form: str) -> bool:
-    parsed = pl.Series(texts).str.to_datetime(form, strict=False, time_unit="us")
-    return int(parsed.null_count()) <= 0.02 * len(texts)
 
 
 def _column(raw: RawTable, name: str, found: Named, *, stated: str | None) -> DraftColumn:
@@ -420,7 +292,18 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
         by_log = False
         unit, doubt = _plausible_unit(name, found.quantity, known)
     low, usual, high = map(float, np.quantile(known, [0.0, 0.5, 1.0]))
-    return DraftColumn(name, found.quantity, unit, by_log, low, usual, high, known.size, doubt)
+    return DraftColumn(
+        name,
+        found.quantity,
+        unit,
+        by_log,
+        low,
+        usual,
+        high,
+        known.size,
+        doubt,
+        unsure=found.score < 1.0 or (bool(doubt) and by_log),
+    )
 
 
 def _beyond(quantity: str, unit: str, values: Floats) -> str:

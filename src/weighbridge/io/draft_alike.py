@@ -31,7 +31,8 @@ def merged(drafts: Sequence[Draft]) -> Draft | None:
 def _layout(one: Draft) -> tuple[object, ...]:
     """What files have to share for one mapping: all but units that were found from values."""
     columns = tuple((c.name, c.quantity, c.valid, c.stated and c.unit) for c in one.columns)
-    return one.path.suffix, one.text, one.time, one.time_unit, one.time_format, columns
+    time = (one.time, one.time_unit, one.time_format, str(one.row_rate))
+    return one.path.suffix, one.text, time, columns
 
 
 def _widest(columns: Sequence[DraftColumn]) -> DraftColumn:

@@ -8,10 +8,22 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import GRAVITY
+from weighbridge.io.naming import words_of
+from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
 PERCENT: Final = (-130.0, 130.0)
 """Values of a torque in percent, at least and at most; J1939 has -125 to 125 %."""
+
+_SPEEDS: Final = {
+    "vehicle_speed": "the speed of the wheels, not of satellites (gnss_speed)",
+    "gnss_speed": "the speed of satellites, not of the wheels (vehicle_speed)",
+}
+
+_TELLING: Final = frozenset(
+    ("obd", "vehicle", "veh", "car", "wheel", "ego", "gps", "gnss", "ground", "location", "sog")
+)
+"""Words by which a speed is known to be one of the two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +40,7 @@ class DraftColumn:
     count : cells with a number
     doubt : what is not sure, one sentence; empty where it is
     valid : signal of the same message that says whether it counts; empty for none
+    unsure : whether what it is taken for is not sure: its name says more, or fits two quantities
     """
 
     name: str
@@ -40,11 +53,29 @@ class DraftColumn:
     count: int
     doubt: str = ""
     valid: str = ""
+    unsure: bool = False
 
 
 def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Say what the columns of one log tell of each other's units."""
-    return retarder_checked(percent_checked(gravity_checked(columns)))
+    return speed_checked(retarder_checked(percent_checked(gravity_checked(columns))))
+
+
+def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Doubt whose the one speed of a table of car and position is, if its name does not tell."""
+    tables = {QUANTITIES[c.quantity].table for c in columns if c.quantity not in ("", *_SPEEDS)}
+    if not {"obd", "gnss"} <= tables:
+        return columns
+    speeds = [c for c in columns if c.quantity in _SPEEDS]
+    if len(speeds) != 1 or _TELLING & set(words_of(speeds[0].name)):
+        return columns
+    doubt = f"taken for {_SPEEDS[speeds[0].quantity]}; its name does not tell which"
+    return tuple(
+        replace(c, doubt=f"{c.doubt}; {doubt}" if c.doubt else doubt, unsure=True)
+        if c is speeds[0]
+        else c
+        for c in columns
+    )
 
 
 def gravity_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:

@@ -70,7 +70,7 @@ class Format:
         if text and self.takes is not Takes.TEXT and not plain:
             return "[csv]"
         if mapping.time != clock and self.takes in (Takes.CHANNELS, Takes.CLOCK):
-            return "column, unit or format of [time]"
+            return "column, unit, format or rate_hz of [time]"
         if mapping.time.format is not None and self.takes is Takes.NUMBERS:
             return "format of [time]"
         if mapping.signals and self.takes is Takes.CLOCK:
@@ -80,7 +80,7 @@ class Format:
     @property
     def holds_frames(self) -> bool:
         """Whether a DBC may name signals of its frames."""
-        return self.takes is Takes.CHANNELS and (self.extra in ("can", "mdf"))
+        return self.takes is Takes.CHANNELS and (self.extra in ("can", "mdf", "openpilot"))
 
     def ends(self, name: str) -> int:
         """Length of the longest of the suffixes that a file's name ends in; 0 for none."""

@@ -17,7 +17,7 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.columns import bracketed_unit, time_unit, unit_suffix
-from weighbridge.io.draft import text_time_format
+from weighbridge.io.draft_time import text_time_format
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.naming import is_time, unit_of
 from weighbridge.io.table import (
@@ -154,6 +154,11 @@ def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[str]) -> Cha
 
 def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording) -> Floats:
     """Times of the rows [s], as a mapping tells or as they look."""
+    if time.rate is not None:
+        raise DriveError(
+            f"{raw.path} has one row for each value, so that rate_hz in [time] of the mapping is "
+            "no rate of a signal; name the time's column in its place"
+        )
     index = _time_place(names) if time.column is None else raw.index(time.column)
     if index is None:
         raise DriveError(

@@ -17,6 +17,7 @@
     column = "Time [ms]"
     unit = "ms"                      # else the brackets, else seconds
     format = "clock"                 # 17:58:02.288; or "iso"; or a pattern with %
+    rate_hz = 10.0                   # column counts rows, so many a second; without column all rows
     offset_s = 0.5                   # added to every stamp
     align = true                     # find the offset to the drive's other files
 
@@ -43,15 +44,19 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, Final
 
+from weighbridge.arguments import check_texts, check_type
 from weighbridge.errors import ConfigError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
 from weighbridge.io.table import MOST_COLUMNS, TextFormat
 from weighbridge.signals import QUANTITIES, Problem, Quantity
-from weighbridge.signals.tomlfile import Section, read_toml, suggestion
+from weighbridge.signals.tomlfile import Faults, Section, read_toml, suggestion
 from weighbridge.signals.units import UNITS
 
 FORMAT_VERSION: Final = 1
 """Version of the mapping file this program reads."""
+
+UNKNOWN_RATE: Final = "unknown"
+"""What a drafted mapping says of a rate that nobody knows yet."""
 
 # What cells of numbers, ends of lines and quotes are made of.
 _NO_SEPARATORS: Final = frozenset('0123456789.+-eE"\r\n\0')
@@ -73,6 +78,7 @@ class TimeColumn:
     format : None for numbers, "clock", "iso" or a `strptime` format
     offset : added to every stamp [s]
     align : whether the clock differs from that of the drive's other files
+    rate : rows per second where ``column`` counts rows, or every row counts [Hz]; None for a clock
     """
 
     column: str | None = None
@@ -80,6 +86,7 @@ class TimeColumn:
     format: str | None = None
     offset: float = 0.0
     align: bool = False
+    rate: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,12 +150,17 @@ def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
     Raises
     ------
     ConfigError
-        The file, a key or a value cannot be used.
+        The file, keys or values cannot be used; all that is wrong is told at once.
     """
     if isinstance(source, Mapping):
+        check_texts("keys of mapping", source)
         root = Section(source, "mapping", {})
     else:
+        check_type(
+            "mapping", source, (str, Path), "the path of a mapping file, or a dictionary like one"
+        )
         root = read_toml(Path(source))
+    faults = Faults()
     version = root.count("format_version")
     if version not in (None, FORMAT_VERSION):
         root.fail(
@@ -156,21 +168,26 @@ def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
             f"is {version}, and this program reads {FORMAT_VERSION}: "
             "use the program's version that goes with the file",
         )
-    found = []
+    found: list[TableMapping] = []
     tables = root.section("tables")
     if tables is not None:
         for name in tables.data:
-            section = tables.section(name)
-            if section is not None:
-                found.append(_table(section, section.text("files") or f"{name}.*"))
+            with faults.gathered():
+                section = tables.section(name)
+                if section is not None:
+                    found.append(_table(section, section.text("files") or f"{name}.*"))
     if tables is not None and "signals" not in root.data:
         for key in ("csv", "time"):
             if key in root.data:
                 places = ", ".join(f"[tables.{name}.{key}]" for name in tables.data)
-                root.fail(key, f"stands beside [tables]: write it for each table, as {places}")
+                with faults.gathered():
+                    root.fail(key, f"stands beside [tables]: write it for each table, as {places}")
     if tables is None or "signals" in root.data:
-        found.append(_table(root, "*"))
-    root.done()
+        with faults.gathered():
+            found.append(_table(root, "*"))
+    with faults.gathered():
+        root.done()
+    faults.refuse()
     return tuple(found)
 
 
@@ -181,24 +198,33 @@ def mapping_for(path: Path, mappings: tuple[TableMapping, ...]) -> TableMapping 
 
 
 def _table(root: Section, files: str) -> TableMapping:
-    text = _text_format(root.section("csv"))
-    time = _time(root.section("time"))
+    faults = Faults()
+    text, time = TextFormat(), TimeColumn()
+    with faults.gathered():
+        text = _text_format(root.section("csv"))
+    with faults.gathered():
+        time = _time(root.section("time"))
     section = root.section("signals")
     own_names = time == TimeColumn(offset=time.offset, align=time.align)
-    told = time != TimeColumn() or text != TextFormat()
-    if section is None and own_names and told:
-        root.done()
-        return TableMapping(files=files, text=text, time=time, signals=(), source=root.name)
-    if section is None or not section.data:
-        root.fail(
-            "signals",
-            "is missing: name at least one column, such as "
-            '[signals.vehicle_speed] column = "Speed", unit = "kmh"',
-        )
-    signals = tuple(_signal(section, name) for name in section.data)
-    if root.path:
-        root.done()
-    return TableMapping(files=files, text=text, time=time, signals=signals, source=root.name)
+    told = time != TimeColumn() or text != TextFormat() or bool(faults.said)
+    alone = section is None and own_names and told
+    signals: list[MappedSignal] = []
+    if not alone and (section is None or not section.data):
+        with faults.gathered():
+            root.fail(
+                "signals",
+                "is missing: name at least one column, such as "
+                '[signals.vehicle_speed] column = "Speed", unit = "kmh"',
+            )
+    if section is not None:
+        for name in section.data:
+            with faults.gathered():
+                signals.append(_signal(section, name))
+    if root.path or alone:
+        with faults.gathered():
+            root.done()
+    faults.refuse()
+    return TableMapping(files=files, text=text, time=time, signals=tuple(signals), source=root.name)
 
 
 def _text_format(section: Section | None) -> TextFormat:
@@ -267,7 +293,11 @@ def _time(section: Section | None) -> TimeColumn:
         format=section.text("format"),
         offset=section.quantity("offset", "s") or 0.0,
         align=section.flag("align") or False,
+        rate=_rate(section),
     )
+    if time.rate is not None and (time.unit is not None or time.format is not None):
+        key = "unit" if time.unit is not None else "format"
+        section.fail(key, "stands beside rate_hz: a number of rows has none; remove one of the two")
     if time.format is not None and time.format not in ("clock", "iso") and "%" not in time.format:
         section.fail(
             "format",
@@ -276,6 +306,18 @@ def _time(section: Section | None) -> TimeColumn:
         )
     section.done()
     return time
+
+
+def _rate(section: Section) -> float | None:
+    """Rows per second of a time that counts rows [Hz]."""
+    if section.data.get("rate_hz") == UNKNOWN_RATE:
+        section.fail(
+            "rate_hz", "is not known yet: write how many rows the logger wrote per second, as 10.0"
+        )
+    rate = section.number("rate_hz")
+    if rate is not None and rate <= 0.0:
+        section.fail("rate_hz", f"must be more than 0 rows per second, got {rate:g}")
+    return rate
 
 
 def _signal(parent: Section, name: str) -> MappedSignal:

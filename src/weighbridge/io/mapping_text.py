@@ -13,6 +13,7 @@ from tomlkit.items import Table
 
 from weighbridge.io.draft import Draft
 from weighbridge.io.draft_column import DraftColumn
+from weighbridge.io.mapping import UNKNOWN_RATE
 from weighbridge.io.table import TextFormat
 from weighbridge.signals import QUANTITIES
 from weighbridge.visible import visible
@@ -101,6 +102,8 @@ def _time(one: Draft) -> Table:
         table.add("unit", one.time_unit)
     if one.time_format:
         table.add("format", one.time_format)
+    if one.row_rate is not None:
+        table.add("rate_hz", UNKNOWN_RATE if one.rate_unknown else one.row_rate)
     return table
 
 

@@ -40,6 +40,7 @@ from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import column_list
 from weighbridge.signals import DriveInfo, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
+from weighbridge.signals.tomlfile import Faults
 from weighbridge.signals.units import to_si
 
 # Channel groups of bus logging (ASAM MDF 4, bus logging), not of measurements.
@@ -304,6 +305,7 @@ def _mapped(
     log: Log, channels: dict[str, list[_Place]], mapping: TableMapping, file: Any
 ) -> _Wanted:
     wanted: _Wanted = {}
+    faults = Faults()
     plain = {name.strip().casefold(): name for name in channels}
     for s in mapping.signals:
         name = s.column if s.column in channels else plain.get(s.column.strip().casefold())
@@ -313,8 +315,10 @@ def _mapped(
             continue
         place = _longest(file, channels[name])
         stated = unit_suffix(_unit_text(file, place))
-        wanted[s.name] = (place, resolved_unit(s, stated, mapping.source), s)
+        with faults.gathered():
+            wanted[s.name] = (place, resolved_unit(s, stated, mapping.source), s)
         _note_choice(log, name, channels[name])
+    faults.refuse()
     return wanted
 
 

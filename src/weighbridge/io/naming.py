@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from weighbridge.io.abbreviations import OF_ANOTHER, SOURCES, spelled
-from weighbridge.io.columns import dimension_of, unit_suffix
+from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, unit_suffix
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
@@ -73,7 +73,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
         "engine reference torque", "reference torque", "referenzmoment", "reference engine torque",
     ),
     "retarder_torque": ("actual retarder percent torque", "retarder percent torque", "actual retarder torque", "retarder torque"),
-    "mass_air_flow": (
+    "mass_air_flow": ("mass airflow",
         "mass air flow", "mass air flow rate", "maf", "air flow", "maf rate", "maf air flow rate", "air flow rate",
         "luftmassenstrom", "luftmasse", "debit air", "debit massique air", "flujo masa aire", "flujo aire",
         "portata aria", "massa aria", "fluxo de ar", "air flow rate maf", "intake air flow", "maf sensor",
@@ -113,12 +113,12 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
         "temperature air admission", "temperatura aire admision", "temperatura aria aspirata", "intake temp",
         "inlet air temperature",
     ),
-    "ambient_temperature": (
+    "ambient_temperature": ("ambient",
         "ambient air temperature", "ambient temperature", "ambient air temp", "ambient temp", "outside temperature",
         "oat", "aussentemperatur", "umgebungstemperatur", "temperature exterieure", "temperatura ambiente",
         "temperatura exterior", "temperatura esterna", "outside air temperature",
     ),
-    "oil_temperature": (
+    "oil_temperature": ("oil celsius",
         "engine oil temperature", "oil temperature", "oil temp", "engine oil temp", "oltemperatur", "motoroltemperatur",
         "temperature huile", "temperatura aceite", "temperatura olio",
     ),
@@ -149,11 +149,11 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
         "bremslicht", "frein", "freno", "brake light", "brake pedal status", "brakes", "brake lights",
     ),
     "clutch_switch": ("clutch switch", "clutch", "clutch pedal", "kupplung", "embrayage", "embrague", "frizione", "clutch pressed"),
-    "battery_voltage": (
+    "battery_voltage": ("hv v",
         "battery voltage hv", "hv battery voltage", "traction battery voltage", "battery pack voltage", "pack voltage",
         "high voltage battery voltage", "hv voltage", "batteriespannung", "battery voltage",
     ),
-    "battery_current": (
+    "battery_current": ("pack amps", "hv a",
         "battery current", "hv battery current", "traction battery current", "battery pack current", "pack current",
         "high voltage battery current", "hv current", "batteriestrom",
     ),
@@ -163,10 +163,10 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     ),
     "fuel_level": ("fuel level", "fuel tank level", "fuel level input", "tankfullstand", "niveau carburant", "nivel combustible", "fuel remaining", "livello carburante"),
     "run_time": ("run time since engine start", "time since engine start", "engine run time", "engine runtime", "runtime since engine start", "tiempo desde arranque motor"),
-    "odometer": ("odometer", "mileage", "kilometerstand", "total distance", "kilometrage", "vehicle odometer"),
+    "odometer": ("odometer", "mileage", "kilometerstand", "total distance", "kilometrage", "vehicle odometer", "odo"),
     "latitude": ("pos lat", "latitude", "lat", "breitengrad", "breite", "latitud", "latitudine", "gps latitude", "latitude deg", "gps lat", "position latitude"),
     "longitude": ("pos lon", "pos lng", "pos long", "longitude", "lon", "lng", "long", "langengrad", "lange", "longitud", "longitudine", "gps longitude", "gps lon", "gps long", "gps lng"),
-    "altitude": ("alt msl", "hgt", "altitude", "alt", "height", "elevation", "ele", "hohe", "altitud", "altitudine", "gps altitude", "gps alt", "gps height", "hauteur", "altura", "msl altitude", "height above msl", "location altitude"),
+    "altitude": ("alt msl", "hgt", "altitude", "alt", "height", "elevation", "ele", "hohe", "altitud", "altitudine", "gps altitude", "gps alt", "gps height", "hauteur", "altura", "msl altitude", "height above msl", "location altitude", "elv"),
     "gnss_speed": ("gps kmh", "gps kph", "gps mph", "gps mps", "gps spd", "gp sspeed", "gps speed", "speed gps", "gnss speed", "speed over ground", "gps geschwindigkeit", "vitesse gps", "velocidad gps", "location speed", "gps velocity", "sog", "velocita gps", "geschwindigkeit gps"),
     "gnss_course": ("course", "heading", "bearing", "gps course", "gps bearing", "gps heading", "course over ground", "cog", "kurs", "cap", "rumbo", "track angle", "location course", "direction", "gps direction", "location bearing"),
     "hdop": ("hdop", "horizontal dilution of precision", "dop", "gps hdop"),
@@ -203,7 +203,7 @@ TIME_PHRASES: Final = frozenset(
         "device time", "gps time", "temps", "horodatage", "tiempo", "fecha hora", "hora", "tempo", "ora", "data ora", "datum",
         "elapsed", "elapsed time", "seconds elapsed", "seconds", "millis", "milliseconds", "utc", "utc time", "epoch",
         "time since start", "time utc", "unix time", "log time", "timestamps", "created at", "measured at", "sec", "ms",
-        "session time", "meta time", "relative time", "recording time", "logging time", "time since start in ms", "running time",
+        "session time", "epoch time", "interval", "meta time", "relative time", "recording time", "logging time", "time since start in ms", "running time",
         "ts", "stamp", "log mono time", "local time", "elapsed seconds", "offset", "trip time", "time elapsed", "tijd", "timestamp ms", "unix timestamp",
     )
 )  # fmt: skip
@@ -239,8 +239,8 @@ _AGAINST: Final[dict[str, frozenset[str]]] = {
                       "target", "accuracy", "set", "shaft", "output", "input", "turbine", "angular", "idle", "course")),
     "engine_speed": frozenset(("idle", "max", "min", "target", "wheel", "shaft", "turbo", "vehicle", "fan", "limit", "desired", "average")),
     "engine_load": frozenset(("absolute", "sensor", "cpu", "axle", "torque")),
-    "engine_torque": frozenset(("reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder", "axle")),
-    "engine_torque_fraction": frozenset(("reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "nominal", "converter")),
+    "engine_torque": frozenset(("steer", "eps", "reserve", "resv", "reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder", "axle")),
+    "engine_torque_fraction": frozenset(("steer", "eps", "reserve", "resv", "reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "nominal", "converter")),
     "engine_power": frozenset(("max", "min", "limit", "available", "charge", "charger", "charging", "battery", "heater", "ac", "steering", "window", "supply", "seat",
                                "mode", "state", "level", "demand", "demanded", "request", "requested", "target", "regen", "rated", "reference", "accessory", "hvac", "front", "rear", "ecu")),
     **{
@@ -298,6 +298,7 @@ _MARKS: Final = frozenset(("txt", "wgs84", "gear", "bool", "int", "float", "on/o
 """What stands in brackets as a unit does, and is none."""
 
 _UNIT: Final = re.compile(r"[\[({<]\s*([^\])}>]{0,20}?)\s*[\])}>]")
+_PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)*$')
 _WORD: Final = re.compile(r"[a-z]+|\d+")
 _CAMEL: Final = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
@@ -320,11 +321,17 @@ class Named:
 
 def words_of(name: str) -> tuple[str, ...]:
     """Words of a name in small letters, without accents and without units in brackets."""
-    plain = _UNIT.sub(lambda found: _kept(found.group(1)), name)
+    plain = _UNIT.sub(lambda found: _kept(found.group(1)), _piped(name))
     plain = _CAMEL.sub(" ", plain)
     plain = unicodedata.normalize("NFKD", plain.replace("ß", "ss"))
     plain = "".join(c for c in plain if not unicodedata.combining(c)).lower()
     return tuple(_WORD.findall(plain))
+
+
+def _piped(name: str) -> str:
+    """A name with its unit in brackets, where the log parts name, unit and range by bars."""
+    found = _PIPED.match(name)
+    return f"{found['name']} [{found['unit']}]" if found is not None else name
 
 
 def _kept(bracketed: str) -> str:
@@ -337,6 +344,7 @@ def _kept(bracketed: str) -> str:
 
 def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
     """Unit that a name states in brackets or as its last word, and the words without it."""
+    name = _piped(name)
     words = words_of(name)
     for found in reversed(_UNIT.findall(name)):
         suffix = unit_suffix(found)
@@ -393,8 +401,8 @@ def is_time(name: str) -> bool:
 def _can_be(quantity: str, unit: str) -> bool:
     q = QUANTITIES[quantity]
     if not q.suffix:
-        return unit == "ratio"
-    return UNITS[unit].dimension == dimension_of(q)
+        return unit in ("ratio", UNKNOWN_UNIT)
+    return unit != UNKNOWN_UNIT and UNITS[unit].dimension == dimension_of(q)
 
 
 def _score(words: frozenset[str], phrase: frozenset[str]) -> float:
@@ -445,8 +453,7 @@ def _speed_of_satellites(names: list[str], found: list[Named]) -> list[Named]:
         return found
     speeds = [k for k, n in enumerate(found) if n.quantity == "vehicle_speed"]
     plain = [k for k in speeds if not {"obd", "vehicle", "car", "wheel"} & set(words_of(names[k]))]
-    if len(plain) != 1 or (len(speeds) == 1 and quantities & _ENGINE):
+    alone = len(plain) == len(speeds)
+    if not plain or (alone and (len(plain) > 1 or quantities & _ENGINE)):
         return found
-    changed = list(found)
-    changed[plain[0]] = Named("gnss_speed", found[plain[0]].unit, found[plain[0]].score)
-    return changed
+    return [Named("gnss_speed", n.unit, n.score) if k in plain else n for k, n in enumerate(found)]

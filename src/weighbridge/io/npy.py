@@ -50,12 +50,15 @@ def read_npy(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         raise DriveError(f"{path} has {values.ndim} dimensions; rows and columns are needed")
     source = mapping.source
     column = mapping.time.column
-    if column is None:
+    rate = mapping.time.rate
+    if column is None and rate is None:
         raise ConfigError(
             f"{source}: set column in [time] for {path.name}, to the array beside it that holds "
-            "its times or to the number of a column"
+            "its times or to the number of a column; or rate_hz where its rows are even"
         )
-    if column.lower().endswith(".npy"):
+    if column is None:
+        time = np.arange(float(len(values)))
+    elif column.lower().endswith(".npy"):
         time = _load(path.parent / column)
         if time.shape not in ((len(values),), (len(values), 1)):
             raise DriveError(
@@ -65,7 +68,8 @@ def read_npy(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         time = time.reshape(-1)
     else:
         time = _column(values, column, path, f"{source}: [time] column")
-    time = time * UNITS[mapping.time.unit or "s"].factor + mapping.time.offset
+    factor = UNITS[mapping.time.unit or "s"].factor if rate is None else 1.0 / rate
+    time = time * factor + mapping.time.offset
     columns = []
     for s in mapping.signals:
         cells = _column(values, s.column, path, f"{source}: signals.{s.name} column")

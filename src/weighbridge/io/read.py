@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.arguments import check_path, check_type
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import tabular
 from weighbridge.io.bus import decode
@@ -121,8 +122,10 @@ def _opened(
     path: DrivePath, mapping: MappingSource | None, dbc: DbcSource | Sequence[DbcSource]
 ) -> _Opened:
     """Name of a drive, its files, and what they are read with."""
+    if not isinstance(path, str | Path):
+        path = _paths("path", path)
     mappings = load_mapping(mapping) if mapping is not None else ()
-    databases = load_dbcs([dbc] if isinstance(dbc, str | Path) else list(dbc))
+    databases = load_dbcs(_paths("dbc", [dbc] if isinstance(dbc, str | Path) else dbc))
     info = DriveInfo()
     if not isinstance(path, str | Path):
         paths = [Path(p) for p in path]
@@ -138,6 +141,15 @@ def _opened(
         logs, info = _read_folder(path, mappings)
         return path.resolve().name, logs, info, mappings, databases
     return path.stem, _read_files([(path, None)], mappings), info, mappings, databases
+
+
+def _paths(name: str, given: Iterable[str | Path]) -> list[str | Path]:
+    """Several paths, each checked."""
+    check_type(name, given, Iterable, "a path, as text or pathlib.Path, or a list of them")
+    paths = list(given)
+    for one in paths:
+        check_path(f"each {name}", one)
+    return paths
 
 
 def read_table(path: str | Path) -> dict[str, Floats]:

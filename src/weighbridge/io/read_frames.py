@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import polars as pl
 
+from weighbridge.arguments import check_text, type_name
 from weighbridge.errors import ConfigError
 from weighbridge.io.columns import UnitlessColumnError, parse_column, time_unit
 from weighbridge.io.log import Log
@@ -26,7 +27,6 @@ from weighbridge.io.table import RawTable, column_list
 from weighbridge.io.tabular import read_canonical, read_mapped
 from weighbridge.signals import Drive, DriveInfo
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
-from weighbridge.signals.shown import type_name
 
 if TYPE_CHECKING:
     import pandas
@@ -69,6 +69,7 @@ def read_frame(
     DriveError
         There is no time, or no column that is known.
     """
+    check_text("name", name)
     frames = dict(frame) if isinstance(frame, Mapping) else {name: frame}
     mappings = load_mapping(mapping) if mapping is not None else ()
     raws = [_raw(str(table), one, mapped=bool(mappings)) for table, one in frames.items()]

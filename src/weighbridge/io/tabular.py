@@ -6,6 +6,8 @@ import difflib
 import json
 from pathlib import Path
 
+import numpy as np
+
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import (
     UnitlessColumnError,
@@ -28,6 +30,7 @@ from weighbridge.signals import Floats, Problem
 from weighbridge.signals.catalogue import TIME_COLUMN
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.parts import find_restarts
+from weighbridge.signals.tomlfile import Faults
 from weighbridge.signals.units import UNITS, to_si
 
 
@@ -134,30 +137,12 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
             f"{raw.path}: none of the columns named in {mapping.source} is there; "
             f"the file has {column_list(raw.names)}{_separator_hint(raw)}"
         )
-    time_column = mapping.time.column
-    if time_column is None:
-        index = next((i for i, n in enumerate(raw.names) if time_unit(n)), None)
-        if index is None:
-            raise DriveError(
-                f"{raw.path}: {mapping.source} names no time column; "
-                f"set column in [time] to one of {column_list(raw.names)}"
-            )
-    else:
-        index = raw.index(time_column)
-        if index is None:
-            raise DriveError(
-                f"{raw.path} has no time column {time_column!r} (from {mapping.source}); "
-                f"it has {column_list(raw.names)}"
-            )
-    name = raw.names[index]
-    suffix = mapping.time.unit or time_unit(name) or bracketed_unit(name) or "s"
-    factor = UNITS[suffix].factor if UNITS[suffix].dimension == "s" else 1.0
-    time, log.absolute, notes = time_seconds(raw, index, factor, mapping.time.format)
-    log.of_day = mapping.time.format == "clock"
+    time, notes = _mapped_time(raw, mapping, log)
     if mapping.time.offset:
         time = time + mapping.time.offset
     log.problems += [Problem("", f"{raw.path.name}: {note}") for note in notes]
     columns = []
+    faults = Faults()
     for s in mapping.signals:
         if s.name not in places:
             continue
@@ -165,10 +150,48 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
         log.problems += [Problem(s.name, f"{raw.path.name}: {note}") for note in notes]
         if s.factor != 1.0 or s.offset != 0.0:
             values = values * s.factor + s.offset
-        suffix = resolved_unit(s, None, mapping.source)
-        columns.append((s.name, to_si(values, suffix) if suffix else values))
+        with faults.gathered():
+            suffix = resolved_unit(s, None, mapping.source)
+            columns.append((s.name, to_si(values, suffix) if suffix else values))
+    faults.refuse()
     _finish(log, raw, time, columns)
     return log
+
+
+def _mapped_time(raw: RawTable, mapping: TableMapping, log: Log) -> tuple[Floats, list[str]]:
+    """Read the time that a mapping names [s], and what was odd; tell the log of its kind.
+
+    Raises
+    ------
+    DriveError
+        There is no such column.
+    """
+    column, rate = mapping.time.column, mapping.time.rate
+    if column is None and rate is not None:
+        return np.arange(raw.rows) / rate, []
+    if column is None:
+        index = next((i for i, n in enumerate(raw.names) if time_unit(n)), None)
+        if index is None:
+            raise DriveError(
+                f"{raw.path}: {mapping.source} names no time column; set column in [time] to one "
+                f"of {column_list(raw.names)}, or rate_hz where the rows are even"
+            )
+    else:
+        index = raw.index(column)
+        if index is None:
+            raise DriveError(
+                f"{raw.path} has no time column {column!r} (from {mapping.source}); "
+                f"it has {column_list(raw.names)}"
+            )
+    if rate is not None:
+        rows, notes = raw.numbers(index)
+        return rows / rate, notes
+    name = raw.names[index]
+    suffix = mapping.time.unit or time_unit(name) or bracketed_unit(name) or "s"
+    factor = UNITS[suffix].factor if UNITS[suffix].dimension == "s" else 1.0
+    time, log.absolute, notes = time_seconds(raw, index, factor, mapping.time.format)
+    log.of_day = mapping.time.format == "clock"
+    return time, notes
 
 
 def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floats]]) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from weighbridge.errors import ConfigError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.columns import time_unit, unit_suffix
-from weighbridge.io.draft import guessed_time_unit
+from weighbridge.io.draft_time import guessed_time_unit
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.naming import is_time, unit_of
 from weighbridge.io.table import column_list, since_1970
@@ -79,12 +79,17 @@ def recording_of(path: Path, tree: Tree, time: TimeColumn) -> Recording:
     found = Recording([])
     clockless: list[str] = []
     clocks: list[_Clock] = []
+    even: dict[int, Floats] = {}
     for name, leaf, near in _leaves(tree, "", (), time, found, clocks):
         if leaf.time is not None:
             found.channels.append(Channel(name, leaf.time, leaf.values, leaf.unit))
             continue
         clock = next((c for c in near if c.seconds.size == leaf.values.size), None)
-        if clock is None:
+        if clock is None and time.rate is not None and time.column is None:
+            count = leaf.values.size
+            rows = even.setdefault(count, np.arange(count) / time.rate)
+            found.channels.append(Channel(name, rows, leaf.values, leaf.unit))
+        elif clock is None:
             clockless.append(name)
         else:
             found.channels.append(Channel(name, clock.seconds, leaf.values, leaf.unit))
@@ -141,6 +146,8 @@ def _leaves(
 def _is_clock(place: str, name: str, time: TimeColumn) -> bool:
     if time.column is not None:
         return time.column.casefold() in (place.casefold(), name.casefold())
+    if time.rate is not None:
+        return False
     return name.lower() in _TIMES or is_time(name) or time_unit(name) is not None
 
 
@@ -160,6 +167,8 @@ def _clock(place: str, leaf: Leaf, time: TimeColumn, found: Recording) -> _Clock
         return None
     name = place.rsplit("/", 1)[-1]
     stated = unit_suffix(leaf.unit) or unit_of(name)[0] or time_unit(name)
+    if time.rate is not None:
+        return _Clock(place, numbers / time.rate, False, "")
     unit = time.unit or (stated if stated and UNITS[stated].dimension == "s" else None)
     if unit is None:
         unit, doubt = guessed_time_unit(name, known)

@@ -14,6 +14,7 @@ from typing import Final, Literal
 import numpy as np
 import polars as pl
 
+from weighbridge.arguments import check_type
 from weighbridge.errors import DriveError, MissingExtraError, WeighbridgeError
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import MDF_INFO_MARK, info_text
@@ -75,6 +76,7 @@ def to_frames(drive: Drive) -> dict[str, pl.DataFrame]:
     By table (``imu``, ``obd``, …), as `write_drive` writes them; ``.to_pandas()`` of one is a data
     frame of pandas
     """
+    check_type("drive", drive, Drive, "a drive, as read_drive returns it")
     every = {
         table: [s for s in drive.signals.values() if QUANTITIES[s.name].table == table]
         for table in TABLES

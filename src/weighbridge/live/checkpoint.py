@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.arguments import check_text
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.model import Vehicle
 
@@ -57,6 +58,7 @@ def unpacked(text: str, vehicle: Vehicle) -> Any:
     ConfigError
         The text is damaged, of another version or of another vehicle file.
     """
+    check_text("checkpoint", text)
     refused = "the checkpoint is not used"
     if len(text) > _MOST:
         raise ConfigError(f"{refused}: it has {len(text)} letters, more than any of ours")

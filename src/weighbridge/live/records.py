@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.arguments import check_number
 from weighbridge.errors import ConfigError
 from weighbridge.live.source import Samples
 from weighbridge.signals import Drive, DriveInfo, Floats, Signal
@@ -116,6 +117,7 @@ class Records:
     """
 
     def __init__(self, lateness: float = LATENESS) -> None:
+        check_number("lateness", lateness)
         if not 0.0 <= lateness < math.inf:
             raise ConfigError(f"lateness must be 0 s or more, got {lateness}")
         self.lateness = lateness

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 import numpy as np
 
+from weighbridge.arguments import as_floats, check_text, check_type
 from weighbridge.balance.table import MOVING
 from weighbridge.errors import ConfigError
 from weighbridge.live.arrival import needed_signals
@@ -20,9 +21,9 @@ from weighbridge.live.source import Samples
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
 from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
+from weighbridge.pipeline.given import GivenVehicle, as_vehicle
 from weighbridge.signals import Drive, DriveInfo, Floats
 from weighbridge.signals.recent import BEHIND, FEWEST, STEP, first_instant, recent
-from weighbridge.vehicle.model import Vehicle
 
 _LOG = logging.getLogger(__name__)
 
@@ -66,13 +67,17 @@ class LiveScale:
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        vehicle: GivenVehicle,
         *,
         lateness: float = LATENESS,
         setup: ForwardSetup | None = None,
         info: DriveInfo | None = None,
     ) -> None:
-        self.vehicle = vehicle
+        if setup is not None:
+            check_type("setup", setup, ForwardSetup, "a ForwardSetup")
+        if info is not None:
+            check_type("info", info, DriveInfo, "a weighbridge.DriveInfo")
+        self.vehicle = as_vehicle(vehicle)
         self.info = info or DriveInfo()
         self._records = Records(lateness)
         self._learns = setup is None
@@ -102,10 +107,11 @@ class LiveScale:
         ConfigError
             There is no such signal, or times and values differ in number.
         """
+        check_text("signal", signal)
         if isinstance(time, float | int) and isinstance(value, float | int):
             self._records.add(signal, float(time), float(value))
         else:
-            pair = np.atleast_1d(np.asarray(time, float)), np.atleast_1d(np.asarray(value, float))
+            pair = np.atleast_1d(as_floats("time", time)), np.atleast_1d(as_floats("value", value))
             self._records.add_block({signal: pair})
         if self._next is None or self._records.watermark >= self._next:
             self._advance()
@@ -117,7 +123,15 @@ class LiveScale:
         ----------
         samples : by canonical name, instants (n,) [s] and values (n,) in SI
         """
-        self._records.add_block(samples)
+        check_type("samples", samples, Mapping, "a dictionary of (instants, values) by signal")
+        for name, pair in samples.items():
+            check_type(f"samples of {name!r}", pair, tuple, "a pair of arrays, instants and values")
+        self._records.add_block(
+            {
+                name: (as_floats(f"instants of {name!r}", time), as_floats(f"{name!r}", values))
+                for name, (time, values) in samples.items()
+            }
+        )
         self._advance()
 
     def finish(self) -> None:
@@ -150,7 +164,7 @@ class LiveScale:
         return packed(content, self.vehicle)
 
     @classmethod
-    def restore(cls, vehicle: Vehicle, checkpoint: str) -> LiveScale:
+    def restore(cls, vehicle: GivenVehicle, checkpoint: str) -> LiveScale:
         """Go on from a checkpoint of the same vehicle file.
 
         Parameters
@@ -164,6 +178,7 @@ class LiveScale:
             The checkpoint is damaged, of another version or vehicle file, or holds a mass that
             no vehicle has.
         """
+        vehicle = as_vehicle(vehicle)
         content = unpacked(checkpoint, vehicle)
         try:
             scale = cls(vehicle, lateness=content["lateness"], info=content["info"])

@@ -9,6 +9,9 @@ from typing import Any
 
 from scipy.special import ndtr, ndtri
 
+from weighbridge.arguments import check_number
+from weighbridge.results.writing import check_level
+
 
 class LiveStatus(StrEnum):
     """What a live mass is worth."""
@@ -91,7 +94,8 @@ class LiveWeighing:
     notes: tuple[str, ...] = ()
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Interval that holds the mass with probability ``level`` [kg]."""
+        """Interval that holds the mass with probability ``level``, between 0 and 1 [kg]."""
+        check_level(level)
         half = float(ndtri(0.5 * (1.0 + level))) * self.std
         return self.mass - half, self.mass + half
 
@@ -108,6 +112,7 @@ class LiveWeighing:
 
     def above(self, limit: float | None) -> float | None:
         """Probability that the mass is above a limit [kg]; None where either is not known."""
+        check_number("limit", limit, optional=True)
         if limit is None or not self.std > 0.0:
             return None
         return float(ndtr((self.mass - limit) / self.std))

@@ -17,6 +17,40 @@ BY_SPEED: Final = frozenset({"speed_grade", "speed"})
 heights, or none; both are conditional means."""
 
 
+SLOW: Final = 0.4
+"""Values of a speed further apart are too slow to be the only source of acceleration [s]: starts
+last few seconds, and masses by speed alone get worse from there on (README, What to expect)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedSpeed:
+    """The speed that an acceleration without an accelerometer is the slope of.
+
+    Attributes
+    ----------
+    period : time between its values [s]
+    step : smallest step between values; 0 where it is fine [m/s]
+    spread : standard deviation of its slope over `SLOPE`, which slow values still show [m/s^2]
+    """
+
+    period: float
+    step: float
+    spread: float
+
+    @property
+    def slow_text(self) -> str:
+        """What is wrong with a slow speed and what to log, as a clause; empty for a fast one."""
+        if self.period <= SLOW:
+            return ""
+        rate = 1.0 / self.period
+        steps = f" in steps of {3.6 * self.step:.1f} km/h" if self.step > 0.0 else ""
+        return (
+            f"without an accelerometer the acceleration comes from a speed of {rate:.2g} values "
+            f"per second{steps}, which is too slow: log the speed 3 times per second or more, "
+            "or an inertial sensor (a phone's) beside it"
+        )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
     """How the vehicle moved, band-limited and on an even clock.
@@ -53,6 +87,7 @@ class Motion:
     speed_std : of ``speed`` where ``accel`` is its slope, as a smoother knows it; 0 where an
         accelerometer gave ``accel`` [m/s]
     specific_force_scale_std : relative, of the accelerometer's scale where it was corrected [-]
+    recorded_speed : the speed whose slope ``accel`` is; None where an accelerometer gave it
     notes : sentences on what was found and what was doubtful
     """
 
@@ -81,6 +116,7 @@ class Motion:
     mounting_std: tuple[float, float, float] | None = None
     speed_std: float = 0.0
     specific_force_scale_std: float = 0.0
+    recorded_speed: RecordedSpeed | None = None
     notes: tuple[str, ...] = ()
 
     @property

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from weighbridge.errors import ConfigError
+from weighbridge.arguments import type_name
+from weighbridge.errors import ArgumentTypeError, ConfigError
 from weighbridge.signals import Drive
-from weighbridge.signals.shown import type_name
 from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def as_drive(
         # Data frames with canonical names need no mapping, wherever the vehicle file was copied to.
         there = asked is not None or (named is not None and named.is_file())
         return read_frame(given, mapping if there else None, name=name)
-    raise ConfigError(
+    raise ArgumentTypeError(
         f"a drive is expected, got {type_name(given)}: give what read_drive returns, the path of a "
         "folder or file, or data frames"
     )
@@ -127,14 +127,16 @@ def as_vehicle(given: GivenVehicle) -> Vehicle:
 
     Raises
     ------
+    ArgumentTypeError
+        It is neither.
     ConfigError
-        It is neither, or the file cannot be used.
+        The file cannot be used.
     """
     if isinstance(given, Vehicle):
         return given
     if isinstance(given, str | Path):
         return Vehicle.load(given)
-    raise ConfigError(
+    raise ArgumentTypeError(
         f"a vehicle is expected, got {type_name(given)}: give what calibrate returns, or the path "
         "of a vehicle file"
     )

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.arguments import check_path, check_text, check_type
 from weighbridge.checks import refuse_serious, settle_drive
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
@@ -95,6 +96,7 @@ class Inertia(InertiaResult):
         """Write a self-contained HTML report that opens offline."""
         from weighbridge.report.inertia_panels import write_inertia
 
+        check_path("path", path)
         write_inertia(self, Path(path))
 
 
@@ -127,6 +129,9 @@ def estimate_inertia(
     DriveError
         What the drive says cannot be so, such as a wrong unit or sign.
     """
+    check_text("method", method)
+    if settings is not None:
+        check_type("settings", settings, InertiaSettings, "an InertiaSettings")
     chosen: Method | None = next((m for m in METHODS if m == method), None)
     if chosen is None:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(METHODS)}")

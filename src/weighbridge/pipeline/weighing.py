@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from weighbridge.arguments import check_flag, check_path, check_text, check_type
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
 from weighbridge.balance.circumference import on_its_tyres
@@ -77,6 +78,8 @@ class Weighing(MassResult):
         """
         from weighbridge.report import write_report
 
+        check_path("path", path)
+        check_flag("compare", compare)
         write_report([self], path, comparisons=[self.compare()] if compare else None)
 
     def plot(self) -> Any:
@@ -118,6 +121,9 @@ def weigh(
     DriveError
         What the drive says cannot be so, such as a wrong unit.
     """
+    check_text("method", method)
+    if settings is not None:
+        check_type("settings", settings, Mapping, "a dictionary of values by name")
     if method not in ESTIMATORS:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
     chosen = ESTIMATORS[method].settings_of(settings) if settings else None
@@ -265,6 +271,7 @@ def compare(weighing: Weighing) -> tuple[Weighing, ...]:
     One by each of `weighbridge.estimators.ESTIMATORS`, in their order; a method that could not be
     tried says why
     """
+    check_type("weighing", weighing, Weighing, "what weigh returns")
     found: dict[str, Weighing] = {weighing.method: weighing}
     for method in ESTIMATORS:
         if method not in found:

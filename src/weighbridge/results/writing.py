@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from weighbridge.arguments import check_number, check_path
 from weighbridge.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ def check_level(level: float) -> None:
     ConfigError
         The level is not between 0 and 1.
     """
+    check_number("level", level)
     if not 0.0 < level < 1.0:
         raise ConfigError(f"level must be between 0 and 1, got {level}")
 
@@ -39,6 +41,7 @@ def write_track(table: pl.DataFrame, path: str | Path) -> None:
     """
     from weighbridge.io.write import write_frame
 
+    check_path("path", path)
     if Path(path).suffix.lower() not in (".csv", ".parquet"):
         raise ConfigError(f"{path}: a track is written as .csv or .parquet")
     write_frame(table, path, ConfigError)

@@ -5,10 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
+from typing import Final
 
+from weighbridge.arguments import (
+    check_all,
+    check_flag,
+    check_number,
+    check_text,
+    check_texts,
+    check_type,
+)
 from weighbridge.signals.shown import at_rate, in_html, in_lines, plural
 from weighbridge.signals.signal import Signal
 from weighbridge.visible import cut
+
+_NUMBERS: Final = (
+    "mass",
+    "ambient_temperature",
+    "barometric_pressure",
+    "wind_speed",
+    "wind_from",
+)
+"""Fields of `DriveInfo` that are numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +56,13 @@ class DriveInfo:
     notes: str | None = None
     trusted: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        for name in ("start_time", "vehicle", "notes"):
+            check_text(name, getattr(self, name), optional=True)
+        for name in _NUMBERS:
+            check_number(name, getattr(self, name), optional=True)
+        check_texts("trusted", self.trusted)
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -57,6 +82,9 @@ class Problem:
     serious: bool = False
 
     def __post_init__(self) -> None:
+        check_text("signal of a problem", self.signal)
+        check_text("text of a problem", self.text)
+        check_flag("serious", self.serious)
         object.__setattr__(self, "text", cut(self.text))
 
 
@@ -79,16 +107,27 @@ class Drive:
     problems: tuple[Problem, ...] = ()
     contents: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        check_text("name of a drive", self.name)
+        check_type("signals", self.signals, Mapping, "a dictionary of weighbridge.Signal by name")
+        check_all("signals", self.signals.values(), Signal, "weighbridge.Signal")
+        check_type("info", self.info, DriveInfo, "a weighbridge.DriveInfo")
+        check_all("problems", self.problems, Problem, "weighbridge.Problem")
+        check_texts("contents", self.contents)
+
     def get(self, name: str) -> Signal | None:
         """Return the signal, or None where the drive lacks it."""
+        check_text("name of a signal", name)
         return self.signals.get(name)
 
     def has(self, *names: str) -> bool:
         """Tell whether all the signals are there."""
+        check_texts("names", names)
         return all(name in self.signals for name in names)
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Name the signals that are not there."""
+        check_texts("names", names)
         return [name for name in names if name not in self.signals]
 
     def __repr__(self) -> str:
@@ -147,6 +186,7 @@ class Drive:
 
     def with_signals(self, *signals: Signal) -> Drive:
         """Return a drive in which these signals are added or replaced."""
+        check_all("signals", signals, Signal, "weighbridge.Signal")
         return replace(self, signals={**self.signals, **{s.name: s for s in signals}})
 
     def with_problems(self, *problems: Problem) -> Drive:
@@ -155,10 +195,13 @@ class Drive:
 
     def without(self, *names: str) -> Drive:
         """Return a drive that lacks these signals."""
+        check_texts("names", names)
         return replace(self, signals={k: v for k, v in self.signals.items() if k not in names})
 
     def between(self, start: float, end: float) -> Drive:
         """Return the part from ``start`` to ``end`` [s]; no signal is copied."""
+        check_number("start", start)
+        check_number("end", end)
         cut = {}
         for name, s in self.signals.items():
             a, b = s.time.searchsorted([start, end])

@@ -34,8 +34,10 @@ _STANDS_FOR: Final = 2.0  # a sample stands for so long at most [s]
 # A splice: samples so near in time that differ as no vehicle's do, and so do those around them.
 _NEAR: Final = 5.0  # [s]
 _AROUND: Final = 5  # samples compared to each side
-_CHANGE: Final = 12.0  # of speed [m/s^2]
-_STEP: Final = 3.0  # of speed, beside that [m/s]
+_FASTER: Final = 7.0  # tyres drive a road vehicle no harder [m/s^2]
+_SLOWER: Final = 11.0  # nor brake it harder [m/s^2]
+_STEP: Final = 2.0  # of speed, beside that [m/s]
+_ALONE: Final = 0.35  # steps around a splice over its own [-]
 _FASTEST: Final = 100.0  # between two positions [m/s]
 _FAR: Final = 300.0  # beside that [m]
 _COOLED: Final = 10.0  # of the coolant: the engine was parked [K]
@@ -137,14 +139,32 @@ def find_splices(drive: Drive) -> list[Cut]:
 
 
 def _speed_jumps(speed: Signal) -> list[Cut]:
-    step, change = np.diff(speed.time), np.abs(np.diff(speed.values))
-    places = np.flatnonzero((step < _NEAR) & (change > _STEP + _CHANGE * step))
-    before, after = (np.abs(w) for w in _windows(speed.values, places))
+    """Find steps that no tyre could make since the value before was new, amid steady driving.
+
+    Over 92 hours of recorded and simulated drives, thinned to as little as a value in 2 s, and 795
+    of them with values held, dropped or spiked, none was found. Of pairs of them put one behind the
+    other every second was, from 30 km/h on at 2 Hz or more, from 45 km/h on at 1 Hz; at a value in
+    2 s every third, from 60 km/h on.
+    """
+    time, values = speed.time, speed.values
+    change = np.abs(np.diff(values))
+    # A value that is held is as old as its first sample.
+    new = np.concatenate(([True], change > 0.0))
+    since = time[np.maximum.accumulate(np.where(new, np.arange(new.size), 0))]
+    size = np.abs(values)
+    hardest = np.where(size[1:] > size[:-1], _FASTER, _SLOWER)
+    possible = _STEP + hardest * (time[1:] - since[:-1])
+    places = np.flatnonzero((np.diff(time) < _NEAR) & (change > possible))
+    if not places.size:
+        return []
+    before, after = (np.abs(w) for w in _windows(values, places))
+    around = np.abs(np.concatenate((np.diff(before, axis=1), np.diff(after, axis=1)), axis=1))
     stays = np.abs(_rise(before, after)) > 0.6 * change[places]
-    # A source that freezes, or reads zero for a while, jumps as well.
+    stays &= np.nanmax(around, axis=1) < _ALONE * change[places]
+    # A source that reads zero for a while jumps as well.
     for side in (before, after):
-        stays &= (np.nanmin(side, axis=1) > _STILL) & (np.nanmax(side, axis=1) > side[:, -1])
-    return _told(speed.time, places[stays], "jumps of the speed")
+        stays &= np.nanmin(side, axis=1) > _STILL
+    return _told(time, places[stays], "jumps of the speed")
 
 
 def _position_jumps(lat: Signal, longitude: Floats) -> list[Cut]:

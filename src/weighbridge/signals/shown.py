@@ -29,11 +29,6 @@ def plural(count: int, word: str) -> str:
     return f"{count} {word}" if count == 1 else f"{count} {word}s"
 
 
-def type_name(given: object) -> str:
-    """Name what a caller gave, with the module of its type: ``pandas.Series``, ``int``."""
-    return f"{type(given).__module__}.{type(given).__qualname__}".removeprefix("builtins.")
-
-
 def at_rate(period: float) -> str:
     """Samples per second, of a median period [s]; empty where it is not known."""
     return f"{1.0 / period:.3g} Hz" if math.isfinite(period) and period > 0.0 else ""

@@ -8,6 +8,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from weighbridge.arguments import as_floats, check_text
+from weighbridge.errors import ConfigError
+
 Floats: TypeAlias = NDArray[np.float64]
 Bools: TypeAlias = NDArray[np.bool_]
 Ints: TypeAlias = NDArray[np.int64]
@@ -22,11 +25,33 @@ class Signal:
     name : canonical name, see `weighbridge.signals.catalogue`
     time : (n,) strictly increasing, finite [s]
     values : (n,) finite, in SI
+
+    Lists and arrays of whole numbers become arrays of doubles.
+
+    Raises
+    ------
+    ArgumentTypeError
+        Times or values are no numbers.
+    ConfigError
+        They are not as many.
     """
 
     name: str
     time: Floats
     values: Floats
+
+    def __post_init__(self) -> None:
+        check_text("name of a signal", self.name)
+        for field in ("time", "values"):
+            given = getattr(self, field)
+            floats = as_floats(f"{field} of signal {self.name!r}", given)
+            if floats is not given:
+                object.__setattr__(self, field, floats)
+        if self.time.shape != self.values.shape or self.time.ndim != 1:
+            raise ConfigError(
+                f"signal {self.name!r} has times of shape {self.time.shape} and values of shape "
+                f"{self.values.shape}; give one row of each, as many"
+            )
 
     def __repr__(self) -> str:
         if not len(self):
@@ -52,12 +77,14 @@ class Signal:
 
     def at(self, time: Floats) -> Floats:
         """Interpolate linearly; NaN outside the samples [SI]."""
+        time = as_floats("time", time)
         if self.time.size == 0:
             return np.full(np.shape(time), np.nan)
         return np.interp(time, self.time, self.values, left=np.nan, right=np.nan)
 
     def held(self, time: Floats) -> Floats:
         """Hold the last value seen; NaN before the first sample [SI]."""
+        time = as_floats("time", time)
         index = np.searchsorted(self.time, time, side="right") - 1
         if self.time.size == 0:
             return np.full(np.shape(time), np.nan)
@@ -65,6 +92,7 @@ class Signal:
 
     def age(self, time: Floats) -> Floats:
         """Distance to the nearest sample [s]; infinite without samples."""
+        time = as_floats("time", time)
         if self.time.size == 0:
             return np.full(np.shape(time), np.inf)
         right = np.clip(np.searchsorted(self.time, time), 0, self.time.size - 1)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from decimal import Context, Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -262,10 +263,39 @@ class Section:
         return tuple(_si(self._exact(key, v), u) for v in value)
 
     def done(self) -> None:
-        """Refuse keys that nobody asked for."""
+        """Refuse keys that nobody asked for, all of them at once."""
+        faults = Faults(self.error)
         for key in self.data:
             if key not in self._known:
-                self.fail(key, f"is not known{suggestion(key, dict.fromkeys(self._known))}")
+                with faults.gathered():
+                    self.fail(key, f"is not known{suggestion(key, dict.fromkeys(self._known))}")
+        faults.refuse()
+
+
+class Faults:
+    """What is wrong with one file, gathered and told at once.
+
+    Parameters
+    ----------
+    error : the exception that is gathered, and raised for all
+    """
+
+    def __init__(self, error: type[WeighbridgeError] = ConfigError) -> None:
+        self.error = error
+        self.said: list[str] = []
+
+    @contextlib.contextmanager
+    def gathered(self) -> Iterator[None]:
+        """Keep an error that is raised inside for `refuse`."""
+        try:
+            yield
+        except self.error as error:
+            self.said.append(str(error))
+
+    def refuse(self) -> None:
+        """Raise one error that tells all that was gathered; nothing where there is none."""
+        if self.said:
+            raise self.error("; ".join(self.said))
 
 
 def _rational(number: float) -> Fraction:

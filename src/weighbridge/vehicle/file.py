@@ -16,6 +16,7 @@ from typing import Any, Final, Protocol, TypeVar
 import tomlkit
 from tomlkit.items import Table
 
+from weighbridge.arguments import check_path
 from weighbridge.errors import ConfigError
 from weighbridge.signals.tomlfile import Section, read_toml
 from weighbridge.vehicle.file_keys import SECTIONS, VEHICLE_KEYS, WITNESS_KEYS, Key
@@ -56,6 +57,7 @@ def load_vehicle(path: str | Path, build: type[Made]) -> Made:
         A key is unknown, a value impossible, a unit missing, or the file's
         version another one; the message names file, line, value and remedy.
     """
+    check_path("path", path)
     path = Path(path)
     root = read_toml(path)
     _check_version(root)
@@ -142,6 +144,7 @@ def save_vehicle(
     ConfigError
         The file cannot be written.
     """
+    check_path("path", path)
     path = Path(path)
     document = tomlkit.document()
     document.add(tomlkit.comment("A vehicle for weighbridge; every key carries its unit."))

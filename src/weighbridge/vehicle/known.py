@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, Literal, get_args
+from typing import Final, get_args
 
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
@@ -13,6 +13,7 @@ from weighbridge.vehicle.data_sheet import RADIUS_STD, usual_efficiency
 from weighbridge.vehicle.model import (
     Driveline,
     Driven,
+    EngineKind,
     Layout,
     Provenance,
     RoadLoad,
@@ -22,8 +23,6 @@ from weighbridge.vehicle.model import (
 from weighbridge.vehicle.possible import within
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
-
-EngineKind = Literal["petrol", "diesel", "electric"]
 
 RADII: Final = (0.15, 0.9)
 """Rolling radii of road vehicles, wide enough for any [m]."""
@@ -113,6 +112,7 @@ def describe(known: Known) -> Described:
     vehicle = Vehicle(
         name=known.name,
         kind=known.kind,
+        engine=known.engine,
         mapping=known.mapping,
         tare=known.tare,
         gross=known.gross,
@@ -129,8 +129,6 @@ def describe(known: Known) -> Described:
 
 def _notes(known: Known) -> str:
     remarks = ["written by weighbridge vehicle new; nothing is calibrated"]
-    if known.engine is not None:
-        remarks.append(f"{known.engine} engine" if known.engine != "electric" else "electric motor")
     if known.torque is not None and not TORQUE_SOURCES[known.torque].signed:
         remarks.append(f"torque by {known.torque.replace('_', ' ')}, which calibrate finds")
     return "; ".join(remarks)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final, Literal, get_args
 
+from weighbridge.arguments import check_all, check_text, check_type
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
 from weighbridge.vehicle.driveline import Driveline, Driven, Layout, Mounting, RoadLoad
@@ -24,6 +26,21 @@ from weighbridge.vehicle.torque_model import (
 )
 from weighbridge.visible import visible
 
+EngineKind = Literal["petrol", "diesel", "electric"]
+
+_PARTS: Final[dict[str, tuple[type, bool]]] = {
+    "driveline": (Driveline, False),
+    "torque": (TorqueModel, False),
+    "road_load": (RoadLoad, False),
+    "mounting": (Mounting, True),
+    "timing": (Timing, False),
+    "dragged": (DraggedReading, True),
+    "speed_model": (SpeedModel, True),
+    "ride": (Ride, True),
+    "provenance": (Provenance, False),
+}
+"""Parts of a vehicle by field: their type, and whether they may be None."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
@@ -33,6 +50,7 @@ class Vehicle:
     ----------
     name : for people
     kind : name of one of `weighbridge.vehicle.classes.VEHICLE_CLASSES`
+    engine : "petrol", "diesel" or "electric"; None where it is not known
     tare : mass without payload [kg]
     gross : permitted mass [kg]
     mapping : path of a mapping TOML for its logs
@@ -44,6 +62,7 @@ class Vehicle:
 
     name: str = "vehicle"
     kind: str = "car"
+    engine: EngineKind | None = None
     tare: float | None = None
     gross: float | None = None
     mapping: str | None = None
@@ -59,8 +78,19 @@ class Vehicle:
     provenance: Provenance = field(default_factory=Provenance)
 
     def __post_init__(self) -> None:
+        check_text("name", self.name)
+        check_text("kind", self.kind)
+        for name in ("engine", "mapping"):
+            check_text(name, getattr(self, name), optional=True)
+        for name, (part, optional) in _PARTS.items():
+            if not (optional and getattr(self, name) is None):
+                check_type(name, getattr(self, name), part, f"a {part.__name__}")
+        check_all("witnesses", self.witnesses, WitnessRelation, "WitnessRelation")
         if self.kind not in VEHICLE_CLASSES:
             raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {self.kind!r}")
+        if self.engine is not None and self.engine not in get_args(EngineKind):
+            kinds = ", ".join(get_args(EngineKind))
+            raise ConfigError(f"engine must be one of {kinds}, got {self.engine!r}")
         for name in ("tare", "gross"):
             positive(name, getattr(self, name))
             within(name, getattr(self, name), *MASSES, "kg")
@@ -117,6 +147,7 @@ __all__ = [
     "DraggedReading",
     "Driveline",
     "Driven",
+    "EngineKind",
     "Layout",
     "Mounting",
     "Provenance",

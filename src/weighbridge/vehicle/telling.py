@@ -73,6 +73,11 @@ def worth(vehicle: Vehicle) -> str:
             "mass for torque, efficiency and rolling radius, and 3 % more where the sensor's lean "
             "is not known"
         )
+    if not vehicle.provenance.drives and not vehicle.provenance.masses:
+        return (
+            f"weighs by what the file states, never calibrated: ± {100.0 * scale:.1f} % of any "
+            "mass (mass_scale_std, one std)"
+        )
     text = f"± {100.0 * scale:.1f} % of any mass is left by the calibration (one std)"
     if len(vehicle.provenance.drives) < _FEWEST_RELIABLE:
         text += "; one drive made it: two more, of other masses, would make it better"
@@ -81,6 +86,8 @@ def worth(vehicle: Vehicle) -> str:
 
 def _masses(vehicle: Vehicle) -> str:
     parts = [f"{vehicle.kind} {vehicle.name!r}"]
+    if vehicle.engine is not None:
+        parts.append(f"{vehicle.engine} {'motor' if vehicle.engine == 'electric' else 'engine'}")
     parts.append(
         f"tare {vehicle.tare:.0f} kg"
         if vehicle.tare is not None

@@ -26,7 +26,23 @@ _METRIC: Final = re.compile(
     (?!\d)""",
     re.VERBOSE | re.IGNORECASE,
 )
-_LIMITS: Final = {"width": (125.0, 500.0), "aspect": (20.0, 100.0), "rim": (10.0, 26.0)}
+_INCHES: Final = re.compile(
+    r"""^\s*
+    (?:(?P<diameter>\d{2}(?:[.,]\d{1,2})?)\s*[xX×]\s*)?
+    (?P<width>\d{1,2}(?:[.,]\d{1,2})?)\s*
+    (?:R|-)\s*
+    (?P<rim>\d{2}(?:[.,]5)?)
+    (?!\d)""",
+    re.VERBOSE | re.IGNORECASE,
+)
+"""Width in inches: ``11R22.5``, ``10.00R20``, and ``31x10.50R15`` with the diameter before it."""
+
+_INCH_HEIGHT: Final = (1.06, 0.86)
+"""Height over width of a tyre in inches [-]: of flat rims, such as 10.00 R 20, and of rims that
+end in a half, such as 11 R 22.5. Makers print diameters of 1053 mm for the first and 1050 mm for
+the second (Pirelli, truck size conversions); other sizes are within 2.5 % in radius."""
+
+_LIMITS: Final = {"width": (125.0, 500.0), "aspect": (20.0, 107.0), "rim": (10.0, 26.0)}
 
 
 def rolling_radius(size: str) -> float:
@@ -34,8 +50,8 @@ def rolling_radius(size: str) -> float:
 
     Parameters
     ----------
-    size : as on the tyre's side, such as ``205/55 R16``, ``205/55R16 91V``, ``315/80 R 22.5`` or
-        ``195 R14 C``
+    size : as on the tyre's side, such as ``205/55 R16``, ``205/55R16 91V``, ``315/80 R 22.5``,
+        ``195 R14 C``, or in inches ``11R22.5``, ``10.00R20`` or ``31x10.50R15``
 
     Returns
     -------
@@ -46,16 +62,13 @@ def rolling_radius(size: str) -> float:
     ConfigError
         The text is no tyre size.
     """
-    found = _METRIC.match(size)
+    found = _METRIC.match(size) or _INCHES.match(size)
     if found is None:
         raise ConfigError(
-            f"tyre size {size[:40]!r}: must be written as on the tyre's side, such as '205/55 R16'"
+            f"tyre size {size[:40]!r}: must be written as on the tyre's side, such as "
+            "'205/55 R16', '315/80 R22.5' or '11R22.5'"
         )
-    parts = {
-        "width": float(found["width"]),
-        "aspect": float(found["aspect"]) if found["aspect"] else FULL_SECTION,
-        "rim": float(found["rim"].replace(",", ".")),
-    }
+    parts = _parts({name: text.replace(",", ".") for name, text in found.groupdict("").items()})
     for name, (low, high) in _LIMITS.items():
         if not low <= parts[name] <= high:
             raise ConfigError(
@@ -64,3 +77,15 @@ def rolling_radius(size: str) -> float:
             )
     diameter = _INCH * parts["rim"] + 2e-3 * parts["width"] * parts["aspect"] / 100.0
     return ROLLING_CIRCUMFERENCE * diameter / (2.0 * math.pi)
+
+
+def _parts(said: dict[str, str]) -> dict[str, float]:
+    """Width [mm], height over width [%] and rim [in] of a size, metric or in inches."""
+    rim, width = float(said["rim"]), float(said["width"])
+    if "aspect" in said:
+        aspect = float(said["aspect"]) if said["aspect"] else FULL_SECTION
+        return {"width": width, "aspect": aspect, "rim": rim}
+    aspect = 100.0 * _INCH_HEIGHT[rim % 1.0 > 0.0]
+    if said["diameter"]:
+        aspect = 50.0 * (float(said["diameter"]) - rim) / width
+    return {"width": 1e3 * _INCH * width, "aspect": aspect, "rim": rim}

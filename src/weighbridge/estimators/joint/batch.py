@@ -288,8 +288,9 @@ def _track(
     track = np.where(last >= 0, running[seen] - burnt, np.nan)
     track_std = UNMODELLED * np.sqrt(solved.running_var)[seen]
     evidence = Evidence(
-        view=view, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size, left=mass * left
-    )
+        view=view, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size,
+        left=mass * left, motion=balance.motion,
+    )  # fmt: skip
     status, why = judge(evidence, vehicle)
     return MassTrack(
         method="joint",

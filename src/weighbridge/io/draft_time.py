@@ -1,0 +1,282 @@
+"""The time of a table: which column it is and how it is written."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+import polars as pl
+
+from weighbridge.errors import DriveError
+from weighbridge.io.naming import TIME_WORDS, is_time, unit_of, words_of
+from weighbridge.io.table import RawTable, column_list, since_1970, time_seconds
+from weighbridge.signals import Floats
+from weighbridge.signals.units import UNITS
+
+RISES: Final = 0.7
+"""Part of the steps of a time that do not fall [-]."""
+
+DATE_FORMATS: Final = (
+    "%d.%m.%Y %H:%M:%S%.f",
+    "%d/%m/%Y %H:%M:%S%.f",
+    "%m/%d/%Y %H:%M:%S%.f",
+    "%m/%d/%Y %I:%M:%S%.f %p",
+    "%d-%b-%Y %H:%M:%S%.f",
+    "%Y/%m/%d %H:%M:%S%.f",
+    "%Y-%m-%d %H-%M-%S%.f",
+    "%Y%m%d %H%M%S%.f",
+)
+"""Dates that loggers write beside ISO 8601; day before month where both would fit."""
+
+_EPOCHS: Final = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
+"""Least number of a clock that counts from 1970, and its unit."""
+
+_NUMBER: Final = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?$")
+_CLOCK: Final = re.compile(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?$")
+_ISO: Final = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
+
+_USUAL_STEP: Final = (1e-3, 20.0)
+"""Time between rows of loggers [s]."""
+
+_COUNTERS: Final = frozenset(
+    ("", "index", "idx", "row", "row number", "row no", "sample", "sample number", "sample no", "n",
+     "no", "nr", "number", "count", "counter", "sample count", "sample counter", "frame", "line",
+     "frame number", "frame id", "record", "record number", "seq", "sequence", "packet", "zeile",
+     "sequence number", "packet number", "unnamed 0", "messwert nr", "ligne", "fila", "riga")
+)  # fmt: skip
+"""What loggers call a number that counts their rows, as `words_of` cuts it."""
+
+_TOLD_RATE: Final = re.compile(
+    r"\b(?:sampl\w*|logging|log|recording|data|abtast)[ _-]*(?:rate|freq\w*|frequenz)"
+    r"[^\w.]{1,8}(?P<rate>\d+(?:[.,]\d+)?)\W{0,4}(?:hz\b|$)",
+    re.IGNORECASE,
+)
+"""A rate that a line above the header tells."""
+
+_ONE_BY_ONE: Final = 0.9
+"""Part of the rows whose number follows that of the row before [-]."""
+
+
+@dataclass(slots=True)
+class DraftTime:
+    """A column that can be the time of a table.
+
+    Attributes
+    ----------
+    column : its name; empty where rows are counted and no column does it
+    index : its place; -1 where no column is the time
+    unit : suffix of its unit; empty for a text and for a number of rows
+    format : "clock", "iso" or a `strptime` format; empty for numbers
+    seconds : (n,) the time [s]; of rows that are counted, their number
+    doubts : what is not sure, one sentence each
+    row_rate : rows per second of a time that counts rows [Hz], NaN where it is not known; None
+        for a clock
+    guessed : whether the log does not state its unit
+    """
+
+    column: str
+    index: int
+    unit: str
+    format: str
+    seconds: Floats
+    doubts: list[str] = field(default_factory=list)
+    row_rate: float | None = None
+    guessed: bool = False
+
+
+def is_number(cell: str) -> bool:
+    """Tell whether a cell is a number, with a point or a comma."""
+    return _NUMBER.match(cell) is not None
+
+
+def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) -> list[DraftTime]:
+    """Find the columns that can be the time, the likeliest first.
+
+    Parameters
+    ----------
+    raw : the table
+    units : suffixes that a row of the file states, by column
+    above : lines above the header, which may tell a rate
+
+    Returns
+    -------
+    At least one: where no column is a clock, rows are counted, by a column that does or by
+    their place.
+    """
+    places = [k for k, name in enumerate(raw.names) if is_time(name)]
+    places += [
+        k for k in range(len(raw.names)) if raw.column(k).dtype.is_temporal() and k not in places
+    ]
+    found = [t for k in places if (t := _as_time(raw, k, units)) is not None]
+    found = found or [
+        t for k in range(len(raw.names)) if (t := _likely_time(raw, k, units)) is not None
+    ]
+    if not found:
+        return [_counted(raw, _told_rate(above))]
+    # The finer of several clocks; where they are alike, the first.
+    found.sort(key=lambda t: (-round(_resolution(t.seconds), 3), t.index))
+    best, *others = found
+    if others:
+        names = column_list(t.column for t in others)
+        best.doubts.append(f"{best.column!r} is taken for the time, not {names}")
+    return found
+
+
+def _counted(raw: RawTable, rate: float) -> DraftTime:
+    """Take the number of the row for the time: a column's, else its place.
+
+    Parameters
+    ----------
+    raw : the table
+    rate : rows per second [Hz]; NaN where it is not known
+    """
+    named = (k for k, n in enumerate(raw.names) if " ".join(words_of(n)) in _COUNTERS)
+    index = next((k for k in named if _counts(raw, k)), -1)
+    name = raw.names[index] if index >= 0 else ""
+    rows = raw.numbers(index)[0] if index >= 0 else np.arange(raw.rows, dtype=np.float64)
+    what = f"{name!r} counts rows" if name else "no column can be its time"
+    doubt = (
+        f"{what}, and the log does not tell how many there are per second: state rate_hz in [time]"
+        if np.isnan(rate)
+        else f"{what}; {rate:g} per second, as a line above the header tells"
+    )
+    doubt += "" if name else ", where its rows are even, else the time's column"
+    return DraftTime(name, index, "", "", rows, [doubt], rate)
+
+
+def _counts(raw: RawTable, index: int) -> bool:
+    """Whether a column counts rows one by one, a few lost ones apart."""
+    try:
+        values, _ = raw.numbers(index)
+    except DriveError:
+        return False
+    if values.size < 2 or not np.all(np.isfinite(values)):
+        return False
+    steps = np.diff(values)
+    return bool(np.all(steps >= 1.0) and np.mean(steps == 1.0) > _ONE_BY_ONE)
+
+
+def _told_rate(above: Sequence[str]) -> float:
+    """Rate that a line above the header tells [Hz]; NaN where none does."""
+    for line in above:
+        found = _TOLD_RATE.search(line.strip().strip(",;\t"))
+        if found is not None and (rate := float(found["rate"].replace(",", "."))) > 0.0:
+            return rate
+    return float("nan")
+
+
+def _likely_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime | None:
+    """Read a column that rises as a time where part of its name, or its size, says so."""
+    unit, _ = unit_of(raw.names[index])
+    named = bool(TIME_WORDS & set(words_of(raw.names[index])))
+    named = named or (unit is not None and UNITS[unit].dimension == "s")
+    found = _as_time(raw, index, units)
+    if found is None or not (named or since_1970(found.seconds)):
+        return None
+    steps = np.diff(found.seconds[np.isfinite(found.seconds)])
+    if np.mean(steps >= 0.0) < RISES:
+        return None
+    found.doubts.append(f"{found.column!r} is taken for the time, for it rises as one")
+    return found
+
+
+def _resolution(seconds: Floats) -> float:
+    """Part of the rows that have a stamp of their own."""
+    known = seconds[np.isfinite(seconds)]
+    return np.unique(known).size / max(seconds.size, 1)
+
+
+def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime | None:
+    """Read a column as a time; None where it cannot be one."""
+    series, name = raw.column(index), raw.names[index]
+    if series.dtype.is_temporal():
+        seconds, _, _ = time_seconds(raw, index, 1.0, None)
+        return DraftTime(name, index, "", "", seconds)
+    if series.dtype == pl.String:
+        texts = [t.strip() for t in series.drop_nulls().head(200).to_list() if t.strip()]
+        numbers = sum(map(is_number, texts))
+        if texts and numbers < 0.5 * len(texts):
+            return _text_time(raw, index, texts)
+    try:
+        values, _ = raw.numbers(index)
+    except DriveError:
+        return None
+    known = values[np.isfinite(values)]
+    if known.size < 2 or known[-1] <= known[0]:
+        return None
+    doubts = []
+    stated, _ = unit_of(name)
+    if stated is None and name in units:
+        stated, _ = unit_of(f"{name} [{units[name]}]")
+    if stated is not None and UNITS[stated].dimension == "s":
+        unit = stated
+    else:
+        unit, doubt = guessed_time_unit(name, known)
+        doubts += [doubt] if doubt else []
+    seconds = values * UNITS[unit].factor
+    return DraftTime(name, index, unit, "", seconds, doubts, guessed=bool(doubts))
+
+
+def guessed_time_unit(name: str, values: Floats) -> tuple[str, str]:
+    """Unit of a time in numbers, by its size and its steps, and a doubt."""
+    usual = float(np.median(np.abs(values)))
+    for least, unit in _EPOCHS:
+        if usual >= least:
+            return unit, ""
+    step = np.diff(values)
+    step = step[step > 0.0]
+    usual_step = float(np.median(step)) if step.size else 1.0
+    whole = bool(np.all(values == np.round(values)))
+    if whole and usual_step >= 5.0:
+        for unit in ("ms", "us", "ns"):
+            low, high = _USUAL_STEP
+            if low <= usual_step * UNITS[unit].factor <= high:
+                return unit, (
+                    f"time {name!r} states no unit; its steps of {usual_step:g} are taken as {unit}"
+                )
+    return "s", f"time {name!r} states no unit; taken as seconds, {usual_step:g} s from row to row"
+
+
+def _text_time(raw: RawTable, index: int, texts: Sequence[str]) -> DraftTime | None:
+    name = raw.names[index]
+    form, doubts = text_time_format(texts)
+    if not form:
+        return None
+    try:
+        seconds, _, _ = time_seconds(raw, index, 1.0, form)
+    except DriveError:
+        return None
+    return DraftTime(name, index, "", form, seconds, doubts)
+
+
+def text_time_format(texts: Sequence[str]) -> tuple[str, list[str]]:
+    """Find how times are written, as ``format`` of a mapping names it.
+
+    Parameters
+    ----------
+    texts : some of them, without blanks around
+
+    Returns
+    -------
+    format : empty where they are no times, or numbers
+    doubts : what is not sure, one sentence each
+    """
+    if not texts:
+        return "", []
+    if all(_CLOCK.match(t) for t in texts):
+        return "clock", []
+    if all(_ISO.match(t) for t in texts):
+        return "iso", []
+    fits = [f for f in DATE_FORMATS if _fits(texts, f)]
+    doubts = []
+    if len(fits) > 1 and {f[:5] for f in fits} >= {"%d/%m", "%m/%d"}:
+        doubts.append(f"{texts[0]!r} is read with the day before the month")
+    return (fits[0] if fits else ""), doubts
+
+
+def _fits(texts: Sequence[str], form: str) -> bool:
+    parsed = pl.Series(texts).str.to_datetime(form, strict=False, time_unit="us")
+    return int(parsed.null_count()) <= 0.02 * len(texts)
