@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from make_openpilot_log import AGE, START, STEP, STEPS, truth
 from numpy.testing import assert_allclose
@@ -120,5 +120,6 @@ def test_no_log_is_one_sentence(tmp_path, data):
     max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(part=st.floats(0.0, 1.0), at=st.floats(0.0, 1.0), junk=st.binary(min_size=0, max_size=16))
+@example(part=0.5919228560132325, at=0.98, junk=15 * b"\x00" + b"_")
 def test_damage_leaves_signals_or_one_sentence(assert_damage_is_told, part, at, junk):
     assert_damage_is_told("rlog", PLAIN, part, at, junk)

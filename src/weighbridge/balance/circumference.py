@@ -45,10 +45,12 @@ def on_its_tyres(balance: ForceBalance, vehicle: Vehicle) -> tuple[Vehicle, str]
     note : what was found, a sentence; empty if nothing
     """
     motion, line = balance.motion, vehicle.driveline
-    if motion.speed_scale is None or not line.gearings or not vehicle.provenance.torque_fitted:
+    shown = motion.speed_scale or 0.0
+    # Positions of two drives put together can make a scale that is no scale.
+    if shown <= 0.0 or not line.gearings or not vehicle.provenance.torque_fitted:
         return vehicle, ""
     _, ratio = held_ratios(balance)
-    change = float(np.log(motion.speed_scale / line.speed_scale))
+    change = float(np.log(shown / line.speed_scale))
     std = motion.speed_scale_std or 0.0
     if ratio.size < FEWEST or not max(LEAST, 3.0 * std) < abs(change) < MOST:
         return vehicle, ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -30,14 +30,17 @@ CLOSED: Final = 0.15
 """Part of the witness's range, from its low end, where fuel is cut or the throttle closed [-]:
 there air still passes, and the reading lies on its floor."""
 
+FROM: Final = tuple(float(part) for part in np.arange(0.6, CLOSED - 0.01, -0.05))
+"""Parts of the witness's range, from its low end, from which the relation is tried [-]."""
+
 OUTLYING: Final = 6.0
-"""A mean so many usual scatters off the relation belongs to another state of the engine [-]."""
+"""A mean so many usual scatters off the relation belongs to another state of the engine [-],"""
+
+FINEST: Final = 0.005
+"""where a scatter is at least this part of the reading's range [-]."""
 
 STRAY: Final = 0.1
-"""A witness tells nothing where more of its means are of another state [-],"""
-
-BLIND_STEP: Final = 0.05
-"""by parts of its range from the low end [-]."""
+"""Where a larger part of the means is of another state, a witness tells nothing [-]."""
 
 FEWEST_LEARNT: Final = 100
 """Means from which a relation is learnt: five minutes of pulling."""
@@ -88,23 +91,33 @@ def learn_witnesses(
     return tuple(relations), tuple(doubts)
 
 
-def _blind(w: Floats, off: Floats, value_range: tuple[float, float]) -> float:
-    """How much further up a witness begins to tell its reading [SI]; 0 where it does already.
+class _Followed(NamedTuple):
+    """Means of a range in which the reading follows the witness.
 
-    Where the clutch is open or fuel is cut the engine breathes, and the reading lies on its floor.
-
-    Parameters
+    Attributes
     ----------
-    w : (m,) of the witness over the largest of its range
-    off : (m,) reading less the relation
     value_range : of the witness [SI]
+    columns, reading : (m, k), (m,) of the means
+    found : (k,) coefficients
     """
-    low, high = value_range
-    scatter = 1.4826 * float(np.median(np.abs(off)))
-    step = BLIND_STEP * (high - low)
-    lowest = np.abs(off[w * max(abs(low), abs(high)) < low + step])
-    stray = int(np.count_nonzero(lowest > OUTLYING * scatter))
-    return step if stray > max(STRAY * lowest.size, 2) else 0.0
+
+    value_range: tuple[float, float]
+    columns: Floats
+    reading: Floats
+    found: Floats
+
+    def strays_below(self, columns: Floats, reading: Floats) -> bool:
+        """Tell whether the means that a lower begin of the range adds are of another state.
+
+        Where the clutch is open or fuel is cut the engine breathes, and the reading lies on its
+        floor.
+        """
+        span = float(np.ptp(np.percentile(self.reading, [2.0, 98.0])))
+        scatter = 1.4826 * float(np.median(np.abs(self.reading - self.columns @ self.found)))
+        added = columns[:, 1] < float(np.min(self.columns[:, 1]))
+        off = np.abs(reading[added] - columns[added] @ self.found)
+        stray = np.count_nonzero(off > OUTLYING * max(scatter, FINEST * span))
+        return bool(stray > max(STRAY * off.size, 2))
 
 
 def contradiction(
@@ -160,23 +173,23 @@ def learn(
     if value.size < FEWEST_LEARNT:
         return None
     low, high = np.percentile(value, [1.0, 99.0])
-    closed = 0.0 if witness.battery else CLOSED
-    value_range = (float(low + closed * (high - low)), float(high + 0.05 * (high - low)))
     slow, fast = np.percentile(turning, [1.0, 99.0])
     speed_range = (float(0.95 * slow), float(1.05 * fast))
-    while True:
-        ranges = value_range, speed_range
-        parts = [means(r, witness, ranges) for r in rows]
+    best: _Followed | None = None
+    for begin in [0.0] if witness.battery else FROM:
+        ends = (float(low + begin * (high - low)), float(high + 0.05 * (high - low)))
+        parts = [means(r, witness, (ends, speed_range)) for r in rows]
         reading = np.concatenate([p.reading for p in parts])
-        if reading.size < FEWEST_LEARNT:
-            return None
         columns = np.vstack([p.terms for p in parts])
-        predicted = columns @ robust_fit(columns, reading)
-        blind = 0.0 if witness.battery else _blind(columns[:, 1], reading - predicted, ranges[0])
-        if not blind:
+        if reading.size < FEWEST_LEARNT:
+            continue
+        if best is not None and best.strays_below(columns, reading):
             break
-        value_range = (value_range[0] + blind, value_range[1])
-    found = robust_fit(columns, reading)
+        best = _Followed(ends, columns, reading, robust_fit(columns, reading))
+    if best is None:
+        return None
+    value_range, columns, reading, found = best
+    predicted = columns @ found
     bottom, top = np.percentile(reading, [2.0, 98.0])
     span = float(top - bottom)
     scatter = 1.4826 * float(np.median(np.abs(reading - predicted)))

@@ -199,6 +199,8 @@ def _whole_events(data: bytes) -> int:
         if segments > _MOST_SEGMENTS:
             return at
         head = 4 * (segments + 1 + (segments + 1) % 2)
+        if at + head > len(data):
+            return at
         sizes = np.frombuffer(data[at + 4 : at + 4 + 4 * segments], "<u4")
         end = at + head + 8 * int(sizes.sum(dtype=np.int64))
         if sizes.size < segments or end > len(data):
