@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.signals import Bools, Floats
+from weighbridge.signals import Bools, Floats, Signal
 
 MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
 
@@ -53,6 +53,8 @@ class Motion:
     speed_std : of ``speed`` where ``accel`` is its slope, as a smoother knows it; 0 where an
         accelerometer gave ``accel`` [m/s]
     specific_force_scale_std : relative, of the accelerometer's scale where it was corrected [-]
+    measured_speed : samples of the speed that all of this was made from, true scale; None where an
+        accelerometer was there as well
     notes : sentences on what was found and what was doubtful
     """
 
@@ -81,6 +83,7 @@ class Motion:
     mounting_std: tuple[float, float, float] | None = None
     speed_std: float = 0.0
     specific_force_scale_std: float = 0.0
+    measured_speed: Signal | None = None
     notes: tuple[str, ...] = ()
 
     @property

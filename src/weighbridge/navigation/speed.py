@@ -73,6 +73,7 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
         specific_force_std=float(np.median(accel_std)),
         grade_std=grade_std,
         speed_std=float(np.median(speed_std)),
+        measured_speed=speed,
         notes=notes,
     )  # fmt: skip
 
