@@ -114,7 +114,7 @@ class SpeedTorqueSettings:
     speed_noise: float | None = None
     accel_noise: float | None = None
     slope_std: float | None = None
-    slope_length: float = 150.0
+    slope_length: float = 100.0
     slope_walk: float = 0.0
     rolling_std: float = ROLLING_STD
     rolling_time: float = 900.0
