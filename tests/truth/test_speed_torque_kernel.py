@@ -58,7 +58,8 @@ def columns(n=400, mass=1400.0, seed=1):
     full = np.ones(n)
     return kernel.Columns(
         length=full, speed=speed, force=force, force_var=0.0 * full, drag=0.4 * full,
-        headwind=0.0 * full, rotating=70.0 * full, grade=grade, accel=np.diff(speed, prepend=speed[0]),
+        headwind=0.0 * full, rotating=70.0 * full, grade=grade,
+        accel=np.diff(speed, prepend=speed[0]),
         columns=np.zeros((n, 0)), on=np.ones(n, dtype=bool),
     )  # fmt: skip
 
