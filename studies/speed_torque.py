@@ -175,7 +175,7 @@ def levels(first: int) -> str:
     )
 
 
-def second(first: int, count: int = 20) -> str:
+def second(first: int, count: int = 10) -> str:
     """Vehicles, roads and drivers of the second model, with GNSS heights."""
     found = []
     for k in range(count):
