@@ -2,7 +2,8 @@
 
 Run from the checkout: ``python studies/galvao.py``. Recorded drives lie in
 ``../shared/data`` and are not part of the project; without them their table says so.
-``python studies/galvao.py tuning`` prints the transfer error that set the interval.
+``python studies/galvao.py tuning`` prints the transfer error that set the interval, ``alone`` makes
+all but the table of speed and torque anew, which takes an hour, and ``torque`` that table alone.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.stats import norm
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import speed_torque
 
 import weighbridge as wb
-from weighbridge.balance.speed_balance import speed_balance, window_means
+from weighbridge.balance.speed_balance import kernel_parameters, speed_balance, window_means
 from weighbridge.calibration.speed import calibrate_by_speed, speed_rows
 from weighbridge.calibration.speed_fit import SpeedRows
 from weighbridge.estimators.speed_ekf import SpeedEkfSettings, mean_mass, run_filter, start_share
@@ -69,6 +72,45 @@ def other_roads() -> str:
             f"| {100 * max(abs(t.error(t.printed)) for t in tests):.0f} |"
         )
     return "\n".join(lines)
+
+
+def corrected_gravity() -> str:
+    """Tell a3 as the fit corrects it, and the bands beside the errors, from 1500 kg as printed."""
+    lines = [
+        "| road | a3 at 10, 50 and 90 % of the speeds, m/s² | errors as printed % "
+        "| bands as printed ± % | largest error over its 95 % band |",
+        "|---|---|---|---|---|",
+    ]
+    for seed in (SEED, *OTHER_SEEDS):
+        fitted, _, tests = paper.weigh_three(seed)
+        model = fitted.vehicle.speed_model
+        params = kernel_parameters(model, (0.0, 0.0, 0.0), 0.0)
+        speeds = tests[0].balance.merged.speed[tests[0].ours.used]
+        at = np.percentile(speeds, [10.0, 50.0, 90.0])
+        gravity = params.gravity + params.corrections[4] + params.corrections[5] * at
+        errors = [100.0 * abs(t.error(t.printed)) for t in tests]
+        bands = [100.0 * t.band(t.printed) / t.mass for t in tests]
+        ratio = max(e / b for e, b in zip(errors, bands, strict=True))
+        lines.append(
+            f"| {seed} | {', '.join(f'{g:+.1f}' for g in gravity)} "
+            f"| {', '.join(f'{e:.0f}' for e in errors)} | {', '.join(f'{b:.0f}' for b in bands)} "
+            f"| {ratio:.1f} |"
+        )
+    return "\n".join(lines)
+
+
+def chance_of_print() -> str:
+    """Tell how likely errors as small as the printed ones are under the printed bands."""
+    true = 1092.0
+    chances = []
+    for mass, band in zip(paper.PAPER_MASSES, paper.PAPER_BANDS, strict=True):
+        chances.append(float(2.0 * norm.cdf(1.96 * abs(mass - true) / band) - 1.0))
+    errors = ", ".join(f"{abs(m - true):.2f}" for m in paper.PAPER_MASSES)
+    bands = ", ".join(f"{b:.0f}" for b in paper.PAPER_BANDS)
+    return (
+        f"errors of {errors} kg under 95 % bands of ± {bands} kg have, if the bands hold, a chance "
+        f"of {np.prod(chances):.0e}."
+    )
 
 
 def readings() -> str:
@@ -384,9 +426,35 @@ def figure(done: paper.Reproduction) -> None:
     plt.close(drawn)
 
 
+TORQUE = ("<!-- torque -->", "<!-- /torque -->")
+
+
+def between(page: str) -> str:
+    """Return what a page has between the marks of the table of speed and torque."""
+    return page.split(TORQUE[0])[1].split(TORQUE[1])[0] if TORQUE[0] in page else "\n"
+
+
+def with_torque(page: str, text: str) -> str:
+    """Put a text between these marks."""
+    before, rest = page.split(TORQUE[0])
+    return f"{before}{TORQUE[0]}{text}{TORQUE[1]}{rest.split(TORQUE[1])[1]}"
+
+
+def torque_tables() -> str:
+    """Weigh by speed and recorded torque, and by joint without an accelerometer."""
+    made = speed_torque.parts("judging")
+    simulated = [made[name]() for name in ("own", "second", "sheets")]
+    return "\n" + "\n".join([speed_torque.HEAD, *simulated]) + f"\n\n{made['recorded']()}\n"
+
+
 def main() -> None:
-    if sys.argv[1:] == ["tuning"]:
+    out, asked = HERE / "galvao.md", sys.argv[1:]
+    if asked == ["tuning"]:
         print(transfer_text(TUNING))
+        return
+    if asked == ["torque"]:
+        page = with_torque(out.read_text(encoding="utf-8"), torque_tables())
+        out.write_text(page, encoding="utf-8")
         return
     done = paper.reproduce(seed=SEED)
     figure(done)
@@ -397,6 +465,8 @@ def main() -> None:
         ("starts", markdown(paper.starts_table(done))),
         ("trials", markdown(paper.trials_table(done))),
         ("roads", other_roads()),
+        ("gravity", corrected_gravity()),
+        ("chance", chance_of_print()),
         ("readings", readings()),
         ("models", other_models()),
         ("sampling", sampling()),
@@ -404,7 +474,8 @@ def main() -> None:
         ("bmw-i3", bmw_i3()),
     ):
         page = page.replace(f"<!-- {name} -->", text)
-    (HERE / "galvao.md").write_text(page, encoding="utf-8")
+    kept = between(out.read_text(encoding="utf-8")) if asked == ["alone"] else torque_tables()
+    out.write_text(with_torque(page, kept), encoding="utf-8")
 
 
 if __name__ == "__main__":

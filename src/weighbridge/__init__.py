@@ -23,12 +23,17 @@ if TYPE_CHECKING:
     from weighbridge.live.weighing import LiveStatus, LiveWeighing
     from weighbridge.pipeline.inertia import Inertia, estimate_inertia
     from weighbridge.pipeline.inspection import inspect_drive
+    from weighbridge.pipeline.speed_bounds import CoastDown, MassBound, coast_down, mass_bound
     from weighbridge.pipeline.weighing import Weighing, compare, weigh
     from weighbridge.results.row import WeighingRow
     from weighbridge.signals import Drive, DriveInfo, Problem, Signal
     from weighbridge.vehicle.model import Vehicle
 
 _HOMES = {
+    "CoastDown": "weighbridge.pipeline.speed_bounds",
+    "MassBound": "weighbridge.pipeline.speed_bounds",
+    "coast_down": "weighbridge.pipeline.speed_bounds",
+    "mass_bound": "weighbridge.pipeline.speed_bounds",
     "CalibrationSettings": "weighbridge.calibration.settings",
     "ConfigError": "weighbridge.errors",
     "Drive": "weighbridge.signals",
@@ -60,6 +65,7 @@ _HOMES = {
 
 __all__ = [
     "CalibrationSettings",
+    "CoastDown",
     "ConfigError",
     "Drive",
     "DriveError",
@@ -68,6 +74,7 @@ __all__ = [
     "LiveScale",
     "LiveStatus",
     "LiveWeighing",
+    "MassBound",
     "MissingExtraError",
     "Problem",
     "Segment",
@@ -78,9 +85,11 @@ __all__ = [
     "Weighing",
     "WeighingRow",
     "calibrate",
+    "coast_down",
     "compare",
     "estimate_inertia",
     "inspect_drive",
+    "mass_bound",
     "read_drive",
     "read_drives",
     "read_frame",

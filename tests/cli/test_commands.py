@@ -10,6 +10,7 @@ import pytest
 
 from weighbridge import Vehicle, __version__, read_drive
 from weighbridge.cli.own_masses import own_mass_lines
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.papers import jensen2022
 from weighbridge.results.weighing import TRACK_COLUMNS
 from weighbridge.vehicle.model import Driveline
@@ -177,10 +178,13 @@ def test_weigh_compares_every_method(weighbridge, car, loaded, tmp_path):
     ran = weighbridge(*words, "--report", page)
     assert ran.code == 0
     rows = {line.split("│")[1].strip(): line for line in ran.out.splitlines() if "│" in line}
-    assert {"joint", "rls", "robust-rls", "ekf", "hybrid", "speed-ekf"} <= set(rows)
+    assert {*ESTIMATORS} == set(rows) & {*ESTIMATORS}
     assert "converged" in rows["hybrid"]
     assert "[speed_model]" in rows["speed-ekf"]
-    note = "calibrated for joint: rls, robust-rls, ekf, hybrid were run with the torque of another"
+    note = (
+        "calibrated for joint: rls, robust-rls, ekf, hybrid, speed-torque-ekf were run with the "
+        "torque of another"
+    )
     assert note in ran.out
     alone = json.loads(weighbridge(*words[:-1], "--method", "hybrid", "--json", "-").out)
     assert f"{alone['mass_kg']:.0f}" in rows["hybrid"]

@@ -10,7 +10,7 @@ from numba import config
 
 from weighbridge import CalibrationSettings, Vehicle, calibrate, weigh
 from weighbridge.balance import force_balance
-from weighbridge.calibration import joint as joint_fit
+from weighbridge.calibration import self_weighing
 from weighbridge.calibration.run import (
     run_calibration,
     run_speed_calibration,
@@ -314,7 +314,7 @@ def test_joint_finds_a_load_in_unknown_wind(empty, loaded):
 
 
 def test_a_calibration_with_which_nothing_could_be_weighed_is_refused(empty, monkeypatch):
-    monkeypatch.setattr(joint_fit, "TRANSFER_STD", (0.3, 0.003))
+    monkeypatch.setattr(self_weighing, "TRANSFER_STD", (0.3, 0.003))
     with pytest.raises(DriveError, match="would leave 30 % in every mass"):
         calibrate(empty.drive)
 
@@ -347,19 +347,19 @@ def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monke
         mass = 6800.0 + 1.3 * 6800.0 * (scale - 1.0) - jump
         return SimpleNamespace(mass=mass, bound_std=30.0, sensitivity=np.zeros(1))
 
-    monkeypatch.setattr(joint_fit.joint, "estimate", estimate)
+    monkeypatch.setattr(self_weighing.joint, "estimate", estimate)
     burnt = SimpleNamespace(merged=SimpleNamespace(fuel_burnt=np.zeros(2)))
     problem = SimpleNamespace(masses=[8400.0])
-    monkeypatch.setattr(joint_fit, "rebalanced", lambda problem, car: [burnt])
-    scaled = joint_fit.self_weighed(problem, base, None)
+    monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [burnt])
+    scaled = self_weighing.self_weighed(problem, base, None, self_weighing.BY_JOINT)
     assert estimate(None, scaled, False).mass == pytest.approx(8400.0, rel=1e-3)
     assert scaled.provenance.mass_scale_std < 0.015
 
     def stuck(_, car, load_changes):
         return SimpleNamespace(mass=6800.0, bound_std=30.0, sensitivity=np.zeros(1))
 
-    monkeypatch.setattr(joint_fit.joint, "estimate", stuck)
-    lost = joint_fit.self_weighed(problem, base, None)
+    monkeypatch.setattr(self_weighing.joint, "estimate", stuck)
+    lost = self_weighing.self_weighed(problem, base, None, self_weighing.BY_JOINT)
     # What the scale cannot mend is in the interval.
     assert lost.provenance.mass_scale_std > 0.15
 

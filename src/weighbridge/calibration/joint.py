@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -20,7 +19,6 @@ from weighbridge.calibration.fitted import (
     learnt_dragged,
     noted,
     ranges,
-    rebalanced,
 )
 from weighbridge.calibration.inverse import (
     DriveRows,
@@ -33,13 +31,16 @@ from weighbridge.calibration.inverse import (
 from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows
 from weighbridge.calibration.rls import fit_rls, refuse_nonsense
+from weighbridge.calibration.self_weighing import (
+    BY_JOINT,
+    BY_SPEED_TORQUE,
+    Weigher,
+    self_weighed,
+)
 from weighbridge.errors import DriveError
-from weighbridge.estimators import joint
-from weighbridge.estimators.considered import pinned, triangle
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
-from weighbridge.vehicle.fits import JOINT
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Timing, Vehicle
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.45)
@@ -57,37 +58,26 @@ USUAL_DELAY: Final = 0.3
 TIMING_WINDOW: Final = 1.2
 """Windows of the search [s]: shorter than those of the fit, for delay shows in what is fast."""
 
-TRANSFER_STD: Final = (0.002, 0.003)
-"""What a joint calibration loses on other drives, relative [-]: always, and from each
-drive of the calibration anew. Simulated, sixteen vehicles, calibrated by one or three
-ordinary drives, six others weighed with each; sensors whose scale is 0.3 % off from drive
-to drive are most of it."""
-
 FARTHEST: Final = 5.0
 """Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
 seen without an accelerometer, where hills and torque noise pass for drag."""
-
-USUAL_SLOPE: Final = 1.2
-"""Relative change of a mass per relative change of its torque [-]: what road loads take is not
-scaled."""
-
-SLOPES: Final = (0.8, 2.5)
-"""The same at least and at most [-]."""
-
-SCALES: Final = (0.5, 2.0)
-"""A torque that was fitted is scaled by so much at least and at most [-]."""
-
-SELF_CLOSE: Final = 5e-4
-"""The calibration's own drives are weighed so near to their masses, in the mean [-]."""
-
-SELF_ROUNDS: Final = 4
 
 ROUGH_NOISE: Final = 0.05
 """Noise of the torque over the highest of the motion, until a fit has told it [-]."""
 
 
 def fit_joint(problem: Problem) -> Fitted:
-    """Fit torque, road load, delay and lag by likelihood, then scale by weighing the drives.
+    """Fit torque, road load, delay and lag by likelihood, then scale by weighing the drives."""
+    return _fit(problem, BY_JOINT)
+
+
+def fit_speed_torque(problem: Problem) -> Fitted:
+    """Fit as `fit_joint` does, and scale by weighing as ``speed-torque-ekf`` does."""
+    return _fit(problem, BY_SPEED_TORQUE)
+
+
+def _fit(problem: Problem, weigher: Weigher) -> Fitted:
+    """Fit by likelihood, then scale the torque by what the drives weigh.
 
     Where the drives are too short for it, or say of the road load what no vehicle has, the torque
     of eq. 48 is scaled in its place.
@@ -100,7 +90,7 @@ def fit_joint(problem: Problem) -> Fitted:
     try:
         fitted, cov = _likeliest(problem)
     except TooShort as short:
-        return _as_it_is(problem, str(short))
+        return _as_it_is(problem, str(short), weigher)
     except _NoRoadLoad as strange:
         if problem.by_speed:
             # The torque of eq. 48 is worse still: noise of the motion and hills draw it.
@@ -109,8 +99,8 @@ def fit_joint(problem: Problem) -> Fitted:
                 f"resistance; check the masses, and calibrate on more or longer drives, or with "
                 f"{_would_help(problem)}"
             ) from None
-        return _as_it_is(problem, str(strange))
-    return replace(fitted, vehicle=self_weighed(problem, fitted.vehicle, cov))
+        return _as_it_is(problem, str(strange), weigher)
+    return replace(fitted, vehicle=self_weighed(problem, fitted.vehicle, cov, weigher))
 
 
 def _would_help(problem: Problem) -> str:
@@ -130,12 +120,11 @@ class _NoRoadLoad(Exception):
     """The fit makes a road load that no vehicle of the class has."""
 
 
-def _as_it_is(problem: Problem, why: str) -> Fitted:
+def _as_it_is(problem: Problem, why: str, weigher: Weigher) -> Fitted:
     """Fit by eq. 48, and scale the torque alone."""
     fitted = fit_rls(problem)
-    made = replace(fitted.vehicle.provenance, method=JOINT.name)
-    vehicle = noted(replace(fitted.vehicle, provenance=made), f"scaled, not fitted anew: {why}")
-    return replace(fitted, vehicle=self_weighed(problem, vehicle, None))
+    vehicle = noted(fitted.vehicle, f"scaled, not fitted anew: {why}")
+    return replace(fitted, vehicle=self_weighed(problem, vehicle, None, weigher))
 
 
 def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
@@ -168,7 +157,7 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
         vehicle,
         torque=replace(vehicle.torque, noise=noise, load_range=loads, speed_range=speeds),
         timing=replace(timing, torque_delay_std=search.std),
-        provenance=Provenance(masses=tuple(problem.masses), method=JOINT.name),
+        provenance=Provenance(masses=tuple(problem.masses)),
     )
     if not identified:
         vehicle = noted(vehicle, NOT_TOLD)
@@ -381,67 +370,5 @@ def _with(draft: Vehicle, found: InverseFit, settings: FitSettings) -> Vehicle:
             engine_inertia_std=stds[-2],
             wheel_inertia=float(road[3]),
             wheel_inertia_std=stds[-1],
-        ),
-    )
-
-
-def self_weighed(problem: Problem, vehicle: Vehicle, cov: Floats | None) -> Vehicle:
-    """Scale the torque so that the drives weigh what they are known to.
-
-    ``cov`` is that of the fit, if there was one. The scale pins what the drives weigh in the
-    mean; what is left open moves drives that use the torque otherwise.
-    """
-
-    def found(scale: float) -> tuple[float, float, Floats, int]:
-        tried = replace(vehicle, torque=vehicle.torque.scaled(scale))
-        ratios, stds = [], []
-        moved: list[Floats] = []
-        for balance, mass in zip(rebalanced(problem, tried), problem.masses, strict=True):
-            track = joint.estimate(balance, tried, load_changes=False)
-            if np.isfinite(track.mass) and track.sensitivity is not None:
-                left = mass - float(balance.merged.fuel_burnt[-1])
-                ratios.append(track.mass / left)
-                stds.append(track.bound_std / left)
-                moved.append(track.sensitivity / left)
-        if not ratios:
-            raise DriveError(
-                "the drives of the calibration cannot be weighed: drive longer, with more starts"
-            )
-        weight = 1.0 / np.square(stds)
-        return (
-            float(np.average(ratios, weights=weight)),
-            float(1.0 / np.sqrt(np.mean(weight))),
-            np.average(np.array(moved), axis=0, weights=weight),
-            len(ratios),
-        )
-
-    scale, slope = 1.0, USUAL_SLOPE
-    tried = [(scale, *found(scale))]
-    for _ in range(SELF_ROUNDS):
-        before, ratio = scale, tried[-1][1]
-        if abs(ratio - 1.0) < SELF_CLOSE:
-            break
-        scale = float(np.clip(scale + (1.0 - ratio) / slope, *SCALES))
-        if scale == before:
-            break
-        tried.append((scale, *found(scale)))
-        # Levels of noise may fall into another optimum, and the mass jump with them.
-        slope = float(np.clip((tried[-1][1] - ratio) / (scale - before), *SLOPES))
-    scale, ratio, bound, direction, count = min(tried, key=lambda t: abs(t[1] - 1.0))
-    each = float(np.hypot(TRANSFER_STD[1], UNMODELLED * bound))
-    # Where the torque could not be fitted anew, what its own fit left open stays.
-    known = math.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0, ratio - 1.0)
-    open_cov: tuple[float, ...] = ()
-    if cov is not None:
-        # The torque coefficients are scaled, and their errors with them.
-        units = np.concatenate((np.full(len(cov) - 4, scale), np.ones(4)))
-        open_cov = triangle(pinned(cov * np.outer(units, units), direction))
-    return replace(
-        vehicle,
-        torque=vehicle.torque.scaled(scale),
-        provenance=replace(
-            vehicle.provenance,
-            fit_cov=open_cov,
-            mass_scale_std=float(np.hypot(known, each / np.sqrt(count))),
         ),
     )

@@ -18,7 +18,7 @@ from weighbridge.checks import refuse_serious, settle_drive
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
-from weighbridge.navigation.select import find_motion
+from weighbridge.navigation.select import find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.classes import VehicleClass
@@ -119,6 +119,8 @@ def problem_of(
         A drive or a setting cannot be used.
     """
     drives, base, masses = checked(drives, mass, vehicle, settings.source)
+    if settings.fit.by_speed:
+        drives = [without_accelerometer(drive) for drive in drives]
     source = TORQUE_SOURCES[settings.source] if settings.source else best_source(drives, base)
     for drive in drives:
         if missing := source.lacking(drive):

@@ -14,7 +14,7 @@ from weighbridge.balance import ForceBalance
 from weighbridge.balance.witness_learning import learn_witnesses
 from weighbridge.calibration.doubted_masses import doubted_masses, unbacked_scale, with_doubts
 from weighbridge.calibration.fitted import Fitted, fitted_rows, noted, rebalanced
-from weighbridge.calibration.joint import fit_joint
+from weighbridge.calibration.joint import fit_joint, fit_speed_torque
 from weighbridge.calibration.known_mass import scale_doubt
 from weighbridge.calibration.problem import Problem, checked, problem_of
 from weighbridge.calibration.rls import fit_rls
@@ -32,7 +32,7 @@ from weighbridge.pipeline.given import (
 )
 from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive
-from weighbridge.vehicle.fits import JOINT, RLS
+from weighbridge.vehicle.fits import JOINT, RLS, SPEED_TORQUE_EKF
 from weighbridge.vehicle.model import Driveline, Vehicle
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 FITTERS: Final[dict[str, Callable[[Problem], Fitted]]] = {
     JOINT.name: fit_joint,
     RLS.name: fit_rls,
+    SPEED_TORQUE_EKF.name: fit_speed_torque,
 }
 """What fits the torque for each method."""
 

@@ -23,8 +23,9 @@ class CalibrationSettings:
     grid : solve on the grid of Jensen 2022, Table 5, in place of the bounds
     curved : let the torque per load change with engine speed and load; off for
         the regression of eq. 49 as printed
-    method : estimator the vehicle is calibrated for: "joint", "rls" by eq. 48, or
-        "speed-ekf", which fits a model of the speed alone
+    method : estimator the vehicle is calibrated for: "joint", "rls" by eq. 48,
+        "speed-torque-ekf", which uses no accelerometer, or "speed-ekf", which fits a model of the
+        speed alone
     """
 
     order: int | None = None

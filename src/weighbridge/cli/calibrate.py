@@ -68,7 +68,10 @@ _Tare = Annotated[
     typer.Option("--tare", help="Mass without payload in kg; payloads count from it."),
 ]
 _Method = Annotated[
-    str, typer.Option("--method", help="Estimator to calibrate for: rls, joint or speed-ekf.")
+    str,
+    typer.Option(
+        "--method", help="Estimator to calibrate for: joint, rls, speed-torque-ekf or speed-ekf."
+    ),
 ]
 _Order = Annotated[
     Optional[int],  # noqa: UP045

@@ -6,11 +6,19 @@ from typing import Any, Final
 
 from weighbridge.balance import ForceBalance
 from weighbridge.errors import ConfigError
-from weighbridge.estimators import ekf, hybrid, joint, rls, robust_rls, speed_ekf
+from weighbridge.estimators import (
+    ekf,
+    hybrid,
+    joint,
+    rls,
+    robust_rls,
+    speed_ekf,
+    speed_torque_ekf,
+)
 from weighbridge.estimators.settings import changed
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.registry import Registry
-from weighbridge.vehicle.fits import JOINT, RLS, SPEED_EKF
+from weighbridge.vehicle.fits import JOINT, RLS, SPEED_EKF, SPEED_TORQUE_EKF
 from weighbridge.vehicle.model import Vehicle
 
 
@@ -28,6 +36,8 @@ class Estimator:
         torques bias its masses
     speed_alone : it needs a speed and no torque, and takes a balance of
         `weighbridge.balance.speed_balance`
+    by_speed : it weighs without an accelerometer, and takes a balance of a motion by speed whatever
+        the drive holds
     segments_are_loads : its segments are loads told apart, not just legs of a drive
     reckons_fuel : its mass is that at the end of the drive, fuel burnt taken off; else that of
         the whole drive
@@ -40,6 +50,7 @@ class Estimator:
     settings: type[Any] | None = None
     fits: tuple[str, ...]
     speed_alone: bool = False
+    by_speed: bool = False
     segments_are_loads: bool = False
     reckons_fuel: bool = False
     slow_errors: bool = False
@@ -91,6 +102,13 @@ ESTIMATORS: Final = Registry(
             estimate=hybrid.estimate,
             settings=hybrid.HybridSettings,
             fits=_ANY_TORQUE,
+        ),
+        Estimator(
+            name=speed_torque_ekf.METHOD,
+            estimate=speed_torque_ekf.estimate,
+            settings=speed_torque_ekf.SpeedTorqueSettings,
+            fits=(SPEED_TORQUE_EKF.name,),
+            by_speed=True,
         ),
         Estimator(
             name="speed-ekf",

@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.signals import Bools, Floats
+from weighbridge.signals import Bools, Floats, Signal
 
 MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
 
@@ -88,6 +88,8 @@ class Motion:
         accelerometer gave ``accel`` [m/s]
     specific_force_scale_std : relative, of the accelerometer's scale where it was corrected [-]
     recorded_speed : the speed whose slope ``accel`` is; None where an accelerometer gave it
+    measured_speed : samples of the speed that all of this was made from, true scale; None where an
+        accelerometer was there as well
     notes : sentences on what was found and what was doubtful
     """
 
@@ -117,6 +119,7 @@ class Motion:
     speed_std: float = 0.0
     specific_force_scale_std: float = 0.0
     recorded_speed: RecordedSpeed | None = None
+    measured_speed: Signal | None = None
     notes: tuple[str, ...] = ()
 
     @property

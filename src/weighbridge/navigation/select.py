@@ -57,6 +57,11 @@ def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motio
     )
 
 
+def without_accelerometer(drive: Drive) -> Drive:
+    """Return the drive as one that recorded no inertial sensor; its motion is then by speed."""
+    return drive.without(*IMU_SIGNALS, "longitudinal_accel")
+
+
 def scaled_for_navigation(drive: Drive, vehicle: Vehicle | None) -> Drive:
     """Return the drive as navigation takes it: positions show the scale of its speed."""
     positions = drive.has("latitude", "longitude")

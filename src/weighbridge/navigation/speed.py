@@ -77,6 +77,7 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
         grade_std=grade_std,
         speed_std=float(np.median(speed_std)),
         recorded_speed=_recorded(speed),
+        measured_speed=speed,
         notes=notes,
     )  # fmt: skip
 

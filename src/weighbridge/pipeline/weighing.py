@@ -26,7 +26,7 @@ from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
-from weighbridge.navigation.select import identify_motion
+from weighbridge.navigation.select import identify_motion, without_accelerometer
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -143,6 +143,7 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
     """
     warnings = tuple(p.text for p in drive.problems)
     alone = ESTIMATORS[method].speed_alone
+    seen = without_accelerometer(drive) if ESTIMATORS[method].by_speed else drive
     if not alone:
         vehicle = as_read(vehicle)
     lacking = no_speed(drive) if alone else what_is_missing(drive, vehicle)
@@ -152,11 +153,11 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
         balance = speed_balance(drive, vehicle)
         warnings += balance.motion.notes
     else:
-        vehicle, found = by_power(drive, vehicle)
-        balance, notes = torque_balance(drive, vehicle)
+        vehicle, found = by_power(seen, vehicle)
+        balance, notes = torque_balance(seen, vehicle)
         vehicle, tyres = on_its_tyres(balance, vehicle)
         if tyres:
-            balance, notes = torque_balance(drive, vehicle)
+            balance, notes = torque_balance(seen, vehicle)
             notes = (tyres, *notes)
         warnings += found + notes + vehicle.provenance.doubts
         warnings += fitted_for_another(vehicle, method)
@@ -284,12 +285,23 @@ def _by(weighing: Weighing, method: str, joined: MassTrack | None) -> Weighing:
     """Weigh by another method."""
     drive, vehicle, done = weighing.drive, weighing.vehicle, weighing.result
     try:
-        if done is None or weighing.estimator.speed_alone or ESTIMATORS[method].speed_alone:
+        if done is None or _another_balance(weighing, method):
             return weigh_checked(drive, vehicle, method)
         warnings = fitted_for_another(vehicle, method)
         return weigh_balance(drive, vehicle, method, done.balance, warnings, joined)
     except WeighbridgeError as error:
         return without_mass(drive, vehicle, method, str(error))
+
+
+def _another_balance(weighing: Weighing, method: str) -> bool:
+    """Whether a method needs another balance than that of a weighing."""
+    made, other = weighing.estimator, ESTIMATORS[method]
+    if made.speed_alone or other.speed_alone:
+        return True
+    if made.by_speed == other.by_speed:
+        return False
+    drive = weighing.drive
+    return len(without_accelerometer(drive).signals) < len(drive.signals)
 
 
 def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[str, ...]]:

@@ -35,6 +35,7 @@ METHOD_STYLE: Final[dict[str, tuple[str, str]]] = {
     "robust-rls": (ORANGE, "dot"),
     "ekf": (GREEN, "dashdot"),
     "hybrid": (PURPLE, "longdash"),
+    "speed-torque-ekf": (VERMILLION, "longdash"),
     "speed-ekf": (GREY, "longdashdot"),
 }
 """Colour and dash of each method."""

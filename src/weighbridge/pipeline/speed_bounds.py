@@ -1,0 +1,278 @@
+"""What speed alone does say beside a grade: an upper bound of the mass, and drag over mass.
+
+Neither is a weighing: a bound is no estimate, and a coast-down tells no mass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from weighbridge.balance.law import rotating_mass
+from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.track import Status
+from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.select import find_motion, without_accelerometer
+from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle.air import air_density
+from weighbridge.vehicle.model import Vehicle
+
+WINDOW: Final = 10.0
+"""Over which power is averaged [s]: what a driver holds at full load on a climb."""
+
+SLOWEST: Final = 4.0
+"""Windows with a slower sample are left out: clutch and converter slip [m/s]."""
+
+COAST_WINDOW: Final = 4.0
+"""Over which a coast-down is differenced [s]."""
+
+SURE: Final = 3.0
+"""Standard deviations by which a window must climb or gain speed to bound a mass."""
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MassBound:
+    """An upper bound of the mass by the power of the engine.
+
+    Attributes
+    ----------
+    mass : the vehicle has at most this mass with 95 % probability [kg]; NaN without a climb
+    nearest, nearest_std : mass that the window of the bound would say if it was driven at full
+        power, and its standard deviation [kg]
+    start : when that window begins [s]
+    windows : how many were hard enough to bound a mass
+    status : never `Status.CONVERGED`, for nothing proves full load
+    reason : in a sentence
+    """
+
+    mass: float
+    nearest: float
+    nearest_std: float
+    start: float
+    windows: int
+    status: Status
+    reason: str
+
+
+def mass_bound(
+    drive: Drive, vehicle: Vehicle, power: float, *, power_std: float = 0.05
+) -> MassBound:
+    """Bound the mass of a drive from above by speed, grade and the engine's full power.
+
+    No window of a drive asks for more power than the engine has: kinetic and potential energy and
+    rolling resistance, all in proportion to the mass, and air drag. Each window bounds the mass;
+    the lowest bound counts, each taken high enough that all of them hold together.
+
+    Parameters
+    ----------
+    drive : with a speed, and a grade (of a map) or heights
+    vehicle : road load, wheel inertia
+    power : full power at the wheels [W]
+    power_std : its standard deviation, relative [-]
+
+    Raises
+    ------
+    ConfigError
+        The power is none.
+    DriveError
+        There is no speed, or nothing tells the grade.
+
+    References
+    ----------
+    Bonferroni's inequality: Miller, Simultaneous Statistical Inference, 1981, ch. 1.
+    """
+    if not (math.isfinite(power) and power > 0.0):
+        raise ConfigError(f"power must be a positive number of W, got {power}")
+    if not 0.0 <= power_std < 0.5:
+        raise ConfigError(f"power_std must be in [0, 0.5), got {power_std}")
+    motion = _graded(drive, vehicle)
+    start, gain, gain_std, force_work = _windows(drive, motion, vehicle)
+    hard = gain > np.maximum(SURE * gain_std, 1e-9)
+    if not hard.any():
+        return MassBound(
+            mass=math.nan, nearest=math.nan, nearest_std=math.nan, start=math.nan, windows=0,
+            status=Status.NOT_EXCITED,
+            reason="no climb or start is steep enough beside its errors: nothing bounds the mass",
+        )  # fmt: skip
+    start, gain, gain_std, force_work = (x[hard] for x in (start, gain, gain_std, force_work))
+    most = (power * WINDOW - force_work) / gain
+    std = np.hypot(power_std * power * WINDOW / gain, most * gain_std / gain)
+    bound = most + float(norm.isf(0.05 / most.size)) * std
+    best = int(np.argmin(bound))
+    return MassBound(
+        mass=float(bound[best]),
+        nearest=float(most[best]),
+        nearest_std=float(std[best]),
+        start=float(start[best]),
+        windows=int(most.size),
+        status=Status.NOT_EXCITED,
+        reason=(
+            f"speed and grade say at most {bound[best]:.0f} kg by a full power of "
+            f"{power / 1e3:.0f} kW: a bound, for nothing shows that the engine gave all of it"
+        ),
+    )
+
+
+def _graded(drive: Drive, vehicle: Vehicle) -> Motion:
+    """Find the motion by speed, with a grade.
+
+    Raises
+    ------
+    DriveError
+        Nothing tells the grade.
+    """
+    motion = find_motion(without_accelerometer(drive), vehicle)
+    if motion.source != "speed_grade":
+        raise DriveError(
+            f"{drive.name}: no grade and no altitude over a long enough way; without them a climb "
+            "is not seen: add grade_pct of a map, or altitude_m"
+        )
+    return motion
+
+
+def _windows(
+    drive: Drive, motion: Motion, vehicle: Vehicle
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Cut a drive into windows and tell the energy that each takes.
+
+    Returns
+    -------
+    start : (n,) [s]
+    gain, gain_std : (n,) energy over the mass, and its standard deviation [J/kg]
+    rest : (n,) energy that is not in proportion to the mass: drag and wheels [J]
+    """
+    size = max(2, round(WINDOW * motion.rate))
+    begin = np.arange(0, motion.time.size - size, size)
+    end = begin + size
+    dt = 1.0 / motion.rate
+    speed, road = motion.speed, vehicle.road
+
+    def summed(values: Floats) -> Floats:
+        total = np.concatenate(([0.0], np.cumsum(values)))
+        return np.asarray((total[end] - total[begin]) * dt)
+
+    bad = summed((~motion.valid | (speed < SLOWEST)).astype(np.float64)) > 0.0
+    way = summed(speed)
+    kinetic = 0.5 * (speed[end] ** 2 - speed[begin] ** 2)
+    rolling = road.rolling_coefficient.value + vehicle.road_load.rolling_speed_coefficient * speed
+    gain = kinetic + GRAVITY * summed(
+        speed * (np.sin(motion.grade) + rolling * np.cos(motion.grade))
+    )
+    rough = np.hypot(road.rolling_coefficient.std, np.sqrt(summed(motion.grade_std**2) / WINDOW))
+    fast = motion.speed_std * np.hypot(speed[end], speed[begin])
+    density = air_density(drive, np.nan_to_num(motion.altitude))
+    drag = 0.5 * road.drag_area.value * summed(density * speed**3)
+    turning = rotating_mass(vehicle, 0.0) * kinetic
+    gain_std = np.hypot(fast, GRAVITY * way * rough)
+    keep = ~bad
+    return motion.time[begin][keep], gain[keep], gain_std[keep], (drag + turning)[keep]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoastDown:
+    """What coasting in both directions tells.
+
+    Attributes
+    ----------
+    drag_over_mass, drag_over_mass_std : C_d A over the mass [m^2/kg]
+    rolling, rolling_std : rolling resistance coefficient, driveline drag taken in [-]
+    degrees_of_freedom : behind the standard deviations
+    status : `Status.NOT_EXCITED`, for it tells no mass
+    """
+
+    drag_over_mass: float
+    drag_over_mass_std: float
+    rolling: float
+    rolling_std: float
+    degrees_of_freedom: float
+    status: Status = Status.NOT_EXCITED
+
+    def interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Interval of ``drag_over_mass`` that holds with a probability [m^2/kg]."""
+        reach = float(student.ppf(0.5 + 0.5 * level, self.degrees_of_freedom))
+        half = reach * self.drag_over_mass_std
+        return self.drag_over_mass - half, self.drag_over_mass + half
+
+
+def coast_down(
+    drive: Drive, there: Sequence[Span], back: Sequence[Span], *, vehicle: Vehicle | None = None
+) -> CoastDown:
+    """Find C_d A over mass from spans of a drive that coast out of gear, in opposite directions.
+
+    In each span the retardation, grade taken off, is a line in the dynamic pressure: its slope is
+    C_d A / m, times the part of the inertia that rolls. Wind along the road adds opposite parts to
+    the slopes of the two directions, which the mean of both takes out.
+
+    Parameters
+    ----------
+    drive : with a speed, and a grade or heights
+    there, back : spans of time in the one direction and in the other [s]; two of each at least
+    vehicle : wheel inertia and tare; those usual for a car when None
+
+    Raises
+    ------
+    ConfigError
+        There are fewer spans than two in a direction, or one is too short.
+    DriveError
+        There is no speed, or nothing tells the grade.
+
+    References
+    ----------
+    SAE J1263, Road Load Measurement and Dynamometer Simulation Using Coastdown Techniques.
+    """
+    vehicle = vehicle or Vehicle()
+    if min(len(there), len(back)) < 2:
+        raise ConfigError(
+            f"{drive.name}: {len(there)} coast-downs there and {len(back)} back; two of each are "
+            "needed, for their scatter is the interval"
+        )
+    motion = _graded(drive, vehicle)
+    density = air_density(drive, np.nan_to_num(motion.altitude))
+    mass = vehicle.tare or vehicle.of_class.typical_mass
+    rolls = 1.0 + float(rotating_mass(vehicle, 0.0)) / mass
+    lines = [
+        np.array([_line(drive, motion, density, span, rolls) for span in spans])
+        for spans in (there, back)
+    ]
+    found = 0.5 * (lines[0].mean(axis=0) + lines[1].mean(axis=0))
+    var = sum(0.25 * part.var(axis=0, ddof=1) / len(part) for part in lines)
+    std = np.sqrt(np.asarray(var))
+    return CoastDown(
+        drag_over_mass=float(found[1]),
+        drag_over_mass_std=float(std[1]),
+        rolling=float(found[0] / GRAVITY),
+        rolling_std=float(std[0] / GRAVITY),
+        degrees_of_freedom=float(min(len(there), len(back)) - 1),
+    )
+
+
+def _line(drive: Drive, motion: Motion, density: Floats, span: Span, rolls: float) -> Floats:
+    """Retardation at standstill [m/s^2] and its slope over dynamic pressure [m^2/kg] of a span."""
+    size = max(2, round(COAST_WINDOW * motion.rate))
+    inside = np.flatnonzero((motion.time >= span[0]) & (motion.time <= span[1]) & motion.valid)
+    if inside.size < 3 * size:
+        raise ConfigError(
+            f"{drive.name}: from {span[0]:g} to {span[1]:g} s there are "
+            f"{inside.size / motion.rate:.0f} s of speed; a coast-down needs "
+            f"{3.0 * COAST_WINDOW:.0f} s"
+        )
+    begin = inside[:-size:size]
+    end = begin + size
+    accel = (motion.speed[end] - motion.speed[begin]) / (motion.time[end] - motion.time[begin])
+    hill = [float(np.mean(np.sin(motion.grade[a:b]))) for a, b in zip(begin, end, strict=True)]
+    pressure = [
+        float(np.mean(0.5 * density[a:b] * motion.speed[a:b] ** 2))
+        for a, b in zip(begin, end, strict=True)
+    ]
+    slowed = -rolls * accel - GRAVITY * np.array(hill)
+    slope, rest = np.polyfit(pressure, slowed, 1)
+    return np.array([rest, slope])

@@ -1,0 +1,244 @@
+"""Speed and recorded torque, no accelerometer: masses of simple drives, and when there is none."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.balance import Reason
+from weighbridge.errors import ConfigError
+from weighbridge.estimators import ESTIMATORS, speed_torque_ekf
+from weighbridge.estimators.speed_samples import covered, span_means
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.model import Driveline, RoadLoad, Timing, TorqueModel, Vehicle
+
+METHOD = "speed-torque-ekf"
+MASS = 1400.0
+DRAG_AREA, ROLLING, RADIUS, GEARING = 0.65, 0.011, 0.3, 12.0
+G, DENSITY = 9.80665, 1.225
+
+CAR = Vehicle(
+    name="one gear",
+    tare=1250.0,
+    driveline=Driveline(
+        wheel_radius=RADIUS,
+        gearings=(GEARING,),
+        efficiency=1.0,
+        engine_inertia=0.0,
+        wheel_inertia=0.0,
+        engine_inertia_std=0.0,
+        wheel_inertia_std=0.0,
+    ),
+    torque=TorqueModel(source="measured", coefficients=(0.0, 1.0), scale_std=0.01),
+    road_load=RoadLoad(
+        drag_area=DRAG_AREA, drag_area_std=0.02, rolling_coefficient=ROLLING,
+        rolling_coefficient_std=0.001,
+    ),
+    timing=Timing(torque_delay=0.0),
+)  # fmt: skip
+
+
+def drive(
+    seed=1,
+    *,
+    mass=MASS,
+    minutes=20.0,
+    wave=1.0,
+    hills=0.03,
+    height=True,
+    rate=1.0,
+    step=1 / 3.6,
+    noise=0.02,
+):
+    """Accelerations of random sizes over hills; whole km/h, and a torque of 2 % noise."""
+    rng = np.random.default_rng(seed)
+    dt = 0.05
+    time = np.arange(0.0, 60.0 * minutes, dt)
+    knots = np.arange(0.0, time[-1] + 12.0, 6.0)
+    wanted = 18.0 + wave * rng.normal(scale=5.0, size=knots.size)
+    wanted = np.interp(time, knots, np.clip(wanted, 6.0, 35.0))
+    kernel = np.exp(-0.5 * (np.arange(-80, 81) * dt / 1.5) ** 2)
+    speed = np.convolve(np.pad(wanted, 80, mode="edge"), kernel / kernel.sum(), mode="valid")
+    accel = np.gradient(speed, dt)
+    distance = np.cumsum(speed) * dt
+    grade = hills * np.sin(distance / 150.0)
+    altitude = np.cumsum(np.sin(grade) * speed) * dt + 200.0
+    force = mass * (accel + G * (np.sin(grade) + ROLLING * np.cos(grade)))
+    force = force + 0.5 * DENSITY * DRAG_AREA * speed**2
+    torque = force / GEARING
+    torque = torque + rng.normal(scale=noise * np.abs(torque).max(), size=torque.size)
+
+    def every(name, values, period, grain=0.0):
+        at = slice(None, None, round(period / dt))
+        kept = values[at] if grain == 0.0 else np.floor(values[at] / grain) * grain
+        return Signal(name, time[at], kept)
+
+    signals = [
+        every("vehicle_speed", speed, 1.0 / rate, step),
+        every("engine_torque", torque, 0.5),
+        every("brake_switch", np.zeros(time.size), 0.5),
+    ]
+    if height:
+        signals.append(every("altitude", altitude + rng.normal(scale=0.5, size=time.size), 1.0))
+    return Drive(name=f"drive {seed}", signals={s.name: s for s in signals})
+
+
+@pytest.fixture(scope="module")
+def weighed():
+    return wb.weigh(drive(), CAR, METHOD)
+
+
+def test_known_mass_of_whole_kilometres_per_hour_once_a_second(weighed):
+    assert weighed.status == "converged", weighed.reason
+    assert weighed.mass == pytest.approx(MASS, rel=0.04)
+    low, high = weighed.interval(0.95)
+    assert low < MASS < high
+    assert weighed.result.balance.motion.source == "speed_grade"
+
+
+def test_a_load_is_found_and_the_start_is_not_in_the_answer(weighed):
+    loaded = wb.weigh(drive(2, mass=MASS + 400.0), CAR, METHOD)
+    assert loaded.mass - weighed.mass == pytest.approx(400.0, abs=70.0)
+    ends = [
+        wb.weigh(drive(), CAR, METHOD, settings={"initial_mass": start}).mass
+        for start in (900.0, 2200.0)
+    ]
+    assert ends[0] == pytest.approx(ends[1], rel=0.005)
+    assert ends[0] == pytest.approx(weighed.mass, rel=0.005)
+
+
+def test_without_heights_the_slope_is_a_state_and_the_interval_wider(weighed):
+    blind = wb.weigh(drive(height=False), CAR, METHOD)
+    assert blind.result.balance.motion.source == "speed"
+    assert blind.result.mass == pytest.approx(MASS, rel=0.10)
+    assert blind.result.bound_std > 1.5 * weighed.result.bound_std
+    untold = wb.weigh(drive(), CAR, METHOD, settings={"measured_grade": False})
+    assert untold.result.bound_std > 1.5 * weighed.result.bound_std
+
+
+def test_an_accelerometer_is_not_read(weighed):
+    seen = drive()
+    time = np.arange(0.0, seen.duration, 0.1)
+    nonsense = Signal("longitudinal_accel", time, np.sin(time) * 3.0)
+    other = wb.weigh(replace(seen, signals=seen.signals | {nonsense.name: nonsense}), CAR, METHOD)
+    assert other.result.mass == weighed.result.mass
+
+
+def test_a_cruise_on_the_flat_carries_no_mass():
+    calm = wb.weigh(drive(3, wave=0.06, hills=0.0), CAR, METHOD)
+    assert calm.status == "not_excited"
+    assert np.isnan(calm.mass)
+
+
+def test_a_minute_carries_no_mass():
+    assert wb.weigh(drive(4, minutes=1.0), CAR, METHOD).status != "converged"
+
+
+def test_a_gap_of_the_speed_and_of_the_torque_is_left_out(weighed):
+    whole = drive()
+    signals = dict(whole.signals)
+    for name, begin, end in (("vehicle_speed", 300.0, 360.0), ("engine_torque", 600.0, 640.0)):
+        signal = signals[name]
+        kept = (signal.time < begin) | (signal.time > end)
+        signals[name] = Signal(name, signal.time[kept], signal.values[kept])
+    holed = wb.weigh(replace(whole, signals=signals), CAR, METHOD)
+    assert holed.status == "converged"
+    assert holed.mass == pytest.approx(weighed.mass, rel=0.03)
+    view = holed.result.balance.merged
+    hidden = (view.time > 305.0) & (view.time < 355.0)
+    assert not holed.result.used[hidden].any()
+    assert np.isnan(holed.result.residual[hidden]).all()
+
+
+def test_linearised_at_its_own_acceleration_noise_of_the_torque_makes_it_heavier():
+    """As a regressor a noisy force attenuates the inverse mass; measured acceleration does not."""
+    ends = {}
+    for measured in (True, False):
+        given = {"measured_jacobian": measured}
+        ends[measured] = wb.weigh(drive(noise=0.25), CAR, METHOD, settings=given).result.mass
+    assert abs(ends[True] / MASS - 1.0) < 0.08
+    assert ends[False] > 1.04 * ends[True]
+
+
+def test_residual_reason_and_running_mass_are_of_the_rows(weighed):
+    track = weighed.result
+    n = track.balance.merged.time.size
+    assert track.running_mass.shape == track.residual.shape == track.reason.shape == (n,)
+    assert np.isfinite(track.residual[track.used]).all()
+    known = track.residual[track.used]
+    # 2 % of noise of the torque of one row is 6 % of the weight's 0.1 g; means have less.
+    assert np.std(known) < 0.05 * MASS * G
+    assert abs(np.mean(known)) < 0.2 * np.std(known)
+    assert track.running_mass[-1] == pytest.approx(track.mass, rel=0.02)
+    assert set(np.unique(track.reason)) <= set(Reason)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"initial_mass": -1.0}, "initial_mass must be a positive number, got -1"),
+        ({"sample_time": 60.0}, "sample_time must be 30 s or less"),
+        ({"gate": 0.0}, "gate must be positive"),
+        ({"slope_walk": -0.1}, "slope_walk must be zero or positive"),
+        ({"measured_grade": 1.0}, "takes true or false"),
+    ],
+)
+def test_what_cannot_be_set_is_one_sentence(given, said):
+    with pytest.raises(ConfigError, match=said):
+        ESTIMATORS[METHOD].settings_of(given)
+
+
+def test_stated_noise_is_not_searched(monkeypatch):
+    def refuse(*_, **__):
+        raise AssertionError
+
+    monkeypatch.setattr(speed_torque_ekf, "minimize", refuse)
+    stated = {"speed_noise": 0.1, "accel_noise": 0.05, "slope_std": 0.01}
+    found = wb.weigh(drive(), CAR, METHOD, settings=stated)
+    assert found.mass == pytest.approx(MASS, rel=0.05)
+
+
+def test_calibration_takes_a_constant_bias_out():
+    """A torque told 20 % too low weighs right after a calibration with it."""
+    off = []
+    for seed, mass in ((11, MASS), (12, MASS + 300.0), (13, MASS + 150.0)):
+        made = drive(seed, mass=mass)
+        torque = made.signals["engine_torque"]
+        low = Signal(torque.name, torque.time, 0.8 * torque.values)
+        off.append(replace(made, signals=made.signals | {low.name: low}))
+    base = replace(CAR, torque=TorqueModel(), road_load=RoadLoad(), timing=Timing())
+    car = wb.calibrate(
+        off[:2],
+        [MASS, MASS + 300.0],
+        vehicle=base,
+        settings=wb.CalibrationSettings(method=METHOD),
+    )
+    assert car.provenance.method == METHOD
+    assert car.provenance.motion == "speed_grade"
+    found = wb.weigh(off[2], car, METHOD)
+    assert found.status == "converged", found.reason
+    assert found.mass == pytest.approx(MASS + 150.0, rel=0.04)
+    assert not any("was calibrated for" in text for text in found.warnings)
+
+
+def test_means_over_spans_are_those_of_the_line_between():
+    time = np.array([0.0, 1.0, 3.0, 4.0])
+    values = np.array([0.0, 2.0, 2.0, 0.0])
+    edges = np.array([0.0, 0.5, 2.0, 3.5])
+    fine = np.linspace(0.0, 4.0, 400_001)
+    line = np.interp(fine, time, values)
+    expected = [line[(fine > a) & (fine <= b)].mean() for a, b in pairwise(edges)]
+    np.testing.assert_allclose(span_means(time, values, edges)[1:], expected, rtol=1e-4)
+
+
+def test_a_span_counts_only_with_all_its_rows():
+    time = np.arange(0.0, 10.0, 0.5)
+    known = np.ones(time.size, dtype=bool)
+    known[8] = False  # 4.0 s: what reaches over it, or begins within its line
+    edges = np.arange(0.25, 9.0, 1.0)
+    on = covered(time, known, edges)
+    assert edges[~on].tolist() == [0.25, 4.25, 5.25]
+    gone = (time < 5.0) | (time > 7.6)
+    assert not covered(time[gone], known[gone], edges)[6:8].any()
