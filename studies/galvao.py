@@ -366,7 +366,7 @@ def figure(done: paper.Reproduction) -> None:
     drawn, axes = plt.subplots(1, 3, figsize=(12, 3.6), sharey=True, layout="constrained")
     for axis, test in zip(axes, done.tests, strict=True):
         used = test.ours.used
-        minutes = (test.balance.merged.time - test.balance.motion.time[0])[used] / 60.0
+        minutes = (test.balance.table.time - test.balance.motion.time[0])[used] / 60.0
         for run, colour, label in (
             (test.ours, "tab:blue", "started at the calibration's mass"),
             (test.printed, "tab:orange", "start and noise as printed"),

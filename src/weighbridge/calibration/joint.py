@@ -185,7 +185,7 @@ def _drive_rows(problem: Problem, rows: Sequence[DelayedRows]) -> list[DriveRows
     """See rows as the fit reads them."""
     return [
         DriveRows(
-            view=part.view,
+            table=part.table,
             regressor=recording.reading,
             engine_speed=part.engine_speed,
             usable=part.usable,
@@ -214,7 +214,7 @@ def _rough_noise(problem: Problem, rows: Sequence[DelayedRows]) -> float:
     """Guess the noise of the torque from the torque that the motion takes [N m]."""
     taken = np.concatenate(
         [
-            recording.mass * np.abs(part.view.specific_force / part.view.gearing)[part.usable]
+            recording.mass * np.abs(part.table.specific_force / part.table.gearing)[part.usable]
             for recording, part in zip(problem.recordings, rows, strict=True)
         ]
     )
@@ -399,7 +399,7 @@ def self_weighed(problem: Problem, vehicle: Vehicle, cov: Floats | None) -> Vehi
         for balance, mass in zip(rebalanced(problem, tried), problem.masses, strict=True):
             track = joint.estimate(balance, tried, load_changes=False)
             if np.isfinite(track.mass) and track.sensitivity is not None:
-                left = mass - float(balance.merged.fuel_burnt[-1])
+                left = mass - float(balance.table.fuel_burnt[-1])
                 ratios.append(track.mass / left)
                 stds.append(track.bound_std / left)
                 moved.append(track.sensitivity / left)
