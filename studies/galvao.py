@@ -85,7 +85,7 @@ def corrected_gravity() -> str:
         fitted, _, tests = paper.weigh_three(seed)
         model = fitted.vehicle.speed_model
         params = kernel_parameters(model, (0.0, 0.0, 0.0), 0.0)
-        speeds = tests[0].balance.merged.speed[tests[0].ours.used]
+        speeds = tests[0].balance.table.speed[tests[0].ours.used]
         at = np.percentile(speeds, [10.0, 50.0, 90.0])
         gravity = params.gravity + params.corrections[4] + params.corrections[5] * at
         errors = [100.0 * abs(t.error(t.printed)) for t in tests]
@@ -408,7 +408,7 @@ def figure(done: paper.Reproduction) -> None:
     drawn, axes = plt.subplots(1, 3, figsize=(12, 3.6), sharey=True, layout="constrained")
     for axis, test in zip(axes, done.tests, strict=True):
         used = test.ours.used
-        minutes = (test.balance.merged.time - test.balance.motion.time[0])[used] / 60.0
+        minutes = (test.balance.table.time - test.balance.motion.time[0])[used] / 60.0
         for run, colour, label in (
             (test.ours, "tab:blue", "started at the calibration's mass"),
             (test.printed, "tab:orange", "start and noise as printed"),

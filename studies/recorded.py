@@ -171,10 +171,10 @@ def bmw_loads() -> str:
     )
     drives = trips()
 
-    def with_inertias(view, vehicle, **options):  # type: ignore[no-untyped-def]
-        rows, y = design(view, vehicle, **options)
-        wheels = view.accel / vehicle.driveline.wheel_radius**2
-        return np.column_stack([rows, view.gearing**2 * view.accel, wheels]), y
+    def with_inertias(table, vehicle, **options):  # type: ignore[no-untyped-def]
+        rows, y = design(table, vehicle, **options)
+        wheels = table.accel / vehicle.driveline.wheel_radius**2
+        return np.column_stack([rows, table.gearing**2 * table.accel, wheels]), y
 
     def their_std(vehicle, *given, **options):  # type: ignore[no-untyped-def]
         inertias = vehicle.road.engine_inertia.std, vehicle.road.wheel_inertia.std
@@ -232,20 +232,20 @@ def bmw_regressions() -> str:
     found: dict[str, dict[str, float]] = {kind: {} for kind in kinds}
     for name, drive in trips().items():
         balance = wb.weigh(drive, car).result.balance
-        view, motion = balance.merged, balance.motion
+        table, motion = balance.table, balance.motion
         rate = np.gradient(motion.speed, motion.time)
-        rolled = np.interp(view.time, motion.time, rate)
-        force = force_on_mass(view, car)
-        known = view.usable & np.isfinite(force) & np.isfinite(view.specific_force)
+        rolled = np.interp(table.time, motion.time, rate)
+        force = force_on_mass(table, car)
+        known = table.usable & np.isfinite(force) & np.isfinite(table.specific_force)
         for kind in kinds:
-            driven = np.sign(view.traction_force)
+            driven = np.sign(table.traction_force)
             side = {"driving": driven > 0.0, "recuperating": driven < 0.0}.get(
                 kind.rpartition(" ")[2], True
             )
-            cut = windows(view.time, known & side)
-            time = cut.mean(view.time)
+            cut = windows(table.time, known & side)
+            time = cut.mean(table.time)
             y, f, a = (
-                without_slow(time, cut.mean(x)) for x in (force, view.specific_force, rolled)
+                without_slow(time, cut.mean(x)) for x in (force, table.specific_force, rolled)
             )
             found[kind][name] = {
                 kinds[0]: (f @ y) / (f @ f),
@@ -357,10 +357,10 @@ def j1939_truck() -> str:
     speed = 3.6 * signals["vehicle_speed"].values
     car = wb.Vehicle.load(HERE.parent / "examples" / "j1939-truck" / "vehicle.toml")
     w = wb.weigh(wb.read_drive(path), car)
-    view = w.result.balance.merged
-    rows = view.usable
-    force = force_on_mass(view, car)[rows]
-    design = np.column_stack([view.accel[rows], np.ones(force.size)])
+    table = w.result.balance.table
+    rows = table.usable
+    force = force_on_mass(table, car)[rows]
+    design = np.column_stack([table.accel[rows], np.ones(force.size)])
     fit = np.linalg.lstsq(design, force, rcond=None)[0]
     # Six stretches of the log, each left out in turn: their spread is what the grade may do.
     parts = np.array_split(np.arange(force.size), 6)
@@ -600,15 +600,15 @@ def canedge_regressions(drives: list[tuple[str, wb.Drive]]) -> str:
         "| part by acceleration |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    table = []
+    found = []
     for (name, drive), motion, own in zip(long, motions, delays, strict=True):
-        view = force_balance(drive, car, motion, delay=delay).merged
-        phi, y = regression(view, car)
-        pressure = drive.signals["intake_pressure"].at(view.time) * view.gearing
-        usable = view.usable & np.isfinite(phi) & np.isfinite(y) & np.isfinite(pressure)
-        cut = windows(view.time, usable)
-        time = cut.mean(view.time)
-        f, force, p, a = (without_slow(time, cut.mean(x)) for x in (phi, y, pressure, view.accel))
+        table = force_balance(drive, car, motion, delay=delay).table
+        phi, y = regression(table, car)
+        pressure = drive.signals["intake_pressure"].at(table.time) * table.gearing
+        usable = table.usable & np.isfinite(phi) & np.isfinite(y) & np.isfinite(pressure)
+        cut = windows(table.time, usable)
+        time = cut.mean(table.time)
+        f, force, p, a = (without_slow(time, cut.mean(x)) for x in (phi, y, pressure, table.accel))
         hill = f - a
         apart = np.linalg.lstsq(np.column_stack([a, hill]), force, rcond=None)[0]
         row = np.array(
@@ -621,13 +621,13 @@ def canedge_regressions(drives: list[tuple[str, wb.Drive]]) -> str:
             ]
         )
         row /= reference
-        table.append(row)
+        found.append(row)
         part = (a @ a) / (a @ a + hill @ hill)
         told = "–" if np.isnan(own) else f"{own:+.2f}"
         lines.append(
             f"| {name} | {told} | {' | '.join(f'{x:.2f}' for x in row)} | {100 * part:.0f} % |"
         )
-    rows = np.array(table)
+    rows = np.array(found)
     spread = 100.0 * rows.std(axis=0, ddof=1) / rows.mean(axis=0)
     told = " | ".join(f"{m:.2f}, {s:.1f} %" for m, s in zip(rows.mean(0), spread, strict=True))
     weighed = np.array(

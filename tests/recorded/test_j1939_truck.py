@@ -108,10 +108,10 @@ def test_thirty_seconds_give_no_mass_but_a_reason(truck):
 def test_the_force_grows_with_acceleration_as_with_a_truck_of_some_tonnes(truck):
     """Force against acceleration with a free constant, so that an even grade cannot matter."""
     car = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
-    view = wb.weigh(wb.read_drive(truck), car, "rls").result.balance.merged
-    rows = view.usable
-    force = force_on_mass(view, car)[rows]
-    design = np.column_stack([view.accel[rows], np.ones(force.size)])
+    table = wb.weigh(wb.read_drive(truck), car, "rls").result.balance.table
+    rows = table.usable
+    force = force_on_mass(table, car)[rows]
+    design = np.column_stack([table.accel[rows], np.ones(force.size)])
     (mass, rest), *_ = np.linalg.lstsq(design, force, rcond=None)
     assert 4000.0 < mass < 12000.0
     assert abs(rest / mass / 9.81) < 0.05

@@ -56,10 +56,10 @@ def test_columns_are_what_a_change_of_each_parameter_does_to_the_balance():
     balance = force_balance(made.drive, CAR, motion)
 
     def left_over(vehicle):
-        rows, y = design(force_balance(made.drive, vehicle, motion).merged, vehicle)
+        rows, y = design(force_balance(made.drive, vehicle, motion).table, vehicle)
         return y - MASS * rows[:, 0]
 
-    known = balance.merged.usable & np.isfinite(left_over(CAR))
+    known = balance.table.usable & np.isfinite(left_over(CAR))
     assert known.sum() > 500
     columns = force_columns(balance, CAR, MASS)[known]
     steps = (1.0, 5.0, 0.01, 1e-5, 0.01, 5.0, 0.01, 1e-4, 0.01, 0.1)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.calibration.inverse import (
     DriveRows,
     FitSettings,
@@ -49,7 +49,7 @@ def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, unmeasured_grade
     rotating = WHEEL_INERTIA / RADIUS**2 + ENGINE_INERTIA * gearing**2
     force = (mass + rotating) * accel + mass * 9.80665 * ROLLING + 0.6 * DRAG_AREA * speed**2
     load = (force / gearing - OFFSET) / full(engine) + rng.normal(0.0, 0.03, n)
-    view = MergedView(
+    table = ForceTable(
         time=time, traction_force=force, force_std=zero, torque=force / gearing,
         engine_speed=engine, speed=speed, accel=found, specific_force=found, grade=zero,
         pitch=zero, heading=zero, gear=np.ones(n, dtype=np.int64), gearing=gearing,
@@ -60,7 +60,7 @@ def made(rng, motion_noise, n=4800, *, mass=MASS, full=growing, unmeasured_grade
         mean_accel_std=lambda length: motion_noise / np.sqrt(2.0 * length),
     )  # fmt: skip
     return DriveRows(
-        view=view, regressor=load, engine_speed=engine,
+        table=table, regressor=load, engine_speed=engine,
         usable=np.append(np.diff(stretch) == 0, True), mass=mass, motion=motion,
     )  # fmt: skip
 
@@ -138,7 +138,7 @@ def gusty(rng, mass):
         now += step * accel[k]
     force = power / speed
     zero, one = np.zeros(n), np.ones(n)
-    view = MergedView(
+    table = ForceTable(
         time=time, traction_force=force, force_std=zero, torque=force / gearing,
         engine_speed=gearing * speed, speed=speed, accel=accel, specific_force=accel, grade=zero,
         pitch=zero, heading=zero, gear=np.ones(n, dtype=np.int64), gearing=gearing * one,
@@ -151,7 +151,7 @@ def gusty(rng, mass):
         mean_accel_std=lambda _: 0.0,
     )
     return DriveRows(
-        view=view, regressor=force / gearing, engine_speed=gearing * speed,
+        table=table, regressor=force / gearing, engine_speed=gearing * speed,
         usable=np.ones(n, dtype=bool), mass=mass, motion=motion,
     )  # fmt: skip
 

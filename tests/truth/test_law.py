@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.balance import law
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.simulation import MIDSIZE, Effects, Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.model import Driveline, RoadLoad, TorqueModel, Vehicle
 
@@ -45,7 +45,7 @@ def rows(**changes):
         "fuel_burnt": np.zeros(2),
         "reason": np.zeros(2, dtype=np.uint8),
     }
-    return MergedView(**{**made, **changes})
+    return ForceTable(**{**made, **changes})
 
 
 VIEW = rows()
@@ -93,8 +93,8 @@ def test_columns_by_hand(column, by_hand):
 
 def test_coefficients_of_the_torque_make_its_traction():
     """100 N m at 200 rad/s: -20 + 400 x 0.25 + 0.1 x 200; the load comes back from the torque."""
-    view = rows(torque=np.array([100.0, 65.0]))
-    columns = law.torque_columns(view, CAR)
+    table = rows(torque=np.array([100.0, 65.0]))
+    columns = law.torque_columns(table, CAR)
     assert_allclose(columns[0], [9.0, 9.0 * 0.25, 9.0 * 200.0])
     assert_allclose(columns[1], [4.5, 4.5 * 0.2, 4.5 * 50.0])
     assert_allclose(columns @ CAR.torque.coefficients, [900.0, 0.9 * 5.0 * 65.0])
@@ -112,10 +112,10 @@ def test_wind_columns_are_the_slope_of_the_drag_over_the_wind():
     """The drag is a parabola of the wind, so that central differences are exact."""
     rng = np.random.default_rng(7)
     heading, speed = rng.uniform(0.0, 2.0 * np.pi, 2), rng.uniform(10.0, 30.0, 2)
-    view = rows(heading=heading, speed=speed, air_speed=speed)
-    for column, part in zip(law.wind_columns(view), (np.cos, np.sin), strict=True):
+    table = rows(heading=heading, speed=speed, air_speed=speed)
+    for column, part in zip(law.wind_columns(table), (np.cos, np.sin), strict=True):
         ahead, behind = (
-            law.drag_force(replace(view, air_speed=speed + wind * part(heading)), CAR)
+            law.drag_force(replace(table, air_speed=speed + wind * part(heading)), CAR)
             for wind in (2.0, -2.0)
         )
         assert_allclose(0.6 * column, (ahead - behind) / 4.0, rtol=1e-12)
@@ -146,7 +146,7 @@ def seen(scenario, truth, rows):
     height = truth.altitude[rows] - scenario.route.altitude
     density = scenario.pressure / cold * np.exp(-9.81 * height / cold)
     none = np.zeros(gear.size)
-    return MergedView(
+    return ForceTable(
         time=truth.time[rows], traction_force=truth.engine_torque[rows] * gearing, force_std=none,
         torque=truth.engine_torque[rows], engine_speed=truth.engine_speed[rows],
         speed=truth.speed[rows], accel=truth.accel[rows],
@@ -164,17 +164,17 @@ def off(force):
 
 def test_each_term_is_that_of_the_simulator(driven):
     scenario, truth, free = driven
-    view, car = seen(scenario, truth, free), scenario.car
+    table, car = seen(scenario, truth, free), scenario.car
     mass = truth.mass[free]
     assert free.sum() > 1500
     drag, rolling = truth.drag_force[free], truth.rolling_force[free]
-    assert_allclose(car.drag_area * law.drag_column(view), drag, rtol=1e-6)
-    rolled = car.rolling_coefficient * law.rolling_column(view, mass)
+    assert_allclose(car.drag_area * law.drag_column(table), drag, rtol=1e-6)
+    rolled = car.rolling_coefficient * law.rolling_column(table, mass)
     assert_allclose(rolled, rolling, rtol=1e-6)
-    engine = car.engine_inertia * law.engine_inertia_column(view.gearing, view.accel)
-    assert off(engine - (view.traction_force - truth.traction_force[free])) < 1.0
-    wheels = car.wheel_inertia * law.wheel_inertia_column(view.accel, car.wheel_radius)
-    left = truth.traction_force[free] - drag - rolling - mass * view.specific_force
+    engine = car.engine_inertia * law.engine_inertia_column(table.gearing, table.accel)
+    assert off(engine - (table.traction_force - truth.traction_force[free])) < 1.0
+    wheels = car.wheel_inertia * law.wheel_inertia_column(table.accel, car.wheel_radius)
+    left = truth.traction_force[free] - drag - rolling - mass * table.specific_force
     assert off(wheels - left) < 1.0
     assert np.std(engine) > 5.0
     assert np.std(wheels) > 5.0
@@ -182,7 +182,7 @@ def test_each_term_is_that_of_the_simulator(driven):
 
 def test_the_sum_of_the_columns_is_the_traction(driven):
     scenario, truth, free = driven
-    view, made = seen(scenario, truth, free), scenario.car
+    table, made = seen(scenario, truth, free), scenario.car
     mass = truth.mass[free]
     assert mass.mean() == pytest.approx(MIDSIZE.mass + 220.0, abs=1.0)
     car = Vehicle(
@@ -194,13 +194,13 @@ def test_the_sum_of_the_columns_is_the_traction(driven):
             drag_area=made.drag_area, rolling_coefficient=made.rolling_coefficient
         ),
     )  # fmt: skip
-    road = law.road_columns(view, mass, made.wheel_radius)
+    road = law.road_columns(table, mass, made.wheel_radius)
     parameters = np.array(
         [made.drag_area, made.rolling_coefficient, made.engine_inertia, made.wheel_inertia]
     )
-    whole = mass * view.specific_force + road @ parameters
-    assert off(whole - view.traction_force) < 1.5
+    whole = mass * table.specific_force + road @ parameters
+    assert off(whole - table.traction_force) < 1.5
     # The same as one slope: force on the mass over the column of the mass.
-    phi = law.mass_column(view, car)
-    assert off(law.force_on_mass(view, car) - mass * phi) < 1.5
+    phi = law.mass_column(table, car)
+    assert off(law.force_on_mass(table, car) - mass * phi) < 1.5
     assert np.std(mass * phi) > 300.0

@@ -78,7 +78,7 @@ def between(a, b):
 
 
 def reasons(*args, vehicle=CAR, **changes):
-    return force_balance(drive(*args), vehicle, motion(**changes)).merged.reason
+    return force_balance(drive(*args), vehicle, motion(**changes)).table.reason
 
 
 def test_every_row_of_a_plain_drive_may_be_used():
@@ -95,8 +95,8 @@ def test_standing_and_no_motion():
 
 
 def test_no_motion_beyond_its_ends():
-    view = force_balance(drive(), CAR, motion(), delay=3.0).merged
-    assert_array_equal(view.reason[STAMPS < 3.0], Reason.NO_MOTION)
+    table = force_balance(drive(), CAR, motion(), delay=3.0).table
+    assert_array_equal(table.reason[STAMPS < 3.0], Reason.NO_MOTION)
 
 
 def test_braking_by_its_switch_and_unseen():
@@ -121,14 +121,14 @@ def test_a_retarder_brakes_with_and_without_a_brake_switch():
 
 def test_shifting_and_clutch():
     first = np.where(STAMPS < 200.0, 20.0, 10.0) * speed_at(STAMPS)
-    view = force_balance(drive(engine_speed=first), CAR, motion()).merged
-    assert_array_equal(view.gear[STAMPS < 200.0], 1)
-    assert_array_equal(view.gear[STAMPS >= 200.0], 2)
-    assert_array_equal(view.reason[between(199.7, 200.2)], Reason.SHIFTING)
-    assert_array_equal(view.reason[~between(199, 201)], Reason.USED)
+    table = force_balance(drive(engine_speed=first), CAR, motion()).table
+    assert_array_equal(table.gear[STAMPS < 200.0], 1)
+    assert_array_equal(table.gear[STAMPS >= 200.0], 2)
+    assert_array_equal(table.reason[between(199.7, 200.2)], Reason.SHIFTING)
+    assert_array_equal(table.reason[~between(199, 201)], Reason.USED)
     slipping = np.where(between(100, 120), 13.0, 10.0) * speed_at(STAMPS)
-    view = force_balance(drive(engine_speed=slipping), CAR, motion()).merged
-    assert_array_equal(view.reason[between(101, 119)], Reason.CLUTCH_SLIPPING)
+    table = force_balance(drive(engine_speed=slipping), CAR, motion()).table
+    assert_array_equal(table.reason[between(101, 119)], Reason.CLUTCH_SLIPPING)
     pedal = signal("clutch_switch", between(300, 310))
     assert_array_equal(reasons(pedal)[between(300, 310)], Reason.CLUTCH_SLIPPING)
 
@@ -136,10 +136,10 @@ def test_shifting_and_clutch():
 def test_a_measured_gear_is_believed():
     # Neutral where the recorder says 0, whatever the ratio.
     gear = signal("gear", np.where(between(100, 120), 0.0, 2.0))
-    view = force_balance(drive(gear), CAR, motion()).merged
-    assert_array_equal(view.gear[between(101, 119)], 0)
-    assert_array_equal(view.reason[between(101, 119)], Reason.CLUTCH_SLIPPING)
-    assert_array_equal(view.reason[~between(99, 121)], Reason.USED)
+    table = force_balance(drive(gear), CAR, motion()).table
+    assert_array_equal(table.gear[between(101, 119)], 0)
+    assert_array_equal(table.reason[between(101, 119)], Reason.CLUTCH_SLIPPING)
+    assert_array_equal(table.reason[~between(99, 121)], Reason.USED)
 
 
 def test_load_outside_the_model_and_engine_speed_that_ends():
@@ -148,7 +148,7 @@ def test_load_outside_the_model_and_engine_speed_that_ends():
     load = np.where(between(100, 110), 0.1, np.where(between(200, 210), 0.9, 0.5))
     turning = Signal("engine_speed", STAMPS[:1200], 10.0 * speed_at(STAMPS[:1200]))
     recorded = Drive("d", {"engine_load": signal("engine_load", load), "engine_speed": turning})
-    found = force_balance(recorded, car, motion()).merged.reason
+    found = force_balance(recorded, car, motion()).table.reason
     assert_array_equal(found[between(101, 109)], Reason.OVERRUN)
     assert_array_equal(found[between(201, 209)], Reason.EXTRAPOLATED)
     assert_array_equal(found[1200:], Reason.NO_TORQUE)
@@ -174,13 +174,13 @@ def test_noise_of_the_torque_does_not_choose_its_rows(source):
     wave = waving(STAMPS)
     recorded = Drive("d", {"engine_torque": signal("engine_torque", wave + noise)})
     electric = replace(CAR, driveline=replace(CAR.driveline, gearings=(10.0,)))
-    found = force_balance(recorded, electric, waved(source=source)).merged.reason
+    found = force_balance(recorded, electric, waved(source=source)).table.reason
     used = found == Reason.USED
     assert_array_equal(np.isin(found[wave < -40.0], (Reason.OVERRUN, Reason.BRAKING)), True)
     assert np.count_nonzero(used) > 0.4 * STAMPS.size
     if source == "inertial":
         quiet = Drive("d", {"engine_torque": signal("engine_torque", wave)})
-        assert_array_equal(force_balance(quiet, electric, waved()).merged.reason, found)
+        assert_array_equal(force_balance(quiet, electric, waved()).table.reason, found)
     assert abs(np.mean(noise[used])) < 3.0 * 10.0 / np.sqrt(np.count_nonzero(used))
 
 
@@ -190,11 +190,11 @@ def test_a_foot_on_the_accelerator_is_not_on_the_brake():
     dragging = wave < -40.0
     pedal = np.where(STAMPS < 200.0, 0.2, 0.0)
     told = {"engine_torque": signal("engine_torque", wave), "throttle": signal("throttle", pedal)}
-    found = force_balance(Drive("d", told), electric, waved()).merged.reason
+    found = force_balance(Drive("d", told), electric, waved()).table.reason
     assert_array_equal(found[dragging & (STAMPS < 199.0)], Reason.USED)
     assert_array_equal(found[dragging & (STAMPS > 201.0)], Reason.OVERRUN)
     # With an engine the throttle may be the valve of the intake, open at idle.
-    geared = force_balance(drive(signal("throttle", pedal), torque=wave), CAR, waved()).merged
+    geared = force_balance(drive(signal("throttle", pedal), torque=wave), CAR, waved()).table
     assert_array_equal(geared.reason[dragging], Reason.OVERRUN)
 
 
@@ -206,49 +206,49 @@ def test_a_torque_that_runs_straight_for_long_was_filled_in(slope):
     torque[gap] = torque[gap][0] + slope * np.arange(np.count_nonzero(gap))
     car = replace(CAR, driveline=Driveline(gearings=(10.0,)))
     recorded = Drive("d", {"engine_torque": Signal("engine_torque", fast, torque)})
-    found = force_balance(recorded, car, motion()).merged.reason
+    found = force_balance(recorded, car, motion()).table.reason
     inside = (fast > 101.0) & (fast < 129.0)
     assert_array_equal(found[inside], Reason.NO_TORQUE)
     assert not np.any(found[~gap] == Reason.NO_TORQUE)
 
 
 def test_driveline_loses_power_both_ways():
-    pulling = force_balance(drive(torque=50.0), CAR, motion()).merged
+    pulling = force_balance(drive(torque=50.0), CAR, motion()).table
     assert_allclose(pulling.traction_force, 0.9 * 50.0 * 10.0)
-    dragging = force_balance(drive(torque=-50.0), CAR, motion()).merged
+    dragging = force_balance(drive(torque=-50.0), CAR, motion()).table
     assert_allclose(dragging.traction_force, -50.0 * 10.0 / 0.9)
 
 
 def test_rotating_mass_and_drag():
-    view = force_balance(drive(), CAR, motion()).merged
-    assert_allclose(rotating_mass(CAR, view.gearing), 4.0 / 0.09 + 0.2 * 100.0)
+    table = force_balance(drive(), CAR, motion()).table
+    assert_allclose(rotating_mass(CAR, table.gearing), 4.0 / 0.09 + 0.2 * 100.0)
     assert_allclose(
-        drag_force(view, CAR), 0.5 * view.air_density * 0.6 * speed_at(view.time) ** 2, rtol=1e-3
+        drag_force(table, CAR), 0.5 * table.air_density * 0.6 * speed_at(table.time) ** 2, rtol=1e-3
     )
 
 
 def test_delay_shifts_torque_against_motion():
     late = drive(torque=50.0 + 10.0 * np.sin(0.5 * (STAMPS - 0.6)))
-    side = force_balance(late, CAR, motion(), delay=0.6).merged
+    side = force_balance(late, CAR, motion(), delay=0.6).table
     assert_allclose(side.time, STAMPS - 0.6)
     assert_allclose(side.torque, 50.0 + 10.0 * np.sin(0.5 * side.time), atol=1e-9)
     by_file = replace(CAR, timing=Timing(torque_delay=0.6))
-    assert_allclose(force_balance(late, by_file, motion()).merged.time, side.time)
+    assert_allclose(force_balance(late, by_file, motion()).table.time, side.time)
 
 
 @pytest.mark.parametrize(("heading", "part"), [(0.0, 1.0), (np.pi, -1.0), (np.pi / 2.0, 0.0)])
 def test_headwind_from_the_north(heading, part):
     info = DriveInfo(wind_speed=8.0, wind_from=0.0)
-    view = force_balance(drive(info=info), CAR, motion(heading=np.full(CLOCK.size, heading))).merged
-    air = view.speed + part * WIND_AT_VEHICLE * 8.0
-    assert_allclose(drag_force(view, CAR), 0.5 * view.air_density * 0.6 * air**2, rtol=1e-9)
+    table = force_balance(drive(info=info), CAR, motion(heading=np.full(CLOCK.size, heading))).table
+    air = table.speed + part * WIND_AT_VEHICLE * 8.0
+    assert_allclose(drag_force(table, CAR), 0.5 * table.air_density * 0.6 * air**2, rtol=1e-9)
 
 
 def test_wind_of_unknown_direction_is_no_wind():
-    still = force_balance(drive(), CAR, motion()).merged
+    still = force_balance(drive(), CAR, motion()).table
     unknown = force_balance(
         drive(info=DriveInfo(wind_speed=8.0, wind_from=0.0)), CAR, motion()
-    ).merged
+    ).table
     assert_allclose(drag_force(unknown, CAR), drag_force(still, CAR))
 
 
@@ -259,16 +259,16 @@ def test_missing_torque_is_told():
 
 def weighable():
     """Make the torque that moves 1500 kg."""
-    view = force_balance(drive(), CAR, motion()).merged
-    moved = MASS * view.specific_force + rotating_mass(CAR, view.gearing) * view.accel
-    needed = moved + MASS * 9.81 * 0.01 + drag_force(view, CAR)
+    table = force_balance(drive(), CAR, motion()).table
+    moved = MASS * table.specific_force + rotating_mass(CAR, table.gearing) * table.accel
+    needed = moved + MASS * 9.81 * 0.01 + drag_force(table, CAR)
     return needed / 10.0 * np.where(needed > 0.0, 1.0 / 0.9, 0.9)
 
 
 def test_weighing_takes_rising_speed_only():
     track = estimate(force_balance(drive(torque=weighable()), CAR, motion()), CAR)
     assert track.mass == pytest.approx(MASS, rel=1e-3)
-    falling = track.balance.merged.accel <= 0.0
+    falling = track.balance.table.accel <= 0.0
     assert np.isin(track.reason[falling], (Reason.NOT_ACCELERATING, Reason.OVERRUN)).all()
     assert_array_equal(track.reason[~falling], Reason.USED)
 

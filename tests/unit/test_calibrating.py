@@ -348,7 +348,7 @@ def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monke
         return SimpleNamespace(mass=mass, bound_std=30.0, sensitivity=np.zeros(1))
 
     monkeypatch.setattr(self_weighing.joint, "estimate", estimate)
-    burnt = SimpleNamespace(merged=SimpleNamespace(fuel_burnt=np.zeros(2)))
+    burnt = SimpleNamespace(table=SimpleNamespace(fuel_burnt=np.zeros(2)))
     problem = SimpleNamespace(masses=[8400.0])
     monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [burnt])
     scaled = self_weighing.self_weighed(problem, base, None, self_weighing.BY_JOINT)
@@ -426,16 +426,16 @@ def test_the_rows_shown_are_those_of_the_vehicle_saved(empty, tmp_path, method):
     balance = force_balance(
         empty.drive, Vehicle.load(tmp_path / "car.toml"), done.balances[0].motion
     )
-    view = balance.merged
-    index = np.searchsorted(view.time - view.time[0], done.rows.time - 1e-6)
+    table = balance.table
+    index = np.searchsorted(table.time - table.time[0], done.rows.time - 1e-6)
     np.testing.assert_allclose(
-        done.rows.source_torque, balance.merged.torque[index], rtol=5e-4, atol=0.02
+        done.rows.source_torque, balance.table.torque[index], rtol=5e-4, atol=0.02
     )
-    phi, rest = regression(view, Vehicle.load(tmp_path / "car.toml"))
-    mass = empty.drive.info.mass - view.fuel_burnt
-    taken = (mass * phi + view.traction_force - rest) / view.gearing
+    phi, rest = regression(table, Vehicle.load(tmp_path / "car.toml"))
+    mass = empty.drive.info.mass - table.fuel_burnt
+    taken = (mass * phi + table.traction_force - rest) / table.gearing
     np.testing.assert_allclose(done.rows.motion_torque, taken[index], rtol=5e-4, atol=0.05)
-    residual = taken[index] - balance.merged.torque[index]
+    residual = taken[index] - balance.table.torque[index]
     std = 1.4826 * np.median(np.abs(residual))
     assert done.vehicle.provenance.residual_std == pytest.approx(std, rel=5e-3)
 

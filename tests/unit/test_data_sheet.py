@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from weighbridge.balance import Reason
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, NAMES, design, prior_std
@@ -122,9 +122,9 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
     line = vehicle.driveline
     gearing, accel, speed = rng.choice(GEARS, n), rng.normal(0, 1, n), rng.uniform(5, 20, n)
 
-    def view(offset, growth):
+    def table(offset, growth):
         torque = 100.0 - offset - growth * gearing * speed / 200.0
-        return MergedView(
+        return ForceTable(
             time=np.arange(float(n)),
             traction_force=torque * gearing,
             force_std=np.ones(n),
@@ -144,7 +144,7 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
             reason=np.full(n, Reason.USED, dtype=np.uint8),
         )
 
-    rows, right = design(view(0.0, 0.0), vehicle)
+    rows, right = design(table(0.0, 0.0), vehicle)
     assert rows.shape[1] == len(NAMES) + len(DATA_SHEET_NAMES)
     assert prior_std(vehicle, 1500.0, 200.0).size == rows.shape[1]
     errors = np.array([3.0, 2.0, 0.05, 0.5])
@@ -156,7 +156,7 @@ def test_offset_growth_and_inertias_are_states_of_a_data_sheet():
             wheel_inertia=line.wheel_inertia - errors[3],
         ),
     )
-    _, wrong = design(view(*errors[:2]), lighter)
+    _, wrong = design(table(*errors[:2]), lighter)
     k = len(NAMES)
     made = rows[:, k : k + 2] @ -errors[:2] + rows[:, k + 2 :] @ errors[2:]
     assert_allclose(wrong - right, made, atol=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, ekf, hybrid, robust_rls
 from weighbridge.kernels import mass_ekf as kernel
@@ -49,7 +49,7 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
     braking = force < -2000.0
     reason[braking] = Reason.BRAKING
     noise = 0.02 * rng.normal(size=n)
-    view = MergedView(
+    table = ForceTable(
         time=time,
         traction_force=force + rng.normal(0.0, 200.0, n),
         force_std=np.full(n, 200.0),
@@ -69,7 +69,7 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
         reason=reason,
     )
     motion = SimpleNamespace(source="inertial", unmeasured_grade=0.0, recorded_speed=None)
-    return ForceBalance(motion=motion, merged=view)
+    return ForceBalance(motion=motion, table=table)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -100,7 +100,7 @@ def test_a_cruise_carries_no_mass(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_no_usable_row_is_no_mass_and_no_error(method):
     made = balance(minutes=1.0)
-    none = replace(made, merged=replace(made.merged, reason=np.full_like(made.merged.reason, 3)))
+    none = replace(made, table=replace(made.table, reason=np.full_like(made.table.reason, 3)))
     track = ESTIMATORS[method].track(none, BUS)
     assert track.status is Status.NOT_EXCITED
     assert np.isnan(track.mass)
@@ -109,14 +109,14 @@ def test_no_usable_row_is_no_mass_and_no_error(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_missing_numbers_are_left_out(method):
     made = balance()
-    view = made.merged
+    table = made.table
     broken = {
-        name: getattr(view, name).copy()
+        name: getattr(table, name).copy()
         for name in ("traction_force", "specific_force", "grade", "speed", "air_speed")
     }
     for k, name in enumerate(broken):
         broken[name][1000 + 150 * k : 1100 + 150 * k] = np.nan
-    track = ESTIMATORS[method].track(replace(made, merged=replace(view, **broken)), BUS)
+    track = ESTIMATORS[method].track(replace(made, table=replace(table, **broken)), BUS)
     assert track.status is Status.CONVERGED
     assert track.mass == pytest.approx(10_000.0, rel=0.02)
     assert np.isfinite(track.running_mass[2000:]).all()
@@ -138,12 +138,12 @@ def test_without_an_offset_the_paper_is_biased_by_one():
 
 def filtered(made, settings):
     """Errors of the Kalman filter's running mass over the standard deviation it has itself."""
-    _, _, valid = robust_rls.rows(made.merged, BUS, settings.start)
-    table = ekf.columns(made, BUS, valid)
-    params = ekf.parameters(settings, BUS, robust_rls.row_period(made.merged.time))
-    start = kernel.initial_state(10_000.0, 1000.0**2, kernel.row_at(table, 0), params)
-    _, mass, var, *_ = kernel.run(start, table, 0, params)
-    return ((mass - 10_000.0) / np.sqrt(var))[made.merged.time > 60.0]
+    _, _, valid = robust_rls.rows(made.table, BUS, settings.start)
+    rows = ekf.columns(made, BUS, valid)
+    params = ekf.parameters(settings, BUS, robust_rls.row_period(made.table.time))
+    start = kernel.initial_state(10_000.0, 1000.0**2, kernel.row_at(rows, 0), params)
+    _, mass, var, *_ = kernel.run(start, rows, 0, params)
+    return ((mass - 10_000.0) / np.sqrt(var))[made.table.time > 60.0]
 
 
 def test_the_kalman_filter_is_as_sure_as_torque_errors_that_last_allow():
@@ -151,10 +151,10 @@ def test_the_kalman_filter_is_as_sure_as_torque_errors_that_last_allow():
     usual, white = [], []
     for seed in range(6):
         made = balance(seed=seed, rate=10.0)
-        view = made.merged
-        shocks = np.random.default_rng([seed, 5]).normal(size=view.time.size)
+        table = made.table
+        shocks = np.random.default_rng([seed, 5]).normal(size=table.time.size)
         error = 300.0 * lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], shocks)
-        made = replace(made, merged=replace(view, traction_force=view.traction_force + error))
+        made = replace(made, table=replace(table, traction_force=table.traction_force + error))
         usual.append(filtered(made, ekf.EkfSettings()))
         white.append(filtered(made, ekf.EkfSettings(accel_walk=0.02)))
     assert np.mean(np.abs(np.concatenate(usual)) < 1.96) > 0.93
@@ -164,19 +164,19 @@ def test_the_kalman_filter_is_as_sure_as_torque_errors_that_last_allow():
 
 def test_counting_the_grade_twice_makes_a_climbing_bus_light():
     made = balance(swing=0.4, grade=0.0)
-    view = made.merged
-    steep = np.full_like(view.grade, 0.03)
+    table = made.table
+    steep = np.full_like(table.grade, 0.03)
     climbing = replace(
-        view,
+        table,
         grade=steep,
-        specific_force=view.specific_force + 9.81 * np.sin(steep),
-        traction_force=view.traction_force + 10_000.0 * 9.81 * np.sin(steep),
+        specific_force=table.specific_force + 9.81 * np.sin(steep),
+        traction_force=table.traction_force + 10_000.0 * 9.81 * np.sin(steep),
     )
-    made = replace(made, merged=climbing)
+    made = replace(made, table=climbing)
     once = robust_rls.RobustRlsSettings(offset_std=0.0)
     assert robust_rls.estimate(made, BUS, once).mass == pytest.approx(10_000.0, rel=0.01)
     twice = replace(once, count_grade_twice=True)
-    phi = (climbing.specific_force + 9.81 * (0.0075 + 4e-5 * view.speed))[view.usable]
+    phi = (climbing.specific_force + 9.81 * (0.0075 + 4e-5 * table.speed))[table.usable]
     more = phi + 9.81 * np.sin(0.03)
     expected = 10_000.0 * np.sum(phi * more) / np.sum(more**2)
     assert expected < 8000.0

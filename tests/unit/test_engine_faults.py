@@ -352,8 +352,8 @@ def test_indicated_speed_lies_on_the_gears_too(fleet):
     result = fleet.weigh("electric", fleet.drive("electric")).result
     vehicle = fleet.files["electric"]
     line = replace(vehicle.driveline, speed_scale=1.07)
-    view = result.balance.merged
-    indicated = replace(result.balance, merged=replace(view, speed=1.07 * view.speed))
+    table = result.balance.table
+    indicated = replace(result.balance, table=replace(table, speed=1.07 * table.speed))
     assert share_on_gears(indicated, vehicle) < 0.1
     known = replace(vehicle, driveline=line)
     assert share_on_gears(indicated, known) > 0.9
@@ -390,9 +390,9 @@ def test_a_payload_below_nothing_is_told_or_refused(fleet):
     assert told == "the payload of -50 kg is below nothing, within the uncertainty"
     assert below_tare(replace(vehicle, tare=result.mass - 1.0), replace(result, std=32.0)) == ()
     evidence = Evidence(
-        view=result.balance.merged,
+        table=result.balance.table,
         used=result.used,
-        phi=result.balance.merged.specific_force,
+        phi=result.balance.table.specific_force,
         mass=result.mass,
         std=32.0,
         blocks=100,

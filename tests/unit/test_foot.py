@@ -76,7 +76,7 @@ def recorded(**values):
 
 
 def reasons(drive, car=CAR, **balance):
-    return force_balance(drive, car, motion(), **balance).merged.reason
+    return force_balance(drive, car, motion(), **balance).table.reason
 
 
 LOADED = replace(CAR, torque=TorqueModel(source="load", coefficients=(-FULL * FLOOR, FULL)))
@@ -130,7 +130,7 @@ def test_a_brake_switch_that_misses_hard_braking_is_not_believed(late):
     assert balance.switch_dead
     assert "brake switch is off in much of the hard braking" in " ".join(balance.notes)
     braked = np.interp(STAMPS, CLOCK, hard) > 0.0
-    assert not np.any(balance.merged.usable & braked)
+    assert not np.any(balance.table.usable & braked)
     true = force_balance(
         recorded(engine_torque=torque_of(STAMPS), brake_switch=braked.astype(float)), CAR, moved
     )
@@ -157,8 +157,8 @@ def test_smoothing_holds_a_brake_that_was_let_go():
     slowed = np.where((CLOCK % 20.0 > 17.0) & (CLOCK % 20.0 < 17.5), -3.0, 0.1)
     moved = replace(motion(), specific_force=slowed, accel=slowed)
     after = (STAMPS % 20.0 > 18.0) & (STAMPS % 20.0 < 18.6)
-    assert np.all(force_balance(drive, CAR, moved, lag=0.4).merged.reason[after] != Reason.USED)
-    assert np.all(force_balance(drive, CAR, moved, lag=0.0).merged.reason[after] == Reason.USED)
+    assert np.all(force_balance(drive, CAR, moved, lag=0.4).table.reason[after] != Reason.USED)
+    assert np.all(force_balance(drive, CAR, moved, lag=0.0).table.reason[after] == Reason.USED)
 
 
 def test_a_foot_that_taps_the_brake_is_found_through_the_smoothing():
@@ -223,7 +223,7 @@ def test_where_nothing_tells_of_the_brake_that_is_said():
     assert not balance(brake_switch=1.0 - foot(STAMPS)).brake_hidden
     by_pedal = balance(accelerator_pedal=up)
     assert not by_pedal.brake_hidden
-    assert not np.any(by_pedal.merged.usable & (foot(STAMPS) < 0.5))
+    assert not np.any(by_pedal.table.usable & (foot(STAMPS) < 0.5))
     # A vehicle that never slows is not braked.
     even = force_balance(recorded(engine_load=no_floor), LOADED, replace(
         motion(), specific_force=0.2 + 0.0 * CLOCK, accel=0.2 + 0.0 * CLOCK))  # fmt: skip

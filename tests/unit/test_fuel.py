@@ -91,19 +91,19 @@ def test_a_simulated_drive_tells_what_its_tank_lost(weighed):
     made, _, weighing = weighed
     lost = made.truth.mass[0] - made.truth.mass[-1]
     # The density of the fuel is not known.
-    assert_allclose(weighing.result.balance.merged.fuel_burnt[-1], lost, rtol=0.1)
+    assert_allclose(weighing.result.balance.table.fuel_burnt[-1], lost, rtol=0.1)
 
 
 def test_the_mass_is_that_at_the_end_of_the_drive(weighed):
     """A tank of 200 kg that empties during the drive, against the drive as it was."""
     _, car, weighing = weighed
     balance = weighing.result.balance
-    view = balance.merged
-    tank = 200.0 * (view.time - view.time[0]) / (view.time[-1] - view.time[0])
-    phi, _ = regression(view, car)
-    lighter = replace(view, traction_force=view.traction_force - tank * phi)
+    table = balance.table
+    tank = 200.0 * (table.time - table.time[0]) / (table.time[-1] - table.time[0])
+    phi, _ = regression(table, car)
+    lighter = replace(table, traction_force=table.traction_force - tank * phi)
     told = joint.estimate(
-        replace(balance, merged=replace(lighter, fuel_burnt=view.fuel_burnt + tank)), car
+        replace(balance, table=replace(lighter, fuel_burnt=table.fuel_burnt + tank)), car
     )
     assert_allclose(told.mass, weighing.mass - 200.0, atol=0.5)
     assert_allclose(told.segments[-1].mass, told.mass, atol=1e-6)
@@ -112,5 +112,5 @@ def test_the_mass_is_that_at_the_end_of_the_drive(weighed):
         told.running_mass[early], weighing.result.running_mass[early] - tank[early], rtol=1e-3
     )
     # Stops would be taken for the places where the tank lost it.
-    untold = joint.estimate(replace(balance, merged=lighter), car, load_changes=False)
+    untold = joint.estimate(replace(balance, table=lighter), car, load_changes=False)
     assert untold.mass > told.mass + 40.0

@@ -9,7 +9,7 @@ import pytest
 import weighbridge as wb
 from weighbridge.balance import ForceBalance, Reason, force_balance
 from weighbridge.balance.cornering import HARD_CORNERING, cornering, lateral_acceleration
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.estimators import ESTIMATORS, Status, fit_std, judging
 from weighbridge.estimators.fit_std import honest_std, slow_std
 from weighbridge.estimators.joint import foreign
@@ -49,7 +49,7 @@ def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
     speed = 18.0 - swing * 60.0 / (2.0 * np.pi) * np.cos(2.0 * np.pi * time / 60.0)
     rotating, drag = np.full(n, 300.0), 0.5 * 1.2 * 5.4 * speed**2
     force = (MASS + rotating) * accel + drag + MASS * (9.81 * 0.0075 + offset * rng.normal())
-    view = MergedView(
+    table = ForceTable(
         time=time,
         traction_force=force + rng.normal(0.0, 100.0, n),
         force_std=np.full(n, 0.03 * np.percentile(np.abs(force), 98.0)),
@@ -78,7 +78,7 @@ def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
         specific_force_scale_std=0.0,
         mean_accel_std=lambda _: 0.0,
     )
-    return ForceBalance(motion=motion, merged=view)
+    return ForceBalance(motion=motion, table=table)
 
 
 @pytest.fixture(scope="module")
@@ -188,17 +188,17 @@ def test_where_nothing_tells_of_the_brake_no_method_is_as_sure(method):
 
 def test_slow_errors_add_up_as_their_covariance_says(monkeypatch):
     made = balance(minutes=3.0)
-    view = made.merged
-    phi = view.specific_force
+    table = made.table
+    phi = table.specific_force
     index = np.arange(0, phi.size, 25)
     influence = phi[index] / np.sum(phi[index] ** 2)
     std = np.zeros(9)
     std[1] = 400.0
     monkeypatch.setattr(fit_std, "prior_std", lambda *_: std)
     passing, lasting = slow_std(made, BUS, index, influence, MASS)
-    apart = np.abs(np.subtract.outer(view.time[index], view.time[index]))
+    apart = np.abs(np.subtract.outer(table.time[index], table.time[index]))
     # Half of the disturbance is gusts, which push in proportion to the speed.
-    moved = influence * np.sqrt(0.5 + 0.5 * (view.speed[index] / 15.0) ** 2)
+    moved = influence * np.sqrt(0.5 + 0.5 * (table.speed[index] / 15.0) ** 2)
     expected = moved @ (400.0**2 * np.exp(-apart / 30.0)) @ moved
     assert passing == pytest.approx(np.sqrt(expected), rel=1e-6)
     assert lasting == 0.0
@@ -231,10 +231,10 @@ def test_rows_of_hard_cornering_are_left_out(made, car, own, method):
     motion = own.result.balance.motion
     hard = force_balance(made.drive, car, turning(motion, HARD_CORNERING + 0.5))
     soft = force_balance(made.drive, car, turning(motion, HARD_CORNERING - 0.5))
-    fast = soft.merged.usable & (soft.merged.speed > 5.0)
-    assert np.mean(hard.merged.reason[fast] == Reason.CORNERING) > 0.95
+    fast = soft.table.usable & (soft.table.speed > 5.0)
+    assert np.mean(hard.table.reason[fast] == Reason.CORNERING) > 0.95
     track = ESTIMATORS[method].track(hard, car)
-    assert not track.used[fast & (hard.merged.reason == Reason.CORNERING)].any()
+    assert not track.used[fast & (hard.table.reason == Reason.CORNERING)].any()
     assert track.status is Status.NOT_EXCITED
     assert "cornering hard" in track.why
 
@@ -245,9 +245,9 @@ def test_a_file_whose_resistance_is_another_vehicles_is_refused(made, car, own, 
     sure = replace(car.road_load, drag_area_std=0.03, rolling_coefficient_std=0.001)
     car = replace(car, road_load=sure)
     assert foreign.of_another(car, own.result) == (False, "")
-    view = balance.merged
+    table = balance.table
     more = 0.6 * made.scenario.mass
-    slower = replace(balance, merged=replace(view, traction_force=view.traction_force + more))
+    slower = replace(balance, table=replace(table, traction_force=table.traction_force + more))
     found = weigh_balance(made.drive, car, method, slower)
     assert found.status is not Status.CONVERGED
     # An ekf that such a force confuses says itself that it is not sure.

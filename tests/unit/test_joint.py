@@ -43,24 +43,24 @@ def with_stops(balance, car, *, load, every=None, lean=0.0):
 
     ``lean`` is what the load adds to the accelerometer's reading [m/s^2].
     """
-    view = balance.merged
-    rows, y = design(view, car)
-    cut = windows(view.time, usable_rows(view, rows, y))
+    table = balance.table
+    rows, y = design(table, car)
+    cut = windows(table.time, usable_rows(table, rows, y))
     count = cut.count.size
     first = np.array([cut.index[cut.window == k][0] for k in range(count)])
     middle = count // 2
-    rest = np.zeros(view.time.size)
+    rest = np.zeros(table.time.size)
     rest[first[middle] :] += 300.0
     for k in range(middle + every, count, every) if every else ():
         rest[first[k] :] += 25.0
-    after = np.arange(view.time.size) >= first[middle]
+    after = np.arange(table.time.size) >= first[middle]
     return replace(
         balance,
-        merged=replace(
-            view,
-            time=view.time + rest,
-            traction_force=view.traction_force + after * load * rows[:, 0],
-            specific_force=view.specific_force + lean * after,
+        table=replace(
+            table,
+            time=table.time + rest,
+            traction_force=table.traction_force + after * load * rows[:, 0],
+            specific_force=table.specific_force + lean * after,
         ),
     )
 
@@ -90,22 +90,22 @@ def test_a_body_that_leans_with_its_load_costs_little(balance, car):
 
 def test_each_segment_has_burnt_its_own_fuel(balance, car):
     loaded = with_stops(balance, car, load=LOADED)
-    view = loaded.merged
-    burnt = 50.0 * (view.time - view.time[0]) / (view.time[-1] - view.time[0])
+    table = loaded.table
+    burnt = 50.0 * (table.time - table.time[0]) / (table.time[-1] - table.time[0])
     dry = joint.estimate(loaded, car)
     wet = joint.estimate(
         replace(
             loaded,
-            merged=replace(
-                view,
-                traction_force=view.traction_force - burnt * design(view, car)[0][:, 0],
-                fuel_burnt=view.fuel_burnt + burnt,
+            table=replace(
+                table,
+                traction_force=table.traction_force - burnt * design(table, car)[0][:, 0],
+                fuel_burnt=table.fuel_burnt + burnt,
             ),
         ),
         car,
     )
     for a, b in zip(dry.segments, wet.segments, strict=True):
-        lost = np.interp(a.end, view.time, burnt)
+        lost = np.interp(a.end, table.time, burnt)
         assert_allclose(b.mass, a.mass - lost, atol=0.5)
 
 
@@ -130,8 +130,8 @@ def test_what_noise_of_the_motion_takes_reaches_mass_and_interval(balance, car, 
     monkeypatch.setattr(batch, "attenuation", lambda weight, *_: np.full(weight.size, 0.1))
     much = joint.estimate(balance, car)
     assert bare.mass < real.mass < 1.02 * bare.mass
-    assert much.mass + balance.merged.fuel_burnt[-1] == pytest.approx(
-        1.1 * (bare.mass + balance.merged.fuel_burnt[-1])
+    assert much.mass + balance.table.fuel_burnt[-1] == pytest.approx(
+        1.1 * (bare.mass + balance.table.fuel_burnt[-1])
     )
     assert much.std > 0.045 * much.mass
 
@@ -145,11 +145,11 @@ def test_what_the_fit_left_open_reaches_the_interval(balance, car, monkeypatch):
 
 
 def test_rows_that_are_no_numbers_are_left_out(balance, car):
-    view = balance.merged
-    rows = np.flatnonzero(view.usable)[10:13]
-    broken = view.specific_force.copy()
+    table = balance.table
+    rows = np.flatnonzero(table.usable)[10:13]
+    broken = table.specific_force.copy()
     broken[rows] = np.nan
-    found = joint.estimate(replace(balance, merged=replace(view, specific_force=broken)), car)
+    found = joint.estimate(replace(balance, table=replace(table, specific_force=broken)), car)
     assert np.isfinite(found.std)
     assert (found.reason[rows] == Reason.NO_MOTION).all()
 
@@ -169,16 +169,15 @@ def test_a_speed_model_leaves_the_torque_of_a_data_sheet_alone(made, car):
     assert_allclose(wb.weigh(drive, by_speed).mass, weighing.mass, rtol=1e-9)
     slow = weighing.result.slow_errors
     assert set(DATA_SHEET_NAMES) < set(slow.constants)
-    table = constants_table(slow)
-    assert len(table.rows) == len(slow.constants)
+    assert len(constants_table(slow).rows) == len(slow.constants)
 
 
 @pytest.mark.parametrize(("factor", "status"), [(1.3, "converged"), (3.5, "inconsistent")])
 def test_a_mass_that_no_load_explains_is_refused(balance, car, factor, status):
-    view = balance.merged
-    rows, _ = design(view, car)
-    more = view.traction_force + (factor - 1.0) * 1580.0 * rows[:, 0]
-    found = joint.estimate(replace(balance, merged=replace(view, traction_force=more)), car)
+    table = balance.table
+    rows, _ = design(table, car)
+    more = table.traction_force + (factor - 1.0) * 1580.0 * rows[:, 0]
+    found = joint.estimate(replace(balance, table=replace(table, traction_force=more)), car)
     assert found.status == status
     if status == "inconsistent":
         assert "times the" in found.why
@@ -242,7 +241,7 @@ def folded(track, stops=1.0, state=None, **sizes):
 def test_forward_ends_where_the_smoother_does(balance, car):
     track = joint.estimate(balance, car, load_changes=False)
     state = forward(track, stops=0.0)
-    end = track.mass + balance.merged.fuel_burnt[-1]
+    end = track.mass + balance.table.fuel_burnt[-1]
     assert state.mass == pytest.approx(end, rel=1e-9)
     assert state.std(track.sizes) == pytest.approx(track.std, rel=1e-3)
     assert state.windows == track.filter_input.time.size
@@ -265,7 +264,7 @@ def test_forward_goes_on_from_a_drive_weighed_as_a_whole(balance, car, load):
     track = joint.estimate(loaded, car)
     given = track.filter_input
     setup = joint_forward.identify_joint(given, track.sizes)
-    end = track.mass + balance.merged.fuel_burnt[-1]
+    end = track.mass + balance.table.fuel_burnt[-1]
     whole = joint_forward.resumed(given, setup, np.inf)
     assert whole.mass == pytest.approx(end, rel=1e-5)
     assert whole.std(track.sizes) == pytest.approx(track.std, rel=1e-3)
@@ -282,4 +281,4 @@ def test_forward_follows_a_load_that_changes_at_a_stop(balance, car):
     track = joint.estimate(loaded, car)
     assert len(track.segments) > 1
     state = forward(track)
-    assert state.mass == pytest.approx(track.mass + balance.merged.fuel_burnt[-1], rel=0.003)
+    assert state.mass == pytest.approx(track.mass + balance.table.fuel_burnt[-1], rel=0.003)

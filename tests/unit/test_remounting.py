@@ -82,11 +82,11 @@ def test_calibration_sees_the_reported_wind(made):
     for speed in (0.0, 10.0):
         told = replace(drive, info=replace(drive.info, wind_speed=speed, wind_from=3.0))
         balance = force_balance(told, car, motion)
-        rows = balance.merged.usable & np.isfinite(balance.merged.engine_speed)
+        rows = balance.table.usable & np.isfinite(balance.table.engine_speed)
         made_rows = build_rows(
-            balance.merged,
+            balance.table,
             drive.signals["engine_load"].values,
-            balance.merged.engine_speed,
+            balance.table.engine_speed,
             mass=1580.0,
             wheel_radius=0.319,
             order=1,
@@ -94,7 +94,7 @@ def test_calibration_sees_the_reported_wind(made):
             rows=rows,
         )
         columns.append(made_rows.design[:, -4])
-        drag = drag_force(balance.merged, car)[rows] / balance.merged.gearing[rows]
+        drag = drag_force(balance.table, car)[rows] / balance.table.gearing[rows]
         assert made_rows.design[:, -4] * car.road.drag_area.value == pytest.approx(-drag)
     calm, windy = columns
     assert abs(calm.mean() - windy.mean()) > 0.05 * abs(calm.mean())

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from weighbridge.balance import ForceBalance, MergedView, Reason
+from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import MassTrack, Segment, Status
 from weighbridge.navigation.motion import Motion
@@ -105,7 +105,7 @@ def make_weighing(
     reason = np.where(accel > 0.0, Reason.USED, Reason.NOT_ACCELERATING).astype(np.uint8)
     reason[speed < 1.5] = Reason.STANDING
     reason[1003] = Reason.BAD_FIT
-    merged = MergedView(
+    table = ForceTable(
         time=time,
         traction_force=traction,
         force_std=np.full(n, 60.0),
@@ -126,7 +126,7 @@ def make_weighing(
     )
     result = MassTrack(
         method="rls",
-        balance=ForceBalance(motion=motion, merged=merged),
+        balance=ForceBalance(motion=motion, table=table),
         running_mass=MASS + 300.0 * np.exp(-(time - 50.0) / 100.0),
         running_std=np.full(n, 12.0),
         residual=np.where(reason == Reason.USED, noise, np.nan),
@@ -156,12 +156,12 @@ def make_weighing(
 
 def make_calibration(weighing):
     balance = weighing.result.balance
-    view = balance.merged
+    table = balance.table
     rng = np.random.default_rng(4)
-    torque = balance.merged.torque[view.usable]
-    turning = balance.merged.engine_speed[view.usable]
+    torque = balance.table.torque[table.usable]
+    turning = balance.table.engine_speed[table.usable]
     rows = FittedRows(
-        time=view.time[view.usable],
+        time=table.time[table.usable],
         drive=np.zeros(torque.size, dtype=np.int64),
         # 210 Nm at full load, less friction that grows with speed.
         reading=(torque + 10.0 + 0.02 * turning) / 210.0,
@@ -186,7 +186,7 @@ def make_calibration(weighing):
     )
     return Calibration(
         vehicle=vehicle,
-        gears=detect_gearings(view.time, balance.merged.engine_speed, view.speed, idle_speed=0.0),
+        gears=detect_gearings(table.time, balance.table.engine_speed, table.speed, idle_speed=0.0),
         balances=(balance,),
         rows=rows,
         search=DelaySearch(delay=np.array([0.0, 0.1, 0.2]), misfit=np.array([9.0, 0.0, 4.0])),
@@ -362,7 +362,7 @@ def test_legend_counts_every_sample(tmp_path):
     assert int(told["used"]) == np.count_nonzero(reason == Reason.USED)
     assert told["bad fit"] == "1"
     rare = next(t for t in speed["data"] if t["name"] == "bad fit (1)")
-    kmh = 3.6 * weighing.result.balance.merged.speed[1003]
+    kmh = 3.6 * weighing.result.balance.table.speed[1003]
     assert_allclose(numbers(rare["y"]), [kmh], rtol=1e-6)
 
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.unit.test_report import GEARINGS, VEHICLE, Elements, figures, make_weighing, numbers
 from tests.unit.test_weighing import weighing as weighed_by_rls
 
-from weighbridge.balance import ForceBalance, MergedView, Reason
+from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.balance.instants import WIND_AT_VEHICLE
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, joint
@@ -92,7 +92,7 @@ def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0
         squat=0.0,
         squat_std=0.0,
     )
-    merged = MergedView(
+    table = ForceTable(
         time=time,
         traction_force=traction,
         force_std=np.full(n, 40.0),
@@ -111,7 +111,7 @@ def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0
         fuel_burnt=np.zeros(n),
         reason=reason,
     )
-    track = joint.estimate(ForceBalance(motion=motion, merged=merged), CAR)
+    track = joint.estimate(ForceBalance(motion=motion, table=table), CAR)
     told = np.hypot(*reported) / WIND_AT_VEHICLE
     info = DriveInfo(wind_speed=told or None, wind_from=np.arctan2(reported[1], reported[0]))
     drive = Drive("driven", {"vehicle_speed": Signal("vehicle_speed", time, speed)}, info=info)
@@ -273,8 +273,8 @@ def test_bins_are_wide_enough_for_the_range():
 
 def test_one_gear_and_no_heading_are_said():
     w = make_weighing()
-    view = w.result.balance.merged
-    balance = replace(w.result.balance, merged=replace(view, gear=np.ones_like(view.gear)))
+    table = w.result.balance.table
+    balance = replace(w.result.balance, table=replace(table, gear=np.ones_like(table.gear)))
     panels = residual_section(replace(w, result=replace(w.result, balance=balance)), ()).panels
     told = " ".join(p.absent for p in panels)
     assert "there is only one gear" in told

@@ -23,7 +23,7 @@ def test_a_cold_start_counts_by_its_share_of_the_information():
     every = np.ones(time.size, dtype=bool)
     share = 600 * 4.0 / (600 * 4.0 + 2400)
     balance = SimpleNamespace(
-        merged=SimpleNamespace(time=time),
+        table=SimpleNamespace(time=time),
         motion=SimpleNamespace(source="inertial"),
         brake_hidden=False,
         coarse_std=0.0,

@@ -163,7 +163,7 @@ def test_other_signals_are_not_looked_at(car):
     more = alone.with_signals(
         Signal("engine_torque", np.arange(0.0, 1200.0), 80.0 + np.arange(1200.0) % 7)
     )
-    a, b = (speed_balance(d, car).merged for d in (alone, more))
+    a, b = (speed_balance(d, car).table for d in (alone, more))
     np.testing.assert_array_equal(a.speed, b.speed)
     assert (a.reason == Reason.USED).sum() > 100
 

@@ -138,7 +138,7 @@ def test_a_slow_cruise_lacks_starts_and_hills(short_drive, short_car):
     cruise = Signal(speed.name, speed.time, 25.0 + np.round(np.sin(speed.time / 20.0)) / 3.6)
     motion = speed_motion(slow.with_signals(cruise).without("altitude"))
     evidence = Evidence(
-        view=force_balance(slow, short_car, motion).merged,
+        table=force_balance(slow, short_car, motion).table,
         used=np.ones(1, dtype=bool), phi=np.ones(1), mass=1.0, std=1.0, blocks=1, motion=motion,
     )  # fmt: skip
     assert motion.recorded_speed.slow_text

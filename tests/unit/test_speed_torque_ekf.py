@@ -146,7 +146,7 @@ def test_a_gap_of_the_speed_and_of_the_torque_is_left_out(weighed):
     holed = wb.weigh(replace(whole, signals=signals), CAR, METHOD)
     assert holed.status == "converged"
     assert holed.mass == pytest.approx(weighed.mass, rel=0.03)
-    view = holed.result.balance.merged
+    view = holed.result.balance.table
     hidden = (view.time > 305.0) & (view.time < 355.0)
     assert not holed.result.used[hidden].any()
     assert np.isnan(holed.result.residual[hidden]).all()
@@ -164,7 +164,7 @@ def test_linearised_at_its_own_acceleration_noise_of_the_torque_makes_it_heavier
 
 def test_residual_reason_and_running_mass_are_of_the_rows(weighed):
     track = weighed.result
-    n = track.balance.merged.time.size
+    n = track.balance.table.time.size
     assert track.running_mass.shape == track.residual.shape == track.reason.shape == (n,)
     assert np.isfinite(track.residual[track.used]).all()
     known = track.residual[track.used]

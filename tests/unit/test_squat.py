@@ -38,10 +38,10 @@ def weighed():
 
 def seen(balance, squat, *, factor):
     """The balance with ``factor`` of a lean in its readings, and the squat the drive shows."""
-    squat_accel = factor * GRAVITY * K * balance.merged.accel
-    view = replace(balance.merged, specific_force=balance.merged.specific_force + squat_accel)
+    squat_accel = factor * GRAVITY * K * balance.table.accel
+    table = replace(balance.table, specific_force=balance.table.specific_force + squat_accel)
     std = None if squat is None else 2e-4
-    return replace(balance, merged=view, motion=replace(balance.motion, squat=squat, squat_std=std))
+    return replace(balance, table=table, motion=replace(balance.motion, squat=squat, squat_std=std))
 
 
 def calibrated(car, squat):

@@ -56,20 +56,20 @@ def smoothed_torque(balance: ForceBalance, vehicle: Vehicle) -> str:
     ----------
     balance, vehicle
     """
-    view = balance.merged
-    if balance.motion.source != "inertial" or view.time.size < FEWEST:
+    table = balance.table
+    if balance.motion.source != "inertial" or table.time.size < FEWEST:
         return ""
-    if not float(np.median(np.diff(view.time))) <= SLOWEST:
+    if not float(np.median(np.diff(table.time))) <= SLOWEST:
         return ""
-    force = force_on_mass(view, vehicle)
-    use = view.usable & np.isfinite(force) & np.isfinite(view.specific_force)
+    force = force_on_mass(table, vehicle)
+    use = table.usable & np.isfinite(force) & np.isfinite(table.specific_force)
     slow = None
     for span in SLOW:
-        slow = slow or _slopes(view.time, use, force, view.specific_force, span)
+        slow = slow or _slopes(table.time, use, force, table.specific_force, span)
     if slow is None:
         return ""
     for span in FAST:
-        fast = _slopes(view.time, use, force, view.specific_force, span)
+        fast = _slopes(table.time, use, force, table.specific_force, span)
         if fast is not None and (said := _lacking(fast, slow, span, vehicle)):
             return said
     return ""

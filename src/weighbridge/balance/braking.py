@@ -13,7 +13,7 @@ from weighbridge.balance.foot import find_foot
 from weighbridge.balance.foot_setup import FootSetup, identify_foot, near
 from weighbridge.balance.instants import SLOWEST, behind
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
-from weighbridge.balance.table import ForceSetup, MergedView
+from weighbridge.balance.table import ForceSetup, ForceTable
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import dynamic_pressure
@@ -90,7 +90,7 @@ def find_brakes(
     vehicle: Vehicle,
     motion: Motion,
     source: Signal,
-    view: MergedView,
+    table: ForceTable,
     *,
     known: Bools,
     lag: float,
@@ -103,20 +103,20 @@ def find_brakes(
     ----------
     drive, vehicle, motion
     source : what the torque is made from
-    view : (n,) rows, at the stamps of the source
+    table : (n,) rows, at the stamps of the source
     known : (n,) the motion is known there
     lag : time constant of the smoothing [s]
     signed : the torque tells what a dragged engine takes
     setup : what holds all along the drive; found from this drive when None
     """
-    recorded, traction = source.time, view.traction_force
-    rotating = rotating_mass(vehicle, view.gearing)
-    needed, weight = needed_force(vehicle, view.specific_force, view.dynamic_pressure, rotating)
+    recorded, traction = source.time, table.traction_force
+    rotating = rotating_mass(vehicle, table.gearing)
+    needed, weight = needed_force(vehicle, table.specific_force, table.dynamic_pressure, rotating)
     slowing = _Slowing(
         needed=needed,
         weight=weight,
         beyond=needed - np.minimum(np.where(np.isfinite(traction), traction, 0.0), 0.0),
-        moving=np.asarray(view.speed > SLOWEST),
+        moving=np.asarray(table.speed > SLOWEST),
     )
     pressed = brake_pressed(drive, recorded)
     if setup is not None:
@@ -125,7 +125,7 @@ def find_brakes(
         dead = pressed is not None and _misses(pressed, slowing, known)
     pressed = None if dead else pressed
     told = np.nan if motion.source in BY_SPEED else 1.0
-    need, torque = told * needed / weight, told * needed / view.gearing
+    need, torque = told * needed / weight, told * needed / table.gearing
     by = setup.foot if setup is not None else identify_foot(drive, vehicle, source, need, torque)
     foot = find_foot(drive, vehicle, source, need, torque, by)
     # What a dragged engine takes is told by a torque alone, and by none where a foot may brake,
@@ -133,7 +133,7 @@ def find_brakes(
     released = signed and pressed is not None and not retarder_untold(drive, vehicle)
     overrun = np.zeros_like(foot.off) if released else foot.off
     slowed = foot.off if pressed is None else pressed
-    held = _trailing(vehicle, motion, view.time, slowed, traction if signed else None, lag)
+    held = _trailing(vehicle, motion, table.time, slowed, traction if signed else None, lag)
     slows = (needed < -SLOWED * weight)[slowing.moving]
     hidden = pressed is None and not foot.told and slows.size and slows.mean() > SLOWS
     return Brakes(

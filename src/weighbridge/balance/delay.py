@@ -9,7 +9,7 @@ import numpy as np
 
 from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.law import force_on_mass
-from weighbridge.balance.table import ForceBalance, MergedView
+from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Vehicle
@@ -173,15 +173,15 @@ def far_shift(balance: ForceBalance, vehicle: Vehicle) -> float:
     -------
     Coarse, to half a second [s]; negative where the motion is ahead
     """
-    view = balance.merged
-    known = np.isfinite(view.specific_force)
-    force = force_on_mass(view, vehicle)
-    rows = view.usable & np.isfinite(force)
+    table = balance.table
+    known = np.isfinite(table.specific_force)
+    force = force_on_mass(table, vehicle)
+    rows = table.usable & np.isfinite(force)
     if np.count_nonzero(rows) < 100 or np.count_nonzero(known) < 100:
         return 0.0
-    time, specific = view.time[known], view.specific_force[known]
+    time, specific = table.time[known], table.specific_force[known]
     shifts = np.arange(-_SOUGHT, _SOUGHT + 0.25, 0.5)
-    moved = (np.interp(view.time[rows] + s, time, specific) for s in shifts)
+    moved = (np.interp(table.time[rows] + s, time, specific) for s in shifts)
     misfit = 1.0 - np.array([_correlation(force[rows], m) for m in moved])
     best = int(np.argmin(misfit))
     near = float(misfit[np.abs(shifts) < ELSEWHERE].min())
@@ -210,21 +210,21 @@ def _misfit(
 ) -> Callable[[float], float]:
     """One less the correlation of force and specific force, over rows usable at all ``delays``."""
 
-    def at(delay: float) -> MergedView:
-        return force_balance(drive, vehicle, motion, delay=delay).merged
+    def at(delay: float) -> ForceTable:
+        return force_balance(drive, vehicle, motion, delay=delay).table
 
     views = {float(delay): at(float(delay)) for delay in delays}
     # Rows that come and go with the delay would make its misfit rough.
     common = np.logical_and.reduce(
-        [view.usable & np.isfinite(view.traction_force) for view in views.values()]
+        [table.usable & np.isfinite(table.traction_force) for table in views.values()]
     )
 
     def misfit(delay: float) -> float:
-        view = views[delay] if delay in views else at(delay)
-        rows = common & np.isfinite(view.traction_force) & np.isfinite(view.specific_force)
+        table = views[delay] if delay in views else at(delay)
+        rows = common & np.isfinite(table.traction_force) & np.isfinite(table.specific_force)
         if np.count_nonzero(rows) < 100:
             return float("nan")
-        return 1.0 - _correlation(force_on_mass(view, vehicle)[rows], view.specific_force[rows])
+        return 1.0 - _correlation(force_on_mass(table, vehicle)[rows], table.specific_force[rows])
 
     return misfit
 

@@ -16,7 +16,7 @@ from weighbridge.balance.filled import Fill, filled, identify_fill
 from weighbridge.balance.foot_setup import learn_dragged
 from weighbridge.balance.instants import SLOWEST, Instants, motion_at, read_instants, smoothed
 from weighbridge.balance.law import needed_force, traction_gain
-from weighbridge.balance.table import ForceBalance, ForceSetup, MergedView, Reason
+from weighbridge.balance.table import ForceBalance, ForceSetup, ForceTable, Reason
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.air import Air, air_density, dynamic_pressure, identify_air
@@ -62,15 +62,15 @@ def force_balance(
         delay = vehicle.timing.torque_delay or 0.0
     lag = vehicle.timing.torque_lag if lag is None else lag
     read = _read(drive, vehicle, motion, source, delay, lag, setup)
-    view = read.view
+    table = read.table
     brakes = find_brakes(
-        drive, vehicle, motion, source, view,
+        drive, vehicle, motion, source, table,
         known=read.instants.known, lag=lag,
         signed=signed and source_of(vehicle).signed, setup=setup,
     )  # fmt: skip
     fill = setup.fill if setup is not None else identify_fill(source)
     reason = _reasons(vehicle, motion, source, read, brakes, fill)
-    view = replace(view, reason=reason)
+    table = replace(table, reason=reason)
     if setup is None:
         setup = ForceSetup(
             foot=brakes.foot,
@@ -78,11 +78,11 @@ def force_balance(
             gears=read.instants.numbers,
             air=read.air,
             full_torque=read.full_torque,
-            torque_noise=_torque_noise(vehicle, view),
+            torque_noise=_torque_noise(vehicle, table),
             fill=fill,
         )
     return ForceBalance(
-        merged=replace(view, force_std=setup.torque_noise * np.nan_to_num(view.gearing)),
+        table=replace(table, force_std=setup.torque_noise * np.nan_to_num(table.gearing)),
         motion=motion,
         brake_hidden=brakes.hidden,
         switch_dead=brakes.switch_dead,
@@ -98,13 +98,13 @@ class _Read:
 
     Attributes
     ----------
-    view : (n,) rows, without reasons and noise
+    table : (n,) rows, without reasons and noise
     torque : of the rows
     instants : motion, engine speed and gear
     air, full_torque : of `ForceSetup`
     """
 
-    view: MergedView
+    table: ForceTable
     torque: Torque
     instants: Instants
     air: Air
@@ -128,7 +128,7 @@ def _read(
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
     full = setup.full_torque if setup is not None else full_load_torque(torque.torque)
     air = setup.air if setup is not None else identify_air(drive, altitude)
-    view = MergedView(
+    table = ForceTable(
         **at.columns,
         traction_force=traction_gain(vehicle, torque.torque, gearing) * torque.torque,
         force_std=np.full(recorded.size, np.nan),
@@ -138,7 +138,7 @@ def _read(
         reason=np.zeros(recorded.size, dtype=np.uint8),
     )
     return _Read(
-        view=view,
+        table=table,
         torque=torque,
         instants=at,
         air=air,
@@ -163,19 +163,19 @@ def _reasons(
     read, brakes : of the rows
     fill : how readings that a logger filled in would look
     """
-    view = read.view
-    reason = np.zeros(view.time.size, dtype=np.uint8)
-    has_torque = np.isfinite(view.traction_force) & ~filled(source, fill)
+    table = read.table
+    reason = np.zeros(table.time.size, dtype=np.uint8)
+    has_torque = np.isfinite(table.traction_force) & ~filled(source, fill)
     for flag, why in (
-        (~read.instants.known | ~np.isfinite(view.speed), Reason.NO_MOTION),
-        (view.speed < SLOWEST, Reason.STANDING),
+        (~read.instants.known | ~np.isfinite(table.speed), Reason.NO_MOTION),
+        (table.speed < SLOWEST, Reason.STANDING),
         (brakes.braked, Reason.BRAKING),
         (read.instants.changing, Reason.SHIFTING),
         (read.instants.slipping, Reason.CLUTCH_SLIPPING),
         (~has_torque, Reason.NO_TORQUE),
         (read.torque.overrun | brakes.overrun, Reason.OVERRUN),
         (read.torque.extrapolated, Reason.EXTRAPOLATED),
-        (cornering(motion, view.time), Reason.CORNERING),
+        (cornering(motion, table.time), Reason.CORNERING),
     ):
         reason[(reason == 0) & flag] = why
     return reason
@@ -187,9 +187,9 @@ def highest_torque(torque: Floats) -> float:
     return float(np.percentile(known, 98.0)) if known.size else 0.0
 
 
-def _torque_noise(vehicle: Vehicle, view: MergedView) -> float:
+def _torque_noise(vehicle: Vehicle, table: ForceTable) -> float:
     """Noise of one torque [N m]: the vehicle's, else a part of the highest of the drive."""
-    return vehicle.torque.noise or ROUGH_NOISE * highest_torque(view.torque[view.usable])
+    return vehicle.torque.noise or ROUGH_NOISE * highest_torque(table.torque[table.usable])
 
 
 def dragged_reading(

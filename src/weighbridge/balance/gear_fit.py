@@ -59,7 +59,7 @@ def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> str:
     if not vehicle.driveline.gearings:
         return ""
     time, ratio = held_ratios(balance)
-    rows = balance.merged.time
+    rows = balance.table.time
     begins = rows[1:][np.diff(rows) > PAUSE]
     number = np.searchsorted(begins, time, side="right")
     for k in range(begins.size + 1):
@@ -96,8 +96,8 @@ def held_ratios(balance: ForceBalance) -> tuple[Floats, Floats]:
     time : (n,) [s]
     ratio : (n,) of ratios in 1/m
     """
-    view, engine_speed = balance.merged, balance.merged.engine_speed
-    pulling = (view.speed > SLOWEST) & (view.accel > 0.0) & (engine_speed > 0.0)
-    ratio = np.where(pulling, engine_speed / np.where(pulling, view.speed, 1.0), 0.0)
-    held = pulling & steady(view.time, ratio, np.full(ratio.size, 0.02))
-    return view.time[held], np.log(ratio[held])
+    table, engine_speed = balance.table, balance.table.engine_speed
+    pulling = (table.speed > SLOWEST) & (table.accel > 0.0) & (engine_speed > 0.0)
+    ratio = np.where(pulling, engine_speed / np.where(pulling, table.speed, 1.0), 0.0)
+    held = pulling & steady(table.time, ratio, np.full(ratio.size, 0.02))
+    return table.time[held], np.log(ratio[held])

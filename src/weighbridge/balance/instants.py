@@ -156,7 +156,7 @@ class Instants:
 
     Attributes
     ----------
-    columns : of `weighbridge.balance.table.MergedView` that hang on neither torque nor air (n,)
+    columns : of `weighbridge.balance.table.ForceTable` that hang on neither torque nor air (n,)
     altitude : (n,) [m]; NaN where unknown
     known : (n,) the motion is known
     slipping : (n,) the clutch slips

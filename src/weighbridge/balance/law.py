@@ -29,7 +29,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.constants import (
     GAS_CONSTANT_DRY_AIR,
     GRAVITY,
@@ -63,24 +63,24 @@ def traction_gain(vehicle: Vehicle, torque: Floats, gearing: Floats) -> Floats:
     return np.asarray(wheel_share(vehicle, torque) * gearing)
 
 
-def mass_column(view: MergedView, vehicle: Vehicle) -> Floats:
+def mass_column(table: ForceTable, vehicle: Vehicle) -> Floats:
     """Of the mass, ``f + g (C_r + C_rv v) cos(grade)`` (n,) [m/s^2].
 
     The two terms ``v' + g sin(grade)`` of Jensen 2022, eq. 5, are the specific force.
     """
     at_rest = vehicle.road.rolling_coefficient.value
-    rolling = at_rest + vehicle.road_load.rolling_speed_coefficient * view.speed
-    return np.asarray(view.specific_force + GRAVITY * rolling * np.cos(view.grade))
+    rolling = at_rest + vehicle.road_load.rolling_speed_coefficient * table.speed
+    return np.asarray(table.specific_force + GRAVITY * rolling * np.cos(table.grade))
 
 
-def rolling_column(view: MergedView, mass: Floats | float) -> Floats:
+def rolling_column(table: ForceTable, mass: Floats | float) -> Floats:
     """Of the rolling coefficient, ``m g cos(grade)`` (n,) [N]."""
-    return np.asarray(mass * GRAVITY * np.cos(view.grade))
+    return np.asarray(mass * GRAVITY * np.cos(table.grade))
 
 
-def drag_column(view: MergedView) -> Floats:
+def drag_column(table: ForceTable) -> Floats:
     """Of the drag area C_d A, ``q = rho v_air |v_air| / 2`` (n,) [Pa], with the reported wind."""
-    return view.dynamic_pressure
+    return table.dynamic_pressure
 
 
 def engine_inertia_column(gearing: Floats | float, accel: Floats | float) -> Floats:
@@ -93,42 +93,42 @@ def wheel_inertia_column(accel: Floats | float, wheel_radius: float) -> Floats:
     return np.asarray(accel / wheel_radius**2)
 
 
-def road_columns(view: MergedView, mass: Floats | float, wheel_radius: float) -> Floats:
+def road_columns(table: ForceTable, mass: Floats | float, wheel_radius: float) -> Floats:
     """Columns of `ROAD_PARAMETERS` (n, 4) [N per unit].
 
     Parameters
     ----------
-    view
+    table
     mass : that rolls, one or (n,) [kg]
     wheel_radius : [m]
     """
     return np.column_stack(
         [
-            drag_column(view),
-            rolling_column(view, mass),
-            engine_inertia_column(view.gearing, view.accel),
-            wheel_inertia_column(view.accel, wheel_radius),
+            drag_column(table),
+            rolling_column(table, mass),
+            engine_inertia_column(table.gearing, table.accel),
+            wheel_inertia_column(table.accel, wheel_radius),
         ]
     )
 
 
-def wind_columns(view: MergedView) -> tuple[Floats, Floats]:
+def wind_columns(table: ForceTable) -> tuple[Floats, Floats]:
     """Of ``C_d A`` times the head wind of one who drives north, and east (n,) [N per m^3/s].
 
     The drag of a wind small against the speed is linear in it: ``rho v`` times its part along
     the road. Zero where the heading is unknown.
     """
-    north, east = view.direction
-    push = view.air_density * view.speed
+    north, east = table.direction
+    push = table.air_density * table.speed
     return push * north, push * east
 
 
-def resistance_column(view: MergedView) -> Floats:
+def resistance_column(table: ForceTable) -> Floats:
     """Of a force that is always there: rolling resistance, offsets of torque and sensors (n,)."""
-    return np.ones_like(view.time)
+    return np.ones_like(table.time)
 
 
-def gust_column(view: MergedView, unmeasured_grade: float = 0.0) -> Floats:
+def gust_column(table: ForceTable, unmeasured_grade: float = 0.0) -> Floats:
     """How large the fast disturbance is at each row over its usual size (n,) [-].
 
     Half of it are errors of grade and torque, the other half gusts, whose force grows with the
@@ -136,36 +136,36 @@ def gust_column(view: MergedView, unmeasured_grade: float = 0.0) -> Floats:
 
     Parameters
     ----------
-    view
+    table
     unmeasured_grade : what of the grade nothing has measured [rad]
     """
-    gusts = 0.5 * (1.0 + (np.nan_to_num(view.speed) / GUST_SPEED) ** 2)
+    gusts = 0.5 * (1.0 + (np.nan_to_num(table.speed) / GUST_SPEED) ** 2)
     grade = (GRAVITY * unmeasured_grade / DISTURBANCE_STD) ** 2
     return np.asarray(np.sqrt((gusts + grade) / (1.0 + grade)))
 
 
-def coldness(view: MergedView) -> Floats:
+def coldness(table: ForceTable) -> Floats:
     """How much of the cold of the start is left at each row, ``exp(-t / tau)`` (n,) [-]."""
-    return np.asarray(np.exp(-np.maximum(view.time - view.first_moved, 0.0) / WARM_UP))
+    return np.asarray(np.exp(-np.maximum(table.time - table.first_moved, 0.0) / WARM_UP))
 
 
-def cold_torque_column(view: MergedView) -> Floats:
+def cold_torque_column(table: ForceTable) -> Floats:
     """Of the friction of a cold start in the reading, ``G exp(-t / tau)`` (n,) [1/m]."""
-    return np.asarray(coldness(view) * np.nan_to_num(view.gearing))
+    return np.asarray(coldness(table) * np.nan_to_num(table.gearing))
 
 
-def torque_offset_column(view: MergedView) -> Floats:
+def torque_offset_column(table: ForceTable) -> Floats:
     """Of what the torque is told too high by, ``G`` (n,) [1/m]."""
-    return np.nan_to_num(view.gearing)
+    return np.nan_to_num(table.gearing)
 
 
-def torque_growth_column(view: MergedView) -> Floats:
+def torque_growth_column(table: ForceTable) -> Floats:
     """Of the part of it that grows with engine speed, ``G (G v / N_0)`` (n,) [1/m].
 
     Its unit is the torque at N_0, `weighbridge.vehicle.data_sheet.USUAL_SPEED`.
     """
-    gearing = np.nan_to_num(view.gearing)
-    return np.asarray(gearing * (gearing * view.speed / USUAL_SPEED))
+    gearing = np.nan_to_num(table.gearing)
+    return np.asarray(gearing * (gearing * table.speed / USUAL_SPEED))
 
 
 def reading_columns(
@@ -190,10 +190,10 @@ def reading_columns(
     return np.asarray(gain[:, None] * rows)
 
 
-def torque_columns(view: MergedView, vehicle: Vehicle) -> Floats:
+def torque_columns(table: ForceTable, vehicle: Vehicle) -> Floats:
     """`reading_columns` of a vehicle's model, at the readings that gave its torque (n, p)."""
-    torque, speed = np.nan_to_num(view.torque), np.nan_to_num(view.engine_speed)
-    gain = traction_gain(vehicle, torque, np.nan_to_num(view.gearing))
+    torque, speed = np.nan_to_num(table.torque), np.nan_to_num(table.engine_speed)
+    gain = traction_gain(vehicle, torque, np.nan_to_num(table.gearing))
     model = vehicle.torque
     return np.asarray(rows_of(model, reading_of(torque, speed, model), speed) * gain[:, None])
 
@@ -210,23 +210,23 @@ def rotating_mass(vehicle: Vehicle, gearing: Floats | float) -> Floats:
     return np.asarray(wheels + road.engine_inertia.value * gearing**2)
 
 
-def drag_force(view: MergedView, vehicle: Vehicle) -> Floats:
+def drag_force(table: ForceTable, vehicle: Vehicle) -> Floats:
     """Air drag ``C_d A q`` (n,) [N], in still air or in the wind that ``drive.toml`` reports."""
-    return np.asarray(vehicle.road.drag_area.value * drag_column(view))
+    return np.asarray(vehicle.road.drag_area.value * drag_column(table))
 
 
-def drag_factor(view: MergedView, vehicle: Vehicle) -> Floats:
+def drag_factor(table: ForceTable, vehicle: Vehicle) -> Floats:
     """Air drag over the square of the air speed, ``rho C_d A / 2`` (n,) [kg/m]."""
-    return np.asarray(0.5 * view.air_density * vehicle.road.drag_area.value)
+    return np.asarray(0.5 * table.air_density * vehicle.road.drag_area.value)
 
 
-def force_on_mass(view: MergedView, vehicle: Vehicle) -> Floats:
+def force_on_mass(table: ForceTable, vehicle: Vehicle) -> Floats:
     """Traction less air drag and what turns: it moves, lifts and rolls the mass (n,) [N].
 
     The right-hand side of Jensen 2022, eq. 6.
     """
-    turning = rotating_mass(vehicle, view.gearing) * view.accel
-    return np.asarray(view.traction_force - drag_force(view, vehicle) - turning)
+    turning = rotating_mass(vehicle, table.gearing) * table.accel
+    return np.asarray(table.traction_force - drag_force(table, vehicle) - turning)
 
 
 def needed_force(

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.table import ForceBalance, MergedView, Reason
+from weighbridge.balance.table import ForceBalance, ForceTable, Reason
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.kernels import speed_ekf as kernel
@@ -156,7 +156,7 @@ def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
     accel = np.concatenate(([np.nan], np.diff(speed))) / length
     return ForceBalance(
         motion=motion,
-        merged=MergedView(
+        table=ForceTable(
             time=time,
             traction_force=traction,
             force_std=nowhere,

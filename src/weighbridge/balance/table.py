@@ -78,7 +78,7 @@ SWITCH_DEAD: Final = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MergedView:
+class ForceTable:
     """Forces at the instants they were computed in the vehicle, and the motion there.
 
     What follows from it by the parameters of a vehicle is in `weighbridge.balance.law`.
@@ -177,7 +177,7 @@ class ForceBalance:
 
     Attributes
     ----------
-    merged, motion
+    table, motion
     brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading tells
         where it is braked
     switch_dead : the brake switch contradicts the motion and is not used
@@ -187,7 +187,7 @@ class ForceBalance:
     navigation : what the motion was found by; None where it was not from an inertial sensor
     """
 
-    merged: MergedView
+    table: ForceTable
     motion: Motion
     brake_hidden: bool = False
     switch_dead: bool = False

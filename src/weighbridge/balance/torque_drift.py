@@ -14,7 +14,7 @@ import numpy as np
 
 from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.law import drag_force
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.errors import DriveError
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
@@ -62,20 +62,20 @@ class ForceLags:
     lag: Floats
 
 
-def force_lags(view: MergedView, vehicle: Vehicle, motion: Motion) -> ForceLags:
+def force_lags(table: ForceTable, vehicle: Vehicle, motion: Motion) -> ForceLags:
     """Find the lag of best correlation in each piece; pieces that show none are left out."""
     specific = np.where(motion.valid, motion.specific_force, np.nan)
-    force = view.traction_force - drag_force(view, vehicle)
-    usable = view.usable & np.isfinite(force)
+    force = table.traction_force - drag_force(table, vehicle)
+    usable = table.usable & np.isfinite(force)
     found: list[tuple[float, float]] = []
-    if not view.time.size:
+    if not table.time.size:
         return ForceLags(np.empty(0), np.empty(0))
-    for begin in np.arange(view.time[0], view.time[-1] - 0.5 * PIECE, 0.5 * PIECE):
-        first, last = np.searchsorted(view.time, (begin, begin + PIECE))
+    for begin in np.arange(table.time[0], table.time[-1] - 0.5 * PIECE, 0.5 * PIECE):
+        first, last = np.searchsorted(table.time, (begin, begin + PIECE))
         here = np.flatnonzero(usable[first:last]) + first
         if here.size < FEWEST_ROWS:
             continue
-        moved = np.interp(view.time[here] - SHIFTS[:, None], motion.time, specific)
+        moved = np.interp(table.time[here] - SHIFTS[:, None], motion.time, specific)
         whole = np.isfinite(moved).all(axis=0)
         if np.count_nonzero(whole) < FEWEST_ROWS:
             continue
@@ -124,7 +124,7 @@ def steadied(
     if motion.source in BY_SPEED or drive.info.trusted or source.combined is not None:
         return drive, ()
     carrier = source.carrier(drive)
-    before = force_lags(force_balance(drive, vehicle, motion, delay=delay).merged, vehicle, motion)
+    before = force_lags(force_balance(drive, vehicle, motion, delay=delay).table, vehicle, motion)
     slope, scatter = _line(before)
     reach = float(np.ptp(before.time)) if before.time.size else 0.0
     if abs(slope) * reach <= max(DRIFTS, SURE * scatter):
@@ -134,7 +134,7 @@ def steadied(
     moved = carrier.time - slope * (carrier.time - before.time[0])
     rising = np.concatenate(([True], np.diff(np.maximum.accumulate(moved)) > 0.0))
     mended = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
-    after = force_lags(force_balance(mended, vehicle, motion, delay=delay).merged, vehicle, motion)
+    after = force_lags(force_balance(mended, vehicle, motion, delay=delay).table, vehicle, motion)
     if after.lag.size >= FEWEST and np.ptp(_median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)
     grows = "later and later" if slope > 0.0 else "earlier and earlier"

@@ -58,7 +58,7 @@ def doubted_masses(
     if fit is None or not fit.refined or len(masses) < 2:
         return contradictions
     tracks = [joint.estimate(b, vehicle, load_changes=False) for b in balances]
-    left = np.array(masses) - np.array([float(b.merged.fuel_burnt[-1]) for b in balances])
+    left = np.array(masses) - np.array([float(b.table.fuel_burnt[-1]) for b in balances])
     ratios = np.array([t.mass for t in tracks]) / left
     stds = UNMODELLED * np.array([t.bound_std for t in tracks]) / left
     return contradictions + contradicting(names, masses, ratios, stds)

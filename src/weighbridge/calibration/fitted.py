@@ -94,7 +94,7 @@ def ranges(
     """Engine speeds and loads that the fit has seen, a little widened."""
     if problem.source.signed:
         return None, None
-    pulling = [part.usable & (part.view.accel > 0.0) for part in rows]
+    pulling = [part.usable & (part.table.accel > 0.0) for part in rows]
     speed = np.concatenate([p.engine_speed[use] for p, use in zip(rows, pulling, strict=True)])
     load = np.concatenate(
         [r.reading[use] for r, use in zip(problem.recordings, pulling, strict=True)]
@@ -116,12 +116,12 @@ def torques(vehicle: Vehicle, recording: Recording, rows: DelayedRows) -> tuple[
     -------
     (n,), (n,) of all rows [N m]
     """
-    view, model = rows.view, vehicle.torque
+    table, model = rows.table, vehicle.torque
     torque = rows_of(model, recording.reading, rows.engine_speed) @ parameters(model)
-    mass = recording.mass - view.fuel_burnt
-    taken = mass * mass_column(view, vehicle) + drag_force(view, vehicle)
-    taken += rotating_mass(vehicle, view.gearing) * view.accel
-    return torque, np.asarray(taken / view.gearing)
+    mass = recording.mass - table.fuel_burnt
+    taken = mass * mass_column(table, vehicle) + drag_force(table, vehicle)
+    taken += rotating_mass(vehicle, table.gearing) * table.accel
+    return torque, np.asarray(taken / table.gearing)
 
 
 def fitted_rows(vehicle: Vehicle, problem: Problem, rows: Sequence[DelayedRows]) -> FittedRows:
@@ -133,7 +133,7 @@ def fitted_rows(vehicle: Vehicle, problem: Problem, rows: Sequence[DelayedRows])
     for k, (recording, part) in enumerate(zip(problem.recordings, rows, strict=True)):
         use = part.usable
         source, motion = torques(vehicle, recording, part)
-        time = part.view.time[use] - part.view.time[0] + end
+        time = part.table.time[use] - part.table.time[0] + end
         end = float(time.max(initial=end)) + 60.0
         columns = (time, np.full(time.size, k), recording.reading[use], part.engine_speed[use],
                    source[use], motion[use])  # fmt: skip

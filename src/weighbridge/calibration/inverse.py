@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from weighbridge.balance import law
 from weighbridge.balance.averaging import WINDOW, Windows, windows
 from weighbridge.balance.law import DISTURBANCE_STD
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.estimators.joint import JointSettings
@@ -42,7 +42,7 @@ class DriveRows:
 
     Attributes
     ----------
-    view : merged view of the drive
+    table : force table of the drive
     regressor : load [-] or torque [N m]
     engine_speed : [rad/s]
     usable : rows to take
@@ -50,7 +50,7 @@ class DriveRows:
     motion : of the drive
     """
 
-    view: MergedView
+    table: ForceTable
     regressor: Floats
     engine_speed: Floats
     usable: Bools
@@ -162,13 +162,13 @@ def terms_covariance(
     return np.asarray(torque**2 * cov)
 
 
-def lasting_pressure(view: MergedView) -> Floats:
+def lasting_pressure(table: ForceTable) -> Floats:
     """Mean dynamic pressure within `AROUND` of each row (n,) [Pa]."""
-    known = np.isfinite(view.dynamic_pressure)
-    total = np.concatenate(([0.0], np.cumsum(np.where(known, view.dynamic_pressure, 0.0))))
+    known = np.isfinite(table.dynamic_pressure)
+    total = np.concatenate(([0.0], np.cumsum(np.where(known, table.dynamic_pressure, 0.0))))
     count = np.concatenate(([0], np.cumsum(known)))
-    first = np.searchsorted(view.time, view.time - AROUND)
-    last = np.searchsorted(view.time, view.time + AROUND, side="right")
+    first = np.searchsorted(table.time, table.time - AROUND)
+    last = np.searchsorted(table.time, table.time + AROUND, side="right")
     return np.asarray((total[last] - total[first]) / np.maximum(count[last] - count[first], 1))
 
 
@@ -249,7 +249,7 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     TooShort
         Too few usable windows.
     """
-    cuts = [windows(d.view.time, d.usable, length=settings.window) for d in drives]
+    cuts = [windows(d.table.time, d.usable, length=settings.window) for d in drives]
     total = sum(cut.count.size for cut in cuts)
     p = 2 + settings.order + 2 * settings.curved
     if total < 15 * (p + 4) or any(cut.count.size == 0 for cut in cuts):
@@ -276,7 +276,7 @@ def _torque_per_reading(drives: list[DriveRows]) -> float:
     slopes = []
     for d in drives:
         rows = d.usable
-        target = d.mass * d.view.specific_force[rows] / d.view.gearing[rows]
+        target = d.mass * d.table.specific_force[rows] / d.table.gearing[rows]
         reading = d.regressor[rows]
         centred = reading - reading.mean()
         if not float(centred @ centred) > 0.0:
@@ -287,17 +287,17 @@ def _torque_per_reading(drives: list[DriveRows]) -> float:
 
 def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
     """Columns of one drive: motion, road load, torque terms, disturbances."""
-    view = d.view
-    north, east = law.wind_columns(view)
-    mass = d.mass - view.fuel_burnt
-    pushed = mass * view.specific_force
-    road = law.road_columns(view, mass, settings.wheel_radius)
+    table = d.table
+    north, east = law.wind_columns(table)
+    mass = d.mass - table.fuel_burnt
+    pushed = mass * table.specific_force
+    road = law.road_columns(table, mass, settings.wheel_radius)
     if settings.lasting_drag:
-        lasting = lasting_pressure(view)
-        pushed = pushed + settings.prior[0][0] * (law.drag_column(view) - lasting)
+        lasting = lasting_pressure(table)
+        pushed = pushed + settings.prior[0][0] * (law.drag_column(table) - lasting)
         road[:, 0] = lasting
     terms = law.reading_columns(
-        np.nan_to_num(view.gearing), reading, d.engine_speed,
+        np.nan_to_num(table.gearing), reading, d.engine_speed,
         order=settings.order, curved=settings.curved, knots=settings.knots,
     )  # fmt: skip
     columns = [
@@ -305,11 +305,11 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
         *road.T,
         # The reading itself stands on the left; the other torque terms stand here.
         *-np.delete(terms, 1, axis=1).T,
-        law.gust_column(view, d.motion.unmeasured_grade),
-        law.resistance_column(view),
+        law.gust_column(table, d.motion.unmeasured_grade),
+        law.resistance_column(table),
         north,
         east,
-        law.cold_torque_column(view),
+        law.cold_torque_column(table),
     ]
     return np.asarray(np.nan_to_num(np.column_stack(columns)))
 
@@ -328,21 +328,21 @@ def _solve(
     mass = float(np.mean([d.mass for d in drives]))
     for d, cut, reading in zip(drives, cuts, readings, strict=True):
         columns = _columns(d, reading, settings)
-        gearing = np.nan_to_num(d.view.gearing)
-        time = cut.mean(d.view.time)
+        gearing = np.nan_to_num(d.table.gearing)
+        time = cut.mean(d.table.time)
         times.append(time - time[0] + clock)
         # Between two drives every disturbance has faded.
         clock = float(times[-1][-1]) + 1e5
         rows.append(cut.mean(columns))
         targets.append(cut.mean(scale * gearing * np.nan_to_num(d.regressor)))
-        noisy = replace(d.view, force_std=settings.torque_noise * gearing)
+        noisy = replace(d.table, force_std=settings.torque_noise * gearing)
         variances.append(noise_variance(noisy, cut, mass, d.motion, settings.window))
         parts.append(columns)
     stacked = np.ascontiguousarray(np.vstack(rows))
     extra = _extra(settings)
     reached = np.concatenate(targets)
     gearing = np.concatenate(
-        [cut.mean(np.nan_to_num(d.view.gearing)) for d, cut in zip(drives, cuts, strict=True)]
+        [cut.mean(np.nan_to_num(d.table.gearing)) for d, cut in zip(drives, cuts, strict=True)]
     )
     torque = float(np.percentile(reached / np.maximum(gearing, 1e-3), 98.0))
     terms = terms_covariance(settings.bounds, settings, torque, torque / scale)
@@ -371,7 +371,7 @@ def _solve(
     )  # fmt: skip
     fitted = []
     for d, columns in zip(drives, parts, strict=True):
-        gearing = np.nan_to_num(d.view.gearing)
+        gearing = np.nan_to_num(d.table.gearing)
         predicted = columns[:, : 5 + extra] @ state.x[: 5 + extra]
         safe = np.maximum(gearing, 1e-3)
         fitted.append(np.where(gearing > 0.0, predicted / (scale * safe), d.regressor))

@@ -174,7 +174,7 @@ def _drive_rows(problem: Problem, rows: Sequence[DelayedRows]) -> list[DriveRows
     """See rows as the fit reads them."""
     return [
         DriveRows(
-            view=part.view,
+            table=part.table,
             regressor=recording.reading,
             engine_speed=part.engine_speed,
             usable=part.usable,
@@ -203,7 +203,7 @@ def _rough_noise(problem: Problem, rows: Sequence[DelayedRows]) -> float:
     """Guess the noise of the torque from the torque that the motion takes [N m]."""
     taken = np.concatenate(
         [
-            recording.mass * np.abs(part.view.specific_force / part.view.gearing)[part.usable]
+            recording.mass * np.abs(part.table.specific_force / part.table.gearing)[part.usable]
             for recording, part in zip(problem.recordings, rows, strict=True)
         ]
     )

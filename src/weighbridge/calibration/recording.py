@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.instants import SLOWEST, read_instants, smoothed
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import air_density
@@ -29,12 +29,12 @@ class DelayedRows:
 
     Attributes
     ----------
-    view : (n,) rows; no vehicle is fitted yet, so its torque and traction are NaN
+    table : (n,) rows; no vehicle is fitted yet, so its torque and traction are NaN
     engine_speed : (n,) [rad/s]
     usable : (n,) rows that a fit may take
     """
 
-    view: MergedView
+    table: ForceTable
     engine_speed: Floats
     usable: Bools
 
@@ -105,9 +105,9 @@ class Recording:
     def rows(self, delay: float, lag: float = 0.0) -> DelayedRows:
         """Return the rows of a whole balance at a delay and a lag [s]."""
         balance = self.balance(delay, lag)
-        view, engine_speed = balance.merged, balance.merged.engine_speed
+        table, engine_speed = balance.table, balance.table.engine_speed
         return DelayedRows(
-            view=view, engine_speed=engine_speed, usable=self._complete(view, engine_speed)
+            table=table, engine_speed=engine_speed, usable=self._complete(table, engine_speed)
         )
 
     def search(
@@ -139,8 +139,8 @@ class Recording:
         recorded = self.source.carrier(drive).time
         at = read_instants(drive, draft, motion, recorded, delay)
         nothing = np.full(recorded.size, np.nan)
-        view = replace(
-            anchor.merged,
+        table = replace(
+            anchor.table,
             **at.columns,
             traction_force=nothing,
             force_std=nothing,
@@ -148,17 +148,17 @@ class Recording:
             air_density=air_density(drive, at.altitude),
         )
         engine_speed = at.columns["engine_speed"]
-        usable = self._complete(view, engine_speed) & ~at.changing & ~at.slipping
-        usable &= at.known & (view.speed >= SLOWEST)
-        return DelayedRows(view=view, engine_speed=engine_speed, usable=usable)
+        usable = self._complete(table, engine_speed) & ~at.changing & ~at.slipping
+        usable &= at.known & (table.speed >= SLOWEST)
+        return DelayedRows(table=table, engine_speed=engine_speed, usable=usable)
 
-    def _complete(self, view: MergedView, engine_speed: Floats) -> Bools:
+    def _complete(self, table: ForceTable, engine_speed: Floats) -> Bools:
         """Rows that nothing speaks against and that have all numbers."""
         return np.asarray(
-            view.usable
+            table.usable
             & self.driven
-            & np.isfinite(view.specific_force)
-            & np.isfinite(view.gearing)
+            & np.isfinite(table.specific_force)
+            & np.isfinite(table.gearing)
             & np.isfinite(self.reading)
             & np.isfinite(engine_speed)
         )

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from weighbridge.balance.law import ROAD_PARAMETERS, reading_columns, road_columns
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.errors import DriveError
 from weighbridge.signals import Bools, Floats
 
@@ -72,7 +72,7 @@ class TorqueFit:
 
 
 def build_rows(
-    view: MergedView,
+    table: ForceTable,
     regressor: Floats,
     engine_speed: Floats,
     *,
@@ -86,7 +86,7 @@ def build_rows(
 
     Parameters
     ----------
-    view : (n,) merged view of the drive
+    table : (n,) force table of the drive
     regressor : (n,) load [-], air-flow torque or measured torque [N m]
     engine_speed : (n,) [rad/s]
     mass : known mass [kg]
@@ -99,16 +99,16 @@ def build_rows(
     ----------
     Jensen et al. 2022, eqs. 3, 48, 49, with the drivetrain efficiency at one.
     """
-    gearing = view.gearing[rows]
+    gearing = table.gearing[rows]
     torque = reading_columns(
         np.ones(gearing.size), regressor[rows], engine_speed[rows], order=order, curved=curved
     )
     # Eq. 48 is the law over the gearing: torque on the left, what it moves on the right.
-    road = road_columns(view, mass, wheel_radius)[rows] / gearing[:, None]
+    road = road_columns(table, mass, wheel_radius)[rows] / gearing[:, None]
     return TorqueRows(
         design=np.hstack([torque, -road]),
-        target=mass * view.specific_force[rows] / gearing,
-        time=view.time[rows],
+        target=mass * table.specific_force[rows] / gearing,
+        time=table.time[rows],
     )
 
 

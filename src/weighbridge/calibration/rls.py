@@ -143,7 +143,7 @@ class _Search:
 
 def _pulling(rows: DelayedRows) -> DelayedRows:
     """Take the rows in which the vehicle gains speed, as the method weighs."""
-    return replace(rows, usable=rows.usable & (rows.view.accel > 0.0))
+    return replace(rows, usable=rows.usable & (rows.table.accel > 0.0))
 
 
 def torque_rows_of(problem: Problem, rows: Sequence[DelayedRows]) -> TorqueRows:
@@ -151,7 +151,7 @@ def torque_rows_of(problem: Problem, rows: Sequence[DelayedRows]) -> TorqueRows:
     return join_rows(
         [
             build_rows(
-                part.view,
+                part.table,
                 recording.reading,
                 part.engine_speed,
                 mass=recording.mass,
@@ -202,18 +202,18 @@ def _own_masses(
     time, phi, whole, rest, cold = [], [], [], [], []
     offset = 0.0
     for balance, mass in zip(balances, masses, strict=True):
-        view = balance.merged
-        x, target = regression(view, vehicle)
-        used = (view.reason == Reason.USED) & (view.accel > 0.0)
+        table = balance.table
+        x, target = regression(table, vehicle)
+        used = (table.reason == Reason.USED) & (table.accel > 0.0)
         used &= np.isfinite(x) & np.isfinite(target)
         if not used.any():
             continue
-        instants = view.time[used] - view.time[0]
-        cold.append((float(np.sum(x[used] ** 2)), cold_share(view.time, x, used)))
+        instants = table.time[used] - table.time[0]
+        cold.append((float(np.sum(x[used] ** 2)), cold_share(table.time, x, used)))
         time.append(instants + offset)
         phi.append(x[used] * mass)
         whole.append(target[used])
-        rest.append((view.traction_force - target)[used])
+        rest.append((table.traction_force - target)[used])
         offset += float(instants[-1]) + 1e3
     every = np.ones(sum(t.size for t in time), dtype=bool)
     joined = np.concatenate(time), np.concatenate(phi)

@@ -98,7 +98,7 @@ def self_weighed(
         for balance, mass in zip(rebalanced(problem, tried), problem.masses, strict=True):
             track = weigher.estimate(balance, tried)
             if np.isfinite(track.mass) and track.sensitivity is not None:
-                left = mass - weigher.burnt * float(balance.merged.fuel_burnt[-1])
+                left = mass - weigher.burnt * float(balance.table.fuel_burnt[-1])
                 ratios.append(track.mass / left)
                 stds.append(track.bound_std / left)
                 moved.append(track.sensitivity / left)

@@ -29,9 +29,9 @@ def force_columns(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Float
     (n, p + 4) for the torque coefficients, their curvature, slopes at the knots, C_d A, C_r,
     I_e, I_w, as `weighbridge.vehicle.model.Provenance.fit_cov` has them
     """
-    view = balance.merged
-    road = road_columns(view, mass - view.fuel_burnt, vehicle.driveline.wheel_radius)
-    return np.asarray(np.nan_to_num(np.hstack([torque_columns(view, vehicle), -road])))
+    table = balance.table
+    road = road_columns(table, mass - table.fuel_burnt, vehicle.driveline.wheel_radius)
+    return np.asarray(np.nan_to_num(np.hstack([torque_columns(table, vehicle), -road])))
 
 
 def sensitivity(

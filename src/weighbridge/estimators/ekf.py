@@ -68,17 +68,17 @@ class EkfSettings:
 
 def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Columns:
     """Collect what the filter needs of each row."""
-    view = balance.merged
+    table = balance.table
     return kernel.Columns(
-        time=view.time,
-        traction=view.traction_force,
-        drag=drag_factor(view, vehicle),
-        headwind=view.air_speed - view.speed,
-        rotating=rotating_mass(vehicle, view.gearing),
-        speed=view.speed,
-        grade=view.grade,
-        driven=valid & np.isfinite(view.grade),
-        standing=np.asarray(view.speed < SLOWEST),
+        time=table.time,
+        traction=table.traction_force,
+        drag=drag_factor(table, vehicle),
+        headwind=table.air_speed - table.speed,
+        rotating=rotating_mass(vehicle, table.gearing),
+        speed=table.speed,
+        grade=table.grade,
+        driven=valid & np.isfinite(table.grade),
+        standing=np.asarray(table.speed < SLOWEST),
     )
 
 
@@ -106,18 +106,18 @@ def parameters(settings: EkfSettings, vehicle: Vehicle, period: float) -> kernel
 
 
 def constant_mass(
-    table: kernel.Columns, chosen: slice, mass: float, params: kernel.MassEkfParams
+    rows: kernel.Columns, chosen: slice, mass: float, params: kernel.MassEkfParams
 ) -> float:
     """Mass of some rows over which it does not change [kg]: the filter's last word.
 
     Parameters
     ----------
-    table : of the drive
+    rows : of the drive
     chosen : its rows
     mass : to start from [kg]
     params : of the running filter
     """
-    part = kernel.Columns(*(values[chosen] for values in table))
+    part = kernel.Columns(*(values[chosen] for values in rows))
     if part.time.size == 0 or not np.isfinite(mass):
         return float("nan")
     still = params._replace(mass_walk=0.0, load_walk=0.0)
@@ -130,7 +130,7 @@ def filter_reason(balance: ForceBalance, valid: Bools, taken: Bools) -> NDArray[
 
     The first row of a stretch only says where the speed starts.
     """
-    reason = balance.merged.reason.copy()
+    reason = balance.table.reason.copy()
     reason[(reason == 0) & ~valid] = Reason.NO_MOTION
     first = valid & ~np.concatenate(([False], valid[:-1]))
     reason[valid & ~taken] = Reason.BAD_FIT
@@ -158,24 +158,24 @@ def estimate(
     Du et al. 2025, eqs. 21-33.
     """
     settings = settings or EkfSettings()
-    view = balance.merged
-    phi, y, valid = robust_rls.rows(view, vehicle, settings.start)
-    rls_params = robust_rls.parameters(settings.start, robust_rls.row_period(view.time))
+    table = balance.table
+    phi, y, valid = robust_rls.rows(table, vehicle, settings.start)
+    rls_params = robust_rls.parameters(settings.start, robust_rls.row_period(table.time))
     _, theta, _, information, mean_phi, mean_y, _ = rls_kernel.run(
-        robust_rls.initial_state(), view.time, phi, y, valid, rls_params
+        robust_rls.initial_state(), table.time, phi, y, valid, rls_params
     )
-    fit = robust_rls.window_fit(view.time, mean_phi, mean_y, rls_params)
-    params = parameters(settings, vehicle, robust_rls.row_period(view.time))
-    table = columns(balance, vehicle, valid)
+    fit = robust_rls.window_fit(table.time, mean_phi, mean_y, rls_params)
+    params = parameters(settings, vehicle, robust_rls.row_period(table.time))
+    rows = columns(balance, vehicle, valid)
     informed = np.flatnonzero(information * rls_params.window >= settings.start.first_information)
-    n = view.time.size
+    n = table.time.size
     mass, var, taken = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool)
     if informed.size:
         k = int(informed[0])
         start = kernel.initial_state(
-            theta[k], (settings.start_std * theta[k]) ** 2, kernel.row_at(table, k), params
+            theta[k], (settings.start_std * theta[k]) ** 2, kernel.row_at(rows, k), params
         )
-        _, mass, var, _, taken = kernel.run(start, table, k, params)
+        _, mass, var, _, taken = kernel.run(start, rows, k, params)
     return robust_rls.finish(
         "ekf",
         balance,
@@ -186,5 +186,5 @@ def estimate(
         spread=np.sqrt(var),
         phi=phi,
         y=y,
-        final=lambda chosen: constant_mass(table, chosen, fit.mass()[0], params),
+        final=lambda chosen: constant_mass(rows, chosen, fit.mass()[0], params),
     )

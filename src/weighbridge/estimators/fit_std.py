@@ -41,7 +41,7 @@ class Fitted:
     mass : [kg]
     scatter : its standard deviation by blocks of time [kg]
     blocks : how many
-    index : (m,) rows of the merged view, rising
+    index : (m,) rows of the force table, rising
     influence : (m,) what a newton at each row adds to the mass [kg/N]
     """
 
@@ -65,7 +65,7 @@ def slow_std(
     Parameters
     ----------
     balance, vehicle
-    index : (m,) rows of the merged view, rising
+    index : (m,) rows of the force table, rising
     influence : (m,) what a newton at each row adds to the mass [kg/N]
     mass : rough [kg]
 
@@ -80,17 +80,17 @@ def slow_std(
     Variance of a linear estimate under coloured noise: Gelb, Applied Optimal Estimation, 1974,
     ch. 4; Gauss-Markov covariance, ch. 3.8.
     """
-    view = balance.merged
+    table = balance.table
     if not (index.size and np.isfinite(mass) and mass > 0.0):
         return float("inf"), 0.0
-    rows, _ = design(view, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
-    highest = highest_torque(view.torque[index])
+    rows, _ = design(table, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
+    highest = highest_torque(table.torque[index])
     std = prior_std(_known_road_load(vehicle), mass, highest)
     # The methods that ask have `weighbridge.estimators.judging.consider_std` for the cold.
     std[COLD] = 0.0
     effect = influence[:, None] * np.nan_to_num(rows[index])
     whole = effect.sum(axis=0)
-    time = view.time[index]
+    time = table.time[index]
     number = ((time - time[0]) // BIN).astype(np.int64)
     passing = 0.0
     for k in range(1, LASTING):
@@ -170,12 +170,12 @@ def judged(
     """
     passing, lasting = slow_std(balance, vehicle, fitted.index, fitted.influence, fitted.mass)
     inertial = balance.motion.source == "inertial"
-    noisy = row_noise_std(balance.merged, phi, used, method) if inertial else 0.0
+    noisy = row_noise_std(balance.table, phi, used, method) if inertial else 0.0
     passing = float(np.hypot(passing, fitted.mass * noisy))
     left = float(np.hypot(fitted.mass * slow, lasting))
     std, freedom = honest_std(fitted.scatter, fitted.blocks, passing, left)
     evidence = Evidence(
-        view=balance.merged,
+        table=balance.table,
         used=used,
         phi=phi,
         mass=fitted.mass,

@@ -65,14 +65,14 @@ def estimate(
     Du et al. 2025, eq. 34.
     """
     settings = settings or HybridSettings()
-    view = balance.merged
-    phi, y, valid = robust_rls.rows(view, vehicle, settings.ekf.start)
-    params = parameters(settings, vehicle, robust_rls.row_period(view.time))
-    table = ekf.columns(balance, vehicle, valid)
+    table = balance.table
+    phi, y, valid = robust_rls.rows(table, vehicle, settings.ekf.start)
+    params = parameters(settings, vehicle, robust_rls.row_period(table.time))
+    rows = ekf.columns(balance, vehicle, valid)
     start = kernel.initial_state(robust_rls.initial_state(), params)  # type: ignore[no-untyped-call]
-    _, mass, var, share, _, _, mean_phi, mean_y, _, _ = kernel.run(start, table, phi, y, params)
-    fit = robust_rls.window_fit(view.time, mean_phi, mean_y, params.rls)
-    reason = robust_rls.window_reason(view, valid, mean_phi)
+    _, mass, var, share, _, _, mean_phi, mean_y, _, _ = kernel.run(start, rows, phi, y, params)
+    fit = robust_rls.window_fit(table.time, mean_phi, mean_y, params.rls)
+    reason = robust_rls.window_reason(table, valid, mean_phi)
     counted = np.where(reason == 0, np.nan_to_num(phi) ** 2, 0.0)
 
     def final(chosen: slice) -> float:
@@ -80,9 +80,9 @@ def estimate(
         if not weight.sum() > 0.0:
             return float("nan")
         mean_share = float(np.average(share[chosen], weights=weight))
-        time = view.time[chosen]
+        time = table.time[chosen]
         fitted = fit.mass(float(time[0]), float(time[-1]))[0]
-        filtered = ekf.constant_mass(table, chosen, fit.mass()[0], params.ekf)
+        filtered = ekf.constant_mass(rows, chosen, fit.mass()[0], params.ekf)
         return mean_share * fitted + (1.0 - mean_share) * filtered
 
     return robust_rls.finish(

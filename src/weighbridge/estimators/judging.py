@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import windows
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
@@ -92,7 +92,7 @@ def consider_std(balance: ForceBalance, phi: Floats, used: Bools, vehicle: Vehic
     as much as `TorqueSource.cold_std` where all that was learnt is from the first `WARMING`
     of driving.
     """
-    share = cold_share(balance.merged.time, phi, used)
+    share = cold_share(balance.table.time, phi, used)
     cold = share * source_of(vehicle).cold_std
     return float(np.hypot(calibration_std(balance, vehicle), cold))
 
@@ -141,7 +141,7 @@ class Evidence:
 
     Attributes
     ----------
-    view : the rows
+    table : the rows
     used : (n,) those the mass is made from
     phi : (n,) regressor of the mass [m/s^2]
     mass, std : [kg]
@@ -151,7 +151,7 @@ class Evidence:
     motion : the rows are of; tells why few of them count
     """
 
-    view: MergedView
+    table: ForceTable
     used: Bools
     phi: Floats
     mass: float
@@ -181,13 +181,13 @@ class Evidence:
     @property
     def used_time(self) -> float:
         """Time of the used rows [s]."""
-        time = self.view.time
+        time = self.table.time
         return float(np.count_nonzero(self.used) * np.median(np.diff(time)))
 
     @property
     def spread(self) -> float:
         """Standard deviation of the regressor, of means over `windows` of used rows [m/s^2]."""
-        cut = windows(self.view.time, self.used & np.isfinite(self.phi))
+        cut = windows(self.table.time, self.used & np.isfinite(self.phi))
         return float(np.std(cut.mean(self.phi))) if cut.count.size else 0.0
 
 
@@ -208,10 +208,10 @@ _PASSED: Final = (Status.CONVERGED, "")
 
 
 def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, str]:
-    view, count = found.view, int(np.count_nonzero(found.used))
+    table, count = found.table, int(np.count_nonzero(found.used))
     if count >= FEWEST_ROWS and found.blocks >= FEWEST_BLOCKS:
         return _PASSED
-    reasons, share = np.unique(view.reason[view.reason != 0], return_counts=True)
+    reasons, share = np.unique(table.reason[table.reason != 0], return_counts=True)
     most = Reason(int(reasons[np.argmax(share)])).text if reasons.size else "too short"
     return Status.NOT_EXCITED, (
         f"only {count} usable samples, in {found.blocks} stretch(es) of time; "
@@ -326,14 +326,14 @@ def segments(
     used : (n,)
     weigh_part : mass and standard deviation of some rows by their scatter alone [kg]
     """
-    view = balance.merged
+    table = balance.table
     slow = consider_std(balance, phi, np.zeros_like(used), vehicle)
     low, high = vehicle.of_class.mass_range
-    begin = float(view.time[used][0]) if used.any() else 0.0
-    time = view.time
+    begin = float(table.time[used][0]) if used.any() else 0.0
+    time = table.time
     if time.size < 2:
         return ()
-    moving = np.nan_to_num(view.speed) > 0.5
+    moving = np.nan_to_num(table.speed) > 0.5
     starts = np.flatnonzero(np.diff(np.concatenate(([False], moving))) & moving)
     edges = [0]
     for k in starts:
@@ -369,11 +369,11 @@ def nothing(
     stretches: int,
 ) -> MassTrack:
     """Return the track of a drive that has too few usable rows for any estimate."""
-    view = balance.merged
-    unknown = np.full(view.time.size, np.nan)
+    table = balance.table
+    unknown = np.full(table.time.size, np.nan)
     used = reason == Reason.USED
     none = Evidence(
-        view=view,
+        table=table,
         used=np.zeros_like(used),
         phi=unknown,
         mass=float("nan"),

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.navigation.motion import noise_level
 from weighbridge.signals import Bools, Floats
 
@@ -53,17 +53,17 @@ MOST: Final = 0.07
 """Above this a method that takes the motion as exact gives no mass [-]."""
 
 
-def row_noise_std(view: MergedView, phi: Floats, used: Bools, method: str) -> float:
+def row_noise_std(table: ForceTable, phi: Floats, used: Bools, method: str) -> float:
     """Relative standard deviation of a mass by a method that takes the motion as exact [-].
 
     Parameters
     ----------
-    view : the rows
+    table : the rows
     phi : (n,) regressor of the mass [m/s^2]
     used : (n,)
     method : of `ROW_SHARE`; another one is taken to lose the most
     """
-    moving = view.specific_force[np.isfinite(view.specific_force) & (view.speed > ROW_FAST)]
+    moving = table.specific_force[np.isfinite(table.specific_force) & (table.speed > ROW_FAST)]
     if not used.any() or moving.size < 10:
         return 0.0
     part = noise_level(moving) ** 2 / float(np.mean(phi[used] ** 2))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from weighbridge.balance.law import force_on_mass, mass_column
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 
 
-def regression(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
+def regression(table: ForceTable, vehicle: Vehicle) -> tuple[Floats, Floats]:
     """Regressor and right-hand side of the mass (Jensen 2022, eqs. 5, 6).
 
     Returns
@@ -16,4 +16,4 @@ def regression(view: MergedView, vehicle: Vehicle) -> tuple[Floats, Floats]:
     phi : (n,) [m/s^2]
     y : (n,) [N]
     """
-    return mass_column(view, vehicle), force_on_mass(view, vehicle)
+    return mass_column(table, vehicle), force_on_mass(table, vehicle)

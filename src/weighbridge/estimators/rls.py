@@ -90,23 +90,23 @@ def estimate(
     Annals of Statistics 17, 1989.
     """
     settings = settings or RlsSettings()
-    view = balance.merged
-    phi, y = regression(view, vehicle)
-    reason = view.reason.copy()
-    reason[(reason == 0) & (view.accel <= 0.0)] = Reason.NOT_ACCELERATING
+    table = balance.table
+    phi, y = regression(table, vehicle)
+    reason = table.reason.copy()
+    reason[(reason == 0) & (table.accel <= 0.0)] = Reason.NOT_ACCELERATING
     reason[(reason == 0) & ~(np.isfinite(phi) & np.isfinite(y))] = Reason.NO_MOTION
     valid = reason == 0
-    period = float(np.median(np.diff(view.time))) if view.time.size > 1 else 1.0 / PAPER_RATE
+    period = float(np.median(np.diff(table.time))) if table.time.size > 1 else 1.0 / PAPER_RATE
     state = kernel.initial_state(  # type: ignore[no-untyped-call]
         [settings.initial_mass], [[settings.initial_gain]]
     )
     state, theta, var, _, taken = kernel.run(
-        state, view.time, phi[:, None], y, valid, parameters(settings, period)
+        state, table.time, phi[:, None], y, valid, parameters(settings, period)
     )
     reason[valid & ~taken] = Reason.BAD_FIT
     used = reason == Reason.USED
 
-    mass, spread, blocks = block_jackknife(view.time, phi, y, used)
+    mass, spread, blocks = block_jackknife(table.time, phi, y, used)
     slow = consider_std(balance, phi, used, vehicle)
     fitted = Fitted(
         mass=mass,
@@ -121,7 +121,7 @@ def estimate(
     running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)
 
     def part(rows: slice) -> tuple[float, float]:
-        return block_jackknife(view.time[rows], phi[rows], y[rows], used[rows], 20.0)[:2]
+        return block_jackknife(table.time[rows], phi[rows], y[rows], used[rows], 20.0)[:2]
 
     return MassTrack(
         method="rls",
@@ -135,7 +135,7 @@ def estimate(
         left_std=found.left,
         degrees_of_freedom=found.degrees_of_freedom,
         bound_std=_bound(phi, residual, used),
-        converged_at=converged_at(view.time, running, mass, used),
+        converged_at=converged_at(table.time, running, mass, used),
         status=found.status,
         why=found.why,
         segments=segments(balance, vehicle, phi, used, part),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged
@@ -86,7 +86,7 @@ class RobustRlsSettings:
 
 
 def rows(
-    view: MergedView, vehicle: Vehicle, settings: RobustRlsSettings
+    table: ForceTable, vehicle: Vehicle, settings: RobustRlsSettings
 ) -> tuple[Floats, Floats, Bools]:
     """Regressor, right-hand side and what is usable of both.
 
@@ -96,10 +96,10 @@ def rows(
     y : (n,) [N]
     valid : (n,) no reason against the row, and finite numbers
     """
-    phi, y = regression(view, vehicle)
+    phi, y = regression(table, vehicle)
     if settings.count_grade_twice:
-        phi = phi + GRAVITY * np.sin(view.grade)
-    return phi, y, np.asarray(view.usable & np.isfinite(phi) & np.isfinite(y))
+        phi = phi + GRAVITY * np.sin(table.grade)
+    return phi, y, np.asarray(table.usable & np.isfinite(phi) & np.isfinite(y))
 
 
 def row_period(time: Floats) -> float:
@@ -131,9 +131,9 @@ def initial_state() -> kernel.RobustRlsState:
     return kernel.initial_state(0.0, 1e-9)  # type: ignore[no-untyped-call,no-any-return]
 
 
-def window_reason(view: MergedView, valid: Bools, mean_phi: Floats) -> NDArray[np.uint8]:
+def window_reason(table: ForceTable, valid: Bools, mean_phi: Floats) -> NDArray[np.uint8]:
     """Reasons of the rows: `Reason.TOO_SHORT` for those of windows that never filled."""
-    reason = view.reason.copy()
+    reason = table.reason.copy()
     reason[(reason == 0) & ~valid] = Reason.NO_MOTION
     folded = np.isfinite(mean_phi)
     # Rows of a window share what became of it: it ends at a fold or at an interruption.
@@ -273,19 +273,19 @@ def estimate(
     Du et al. 2025, eqs. 13-20.
     """
     settings = settings or RobustRlsSettings()
-    view = balance.merged
-    phi, y, valid = rows(view, vehicle, settings)
-    params = parameters(settings, row_period(view.time))
+    table = balance.table
+    phi, y, valid = rows(table, vehicle, settings)
+    params = parameters(settings, row_period(table.time))
     _, running, var, information, mean_phi, mean_y, _ = kernel.run(
-        initial_state(), view.time, phi, y, valid, params
+        initial_state(), table.time, phi, y, valid, params
     )
     informed = information * params.window >= settings.first_information
     return finish(
         "robust-rls",
         balance,
         vehicle,
-        window_fit(view.time, mean_phi, mean_y, params),
-        window_reason(view, valid, mean_phi),
+        window_fit(table.time, mean_phi, mean_y, params),
+        window_reason(table, valid, mean_phi),
         running=np.where(informed, running, np.nan),
         spread=np.sqrt(var),
         phi=phi,
@@ -318,14 +318,14 @@ def finish(
     phi, y : (n,) regressor and right-hand side
     final : mass of some rows [kg]; that of ``fit`` when None
     """
-    view = balance.merged
+    table = balance.table
     if fit.time.size < FEWEST_WINDOWS or not np.isfinite(running).any():
         return nothing(method, balance, vehicle, reason, int(fit.time.size))
     used = reason == Reason.USED
     fitted, scatter, blocks = fit.mass()
-    mass = fitted if final is None else final(slice(0, view.time.size))
+    mass = fitted if final is None else final(slice(0, table.time.size))
     slow = consider_std(balance, phi, used, vehicle)
-    index = np.maximum(np.searchsorted(view.time, fit.time, side="right") - 1, 0)
+    index = np.maximum(np.searchsorted(table.time, fit.time, side="right") - 1, 0)
     # What holds an offset of the force knows it; a filter without one takes it for mass.
     influence = fit.influence if final is None else fit.phi / np.sum(fit.phi**2)
     weighed = Fitted(mass=mass, scatter=scatter, blocks=blocks, index=index, influence=influence)
@@ -334,7 +334,7 @@ def finish(
     passing = np.hypot(slow, UNMODELLED_STD)
 
     def part(chosen: slice) -> tuple[float, float]:
-        time = view.time[chosen]
+        time = table.time[chosen]
         fitted, std, _ = fit.mass(float(time[0]), float(time[-1]))
         return (fitted if final is None else final(chosen)), std
 
@@ -350,7 +350,7 @@ def finish(
         left_std=found.left,
         degrees_of_freedom=found.degrees_of_freedom,
         bound_std=fit.bound,
-        converged_at=converged_at(view.time, running, mass, used),
+        converged_at=converged_at(table.time, running, mass, used),
         status=found.status,
         why=found.why,
         segments=segments(balance, vehicle, phi, used, part),

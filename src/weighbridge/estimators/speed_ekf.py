@@ -116,7 +116,7 @@ def run_filter(
         params = params._replace(process_var=constant)
         cov = np.diag([0.0, 1.0 / mass**2, settings.process_var[2]])
         state = state._replace(cov=cov)
-    view = balance.merged
+    view = balance.table
     used = view.reason == Reason.USED
     speed = np.nan_to_num(view.speed)
     _, x, var, innovation, innovation_var = kernel.run(state, speed, used, params)
@@ -185,7 +185,7 @@ def estimate(
     settings = settings or SpeedEkfSettings()
     model = model_of(vehicle)
     done = run_filter(balance, vehicle, settings)
-    view = balance.merged
+    view = balance.table
     used = done.used
     count = int(np.count_nonzero(used))
     mass, std, share, bound = float("nan"), float("inf"), float("nan"), float("nan")

@@ -8,7 +8,7 @@ import numpy as np
 
 from weighbridge.balance import ForceBalance, law
 from weighbridge.balance.instants import behind
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.joint.slow_errors import RESISTANCE_STD
 from weighbridge.kernels import speed_torque_ekf as kernel
@@ -51,7 +51,7 @@ def sampled(
     time : (n,) of the samples [s]
     table : what `weighbridge.kernels.speed_torque_ekf.run` reads
     """
-    motion, view = balance.motion, balance.merged
+    motion, table = balance.motion, balance.table
     lag = vehicle.timing.torque_lag
     smooth, raw = motion.speed, motion.speed
     if motion.measured_speed is not None:
@@ -62,44 +62,44 @@ def sampled(
     time = motion.time[every]
     between = np.maximum(np.diff(time, prepend=time[0]), 1e-9)
     accel = np.diff(smooth[every], prepend=smooth[0]) / between
-    known = _known(view)
+    known = _known(table)
     nothing = np.zeros(time.size)
 
     def mean(values: Floats) -> Floats:
         filled = np.where(known, np.nan_to_num(values), 0.0)
-        return span_means(view.time, filled, time) if view.time.size > 1 else nothing
+        return span_means(table.time, filled, time) if table.time.size > 1 else nothing
 
-    period = float(np.median(np.diff(view.time))) if view.time.size > 1 else np.inf
-    columns = [mean(c) for c in constant_columns(view, vehicle)] if constant_errors else []
+    period = float(np.median(np.diff(table.time))) if table.time.size > 1 else np.inf
+    columns = [mean(c) for c in constant_columns(table, vehicle)] if constant_errors else []
     return time, kernel.Columns(
         length=np.diff(time, prepend=time[0]),
         speed=np.where(motion.valid[every], raw[every], np.nan),
-        force=mean(view.traction_force),
+        force=mean(table.traction_force),
         # White noise of the rows: its mean over a span falls with the rows in it.
-        force_var=mean(view.force_std**2) * period / between,
-        drag=mean(law.drag_factor(view, vehicle)),
-        headwind=mean(view.air_speed - view.speed),
-        rotating=mean(law.rotating_mass(vehicle, view.gearing)),
-        grade=mean(view.grade) if measured_grade else nothing,
+        force_var=mean(table.force_std**2) * period / between,
+        drag=mean(law.drag_factor(table, vehicle)),
+        headwind=mean(table.air_speed - table.speed),
+        rotating=mean(law.rotating_mass(vehicle, table.gearing)),
+        grade=mean(table.grade) if measured_grade else nothing,
         accel=accel if measured_jacobian else np.full(time.size, np.nan),
         columns=np.ascontiguousarray(np.column_stack(columns) if columns else nothing[:, :0]),
-        on=covered(view.time, known, time),
+        on=covered(table.time, known, time),
     )
 
 
-def _known(view: MergedView) -> Bools:
-    return np.asarray(view.usable & np.isfinite(view.traction_force) & np.isfinite(view.gearing))
+def _known(table: ForceTable) -> Bools:
+    return np.asarray(table.usable & np.isfinite(table.traction_force) & np.isfinite(table.gearing))
 
 
-def constant_columns(view: MergedView, vehicle: Vehicle) -> list[Floats]:
+def constant_columns(table: ForceTable, vehicle: Vehicle) -> list[Floats]:
     """Columns (n,) of the errors of the force that last as long as the drive [N per unit].
 
     Drag area and friction of a cold start in the reading; of a data sheet offset of the torque and
     its growth with engine speed as well.
     """
-    columns = [law.drag_column(view), law.cold_torque_column(view)]
+    columns = [law.drag_column(table), law.cold_torque_column(table)]
     if by_data_sheet(vehicle):
-        columns += [law.torque_offset_column(view), law.torque_growth_column(view)]
+        columns += [law.torque_offset_column(table), law.torque_growth_column(table)]
     return columns
 
 

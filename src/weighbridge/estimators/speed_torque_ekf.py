@@ -283,8 +283,8 @@ def initial_state(
 
 def constant_std(balance: ForceBalance, vehicle: Vehicle) -> Floats:
     """Standard deviations of the errors of `constant_columns` before the drive has told (k,)."""
-    view = balance.merged
-    torque = highest_torque(view.torque[view.usable])
+    table = balance.table
+    torque = highest_torque(table.torque[table.usable])
     stds = [vehicle.road.drag_area.std, source_of(vehicle).cold_torque_std * torque]
     if by_data_sheet(vehicle):
         stds += offset_std(vehicle, torque)
@@ -342,35 +342,35 @@ def estimate(
     Information Theory 11, 1965. Consider parameters: Schmidt, 1966.
     """
     settings = settings or SpeedTorqueSettings()
-    view = balance.merged
+    table = balance.table
     done = run_filter(balance, vehicle, settings)
-    span = span_of(view.time, done.time)
+    span = span_of(table.time, done.time)
     reason = _reasons(balance, done, span)
     used = reason == Reason.USED
     stretches = int(np.unique(done.time[done.taken] // STRETCH).size)
     if not used.any():
         return nothing(METHOD, balance, vehicle, reason, stretches)
-    phi, _ = regression(view, vehicle)
+    phi, _ = regression(table, vehicle)
     mass = done.mass
     moved = sensitivity(balance, vehicle, settings, done)
     left = math.hypot(
         systematic_std(balance, vehicle),
-        inertia_relative_std(vehicle, mass, view.accel, phi, used) if mass > 0.0 else 0.0,
+        inertia_relative_std(vehicle, mass, table.accel, phi, used) if mass > 0.0 else 0.0,
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
     )
     std = math.hypot(UNMODELLED * done.std, mass * left)
     evidence = Evidence(
-        view=view, used=used, phi=phi, mass=mass, std=std, blocks=stretches, left=abs(mass) * left
+        table=table, used=used, phi=phi, mass=mass, std=std, blocks=stretches, left=abs(mass) * left
     )
     status, why = judge(evidence, vehicle)
-    before = np.searchsorted(done.time, view.time, side="right") - 1
+    before = np.searchsorted(done.time, table.time, side="right") - 1
     begun = np.cumsum(done.taken)[np.maximum(before, 0)] > 0
     running = np.where(begun, done.running_mass[np.maximum(before, 0)], np.nan)
     spread = UNMODELLED * done.running_std[np.maximum(before, 0)]
     pull = done.innovation * mass / np.maximum(done.table.length, 1e-9)
 
     def part(chosen: slice) -> tuple[float, float]:
-        return _mass_of_part(balance, vehicle, settings, done, view.time[chosen])
+        return _mass_of_part(balance, vehicle, settings, done, table.time[chosen])
 
     return MassTrack(
         method=METHOD,
@@ -384,7 +384,7 @@ def estimate(
         left_std=abs(mass) * left,
         degrees_of_freedom=float("inf"),
         bound_std=done.std,
-        converged_at=converged_at(view.time, running, mass, used),
+        converged_at=converged_at(table.time, running, mass, used),
         status=status,
         why=why,
         segments=segments(balance, vehicle, phi, used, part),
@@ -394,9 +394,9 @@ def estimate(
 
 def _reasons(balance: ForceBalance, done: FilterRun, span: NDArray[np.int64]) -> NDArray[np.uint8]:
     """Why a row did not count: left out by the gate, or its span holds rows that are not usable."""
-    reason = balance.merged.reason.copy()
-    usable = balance.merged.usable
-    inside = (balance.merged.time > done.time[0]) & (balance.merged.time <= done.time[-1])
+    reason = balance.table.reason.copy()
+    usable = balance.table.usable
+    inside = (balance.table.time > done.time[0]) & (balance.table.time <= done.time[-1])
     predicted = np.isfinite(done.innovation)
     reason[usable & ~predicted[span]] = Reason.TOO_SHORT
     reason[usable & predicted[span] & ~done.taken[span]] = Reason.BAD_FIT
@@ -424,14 +424,14 @@ def sensitivity(
     The filter is run again with the force moved by a small part along each column of
     `weighbridge.estimators.considered.force_columns`.
     """
-    view = balance.merged
+    table = balance.table
     size = float(np.sqrt(np.mean(done.table.force**2)))
     start = initial_state(balance, vehicle, settings, done.mass, done.params)
     still = done.table._replace(on=done.table.on & (done.taken | ~np.isfinite(done.innovation)))
     params = done.params._replace(gate=math.inf)
     moved = []
     for column in force_columns(balance, vehicle, done.mass).T:
-        mean = span_means(view.time, np.where(view.usable, column, 0.0), done.time)
+        mean = span_means(table.time, np.where(table.usable, column, 0.0), done.time)
         scale = float(np.sqrt(np.mean(mean**2)))
         if not (scale > 0.0 and size > 0.0):
             moved.append(0.0)
@@ -439,8 +439,8 @@ def sensitivity(
         by = TRIED * size / scale
         ends = []
         for sign in (-1.0, 1.0):
-            table = still._replace(force=still.force + sign * by * mean)
-            end = kernel.run(start, table, params)[0]
+            moved = still._replace(force=still.force + sign * by * mean)
+            end = kernel.run(start, moved, params)[0]
             ends.append(1.0 / float(end.x[kernel.INVERSE]))
         moved.append((ends[1] - ends[0]) / (2.0 * by))
     return np.array(moved)

@@ -51,7 +51,7 @@ class MassTrack:
     Attributes
     ----------
     method : name of the estimator
-    balance : what it was made from; the rows are those of its merged view
+    balance : what it was made from; the rows are those of its force table
     running_mass, running_std : (n,) as the rows until then have it; motion and levels of noise
         are those of the whole drive [kg]
     residual : (n,) measured force minus the model's at the final mass [N];
@@ -98,7 +98,7 @@ class MassTrack:
     @property
     def time(self) -> Floats:
         """(n,) instants of the rows [s]."""
-        return self.balance.merged.time
+        return self.balance.table.time
 
     @property
     def used(self) -> Bools:

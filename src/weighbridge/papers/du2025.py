@@ -453,7 +453,7 @@ def mass_panel(
 
 def motion_panels(balance: ForceBalance) -> list[Panel]:
     """Draw torque, speed and acceleration of a drive."""
-    view = balance.merged
+    view = balance.table
     rows = slice(None, None, max(1, view.time.size // 1500))
     drawn = []
     for letter, name, unit, values in (

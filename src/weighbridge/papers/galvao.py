@@ -421,7 +421,7 @@ def comparisons(done: Reproduction) -> tuple[Comparison, ...]:
 
 def _panels(test: Test) -> list[Panel]:
     """Draw figs. 7 to 15 for one test: model speed, mass and error."""
-    minutes = from_si(test.balance.merged.time - test.balance.motion.time[0], "min")
+    minutes = from_si(test.balance.table.time - test.balance.motion.time[0], "min")
     name = f"Test {test.number:02d}"
     used = test.ours.used
     speed = blank("Time [min]", "Speed [km/h]")

@@ -341,7 +341,7 @@ def sensitivity(
     if weighing.result is None:
         raise ValueError("nothing was weighed")
     balance, vehicle = weighing.result.balance, weighing.vehicle
-    view = balance.merged
+    view = balance.table
     heading = np.where(np.isfinite(view.heading), view.heading, 0.0)
     along = view.speed + wind_speed * np.cos(wind_from - heading)
     changed = replace(view, air_speed=along)
@@ -353,7 +353,7 @@ def sensitivity(
             rolling_coefficient=rolling * vehicle.road.rolling_coefficient.value,
         ),
     )
-    return estimate(replace(balance, merged=changed), car).running_mass
+    return estimate(replace(balance, table=changed), car).running_mass
 
 
 def reproduced(seed: int, progress: Progress | None) -> Reproduced:

@@ -17,7 +17,7 @@ import numpy as np
 
 from weighbridge.balance import force_balance
 from weighbridge.balance.averaging import FEWEST, PAUSE, WINDOW
-from weighbridge.balance.table import MOVING, MergedView
+from weighbridge.balance.table import MOVING, ForceTable
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.joint import forward as joint_forward
 from weighbridge.estimators.joint.forward import (
@@ -112,7 +112,7 @@ def identify_forward(weighing: Weighing) -> ForwardSetup:
             f"{drive.name}: a forward pass needs accel_x..z and gyro_x..z, and this drive was "
             f"weighed by {motion.source}"
         )
-    time = result.balance.merged.time
+    time = result.balance.table.time
     return ForwardSetup(
         vehicle=vehicle,
         navigation=_holding(navigation, motion.squat),
@@ -247,31 +247,31 @@ def step(
     except DriveError:
         # No torque came for long: the rows go on with the next one.
         return state, NO_WINDOWS
-    view = balance.merged
+    table = balance.table
     horizon = float(moved.motion.time[-1]) - AHEAD
-    first, last = view.time.searchsorted([state.read, horizon], side="right")
+    first, last = table.time.searchsorted([state.read, horizon], side="right")
     if last <= first:
         return state, NO_WINDOWS
-    return _folded(state, view, slice(int(first), int(last)), setup)
+    return _folded(state, table, slice(int(first), int(last)), setup)
 
 
 def _folded(
-    state: ForwardState, view: MergedView, new: slice, setup: ForwardSetup
+    state: ForwardState, table: ForceTable, new: slice, setup: ForwardSetup
 ) -> tuple[ForwardState, Running]:
     """Fold new rows of the table into windows, and complete windows into the filter."""
     sizes = setup.joint
-    burnt = view.fuel_burnt + (state.burnt - view.fuel_burnt[max(new.start - 1, 0)])
-    moving = np.nan_to_num(view.speed) > MOVING
+    burnt = table.fuel_burnt + (state.burnt - table.fuel_burnt[max(new.start - 1, 0)])
+    moving = np.nan_to_num(table.speed) > MOVING
     begun = state.begun
     if begun is None and moving[new].any():
-        begun = float(view.time[new][np.argmax(moving[new])])
-    view = replace(view, fuel_burnt=burnt, begun=begun)
-    rows, y = design(view, setup.vehicle, squat_accel=sizes.body.squat_accel(view.accel))
-    values = np.column_stack([view.time, y, view.force_std**2, rows])
+        begun = float(table.time[new][np.argmax(moving[new])])
+    table = replace(table, fuel_burnt=burnt, begun=begun)
+    rows, y = design(table, setup.vehicle, squat_accel=sizes.body.squat_accel(table.accel))
+    values = np.column_stack([table.time, y, table.force_std**2, rows])
     windows, means, count, stood = window_means.run(
         state.windows,
-        np.ascontiguousarray(view.time[new]),
-        usable_rows(view, rows, y)[new],
+        np.ascontiguousarray(table.time[new]),
+        usable_rows(table, rows, y)[new],
         moving[new],
         values[new],
         window_means.WindowParams(
@@ -286,11 +286,11 @@ def _folded(
         window = Window(float(mean[0]), mean[3:], float(mean[1]), float(mean[2] / many), stood[k])
         joint = joint_forward.step(joint, window, sizes)
         mass[k], std[k] = joint.mass, joint.std(sizes)
-    light = np.interp(means[:, 0], view.time, burnt)
+    light = np.interp(means[:, 0], table.time, burnt)
     after = state._replace(
         windows=windows,
         joint=joint,
-        read=float(view.time[new][-1]),
+        read=float(table.time[new][-1]),
         burnt=float(burnt[new][-1]),
         begun=begun,
     )

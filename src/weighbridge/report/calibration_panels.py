@@ -76,10 +76,10 @@ def ratio_panel(calibration: Calibration) -> Panel:
 
 def gear_panel(calibration: Calibration) -> Panel:
     """Engine speed over vehicle speed with the gears' lines (fig. 7)."""
-    speed = np.concatenate([b.merged.speed for b in calibration.balances])
-    engine = np.concatenate([b.merged.engine_speed for b in calibration.balances])
-    gear = np.concatenate([b.merged.gear for b in calibration.balances])
-    reason = np.concatenate([b.merged.reason for b in calibration.balances])
+    speed = np.concatenate([b.table.speed for b in calibration.balances])
+    engine = np.concatenate([b.table.engine_speed for b in calibration.balances])
+    gear = np.concatenate([b.table.gear for b in calibration.balances])
+    reason = np.concatenate([b.table.reason for b in calibration.balances])
     known = np.isfinite(speed) & np.isfinite(engine)
     if not known.any():
         return Panel(

@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.balance import Reason
 from weighbridge.balance.averaging import windows
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.estimators import MassTrack
 from weighbridge.report.style import (
     AXIS,
@@ -131,25 +131,25 @@ def information_gained(result: MassTrack) -> Gained | None:
     slow = result.slow_errors
     if slow is None or slow.time.size == 0:
         return None
-    view = result.balance.merged
-    cut = windows(view.time, windowed_rows(result))
+    table = result.balance.table
+    cut = windows(table.time, windowed_rows(result))
     starts = np.array([s.start for s in result.segments[1:]])
     load = np.searchsorted(starts, slow.time, side="right")
     gain = np.zeros(slow.time.size)
     for k in np.unique(load):
         rows = load == k
         gain[rows] = _net_gain(1.0 / slow.mass_bound[rows] ** 2)
-    period = float(np.median(np.diff(view.time)))
+    period = float(np.median(np.diff(table.time)))
     return Gained(
         time=slow.time,
         duration=np.asarray(cut.count * period, dtype=np.float64),
         gain=gain / gain.sum(),
         manoeuvre=manoeuvres(
             slow.time,
-            cut.mean(view.speed),
-            cut.mean(view.accel),
-            cut.mean(np.tan(view.grade)),
-            shift_times(view),
+            cut.mean(table.speed),
+            cut.mean(table.accel),
+            cut.mean(np.tan(table.grade)),
+            shift_times(table),
         ),
     )
 
@@ -157,7 +157,7 @@ def information_gained(result: MassTrack) -> Gained | None:
 def windowed_rows(result: MassTrack) -> Bools:
     """Rows that the joint estimator cut into windows: taken, too short a stretch, or a bad fit."""
     kept = np.isin(result.reason, (Reason.USED, Reason.TOO_SHORT, Reason.BAD_FIT))
-    return np.asarray(result.balance.merged.usable & kept)
+    return np.asarray(result.balance.table.usable & kept)
 
 
 def manoeuvres(time: Floats, speed: Floats, accel: Floats, slope: Floats, shifts: Floats) -> Ints:
@@ -192,10 +192,10 @@ def manoeuvres(time: Floats, speed: Floats, accel: Floats, slope: Floats, shifts
     )
 
 
-def shift_times(view: MergedView) -> Floats:
+def shift_times(table: ForceTable) -> Floats:
     """Instants at which another gear than the last known one is in (k,) [s]."""
-    known = np.flatnonzero(view.gear > 0)
-    return np.asarray(view.time[known[1:]][np.diff(view.gear[known]) != 0])
+    known = np.flatnonzero(table.gear > 0)
+    return np.asarray(table.time[known[1:]][np.diff(table.gear[known]) != 0])
 
 
 def information_section(weighing: MassResult) -> Section:

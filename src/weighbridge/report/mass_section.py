@@ -131,7 +131,7 @@ def speed_panel(weighing: MassResult) -> Panel:
         x=x, y=y, mode="lines", name="speed", line={"color": GREY, "width": 1}, hoverinfo="skip"
     )
     time = minutes(weighing.drive, result.time)
-    rows = from_si(result.balance.merged.speed, "kmh")
+    rows = from_si(result.balance.table.speed, "kmh")
     total = result.reason.size
     for reason in Reason:
         those = result.reason == reason
@@ -165,7 +165,7 @@ def fit_panel(weighing: MassResult) -> Panel:
     result = weighing.result
     if result is None or not result.used.any():
         return Panel(title=title, absent="no force over specific force: not one sample was used.")
-    phi, y = regression(result.balance.merged, weighing.vehicle)
+    phi, y = regression(result.balance.table, weighing.vehicle)
     known = result.used & np.isfinite(phi) & np.isfinite(y)
     if not known.any():
         return Panel(title=title, absent="no force over specific force: the grade is not known.")

@@ -220,7 +220,7 @@ def _truth(weighing: MassResult, truth: Mapping[str, float]) -> float | None:
     mass = None if weighing.load_changed else weighing.drive.info.mass
     result = weighing.result
     if mass is not None and result is not None and weighing.estimator.reckons_fuel:
-        mass -= float(result.balance.merged.fuel_burnt[-1])
+        mass -= float(result.balance.table.fuel_burnt[-1])
     return truth.get(weighing.drive.name, mass)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.estimators import MassTrack
 from weighbridge.report.methods_section import method_style
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots
@@ -40,7 +40,7 @@ class _Against:
     ----------
     name : in words
     axis : title of the axis, with the unit
-    values : of it, one per row of a view
+    values : of it, one per row of a table
     widths : of a bin, of which the first that gives at most `BINS` is taken
     says : what a mean that leaves zero points to
     absent : why it may be missing
@@ -48,21 +48,21 @@ class _Against:
 
     name: str
     axis: str
-    values: Callable[[MergedView], Floats]
+    values: Callable[[ForceTable], Floats]
     widths: tuple[float, ...]
     says: str
     absent: str
 
 
-def _compass(view: MergedView) -> Floats:
-    return np.mod(from_si(view.heading, "deg"), 360.0)
+def _compass(table: ForceTable) -> Floats:
+    return np.mod(from_si(table.heading, "deg"), 360.0)
 
 
 _AXES: Final = (
     _Against(
         "speed",
         "Speed [km/h]",
-        lambda view: from_si(view.speed, "kmh"),
+        lambda table: from_si(table.speed, "kmh"),
         (5.0, 10.0, 20.0),
         "A mean that leaves zero at high speed points to air drag or wind, at low speed to "
         "torque or rolling resistance.",
@@ -71,7 +71,7 @@ _AXES: Final = (
     _Against(
         "force",
         "Traction force [N]",
-        lambda view: view.traction_force,
+        lambda table: table.traction_force,
         (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0),
         "A bend points to the scale of the torque; a slight rise is natural, for the noise of "
         "the torque is in both.",
@@ -80,7 +80,7 @@ _AXES: Final = (
     _Against(
         "gear",
         "Gear [-]",
-        lambda view: np.where(view.gear > 0, view.gear, np.nan).astype(np.float64),
+        lambda table: np.where(table.gear > 0, table.gear, np.nan).astype(np.float64),
         (1.0,),
         "One gear that stands apart has a wrong ratio, inertia or efficiency.",
         "there is only one gear",
@@ -211,5 +211,5 @@ def binned(
 
 def _rows(result: MassTrack, against: _Against) -> tuple[Floats, Bools]:
     """Values to draw against, and the rows that have both."""
-    x = against.values(result.balance.merged)
+    x = against.values(result.balance.table)
     return x, np.asarray(result.used & np.isfinite(result.residual) & np.isfinite(x))

@@ -109,7 +109,7 @@ def slow_section(weighing: MassResult) -> Section:
         return Section(key=key, title=title)
     slow = result.slow_errors
     wind = wind_at_vehicle(slow, weighing.drive)
-    blind = not np.isfinite(result.balance.merged.heading).any()
+    blind = not np.isfinite(result.balance.table.heading).any()
     return Section(
         key=key,
         title=title,

@@ -149,20 +149,20 @@ class MassResult:
 
         if self.result is None:
             return pl.DataFrame(schema=dict.fromkeys(TRACK_COLUMNS, pl.Float64))
-        r, view = self.result, self.result.balance.merged
+        r, table = self.result, self.result.balance.table
         texts = np.array([REASON_TEXT[Reason(k)] for k in range(len(Reason))])
         columns = (
             r.time,
             r.running_mass,
             r.running_std,
             r.used,
-            view.speed,
-            view.accel,
-            view.specific_force,
-            view.grade,
-            view.pitch,
-            view.gear,
-            view.traction_force,
+            table.speed,
+            table.accel,
+            table.specific_force,
+            table.grade,
+            table.pitch,
+            table.gear,
+            table.traction_force,
             texts[r.reason],
         )
         return pl.DataFrame(dict(zip(TRACK_COLUMNS, columns, strict=True)), nan_to_null=True)

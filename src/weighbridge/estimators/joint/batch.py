@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import WINDOW, Windows, windows
 from weighbridge.balance.force_balance import highest_torque
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.load_stops import change_odds, stood_before, too_hasty
@@ -115,12 +115,12 @@ def estimate(
     drive can improve are considered, not estimated: Schmidt, 1966.
     """
     settings = settings or JointSettings()
-    view = balance.merged
-    rows, y = design(view, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
-    usable = usable_rows(view, rows, y)
-    cut = windows(view.time, usable)
-    reason = view.reason.copy()
-    reason[view.usable] = Reason.NO_MOTION
+    table = balance.table
+    rows, y = design(table, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
+    usable = usable_rows(table, rows, y)
+    cut = windows(table.time, usable)
+    reason = table.reason.copy()
+    reason[table.usable] = Reason.NO_MOTION
     reason[usable] = Reason.TOO_SHORT
     reason[cut.index] = Reason.USED
     if cut.count.size < settings.fewest_windows:
@@ -184,16 +184,19 @@ def _ask(
     balance: ForceBalance, vehicle: Vehicle, cut: Windows, rough: float, settings: JointSettings
 ) -> _Asked:
     """State the problem of a drive whose mass is ``rough`` [kg]."""
-    view = balance.merged
-    time = cut.mean(view.time)
-    stood = stood_before(view, time)
+    table = balance.table
+    time = cut.mean(table.time)
+    stood = stood_before(table, time)
 
     def of(mass: float | None) -> _Asked:
         """Squat and levels of noise are told in terms of a mass [kg]."""
         body = residual_squat(balance, vehicle, mass or rough)
-        squat_accel = body.squat_accel(view.accel)
+        squat_accel = body.squat_accel(table.accel)
         rows, y = design(
-            view, vehicle, squat_accel=squat_accel, unmeasured_grade=balance.motion.unmeasured_grade
+            table,
+            vehicle,
+            squat_accel=squat_accel,
+            unmeasured_grade=balance.motion.unmeasured_grade,
         )
         means, sums = np.ascontiguousarray(cut.mean(rows)), cut.mean(y)
         guess = mass or first_guess(means[:, 0], sums)
@@ -202,7 +205,7 @@ def _ask(
             rows=means,
             y=sums,
             odds=change_odds(stood, by_speed=balance.motion.source in BY_SPEED),
-            variance=noise_variance(view, cut, guess, balance.motion),
+            variance=noise_variance(table, cut, guess, balance.motion),
             std=_prior(balance, vehicle, cut, guess),
             settings=settings,
         )
@@ -253,18 +256,18 @@ def _track(
     solved: _Solved,
 ) -> MassTrack:
     """Lay out the running mass and judge the final one."""
-    view, problem, time = balance.merged, asked.problem, asked.problem.time
+    table, problem, time = balance.table, asked.problem, asked.problem.time
     # More noise than usual is more likely the torque's; less is less on both sides.
     shown = min(solved.fast, 1.0) ** 2 * motion_variance(balance.motion)
     low = attenuation(solved.weight, np.full(time.size, shown), solved.var[:, 0], solved.begins)
 
-    left_out = np.zeros(view.time.size, dtype=bool)
+    left_out = np.zeros(table.time.size, dtype=bool)
     left_out[cut.index] = ~solved.taken[cut.window]
     reason[left_out] = Reason.BAD_FIT
     used = reason == Reason.USED
-    burnt = view.fuel_burnt
+    burnt = table.fuel_burnt
     smoothed, running = solved.x[:, 0] * (1.0 + low), solved.running * (1.0 + low)
-    given = _given(asked, solved, cut.mean(view.traction_force - asked.y))
+    given = _given(asked, solved, cut.mean(table.traction_force - asked.y))
     end, _, possible = averaged(given, problem.std, problem.settings)
     stds = np.sqrt(solved.var[:, 0])
     smoothed[-1], stds[-1] = end.x[0] * (1.0 + low[-1]), np.sqrt(end.cov[0, 0])
@@ -277,18 +280,18 @@ def _track(
     phi = asked.rows[:, 0]
     left = math.hypot(
         _systematic_std(balance, vehicle, mass),
-        asked.body.relative_std(view.accel, phi, used),
-        inertia_relative_std(vehicle, mass, view.accel, phi, used),
+        asked.body.relative_std(table.accel, phi, used),
+        inertia_relative_std(vehicle, mass, table.accel, phi, used),
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         LEVEL_STD * float(low[-1]),
     )
     std = float(np.hypot(UNMODELLED * stds[-1], mass * left))
-    last = np.searchsorted(time, view.time, side="right") - 1
+    last = np.searchsorted(time, table.time, side="right") - 1
     seen = np.maximum(last, 0)
     track = np.where(last >= 0, running[seen] - burnt, np.nan)
     track_std = UNMODELLED * np.sqrt(solved.running_var)[seen]
     evidence = Evidence(
-        view=view, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size,
+        table=table, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size,
         left=mass * left, motion=balance.motion,
     )  # fmt: skip
     status, why = judge(evidence, vehicle)
@@ -305,10 +308,10 @@ def _track(
         degrees_of_freedom=float("inf"),
         bound_std=bound,
         sensitivity=moved,
-        converged_at=converged_at(view.time, track, mass, used),
+        converged_at=converged_at(table.time, track, mass, used),
         status=status,
         why=why,
-        segments=_segments(view, time, solved.begins, smoothed, stds, left),
+        segments=_segments(table, time, solved.begins, smoothed, stds, left),
         slow_errors=SlowErrors.from_states(
             time, solved.x, solved.var, solved.running_var, problem.rows[:, 1]
         ),
@@ -371,7 +374,7 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
     if not mass > 0.0:
         return left
     # When the rows weigh, half of the fuel is gone, in the mean.
-    fuel = 0.5 * float(balance.merged.fuel_burnt[-1]) / mass
+    fuel = 0.5 * float(balance.table.fuel_burnt[-1]) / mass
     left = float(np.hypot(left, FUEL_STD * fuel))
     if made.masses:
         above, below = np.log(mass / max(made.masses)), np.log(min(made.masses) / mass)
@@ -381,25 +384,25 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
 
 def _prior(balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float) -> Floats:
     """Standard deviations of the states before the drive has told, of a rough mass [kg]."""
-    torque = highest_torque(balance.merged.torque[cut.index])
+    torque = highest_torque(balance.table.torque[cut.index])
     return prior_std(vehicle, guess, torque, unmeasured_grade=balance.motion.unmeasured_grade)
 
 
 def _segments(
-    view: MergedView, time: Floats, begins: Bools, mass: Floats, bound: Floats, left: float
+    table: ForceTable, time: Floats, begins: Bools, mass: Floats, bound: Floats, left: float
 ) -> tuple[Segment, ...]:
     """Stretches of one load: the mass at the end of each, smoothed over the whole drive."""
     first = np.concatenate(([0], np.flatnonzero(begins)))
     last = np.concatenate((first[1:], [time.size])) - 1
-    edges = [float(view.time[0])]
-    moving = np.nan_to_num(view.speed) > 0.5
+    edges = [float(table.time[0])]
+    moving = np.nan_to_num(table.speed) > 0.5
     for k in first[1:]:
         # The load changed while the vehicle stood: the segment begins as it drives off.
-        between = (view.time > time[k - 1]) & (view.time <= time[k])
+        between = (table.time > time[k - 1]) & (table.time <= time[k])
         rests = np.flatnonzero(between & ~moving)
-        edges.append(float(view.time[rests[-1]]) if rests.size else float(time[k]))
-    edges.append(float(view.time[-1]))
-    burnt = np.interp(edges[1:], view.time, view.fuel_burnt)
+        edges.append(float(table.time[rests[-1]]) if rests.size else float(time[k]))
+    edges.append(float(table.time[-1]))
+    burnt = np.interp(edges[1:], table.time, table.fuel_burnt)
     return tuple(
         Segment(
             start=edges[j],

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.judging import STOP
 from weighbridge.signals import Bools, Floats
 
@@ -41,7 +41,7 @@ MOST_LOADED: Final = 0.3
 """Part of the mass that a whole stop loads or unloads [-]."""
 
 
-def stood_before(view: MergedView, time: Floats) -> Floats:
+def stood_before(table: ForceTable, time: Floats) -> Floats:
     """How long the vehicle stood between each window and the one before it (m,) [s].
 
     A gap in the log counts as standing: what happened in it is not known. Of several stops
@@ -49,11 +49,11 @@ def stood_before(view: MergedView, time: Floats) -> Floats:
 
     Parameters
     ----------
-    view
+    table
     time : (m,) instants of the windows [s]
     """
-    standing = ~(np.nan_to_num(view.speed) > 0.5)
-    gap = np.diff(view.time, append=view.time[-1])
+    standing = ~(np.nan_to_num(table.speed) > 0.5)
+    gap = np.diff(table.time, append=table.time[-1])
     # Rows near in time stand for the time until the next; a long gap stands for itself.
     still = np.cumsum(np.where(standing | (gap > STOP), gap, 0.0))
     moved = np.flatnonzero(~standing)
@@ -61,7 +61,7 @@ def stood_before(view: MergedView, time: Floats) -> Floats:
     if moved.size < 2:
         return stood
     rest = still[moved[1:] - 1] - np.where(moved[:-1] > 0, still[moved[:-1] - 1], 0.0)
-    at = np.searchsorted(time, view.time[moved[1:]])
+    at = np.searchsorted(time, table.time[moved[1:]])
     within = (at > 0) & (at < time.size) & (rest > 0.0)
     np.maximum.at(stood, at[within], rest[within])
     return stood

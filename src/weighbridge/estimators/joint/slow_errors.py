@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.balance import law
 from weighbridge.balance.averaging import WINDOW, Windows
 from weighbridge.balance.law import DISTURBANCE_STD
-from weighbridge.balance.table import MergedView
+from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
 from weighbridge.estimators.regression import regression
 from weighbridge.kernels.disturbance import DisturbanceParams
@@ -128,7 +128,7 @@ class SlowErrors:
 
 
 def design(
-    view: MergedView,
+    table: ForceTable,
     vehicle: Vehicle,
     *,
     squat_accel: Floats | None = None,
@@ -140,7 +140,7 @@ def design(
 
     Parameters
     ----------
-    view, vehicle
+    table, vehicle
     squat_accel : (n,) what squat of the body adds to the specific force [m/s^2]
     unmeasured_grade : what of the grade nothing has measured [rad]
 
@@ -151,49 +151,49 @@ def design(
     y : (n,) traction less drag and rotating inertia, and what the fuel that is burnt by then
         would have weighed [N]
     """
-    phi, y = regression(view, vehicle)
+    phi, y = regression(table, vehicle)
     if squat_accel is not None:
         phi = phi - squat_accel
     area = vehicle.road.drag_area.value
-    north, east = law.wind_columns(view)
+    north, east = law.wind_columns(table)
     columns = [
         phi,
-        law.gust_column(view, unmeasured_grade),
-        law.resistance_column(view),
+        law.gust_column(table, unmeasured_grade),
+        law.resistance_column(table),
         area * north,
         area * east,
-        law.cold_torque_column(view),
-        law.drag_column(view),
+        law.cold_torque_column(table),
+        law.drag_column(table),
     ]
     if by_data_sheet(vehicle):
         line = vehicle.driveline
-        columns += [law.torque_offset_column(view), law.torque_growth_column(view)]
+        columns += [law.torque_offset_column(table), law.torque_growth_column(table)]
         if not line.single_speed:
             columns += [
-                law.engine_inertia_column(np.nan_to_num(view.gearing), view.accel),
-                law.wheel_inertia_column(view.accel, line.wheel_radius),
+                law.engine_inertia_column(np.nan_to_num(table.gearing), table.accel),
+                law.wheel_inertia_column(table.accel, line.wheel_radius),
             ]
-    return np.column_stack(columns), y + phi * view.fuel_burnt
+    return np.column_stack(columns), y + phi * table.fuel_burnt
 
 
-def usable_rows(view: MergedView, rows: Floats, y: Floats) -> Bools:
+def usable_rows(table: ForceTable, rows: Floats, y: Floats) -> Bools:
     """Rows without a reason against them and with finite numbers."""
-    return np.asarray(view.usable & np.isfinite(y) & np.isfinite(rows).all(axis=1))
+    return np.asarray(table.usable & np.isfinite(y) & np.isfinite(rows).all(axis=1))
 
 
 def noise_variance(
-    view: MergedView, cut: Windows, mass: float, motion: Motion, length: float = WINDOW
+    table: ForceTable, cut: Windows, mass: float, motion: Motion, length: float = WINDOW
 ) -> Floats:
     """Variance of the fast noise of each window's mean force (m,) [N^2], both sides.
 
     Parameters
     ----------
-    view, cut
+    table, cut
     mass : [kg]
     motion
     length : of a window [s]
     """
-    force = cut.mean(view.force_std**2)
+    force = cut.mean(table.force_std**2)
     moved = motion_variance(motion, length) + motion.mean_accel_std(length) ** 2
     return np.asarray(force / cut.count + mass**2 * moved)
 
