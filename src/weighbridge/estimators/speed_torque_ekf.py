@@ -439,8 +439,8 @@ def sensitivity(
         by = TRIED * size / scale
         ends = []
         for sign in (-1.0, 1.0):
-            moved = still._replace(force=still.force + sign * by * mean)
-            end = kernel.run(start, moved, params)[0]
+            pushed = still._replace(force=still.force + sign * by * mean)
+            end = kernel.run(start, pushed, params)[0]
             ends.append(1.0 / float(end.x[kernel.INVERSE]))
         moved.append((ends[1] - ends[0]) / (2.0 * by))
     return np.array(moved)
