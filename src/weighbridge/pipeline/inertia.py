@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks import refuse_serious, settle_drive
+from weighbridge.checks import mend_drive, refuse_serious
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.track import Status
@@ -162,10 +162,10 @@ def _estimate(
             "every signal of the ride repeats one value: the vehicle stood, or nothing was "
             "measured; drive at 20 km/h or more while recording",
         )
-    settled = settle_drive(only)
-    problems = [*settled.problems, *check_signals(only)]
+    mended = mend_drive(only)
+    problems = [*mended.problems, *check_signals(only)]
     refuse_serious(drive.name, problems)
-    samples = ride_samples(settled)
+    samples = ride_samples(mended)
     seen = response(samples, ride)
     problems += check_response(seen) if seen is not None else ()
     refuse_serious(drive.name, problems)
