@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
-from weighbridge.balance.instants import SLOWEST
+from weighbridge.balance.instants import SLOWEST_GEARED
 from weighbridge.balance.law import drag_factor, rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
@@ -78,7 +78,7 @@ def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Col
         speed=table.speed,
         grade=table.grade,
         driven=valid & np.isfinite(table.grade),
-        standing=np.asarray(table.speed < SLOWEST),
+        standing=np.asarray(table.speed < SLOWEST_GEARED),
     )
 
 

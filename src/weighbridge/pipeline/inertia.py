@@ -27,8 +27,8 @@ from weighbridge.inertia.filter import (
 from weighbridge.inertia.load_changes import believed_otherwise, jumps, load_changes
 from weighbridge.inertia.ride_checks import (
     LEAST,
+    LONGEST_PERIOD,
     NEEDED,
-    SLOWEST,
     check_response,
     check_signals,
     nothing_moves,
@@ -170,7 +170,7 @@ def _estimate(
     problems += check_response(seen) if seen is not None else ()
     refuse_serious(drive.name, problems)
     warnings = tuple(dict.fromkeys(p.text for p in problems))
-    if not samples.period <= SLOWEST:
+    if not samples.period <= LONGEST_PERIOD:
         return nothing(
             Status.NOT_EXCITED,
             f"the ride is sampled {1.0 / samples.period:.3g} times per second, and axles hop 10 to "
