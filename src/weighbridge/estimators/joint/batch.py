@@ -123,7 +123,7 @@ def estimate(
     reason[usable] = Reason.TOO_SHORT
     reason[cut.index] = Reason.USED
     if cut.count.size < settings.fewest_windows:
-        return nothing("joint", balance, vehicle, reason, int(cut.count.size))
+        return nothing("joint", balance, vehicle, reason, int(cut.count.size), settings)
     rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
     asked = _ask(balance, vehicle, cut, rough, settings)
     if not load_changes:
@@ -286,8 +286,9 @@ def _track(
     track = np.where(last >= 0, running[seen] - burnt, np.nan)
     track_std = UNMODELLED * np.sqrt(solved.running_var)[seen]
     evidence = Evidence(
-        table=table, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size, left=mass * left
-    )
+        table=table, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size,
+        left=mass * left, gate=problem.settings,
+    )  # fmt: skip
     status, why = judge(evidence, vehicle)
     stds = np.sqrt(solved.var[:, 0])
     return MassTrack(
