@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.averaging import WINDOW, Windows, windows
+from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
@@ -31,6 +31,7 @@ from weighbridge.estimators.joint.slow_errors import (
     noise_variance,
     prior_std,
     usable_rows,
+    window_motion_variance,
 )
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
@@ -55,7 +56,7 @@ BEYOND_STD: Final = 0.015
 """Relative standard deviation of a mass per unit of the logarithm by which it lies beyond
 those of the calibration [-]: torque is used where its fit has seen little."""
 
-MOTION_STD: Final[dict[MotionSource, float]] = {
+JOINT_MOTION_STD: Final[dict[MotionSource, float]] = {
     "inertial": 0.0,
     "longitudinal_accel": 0.01,
     "speed_grade": 0.025,
@@ -317,7 +318,7 @@ def _track(
             fast=solved.fast,
             slow=solved.slow,
             body=asked.body,
-            motion_var=motion_variance(balance.motion) + balance.motion.mean_accel_std(WINDOW) ** 2,
+            motion_var=window_motion_variance(balance.motion),
             noise_information=shown * float(np.sum(solved.weight)),
             left=left,
             settings=problem.settings,
@@ -355,7 +356,7 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
     scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(vehicle)
     left = math.hypot(
         scale,
-        MOTION_STD[balance.motion.source],
+        JOINT_MOTION_STD[balance.motion.source],
         balance.motion.specific_force_scale_std,
         balance.coarse_std,
     )
