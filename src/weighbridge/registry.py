@@ -41,6 +41,11 @@ class Registry(Mapping[str, Record], Generic[Record]):
         self._all: dict[str, Record] | None = None
 
     @property
+    def own(self) -> tuple[str, ...]:
+        """Names of the program's own records, in order."""
+        return tuple(self._own)
+
+    @property
     def names(self) -> str:
         """All names in words: ``a, b or c``."""
         *most, last = self

@@ -109,7 +109,7 @@ def test_longer_stops_change_the_load_more_often():
     for begin, duration in ((100.0, 7.0), (300.0, 9.0), (450.0, 25.0), (600.0, 240.0)):
         speed[(time >= begin) & (time < begin + duration)] = 0.0
     kept = (time < 900.0) | (time > 960.0)  # a gap in the log
-    table = SimpleNamespace(time=time[kept], speed=speed[kept])
+    table = SimpleNamespace(time=time[kept], moving=speed[kept] > 0.5)
     windows = np.array([50.0, 120.0, 290.0, 330.0, 490.0, 590.0, 850.0, 890.0, 970.0])
     odds = change_odds(stood_before(table, windows))
     assert np.flatnonzero(np.isfinite(odds)).tolist() == [3, 4, 6, 8]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weighbridge.checks import check_drive, settle_drive
+from weighbridge.checks import check_drive, mend_drive
 from weighbridge.checks.clocks import check_pauses
 from weighbridge.checks.inertial import check_imu
 from weighbridge.errors import DriveError
@@ -571,7 +571,7 @@ def test_clock_that_jumps_a_day(sane):
     s = sane.signals["vehicle_speed"]
     time = s.time.copy()
     time[-10:] += 1e9
-    settled = settle_drive(Drive("d", {s.name: replace(s, time=time)}))
+    settled = mend_drive(Drive("d", {s.name: replace(s, time=time)}))
     assert not any(p.serious for p in settled.problems)
     assert settled.duration < 1000.0
     assert "jumps by 1e+09 s" in settled.problems[0].text

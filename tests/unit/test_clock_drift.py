@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import weighbridge as wb
-from weighbridge.balance.instants import smoothed
-from weighbridge.checks import settle_drive
+from weighbridge.balance.instants import lagged_motion
+from weighbridge.checks import mend_drive
 from weighbridge.errors import DriveError
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.navigation.clock_lag import find_lags
@@ -128,7 +128,7 @@ def test_a_clock_that_jumps_about_is_refused(made, car):
 
 def test_rows_about_a_step_are_left_out(made):
     drive = retimed(made.drive, {"obd"}, lambda t: t + 2.0 * (t > 700.0))
-    settled = settle_drive(drive)
+    settled = mend_drive(drive)
     assert any("jumps by +2.0" in p.text and "left out" in p.text for p in settled.problems)
     speed = settled.signals["vehicle_speed"]
     assert len(speed) > 0.8 * len(made.drive.signals["vehicle_speed"])
@@ -136,7 +136,7 @@ def test_rows_about_a_step_are_left_out(made):
 
 
 def test_clocks_seconds_apart_are_no_swapped_axes(made):
-    settled = settle_drive(retimed(made.drive, {"obd", "gnss"}, lambda t: t + 40.0))
+    settled = mend_drive(retimed(made.drive, {"obd", "gnss"}, lambda t: t + 40.0))
     assert not any(p.serious for p in settled.problems)
     assert any("obd and gnss is +39.9" in p.text for p in settled.problems)
     assert_array_equal(
@@ -155,8 +155,8 @@ def test_a_part_that_fits_at_no_lag_is_left_out(made, car, mass):
 def test_a_gap_of_the_inertial_sensor_leaks_no_zeros(made):
     """A lag passes on what stood in the gap; what is valid behind it must not hold any of that."""
     gaps = [(at, at + 2.0) for at in np.arange(200.0, 1300.0, 50.0)]
-    whole = smoothed(find_motion(made.drive), 0.3)
-    gapped = smoothed(find_motion(without_inertial(made.drive, gaps)), 0.3)
+    whole = lagged_motion(find_motion(made.drive), 0.3)
+    gapped = lagged_motion(find_motion(without_inertial(made.drive, gaps)), 0.3)
     behind = np.logical_or.reduce([(whole.time > b) & (whole.time < b + 2.0) for _, b in gaps])
     rows = behind & gapped.valid & whole.valid
     assert np.count_nonzero(rows) > 200

@@ -244,13 +244,13 @@ def test_a_drive_that_shows_no_floor_has_that_of_the_vehicle_file():
     source = rare.signals["engine_load"]
     unknown = np.full(len(source), np.nan)
     alone = find_foot(rare, LOADED, source, unknown, unknown)
-    assert not alone.told
+    assert not alone.observable
 
     town = recorded(engine_load=load_of(STAMPS))
     learnt = learn_dragged([town], [town.signals["engine_load"]], [np.full(STAMPS.size, np.nan)])
     assert np.interp(150.0, learnt.engine_speed, learnt.level) == pytest.approx(FLOOR, abs=0.01)
     known = find_foot(rare, replace(LOADED, dragged=learnt), source, unknown, unknown)
-    assert known.told
+    assert known.observable
     assert np.all(known.off[dragged[::4]])
     assert np.mean(known.off[~dragged[::4]]) < 0.15
 
@@ -271,15 +271,15 @@ def test_a_reading_that_has_risen_far_is_found_by_the_motion():
     off = foot(STAMPS) < 0.5
     need = np.where(off, -0.05, 0.05)
     by_motion = find_foot(risen, car, source, need, unknown)
-    assert by_motion.told
+    assert by_motion.observable
     assert np.mean(by_motion.off[off]) > 0.8
     # Without a grade nothing shows it: a vehicle that stops has been dragged somewhere.
     held = np.where(off, 0.4, source.values)
     speed = np.where((STAMPS % 200.0) > 196.0, 0.0, 15.0)
     stops = recorded(engine_load=held, vehicle_speed=speed)
-    assert not find_foot(stops, car, stops.signals["engine_load"], unknown, unknown).told
+    assert not find_foot(stops, car, stops.signals["engine_load"], unknown, unknown).observable
     cruise = recorded(engine_load=held)
-    assert find_foot(cruise, car, cruise.signals["engine_load"], unknown, unknown).told
+    assert find_foot(cruise, car, cruise.signals["engine_load"], unknown, unknown).observable
 
 
 def test_a_noisy_reading_chooses_no_rows_where_the_engine_surely_pushes():

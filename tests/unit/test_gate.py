@@ -10,6 +10,7 @@ import weighbridge as wb
 from weighbridge.balance import ForceBalance, Reason, force_balance
 from weighbridge.balance.cornering import HARD_CORNERING, cornering, lateral_acceleration
 from weighbridge.balance.table import ForceTable
+from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, fit_std, judging
 from weighbridge.estimators.fit_std import honest_std, slow_std
 from weighbridge.estimators.joint import foreign
@@ -18,6 +19,7 @@ from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 
 METHODS = ("joint", "rls", "robust-rls", "ekf", "hybrid")
+ANY_WIDTH = {"widest": np.inf, "widest_of_drive": np.inf}
 MASS = 10_000.0
 BUS = Vehicle(
     kind="bus",
@@ -81,6 +83,11 @@ def balance(*, minutes=8.0, swing=0.8, offset=0.0, seed=1, rate=10.0):
     return ForceBalance(motion=motion, table=table)
 
 
+def weighed(method, rows, vehicle=BUS, **settings):
+    estimator = ESTIMATORS[method]
+    return estimator.track(rows, vehicle, estimator.settings_of(settings))
+
+
 @pytest.fixture(scope="module")
 def made():
     return simulate_car(Scenario(name="gate", car=MIDSIZE, route=short_route(), seed=73))
@@ -106,28 +113,23 @@ def test_a_good_drive_passes(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_specific_force_that_hardly_varies_carries_no_mass(method, monkeypatch):
     cruise = balance(swing=0.14, minutes=30.0)
-    monkeypatch.setattr(judging, "WIDEST", np.inf)
-    monkeypatch.setattr(judging, "WIDEST_OF_DRIVE", np.inf)
-    track = ESTIMATORS[method].track(cruise, BUS)
+    track = weighed(method, cruise, **ANY_WIDTH)
     assert track.status is Status.NOT_EXCITED
     assert "vary the specific force by only" in track.why
-    monkeypatch.setattr(judging, "LEAST_SPREAD", 0.0)
-    assert ESTIMATORS[method].track(cruise, BUS).status is Status.CONVERGED
+    assert "and the mass needs 0.120" in track.why
+    assert weighed(method, cruise, **ANY_WIDTH, least_spread=0).status is Status.CONVERGED
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_short_stretch_carries_no_mass(method, monkeypatch):
     # The least squares of jensen2022 take rising speed alone: half of the time.
     short = balance(minutes=1.4 if method == "rls" else 0.9)
-    monkeypatch.setattr(judging, "WIDEST", np.inf)
-    monkeypatch.setattr(judging, "WIDEST_OF_DRIVE", np.inf)
-    monkeypatch.setattr(judging, "FEWEST_BLOCKS", 0)
     monkeypatch.setattr(judging.Evidence, "reach", 0.0)
-    track = ESTIMATORS[method].track(short, BUS)
+    wide = ANY_WIDTH | {"fewest_blocks": 0}
+    track = weighed(method, short, **wide)
     assert track.status is Status.NOT_EXCITED
-    assert "s of the drive could be used" in track.why
-    monkeypatch.setattr(judging, "LEAST_TIME", 0.0)
-    assert ESTIMATORS[method].track(short, BUS).status is Status.CONVERGED
+    assert "s of the drive could be used, and 60 s are needed" in track.why
+    assert weighed(method, short, **wide, least_time=0).status is Status.CONVERGED
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -150,10 +152,20 @@ def test_a_mass_above_what_loads_explain_is_none(method):
 def test_what_the_drive_leaves_open_is_bounded_whatever_the_file_does(method, monkeypatch):
     wide = replace(BUS, provenance=Provenance(mass_scale_std=0.12))
     assert ESTIMATORS[method].track(balance(), wide).status is Status.CONVERGED
-    monkeypatch.setattr(judging, "WIDEST_OF_DRIVE", 1e-3)
-    track = ESTIMATORS[method].track(balance(), wide)
-    assert track.status is Status.NOT_EXCITED
-    assert "which is no weighing" in track.why
+    for bound in ({"widest_of_drive": 1e-3}, {"widest": 0.1}):
+        track = weighed(method, balance(), wide, **bound)
+        assert track.status is Status.NOT_EXCITED
+        assert "which is no weighing" in track.why
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_more_rows_or_stretches_can_be_asked_for(method):
+    for bound in ({"fewest_rows": 10**6}, {"fewest_blocks": 10**6}):
+        track = weighed(method, balance(), **bound)
+        assert track.status is Status.NOT_EXCITED
+        assert "usable samples" in track.why
+    with pytest.raises(ConfigError, match="least_time must be zero or positive, got -1"):
+        weighed(method, balance(), least_time=-1.0)
 
 
 def test_the_interval_of_least_squares_holds_under_errors_that_last(monkeypatch):

@@ -7,7 +7,7 @@ import numpy as np
 import pymap3d
 import pytest
 from numba import config
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from weighbridge.constants import GRAVITY
@@ -19,9 +19,10 @@ from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.rows import place_nodes
+from weighbridge.navigation.select import find_motion
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.signals import Drive, Signal
-from weighbridge.vehicle.model import Mounting
+from weighbridge.vehicle.model import Driveline, Mounting, Vehicle
 
 SQUAT = 0.004
 
@@ -411,3 +412,15 @@ def test_settings_refuse_the_impossible():
     with pytest.raises(ConfigError, match="gate"):
         NavigationSettings(gate=-1.0)
     assert P == 0
+
+
+def test_one_position_does_not_show_the_scale_of_the_speed():
+    drive, _ = simulate(duration=120.0, seed=6)
+    vehicle = Vehicle(driveline=Driveline(speed_scale=1.05))
+    first = [drive.signals[name] for name in ("latitude", "longitude")]
+    single = drive.with_signals(*(Signal(s.name, s.time[:1], s.values[:1]) for s in first))
+    without = find_motion(drive.without("latitude", "longitude"), vehicle)
+    assert_array_equal(find_motion(single, vehicle).speed, without.speed)
+    fast = without.speed > 5.0
+    ratio = find_motion(single).speed[fast] / without.speed[fast]
+    assert np.median(ratio) > 1.02

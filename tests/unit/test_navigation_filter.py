@@ -30,12 +30,9 @@ from weighbridge.kernels.ins_model import (
 )
 from weighbridge.navigation.filter import (
     Block,
-    Sample,
     State,
-    motion_at,
     run,
     run_smoothed,
-    step,
 )
 from weighbridge.navigation.forward import forward_motion, lateness
 from weighbridge.navigation.identify import Setup, identify
@@ -99,17 +96,6 @@ def test_any_split_of_the_samples_gives_the_same(size):
     assert_array_equal(np.concatenate(stds), nodes.grade_std)
     assert_array_equal(whole.cov, whole.cov.T)
     assert whole.time == block.time[-1]
-
-
-def test_step_is_a_block_of_one():
-    block, setup = _block(900), _setup()
-    whole, _ = run(setup.start, block, setup)
-    state, place = setup.start, {int(n): k for k, n in enumerate(block.nodes)}
-    for i in range(block.time.size):
-        z = block.z[place[i]] if i in place else None
-        state = step(state, Sample(float(block.time[i]), block.accel[i], block.gyro[i], z), setup)
-    assert_array_equal(state.x, whole.x)
-    assert_array_equal(state.cov, whole.cov)
 
 
 def test_an_open_mounting_is_less_sure():
@@ -204,18 +190,3 @@ def test_a_gap_is_known_only_after_it(hills):
     whole = forward_motion(drive, setup)
     assert_array_equal(m.grade[before], whole.grade[before])
     assert_array_equal(m.time, whole.time)
-
-
-def test_motion_at_the_last_sample(hills):
-    drive, truth, setup = hills
-    from weighbridge.navigation.forward import _gather, _prepared
-
-    block = _prepared(_gather(drive, setup), setup).block
-    state, _ = run(setup.start, block.part(0, 15_000), setup)
-    row = motion_at(state, setup)
-    assert row.time == block.time[14_999]
-    assert row.speed == pytest.approx(np.interp(row.time, truth.time, truth.speed), abs=0.3)
-    assert row.grade == pytest.approx(np.interp(row.time, truth.time, truth.grade), abs=0.01)
-    assert row.specific_force == pytest.approx(row.accel + GRAVITY * math.sin(row.grade))
-    assert 0.0 < row.grade_std < 0.02
-    assert 0.0 < row.speed_std < 0.3

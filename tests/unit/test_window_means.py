@@ -8,12 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from weighbridge.balance.averaging import FEWEST, PAUSE, WINDOW, windows
+from weighbridge.balance.averaging import window_params, windows
 from weighbridge.kernels import window_means
 
-PARAMS = window_means.WindowParams(
-    length=WINDOW, pause=PAUSE, enough=int(FEWEST * WINDOW / 0.1), long_gap=20.0
-)
+PARAMS = window_params(0.1, long_gap=20.0)
 
 
 def drive(seed, rows=1500):

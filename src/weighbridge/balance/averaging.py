@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.kernels import window_means
 from weighbridge.signals import Bools, Floats, Ints
 
 WINDOW: Final = 2.5
@@ -15,7 +16,7 @@ WINDOW: Final = 2.5
 PAUSE: Final = 0.8
 """Usable rows further apart belong to different windows [s]."""
 
-FEWEST: Final = 0.6
+LEAST_FULL: Final = 0.6
 """Part of a window that must be there [-]."""
 
 
@@ -47,6 +48,25 @@ class Windows:
         )
 
 
+def window_params(
+    period: float, *, length: float = WINDOW, long_gap: float = np.inf
+) -> window_means.WindowParams:
+    """Say how rows are cut into windows, of a whole drive as on the way.
+
+    Parameters
+    ----------
+    period : between rows, as a rule [s]
+    length : of a window [s]
+    long_gap : rows further apart count as standing between them [s]
+    """
+    return window_means.WindowParams(
+        length=length,
+        pause=max(PAUSE, 2.5 * period),
+        enough=max(2, int(LEAST_FULL * length / period)),
+        long_gap=long_gap,
+    )
+
+
 def windows(time: Floats, usable: Bools, *, length: float = WINDOW) -> Windows:
     """Cut the usable rows into windows that no unusable row interrupts.
 
@@ -59,20 +79,10 @@ def windows(time: Floats, usable: Bools, *, length: float = WINDOW) -> Windows:
     usable : (k,)
     length : of a window [s]
     """
-    index = np.flatnonzero(usable)
-    if index.size < 2:
+    if np.count_nonzero(usable) < 2:
         nothing = np.zeros(0, dtype=np.int64)
         return Windows(nothing, nothing, nothing)
-    instants = time[index]
-    period = float(np.median(np.diff(time)))
-    broken = np.diff(instants) > max(PAUSE, 2.5 * period)
-    stretch = np.concatenate(([0], np.cumsum(broken)))
-    begins = instants[np.concatenate(([0], np.flatnonzero(broken) + 1))][stretch]
-    within = ((instants - begins) // length).astype(np.int64)
-    new = np.concatenate(([False], (np.diff(stretch) != 0) | (np.diff(within) != 0)))
-    window = np.cumsum(new)
-    count = np.bincount(window)
-    enough = count >= max(2, int(FEWEST * length / period))
-    renumbered = np.cumsum(enough) - 1
-    kept = enough[window]
-    return Windows(index[kept], renumbered[window[kept]], count[enough])
+    cuts = window_params(float(np.median(np.diff(time))), length=length)
+    number = window_means.assign(np.ascontiguousarray(time), np.ascontiguousarray(usable), cuts)
+    index = np.flatnonzero(number >= 0)
+    return Windows(index, number[index], np.bincount(number[index]))

@@ -25,7 +25,7 @@ pass of 3 s; over the shorter time 1.01 in four undamaged drives, 0.61 and 0.63 
 SURE: Final = 3.0
 """Standard deviations by which it is below `SMOOTHED` [-]."""
 
-FEWEST: Final = 200
+FEWEST_ROWS: Final = 200
 """Fewer changes tell nothing."""
 
 FOLLOWS: Final = 0.5
@@ -40,7 +40,7 @@ BLOCK: Final = 60.0
 FEWEST_BLOCKS: Final = 5
 """Fewer blocks tell no standard deviation."""
 
-SLOWEST: Final = 0.6
+LONGEST_PERIOD: Final = 0.6
 """Torque that comes less often does not show `FAST` [s]."""
 
 
@@ -57,9 +57,9 @@ def smoothed_torque(balance: ForceBalance, vehicle: Vehicle) -> str:
     balance, vehicle
     """
     table = balance.table
-    if balance.motion.source != "inertial" or table.time.size < FEWEST:
+    if balance.motion.source != "inertial" or table.time.size < FEWEST_ROWS:
         return ""
-    if not float(np.median(np.diff(table.time))) <= SLOWEST:
+    if not float(np.median(np.diff(table.time))) <= LONGEST_PERIOD:
         return ""
     force = force_on_mass(table, vehicle)
     use = table.usable & np.isfinite(force) & np.isfinite(table.specific_force)
@@ -111,7 +111,7 @@ def _slopes(
     whole &= after - here >= 2
     whole &= time[np.maximum(here - 1, 0)] - time[before] > THERE * span
     whole &= time[after - 1] - time > THERE * span
-    if np.count_nonzero(whole) < FEWEST:
+    if np.count_nonzero(whole) < FEWEST_ROWS:
         return None
 
     def change(x: Floats) -> Floats:

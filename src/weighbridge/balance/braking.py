@@ -11,7 +11,7 @@ import numpy as np
 
 from weighbridge.balance.foot import find_foot
 from weighbridge.balance.foot_setup import FootSetup, identify_foot, near
-from weighbridge.balance.instants import SLOWEST, behind
+from weighbridge.balance.instants import SLOWEST_GEARED, behind
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
 from weighbridge.balance.table import ForceSetup, ForceTable
 from weighbridge.navigation.motion import BY_SPEED, Motion
@@ -116,7 +116,7 @@ def find_brakes(
         needed=needed,
         weight=weight,
         beyond=needed - np.minimum(np.where(np.isfinite(traction), traction, 0.0), 0.0),
-        moving=np.asarray(table.speed > SLOWEST),
+        moving=np.asarray(table.speed > SLOWEST_GEARED),
     )
     pressed = brake_pressed(drive, recorded)
     if setup is not None:
@@ -124,8 +124,8 @@ def find_brakes(
     else:
         dead = pressed is not None and _misses(pressed, slowing, known)
     pressed = None if dead else pressed
-    told = np.nan if motion.source in BY_SPEED else 1.0
-    need, torque = told * needed / weight, told * needed / table.gearing
+    measured = np.nan if motion.source in BY_SPEED else 1.0
+    need, torque = measured * needed / weight, measured * needed / table.gearing
     by = setup.foot if setup is not None else identify_foot(drive, vehicle, source, need, torque)
     foot = find_foot(drive, vehicle, source, need, torque, by)
     # What a dragged engine takes is told by a torque alone, and by none where a foot may brake,
@@ -135,7 +135,7 @@ def find_brakes(
     slowed = foot.off if pressed is None else pressed
     held = _trailing(vehicle, motion, table.time, slowed, traction if signed else None, lag)
     slows = (needed < -SLOWED * weight)[slowing.moving]
-    hidden = pressed is None and not foot.told and slows.size and slows.mean() > SLOWS
+    hidden = pressed is None and not foot.observable and slows.size and slows.mean() > SLOWS
     return Brakes(
         braked=_braked(drive, recorded, slowing, pressed),
         overrun=overrun | held,
@@ -148,8 +148,8 @@ def find_brakes(
 def retarder_untold(drive: Drive, vehicle: Vehicle) -> bool:
     """Whether a retarder may slow the vehicle that neither switch nor signal tells of."""
     retarder = drive.get("retarder_torque")
-    told = retarder is not None and len(retarder) > 0
-    return vehicle.of_class.retarded and not vehicle.driveline.single_speed and not told
+    recorded = retarder is not None and len(retarder) > 0
+    return vehicle.of_class.retarded and not vehicle.driveline.single_speed and not recorded
 
 
 def brake_pressed(drive: Drive, recorded: Floats) -> Bools | None:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.gear_fit import FEWEST, held_ratios
+from weighbridge.balance.gear_fit import FEWEST_RATIOS, held_ratios
 from weighbridge.balance.table import ForceBalance
 from weighbridge.vehicle.model import Vehicle
 
@@ -52,7 +52,7 @@ def on_its_tyres(balance: ForceBalance, vehicle: Vehicle) -> tuple[Vehicle, str]
     _, ratio = held_ratios(balance)
     change = float(np.log(shown / line.speed_scale))
     std = motion.speed_scale_std or 0.0
-    if ratio.size < FEWEST or not max(LEAST, 3.0 * std) < abs(change) < MOST:
+    if ratio.size < FEWEST_RATIOS or not max(LEAST, 3.0 * std) < abs(change) < MOST:
         return vehicle, ""
     off = ratio[:, None] - change - np.log(np.array(line.gearings))
     off = off[np.arange(ratio.size), np.abs(off).argmin(axis=1)]

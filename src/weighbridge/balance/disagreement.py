@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.balance.witness import (
     BY_SIGNAL,
     DELAYS,
-    FEWEST,
+    FEWEST_MEANS,
     LOAD_AIR,
     Comparison,
     Following,
@@ -141,7 +141,7 @@ def _finding(drive: Drive, vehicle: Vehicle, relation: WitnessRelation) -> Findi
     if following is not None and abs(later := following.lag - (relation.lag or 0.0)) >= LATER:
         rows = rows_of(drive, vehicle, witness, later) or rows
     every = means(rows, witness, ranges_of(relation))
-    if every.time.size < FEWEST:
+    if every.time.size < FEWEST_MEANS:
         return None
     source, many = vehicle.torque.of_source.name, every.time.size
 
@@ -297,7 +297,7 @@ def _change(every: Means, relation: WitnessRelation) -> int | None:
     best, at = 0.0, None
     for k in range(1, PARTS):
         cut = every.time.size * k // PARTS
-        if min(cut, every.time.size - cut) < FEWEST:
+        if min(cut, every.time.size - cut) < FEWEST_MEANS:
             continue
         before, after = (
             compare(every.reading[part], predicted[part]) for part in (slice(cut), slice(cut, None))

@@ -16,7 +16,7 @@ BIN: Final = 1.12
 SLOWEST_ENGINE: Final = 30.0
 """Engine speed at which the first bin begins [rad/s]."""
 
-FEWEST: Final = 12
+FEWEST_IN_BIN: Final = 12
 """Samples that a bin needs."""
 
 LOW: Final = 2.0
@@ -103,7 +103,7 @@ class Floor:
         above : (k,) readings over this floor there; NaN where unknown
         """
         known = above[np.isfinite(above)]
-        if known.size < FEWEST:
+        if known.size < FEWEST_IN_BIN:
             return self
         least = float(np.percentile(known, LEAST_DRAGGED))
         return replace(self, level=self.level + least) if least > DRIFT * self.span else self
@@ -122,7 +122,7 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
         None where there are too few samples, or the engine was never dragged.
     """
     known = np.isfinite(reading) & np.isfinite(engine_speed) & (engine_speed > SLOWEST_ENGINE)
-    if np.count_nonzero(known) < 5 * FEWEST:
+    if np.count_nonzero(known) < 5 * FEWEST_IN_BIN:
         return None
     x, turning = reading[known], engine_speed[known]
     low, high = np.percentile(x, [1.0, 99.5])
@@ -135,12 +135,12 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
     rest = []
     for k in range(count):
         inside = x[bins == k]
-        if inside.size < FEWEST:
+        if inside.size < FEWEST_IN_BIN:
             continue
         near = inside[inside <= np.percentile(inside, LOW) + SPREAD * span]
         if np.median(near) > HIGHEST * high:
             continue
-        if near.size >= max(0.5 * FEWEST, SHARE * inside.size):
+        if near.size >= max(0.5 * FEWEST_IN_BIN, SHARE * inside.size):
             level[k] = np.median(near)
             rest.append(near - level[k])
     middle = np.asarray(SLOWEST_ENGINE * BIN ** (np.arange(count) + 0.5), dtype=np.float64)

@@ -67,11 +67,11 @@ class Foot:
     Attributes
     ----------
     off : (n,)
-    told : whether reading, pedal or motion tell it at all
+    observable : whether reading, pedal or motion show it at all
     """
 
     off: Bools
-    told: bool
+    observable: bool
 
 
 def find_foot(
@@ -103,14 +103,14 @@ def find_foot(
     dragged = _dragged(drive, vehicle, source, need, torque, setup)
     if dragged is None:
         if pedal is None:
-            return Foot(np.zeros(len(source), dtype=bool), told=False)
+            return Foot(np.zeros(len(source), dtype=bool), observable=False)
         # A pedal may be up because cruise control pushes.
         pushed = averaged(need, setup.period, PUSHED_TIME) > 0.0
-        return Foot(~_pressed(pedal, source.time, setup) & ~pushed, told=True)
+        return Foot(~_pressed(pedal, source.time, setup) & ~pushed, observable=True)
     pressed = np.zeros(len(source), bool) if pedal is None else _pressed(pedal, source.time, setup)
     # The foot leaves the accelerator before a vehicle stops: a floor that shows it nowhere is none.
-    told = pedal is not None or bool(dragged.any()) or not _stops(drive)
-    return Foot(dragged & ~pressed, told=told)
+    observable = pedal is not None or bool(dragged.any()) or not _stops(drive)
+    return Foot(dragged & ~pressed, observable=observable)
 
 
 def _stops(drive: Drive) -> bool:

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.floor import FEWEST, SCATTER, Floor, find_floor
+from weighbridge.balance.floor import FEWEST_IN_BIN, SCATTER, Floor, find_floor
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.model import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import averaged
@@ -37,7 +37,7 @@ PUSHED_TIME: Final = 1.0
 PRESSED: Final = 0.01
 """Position of the accelerator above its lowest from which a foot is on it [-]."""
 
-MOVING: Final = 1.0
+DRAGGED_SPEED: Final = 1.0
 """Speed above which a reading tells of a dragged engine [m/s]."""
 
 
@@ -195,7 +195,7 @@ def _driven(drive: Drive, source: Signal) -> Floats:
     speed = drive.speed
     if speed is None:
         return source.values
-    return np.where(np.nan_to_num(speed.at(source.time)) > MOVING, source.values, np.nan)
+    return np.where(np.nan_to_num(speed.at(source.time)) > DRAGGED_SPEED, source.values, np.nan)
 
 
 def _slowing(recorded: Floats, need: Floats) -> Bools:
@@ -226,7 +226,7 @@ def _reach(floor: Floor, above: Floats) -> float:
     above : (k,) readings over the floor where the engine is surely dragged
     """
     known = above[np.isfinite(above)]
-    if known.size < FEWEST:
+    if known.size < FEWEST_IN_BIN:
         return 0.0
     shown = min(float(np.percentile(known, 90.0)), FARTHEST * floor.span)
     return shown if shown > BEYOND * floor.scatter else 0.0
@@ -244,7 +244,7 @@ def _least(source: Signal, level: Floats, reach: float, torque: Floats) -> float
     if not reach > 0.0:
         return None
     clear = (source.values - level > 2.0 * reach) & np.isfinite(torque)
-    if np.count_nonzero(clear) < 5 * FEWEST:
+    if np.count_nonzero(clear) < 5 * FEWEST_IN_BIN:
         return None
     slope, offset = np.polyfit(source.values[clear], torque[clear], 1)
     if not slope > 0.0:
@@ -259,7 +259,7 @@ def _asked(source: Signal, level: Floats, span: float, torque: Floats) -> Asked 
     """
     taken = averaged(torque, source.period, PUSHED_TIME)
     clear = (source.values > level + PUSHED * span) & np.isfinite(taken)
-    if np.count_nonzero(clear) < 5 * FEWEST or not np.ptp(taken[clear]) > 0.0:
+    if np.count_nonzero(clear) < 5 * FEWEST_IN_BIN or not np.ptp(taken[clear]) > 0.0:
         return None
     slope, offset = np.polyfit(taken[clear], source.values[clear], 1)
     noise = _white_noise(source.values, clear)

@@ -14,7 +14,13 @@ from weighbridge.balance.coarse import coarse_std
 from weighbridge.balance.cornering import cornering
 from weighbridge.balance.filled import Fill, filled, identify_fill
 from weighbridge.balance.foot_setup import learn_dragged
-from weighbridge.balance.instants import SLOWEST, Instants, motion_at, read_instants, smoothed
+from weighbridge.balance.instants import (
+    SLOWEST_GEARED,
+    Instants,
+    interpolate_motion,
+    lagged_motion,
+    read_instants,
+)
 from weighbridge.balance.law import needed_force, traction_gain
 from weighbridge.balance.table import ForceBalance, ForceSetup, ForceTable, Reason
 from weighbridge.navigation.motion import BY_SPEED, Motion
@@ -123,7 +129,7 @@ def _read(
     """Read motion and torque at the stamps of the source, less its delay."""
     recorded = source.time
     gears = setup.gears if setup is not None else None
-    at = read_instants(drive, vehicle, smoothed(motion, lag), recorded, delay, gears)
+    at = read_instants(drive, vehicle, lagged_motion(motion, lag), recorded, delay, gears)
     engine_speed, gearing, altitude = at.columns["engine_speed"], at.columns["gearing"], at.altitude
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
     full = setup.full_torque if setup is not None else full_load_torque(torque.torque)
@@ -168,7 +174,7 @@ def _reasons(
     has_torque = np.isfinite(table.traction_force) & ~filled(source, fill)
     for flag, why in (
         (~read.instants.known | ~np.isfinite(table.speed), Reason.NO_MOTION),
-        (table.speed < SLOWEST, Reason.STANDING),
+        (table.speed < SLOWEST_GEARED, Reason.STANDING),
         (brakes.braked, Reason.BRAKING),
         (read.instants.changing, Reason.SHIFTING),
         (read.instants.slipping, Reason.CLUTCH_SLIPPING),
@@ -213,7 +219,7 @@ def dragged_reading(
     for drive, motion in zip(drives, motions, strict=True):
         source = source_signal(drive, vehicle)
         time = source.time - (vehicle.timing.torque_delay or 0.0)
-        rows = motion_at(smoothed(motion, vehicle.timing.torque_lag), time)
+        rows = interpolate_motion(lagged_motion(motion, vehicle.timing.torque_lag), time)
         pressure = dynamic_pressure(air_density(drive, rows["altitude"]), rows["speed"])
         needed, weight = needed_force(vehicle, rows["specific_force"], pressure)
         sources.append(source)

@@ -18,7 +18,7 @@ ENOUGH: Final = 0.4
 """Part of the steady ratios that lies at a gearing. Gearings of another vehicle, a third
 apart, catch a quarter by chance; a file that lacks one of its gears keeps more than half [-]."""
 
-FEWEST: Final = 100
+FEWEST_RATIOS: Final = 100
 """Steady ratios needed to judge."""
 
 PAUSE: Final = 60.0
@@ -44,7 +44,7 @@ def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     if not vehicle.driveline.gearings:
         return None
     time, ratio = held_ratios(balance)
-    if time.size < FEWEST:
+    if time.size < FEWEST_RATIOS:
         return None
     return _share(ratio, vehicle)
 
@@ -64,7 +64,7 @@ def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> str:
     number = np.searchsorted(begins, time, side="right")
     for k in range(begins.size + 1):
         part = number == k
-        if np.count_nonzero(part) < FEWEST:
+        if np.count_nonzero(part) < FEWEST_RATIOS:
             continue
         share = _share(ratio[part], vehicle)
         if share < ENOUGH:

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.gear_fit import FEWEST, held_ratios
+from weighbridge.balance.gear_fit import FEWEST_RATIOS, held_ratios
 from weighbridge.balance.table import ForceBalance
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
@@ -59,7 +59,7 @@ def scale_contradiction(balance: ForceBalance, vehicle: Vehicle) -> str:
     if gearings.size < 2:
         return ""
     time, ratio = held_ratios(balance)
-    if time.size < FEWEST:
+    if time.size < FEWEST_RATIOS:
         return ""
     scale, share, own = _best(ratio, gearings)
     if share > FITS and share > own + BETTER:
@@ -77,7 +77,7 @@ def _changing(time: Floats, ratio: Floats, gearings: Floats, name: str) -> str:
     count = np.bincount(number)
     on = np.bincount(number, weights=_on(ratio, gearings, 2.0 * NEAR))
     off = ((count >= FEWEST_OF_PART) & (on < OFF * count))[number]
-    if np.count_nonzero(off) < max(LEAST * off.size, FEWEST):
+    if np.count_nonzero(off) < max(LEAST * off.size, FEWEST_RATIOS):
         return ""
     scale, share, _ = _best(ratio[off], gearings)
     # A gear that the file lacks is off, too; a scale moves several.

@@ -22,7 +22,7 @@ from weighbridge.vehicle.gear import (
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
-SLOWEST: Final = 1.5
+SLOWEST_GEARED: Final = 1.5
 """Below this speed gears, slip and torque are not told apart [m/s]."""
 
 SHIFT_MARGIN: Final = 0.4
@@ -40,20 +40,20 @@ _LONG_GAP: Final = 0.5
 """Across less a line is near to what was not seen [s]."""
 
 
-def smoothed(motion: Motion, lag: float) -> Motion:
+def lagged_motion(motion: Motion, lag: float) -> Motion:
     """Pass what the force side is compared with through a first-order lag [s]."""
     if lag <= 0.0:
         return motion
     return replace(
         motion,
-        valid=_settled(motion.valid, motion.rate, lag),
+        valid=_valid_lagged(motion.valid, motion.rate, lag),
         specific_force=behind(motion.specific_force, motion.rate, lag),
         accel=behind(motion.accel, motion.rate, lag),
         grade=behind(motion.grade, motion.rate, lag),
     )
 
 
-def _settled(valid: Bools, rate: float, lag: float) -> Bools:
+def _valid_lagged(valid: Bools, rate: float, lag: float) -> Bools:
     """Take out what follows long gaps, too, as long as a lag passes on what was not seen there."""
     starts, ends = marked_runs(~valid)
     long = ends - starts > _LONG_GAP * rate
@@ -69,7 +69,7 @@ def behind(values: Floats, rate: float, lag: float) -> Floats:
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0])
 
 
-def motion_at(motion: Motion, time: Floats) -> dict[str, Floats]:
+def interpolate_motion(motion: Motion, time: Floats) -> dict[str, Floats]:
     """Interpolate the motion to the instants ``time``; NaN outside."""
     rate = motion.rate
     position = (time - motion.time[0]) * rate
@@ -130,7 +130,7 @@ def gears_at(
         return gear, np.full(recorded.size, gearings[0]), np.zeros(recorded.size, dtype=bool)
     if gearings.size == 0:
         # Without known ratios the ratio of the moment is the best there is.
-        moving = speed > SLOWEST
+        moving = speed > SLOWEST_GEARED
         ratio = np.where(moving, engine_speed / np.where(moving, speed, 1.0), np.nan)
         return np.zeros(recorded.size, dtype=np.int64), ratio, np.zeros(recorded.size, dtype=bool)
     gear, mismatch = predict_gear(engine_speed, speed, gearings)
@@ -140,7 +140,8 @@ def gears_at(
         gear = number_reported_gears(reported, numbers)
         mismatch = np.where(
             gear > 0,
-            engine_speed / np.maximum(speed, SLOWEST) / gearings[np.maximum(gear, 1) - 1] - 1.0,
+            engine_speed / np.maximum(speed, SLOWEST_GEARED) / gearings[np.maximum(gear, 1) - 1]
+            - 1.0,
             mismatch,
         )
     clutch = drive.get("clutch_switch")
@@ -190,7 +191,7 @@ def read_instants(
     numbers : of `identify_told_gears`; found from this drive when None
     """
     time = recorded - delay
-    rows = motion_at(motion, time)
+    rows = interpolate_motion(motion, time)
     speed = rows["speed"]
     engine_speed = engine_speed_at(drive, vehicle, time + motion.speed_delay, speed)
     if numbers is None:

@@ -99,7 +99,7 @@ class ForceTable:
     air_density : (n,) [kg/m^3]
     fuel_burnt : (n,) since the first row, as far as the drive tells [kg]
     reason : (n,) `Reason` why a sample is not usable
-    begun : instant at which the vehicle first moved; found from the rows when None [s]
+    set_off : instant at which the vehicle first moved; found from the rows when None [s]
     """
 
     time: Floats
@@ -119,15 +119,20 @@ class ForceTable:
     air_density: Floats
     fuel_burnt: Floats
     reason: NDArray[np.uint8]
-    begun: float | None = None
+    set_off: float | None = None
 
     @property
     def first_moved(self) -> float:
         """Instant at which the vehicle first moved, or that of the first row [s]."""
-        if self.begun is not None:
-            return self.begun
-        moving = np.flatnonzero(np.nan_to_num(self.speed) > MOVING)
+        if self.set_off is not None:
+            return self.set_off
+        moving = np.flatnonzero(self.moving)
         return float(self.time[moving[0]] if moving.size else self.time[0])
+
+    @property
+    def moving(self) -> Bools:
+        """Rows at which the vehicle does not stand (n,)."""
+        return np.asarray(np.nan_to_num(self.speed) > MOVING)
 
     @property
     def usable(self) -> Bools:

@@ -30,7 +30,7 @@ SHIFTS: Final = 0.2 * np.arange(-10, 41)
 FEWEST_ROWS: Final = 150
 """Fewer usable rows of a piece show no lag."""
 
-FEWEST: Final = 4
+FEWEST_PARTS: Final = 4
 """Fewer pieces show no drift."""
 
 AGREES: Final = 0.7
@@ -128,14 +128,14 @@ def steadied(
     slope, scatter = _line(before)
     reach = float(np.ptp(before.time)) if before.time.size else 0.0
     if abs(slope) * reach <= max(DRIFTS, SURE * scatter):
-        if before.lag.size >= FEWEST and np.ptp(_median_of_three(before.lag)) > WANDERS:
+        if before.lag.size >= FEWEST_PARTS and np.ptp(_median_of_three(before.lag)) > WANDERS:
             raise _wanders(drive, carrier, before)
         return drive, ()
     moved = carrier.time - slope * (carrier.time - before.time[0])
     rising = np.concatenate(([True], np.diff(np.maximum.accumulate(moved)) > 0.0))
     mended = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
     after = force_lags(force_balance(mended, vehicle, motion, delay=delay).table, vehicle, motion)
-    if after.lag.size >= FEWEST and np.ptp(_median_of_three(after.lag)) > WANDERS:
+    if after.lag.size >= FEWEST_PARTS and np.ptp(_median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)
     grows = "later and later" if slope > 0.0 else "earlier and earlier"
     return mended, (
@@ -156,7 +156,7 @@ def _wanders(drive: Drive, carrier: Signal, found: ForceLags) -> DriveError:
 
 def _line(found: ForceLags) -> tuple[float, float]:
     """Robust slope of the lag over time [-] and scatter of a piece about the line [s]."""
-    if found.lag.size < FEWEST:
+    if found.lag.size < FEWEST_PARTS:
         return 0.0, 0.0
     i, j = np.triu_indices(found.lag.size, 1)
     slope = float(np.median((found.lag[j] - found.lag[i]) / (found.time[j] - found.time[i])))

@@ -46,7 +46,7 @@ BLOCKS: Final = 12
 ROUNDS: Final = 12
 """Rounds of weights of a robust fit."""
 
-FEWEST: Final = 40
+FEWEST_MEANS: Final = 40
 """Means from which a drive, or a part of it, can tell."""
 
 
@@ -222,7 +222,7 @@ def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0
     if drive.missing((name, *witness.needs)) or turning_of is None or speed is None:
         return None
     used = [drive.signals[n] for n in (name, *witness.needs)] + [turning_of, speed]
-    if min(map(len, used)) < FEWEST:
+    if min(map(len, used)) < FEWEST_MEANS:
         return None
     time = drive.signals[name].time
     try:
@@ -360,7 +360,7 @@ def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following
     Following
         None where the signals are sampled too slowly, or the drive is too short.
     """
-    if rows.period > SLOW_PERIOD or np.count_nonzero(rows.driving) < 10 * FEWEST:
+    if rows.period > SLOW_PERIOD or np.count_nonzero(rows.driving) < 10 * FEWEST_MEANS:
         return None
     value = np.clip(rows.value, *relation.value_range)
     turning = np.clip(rows.turning, *relation.speed_range)

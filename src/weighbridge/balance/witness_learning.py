@@ -10,7 +10,7 @@ import numpy as np
 
 from weighbridge.balance.disagreement import accepted_scales, difference, judged
 from weighbridge.balance.witness import (
-    FEWEST,
+    FEWEST_MEANS,
     WITNESSES,
     Rows,
     Witness,
@@ -142,7 +142,7 @@ def contradiction(
             continue
         for j, second in enumerate(rows):
             part = means(second, witness, ranges_of(relation))
-            if i == j or part.time.size < FEWEST:
+            if i == j or part.time.size < FEWEST_MEANS:
                 continue
             accepted = accepted_scales(source, relation, airs[j])
             finding = judged(part, relation, accepted, (-np.inf, np.inf))

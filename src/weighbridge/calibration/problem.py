@@ -14,7 +14,7 @@ from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.known_mass import check_mass
 from weighbridge.calibration.recording import Recording
 from weighbridge.calibration.settings import CalibrationSettings
-from weighbridge.checks import refuse_serious, settle_drive
+from weighbridge.checks import mend_drive, refuse_serious
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.squat import pooled, squat_at
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
@@ -99,10 +99,10 @@ def checked(
         # Friction in the torque is no fault here: the fit finds it as an offset.
         model = replace(model, source=source, coefficients=(-1.0, 1.0))
     known = replace(base, torque=model, witnesses=())
-    settled = [settle_drive(drive, known) for drive in drives]
-    for drive in settled:
+    mended = [mend_drive(drive, known) for drive in drives]
+    for drive in mended:
         refuse_serious(drive.name, drive.problems)
-    return settled, base, masses
+    return mended, base, masses
 
 
 def problem_of(

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance, force_balance
-from weighbridge.balance.instants import SLOWEST, read_instants, smoothed
+from weighbridge.balance.instants import SLOWEST_GEARED, lagged_motion, read_instants
 from weighbridge.balance.table import ForceTable
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
@@ -123,7 +123,7 @@ class Recording:
         motion, last = self.motion, 0.0
         for delay, lag in pairs:
             if lag != last:
-                motion, last = smoothed(self.motion, lag), lag
+                motion, last = lagged_motion(self.motion, lag), lag
             yield self._moved(self._anchor(delay, anchor_lag), motion, delay)
 
     def _anchor(self, delay: float, lag: float) -> ForceBalance:
@@ -149,7 +149,7 @@ class Recording:
         )
         engine_speed = at.columns["engine_speed"]
         usable = self._complete(table, engine_speed) & ~at.changing & ~at.slipping
-        usable &= at.known & (table.speed >= SLOWEST)
+        usable &= at.known & (table.speed >= SLOWEST_GEARED)
         return DelayedRows(table=table, engine_speed=engine_speed, usable=usable)
 
     def _complete(self, table: ForceTable, engine_speed: Floats) -> Bools:

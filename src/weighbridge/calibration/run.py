@@ -21,7 +21,8 @@ from weighbridge.calibration.rls import fit_rls
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.calibration.speed import SpeedCalibration, calibrate_by_speed
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.estimators.judging import HIDDEN_BRAKE_STD, WIDEST
+from weighbridge.estimators.gate import GATE
+from weighbridge.estimators.judging import HIDDEN_BRAKE_STD
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -178,10 +179,10 @@ def _refuse_useless(vehicle: Vehicle) -> None:
     Raises
     ------
     DriveError
-        It leaves more than `WIDEST` in every mass.
+        It leaves more than the widest of `GATE` in every mass.
     """
     made = vehicle.provenance
-    if made.mass_scale_std is not None and made.mass_scale_std > WIDEST:
+    if made.mass_scale_std is not None and made.mass_scale_std > GATE.widest:
         raise DriveError(
             f"the calibration would leave {100.0 * made.mass_scale_std:.0f} % in every mass, as "
             f"standard deviation, with which no drive can be weighed ({made.notes or 'no notes'}); "

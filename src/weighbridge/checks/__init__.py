@@ -29,7 +29,7 @@ from weighbridge.signals import Drive, Problem
 from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle.model import Vehicle
 
-__all__ = ["check_drive", "refuse_serious", "settle_drive"]
+__all__ = ["check_drive", "mend_drive", "refuse_serious"]
 
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
@@ -54,7 +54,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
 )
 
 
-def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
+def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     """Judge a drive, bring its clocks together, and leave out of it what cannot be so.
 
     Clocks come first: what is laid on an even grid later grows with the time from first to last
@@ -91,14 +91,14 @@ def settle_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
             for p in check(drive, vehicle)
         )
     problems.sort(key=lambda p: not p.serious)
-    settled = replace(within_ranges(drive), problems=(*earlier, *problems))
+    clean = replace(within_ranges(drive), problems=(*earlier, *problems))
     if any(p.serious for p in problems):
-        return settled
-    settled = mended(settled, vehicle)
+        return clean
+    clean = mended(clean, vehicle)
     # Last: what froze or dropped out is not held against a witness.
-    problems = [*settled.problems[len(earlier) :], *check_witnesses(settled, vehicle)]
+    problems = [*clean.problems[len(earlier) :], *check_witnesses(clean, vehicle)]
     problems.sort(key=lambda p: not p.serious)
-    return replace(settled, problems=(*earlier, *problems))
+    return replace(clean, problems=(*earlier, *problems))
 
 
 def refuse_serious(name: str, problems: Iterable[Problem]) -> None:
@@ -109,11 +109,11 @@ def refuse_serious(name: str, problems: Iterable[Problem]) -> None:
 
 
 def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, ...]:
-    """Look for what cannot be so in a drive; parameters as of `settle_drive`.
+    """Look for what cannot be so in a drive; parameters as of `mend_drive`.
 
     Returns
     -------
     What was found, serious problems first. The drive's own ``problems`` (from
     reading it) are not repeated.
     """
-    return settle_drive(drive, vehicle).problems[len(drive.problems) :]
+    return mend_drive(drive, vehicle).problems[len(drive.problems) :]

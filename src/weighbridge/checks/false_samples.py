@@ -35,7 +35,7 @@ OFTEN: Final = 0.003
 """Part of the samples at one level from which they are no chance [-]: none of 43 undamaged drives
 of three simulators reached it."""
 
-FEWEST: Final = 5
+FEWEST_SAMPLES: Final = 5
 """Fewer runs at one level are left alone."""
 
 CUT: Final = 0.97
@@ -88,7 +88,7 @@ def isolated(drive: Drive, name: str) -> Bools:
     # Dropouts fall to a level of their own, again and again.
     levels, which = np.unique(level, return_inverse=True)
     often = np.bincount(which, weights=alone, minlength=levels.size)
-    alone &= (often >= max(FEWEST, OFTEN * values.size))[which]
+    alone &= (often >= max(FEWEST_SAMPLES, OFTEN * values.size))[which]
     if not alone.any():
         return marked
     edges = np.zeros(values.size + 1, dtype=np.int64)
@@ -164,7 +164,7 @@ def piled(signal: Signal, *, lowest: bool = False) -> Bools:
     count = np.count_nonzero(at_end)
     runs = runs_of(signal)
     often = np.count_nonzero((values[runs.first] == end) & (runs.length > 1))
-    if count < MUCH * values.size or count < beside or often < FEWEST:
+    if count < MUCH * values.size or count < beside or often < FEWEST_SAMPLES:
         return nothing
     return np.asarray(at_end)
 

@@ -9,21 +9,22 @@ from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
-from weighbridge.balance.instants import SLOWEST
+from weighbridge.balance.instants import SLOWEST_GEARED
 from weighbridge.balance.law import drag_factor, rotating_mass
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import ConfigError
 from weighbridge.estimators import robust_rls
+from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import mass_ekf as kernel
 from weighbridge.kernels import robust_rls as rls_kernel
 from weighbridge.signals import Bools
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.possible import not_negative, positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EkfSettings:
-    """Settings of the filter; the paper gives none.
+class EkfFilter:
+    """Settings of the filter, which is half of the hybrid, too; the paper gives none.
 
     Attributes
     ----------
@@ -43,7 +44,7 @@ class EkfSettings:
     gate : speed innovations beyond this many standard deviations are left out [-]
     """
 
-    start: robust_rls.RobustRlsSettings = field(default_factory=robust_rls.RobustRlsSettings)
+    start: robust_rls.RobustRlsFilter = field(default_factory=robust_rls.RobustRlsFilter)
     start_std: float = 0.3
     speed_noise: float = 0.01
     grade_noise: float = 0.004
@@ -57,13 +58,18 @@ class EkfSettings:
 
     def __post_init__(self) -> None:
         for name in ("start_std", "speed_noise", "grade_noise", "accel_walk", "gate"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ConfigError(f"{name} must be a positive number, got {value}")
+            positive(name, getattr(self, name))
         for name in ("grade_walk", "mass_walk", "load_walk", "grade_offset", "offset_walk"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"{name} must be zero or positive, got {value}")
+            not_negative(name, getattr(self, name))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EkfSettings(GateSettings, EkfFilter):
+    """Settings of filter and gate."""
+
+    def __post_init__(self) -> None:
+        EkfFilter.__post_init__(self)
+        GateSettings.__post_init__(self)
 
 
 def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Columns:
@@ -78,11 +84,11 @@ def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Col
         speed=table.speed,
         grade=table.grade,
         driven=valid & np.isfinite(table.grade),
-        standing=np.asarray(table.speed < SLOWEST),
+        standing=np.asarray(table.speed < SLOWEST_GEARED),
     )
 
 
-def parameters(settings: EkfSettings, vehicle: Vehicle, period: float) -> kernel.MassEkfParams:
+def parameters(settings: EkfFilter, vehicle: Vehicle, period: float) -> kernel.MassEkfParams:
     """Make the kernel's parameters for a vehicle and rows ``period`` apart [s]."""
     lightest, heaviest = vehicle.of_class.mass_range
     mass = vehicle.tare or vehicle.of_class.typical_mass
@@ -182,6 +188,7 @@ def estimate(
         vehicle,
         fit,
         filter_reason(balance, valid, taken),
+        gate=settings,
         running=mass,
         spread=np.sqrt(var),
         phi=phi,

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.estimators.considered import fit_consider_std, force_columns
+from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.joint.slow_errors import (
     LASTING,
     NAMES,
@@ -18,7 +19,7 @@ from weighbridge.estimators.joint.slow_errors import (
     design,
     prior_std,
 )
-from weighbridge.estimators.judging import LEAST_SPREAD, Evidence, judge
+from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.estimators.noisy_motion import row_noise_std, too_noisy
 from weighbridge.estimators.track import Status
 from weighbridge.signals import Bools, Floats, Ints
@@ -156,6 +157,7 @@ def judged(
     fitted: Fitted,
     slow: float,
     method: str,
+    gate: GateSettings,
 ) -> Judged:
     """Find how sure a fit of a published method is, and whether it carries a mass.
 
@@ -167,6 +169,7 @@ def judged(
     fitted
     slow : `weighbridge.estimators.judging.consider_std` [-]
     method : name of the estimator, which takes the motion as exact
+    gate : what a mass needs
     """
     passing, lasting = slow_std(balance, vehicle, fitted.index, fitted.influence, fitted.mass)
     inertial = balance.motion.source == "inertial"
@@ -184,10 +187,11 @@ def judged(
         left=left,
         degrees_of_freedom=freedom,
         motion=balance.motion,
+        gate=gate,
     )
     status, why = judge(evidence, vehicle)
     # Of a cruise the noise is not the first thing to say.
-    if evidence.spread >= LEAST_SPREAD and (noise := too_noisy(noisy)):
+    if evidence.spread >= gate.least_spread and (noise := too_noisy(noisy)):
         status, why = Status.INCONSISTENT, noise
     return Judged(std, freedom, left, status, why)
 

@@ -9,14 +9,15 @@ import numpy as np
 from weighbridge.balance import ForceBalance
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ekf, robust_rls
+from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import hybrid_mass as kernel
 from weighbridge.vehicle.model import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HybridSettings:
-    """Settings of both filters and of their blend.
+class HybridSettings(GateSettings):
+    """Settings of both filters, of their blend and of the gate.
 
     Attributes
     ----------
@@ -25,11 +26,12 @@ class HybridSettings:
         share of the least squares falls with speed [m/s]
     """
 
-    ekf: ekf.EkfSettings = field(default_factory=ekf.EkfSettings)
+    ekf: ekf.EkfFilter = field(default_factory=ekf.EkfFilter)
     blend_speed: float = 6.0
     blend_width: float = 1.0
 
     def __post_init__(self) -> None:
+        GateSettings.__post_init__(self)
         if not self.blend_width > 0.0:
             raise ConfigError(f"blend_width must be positive, got {self.blend_width}")
 
@@ -91,6 +93,7 @@ def estimate(
         vehicle,
         fit,
         reason,
+        gate=settings,
         running=mass,
         spread=np.sqrt(var),
         phi=phi,

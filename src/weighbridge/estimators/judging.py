@@ -14,6 +14,7 @@ from scipy.stats import t as student
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import windows
 from weighbridge.balance.table import ForceTable
+from weighbridge.estimators.gate import GATE, GateSettings
 from weighbridge.estimators.track import MassTrack, Segment, Status
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
@@ -54,30 +55,6 @@ MOTION_STD: Final[dict[MotionSource, float]] = {
 a polled speed is smoothed and late, and grade from GNSS height noisy: simulated drives
 weighed so by the published methods, with vehicle files made with an inertial sensor, came out 9 to
 15 % light."""
-
-LEAST_SPREAD: Final = 0.12
-"""Standard deviation of the specific force below which no mass is given [m/s^2]. What the mass
-rests on then is the local slope of the torque's map, 15 % off in a simulated cruise; cruises
-had 0.07 to 0.11, parts of highway drives 0.14 and more, ordinary drives 0.25 to 0.4."""
-
-FEWEST_ROWS: Final = 50
-"""Fewer used rows carry no mass."""
-
-FEWEST_BLOCKS: Final = 3
-"""Fewer stretches of time say nothing of their scatter."""
-
-LEAST_TIME: Final = 60.0
-"""Time of used rows below which no mass is given [s]: two time constants of the disturbance.
-Of stretches with 40 to 60 s one in 28 was more than 10 % off by joint and robust-rls, of longer
-ones one in 200."""
-
-WIDEST: Final = 0.15
-"""Standard deviation over the mass above which no mass is given [-]: the interval of 95 % is
-30 % to both sides then."""
-
-WIDEST_OF_DRIVE: Final = 0.08
-"""The same of what the drive itself leaves open, the vehicle file aside [-]. Intervals beyond
-hold as well, but a quarter of the masses were more than 10 % off, below one in 100."""
 
 UNMODELLED_STD: Final = 0.04
 """Relative standard deviation that wind, hills and tyres add to the mass of one stretch
@@ -149,6 +126,7 @@ class Evidence:
     left : part of ``std`` that the vehicle file leaves, whatever the drive [kg]
     degrees_of_freedom : behind ``std``
     motion : the rows are of; tells why few of them count
+    gate : what a mass needs
     """
 
     table: ForceTable
@@ -160,12 +138,15 @@ class Evidence:
     left: float = 0.0
     degrees_of_freedom: float = float("inf")
     motion: Motion | None = None
+    gate: GateSettings = GATE
 
     @property
     def slow_speed(self) -> str:
         """What a slow speed spoils, where it shows starts and hills enough; else empty."""
         speed = self.motion.recorded_speed if self.motion is not None else None
-        return speed.slow_text if speed is not None and speed.spread >= LEAST_SPREAD else ""
+        return (
+            speed.slow_text if speed is not None and speed.spread >= self.gate.least_spread else ""
+        )
 
     @property
     def reach(self) -> float:
@@ -209,7 +190,7 @@ _PASSED: Final = (Status.CONVERGED, "")
 
 def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, str]:
     table, count = found.table, int(np.count_nonzero(found.used))
-    if count >= FEWEST_ROWS and found.blocks >= FEWEST_BLOCKS:
+    if count >= found.gate.fewest_rows and found.blocks >= found.gate.fewest_blocks:
         return _PASSED
     reasons, share = np.unique(table.reason[table.reason != 0], return_counts=True)
     most = Reason(int(reasons[np.argmax(share)])).text if reasons.size else "too short"
@@ -221,14 +202,14 @@ def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, str]:
 
 def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
     mass, reach = found.mass, found.reach
-    narrow = np.isfinite(reach) and reach <= 1.96 * WIDEST * abs(mass)
-    if narrow and found.drive_std <= WIDEST_OF_DRIVE * abs(mass):
+    narrow = np.isfinite(reach) and reach <= 1.96 * found.gate.widest * abs(mass)
+    if narrow and found.drive_std <= found.gate.widest_of_drive * abs(mass):
         return _PASSED
     low, high = vehicle.of_class.mass_range
     if mass + reach < low or mass - reach > high:
         return _possible(found, vehicle)
     cause = found.slow_speed or "more starts and hills are needed"
-    if not found.slow_speed and found.used_time < LEAST_TIME:
+    if not found.slow_speed and found.used_time < found.gate.least_time:
         cause = (
             f"only {found.used_time:.0f} s of the drive could be used: drive longer, with starts "
             "and hills"
@@ -256,27 +237,28 @@ def _possible(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
 
 
 def _long_enough(found: Evidence, _: Vehicle) -> tuple[Status, str]:
-    if found.used_time >= LEAST_TIME:
+    least = found.gate.least_time
+    if found.used_time >= least:
         return _PASSED
     return Status.NOT_EXCITED, (
-        f"only {found.used_time:.0f} s of the drive could be used, and {LEAST_TIME:.0f} s are "
+        f"only {found.used_time:.0f} s of the drive could be used, and {least:.0f} s are "
         "needed: wind, grade and torque errors last as long; "
         + (found.slow_speed or "drive longer")
     )
 
 
 def _excited(found: Evidence, _: Vehicle) -> tuple[Status, str]:
-    spread = found.spread
-    if spread >= LEAST_SPREAD:
+    spread, least = found.spread, found.gate.least_spread
+    if spread >= least:
         return _PASSED
     if found.slow_speed:
         return Status.NOT_EXCITED, (
             f"the rows used vary the specific force by only {spread:.3f} m/s^2, and the mass needs "
-            f"{LEAST_SPREAD:.3f}; {found.slow_speed}"
+            f"{least:.3f}; {found.slow_speed}"
         )
     return Status.NOT_EXCITED, (
         f"acceleration and hills vary the specific force by only {spread:.3f} m/s^2, as a cruise "
-        f"on the flat does, and the mass needs {LEAST_SPREAD:.3f}; more starts and hills are needed"
+        f"on the flat does, and the mass needs {least:.3f}; more starts and hills are needed"
     )
 
 
@@ -316,6 +298,7 @@ def segments(
     phi: Floats,
     used: Bools,
     weigh_part: Callable[[slice], tuple[float, float]],
+    gate: GateSettings = GATE,
 ) -> tuple[Segment, ...]:
     """Weigh between standstills of `STOP` or longer.
 
@@ -325,6 +308,7 @@ def segments(
     phi : (n,) regressor of the mass [m/s^2]
     used : (n,)
     weigh_part : mass and standard deviation of some rows by their scatter alone [kg]
+    gate : a segment that is less sure than its ``widest`` has no mass
     """
     table = balance.table
     slow = consider_std(balance, phi, np.zeros_like(used), vehicle)
@@ -349,7 +333,7 @@ def segments(
         cold = cold_share(time[part], phi[part], used[part], begin)
         spread = (slow, UNMODELLED_STD, cold * source_of(vehicle).cold_std)
         std = float(np.sqrt(std**2 + np.sum(np.square(spread)) * mass**2))
-        known = np.isfinite(std) and std < 0.15 * mass and low < mass < high
+        known = np.isfinite(std) and std < gate.widest * mass and low < mass < high
         found.append(
             Segment(
                 start=float(time[a]),
@@ -367,6 +351,7 @@ def nothing(
     vehicle: Vehicle,
     reason: NDArray[np.uint8],
     stretches: int,
+    gate: GateSettings = GATE,
 ) -> MassTrack:
     """Return the track of a drive that has too few usable rows for any estimate."""
     table = balance.table
@@ -380,6 +365,7 @@ def nothing(
         std=float("inf"),
         blocks=stretches,
         motion=balance.motion,
+        gate=gate,
     )
     _, why = judge(none, vehicle)
     return MassTrack(

@@ -10,11 +10,8 @@ import numpy as np
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged
-from weighbridge.estimators.judging import (
-    consider_std,
-    converged_at,
-    segments,
-)
+from weighbridge.estimators.gate import GateSettings
+from weighbridge.estimators.judging import consider_std, converged_at, segments
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import rls as kernel
@@ -26,8 +23,8 @@ BLOCK: Final = 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RlsSettings:
-    """Settings of the filter; the defaults are the paper's.
+class RlsSettings(GateSettings):
+    """Settings of filter and gate; the filter's defaults are the paper's.
 
     Attributes
     ----------
@@ -46,6 +43,7 @@ class RlsSettings:
     settle_rows: int = 200
 
     def __post_init__(self) -> None:
+        GateSettings.__post_init__(self)
         if not 0.9 < self.forgetting <= 1.0:
             raise ConfigError(f"forgetting must be in (0.9, 1], got {self.forgetting}")
         if not self.initial_gain > 0.0:
@@ -115,7 +113,7 @@ def estimate(
         index=np.flatnonzero(used),
         influence=phi[used] / np.sum(phi[used] ** 2),
     )
-    found = judged(balance, vehicle, used, phi, fitted, slow, "rls")
+    found = judged(balance, vehicle, used, phi, fitted, slow, "rls", settings)
     residual = np.where(used, y - phi * mass, np.nan)
     # Before the first row there is a start value, but no measurement.
     running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)
@@ -138,7 +136,7 @@ def estimate(
         converged_at=converged_at(table.time, running, mass, used),
         status=found.status,
         why=found.why,
-        segments=segments(balance, vehicle, phi, used, part),
+        segments=segments(balance, vehicle, phi, used, part, settings),
     )
 
 

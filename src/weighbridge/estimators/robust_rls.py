@@ -13,8 +13,8 @@ from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged
+from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.judging import (
     UNMODELLED_STD,
     consider_std,
@@ -27,6 +27,7 @@ from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.possible import not_negative, positive
 
 DEPENDENCE: Final = 5.0
 """Rows nearer than this share their error, in the running standard deviation [s]."""
@@ -44,8 +45,8 @@ FEWEST_WINDOWS: Final = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RobustRlsSettings:
-    """Settings of the filter.
+class RobustRlsFilter:
+    """Settings of the filter, which starts others, too.
 
     Attributes
     ----------
@@ -76,17 +77,22 @@ class RobustRlsSettings:
 
     def __post_init__(self) -> None:
         for name in ("window", "memory", "first_information", "threshold", "offset_memory"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ConfigError(f"{name} must be a positive number, got {value}")
+            positive(name, getattr(self, name))
         for name in ("kept_information", "offset_std"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"{name} must be zero or positive, got {value}")
+            not_negative(name, getattr(self, name))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobustRlsSettings(GateSettings, RobustRlsFilter):
+    """Settings of filter and gate."""
+
+    def __post_init__(self) -> None:
+        RobustRlsFilter.__post_init__(self)
+        GateSettings.__post_init__(self)
 
 
 def rows(
-    table: ForceTable, vehicle: Vehicle, settings: RobustRlsSettings
+    table: ForceTable, vehicle: Vehicle, settings: RobustRlsFilter
 ) -> tuple[Floats, Floats, Bools]:
     """Regressor, right-hand side and what is usable of both.
 
@@ -107,7 +113,7 @@ def row_period(time: Floats) -> float:
     return float(np.median(np.diff(time))) if time.size > 1 else 1.0
 
 
-def parameters(settings: RobustRlsSettings, period: float) -> kernel.RobustRlsParams:
+def parameters(settings: RobustRlsFilter, period: float) -> kernel.RobustRlsParams:
     """Make the kernel's parameters for rows ``period`` apart [s]."""
     window = max(settings.window, period)
     return kernel.RobustRlsParams(
@@ -286,6 +292,7 @@ def estimate(
         vehicle,
         window_fit(table.time, mean_phi, mean_y, params),
         window_reason(table, valid, mean_phi),
+        gate=settings,
         running=np.where(informed, running, np.nan),
         spread=np.sqrt(var),
         phi=phi,
@@ -300,6 +307,7 @@ def finish(
     fit: WindowFit,
     reason: NDArray[np.uint8],
     *,
+    gate: GateSettings,
     running: Floats,
     spread: Floats,
     phi: Floats,
@@ -314,13 +322,14 @@ def finish(
     balance, vehicle
     fit : windows of the drive, for standard deviation and bound
     reason : (n,) why a row was not used
+    gate : what a mass needs
     running, spread : (n,) running mass and its standard deviation from noise [kg]
     phi, y : (n,) regressor and right-hand side
     final : mass of some rows [kg]; that of ``fit`` when None
     """
     table = balance.table
     if fit.time.size < FEWEST_WINDOWS or not np.isfinite(running).any():
-        return nothing(method, balance, vehicle, reason, int(fit.time.size))
+        return nothing(method, balance, vehicle, reason, int(fit.time.size), gate)
     used = reason == Reason.USED
     fitted, scatter, blocks = fit.mass()
     mass = fitted if final is None else final(slice(0, table.time.size))
@@ -329,7 +338,7 @@ def finish(
     # What holds an offset of the force knows it; a filter without one takes it for mass.
     influence = fit.influence if final is None else fit.phi / np.sum(fit.phi**2)
     weighed = Fitted(mass=mass, scatter=scatter, blocks=blocks, index=index, influence=influence)
-    found = judged(balance, vehicle, used, phi, weighed, slow, method)
+    found = judged(balance, vehicle, used, phi, weighed, slow, method, gate)
     # A running mass that forgets is that of a stretch of time.
     passing = np.hypot(slow, UNMODELLED_STD)
 
@@ -353,5 +362,5 @@ def finish(
         converged_at=converged_at(table.time, running, mass, used),
         status=found.status,
         why=found.why,
-        segments=segments(balance, vehicle, phi, used, part),
+        segments=segments(balance, vehicle, phi, used, part, gate),
     )

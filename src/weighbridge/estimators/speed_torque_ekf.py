@@ -20,6 +20,7 @@ from weighbridge.balance.force_balance import highest_torque
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.considered import fit_consider_std, force_columns
+from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
@@ -85,7 +86,7 @@ TRIED: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SpeedTorqueSettings:
+class SpeedTorqueSettings(GateSettings):
     """Settings of the filter; what is None is found from the drive or the vehicle file.
 
     Attributes
@@ -125,6 +126,7 @@ class SpeedTorqueSettings:
     constant_errors: bool = True
 
     def __post_init__(self) -> None:
+        GateSettings.__post_init__(self)
         for name in ("initial_std", "sample_time", "slope_length", "rolling_time", "gate"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}")
@@ -349,7 +351,7 @@ def estimate(
     used = reason == Reason.USED
     stretches = int(np.unique(done.time[done.taken] // STRETCH).size)
     if not used.any():
-        return nothing(METHOD, balance, vehicle, reason, stretches)
+        return nothing(METHOD, balance, vehicle, reason, stretches, gate=settings)
     phi, _ = regression(table, vehicle)
     mass = done.mass
     moved = sensitivity(balance, vehicle, settings, done)
@@ -360,8 +362,9 @@ def estimate(
     )
     std = math.hypot(UNMODELLED * done.std, mass * left)
     evidence = Evidence(
-        table=table, used=used, phi=phi, mass=mass, std=std, blocks=stretches, left=abs(mass) * left
-    )
+        table=table, used=used, phi=phi, mass=mass, std=std, blocks=stretches,
+        left=abs(mass) * left, gate=settings,
+    )  # fmt: skip
     status, why = judge(evidence, vehicle)
     before = np.searchsorted(done.time, table.time, side="right") - 1
     begun = np.cumsum(done.taken)[np.maximum(before, 0)] > 0

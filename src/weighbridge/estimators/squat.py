@@ -30,7 +30,7 @@ long the squat found was off by 0.0009, where the navigation says 0.0003."""
 LOADED_STD: Final = 0.0003
 """By how much the squat of a vehicle changes with its load [rad per m/s^2]."""
 
-MOVING: Final = 1.0
+SLOWEST_WHEELS: Final = 1.0
 """Slower than this wheels tell no acceleration [m/s]."""
 
 AVERAGED: Final = 1.0
@@ -166,7 +166,7 @@ def squat_by_speed(motion: Motion) -> tuple[float, float] | None:
     accelerates.
     """
     rate = motion.rate
-    moving = motion.valid & (motion.speed > MOVING)
+    moving = motion.valid & (motion.speed > SLOWEST_WHEELS)
     around = max(round(AVERAGED * rate), 1), max(round(BRIEF * rate), 1)
     parts = [
         uniform_filter1d(x, around[0]) - uniform_filter1d(x, around[1])

@@ -20,7 +20,7 @@ VELOCITIES: Final = ("vertical_velocity", "roll_rate", "pitch_rate")
 NEEDED: Final = (*TRAVELS, *RATES, *VELOCITIES)
 """Signals of the ride."""
 
-SLOWEST: Final = 0.0175
+LONGEST_PERIOD: Final = 0.0175
 """Longest period of a ride that can be used [s]: less than five samples in one hop of an axle."""
 
 LEAST: Final = 4.0

@@ -24,20 +24,12 @@ from weighbridge.kernels.ins_model import (
     E_BA,
     E_BG,
     E_PITCH0,
-    E_SCALE,
     E_SQUAT,
     E_V,
     E_YAW0,
     LAST,
     PSD,
     RATE,
-    S_GRADE,
-    S_HEADING,
-    S_PITCH0,
-    S_SCALE,
-    S_SPEED,
-    S_SQUAT,
-    S_YAW0,
     SHOWN,
     TIME,
     TRANSITION,
@@ -244,7 +236,7 @@ def bridge_gap(x, cov, gap, speed, noise):
 
 
 @inlined_kernel
-def _loosen(cov, pitch_var, yaw_var):
+def _inflate(cov, pitch_var, yaw_var):
     """Open the mounting by these variances of pitch and yaw, and the attitude with it."""
     cov[E_PITCH0 * D] += pitch_var
     cov[E_YAW0 * D] += yaw_var
@@ -253,37 +245,28 @@ def _loosen(cov, pitch_var, yaw_var):
 
 
 @inlined_kernel
-def deviations(x, cov, stds, node):
-    """Fill line ``node`` of the standard deviations (m, 7)."""
+def _grade_std(x, cov):
+    """Standard deviation of the grade [rad]."""
     (r00, _, _), (r10, _, _), _ = matrix_rows(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
     n = 1.0 / math.sqrt(r00 * r00 + r10 * r10 + 1e-12)
     # pitch turns about the horizontal axis to the right of the heading; mounting and squat
     # are no grade
-    right, ahead, lean = -r10 * n, r00 * n, x[ACCEL]
+    right, ahead, accel = -r10 * n, r00 * n, x[ACCEL]
     a, b, c, d = E_ATT, E_ATT + 1, E_PITCH0, E_SQUAT
     grade = (
         right * right * cov[a * D] + ahead * ahead * cov[b * D]
-        + cov[c * D] + lean * lean * cov[d * D]
-        + 2.0 * right * (ahead * cov[a * N + b] - cov[a * N + c] - lean * cov[a * N + d])
-        - 2.0 * ahead * (cov[b * N + c] + lean * cov[b * N + d]) + 2.0 * lean * cov[c * N + d]
+        + cov[c * D] + accel * accel * cov[d * D]
+        + 2.0 * right * (ahead * cov[a * N + b] - cov[a * N + c] - accel * cov[a * N + d])
+        - 2.0 * ahead * (cov[b * N + c] + accel * cov[b * N + d]) + 2.0 * accel * cov[c * N + d]
     )  # fmt: skip
-    v = E_V
-    speed = ahead * ahead * cov[v * D] + right * right * cov[(v + 1) * D]
-    speed -= 2.0 * ahead * right * cov[v * N + v + 1]
-    stds[node, S_GRADE] = math.sqrt(max(grade, 0.0))
-    stds[node, S_PITCH0] = math.sqrt(max(cov[E_PITCH0 * D], 0.0))
-    stds[node, S_YAW0] = math.sqrt(max(cov[E_YAW0 * D], 0.0))
-    stds[node, S_SQUAT] = math.sqrt(max(cov[E_SQUAT * D], 0.0))
-    stds[node, S_SCALE] = math.sqrt(max(cov[E_SCALE * D], 0.0))
-    stds[node, S_SPEED] = math.sqrt(max(speed, 0.0))
-    stds[node, S_HEADING] = math.sqrt(max(cov[(E_ATT + 2) * D], 0.0))
+    return math.sqrt(max(grade, 0.0))
 
 
 @inlined_kernel
 def _node(x, cov, z, node, noise, rows, slot):
     """Process covariance and measurements of a node; keep it where ``rows`` is a log."""
     if z[node, Z_PITCH_MOVED] > 0.0 or z[node, Z_YAW_MOVED] > 0.0:
-        _loosen(cov, z[node, Z_PITCH_MOVED], z[node, Z_YAW_MOVED])
+        _inflate(cov, z[node, Z_PITCH_MOVED], z[node, Z_YAW_MOVED])
     propagate_covariance(x, cov, noise)
     update(x, cov, z, node, noise, rows, slot)
     for i in range(13):
@@ -295,7 +278,7 @@ def _node(x, cov, z, node, noise, rows, slot):
 
 
 @kernel
-def run(x, cov, samples, rot_bs, noise, rows, states, stds):
+def run(x, cov, samples, rot_bs, noise, rows, states, grade_std):
     """Process inertial samples and, at the nodes, covariance and measurements.
 
     A sample that is not finite, or does not follow the one before it in time, is left out.
@@ -314,8 +297,8 @@ def run(x, cov, samples, rot_bs, noise, rows, states, stds):
         Work space of one node, or a log of as many as there are.
     states : (m, 24) float64
         Filled: first part of the filter state after each node.
-    stds : (m, 7) float64
-        Filled: standard deviations after each node.
+    grade_std : (m,) float64
+        Filled: standard deviation of the grade after each node [rad].
     """
     time, accel, gyro, nodes, z = samples
     step_slot = 1 if rows.cov.shape[0] > 0 else 0
@@ -349,5 +332,5 @@ def run(x, cov, samples, rot_bs, noise, rows, states, stds):
             _node(x, cov, z, k, noise, rows, k * step_slot)
             for a in range(SHOWN):
                 states[k, a] = x[a]
-            deviations(x, cov, stds, k)
+            grade_std[k] = _grade_std(x, cov)
             k += 1

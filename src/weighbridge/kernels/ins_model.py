@@ -59,11 +59,6 @@ E_P, E_V, E_ATT, E_BA, E_BG, E_PITCH0, E_YAW0, E_SQUAT, E_SCALE, E_LEVER = (
 moving, 1 when the wheels stand, 2 when the body rests too. The last two are variances
 of pitch and yaw by which the mounting may have changed since the last node [rad^2]."""
 
-S_GRADE, S_PITCH0, S_YAW0, S_SQUAT, S_SCALE, S_SPEED, S_HEADING = range(7)
-"""Places in the standard deviations of a node: grade, mounting pitch and yaw, squat, scale of the
-indicated speed, speed over ground, heading."""
-STDS = 7
-
 
 class Noise(NamedTuple):
     """Noise model of the filter.

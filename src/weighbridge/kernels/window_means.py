@@ -1,4 +1,4 @@
-"""Means of usable rows over short windows, row by row."""
+"""Which usable rows share a short window, and their means, row by row."""
 
 from typing import NamedTuple
 
@@ -62,6 +62,56 @@ def initial_state(columns):
 
 
 @kernel
+def _place(time, begin, last, params):
+    """Find the window of a usable row: when its stretch began, and its number within it.
+
+    ``begin`` and ``last`` are those of the usable row before it; NaN is no row.
+    """
+    if not time - last <= params.pause:
+        return time, 0
+    return begin, int((time - begin) // params.length)
+
+
+@kernel
+def assign(time, usable, params):
+    """Number the windows of a whole drive, by the same cuts as `run`.
+
+    Parameters
+    ----------
+    time : (n,) float64
+        Rising [s].
+    usable : (n,) bool
+    params : WindowParams
+
+    Returns
+    -------
+    window : (n,) int64
+        Of each row, from 0 on; -1 where it is in none.
+    """
+    window = np.full(time.size, -1)
+    begin, place, last = 0.0, 0, np.nan
+    first, rows, done = 0, 0, 0
+    for i in range(time.size):
+        if not usable[i]:
+            continue
+        start, at = _place(time[i], begin, last, params)
+        if rows > 0 and (start != begin or at != place):
+            if rows >= params.enough:
+                done += 1
+            else:
+                window[first:i] = -1
+            rows = 0
+        if rows == 0:
+            first = i
+        window[i] = done
+        rows += 1
+        begin, place, last = start, at, time[i]
+    if rows < params.enough:
+        window[first:] = -1
+    return window
+
+
+@kernel
 def _rested(state, time, moving, params):
     """Take the standstill until ``time`` in; ``moving`` is whether the vehicle moves then."""
     rest, longest = state.rest, state.longest
@@ -112,12 +162,11 @@ def run(state, time, usable, moving, values, params):
     before = state.stood
     for i in range(time.size):
         rest, longest = _rested(state, time[i], moving[i], params)
-        over = count > 0 and time[i] - last > params.pause
-        at = 0
-        if usable[i] and count > 0 and not over:
-            at = int((time[i] - begin) // params.length)
-            over = at != place
-        if over:
+        start, at = begin, place
+        if usable[i]:
+            start, at = _place(time[i], begin, last, params)
+        late = time[i] - last > params.pause
+        if count > 0 and (late or at != place):
             if count >= params.enough:
                 for c in range(columns):
                     means[done, c] = sums[c] / count
@@ -130,10 +179,8 @@ def run(state, time, usable, moving, values, params):
             count = 0
         if usable[i]:
             if count == 0:
-                if not (time[i] - last <= params.pause):
-                    begin, at = time[i], 0
                 before, longest = longest, 0.0
-                place = at
+            begin, place = start, at
             for c in range(columns):
                 sums[c] += values[i, c]
             count += 1

@@ -134,15 +134,13 @@ class Records:
     @property
     def watermark(self) -> float:
         """No sample before this instant is taken any more [s]."""
-        return max(self.newest - self.lateness, self._sealed_to)
+        return self._bounds()[1]
 
     def add(self, name: str, time: float, value: float) -> None:
         """Take one sample of a signal; see `add_block`."""
         at = time - self.offset
-        ahead = at - self.newest
-        ordinary = ahead < FARTHEST or (self.newest == -math.inf and abs(at) < _FIRST)
-        in_time = ahead >= -self.lateness and at >= self._sealed_to
-        if not (ordinary and in_time and math.isfinite(value)):
+        first, in_time, last = self._bounds()
+        if not (in_time <= at < last and first < at and math.isfinite(value)):
             self.add_block({name: (np.array([time]), np.array([value]))})
             return
         column = self._columns.get(name) or self._column(name)
@@ -165,6 +163,7 @@ class Records:
             There is no such signal, or times and values differ in number.
         """
         newest = self.newest
+        first, in_time, last = self._bounds()
         for name, (time, values) in samples.items():
             if time.shape != values.shape or time.ndim != 1:
                 raise ConfigError(
@@ -173,10 +172,8 @@ class Records:
             column = self._columns.get(name) or self._column(name)
             at = time - self.offset
             finite = np.isfinite(at) & np.isfinite(values)
-            near = finite & (np.abs(at) < _FIRST)
-            if math.isfinite(self.newest):
-                near &= (at < self.newest + FARTHEST) & (at > self.watermark - BACK)
-            fresh = near & (at >= self.watermark)
+            near = finite & (at > first) & (at < last)
+            fresh = near & (at >= in_time)
             self._count(self.unfit, name, int(np.count_nonzero(~near)))
             self._count(self.late, name, int(np.count_nonzero(near & ~fresh)))
             self._watch(at[finite & ~near], bool(near.any()))
@@ -187,6 +184,18 @@ class Records:
                 newest = max(newest, float(at.max()))
                 self.oldest = min(self.oldest, float(at.min()))
         self.newest = newest
+
+    def _bounds(self) -> tuple[float, float, float]:
+        """Instants between which a stamp can be so: after, in time from, before [s].
+
+        A stamp outside the outer two is of another clock; one before that in the middle is late.
+        """
+        newest, sealed_to = self.newest, self._sealed_to
+        if newest == -math.inf:
+            return -_FIRST, sealed_to, _FIRST
+        open_from = newest - self.lateness
+        in_time = open_from if open_from > sealed_to else sealed_to
+        return in_time - BACK, in_time, newest + FARTHEST
 
     def _column(self, name: str) -> _Column:
         if name not in QUANTITIES:

@@ -23,7 +23,7 @@ from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.pipeline.given import GivenVehicle, as_vehicle
 from weighbridge.signals import Drive, DriveInfo, Floats
-from weighbridge.signals.recent import BEHIND, FEWEST, STEP, first_instant, recent
+from weighbridge.signals.recent import BEHIND, FEWEST_SAMPLES, STEP, first_instant, recent
 
 _LOG = logging.getLogger(__name__)
 
@@ -159,7 +159,7 @@ class LiveScale:
             "lateness": self._records.lateness,
             "info": self.info,
             "learned": None if self._learned is None else self._learned.answer(),
-            "samples": self._records.last(BEHIND + 2.0 * STEP, FEWEST),
+            "samples": self._records.last(BEHIND + 2.0 * STEP, FEWEST_SAMPLES),
         }
         return packed(content, self.vehicle)
 
@@ -339,7 +339,7 @@ class LiveScale:
 
     def _forget(self, before: float) -> None:
         self._kept_from = max(self._kept_from, before)
-        self._records.forget(before, FEWEST)
+        self._records.forget(before, FEWEST_SAMPLES)
 
     def _learn(self, drive: Drive, until: float) -> None:
         """Look at all that is kept, and go on from it where it tells more than is known."""

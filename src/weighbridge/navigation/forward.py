@@ -196,16 +196,16 @@ def _laid_out(
     half = round(0.5 * SQUAT_WIDTH * setup.rate)
     last = before.accel[-half:] if before is not None else np.empty(0)
     accel = held(known, float(last[-1]) if last.size else 0.0)
-    lean = averaged(1.0 / setup.rate, np.concatenate([last, accel]))[last.size :]
-    grade = pose.pitch - constants.pitch0 - constants.squat * lean
-    floor: Floats | float = setup.settings.body_pitch_std
+    mean_accel = averaged(1.0 / setup.rate, np.concatenate([last, accel]))[last.size :]
+    grade = pose.pitch - constants.pitch0 - constants.squat * mean_accel
+    least_std: Floats | float = setup.settings.body_pitch_std
     level = state.level
     pose = type(pose)(*(y[:count] for y in pose))
     time, known, accel, grade = time[:count], known[:count], accel[:count], grade[:count]
     if not setup.has_height:
         moved = np.hypot(pose.velocity[:, 0], pose.velocity[:, 1])
-        level, grade, left = _levelled_so_far(level, grade, moved, setup)
-        floor = np.hypot(floor, left)
+        level, grade, rest_std = _levelled_so_far(level, grade, moved, setup)
+        least_std = np.hypot(least_std, rest_std)
     end_std = np.sqrt(np.maximum(np.diag(state.filter.cov), 0.0))
     end = state.filter.x
     has_scale = scale_is_found(end_std, setup)
@@ -222,7 +222,7 @@ def _laid_out(
         valid=np.isfinite(known) & _aided(found, time),
         specific_force_std=setup.specific_force_std,
         specific_force_scale_std=setup.scale_std,
-        grade_std=np.hypot(_grade_std_at(time, nodes), floor),
+        grade_std=np.hypot(_grade_std_at(time, nodes), least_std),
         speed_scale=float(end[SCALE]) if has_scale else None,
         speed_scale_std=float(end_std[E_SCALE]) if has_scale else None,
         squat=float(end[SQUAT]) if setup.use_squat else None,
@@ -350,9 +350,9 @@ def _levelled_so_far(
     way = level.way + np.cumsum(moved) / setup.rate
     total = level.moved + np.cumsum(moved)
     lifted = level.lifted + np.cumsum(grade * moved)
-    trust, left = level_trust(np.maximum(way, 1.0), setup)
+    trust, rest_std = level_trust(np.maximum(way, 1.0), setup)
     after = Level(float(way[-1]), float(total[-1]), float(lifted[-1]))
-    return after, grade - trust * lifted / np.maximum(total, 1e-9), left
+    return after, grade - trust * lifted / np.maximum(total, 1e-9), rest_std
 
 
 def _aided(found: Found | None, time: Floats) -> Bools:

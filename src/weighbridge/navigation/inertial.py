@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from weighbridge.navigation.identify.rounds import settle
+from weighbridge.navigation.identify.rounds import navigate
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.settings import RATE, NavigationSettings
 from weighbridge.navigation.sources import read_sources
@@ -45,4 +45,4 @@ def inertial_motion(
     ----------
     Jensen et al., Mech. Syst. Signal Process. 171, 2022, sec. 5.2-5.4.
     """
-    return settle(read_sources(drive), mounting, settings or NavigationSettings(), rate)[1]
+    return navigate(read_sources(drive), mounting, settings or NavigationSettings(), rate)[1]

@@ -283,9 +283,9 @@ def _levelled(time: Floats, grade: Floats, pose: Pose, setup: Setup) -> tuple[Fl
     moved = np.hypot(pose.velocity[:, 0], pose.velocity[:, 1])
     way = max(float(np.sum(moved)) * float(time[1] - time[0]), 1.0)
     mean = float(np.sum(grade * moved) / max(np.sum(moved), 1e-9))
-    trust, left = level_trust(way, setup)
+    trust, rest_std = level_trust(way, setup)
     taken = float(trust) * mean
-    return grade - taken, taken, math.hypot(setup.settings.body_pitch_std, float(left))
+    return grade - taken, taken, math.hypot(setup.settings.body_pitch_std, float(rest_std))
 
 
 def _valid(found: Found, accel: Floats, setup: Setup) -> Bools:

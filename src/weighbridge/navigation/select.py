@@ -42,11 +42,14 @@ def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motio
     """
     has_speed = drive.has("vehicle_speed") or drive.has("gnss_speed")
     if drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude")):
-        from weighbridge.navigation.identify.rounds import settle
+        from weighbridge.navigation.identify.rounds import navigate
 
         mounting = vehicle.mounting if vehicle is not None else None
-        sources = read_sources(scaled_for_navigation(drive, vehicle))
-        setup, motion = settle(sources, mounting, NavigationSettings(), RATE)
+        sources = read_sources(drive)
+        known = scaled_for_navigation(drive, vehicle, positions=sources.fixes is not None)
+        if known is not drive:
+            sources = read_sources(known)
+        setup, motion = navigate(sources, mounting, NavigationSettings(), RATE)
         return motion, setup
     if drive.has("longitudinal_accel", "vehicle_speed"):
         return longitudinal_motion(true_speed(drive, vehicle)), None
@@ -62,9 +65,14 @@ def without_accelerometer(drive: Drive) -> Drive:
     return drive.without(*IMU_SIGNALS, "longitudinal_accel")
 
 
-def scaled_for_navigation(drive: Drive, vehicle: Vehicle | None) -> Drive:
-    """Return the drive as navigation takes it: positions show the scale of its speed."""
-    positions = drive.has("latitude", "longitude")
+def scaled_for_navigation(drive: Drive, vehicle: Vehicle | None, *, positions: bool) -> Drive:
+    """Return a drive as inertial navigation takes it, of a whole drive as on the way.
+
+    Parameters
+    ----------
+    drive, vehicle
+    positions : fixes of GNSS show the scale of its speed; else the vehicle's is taken off
+    """
     return drive if positions else true_speed(drive, vehicle)
 
 

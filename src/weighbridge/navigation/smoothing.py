@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -9,6 +10,9 @@ from scipy.optimize import minimize
 
 from weighbridge.kernels import rts
 from weighbridge.signals import Floats, Ints, Signal
+
+_Model = tuple[Floats, Floats, float, Floats, Floats]
+"""Transitions, process covariances, noise variance, first state and its covariance."""
 
 ACCEL_TIME: Final = 3.0
 """How long a driver keeps an acceleration before the drive has told [s]."""
@@ -90,6 +94,46 @@ def _merged(stamps: Floats, values: Floats, time: Floats) -> tuple[Floats, Float
     return clock, z, np.searchsorted(clock, time).astype(np.int64)
 
 
+def _smooth_likeliest(
+    model: Callable[[Floats, Floats], _Model],
+    row: Floats,
+    measured: tuple[Floats, Floats],
+    time: Floats,
+    levels: int,
+    **options: float,
+) -> tuple[Floats, Floats]:
+    """Smooth measurements by the sizes of noise and process that are likeliest.
+
+    Parameters
+    ----------
+    model : of a clock (m,) and logarithms of the sizes over the usual ones (levels,)
+    row : (k,) of the state that is measured
+    measured : stamps [s] and values (j,)
+    time : (n,) instants asked for, rising [s]
+    levels : sizes that are sought
+    options : of the search
+
+    Returns
+    -------
+    x, var : (n, k) states and their variances
+    """
+    stamps, values = measured
+    stride = _stride(stamps)
+    thin = stamps[::stride]
+
+    def misfit(level: Floats) -> float:
+        transition, cov, noise, start, spread = model(thin, level)
+        var = np.full(thin.size, noise)
+        likelihood = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
+        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
+
+    found = minimize(misfit, np.zeros(levels), method="Nelder-Mead", options=options).x
+    clock, z, at = _merged(stamps, values, time)
+    transition, cov, noise, start, spread = model(clock, found)
+    x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
+    return x[at], var[at]
+
+
 def smooth_speed(speed: Signal, time: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Smooth a polled speed into speed and acceleration.
 
@@ -114,31 +158,18 @@ def smooth_speed(speed: Signal, time: Floats) -> tuple[Floats, Floats, Floats, F
     Carroll et al., Measurement Error in Nonlinear Models, 2nd ed., 2006, ch. 1.
     """
     quantum = resolution(speed.values)
-    stride = _stride(speed.time)
-    thin = speed.time[::stride]
     usual = np.log([ACCEL_STD, ACCEL_TIME, np.hypot(SPEED_NOISE, quantum / np.sqrt(12.0))])
     row = np.array([1.0, 0.0])
 
-    def model(clock: Floats, level: Floats) -> tuple[Floats, Floats, float, Floats, Floats]:
+    def model(clock: Floats, level: Floats) -> _Model:
         std, length, noise = np.exp(usual + level)
         transition, cov, _ = _gauss_markov(np.diff(clock, prepend=clock[0]), length, std)
         start = np.array([speed.values[0], 0.0])
         return transition, cov, noise**2, start, np.diag([noise**2, std**2])
 
-    def misfit(level: Floats) -> float:
-        transition, cov, noise, start, spread = model(thin, level)
-        var = np.full(thin.size, noise)
-        likelihood = rts.log_likelihood(
-            transition, cov, row, speed.values[::stride], var, start, spread
-        )
-        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
-
-    found = minimize(misfit, np.zeros(3), method="Nelder-Mead", options={"xatol": 0.02}).x
-    clock, z, at = _merged(speed.time, speed.values, time)
-    transition, cov, noise, start, spread = model(clock, found)
-    x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
-    std = np.sqrt(np.maximum(var[at], 0.0))
-    return x[at, 0], x[at, 1], std[:, 0], std[:, 1]
+    x, var = _smooth_likeliest(model, row, (speed.time, speed.values), time, 3, xatol=0.02)
+    std = np.sqrt(np.maximum(var, 0.0))
+    return x[:, 0], x[:, 1], std[:, 0], std[:, 1]
 
 
 def smooth_height(
@@ -165,8 +196,6 @@ def smooth_height(
     inside = (altitude.time >= time[0]) & (altitude.time <= time[-1])
     stamps, values = altitude.time[inside], altitude.values[inside]
     quantum = resolution(values)
-    stride = _stride(stamps)
-    thin = stamps[::stride]
     usual = np.log(
         [
             GRADE_STD, GRADE_LENGTH, np.hypot(HEIGHT_NOISE, quantum / np.sqrt(12.0)),
@@ -175,7 +204,7 @@ def smooth_height(
     )  # fmt: skip
     row = np.array([1.0, 0.0, 1.0])
 
-    def model(clock: Floats, level: Floats) -> tuple[Floats, Floats, float, Floats, Floats]:
+    def model(clock: Floats, level: Floats) -> _Model:
         std, length, noise, walk, lasting = np.exp(usual + level)
         way = np.interp(clock, time, distance)
         road, road_cov, _ = _gauss_markov(np.diff(way, prepend=way[0]), length, std)
@@ -186,19 +215,9 @@ def smooth_height(
         start = np.array([values[0], 0.0, 0.0])
         return transition, cov, noise**2, start, np.diag([1e4, std**2, walk**2])
 
-    def misfit(level: Floats) -> float:
-        transition, cov, noise, start, spread = model(thin, level)
-        var = np.full(thin.size, noise)
-        likelihood = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
-        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
-
-    found = minimize(
-        misfit, np.zeros(5), method="Nelder-Mead", options={"xatol": 0.05, "maxiter": 300}
-    ).x
-    clock, z, at = _merged(stamps, values, time)
-    transition, cov, noise, start, spread = model(clock, found)
-    x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
-    return x[at, 0], x[at, 1], np.sqrt(np.maximum(var[at, 1], 0.0))
+    options = {"xatol": 0.05, "maxiter": 300}
+    x, var = _smooth_likeliest(model, row, (stamps, values), time, 5, **options)
+    return x[:, 0], x[:, 1], np.sqrt(np.maximum(var[:, 1], 0.0))
 
 
 def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floats, Floats]:
@@ -216,27 +235,15 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
     grade_std : (n,) its standard deviation [rad]
     """
     quantum = resolution(measured.values)
-    stride = _stride(measured.time)
-    thin = measured.time[::stride]
     usual = np.log([GRADE_STD, GRADE_LENGTH, np.hypot(GRADE_NOISE, quantum / np.sqrt(12.0))])
     row = np.array([0.0, 1.0])
 
-    def model(clock: Floats, level: Floats) -> tuple[Floats, Floats, float, Floats, Floats]:
+    def model(clock: Floats, level: Floats) -> _Model:
         std, length, noise = np.exp(usual + level)
         way = np.interp(clock, time, distance)
         transition, cov, _ = _gauss_markov(np.diff(way, prepend=way[0]), length, std)
         return transition, cov, noise**2, np.zeros(2), np.diag([0.0, std**2])
 
-    def misfit(level: Floats) -> float:
-        transition, cov, noise, start, spread = model(thin, level)
-        var = np.full(thin.size, noise)
-        likelihood = rts.log_likelihood(
-            transition, cov, row, measured.values[::stride], var, start, spread
-        )
-        return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
-
-    found = minimize(misfit, np.zeros(3), method="Nelder-Mead", options={"xatol": 0.05}).x
-    clock, z, at = _merged(measured.time, measured.values, time)
-    transition, cov, noise, start, spread = model(clock, found)
-    x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
-    return x[at, 1], np.sqrt(np.maximum(var[at, 1], 0.0))
+    stamps, values = measured.time, measured.values
+    x, var = _smooth_likeliest(model, row, (stamps, values), time, 3, xatol=0.05)
+    return x[:, 1], np.sqrt(np.maximum(var[:, 1], 0.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from weighbridge.estimators.joint.batch import MOTION_STD
+from weighbridge.estimators.joint.batch import JOINT_MOTION_STD
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.vehicle.model import Vehicle
 
@@ -51,6 +51,6 @@ def expected(
     scale = vehicle.provenance.mass_scale_std if vehicle is not None else None
     if scale is None:
         return best, worst
-    left = 100.0 * math.hypot(scale, MOTION_STD[motion])
+    left = 100.0 * math.hypot(scale, JOINT_MOTION_STD[motion])
     best = max(best, round(left, 1))
     return best, max(worst, round(math.hypot(best, left), 1))

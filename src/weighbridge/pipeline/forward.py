@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from weighbridge.balance import force_balance
-from weighbridge.balance.averaging import FEWEST, PAUSE, WINDOW
-from weighbridge.balance.table import MOVING, ForceTable
+from weighbridge.balance.averaging import WINDOW, window_params
+from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.joint import forward as joint_forward
 from weighbridge.estimators.joint.forward import (
@@ -32,7 +32,7 @@ from weighbridge.estimators.judging import STOP
 from weighbridge.kernels import window_means
 from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
 from weighbridge.navigation import forward
-from weighbridge.navigation.select import true_speed
+from weighbridge.navigation.select import scaled_for_navigation
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.recent import instants, recent
 from weighbridge.vehicle.model import Vehicle
@@ -144,7 +144,7 @@ class ForwardState(NamedTuple):
     joint : of the filter of the mass
     read : instant of the last row that was folded [s]
     burnt : fuel since the first row, until then [kg]
-    begun : instant at which the vehicle first moved; None before [s]
+    set_off : instant at which the vehicle first moved; None before [s]
     """
 
     motion: forward.NavigationState
@@ -152,7 +152,7 @@ class ForwardState(NamedTuple):
     joint: JointState
     read: float
     burnt: float
-    begun: float | None
+    set_off: float | None
 
 
 class Running(NamedTuple):
@@ -182,7 +182,7 @@ def begin(setup: ForwardSetup, start: float) -> ForwardState:
         joint=JointState(),
         read=-math.inf,
         burnt=0.0,
-        begun=None,
+        set_off=None,
     )
 
 
@@ -235,7 +235,8 @@ def step(
     running : mass after each window that became complete
     """
     vehicle = setup.vehicle
-    seen = records if setup.navigation.origin is not None else true_speed(records, vehicle)
+    positions = setup.navigation.origin is not None
+    seen = scaled_for_navigation(records, vehicle, positions=positions)
     moved, _ = forward.step(state.motion, seen, until, setup.navigation)
     state = state._replace(motion=moved)
     if moved.motion is None or moved.motion.time.size < 2:
@@ -261,11 +262,11 @@ def _folded(
     """Fold new rows of the table into windows, and complete windows into the filter."""
     sizes = setup.joint
     burnt = table.fuel_burnt + (state.burnt - table.fuel_burnt[max(new.start - 1, 0)])
-    moving = np.nan_to_num(table.speed) > MOVING
-    begun = state.begun
-    if begun is None and moving[new].any():
-        begun = float(table.time[new][np.argmax(moving[new])])
-    table = replace(table, fuel_burnt=burnt, begun=begun)
+    moving = table.moving
+    set_off = state.set_off
+    if set_off is None and moving[new].any():
+        set_off = float(table.time[new][np.argmax(moving[new])])
+    table = replace(table, fuel_burnt=burnt, set_off=set_off)
     rows, y = design(table, setup.vehicle, squat_accel=sizes.body.squat_accel(table.accel))
     values = np.column_stack([table.time, y, table.force_std**2, rows])
     windows, means, count, stood = window_means.run(
@@ -274,12 +275,7 @@ def _folded(
         usable_rows(table, rows, y)[new],
         moving[new],
         values[new],
-        window_means.WindowParams(
-            length=WINDOW,
-            pause=max(PAUSE, 2.5 * setup.period),
-            enough=max(2, int(FEWEST * WINDOW / setup.period)),
-            long_gap=STOP,
-        ),
+        window_params(setup.period, long_gap=STOP),
     )
     joint, mass, std = state.joint, np.empty(len(means)), np.empty(len(means))
     for k, (mean, many) in enumerate(zip(means, count, strict=True)):
@@ -292,7 +288,7 @@ def _folded(
         joint=joint,
         read=float(table.time[new][-1]),
         burnt=float(burnt[new][-1]),
-        begun=begun,
+        set_off=set_off,
     )
     return after, Running(means[:, 0], mass - light, std)
 
@@ -302,7 +298,7 @@ def forward_weigh(drive: Drive, setup: ForwardSetup) -> ForwardTrack:
 
     Parameters
     ----------
-    drive : as settled for the weighing of ``setup``
+    drive : as mended for the weighing of ``setup``
     setup : of `identify_forward`
     """
     state, parts = begin(setup, drive.start), [NO_WINDOWS]

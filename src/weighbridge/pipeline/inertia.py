@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.arguments import check_path, check_text, check_type
-from weighbridge.checks import refuse_serious, settle_drive
+from weighbridge.checks import mend_drive, refuse_serious
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.track import Status
@@ -28,8 +28,8 @@ from weighbridge.inertia.filter import (
 from weighbridge.inertia.load_changes import believed_otherwise, jumps, load_changes
 from weighbridge.inertia.ride_checks import (
     LEAST,
+    LONGEST_PERIOD,
     NEEDED,
-    SLOWEST,
     check_response,
     check_signals,
     nothing_moves,
@@ -167,15 +167,15 @@ def _estimate(
             "every signal of the ride repeats one value: the vehicle stood, or nothing was "
             "measured; drive at 20 km/h or more while recording",
         )
-    settled = settle_drive(only)
-    problems = [*settled.problems, *check_signals(only)]
+    mended = mend_drive(only)
+    problems = [*mended.problems, *check_signals(only)]
     refuse_serious(drive.name, problems)
-    samples = ride_samples(settled)
+    samples = ride_samples(mended)
     seen = response(samples, ride)
     problems += check_response(seen) if seen is not None else ()
     refuse_serious(drive.name, problems)
     warnings = tuple(dict.fromkeys(p.text for p in problems))
-    if not samples.period <= SLOWEST:
+    if not samples.period <= LONGEST_PERIOD:
         return nothing(
             Status.NOT_EXCITED,
             f"the ride is sampled {1.0 / samples.period:.3g} times per second, and axles hop 10 to "

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.speed_balance import SPEEDS
-from weighbridge.checks import settle_drive
+from weighbridge.checks import mend_drive
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.pipeline.expected import EXPECTED, FAST, MOTIONS, expected
 from weighbridge.pipeline.given import (
@@ -138,10 +138,10 @@ def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Ins
     drive = as_drive(drive, mapping_of(vehicle, home))
     order = list(QUANTITIES)
     signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
-    settled = settle_drive(drive, vehicle)
-    problems = settled.problems
+    mended = mend_drive(drive, vehicle)
+    problems = mended.problems
     if not any(p.serious for p in problems):
-        problems += _by_battery(settled, vehicle)
+        problems += _by_battery(mended, vehicle)
     return Inspection(
         drive=drive,
         signals=tuple(describe(s) for s in signals),

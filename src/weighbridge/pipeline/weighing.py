@@ -128,10 +128,10 @@ def weigh(
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
     chosen = ESTIMATORS[method].settings_of(settings) if settings else None
 
-    from weighbridge.checks import refuse_serious, settle_drive
+    from weighbridge.checks import mend_drive, refuse_serious
 
     home, vehicle = home_of(vehicle), as_vehicle(vehicle)
-    drive = settle_drive(as_drive(drive, mapping_of(vehicle, home), mapping), vehicle)
+    drive = mend_drive(as_drive(drive, mapping_of(vehicle, home), mapping), vehicle)
     refuse_serious(drive.name, drive.problems)
     return weigh_checked(drive, vehicle, method, chosen)
 

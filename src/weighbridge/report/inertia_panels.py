@@ -52,8 +52,8 @@ def parameter_panels(
             tx, ty = thin_line(track.time, truth[:, k])
             line(figure, tx, ty, "true", VERMILLION, dash="dash")
         # Some samples after the start or a change, an interval may reach to the sky.
-        settled = seen[seen.size // 10 :] if truth is None else seen
-        figure.update_yaxes(range=[0.0, 1.5 * float(np.nanmax(settled))], autorange=False)
+        calm = seen[seen.size // 10 :] if truth is None else seen
+        figure.update_yaxes(range=[0.0, 1.5 * float(np.nanmax(calm))], autorange=False)
         panels.append(
             Panel(
                 title=f"{name[0].upper()}{name[1:]}",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from weighbridge.estimators import ESTIMATORS
 from weighbridge.report.style import (
     BLUE,
     GREEN,
@@ -29,16 +30,17 @@ from weighbridge.report.thinning import thin_line
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult
 
-METHOD_STYLE: Final[dict[str, tuple[str, str]]] = {
-    "joint": (BLUE, "solid"),
-    "rls": (VERMILLION, "dash"),
-    "robust-rls": (ORANGE, "dot"),
-    "ekf": (GREEN, "dashdot"),
-    "hybrid": (PURPLE, "longdash"),
-    "speed-torque-ekf": (VERMILLION, "longdash"),
-    "speed-ekf": (GREY, "longdashdot"),
-}
-"""Colour and dash of each method."""
+METHOD_STYLES: Final = (
+    (BLUE, "solid"),
+    (VERMILLION, "dash"),
+    (ORANGE, "dot"),
+    (GREEN, "dashdot"),
+    (PURPLE, "longdash"),
+    (GREY, "longdashdot"),
+    (VERMILLION, "longdash"),
+    (GREEN, "longdashdot"),
+)
+"""Colour and dash of each method, in the order of `ESTIMATORS`."""
 
 OTHER_STYLE: Final = (GREY, "dot")
 """Those of a method of another package."""
@@ -49,7 +51,8 @@ TRACK_POINTS: Final = 600
 
 def method_style(method: str) -> tuple[str, str]:
     """Return colour and dash of a method."""
-    return METHOD_STYLE.get(method, OTHER_STYLE)
+    own = dict(zip(ESTIMATORS.own, METHOD_STYLES, strict=False))
+    return own.get(method, OTHER_STYLE)
 
 
 def methods_section(comparison: Sequence[MassResult], truth: float | None) -> Section:
@@ -142,8 +145,8 @@ def tracks_panel(comparison: Sequence[MassResult], truth: float | None) -> Panel
         x, y = thin_line(minutes(w.drive, result.time), mass, points=TRACK_POINTS)
         line(figure, x, y, name, colour, dash=dash)
         if math.isfinite(w.mass):
-            settled = mass[np.isfinite(mass)]
-            late += [float(v) for v in np.percentile(settled[settled.size // 8 :], [1.0, 99.0])]
+            known = mass[np.isfinite(mass)]
+            late += [float(v) for v in np.percentile(known[known.size // 8 :], [1.0, 99.0])]
     if not figure.data:
         return Panel(title="Running masses", absent="no running masses: no method has any.")
     if truth is not None:

@@ -328,8 +328,8 @@ def _facts(weighing: MassResult, known: float | None) -> str:
     if known is not None:
         facts.insert(1, ("true mass", kg(known)))
     if result is not None and _found(weighing):
-        settled = result.converged_at - weighing.drive.start
-        facts.append(("within 5 % for good after", duration(settled)))
+        after = result.converged_at - weighing.drive.start
+        facts.append(("within 5 % for good after", duration(after)))
         if math.isfinite(result.bound_std):
             facts.append(("Cramér-Rao bound", f"± {result.bound_std:.1f} kg (1 sd)"))
     return _list(facts)

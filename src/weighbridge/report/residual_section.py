@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 POINTS: Final = 900
 """Points of each cloud."""
 
-FEWEST: Final = 10
+FEWEST_SAMPLES: Final = 10
 """Samples below which a bin has no mean."""
 
 SMALLEST: Final = 0.002
@@ -196,14 +196,14 @@ def binned(
 
     Returns
     -------
-    centres, mean, std : (k,) of bins of at least `FEWEST` samples and `SMALLEST` of all
+    centres, mean, std : (k,) of bins of at least `FEWEST_SAMPLES` samples and `SMALLEST` of all
     """
     number = np.floor(x / width + (0.5 if centred else 0.0)).astype(np.int64)
     bins, where = np.unique(number, return_inverse=True)
     count = np.bincount(where, minlength=bins.size)
     mean = np.bincount(where, y, bins.size) / np.maximum(count, 1)
     square = np.bincount(where, (y - mean[where]) ** 2, bins.size)
-    full = count >= max(FEWEST, SMALLEST * x.size)
+    full = count >= max(FEWEST_SAMPLES, SMALLEST * x.size)
     std = np.sqrt(square[full] / (count[full] - 1))
     centres = (bins[full] + (0.0 if centred else 0.5)) * width
     return np.asarray(centres), np.asarray(mean[full]), np.asarray(std)

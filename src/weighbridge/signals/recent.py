@@ -18,7 +18,7 @@ BEHIND: Final = 15.0
 """They look back so far [s]: a reading that runs straight for 10 s was filled in, and filters
 have forgotten by then."""
 
-FEWEST: Final = 16
+FEWEST_SAMPLES: Final = 16
 """They see so many samples of a slow signal at least, however old."""
 
 
@@ -27,7 +27,7 @@ def recent(drive: Drive, until: float) -> Drive:
     cut = {}
     for name, s in drive.signals.items():
         first, last = s.time.searchsorted([until - STEP - BEHIND, until])
-        first = max(min(first, last - FEWEST), 0)
+        first = max(min(first, last - FEWEST_SAMPLES), 0)
         if last > first:
             cut[name] = Signal(name, s.time[first:last], s.values[first:last])
     return replace(drive, signals=cut)

@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.torque_source import REPORTED, TorqueConstants
 
-SLOWEST: Final = 1.0
+SLOWEST_POWER: Final = 1.0
 """Slower than this a power says nothing of a force [m/s]."""
 
 SLOWEST_SHAFT: Final = 15.0
@@ -123,7 +123,9 @@ def _speed_of(drive: Drive) -> Signal:
 
 
 def _power_by_speed(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
-    return _per(drive.signals["engine_power"].at(time), _fresh(_speed_of(drive), time), SLOWEST)
+    return _per(
+        drive.signals["engine_power"].at(time), _fresh(_speed_of(drive), time), SLOWEST_POWER
+    )
 
 
 def _driving_power(drive: Drive) -> Signal:
@@ -142,7 +144,7 @@ def _driving_power(drive: Drive) -> Signal:
     averaged = uniform_filter1d(np.nan_to_num(v), around) if time.size else v
     gained = np.gradient(averaged**2, time) if time.size > 1 else np.zeros(time.size)
     sign = math.copysign(1.0, float((power - np.mean(power)) @ gained)) if time.size else 1.0
-    moves = time[np.abs(v) >= SLOWEST]
+    moves = time[np.abs(v) >= SLOWEST_POWER]
     near = np.searchsorted(moves, time + NEAR) > np.searchsorted(moves, time - NEAR)
     # Long after or before driving it may charge or heat.
     standing = (np.abs(v) < STANDING) & near & (sign * power >= 0.0)
@@ -154,7 +156,7 @@ def _driving_power(drive: Drive) -> Signal:
 
 def _battery(drive: Drive, time: Floats, _: TorqueConstants) -> Floats:
     power = _fresh(_driving_power(drive), time)
-    force = _per(power, _fresh(_speed_of(drive), time), SLOWEST)
+    force = _per(power, _fresh(_speed_of(drive), time), SLOWEST_POWER)
     efficiency = BATTERY_EFFICIENCY[0]
     return np.asarray(np.where(force >= 0.0, efficiency * force, force / efficiency))
 

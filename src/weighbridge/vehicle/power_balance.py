@@ -17,6 +17,7 @@ import numpy as np
 
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.data_sheet import by_data_sheet, torque_std
+from weighbridge.vehicle.force_sources import SLOWEST_POWER
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import engine_torque, source_of
 
@@ -37,9 +38,6 @@ LEAST_POWER: Final = 3000.0
 
 LEAST_TIME: Final = 15.0
 """Time above that power that is needed, driving and recuperating [s]."""
-
-SLOWEST: Final = 1.0
-"""Slower than this little power is at the shaft, and speed is rough [m/s]."""
 
 SLOW: Final = 60.0
 """What changes more slowly is taken off: heating, air conditioning, pumps [s]."""
@@ -229,7 +227,7 @@ def _rows(drive: Drive, vehicle: Vehicle) -> tuple[Floats, Floats, Floats, Bools
         np.bincount(number, weights=np.nan_to_num(x))[whole] / count[whole]
         for x in (time, shaft, electric, speed)
     )
-    return at, at_shaft, at_battery, at_speed > SLOWEST * gearings[0]
+    return at, at_shaft, at_battery, at_speed > SLOWEST_POWER * gearings[0]
 
 
 def _lateness(shaft: Floats, power: Signal, time: Floats) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
-from weighbridge.balance.averaging import WINDOW, Windows, windows
+from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
@@ -32,6 +32,7 @@ from weighbridge.estimators.joint.slow_errors import (
     noise_variance,
     prior_std,
     usable_rows,
+    window_motion_variance,
 )
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
@@ -56,7 +57,7 @@ BEYOND_STD: Final = 0.015
 """Relative standard deviation of a mass per unit of the logarithm by which it lies beyond
 those of the calibration [-]: torque is used where its fit has seen little."""
 
-MOTION_STD: Final[dict[MotionSource, float]] = {
+JOINT_MOTION_STD: Final[dict[MotionSource, float]] = {
     "inertial": 0.0,
     "longitudinal_accel": 0.01,
     "speed_grade": 0.025,
@@ -124,7 +125,7 @@ def estimate(
     reason[usable] = Reason.TOO_SHORT
     reason[cut.index] = Reason.USED
     if cut.count.size < settings.fewest_windows:
-        return nothing("joint", balance, vehicle, reason, int(cut.count.size))
+        return nothing("joint", balance, vehicle, reason, int(cut.count.size), settings)
     rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
     asked = _ask(balance, vehicle, cut, rough, settings)
     if not load_changes:
@@ -292,7 +293,7 @@ def _track(
     track_std = UNMODELLED * np.sqrt(solved.running_var)[seen]
     evidence = Evidence(
         table=table, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size,
-        left=mass * left, motion=balance.motion,
+        left=mass * left, motion=balance.motion, gate=problem.settings,
     )  # fmt: skip
     status, why = judge(evidence, vehicle)
     return MassTrack(
@@ -322,7 +323,7 @@ def _track(
             fast=solved.fast,
             slow=solved.slow,
             body=asked.body,
-            motion_var=motion_variance(balance.motion) + balance.motion.mean_accel_std(WINDOW) ** 2,
+            motion_var=window_motion_variance(balance.motion),
             noise_information=shown * float(np.sum(solved.weight)),
             left=left,
             settings=problem.settings,
@@ -361,7 +362,7 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
     scale = made.mass_scale_std if made.mass_scale_std is not None else scale_std(vehicle)
     left = math.hypot(
         scale,
-        MOTION_STD[balance.motion.source],
+        JOINT_MOTION_STD[balance.motion.source],
         balance.motion.specific_force_scale_std,
         balance.coarse_std,
     )

@@ -16,6 +16,7 @@ from weighbridge.estimators.joint.problem import (
     first_state,
     load_params,
 )
+from weighbridge.estimators.joint.slow_errors import window_noise
 from weighbridge.estimators.judging import STOP
 from weighbridge.kernels import disturbance, load_change
 from weighbridge.signals import Floats
@@ -153,7 +154,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     load, begun, tried = state.load, state.begun, state.tried
     if load is None:
         load = load_change.initial_state(start)  # type: ignore[no-untyped-call]
-    noise = setup.fast**2 * (window.torque_var + setup.mass**2 * setup.motion_var)
+    noise = setup.fast**2 * window_noise(window.torque_var, setup.mass, setup.motion_var)
     long = state.windows > 0 and window.stood >= STOP
     odds = float(change_odds(np.array([window.stood]))[0]) if long else np.nan
     weight = disturbance.weight(load.same, window.time, window.row, noise, params)

@@ -52,7 +52,7 @@ def stood_before(table: ForceTable, time: Floats) -> Floats:
     table
     time : (m,) instants of the windows [s]
     """
-    standing = ~(np.nan_to_num(table.speed) > 0.5)
+    standing = ~table.moving
     gap = np.diff(table.time, append=table.time[-1])
     # Rows near in time stand for the time until the next; a long gap stands for itself.
     still = np.cumsum(np.where(standing | (gap > STOP), gap, 0.0))

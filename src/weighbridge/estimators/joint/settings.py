@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from weighbridge.errors import ConfigError
+from weighbridge.estimators.gate import GateSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JointSettings:
+class JointSettings(GateSettings):
     """What a user may change of the joint estimator.
 
     Attributes
@@ -29,6 +30,7 @@ class JointSettings:
     load_pitch_std: float = 0.03
 
     def __post_init__(self) -> None:
+        GateSettings.__post_init__(self)
         if not self.gate > 0.0:
             raise ConfigError(f"gate must be positive, got {self.gate:g}")
         if not (self.settle >= 1 and self.fewest_windows >= 2):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from weighbridge.vehicle.data_sheet import (
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
+Variance = TypeVar("Variance", float, Floats)
+
 TIME_CONSTANTS: Final = (30.0, 900.0, 600.0, 600.0, 2e4)
 """How long disturbance, resistance, wind north and east and cold torque last [s]: gusts,
 grade and torque errors half a minute, rolling resistance and offsets a quarter of an
@@ -34,7 +36,7 @@ RESISTANCE_STD: Final = 0.017
 WIND_STD: Final = 2.0
 """Of each component of the wind at the vehicle [m/s]."""
 
-MOTION_STD: Final = 0.03
+UNMEASURED_NOISE: Final = 0.03
 """Noise of one sample of a specific force that no accelerometer measured [m/s^2]."""
 
 MOTION_SHARE: Final = 0.25
@@ -193,9 +195,25 @@ def noise_variance(
     motion
     length : of a window [s]
     """
-    force = cut.mean(table.force_std**2)
-    moved = motion_variance(motion, length) + motion.mean_accel_std(length) ** 2
-    return np.asarray(force / cut.count + mass**2 * moved)
+    torque_var = cut.mean(table.force_std**2) / cut.count
+    return window_noise(torque_var, mass, window_motion_variance(motion, length))
+
+
+def window_noise(torque_var: Variance, mass: float, motion_var: float) -> Variance:
+    """Variance of the fast noise of a window's mean force, both sides [N^2].
+
+    Parameters
+    ----------
+    torque_var : part of it that is the torque's [N^2]
+    mass : that the noise of the motion moves [kg]
+    motion_var : `window_motion_variance` [m^2/s^4]
+    """
+    return torque_var + mass**2 * motion_var
+
+
+def window_motion_variance(motion: Motion, length: float = WINDOW) -> float:
+    """Variance of a window's mean specific force by its samples and by its ends [m^2/s^4]."""
+    return motion_variance(motion, length) + motion.mean_accel_std(length) ** 2
 
 
 def motion_variance(motion: Motion, length: float = WINDOW) -> float:
@@ -206,7 +224,7 @@ def motion_variance(motion: Motion, length: float = WINDOW) -> float:
     """
     level = motion.specific_force_std
     if motion.source in BY_SPEED or not np.isfinite(level):
-        level = MOTION_STD
+        level = UNMEASURED_NOISE
     return MOTION_WINDOW_STD**2 + (MOTION_SHARE * level) ** 2 * WINDOW / length
 
 

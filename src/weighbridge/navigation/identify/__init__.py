@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from weighbridge.navigation.identify.rounds import settle
+from weighbridge.navigation.identify.rounds import navigate
 from weighbridge.navigation.identify.setup import Setup
 from weighbridge.navigation.settings import RATE, NavigationSettings
 from weighbridge.navigation.sources import read_sources
@@ -34,4 +34,4 @@ def identify(
         Signals are missing, the drive is too short or too quiet, or units or axes of the
         inertial sensor do not fit together.
     """
-    return settle(read_sources(drive), mounting, settings or NavigationSettings(), rate)[0]
+    return navigate(read_sources(drive), mounting, settings or NavigationSettings(), rate)[0]

@@ -64,7 +64,7 @@ _FALSE_TOLD: Final = 1e-3
 """A smaller part of false samples is left out without a word [-]."""
 
 
-def settle(
+def navigate(
     sources: Sources, mounting: Mounting | None, settings: NavigationSettings, rate: float
 ) -> tuple[Setup, Motion]:
     """Identify a drive; its smoothed motion, which shows the accelerometer's scale, comes with it.
@@ -147,7 +147,7 @@ def _scale_note(setup: Setup, sources: Sources) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Settled:
+class _Mounted:
     """Sensor in one mounting, aligned."""
 
     imu: Imu
@@ -157,7 +157,7 @@ class _Settled:
     notes: tuple[str, ...]
 
 
-def _settled(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Settled:
+def _mounted(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Mounted:
     """Align the sensor; where it was moved on the way, turn its later samples back first.
 
     Samples during which it may or may not have been moved are left out.
@@ -178,7 +178,7 @@ def _settled(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Set
     altitude = sources.drive.get("altitude")
     changes = find_changes(coarsely(fine, COARSE_PERIOD), shifted, aligned.rot_bs, altitude)
     if not changes:
-        return _Settled(imu, fine, aligned, (), (*notes, *align_notes))
+        return _Mounted(imu, fine, aligned, (), (*notes, *align_notes))
     keep = ~unsure(imu.time, changes)
     time = imu.time[keep]
     values = undo(time, np.hstack([imu.accel[keep], imu.gyro[keep]]), changes)
@@ -186,7 +186,7 @@ def _settled(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Set
     fine = evenly(imu, FINE_RATE)
     aligned, align_notes = align(fine, sources.reference, mounting)
     moved = remounting_notes(changes, float(time[0]), float(time[-1]))
-    return _Settled(imu, fine, aligned, tuple(changes), (*notes, *moved, *align_notes))
+    return _Mounted(imu, fine, aligned, tuple(changes), (*notes, *moved, *align_notes))
 
 
 def _identified(
@@ -194,14 +194,14 @@ def _identified(
     scale: _Scale,
 ) -> tuple[Setup, Motion]:  # fmt: skip
     """Align, find the start, let a first pass find the constants; then smooth the drive."""
-    settled = _settled(sources, mounting, scale)
-    imu, aligned, fixes = settled.imu, settled.aligned, sources.fixes
+    mounted = _mounted(sources, mounting, scale)
+    imu, aligned, fixes = mounted.imu, mounted.aligned, sources.fixes
     delay = aligned.speed_delay
     late = delay
     if sources.wheel is not None:
-        late = gnss_delay(sources.drive, settled.fine, fixes, aligned.rot_bs)
+        late = gnss_delay(sources.drive, mounted.fine, fixes, aligned.rot_bs)
     _LOG.debug("vehicle speed late by %.3f s, GNSS by %.3f s", delay, late)
-    grid = settled.fine if rate == FINE_RATE else evenly(imu, rate)
+    grid = mounted.fine if rate == FINE_RATE else evenly(imu, rate)
     reference = undelayed(sources.reference, delay)
     fix_times = fixes.time - late if fixes is not None else np.empty(0)
     nodes = place_nodes(imu.time, fix_times, rate, settings.max_gap)
@@ -215,7 +215,7 @@ def _identified(
         node_time, sources.drive, speed, fixes, clocks, settings, has_height=has_height
     )
     z[:, Z_STILL] = still
-    moved_time, moved_var = openings(imu.time, settled.changes)
+    moved_time, moved_var = openings(imu.time, mounted.changes)
     open_mounting(z, node_time, moved_time, moved_var)
     found = Found(Block(imu.time, imu.accel, imu.gyro, nodes, z), grid, reference, fixes)
     del z
@@ -240,7 +240,7 @@ def _identified(
             free_scale,
         ),
         given=aligned.given,
-        changes=settled.changes,
+        changes=mounted.changes,
         moved_time=moved_time,
         moved_var=moved_var,
         gains=scale.gains,
@@ -249,7 +249,7 @@ def _identified(
         origin=fixes.frame if fixes is not None else None,
         has_height=has_height,
         has_wheel=sources.wheel is not None,
-        notes=settled.notes,
+        notes=mounted.notes,
     )
     cut = int(np.searchsorted(node_time, float(sources.imu.time[0]) + _FIRST_PASS)) + 1
     end, _ = run(setup.start, found.block.part(0, int(nodes[min(nodes.size, cut) - 1]) + 1), setup)
