@@ -15,7 +15,9 @@ MASS, MASS_STD = 1500.0, 150.0
 def drives(seed):
     """Run the filter on drives drawn from its model: errors (3,), covariance and innovations."""
     rng = np.random.default_rng(seed)
-    params = kernel.DisturbanceParams(time_constant=TIME_CONSTANT, std=STD, gate=np.inf, settle=0)
+    params = kernel.DisturbanceParams(
+        time_constant=TIME_CONSTANT, std=STD, gate=np.inf, settle_rows=0
+    )
     spread = np.array([MASS_STD, *STD[1:]])
     for _ in range(RUNS):
         time = np.cumsum(rng.uniform(2.0, 5.0, ROWS))

@@ -76,7 +76,7 @@ def problem(n=200):
     rows = np.column_stack([rng.normal(0.2, 0.4, n), np.ones(n)])
     noise = rng.uniform(50.0, 400.0, n)
     params = kernel.DisturbanceParams(
-        time_constant=np.array([np.inf, 30.0]), std=np.array([0.0, 60.0]), gate=3.0, settle=0
+        time_constant=np.array([np.inf, 30.0]), std=np.array([0.0, 60.0]), gate=3.0, settle_rows=0
     )
     start = kernel.initial_state([1500.0, 0.0], np.diag([1e4**2, 60.0**2]), time[0])
     return time, rows, noise, params, start, rng.normal(size=(n, 3))

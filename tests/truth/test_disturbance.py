@@ -23,7 +23,7 @@ def problem(n=300, seed=1):
     ]
     cov = sum(fading) + np.diag(noise)
     y = 1500.0 * rows[:, 0] + np.linalg.cholesky(cov) @ rng.normal(size=n)
-    params = kernel.DisturbanceParams(time_constant=tau, std=std, gate=np.inf, settle=0)
+    params = kernel.DisturbanceParams(time_constant=tau, std=std, gate=np.inf, settle_rows=0)
     start = kernel.initial_state([1000.0, 0.0, 0.0], np.diag([500.0**2, 60.0**2, 25.0**2]), time[0])
     return time, rows, y, noise, params, start, cov
 
@@ -65,7 +65,7 @@ def test_outliers_are_left_out():
     time, rows, y, noise, params, start, _ = problem()
     spoiled = y.copy()
     spoiled[50::40] += 3000.0
-    gated = params._replace(gate=5.0, settle=20)
+    gated = params._replace(gate=5.0, settle_rows=20)
     state, _, _, _, taken = kernel.run(start, time, rows, spoiled, noise, NO_JUMPS, gated)
     clean, *_ = kernel.run(start, time, rows, y, noise, NO_JUMPS, gated)
     assert not taken[50::40].any()

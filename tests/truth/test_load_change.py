@@ -32,7 +32,10 @@ def drive(jump, seed=3, n=300, at=150):
     odds[[40, 90, at, 220]] = -2.2
     params = kernel.LoadParams(
         filter=disturbance.DisturbanceParams(
-            time_constant=np.array([np.inf, 30.0]), std=np.array([0.0, 50.0]), gate=5.0, settle=40
+            time_constant=np.array([np.inf, 30.0]),
+            std=np.array([0.0, 50.0]),
+            gate=5.0,
+            settle_rows=40,
         ),
         jump_var=np.array([400.0**2, 0.0]),
         temper=0.4,
@@ -82,12 +85,12 @@ def test_batch_equals_sample_by_sample_to_the_last_bit():
     _, first, first_var, begins = kernel.run(state, time, rows, y, noise, odds, params)
     seen = []
     for k in range(y.size):
-        state, mass, var, begun = kernel.step(
+        state, mass, var, changed_from = kernel.step(
             state, time[k], rows[k], y[k], noise[k], odds[k], params
         )
         assert mass == first[k]
         assert var == first_var[k]
-        seen.append(begun)
+        seen.append(changed_from)
     assert {b for b in seen if b >= 0} == set(np.flatnonzero(begins))
 
 

@@ -25,7 +25,10 @@ def weighed(seed, n=400):
     y = MASS * true + wander + rng.normal(0.0, 30.0, n)
     noise = np.full(n, 30.0**2 + (MASS * NOISE) ** 2)
     params = kernel.DisturbanceParams(
-        time_constant=np.array([np.inf, 30.0]), std=np.array([0.0, 60.0]), gate=np.inf, settle=0
+        time_constant=np.array([np.inf, 30.0]),
+        std=np.array([0.0, 60.0]),
+        gate=np.inf,
+        settle_rows=0,
     )
     start = kernel.initial_state([MASS, 0.0], np.diag([MASS**2, 60.0**2]), 0.0)
     rows = np.column_stack([motion, np.ones(n)])

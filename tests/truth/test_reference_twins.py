@@ -39,7 +39,7 @@ def test_fading_filter():
     noise = rng.uniform(50.0, 400.0, n)
     y = 1500.0 * rows[:, 0] + rng.normal(scale=60.0, size=n)
     x0, cov0 = np.array([1000.0, 0.0, 0.0]), np.diag([500.0**2, 60.0**2, 25.0**2])
-    params = disturbance.DisturbanceParams(time_constant=tau, std=std, gate=np.inf, settle=0)
+    params = disturbance.DisturbanceParams(time_constant=tau, std=std, gate=np.inf, settle_rows=0)
     start = disturbance.initial_state(x0, cov0, time[0])
     state, _, _, innovation, _ = disturbance.run(
         start, time, rows, y, noise, np.zeros((n, 3)), params

@@ -269,8 +269,8 @@ def test_weighing_takes_rising_speed_only():
     track = estimate(force_balance(drive(torque=weighable()), CAR, motion()), CAR)
     assert track.mass == pytest.approx(MASS, rel=1e-3)
     falling = track.balance.table.accel <= 0.0
-    assert np.isin(track.reason[falling], (Reason.NOT_ACCELERATING, Reason.OVERRUN)).all()
-    assert_array_equal(track.reason[~falling], Reason.USED)
+    assert np.isin(track.row_reason[falling], (Reason.NOT_ACCELERATING, Reason.OVERRUN)).all()
+    assert_array_equal(track.row_reason[~falling], Reason.USED)
 
 
 def test_an_outlier_is_a_bad_fit():
@@ -279,7 +279,7 @@ def test_an_outlier_is_a_bad_fit():
     torque[rising] += 400.0
     track = estimate(force_balance(drive(torque=torque), CAR, motion()), CAR)
     # So sharp a fall behind it may be a foot that leaves the accelerator as well.
-    assert track.reason[rising] in (Reason.BAD_FIT, Reason.OVERRUN)
+    assert track.row_reason[rising] in (Reason.BAD_FIT, Reason.OVERRUN)
     assert track.mass == pytest.approx(MASS, rel=0.01)
 
 

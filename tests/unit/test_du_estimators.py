@@ -94,7 +94,7 @@ def test_finds_the_mass_at_any_rate(method, rate):
 def test_a_cruise_carries_no_mass(method):
     track = ESTIMATORS[method].track(balance(swing=0.0, grade=0.0), BUS)
     assert track.status is Status.NOT_EXCITED
-    assert "more starts and hills" in track.why
+    assert "more starts and hills" in track.reason
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -121,7 +121,7 @@ def test_missing_numbers_are_left_out(method):
     assert track.mass == pytest.approx(10_000.0, rel=0.02)
     assert np.isfinite(track.running_mass[2000:]).all()
     gap = slice(1000, 1100)
-    assert (track.reason[gap] != Reason.USED).all()
+    assert (track.row_reason[gap] != Reason.USED).all()
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -494,7 +494,7 @@ def test_method_that_joint_contradicts_gives_no_mass(fleet):
     assert contradicted(rows, joined) == ""
     heavier = replace(rows, mass=1.3 * joined.mass)
     assert "weigh by joint" in contradicted(heavier, joined)
-    impossible = replace(joined, status=Status.INCONSISTENT, why="it is no car's")
+    impossible = replace(joined, status=Status.INCONSISTENT, reason="it is no car's")
     assert "it is no car's" in contradicted(rows, impossible)
     vague = replace(joined, std=0.4 * joined.mass)
     assert contradicted(heavier, vague) == ""

@@ -111,12 +111,12 @@ def test_a_good_drive_passes(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_specific_force_that_hardly_varies_carries_no_mass(method, monkeypatch):
+def test_specific_force_that_hardly_varies_carries_no_mass(method):
     cruise = balance(swing=0.14, minutes=30.0)
     track = weighed(method, cruise, **ANY_WIDTH)
     assert track.status is Status.NOT_EXCITED
-    assert "vary the specific force by only" in track.why
-    assert "and the mass needs 0.120" in track.why
+    assert "vary the specific force by only" in track.reason
+    assert "and the mass needs 0.120" in track.reason
     assert weighed(method, cruise, **ANY_WIDTH, least_spread=0).status is Status.CONVERGED
 
 
@@ -124,11 +124,11 @@ def test_specific_force_that_hardly_varies_carries_no_mass(method, monkeypatch):
 def test_a_short_stretch_carries_no_mass(method, monkeypatch):
     # The least squares of jensen2022 take rising speed alone: half of the time.
     short = balance(minutes=1.4 if method == "rls" else 0.9)
-    monkeypatch.setattr(judging.Evidence, "reach", 0.0)
+    monkeypatch.setattr(judging.Evidence, "half_width", 0.0)
     wide = ANY_WIDTH | {"fewest_blocks": 0}
     track = weighed(method, short, **wide)
     assert track.status is Status.NOT_EXCITED
-    assert "s of the drive could be used, and 60 s are needed" in track.why
+    assert "s of the drive could be used, and 60 s are needed" in track.reason
     assert weighed(method, short, **wide, least_time=0).status is Status.CONVERGED
 
 
@@ -137,7 +137,7 @@ def test_a_mass_below_the_tare_is_none(method):
     heavy = replace(BUS, tare=MASS / 0.8)
     track = ESTIMATORS[method].track(balance(), heavy)
     assert track.status is Status.INCONSISTENT
-    assert "less than the tare" in track.why
+    assert "less than the tare" in track.reason
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -145,17 +145,17 @@ def test_a_mass_above_what_loads_explain_is_none(method):
     light = replace(BUS, tare=MASS / (1.15 * BUS.of_class.heaviest))
     track = ESTIMATORS[method].track(balance(), light)
     assert track.status is Status.INCONSISTENT
-    assert "more than 2.6 times" in track.why
+    assert "more than 2.6 times" in track.reason
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_what_the_drive_leaves_open_is_bounded_whatever_the_file_does(method, monkeypatch):
+def test_what_the_drive_leaves_open_is_bounded_whatever_the_file_does(method):
     wide = replace(BUS, provenance=Provenance(mass_scale_std=0.12))
     assert ESTIMATORS[method].track(balance(), wide).status is Status.CONVERGED
     for bound in ({"widest_of_drive": 1e-3}, {"widest": 0.1}):
         track = weighed(method, balance(), wide, **bound)
         assert track.status is Status.NOT_EXCITED
-        assert "which is no weighing" in track.why
+        assert "which is no weighing" in track.reason
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -163,7 +163,7 @@ def test_more_rows_or_stretches_can_be_asked_for(method):
     for bound in ({"fewest_rows": 10**6}, {"fewest_blocks": 10**6}):
         track = weighed(method, balance(), **bound)
         assert track.status is Status.NOT_EXCITED
-        assert "usable samples" in track.why
+        assert "usable samples" in track.reason
     with pytest.raises(ConfigError, match="least_time must be zero or positive, got -1"):
         weighed(method, balance(), least_time=-1.0)
 
@@ -248,7 +248,7 @@ def test_rows_of_hard_cornering_are_left_out(made, car, own, method):
     track = ESTIMATORS[method].track(hard, car)
     assert not track.used[fast & (hard.table.reason == Reason.CORNERING)].any()
     assert track.status is Status.NOT_EXCITED
-    assert "cornering hard" in track.why
+    assert "cornering hard" in track.reason
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -151,7 +151,7 @@ def test_rows_that_are_no_numbers_are_left_out(balance, car):
     broken[rows] = np.nan
     found = joint.estimate(replace(balance, table=replace(table, specific_force=broken)), car)
     assert np.isfinite(found.std)
-    assert (found.reason[rows] == Reason.NO_MOTION).all()
+    assert (found.row_reason[rows] == Reason.NO_MOTION).all()
 
 
 def test_a_speed_model_leaves_the_torque_of_a_data_sheet_alone(made, car):
@@ -180,7 +180,7 @@ def test_a_mass_that_no_load_explains_is_refused(balance, car, factor, status):
     found = joint.estimate(replace(balance, table=replace(table, traction_force=more)), car)
     assert found.status == status
     if status == "inconsistent":
-        assert "times the" in found.why
+        assert "times the" in found.reason
 
 
 def late_engine(made, late, names):
@@ -254,7 +254,7 @@ def test_forward_stays_between_its_hypotheses_of_the_load(balance, car):
     assert len(tried) > 5
     for state in tried:
         both = state.load.same.x[0], state.load.changed.x[0]
-        low = state.load.same.cov[0, 0] * 0.03 * (state.total - state.begun)
+        low = state.load.same.cov[0, 0] * 0.03 * (state.total - state.total_at_load)
         assert min(both) <= state.mass <= max(both) * (1.0 + low) * (1.0 + 1e-9)
 
 

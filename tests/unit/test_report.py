@@ -130,14 +130,14 @@ def make_weighing(
         running_mass=MASS + 300.0 * np.exp(-(time - 50.0) / 100.0),
         running_std=np.full(n, 12.0),
         residual=np.where(reason == Reason.USED, noise, np.nan),
-        reason=reason,
+        row_reason=reason,
         mass=MASS,
         std=10.0,
         degrees_of_freedom=20.0,
         bound_std=2.0,
         converged_at=200.0,
         status=status,
-        why=why,
+        reason=why,
         segments=(
             Segment(start=50.0, end=500.0, mass=1490.0, std=20.0),
             Segment(start=500.0, end=1800.0, mass=float("nan"), std=float("nan")),
@@ -357,7 +357,7 @@ def test_legend_counts_every_sample(tmp_path):
     html = written(tmp_path, [weighing])
     speed = figures(html)["figure-2"]
     told = dict(re.findall(r"^(.*) \((\d+)\)$", t["name"])[0] for t in speed["data"][1:])
-    reason = weighing.result.reason
+    reason = weighing.result.row_reason
     assert sum(int(count) for count in told.values()) == reason.size
     assert int(told["used"]) == np.count_nonzero(reason == Reason.USED)
     assert told["bad fit"] == "1"

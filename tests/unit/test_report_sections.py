@@ -120,7 +120,7 @@ def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0
         vehicle=CAR,
         method="joint",
         status=track.status,
-        reason=track.why,
+        reason=track.reason,
         result=track,
     )
 

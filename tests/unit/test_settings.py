@@ -29,8 +29,12 @@ def test_settings_within_settings_are_reached_by_dots():
     [
         ("joint", {"gate": 0.0}, "gate must be positive, got 0"),
         ("joint", {"change_std": 2.0}, r"change_std must be in \(0, 1\]"),
-        ("joint", {"settle": 0}, "settle must be 1 or more"),
-        ("rls", {"lambda": 0.99}, "no setting 'lambda'; known are forgetting, initial_mass"),
+        ("joint", {"settle_windows": 0}, "settle_windows must be 1 or more"),
+        (
+            "rls",
+            {"lambda": 0.99},
+            "no setting 'lambda'; known are fewest_rows, .*, forgetting, initial_mass",
+        ),
         ("rls", {"forgetting": 0.5}, r"forgetting must be in \(0.9, 1\], got 0.5"),
         ("rls", {"forgetting": "fast"}, "forgetting takes a number, got 'fast'"),
         ("rls", {"settle_rows": 1.5}, "settle_rows takes a whole number, got 1.5"),

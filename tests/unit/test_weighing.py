@@ -37,7 +37,7 @@ def weighing(vehicle=CAR, status=None, **changes):
         vehicle=vehicle,
         method="rls",
         status=status or track.status,
-        reason=track.why,
+        reason=track.reason,
         result=track,
     )
 

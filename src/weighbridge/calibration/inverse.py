@@ -362,7 +362,7 @@ def _solve(
         time_constant=np.concatenate((np.full(5 + extra, np.inf), TIME_CONSTANTS)),
         std=np.concatenate((np.zeros(5 + extra), fading)),
         gate=JointSettings().gate,
-        settle=100,
+        settle_rows=100,
     )
     start = kernel.initial_state(x0, prior, 0.0)  # type: ignore[no-untyped-call]
     state, _, _, _, _ = kernel.run(

@@ -136,12 +136,12 @@ def filter_reason(balance: ForceBalance, valid: Bools, taken: Bools) -> NDArray[
 
     The first row of a stretch only says where the speed starts.
     """
-    reason = balance.table.reason.copy()
-    reason[(reason == 0) & ~valid] = Reason.NO_MOTION
+    row_reason = balance.table.reason.copy()
+    row_reason[(row_reason == 0) & ~valid] = Reason.NO_MOTION
     first = valid & ~np.concatenate(([False], valid[:-1]))
-    reason[valid & ~taken] = Reason.BAD_FIT
-    reason[first & ~taken] = Reason.TOO_SHORT
-    return reason
+    row_reason[valid & ~taken] = Reason.BAD_FIT
+    row_reason[first & ~taken] = Reason.TOO_SHORT
+    return row_reason
 
 
 def estimate(

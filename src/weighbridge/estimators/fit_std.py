@@ -110,7 +110,7 @@ def slow_std(
     return float(np.sqrt(passing)), float(np.linalg.norm(stays[1:]))
 
 
-def honest_std(scatter: float, blocks: int, slow: float, left: float) -> tuple[float, float]:
+def honest_std(scatter: float, blocks: int, slow: float, systematic: float) -> tuple[float, float]:
     """Standard deviation of a mass [kg] and the degrees of freedom behind it.
 
     Parameters
@@ -118,7 +118,7 @@ def honest_std(scatter: float, blocks: int, slow: float, left: float) -> tuple[f
     scatter : between blocks of time, which does not see what all of them share [kg]
     blocks : how many
     slow : `slow_std`, below which the scatter is not believed [kg]
-    left : what no row can take away [kg]
+    systematic : what no row can take away [kg]
 
     References
     ----------
@@ -126,7 +126,7 @@ def honest_std(scatter: float, blocks: int, slow: float, left: float) -> tuple[f
     Biometrics Bulletin 2, 1946.
     """
     freedom = float(max(blocks - 1, 1))
-    std = float(np.hypot(max(scatter, slow), left))
+    std = float(np.hypot(max(scatter, slow), systematic))
     if not (np.isfinite(std) and scatter > 0.0):
         return std, freedom
     return std, freedom * (std / scatter) ** 4
@@ -138,15 +138,15 @@ class Judged(NamedTuple):
     Attributes
     ----------
     std, degrees_of_freedom : as of `honest_std`
-    left : part of ``std`` that vehicle file and equipment leave, whatever the drive [kg]
-    status, why : as of `weighbridge.estimators.judging.judge`
+    systematic_std : part of ``std`` that vehicle file and equipment leave, whatever the drive [kg]
+    status, reason : as of `weighbridge.estimators.judging.judge`
     """
 
     std: float
     degrees_of_freedom: float
-    left: float
+    systematic_std: float
     status: Status
-    why: str
+    reason: str
 
 
 def judged(
@@ -175,8 +175,8 @@ def judged(
     inertial = balance.motion.source == "inertial"
     noisy = row_noise_std(balance.table, phi, used, method) if inertial else 0.0
     passing = float(np.hypot(passing, fitted.mass * noisy))
-    left = float(np.hypot(fitted.mass * slow, lasting))
-    std, freedom = honest_std(fitted.scatter, fitted.blocks, passing, left)
+    systematic = float(np.hypot(fitted.mass * slow, lasting))
+    std, freedom = honest_std(fitted.scatter, fitted.blocks, passing, systematic)
     evidence = Evidence(
         table=balance.table,
         used=used,
@@ -184,16 +184,16 @@ def judged(
         mass=fitted.mass,
         std=std,
         blocks=fitted.blocks,
-        left=left,
+        systematic_std=systematic,
         degrees_of_freedom=freedom,
         motion=balance.motion,
         gate=gate,
     )
-    status, why = judge(evidence, vehicle)
+    status, reason = judge(evidence, vehicle)
     # Of a cruise the noise is not the first thing to say.
     if evidence.spread >= gate.least_spread and (noise := too_noisy(noisy)):
-        status, why = Status.INCONSISTENT, noise
-    return Judged(std, freedom, left, status, why)
+        status, reason = Status.INCONSISTENT, noise
+    return Judged(std, freedom, systematic, status, reason)
 
 
 def _known_road_load(vehicle: Vehicle) -> Vehicle:

@@ -74,8 +74,8 @@ def estimate(
     start = kernel.initial_state(robust_rls.initial_state(), params)  # type: ignore[no-untyped-call]
     _, mass, var, share, _, _, mean_phi, mean_y, _, _ = kernel.run(start, rows, phi, y, params)
     fit = robust_rls.window_fit(table.time, mean_phi, mean_y, params.rls)
-    reason = robust_rls.window_reason(table, valid, mean_phi)
-    counted = np.where(reason == 0, np.nan_to_num(phi) ** 2, 0.0)
+    row_reason = robust_rls.window_reason(table, valid, mean_phi)
+    counted = np.where(row_reason == 0, np.nan_to_num(phi) ** 2, 0.0)
 
     def final(chosen: slice) -> float:
         weight = counted[chosen]
@@ -92,7 +92,7 @@ def estimate(
         balance,
         vehicle,
         fit,
-        reason,
+        row_reason,
         gate=settings,
         running=mass,
         spread=np.sqrt(var),

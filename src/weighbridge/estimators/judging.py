@@ -123,7 +123,7 @@ class Evidence:
     phi : (n,) regressor of the mass [m/s^2]
     mass, std : [kg]
     blocks : stretches of time that say something of their own
-    left : part of ``std`` that the vehicle file leaves, whatever the drive [kg]
+    systematic_std : part of ``std`` that the vehicle file leaves, whatever the drive [kg]
     degrees_of_freedom : behind ``std``
     motion : the rows are of; tells why few of them count
     gate : what a mass needs
@@ -135,7 +135,7 @@ class Evidence:
     mass: float
     std: float
     blocks: int
-    left: float = 0.0
+    systematic_std: float = 0.0
     degrees_of_freedom: float = float("inf")
     motion: Motion | None = None
     gate: GateSettings = GATE
@@ -149,7 +149,7 @@ class Evidence:
         )
 
     @property
-    def reach(self) -> float:
+    def half_width(self) -> float:
         """Half of the interval of 95 % [kg]."""
         freedom = max(self.degrees_of_freedom, 1.0)
         return float(student.ppf(0.975, freedom)) * self.std
@@ -157,7 +157,7 @@ class Evidence:
     @property
     def drive_std(self) -> float:
         """Standard deviation by what the drive itself leaves open [kg]."""
-        return float(np.sqrt(max(self.std**2 - self.left**2, 0.0)))
+        return float(np.sqrt(max(self.std**2 - self.systematic_std**2, 0.0)))
 
     @property
     def used_time(self) -> float:
@@ -179,9 +179,9 @@ def judge(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
     specific force that varies, and a size that the vehicle can have.
     """
     for check in (_enough_rows, _narrow_enough, _possible, _long_enough, _excited, _plausible):
-        status, why = check(found, vehicle)
+        status, reason = check(found, vehicle)
         if status is not Status.CONVERGED:
-            return status, why
+            return status, reason
     return Status.CONVERGED, ""
 
 
@@ -201,12 +201,12 @@ def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, str]:
 
 
 def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
-    mass, reach = found.mass, found.reach
-    narrow = np.isfinite(reach) and reach <= 1.96 * found.gate.widest * abs(mass)
+    mass, half_width = found.mass, found.half_width
+    narrow = np.isfinite(half_width) and half_width <= 1.96 * found.gate.widest * abs(mass)
     if narrow and found.drive_std <= found.gate.widest_of_drive * abs(mass):
         return _PASSED
     low, high = vehicle.of_class.mass_range
-    if mass + reach < low or mass - reach > high:
+    if mass + half_width < low or mass - half_width > high:
         return _possible(found, vehicle)
     cause = found.slow_speed or "more starts and hills are needed"
     if not found.slow_speed and found.used_time < found.gate.least_time:
@@ -214,14 +214,14 @@ def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
             f"only {found.used_time:.0f} s of the drive could be used: drive longer, with starts "
             "and hills"
         )
-    elif not found.slow_speed and found.left > found.drive_std:
+    elif not found.slow_speed and found.systematic_std > found.drive_std:
         cause = (
-            f"{100.0 * found.left / abs(mass):.0f} % of it is left open by the vehicle file and "
-            "the equipment, whatever the drive: calibrate again"
+            f"{100.0 * found.systematic_std / abs(mass):.0f} % of it is left open by the vehicle "
+            "file and the equipment, whatever the drive: calibrate again"
         )
     return Status.NOT_EXCITED, (
-        f"the drive says {mass:.0f} kg, {max(mass - reach, 0.0):.0f} to "
-        f"{mass + reach:.0f} kg with 95 % probability, which is no weighing; {cause}"
+        f"the drive says {mass:.0f} kg, {max(mass - half_width, 0.0):.0f} to "
+        f"{mass + half_width:.0f} kg with 95 % probability, which is no weighing; {cause}"
     )
 
 
@@ -317,7 +317,7 @@ def segments(
     time = table.time
     if time.size < 2:
         return ()
-    moving = np.nan_to_num(table.speed) > 0.5
+    moving = table.moving
     starts = np.flatnonzero(np.diff(np.concatenate(([False], moving))) & moving)
     edges = [0]
     for k in starts:
@@ -349,14 +349,14 @@ def nothing(
     method: str,
     balance: ForceBalance,
     vehicle: Vehicle,
-    reason: NDArray[np.uint8],
+    row_reason: NDArray[np.uint8],
     stretches: int,
     gate: GateSettings = GATE,
 ) -> MassTrack:
     """Return the track of a drive that has too few usable rows for any estimate."""
     table = balance.table
     unknown = np.full(table.time.size, np.nan)
-    used = reason == Reason.USED
+    used = row_reason == Reason.USED
     none = Evidence(
         table=table,
         used=np.zeros_like(used),
@@ -367,20 +367,20 @@ def nothing(
         motion=balance.motion,
         gate=gate,
     )
-    _, why = judge(none, vehicle)
+    _, reason = judge(none, vehicle)
     return MassTrack(
         method=method,
         balance=balance,
         running_mass=unknown,
         running_std=unknown,
         residual=unknown,
-        reason=reason,
+        row_reason=row_reason,
         mass=float("nan"),
         std=float("inf"),
         degrees_of_freedom=float("inf"),
         bound_std=float("nan"),
         converged_at=float("nan"),
         status=Status.NOT_EXCITED,
-        why=why,
+        reason=reason,
         segments=(),
     )

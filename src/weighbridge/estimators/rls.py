@@ -90,10 +90,10 @@ def estimate(
     settings = settings or RlsSettings()
     table = balance.table
     phi, y = regression(table, vehicle)
-    reason = table.reason.copy()
-    reason[(reason == 0) & (table.accel <= 0.0)] = Reason.NOT_ACCELERATING
-    reason[(reason == 0) & ~(np.isfinite(phi) & np.isfinite(y))] = Reason.NO_MOTION
-    valid = reason == 0
+    row_reason = table.reason.copy()
+    row_reason[(row_reason == 0) & (table.accel <= 0.0)] = Reason.NOT_ACCELERATING
+    row_reason[(row_reason == 0) & ~(np.isfinite(phi) & np.isfinite(y))] = Reason.NO_MOTION
+    valid = row_reason == 0
     period = float(np.median(np.diff(table.time))) if table.time.size > 1 else 1.0 / PAPER_RATE
     state = kernel.initial_state(  # type: ignore[no-untyped-call]
         [settings.initial_mass], [[settings.initial_gain]]
@@ -101,8 +101,8 @@ def estimate(
     state, theta, var, _, taken = kernel.run(
         state, table.time, phi[:, None], y, valid, parameters(settings, period)
     )
-    reason[valid & ~taken] = Reason.BAD_FIT
-    used = reason == Reason.USED
+    row_reason[valid & ~taken] = Reason.BAD_FIT
+    used = row_reason == Reason.USED
 
     mass, spread, blocks = block_jackknife(table.time, phi, y, used)
     slow = consider_std(balance, phi, used, vehicle)
@@ -127,15 +127,15 @@ def estimate(
         running_mass=running,
         running_std=np.hypot(np.sqrt(var), running * slow),
         residual=residual,
-        reason=reason,
+        row_reason=row_reason,
         mass=mass,
         std=found.std,
-        left_std=found.left,
+        systematic_std=found.systematic_std,
         degrees_of_freedom=found.degrees_of_freedom,
         bound_std=_bound(phi, residual, used),
         converged_at=converged_at(table.time, running, mass, used),
         status=found.status,
-        why=found.why,
+        reason=found.reason,
         segments=segments(balance, vehicle, phi, used, part, settings),
     )
 

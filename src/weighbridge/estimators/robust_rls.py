@@ -139,15 +139,15 @@ def initial_state() -> kernel.RobustRlsState:
 
 def window_reason(table: ForceTable, valid: Bools, mean_phi: Floats) -> NDArray[np.uint8]:
     """Reasons of the rows: `Reason.TOO_SHORT` for those of windows that never filled."""
-    reason = table.reason.copy()
-    reason[(reason == 0) & ~valid] = Reason.NO_MOTION
+    row_reason = table.reason.copy()
+    row_reason[(row_reason == 0) & ~valid] = Reason.NO_MOTION
     folded = np.isfinite(mean_phi)
     # Rows of a window share what became of it: it ends at a fold or at an interruption.
     window = np.cumsum(np.concatenate(([0], (folded | ~valid)[:-1]))) if folded.size else folded
     filled = np.zeros(int(window[-1]) + 1 if window.size else 0, dtype=bool)
     filled[window[folded]] = True
-    reason[valid & ~filled[window]] = Reason.TOO_SHORT
-    return reason
+    row_reason[valid & ~filled[window]] = Reason.TOO_SHORT
+    return row_reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,7 +305,7 @@ def finish(
     balance: ForceBalance,
     vehicle: Vehicle,
     fit: WindowFit,
-    reason: NDArray[np.uint8],
+    row_reason: NDArray[np.uint8],
     *,
     gate: GateSettings,
     running: Floats,
@@ -321,7 +321,7 @@ def finish(
     method : name of the estimator
     balance, vehicle
     fit : windows of the drive, for standard deviation and bound
-    reason : (n,) why a row was not used
+    row_reason : (n,) why a row was not used
     gate : what a mass needs
     running, spread : (n,) running mass and its standard deviation from noise [kg]
     phi, y : (n,) regressor and right-hand side
@@ -329,8 +329,8 @@ def finish(
     """
     table = balance.table
     if fit.time.size < FEWEST_WINDOWS or not np.isfinite(running).any():
-        return nothing(method, balance, vehicle, reason, int(fit.time.size), gate)
-    used = reason == Reason.USED
+        return nothing(method, balance, vehicle, row_reason, int(fit.time.size), gate)
+    used = row_reason == Reason.USED
     fitted, scatter, blocks = fit.mass()
     mass = fitted if final is None else final(slice(0, table.time.size))
     slow = consider_std(balance, phi, used, vehicle)
@@ -353,14 +353,14 @@ def finish(
         running_mass=running,
         running_std=np.hypot(spread, running * passing),
         residual=np.where(used, y - phi * mass, np.nan),
-        reason=reason,
+        row_reason=row_reason,
         mass=mass,
         std=found.std,
-        left_std=found.left,
+        systematic_std=found.systematic_std,
         degrees_of_freedom=found.degrees_of_freedom,
         bound_std=fit.bound,
         converged_at=converged_at(table.time, running, mass, used),
         status=found.status,
-        why=found.why,
+        reason=found.reason,
         segments=segments(balance, vehicle, phi, used, part, gate),
     )

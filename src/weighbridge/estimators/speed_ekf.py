@@ -203,15 +203,15 @@ def estimate(
         running_mass=running,
         running_std=np.hypot(done.std, model.scale_std * running),
         residual=np.where(used, done.innovation * mass / model.sample_time, np.nan),
-        reason=view.reason,
+        row_reason=view.reason,
         mass=mass,
         std=std,
-        left_std=model.scale_std * mass,
+        systematic_std=model.scale_std * mass,
         degrees_of_freedom=float("inf"),
         bound_std=bound,
         converged_at=converged_at(view.time, running, mass, used),
         status=status,
-        why=why,
+        reason=why,
         segments=(),
     )
 

@@ -347,28 +347,28 @@ def estimate(
     table = balance.table
     done = run_filter(balance, vehicle, settings)
     span = span_of(table.time, done.time)
-    reason = _reasons(balance, done, span)
-    used = reason == Reason.USED
+    row_reason = _reasons(balance, done, span)
+    used = row_reason == Reason.USED
     stretches = int(np.unique(done.time[done.taken] // STRETCH).size)
     if not used.any():
-        return nothing(METHOD, balance, vehicle, reason, stretches, gate=settings)
+        return nothing(METHOD, balance, vehicle, row_reason, stretches, settings)
     phi, _ = regression(table, vehicle)
     mass = done.mass
     moved = sensitivity(balance, vehicle, settings, done)
-    left = math.hypot(
+    systematic = math.hypot(
         systematic_std(balance, vehicle),
         inertia_relative_std(vehicle, mass, table.accel, phi, used) if mass > 0.0 else 0.0,
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
     )
-    std = math.hypot(UNMODELLED * done.std, mass * left)
+    std = math.hypot(UNMODELLED * done.std, mass * systematic)
     evidence = Evidence(
         table=table, used=used, phi=phi, mass=mass, std=std, blocks=stretches,
-        left=abs(mass) * left, gate=settings,
+        systematic_std=abs(mass) * systematic, gate=settings,
     )  # fmt: skip
-    status, why = judge(evidence, vehicle)
+    status, reason = judge(evidence, vehicle)
     before = np.searchsorted(done.time, table.time, side="right") - 1
-    begun = np.cumsum(done.taken)[np.maximum(before, 0)] > 0
-    running = np.where(begun, done.running_mass[np.maximum(before, 0)], np.nan)
+    after_first = np.cumsum(done.taken)[np.maximum(before, 0)] > 0
+    running = np.where(after_first, done.running_mass[np.maximum(before, 0)], np.nan)
     spread = UNMODELLED * done.running_std[np.maximum(before, 0)]
     pull = done.innovation * mass / np.maximum(done.table.length, 1e-9)
 
@@ -379,18 +379,18 @@ def estimate(
         method=METHOD,
         balance=balance,
         running_mass=running,
-        running_std=np.where(begun, np.hypot(spread, running * left), np.nan),
+        running_std=np.where(after_first, np.hypot(spread, running * systematic), np.nan),
         residual=np.where(used, -pull[span], np.nan),
-        reason=reason,
+        row_reason=row_reason,
         mass=mass,
         std=std,
-        left_std=abs(mass) * left,
+        systematic_std=abs(mass) * systematic,
         degrees_of_freedom=float("inf"),
         bound_std=done.std,
         converged_at=converged_at(table.time, running, mass, used),
         status=status,
-        why=why,
-        segments=segments(balance, vehicle, phi, used, part),
+        reason=reason,
+        segments=segments(balance, vehicle, phi, used, part, settings),
         sensitivity=moved,
     )
 

@@ -56,15 +56,15 @@ class MassTrack:
         are those of the whole drive [kg]
     residual : (n,) measured force minus the model's at the final mass [N];
         NaN where a row was not used
-    reason : (n,) `Reason` why a row was not used
+    row_reason : (n,) `Reason` why a row was not used
     mass, std : final answer and its standard deviation [kg]
-    left_std : part of ``std`` that vehicle file and equipment leave, whatever the drive [kg]; NaN
-        where a method does not say
+    systematic_std : part of ``std`` that vehicle file and equipment leave, whatever the drive
+        [kg]; NaN where a method does not say
     degrees_of_freedom : behind ``std``, for the interval; infinite if known
     bound_std : Cramér-Rao bound of this drive [kg]
     converged_at : when the running mass stays within 5 % of the final answer
         for good [s]; NaN if never
-    status : and ``why`` in a sentence where it is not converged
+    status : and ``reason`` in a sentence where it is not converged
     segments : mass between stops
     sensitivity : (k,) how far one unit of each parameter of the calibration moves the mass
         [kg per unit]; None where a method does not say
@@ -79,16 +79,16 @@ class MassTrack:
     running_mass: Floats
     running_std: Floats
     residual: Floats
-    reason: NDArray[np.uint8]
+    row_reason: NDArray[np.uint8]
     mass: float
     std: float
     degrees_of_freedom: float
     bound_std: float
     converged_at: float
     status: Status
-    why: str
+    reason: str
     segments: tuple[Segment, ...]
-    left_std: float = math.nan
+    systematic_std: float = math.nan
     sensitivity: Floats | None = None
     slow_errors: SlowErrors | None = None
     filter_input: FilterInput | None = None
@@ -103,4 +103,4 @@ class MassTrack:
     @property
     def used(self) -> Bools:
         """(n,) rows the mass was made from."""
-        return np.asarray(self.reason == Reason.USED)
+        return np.asarray(self.row_reason == Reason.USED)

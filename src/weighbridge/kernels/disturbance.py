@@ -16,13 +16,13 @@ class DisturbanceParams(NamedTuple):
         constant
     std : (n,) stationary standard deviation of the fading states, 0 for constants
     gate : innovations beyond this many standard deviations are left out [-]
-    settle : rows before the gate closes
+    settle_rows : rows before the gate closes
     """
 
     time_constant: np.ndarray
     std: np.ndarray
     gate: float
-    settle: int
+    settle_rows: int
 
 
 class DisturbanceState(NamedTuple):
@@ -112,7 +112,7 @@ def step(state, time, row, y, noise_var, params):
     cov_row = np.empty(x.size)
     mean, innovation_var = _predicted(x, cov, row, noise_var, cov_row)
     innovation = (y - mean) / np.sqrt(innovation_var)
-    taken = state.rows < params.settle or abs(innovation) <= params.gate
+    taken = state.rows < params.settle_rows or abs(innovation) <= params.gate
     seen = min(abs(innovation), params.gate)
     likelihood = state.log_likelihood - 0.5 * (np.log(innovation_var) + seen * seen)
     if taken:
@@ -154,7 +154,7 @@ def run(state, time, rows, y, noise_var, added, params):
     innovation = np.empty(y.size)
     taken = np.empty(y.size, dtype=np.bool_)
     for k in range(y.size):
-        state = loosened(state, added[k])
+        state = inflated(state, added[k])
         state, innovation[k], taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         first[k] = state.x[0]
         first_var[k] = state.cov[0, 0]
@@ -162,7 +162,7 @@ def run(state, time, rows, y, noise_var, added, params):
 
 
 @kernel
-def loosened(state, variance):
+def inflated(state, variance):
     """Return the state with ``variance`` (n,) added to those of the estimates."""
     cov = state.cov.copy()
     for i in range(variance.size):
@@ -182,7 +182,7 @@ def weights(state, time, rows, y, noise_var, added, params):
     """Sum of `weight` over all rows; parameters as of ``run``."""
     total = 0.0
     for k in range(y.size):
-        state = loosened(state, added[k])
+        state = inflated(state, added[k])
         total += weight(state, time[k], rows[k], noise_var[k], params)
         state, _, _ = step(state, time[k], rows[k], y[k], noise_var[k], params)
     return total
@@ -223,7 +223,7 @@ def smooth(state, time, rows, y, noise_var, added, params):
     error = np.zeros(m)
     weight = np.zeros(m)
     for k in range(m):
-        state = loosened(state, added[k])
+        state = inflated(state, added[k])
         x, cov, left = _faded(state, time[k], params)
         state, _, taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         if taken[k]:

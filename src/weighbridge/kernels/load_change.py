@@ -36,7 +36,7 @@ class LoadState(NamedTuple):
     changed : the same with a jump there
     open : whether ``changed`` is still tried
     prior : logarithm of its odds before any row told
-    begun : row at which it began
+    trial_row : row from which it is tried
     rows : rows seen
     """
 
@@ -44,7 +44,7 @@ class LoadState(NamedTuple):
     changed: disturbance.DisturbanceState
     open: bool
     prior: float
-    begun: int
+    trial_row: int
     rows: int
 
 
@@ -67,14 +67,14 @@ def decided(state, params):
     Returns
     -------
     state : LoadState
-    begun : int
+    changed_from : int
         Row from which the first state has another value; -1 if it has not.
     """
-    seen = state.rows - state.begun
+    seen = state.rows - state.trial_row
     if state.open and seen >= params.fewest and log_odds(state, params) > 0.0:
-        kept = LoadState(state.changed, state.changed, False, 0.0, state.begun, state.rows)
-        return kept, state.begun
-    return LoadState(state.same, state.same, False, 0.0, state.begun, state.rows), -1
+        kept = LoadState(state.changed, state.changed, False, 0.0, state.trial_row, state.rows)
+        return kept, state.trial_row
+    return LoadState(state.same, state.same, False, 0.0, state.trial_row, state.rows), -1
 
 
 @kernel
@@ -97,7 +97,7 @@ def step(state, time, row, y, noise_var, odds, params):
     state : LoadState
     first, first_var : float
         Mean and variance of the first state over both hypotheses.
-    begun : int
+    changed_from : int
         Row from which a jump is now believed; -1 if none.
 
     References
@@ -105,22 +105,22 @@ def step(state, time, row, y, noise_var, odds, params):
     Gaussian sum of two members: Bar-Shalom, Li, Kirubarajan, Estimation with
     Applications to Tracking and Navigation, 2001, ch. 11.6.
     """
-    begun = -1
-    young = state.open and state.rows - state.begun < params.fewest
+    changed_from = -1
+    young = state.open and state.rows - state.trial_row < params.fewest
     # Where stops come fast, the one at which a change is likeliest is tried until it can tell.
     if not np.isnan(odds) and not (young and odds <= state.prior):
-        state, begun = decided(state, params)
-        loose = disturbance.loosened(state.same, params.jump_var)
-        state = LoadState(state.same, loose, True, odds, state.rows, state.rows)
+        state, changed_from = decided(state, params)
+        moved = disturbance.inflated(state.same, params.jump_var)
+        state = LoadState(state.same, moved, True, odds, state.rows, state.rows)
     same, _, _ = disturbance.step(state.same, time, row, y, noise_var, params.filter)
     if state.open:
         changed, _, _ = disturbance.step(state.changed, time, row, y, noise_var, params.filter)
-        state = LoadState(same, changed, True, state.prior, state.begun, state.rows + 1)
+        state = LoadState(same, changed, True, state.prior, state.trial_row, state.rows + 1)
         share = 1.0 / (1.0 + np.exp(-log_odds(state, params)))
         # Few rows after a stop are a launch, on a slipping clutch perhaps.
-        share *= min(1.0, (state.rows - state.begun) / params.fewest)
+        share *= min(1.0, (state.rows - state.trial_row) / params.fewest)
     else:
-        state = LoadState(same, same, False, 0.0, state.begun, state.rows + 1)
+        state = LoadState(same, same, False, 0.0, state.trial_row, state.rows + 1)
         share = 0.0
     first = (1.0 - share) * state.same.x[0] + share * state.changed.x[0]
     first_var = (
@@ -128,7 +128,7 @@ def step(state, time, row, y, noise_var, odds, params):
         + share * state.changed.cov[0, 0]
         + share * (1.0 - share) * (state.same.x[0] - state.changed.x[0]) ** 2
     )
-    return state, first, first_var, begun
+    return state, first, first_var, changed_from
 
 
 @kernel
@@ -159,12 +159,12 @@ def run(state, time, rows, y, noise_var, odds, params):
     first_var = np.empty(y.size)
     begins = np.zeros(y.size, dtype=np.bool_)
     for k in range(y.size):
-        state, first[k], first_var[k], begun = step(
+        state, first[k], first_var[k], changed_from = step(
             state, time[k], rows[k], y[k], noise_var[k], odds[k], params
         )
-        if begun >= 0:
-            begins[begun] = True
-    state, begun = decided(state, params)
-    if begun >= 0:
-        begins[begun] = True
+        if changed_from >= 0:
+            begins[changed_from] = True
+    state, changed_from = decided(state, params)
+    if changed_from >= 0:
+        begins[changed_from] = True
     return state, first, first_var, begins

@@ -111,7 +111,7 @@ def _set_up(
 def _floor(weighing: Weighing) -> float:
     result = weighing.result
     assert result is not None
-    left = result.left_std
+    left = result.systematic_std
     return left / weighing.mass if math.isfinite(left) else 0.0
 
 

@@ -275,7 +275,7 @@ class LiveScale:
         if learned is not None and learned.inconsistent:
             return nothing
         if state is not None and setup is not None and state.joint.windows:
-            floor = setup.joint.left
+            floor = setup.joint.systematic_std
             mass = state.joint.mass - state.burnt
             return mass, state.joint.std(setup.joint), floor, state.read
         if learned is not None and math.isfinite(learned.mass):

@@ -189,7 +189,7 @@ def weigh_balance(
         warnings += (f"{method} was run with {own}, not with its defaults",)
     if not estimator.speed_alone:
         warnings += uncalibrated(vehicle, result)
-    status, reason = result.status, result.why
+    status, reason = result.status, result.reason
     share = None if estimator.speed_alone else share_on_gears(balance, vehicle)
     if share is not None and share < ENOUGH:
         status = Status.INCONSISTENT
@@ -356,12 +356,12 @@ def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
     if fit is not None and not fit.torque:
         made = f"calibrated for {fit.name} alone"
     text = f"the vehicle file of {vehicle.name} was {made}"
-    if not (math.isfinite(result.left_std) and result.mass > 0.0):
+    if not (math.isfinite(result.systematic_std) and result.mass > 0.0):
         return (text,)
     return (
         f"{text}: for errors of its torque, rolling radius, efficiency (taken as "
         f"{wheel_efficiency(vehicle):.2f}) and inertias, and of the equipment, such as the lean of "
-        f"the body, {100.0 * result.left_std / result.mass:.1f} % of the mass, as standard "
+        f"the body, {100.0 * result.systematic_std / result.mass:.1f} % of the mass, as standard "
         "deviation, are in the interval",
     )
 

@@ -156,7 +156,7 @@ def information_gained(result: MassTrack) -> Gained | None:
 
 def windowed_rows(result: MassTrack) -> Bools:
     """Rows that the joint estimator cut into windows: taken, too short a stretch, or a bad fit."""
-    kept = np.isin(result.reason, (Reason.USED, Reason.TOO_SHORT, Reason.BAD_FIT))
+    kept = np.isin(result.row_reason, (Reason.USED, Reason.TOO_SHORT, Reason.BAD_FIT))
     return np.asarray(result.balance.table.usable & kept)
 
 

@@ -132,9 +132,9 @@ def speed_panel(weighing: MassResult) -> Panel:
     )
     time = minutes(weighing.drive, result.time)
     rows = from_si(result.balance.table.speed, "kmh")
-    total = result.reason.size
+    total = result.row_reason.size
     for reason in Reason:
-        those = result.reason == reason
+        those = result.row_reason == reason
         count = int(np.count_nonzero(those))
         if not count:
             continue
@@ -189,10 +189,10 @@ def fit_panel(weighing: MassResult) -> Panel:
 
 def share_panel(result: MassTrack) -> Panel:
     """Share of samples by reason."""
-    counts = np.bincount(result.reason, minlength=len(Reason))
+    counts = np.bincount(result.row_reason, minlength=len(Reason))
     present = sorted((r for r in Reason if counts[r]), key=lambda r: int(counts[r]))
     figure = blank("Share of all samples [%]", "", height=460)
-    shares = [100.0 * float(counts[r]) / result.reason.size for r in present]
+    shares = [100.0 * float(counts[r]) / result.row_reason.size for r in present]
     figure.add_bar(
         x=shares,
         y=[reason_name(r) for r in present],

@@ -163,7 +163,7 @@ class MassResult:
             table.pitch,
             table.gear,
             table.traction_force,
-            texts[r.reason],
+            texts[r.row_reason],
         )
         return pl.DataFrame(dict(zip(TRACK_COLUMNS, columns, strict=True)), nan_to_null=True)
 

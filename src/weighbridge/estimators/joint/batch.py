@@ -120,18 +120,18 @@ def estimate(
     rows, y = design(table, vehicle, unmeasured_grade=balance.motion.unmeasured_grade)
     usable = usable_rows(table, rows, y)
     cut = windows(table.time, usable)
-    reason = table.reason.copy()
-    reason[table.usable] = Reason.NO_MOTION
-    reason[usable] = Reason.TOO_SHORT
-    reason[cut.index] = Reason.USED
+    row_reason = table.reason.copy()
+    row_reason[table.usable] = Reason.NO_MOTION
+    row_reason[usable] = Reason.TOO_SHORT
+    row_reason[cut.index] = Reason.USED
     if cut.count.size < settings.fewest_windows:
-        return nothing("joint", balance, vehicle, reason, int(cut.count.size), settings)
+        return nothing("joint", balance, vehicle, row_reason, int(cut.count.size), settings)
     rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
     asked = _ask(balance, vehicle, cut, rough, settings)
     if not load_changes:
         problem = replace(asked.problem, odds=np.full(asked.stood.size, np.nan))
         asked = replace(asked, problem=problem)
-    return _track(balance, vehicle, cut, reason, asked, _solve(asked))
+    return _track(balance, vehicle, cut, row_reason, asked, _solve(asked))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -252,7 +252,7 @@ def _track(
     balance: ForceBalance,
     vehicle: Vehicle,
     cut: Windows,
-    reason: NDArray[np.uint8],
+    row_reason: NDArray[np.uint8],
     asked: _Asked,
     solved: _Solved,
 ) -> MassTrack:
@@ -264,8 +264,8 @@ def _track(
 
     left_out = np.zeros(table.time.size, dtype=bool)
     left_out[cut.index] = ~solved.taken[cut.window]
-    reason[left_out] = Reason.BAD_FIT
-    used = reason == Reason.USED
+    row_reason[left_out] = Reason.BAD_FIT
+    used = row_reason == Reason.USED
     burnt = table.fuel_burnt
     smoothed, running = solved.x[:, 0] * (1.0 + low), solved.running * (1.0 + low)
     given = _given(asked, solved, cut.mean(table.traction_force - asked.y))
@@ -279,40 +279,40 @@ def _track(
         solved.params,
     )  # fmt: skip
     phi = asked.rows[:, 0]
-    left = math.hypot(
+    systematic = math.hypot(
         _systematic_std(balance, vehicle, mass),
         asked.body.relative_std(table.accel, phi, used),
         inertia_relative_std(vehicle, mass, table.accel, phi, used),
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         LEVEL_STD * float(low[-1]),
     )
-    std = float(np.hypot(UNMODELLED * stds[-1], mass * left))
+    std = float(np.hypot(UNMODELLED * stds[-1], mass * systematic))
     last = np.searchsorted(time, table.time, side="right") - 1
     seen = np.maximum(last, 0)
     track = np.where(last >= 0, running[seen] - burnt, np.nan)
     track_std = UNMODELLED * np.sqrt(solved.running_var)[seen]
     evidence = Evidence(
         table=table, used=used, phi=phi, mass=mass, std=std, blocks=cut.count.size,
-        left=mass * left, motion=balance.motion, gate=problem.settings,
+        systematic_std=mass * systematic, motion=balance.motion, gate=problem.settings,
     )  # fmt: skip
-    status, why = judge(evidence, vehicle)
+    status, reason = judge(evidence, vehicle)
     return MassTrack(
         method="joint",
         balance=balance,
         running_mass=track,
-        running_std=np.where(last >= 0, np.hypot(track_std, track * left), np.nan),
+        running_std=np.where(last >= 0, np.hypot(track_std, track * systematic), np.nan),
         residual=np.where(used, asked.y - _explained(asked.rows, solved.x[seen]), np.nan),
-        reason=reason,
+        row_reason=row_reason,
         mass=mass,
         std=std,
-        left_std=mass * left,
+        systematic_std=mass * systematic,
         degrees_of_freedom=float("inf"),
         bound_std=bound,
         sensitivity=moved,
         converged_at=converged_at(table.time, track, mass, used),
         status=status,
-        why=why,
-        segments=_segments(table, time, solved.begins, smoothed, stds, left),
+        reason=reason,
+        segments=_segments(table, time, solved.begins, smoothed, stds, systematic),
         slow_errors=SlowErrors.from_states(
             time, solved.x, solved.var, solved.running_var, problem.rows[:, 1]
         ),
@@ -325,7 +325,7 @@ def _track(
             body=asked.body,
             motion_var=window_motion_variance(balance.motion),
             noise_information=shown * float(np.sum(solved.weight)),
-            left=left,
+            systematic_std=systematic,
             settings=problem.settings,
         ),
     )
@@ -390,17 +390,16 @@ def _prior(balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float) 
 
 
 def _segments(
-    table: ForceTable, time: Floats, begins: Bools, mass: Floats, bound: Floats, left: float
+    table: ForceTable, time: Floats, begins: Bools, mass: Floats, bound: Floats, systematic: float
 ) -> tuple[Segment, ...]:
     """Stretches of one load: the mass at the end of each, smoothed over the whole drive."""
     first = np.concatenate(([0], np.flatnonzero(begins)))
     last = np.concatenate((first[1:], [time.size])) - 1
     edges = [float(table.time[0])]
-    moving = np.nan_to_num(table.speed) > 0.5
     for k in first[1:]:
         # The load changed while the vehicle stood: the segment begins as it drives off.
         between = (table.time > time[k - 1]) & (table.time <= time[k])
-        rests = np.flatnonzero(between & ~moving)
+        rests = np.flatnonzero(between & ~table.moving)
         edges.append(float(table.time[rests[-1]]) if rests.size else float(time[k]))
     edges.append(float(table.time[-1]))
     burnt = np.interp(edges[1:], table.time, table.fuel_burnt)
@@ -409,7 +408,7 @@ def _segments(
             start=edges[j],
             end=edges[j + 1],
             mass=float(mass[k] - burnt[j]),
-            std=float(np.hypot(UNMODELLED * bound[k], mass[k] * left)),
+            std=float(np.hypot(UNMODELLED * bound[k], mass[k] * systematic)),
         )
         for j, k in enumerate(last)
     )

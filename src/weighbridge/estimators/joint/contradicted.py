@@ -30,7 +30,7 @@ def contradicted(track: MassTrack, joined: MassTrack) -> str:
     if track.method == joined.method:
         return ""
     if joined.status is Status.INCONSISTENT:
-        return f"by joint the same rows make no mass that can be: {joined.why}"
+        return f"by joint the same rows make no mass that can be: {joined.reason}"
     if joined.status is not Status.CONVERGED:
         return ""
     apart = abs(float(np.log(track.mass / joined.mass)))

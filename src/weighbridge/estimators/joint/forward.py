@@ -54,8 +54,8 @@ class JointState(NamedTuple):
     ----------
     load : both hypotheses of the load; None before the first window
     total : weight of all windows so far [1/N^2]
-    begun : the same until the load of the mass began
-    tried : the same until the change of load that is tried began
+    total_at_load : the same when the load of the mass began
+    total_at_trial : the same when the change of load that is tried began
     windows : seen
     mass : running, the fuel burnt since the first row not taken off; NaN before the first [kg]
     var : variance of the filter [kg^2]
@@ -63,15 +63,15 @@ class JointState(NamedTuple):
 
     load: load_change.LoadState | None = None
     total: float = 0.0
-    begun: float = 0.0
-    tried: float = 0.0
+    total_at_load: float = 0.0
+    total_at_trial: float = 0.0
     windows: int = 0
     mass: float = np.nan
     var: float = np.nan
 
     def std(self, sizes: JointSizes) -> float:
         """Standard deviation of the running mass [kg]."""
-        return float(np.hypot(UNMODELLED * np.sqrt(self.var), self.mass * sizes.left))
+        return float(np.hypot(UNMODELLED * np.sqrt(self.var), self.mass * sizes.systematic_std))
 
 
 def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
@@ -99,14 +99,14 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
     total = disturbance.weights(given.start, *rows(seen), given.params)
     jumps = np.flatnonzero(given.added[:seen].any(axis=1))
     last = int(jumps[-1]) if jumps.size else 0
-    begun = disturbance.weights(given.start, *rows(last), given.params) if last else 0.0
-    low = same.cov[0, 0] * setup.attenuating_var * (total - begun)
+    before = disturbance.weights(given.start, *rows(last), given.params) if last else 0.0
+    low = same.cov[0, 0] * setup.attenuating_var * (total - before)
     load = load_change.initial_state(end)  # type: ignore[no-untyped-call]
     return JointState(
         load=load._replace(rows=seen),
         total=total,
-        begun=begun,
-        tried=begun,
+        total_at_load=before,
+        total_at_trial=before,
         windows=seen,
         mass=float(end.x[0] * (1.0 + low)),
         var=float(end.cov[0, 0]),
@@ -151,30 +151,30 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     Models, 1987, ch. 1, 2.
     """
     start, params = first_state(setup.std, setup.slow, window.time, setup.settings)
-    load, begun, tried = state.load, state.begun, state.tried
+    load, at_load, at_trial = state.load, state.total_at_load, state.total_at_trial
     if load is None:
         load = load_change.initial_state(start)  # type: ignore[no-untyped-call]
     noise = setup.fast**2 * window_noise(window.torque_var, setup.mass, setup.motion_var)
     long = state.windows > 0 and window.stood >= STOP
     odds = float(change_odds(np.array([window.stood]))[0]) if long else np.nan
     weight = disturbance.weight(load.same, window.time, window.row, noise, params)
-    opened = load.begun
+    trial_row = load.trial_row
     weighed = load_params(params, setup.std, setup.settings)
     load, mass, var, changed = load_change.step(
         load, window.time, window.row, window.y, noise, odds, weighed
     )
     if changed >= 0:
-        begun = tried
-    if load.open and load.begun != opened:
-        tried = state.total
+        at_load = at_trial
+    if load.open and load.trial_row != trial_row:
+        at_trial = state.total
     total = state.total + weight
     # While a change is tried, the spread between both hypotheses is no noise that attenuates.
-    low = load.same.cov[0, 0] * setup.attenuating_var * (total - begun)
+    low = load.same.cov[0, 0] * setup.attenuating_var * (total - at_load)
     return JointState(
         load=load,
         total=total,
-        begun=begun,
-        tried=tried,
+        total_at_load=at_load,
+        total_at_trial=at_trial,
         windows=state.windows + 1,
         mass=float(mass * (1.0 + low)),
         var=float(var),

@@ -38,7 +38,7 @@ def first_state(
     start = disturbance.initial_state(  # type: ignore[no-untyped-call]
         begin, np.diag(std**2), time
     )
-    return start, filter_params(std, settings.gate, settings.settle)
+    return start, filter_params(std, settings.gate, settings.settle_windows)
 
 
 def jump_variance(std: Floats, settings: JointSettings) -> Floats:
@@ -174,7 +174,7 @@ class JointSizes:
     motion_var : variance of the specific force of a window [m^2/s^4]
     noise_information : trace of the windows' information times the noise of the motion in them,
         which times the variance of the mass is the part that it is too low by [1/kg^2]
-    left : relative standard deviation of the mass that no row takes away [-]
+    systematic_std : relative standard deviation of the mass that no row takes away [-]
     settings : of the estimator
     """
 
@@ -184,7 +184,7 @@ class JointSizes:
     body: ResidualSquat
     motion_var: float
     noise_information: float
-    left: float
+    systematic_std: float
     settings: JointSettings
 
     @property

@@ -15,7 +15,7 @@ class JointSettings(GateSettings):
     Attributes
     ----------
     gate : windows with a larger normalised innovation are left out [-]
-    settle : windows before the gate closes
+    settle_windows : windows before the gate closes
     fewest_windows : fewer usable windows carry no mass, after a stop no change of it
     change_std : standard deviation of a change of load at a stop, over mass [-]
     load_pitch_std : standard deviation of what a change of load adds to the slow resistance, over
@@ -24,7 +24,7 @@ class JointSettings(GateSettings):
     """
 
     gate: float = 5.0
-    settle: int = 40
+    settle_windows: int = 40
     fewest_windows: int = 8
     change_std: float = 0.25
     load_pitch_std: float = 0.03
@@ -33,10 +33,10 @@ class JointSettings(GateSettings):
         GateSettings.__post_init__(self)
         if not self.gate > 0.0:
             raise ConfigError(f"gate must be positive, got {self.gate:g}")
-        if not (self.settle >= 1 and self.fewest_windows >= 2):
+        if not (self.settle_windows >= 1 and self.fewest_windows >= 2):
             raise ConfigError(
-                "settle must be 1 or more and fewest_windows 2 or more, "
-                f"got {self.settle} and {self.fewest_windows}"
+                "settle_windows must be 1 or more and fewest_windows 2 or more, "
+                f"got {self.settle_windows} and {self.fewest_windows}"
             )
         if not (0.0 < self.change_std <= 1.0 and 0.0 <= self.load_pitch_std <= 1.0):
             raise ConfigError(

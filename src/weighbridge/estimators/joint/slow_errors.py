@@ -259,7 +259,7 @@ def prior_std(
     return np.array(states)
 
 
-def filter_params(std: Floats, gate: float, settle: int) -> DisturbanceParams:
+def filter_params(std: Floats, gate: float, settle_rows: int) -> DisturbanceParams:
     """Make the kernel's parameters from the standard deviations of the states."""
     lasting = np.full(std.size, np.inf)
     lasting[1 : 1 + len(TIME_CONSTANTS)] = TIME_CONSTANTS
@@ -267,5 +267,5 @@ def filter_params(std: Floats, gate: float, settle: int) -> DisturbanceParams:
         time_constant=lasting,
         std=np.where(np.isfinite(lasting), std, 0.0),
         gate=gate,
-        settle=settle,
+        settle_rows=settle_rows,
     )
