@@ -116,9 +116,9 @@ def run_filter(
         params = params._replace(process_var=constant)
         cov = np.diag([0.0, 1.0 / mass**2, settings.process_var[2]])
         state = state._replace(cov=cov)
-    view = balance.table
-    used = view.reason == Reason.USED
-    speed = np.nan_to_num(view.speed)
+    table = balance.table
+    used = table.reason == Reason.USED
+    speed = np.nan_to_num(table.speed)
     _, x, var, innovation, innovation_var = kernel.run(state, speed, used, params)
     running = 1.0 / x[:, 1]
     return FilterRun(
@@ -185,7 +185,7 @@ def estimate(
     settings = settings or SpeedEkfSettings()
     model = model_of(vehicle)
     done = run_filter(balance, vehicle, settings)
-    view = balance.table
+    table = balance.table
     used = done.used
     count = int(np.count_nonzero(used))
     mass, std, share, bound = float("nan"), float("inf"), float("nan"), float("nan")
@@ -203,13 +203,13 @@ def estimate(
         running_mass=running,
         running_std=np.hypot(done.std, model.scale_std * running),
         residual=np.where(used, done.innovation * mass / model.sample_time, np.nan),
-        row_reason=view.reason,
+        row_reason=table.reason,
         mass=mass,
         std=std,
         systematic_std=model.scale_std * mass,
         degrees_of_freedom=float("inf"),
         bound_std=bound,
-        converged_at=converged_at(view.time, running, mass, used),
+        converged_at=converged_at(table.time, running, mass, used),
         status=status,
         reason=why,
         segments=(),

@@ -453,16 +453,16 @@ def mass_panel(
 
 def motion_panels(balance: ForceBalance) -> list[Panel]:
     """Draw torque, speed and acceleration of a drive."""
-    view = balance.table
-    rows = slice(None, None, max(1, view.time.size // 1500))
+    table = balance.table
+    rows = slice(None, None, max(1, table.time.size // 1500))
     drawn = []
     for letter, name, unit, values in (
-        ("b", "Engine torque", "N m", view.torque),
-        ("c", "Speed", "km/h", from_si(view.speed, "kmh")),
-        ("d", "Acceleration", "m/s²", view.accel),
+        ("b", "Engine torque", "N m", table.torque),
+        ("c", "Speed", "km/h", from_si(table.speed, "kmh")),
+        ("d", "Acceleration", "m/s²", table.accel),
     ):
         figure = blank("time s", f"{name.lower()} {unit}", height=300)
-        line(figure, view.time[rows], values[rows], name.lower(), BLUE)
+        line(figure, table.time[rows], values[rows], name.lower(), BLUE)
         drawn.append(
             Panel(title=f"Fig. 5{letter}: {name.lower()}", caption="No-load.", figure=figure)
         )

@@ -341,10 +341,10 @@ def sensitivity(
     if weighing.result is None:
         raise ValueError("nothing was weighed")
     balance, vehicle = weighing.result.balance, weighing.vehicle
-    view = balance.table
-    heading = np.where(np.isfinite(view.heading), view.heading, 0.0)
-    along = view.speed + wind_speed * np.cos(wind_from - heading)
-    changed = replace(view, air_speed=along)
+    table = balance.table
+    heading = np.where(np.isfinite(table.heading), table.heading, 0.0)
+    along = table.speed + wind_speed * np.cos(wind_from - heading)
+    changed = replace(table, air_speed=along)
     car = replace(
         vehicle,
         road_load=replace(
