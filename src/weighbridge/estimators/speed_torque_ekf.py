@@ -87,7 +87,7 @@ TRIED: Final = 0.01
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedTorqueSettings(GateSettings):
-    """Settings of the filter; what is None is found from the drive or the vehicle file.
+    """Settings of filter and gate; what is None is found from the drive or the vehicle file.
 
     Attributes
     ----------

@@ -36,8 +36,8 @@ METHOD_STYLES: Final = (
     (ORANGE, "dot"),
     (GREEN, "dashdot"),
     (PURPLE, "longdash"),
-    (GREY, "longdashdot"),
     (VERMILLION, "longdash"),
+    (GREY, "longdashdot"),
     (GREEN, "longdashdot"),
 )
 """Colour and dash of each method, in the order of `ESTIMATORS`."""
