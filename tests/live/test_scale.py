@@ -224,6 +224,20 @@ def test_a_change_of_load_is_found_on_the_way(car, loaded):
     assert scale._driven_this_load < 0.7 * told.driven
 
 
+def test_a_mass_that_is_too_wide_is_not_told(weighing, setup, short):
+    """After a change of load the first stretches leave a mass of any size."""
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    part = short.between(short.start, short.start + 90.0)
+    seen = []
+    for block in blocks(part, even(part, 2.0)):
+        scale.update_block(block)
+        seen.append((scale._state.joint, scale.weighing()))
+    wide = [told for joint, told in seen if joint.windows and np.isnan(told.mass)]
+    assert wide
+    assert all("% to both sides" in told.reason for told in wide)
+    assert all(t.std < 0.15 * t.mass for _, t in seen if np.isfinite(t.mass))
+
+
 def test_a_scale_looks_at_its_records_when_the_vehicle_stands(car, loaded):
     scale = wb.LiveScale(car, info=loaded.drive.info)
     part = loaded.drive.between(loaded.drive.start, loaded.drive.start + 400.0)

@@ -275,12 +275,27 @@ class LiveScale:
         if learned is not None and learned.inconsistent:
             return nothing
         if state is not None and setup is not None and state.joint.windows:
+            if self._leaves() > 0.0:
+                return nothing
             floor = setup.joint.systematic_std
             mass = state.joint.mass - state.burnt
             return mass, state.joint.std(setup.joint), floor, state.read
         if learned is not None and math.isfinite(learned.mass):
             return learned.mass, learned.std, learned.floor, learned.until
         return nothing
+
+    def _leaves(self) -> float:
+        """Standard deviation over the mass that is too wide to be told [-]; 0 where it is not.
+
+        A recorded drive that leaves as much has no mass either.
+        """
+        state, setup = self._state, self._setup
+        if state is None or setup is None or not state.joint.windows:
+            return 0.0
+        gate, floor = setup.joint.settings, setup.joint.systematic_std
+        std = state.joint.std(setup.joint) / abs(state.joint.mass)
+        of_drive = math.sqrt(max(std**2 - floor**2, 0.0))
+        return std if std > gate.widest or of_drive > gate.widest_of_drive else 0.0
 
     def _outlook(
         self, mass: float, std: float, floor: float, health: tuple[SignalHealth, ...]
@@ -290,6 +305,11 @@ class LiveScale:
             return Outlook(status=LiveStatus.INCONSISTENT, reason=learned.reason)
         silent = [s.name for s in health if s.needed and not s.fresh]
         reason = learned.reason if learned is not None else ""
+        if wide := self._leaves():
+            reason = (
+                "what was driven since the load may have changed leaves "
+                f"{196.0 * wide:.0f} % to both sides"
+            )
         return outlook(
             mass,
             std,
