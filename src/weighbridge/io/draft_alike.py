@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from weighbridge.io.draft import Draft
-from weighbridge.io.draft_column import DraftColumn
+from weighbridge.io.draft_column import DraftColumn, gyro_checked
 
 
 def merged(drafts: Sequence[Draft]) -> Draft | None:
@@ -23,9 +23,8 @@ def merged(drafts: Sequence[Draft]) -> Draft | None:
         return None
     together = zip(*(one.columns for one in drafts), strict=True)
     doubts = dict.fromkeys(doubt for one in drafts for doubt in one.doubts)
-    return replace(
-        first, columns=tuple(map(_widest, together)), doubts=tuple(doubts), files=len(drafts)
-    )
+    columns = gyro_checked(tuple(map(_widest, together)))
+    return replace(first, columns=columns, doubts=tuple(doubts), files=len(drafts))
 
 
 def _layout(one: Draft) -> tuple[object, ...]:
