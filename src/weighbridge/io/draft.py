@@ -63,7 +63,7 @@ class Draft:
     duration : from the first to the last row [s]
     columns : all but the time
     doubts : of the file and its time, one sentence each
-    files : how many files it is of, that read alike
+    alike : other files that it is of, for they read alike
     row_rate : rows per second of a time that counts rows [Hz], NaN where nobody knows; None for
         a clock
     rows : of a table
@@ -79,11 +79,21 @@ class Draft:
     duration: float
     columns: tuple[DraftColumn, ...]
     doubts: tuple[str, ...] = ()
-    files: int = 1
+    alike: tuple[Path, ...] = ()
     rates: tuple[float, ...] = ()
     row_rate: float | None = None
     rows: int = 0
     times: tuple[DraftTime, ...] = ()
+
+    @property
+    def files(self) -> int:
+        """How many files it is of."""
+        return 1 + len(self.alike)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its files, each once."""
+        return tuple(dict.fromkeys(path.name for path in (self.path, *self.alike)))
 
     @property
     def rate_unknown(self) -> bool:
