@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weighbridge.calibration.doubted_masses import contradicting, unbacked_scale, with_doubts
+from weighbridge.calibration.doubted_masses import contradicting, tared, unbacked_scale, with_doubts
 from weighbridge.errors import DriveError
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 
@@ -42,6 +42,11 @@ def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():
     loads = Vehicle(torque=TorqueModel(source="load", coefficients=(0.0, 250.0)))
     (text,) = unbacked_scale(loads)
     assert "tare_kg and gross_kg" in text
+    noted = replace(loads, provenance=replace(loads.provenance, notes=f"made of one drive; {text}"))
+    car = tared(noted, 1500.0)
+    assert car.tare == 1500.0
+    assert "tare_kg" not in car.provenance.notes
+    assert "state gross_kg" in car.provenance.notes
     assert unbacked_scale(replace(loads, tare=1500.0)) == []
     told = Vehicle(torque=TorqueModel(source="measured", coefficients=(0.0, 0.95)))
     assert unbacked_scale(told) == []

@@ -9,8 +9,9 @@ import pytest
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.io import read_drive
 from weighbridge.io.draft import HEAD_LINES, draft
+from weighbridge.io.file_patterns import file_patterns
 from weighbridge.io.mapping import load_mapping
-from weighbridge.io.mapping_text import file_patterns, mapping_text
+from weighbridge.io.mapping_text import mapping_text
 from weighbridge.io.table import head
 
 ROWS = 400
@@ -212,7 +213,7 @@ def test_a_name_with_a_line_end_stays_in_its_comment(tmp_path):
     ],
 )
 def test_patterns_fit_the_files_of_other_drives(names, patterns):
-    assert file_patterns(names) == patterns
+    assert file_patterns([[name] for name in names]) == patterns
 
 
 def test_decimal_commas_in_a_sparse_table(tmp_path):

@@ -182,6 +182,14 @@ def test_wrong_separator_is_told_with_the_right_one(tmp_path):
         read_drive(log, mapping)
 
 
+@pytest.mark.parametrize("separator", [";", ","])
+def test_a_mapping_of_canonical_columns_is_told_to_be_left_out(tmp_path, separator):
+    log = write(tmp_path / "log.csv", "time_s,vehicle_speed_kmh\n0,36\n")
+    mapping = {"csv": {"separator": separator}, "time": {"column": "t"}, "signals": SPEED}
+    with pytest.raises(DriveError, match="these names need no mapping; leave out --mapping"):
+        read_drive(log, mapping)
+
+
 def test_absent_time_column_is_told(tmp_path):
     log = write(tmp_path / "log.csv", "t,v\n0,36\n")
     with pytest.raises(DriveError, match=r"no time column 'clock'.*it has 't', 'v'"):

@@ -21,6 +21,9 @@ DOUBTED: Final = 0.06
 nine simulated vehicles the farthest of three drives was 0.03 off, with one mass of three 20 % off
 0.21 to 0.32."""
 
+_BOTH_MISSING: Final = "state tare_kg and gross_kg under [vehicle] of --vehicle, or --tare, so that they can be checked"
+_GROSS_MISSING: Final = "state gross_kg under [vehicle] of --vehicle, so that they can be checked"
+
 SURE: Final = 0.12
 """The same above which there is no calibration [-]."""
 
@@ -116,9 +119,15 @@ def unbacked_scale(vehicle: Vehicle) -> list[str]:
         return []
     return [
         f"what {source_of(vehicle).title} is worth, the masses given say alone, and one that is "
-        "wrong makes every mass wrong by as much: state tare_kg and gross_kg under [vehicle] of "
-        "--vehicle, or --tare, so that they can be checked"
+        f"wrong makes every mass wrong by as much: {_BOTH_MISSING}"
     ]
+
+
+def tared(vehicle: Vehicle, tare: float) -> Vehicle:
+    """Give a calibrated vehicle its mass without payload [kg]: its note no longer asks for it."""
+    made = vehicle.provenance
+    notes = made.notes and made.notes.replace(_BOTH_MISSING, _GROSS_MISSING)
+    return replace(vehicle, tare=tare, provenance=replace(made, notes=notes))
 
 
 def with_doubts(vehicle: Vehicle, doubts: Sequence[str]) -> Vehicle:

@@ -144,13 +144,14 @@ def calibrate(
         by_speed = run_speed_calibration(recorded, masses, vehicle=base)
         car, found = by_speed.vehicle, speed_table(by_speed)
         doubts = by_speed.warnings
-        lightest = min(rows.mass for rows in by_speed.rows)
+        if tare is not None:
+            car = _with_tare(car, tare, min(rows.mass for rows in by_speed.rows))
     else:
         done = run_calibration(recorded, masses, vehicle=base, settings=settings)
+        if tare is not None:
+            lightest = min(done.vehicle.provenance.masses)
+            done = replace(done, vehicle=_with_tare(done.vehicle, tare, lightest))
         car, found, doubts = done.vehicle, table(done), ()
-        lightest = min(car.provenance.masses)
-    if tare is not None:
-        car = _with_tare(car, tare, lightest)
     if chosen is not None:
         car = replace(car, mapping=mapping_beside(chosen, output))
     car.save(output)
@@ -165,6 +166,7 @@ def calibrate(
 
 def _with_tare(car: Vehicle, tare: float, lightest: float) -> Vehicle:
     """Return a vehicle with its mass without payload, checked by the lightest known mass [kg]."""
+    from weighbridge.calibration.doubted_masses import tared
     from weighbridge.errors import ConfigError
 
     if not 0.3 * lightest <= tare <= 1.02 * lightest:
@@ -172,7 +174,7 @@ def _with_tare(car: Vehicle, tare: float, lightest: float) -> Vehicle:
             f"--tare {tare:g}: must not be above the known mass of {lightest:g} kg nor far below; "
             "it is the vehicle without payload"
         )
-    return replace(car, tare=tare)
+    return tared(car, tare)
 
 
 def masses_of_parts(

@@ -63,7 +63,7 @@ def map_log(
     Example: weighbridge map trip.csv -o map.toml
     """
     from weighbridge.errors import DriveError
-    from weighbridge.io.draft_alike import merged
+    from weighbridge.io.draft_alike import kinds
     from weighbridge.io.mapping_text import mapping_text
     from weighbridge.whole import whole_file
 
@@ -71,26 +71,23 @@ def map_log(
         refuse_results(inputs(logs, dbc=dbc), [Result("--output", output, "mapping")])
         refuse_overwriting(output, force, "mapping")
     drafts: list[Draft] = []
-    refused: list[str] = []
+    refused: dict[Path, str] = {}
     for path, draft in _files(logs, dbc or []):
         try:
             found = draft(path)
         except DriveError as error:
-            refused.append(str(error))
+            refused[path] = str(error)
             continue
         drafts.append(found)
     if not drafts:
-        raise DriveError("; ".join(refused))
-    one = merged(drafts)
-    alike = one is not None and len(drafts) > 1
-    drafts = [one] if one is not None else drafts
-    drafts = _settled(drafts, rate, ask)
+        raise DriveError("; ".join(refused.values()))
+    drafts = _settled(kinds(drafts, tuple(refused)), rate, ask)
     screen = console(stderr=output is None)
     for found in drafts:
         _show(found, screen)
-    for sentence in refused:
+    for sentence in refused.values():
         complain(f"  left out: {sentence}")
-    text = mapping_text(drafts)
+    text = mapping_text(drafts, tuple(refused))
     if output is None:
         sys.stdout.write(text)
         return
@@ -100,9 +97,10 @@ def map_log(
     if any(found.rate_unknown for found in drafts):
         say(f"next: weighbridge map {shlex.join(map(str, logs))} --rate HZ -o {output} --force")
         return
-    more = "".join(f" --dbc {d}" for d in dbc or ())
-    drive = logs[0] if alike else _drive(logs)
-    say(f"next: weighbridge inspect {drive} --mapping {output}{more}")
+    drive = logs[0] if len(drafts) == 1 else _drive(logs)
+    words = ["weighbridge", "inspect", drive, "--mapping", output]
+    words += [word for d in dbc or () for word in ("--dbc", d)]
+    say(f"next: {shlex.join(map(str, words))}")
 
 
 def _files(logs: list[Path], dbc: list[str]) -> list[tuple[Path, Callable[[Path], Draft]]]:
@@ -175,7 +173,8 @@ def _rated(found: Draft, rate: float) -> Draft:
 
 
 def _drive(logs: list[Path]) -> Path:
-    return logs[0] if len(logs) == 1 else logs[0].parent
+    """Path of one drive: a folder named, else that of the files."""
+    return next((path for path in logs if path.is_dir()), logs[0].parent)
 
 
 def _show(found: Draft, screen: Console) -> None:

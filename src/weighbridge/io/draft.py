@@ -17,7 +17,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, stated_unit, suffixes_of
 from weighbridge.io.draft_column import DraftColumn, checked
 from weighbridge.io.draft_time import DraftTime, find_times, is_number
-from weighbridge.io.naming import Named, recognise_all
+from weighbridge.io.naming import Named, recognise_all, words_of
 from weighbridge.io.table import (
     SEPARATORS,
     RawTable,
@@ -29,6 +29,7 @@ from weighbridge.io.table import (
     read_text,
 )
 from weighbridge.signals import QUANTITIES, Floats
+from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.units import UNITS, to_si
 
 HEAD_LINES: Final = 60
@@ -39,6 +40,9 @@ EVEN: Final = 0.7
 
 _STRANGE_UNIT: Final = re.compile(r"[\[(]\s*([^\])\s]*[/•*·][^\])]*?)\s*[\])]\s*$")
 """A unit of two at the end of a name, such as lb/min."""
+
+_AXES: Final = (("x",), ("y",), ("z",))
+"""Names of columns that tell an axis and no more."""
 
 _COMMA: Final = re.compile(r"[-+]?\d+,\d+$")
 
@@ -59,7 +63,7 @@ class Draft:
     duration : from the first to the last row [s]
     columns : all but the time
     doubts : of the file and its time, one sentence each
-    files : how many files it is of, that read alike
+    alike : other files that it is of, for they read alike
     row_rate : rows per second of a time that counts rows [Hz], NaN where nobody knows; None for
         a clock
     rows : of a table
@@ -75,11 +79,21 @@ class Draft:
     duration: float
     columns: tuple[DraftColumn, ...]
     doubts: tuple[str, ...] = ()
-    files: int = 1
+    alike: tuple[Path, ...] = ()
     rates: tuple[float, ...] = ()
     row_rate: float | None = None
     rows: int = 0
     times: tuple[DraftTime, ...] = ()
+
+    @property
+    def files(self) -> int:
+        """How many files it is of."""
+        return 1 + len(self.alike)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its files, each once."""
+        return tuple(dict.fromkeys(path.name for path in (self.path, *self.alike)))
 
     @property
     def rate_unknown(self) -> bool:
@@ -121,7 +135,9 @@ def draft(path: Path) -> Draft:
     times = find_times(raw, units, above)
     time = times[0]
     names = [n for k, n in enumerate(raw.names) if k != time.index]
-    named = recognise_all(names, [units.get(n) for n in names])
+    # Of a bare axis the name of the file says what is measured.
+    told = [f"{path.stem} {n}" if words_of(n) in _AXES else n for n in names]
+    named = recognise_all(told, [units.get(n) for n in names])
     columns = tuple(
         _column(raw, name, found, stated=units.get(name))
         for name, found in zip(names, named, strict=True)
@@ -158,9 +174,14 @@ def timed(found: Draft, time: DraftTime) -> Draft:
     doubts = list(time.doubts)
     if step.size and np.mean(step == 0.0) > 0.2:
         doubts.append("several rows share one time stamp; they are spread over the step in reading")
-    if step.size and np.any(step < 0.0):
-        doubts.append("the time goes back in places; rows there are left out in reading")
     per_second = 1.0 if time.row_rate is None else time.row_rate
+    if restarts := find_restarts(time.seconds / per_second):
+        doubts.append(
+            f"the clock begins anew: read alone, this file is {len(restarts)} recordings, each "
+            "weighed as a drive of its own"
+        )
+    elif np.any(step < 0.0):
+        doubts.append("the time goes back in places; rows there are left out in reading")
     return replace(
         found,
         time=time.column,

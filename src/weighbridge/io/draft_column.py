@@ -58,7 +58,23 @@ class DraftColumn:
 
 def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
     """Say what the columns of one log tell of each other's units."""
-    return speed_checked(retarder_checked(percent_checked(gravity_checked(columns))))
+    columns = gyro_checked(gravity_checked(columns))
+    return speed_checked(retarder_checked(percent_checked(columns)))
+
+
+def gyro_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Give the axes of a gyroscope one unit: a stated one, else that of the largest values."""
+    axes = [c for c in columns if c.quantity.startswith("gyro_")]
+    told = max(axes, key=lambda c: (c.stated, max(abs(c.low), abs(c.high))), default=None)
+    if told is None:
+        return columns
+    doubt = f"states no unit; taken as {told.unit}, as {told.name!r} is"
+    return tuple(
+        replace(c, unit=told.unit, doubt=doubt)
+        if c in axes and c is not told and not c.stated
+        else c
+        for c in columns
+    )
 
 
 def speed_checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:

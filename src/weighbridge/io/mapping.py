@@ -38,16 +38,16 @@ names, such as a GPX or one with canonical columns, may have ``[time]`` or ``[cs
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, Final
 
 from weighbridge.arguments import check_texts, check_type
-from weighbridge.errors import ConfigError
+from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
-from weighbridge.io.table import MOST_COLUMNS, TextFormat
+from weighbridge.io.table import MOST_COLUMNS, TextFormat, column_list
 from weighbridge.signals import QUANTITIES, Problem, Quantity
 from weighbridge.signals.tomlfile import Faults, Section, read_toml, suggestion
 from weighbridge.signals.units import UNITS
@@ -195,6 +195,23 @@ def mapping_for(path: Path, mappings: tuple[TableMapping, ...]) -> TableMapping 
     """Return the first mapping whose pattern fits the file's name."""
     name = path.name.lower()
     return next((m for m in mappings if fnmatch(name, m.files.lower())), None)
+
+
+def none_fits(folder: Path, files: Sequence[Path], mappings: Sequence[TableMapping]) -> DriveError:
+    """Say that no table of a mapping is for a file of a folder.
+
+    Parameters
+    ----------
+    folder : of a drive
+    files : logs in it
+    mappings : tables of one mapping
+    """
+    return DriveError(
+        f"{folder}: no pattern in files of {mappings[0].source} "
+        f"({column_list(m.files for m in mappings)}) fits a file there "
+        f"({column_list(f.name for f in files)}); correct the patterns, or draft another mapping: "
+        f"weighbridge map {shlex.quote(str(folder))}"
+    )
 
 
 def _table(root: Section, files: str) -> TableMapping:

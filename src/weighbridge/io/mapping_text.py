@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import fnmatch
 import glob
 from collections.abc import Sequence
-from itertools import takewhile
 from pathlib import Path
 
 import tomlkit
@@ -13,27 +11,30 @@ from tomlkit.items import Table
 
 from weighbridge.io.draft import Draft
 from weighbridge.io.draft_column import DraftColumn
+from weighbridge.io.file_patterns import file_patterns
 from weighbridge.io.mapping import UNKNOWN_RATE
 from weighbridge.io.table import TextFormat
 from weighbridge.signals import QUANTITIES
 from weighbridge.visible import visible
 
 
-def mapping_text(drafts: Sequence[Draft]) -> str:
-    """Write a mapping: at the top level for one file, else one table for each.
+def mapping_text(drafts: Sequence[Draft], others: Sequence[Path] = ()) -> str:
+    """Write a mapping: at the top level for one kind of file, else one table for each.
 
     Parameters
     ----------
-    drafts : of the files of one drive
+    drafts : of the files, one for each kind
+    others : files beside them that the mapping is not for
     """
     document = tomlkit.document()
     document.add(tomlkit.comment("How to read this log: a mapping for weighbridge."))
-    if len(drafts) == 1:
+    if len(drafts) == 1 and not others:
         for name, part in _sections(drafts[0]).items():
             document.add(name, part)
         return tomlkit.dumps(document)
     tables = tomlkit.table(is_super_table=True)
-    patterns = file_patterns([one.path.name for one in drafts])
+    patterns = file_patterns([one.names for one in drafts], [path.name for path in others])
+    patterns = patterns or [glob.escape(one.path.name) for one in drafts]
     for k, (one, pattern) in enumerate(zip(drafts, patterns, strict=True), 1):
         table = tomlkit.table()
         table.add("files", pattern)
@@ -42,37 +43,6 @@ def mapping_text(drafts: Sequence[Draft]) -> str:
         tables.add(f"table_{k}", table)
     document.add("tables", tables)
     return tomlkit.dumps(document)
-
-
-def file_patterns(names: Sequence[str]) -> list[str]:
-    """Patterns that tell the files of one drive apart, and fit those of other drives.
-
-    What all names share before and after what differs, such as a date, may be anything.
-
-    Parameters
-    ----------
-    names : of the files
-    """
-    stems = [Path(name).stem for name in names]
-    before = _common_words(stems)
-    after = _common_words([stem[::-1] for stem in stems])
-    found = []
-    for name, stem in zip(names, stems, strict=True):
-        inner = stem[len(before) : max(len(stem) - len(after), len(before))]
-        pattern = f"{'*' if before else ''}{glob.escape(inner)}{'*' if after else ''}"
-        found.append(pattern + glob.escape(name.removeprefix(stem)))
-    alone = all(
-        sum(fnmatch.fnmatch(n.lower(), p.lower()) for n in names) == 1 and p.strip("*.")
-        for p in found
-    )
-    return found if alone else [glob.escape(name) for name in names]
-
-
-def _common_words(texts: Sequence[str]) -> str:
-    """What all texts begin with, to the end of a word."""
-    same = takewhile(lambda letters: len(set(letters)) == 1, zip(*texts, strict=False))
-    text = "".join(letters[0] for letters in same)
-    return text[: max((k + 1 for k, c in enumerate(text) if not c.isalnum()), default=0)]
 
 
 def _sections(one: Draft) -> dict[str, Table]:

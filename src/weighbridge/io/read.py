@@ -26,7 +26,7 @@ from weighbridge.io.frames import Frames, join_frames, settle_clock
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import MappingSource, TableMapping, load_mapping, mapping_for
+from weighbridge.io.mapping import MappingSource, TableMapping, load_mapping, mapping_for, none_fits
 from weighbridge.io.parts import part_folders, read_parts
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.table import read_parquet, read_text, start_text
@@ -219,11 +219,14 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
             f"or one log ({', '.join(suffixes())})"
         )
     if mappings:
+        there = files
         files = [
             f
-            for f in files
+            for f in there
             if f.stem.lower() in TABLES or mapping_for(f, mappings) or _self_described(f)
         ]
+        if not files and not parts:
+            raise none_fits(folder, there, mappings)
     return _read_files([(f, None) for f in files], mappings) + parts, info
 
 

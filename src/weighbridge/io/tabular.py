@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -135,7 +136,7 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
     if not places:
         raise DriveError(
             f"{raw.path}: none of the columns named in {mapping.source} is there; "
-            f"the file has {column_list(raw.names)}{_separator_hint(raw)}"
+            f"the file has {column_list(raw.names)}{_named_hint(raw)}"
         )
     time, notes = _mapped_time(raw, mapping, log)
     if mapping.time.offset:
@@ -223,11 +224,32 @@ def _no_time(raw: RawTable, known: bool) -> str:
     )
 
 
-def _separator_hint(raw: RawTable) -> str:
-    for other in SEPARATORS:
-        if raw.separator and other != raw.separator and any(other in n for n in raw.names):
-            return f", or set separator = {json.dumps(other)} there"
-    return ""
+def _named_hint(raw: RawTable) -> str:
+    """What to do about a mapping whose columns are not there."""
+    names, other = raw.names, _other_separator(raw)
+    if other:
+        names = [cell for name in names for cell in name.split(other)]
+    if _canonical(names):
+        return (
+            ": these names need no mapping; leave out --mapping, or the line mapping of a vehicle "
+            "file that names it"
+        )
+    return f"; set separator = {json.dumps(other)} there" if other else ""
+
+
+def _other_separator(raw: RawTable) -> str:
+    """Separator that stands in the names of a table, where it is not the one given."""
+    others = (s for s in SEPARATORS if raw.separator and s != raw.separator)
+    return next((s for s in others if any(s in name for name in raw.names)), "")
+
+
+def _canonical(names: Sequence[str]) -> bool:
+    """Whether names are those of a table that needs no mapping."""
+    try:
+        known = [name for name in names if parse_column(name, None) is not None]
+    except UnitlessColumnError:
+        return False
+    return bool(known) and any(map(time_unit, names))
 
 
 def _near(column: str, raw: RawTable) -> str:

@@ -1,0 +1,88 @@
+"""Patterns of file names: dates and numbers may be others, and kinds of file stay apart."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from weighbridge.errors import DriveError
+from weighbridge.io import read_drive
+from weighbridge.io.draft import draft
+from weighbridge.io.draft_alike import kinds
+from weighbridge.io.file_patterns import file_patterns
+from weighbridge.io.mapping_text import mapping_text
+
+T = np.arange(0.0, 30.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("names", "others", "patterns"),
+    [
+        (
+            [["phone_20210305_180000.csv"], ["2021-03-05 18-00-00.csv"]],
+            [],
+            ["phone_*.csv", "[0-9]*.csv"],
+        ),
+        ([["phone_20210305.csv"]], [], ["phone_*.csv"]),
+        ([["phone_20210305.csv"]], ["phone_notes.csv"], ["phone_20210305.csv"]),
+        ([["log0012.csv"], ["obd2.csv"]], [], ["log*.csv", "obd2.csv"]),
+        ([["obd_0012.csv", "obd_0013.csv"], ["gps.csv"]], [], ["obd_*.csv", "gps.csv"]),
+        ([["obd monday.csv", "obd friday.csv"], ["gps.csv"]], [], ["obd *day.csv", "gps.csv"]),
+        ([["monday.csv", "x.csv"], ["gps.csv"]], [], []),
+        ([["a [1] 2021-03.csv"], ["b.csv"]], [], ["a [[]1] *.csv", "b.csv"]),
+    ],
+)
+def test_dates_and_numbers_may_be_others(names, others, patterns):
+    assert file_patterns(names, others) == patterns
+
+
+def recorded(folder: Path, stamp: str) -> list[Path]:
+    """A phone's and an adapter's table, named by the time they were recorded."""
+    folder.mkdir()
+    phone = {"Time (s)": T} | {f"acc{a} (m/s^2)": np.sin(T) + 9.0 * (a == "Z") for a in "XYZ"}
+    car = {"Time (s)": T, "Vehicle speed (km/h)": 50.0 + np.sin(T)}
+    paths = [folder / f"phone_{stamp}.csv", folder / f"{stamp}.csv"]
+    for path, columns in zip(paths, (phone, car), strict=True):
+        pl.DataFrame(columns).write_csv(path)
+    return paths
+
+
+def test_a_mapping_of_one_drive_reads_another_of_other_dates(tmp_path):
+    first = recorded(tmp_path / "first", "20210305_180000")
+    recorded(tmp_path / "second", "20210306_103000")
+    text = mapping_text(kinds([draft(path) for path in first]))
+    (tmp_path / "map.toml").write_text(text, encoding="utf-8")
+    drive = read_drive(tmp_path / "second", tmp_path / "map.toml")
+    assert {"accel_z", "vehicle_speed"} <= set(drive.signals)
+
+
+def test_files_of_two_drives_are_a_table_for_each_kind(tmp_path):
+    paths = recorded(tmp_path / "a", "20210305_180000") + recorded(
+        tmp_path / "b", "20210306_103000"
+    )
+    found = kinds([draft(path) for path in paths])
+    assert [one.files for one in found] == [2, 2]
+    assert mapping_text(found).count("files = ") == 2
+
+
+def test_files_whose_names_tell_no_kind_keep_a_table_each(tmp_path):
+    paths = [p for k in ("a", "b") for p in recorded(tmp_path / k, "20210305_180000")]
+    paths[0] = paths[0].rename(tmp_path / "a" / "x.csv")
+    assert len(kinds([draft(path) for path in paths])) == 4
+
+
+def test_a_table_beside_a_file_that_is_none_is_for_its_own_names(tmp_path):
+    phone, notes = recorded(tmp_path / "a", "20210305_180000")
+    notes.write_text("hello world")
+    (tmp_path / "map.toml").write_text(mapping_text([draft(phone)], [notes]), encoding="utf-8")
+    assert "accel_z" in read_drive(tmp_path / "a", tmp_path / "map.toml").signals
+
+
+def test_a_mapping_that_is_for_no_file_there_says_so(tmp_path):
+    recorded(tmp_path / "a", "20210305_180000")
+    signals = {"accel_x": {"column": "accX", "unit": "mps2"}}
+    mapping = {"tables": {"phone": {"files": "phone_2020.csv", "signals": signals}}}
+    words = r"no pattern in files of mapping.*'phone_2020.csv'.*'20210305_180000.csv'.*map "
+    with pytest.raises(DriveError, match=words):
+        read_drive(tmp_path / "a", mapping)
