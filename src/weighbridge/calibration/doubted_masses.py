@@ -21,7 +21,10 @@ DOUBTED: Final = 0.06
 nine simulated vehicles the farthest of three drives was 0.03 off, with one mass of three 20 % off
 0.21 to 0.32."""
 
-_BOTH_MISSING: Final = "state tare_kg and gross_kg under [vehicle] of --vehicle, or --tare, so that they can be checked"
+_BOTH_MISSING: Final = (
+    "state tare_kg and gross_kg under [vehicle] of --vehicle, or --tare, so that they can be "
+    "checked"
+)
 _GROSS_MISSING: Final = "state gross_kg under [vehicle] of --vehicle, so that they can be checked"
 
 SURE: Final = 0.12

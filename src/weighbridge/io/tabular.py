@@ -226,10 +226,9 @@ def _no_time(raw: RawTable, known: bool) -> str:
 
 def _named_hint(raw: RawTable) -> str:
     """What to do about a mapping whose columns are not there."""
-    names, other = raw.names, _other_separator(raw)
-    if other:
-        names = [cell for name in names for cell in name.split(other)]
-    if _canonical(names):
+    other = _other_separator(raw)
+    cells = [cell for name in raw.names for cell in name.split(other)] if other else raw.names
+    if _canonical(cells):
         return (
             ": these names need no mapping; leave out --mapping, or the line mapping of a vehicle "
             "file that names it"
