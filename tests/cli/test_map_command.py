@@ -178,3 +178,19 @@ def test_a_pipe_named_like_a_table_is_no_table(weighbridge, tmp_path):
     assert done.code == 2
     assert "no plain file" in done.err
     assert "holds no table" in weighbridge("map", tmp_path).err
+
+
+def test_the_command_named_next_reads_one_of_several_drives(weighbridge, tmp_path):
+    folders = [tmp_path / "a trip", tmp_path / "b trip"]
+    for day, folder in enumerate(folders, 11):
+        folder.mkdir()
+        for name, column in (("obd", "Vehicle speed (km/h)"), ("gps", "Latitude (deg)")):
+            rows = "".join(f"{k / 4},{40 + k % 9}\n" for k in range(300))
+            (folder / f"{name}_202403{day}.csv").write_text(f"Time (s),{column}\n{rows}")
+    mapping = tmp_path / "m.toml"
+    ran = weighbridge("map", *folders, "-o", mapping)
+    assert ran.code == 0
+    command = f"weighbridge inspect '{folders[0]}' --mapping {mapping}"
+    assert f"next: {command}" in " ".join(ran.out.split())
+    for folder in folders:
+        assert weighbridge("inspect", folder, "--mapping", mapping).code == 0
