@@ -318,16 +318,23 @@ def _track(
         ),
         filter_input=given,
         possible_change=possible,
-        sizes=JointSizes(
-            std=problem.std,
-            fast=solved.fast,
-            slow=solved.slow,
-            body=asked.body,
-            motion_var=window_motion_variance(balance.motion),
-            noise_information=shown * float(np.sum(solved.weight)),
-            systematic_std=systematic,
-            settings=problem.settings,
-        ),
+        sizes=_sizes(balance, asked, solved, shown, systematic),
+    )
+
+
+def _sizes(
+    balance: ForceBalance, asked: _Asked, solved: _Solved, shown: float, systematic: float
+) -> JointSizes:
+    """Keep what the drive tells of noise; ``shown`` is that of the motion [m^2/s^4]."""
+    return JointSizes(
+        std=asked.problem.std,
+        fast=solved.fast,
+        slow=solved.slow,
+        body=asked.body,
+        motion_var=window_motion_variance(balance.motion),
+        noise_information=shown * float(np.sum(solved.weight)),
+        systematic_std=systematic,
+        settings=asked.problem.settings,
     )
 
 
