@@ -165,14 +165,14 @@ def test_linearised_at_its_own_acceleration_noise_of_the_torque_makes_it_heavier
 def test_residual_reason_and_running_mass_are_of_the_rows(weighed):
     track = weighed.result
     n = track.balance.table.time.size
-    assert track.running_mass.shape == track.residual.shape == track.reason.shape == (n,)
+    assert track.running_mass.shape == track.residual.shape == track.row_reason.shape == (n,)
     assert np.isfinite(track.residual[track.used]).all()
     known = track.residual[track.used]
     # 2 % of noise of the torque of one row is 6 % of the weight's 0.1 g; means have less.
     assert np.std(known) < 0.05 * MASS * G
     assert abs(np.mean(known)) < 0.2 * np.std(known)
     assert track.running_mass[-1] == pytest.approx(track.mass, rel=0.02)
-    assert set(np.unique(track.reason)) <= set(Reason)
+    assert set(np.unique(track.row_reason)) <= set(Reason)
 
 
 @pytest.mark.parametrize(
