@@ -62,6 +62,29 @@ def test_a_replay_is_weighed_as_its_samples(minute, weighing, setup, tmp_path):
     }
 
 
+def test_sources_that_fall_silent_are_not_shown_as_alive(minute, weighing, setup, monkeypatch):
+    """A terminal that says ok for minutes after the plug was pulled is wrong."""
+    at = [100.0]
+    monkeypatch.setattr("weighbridge.live.session.now", lambda: at[0])
+    scale = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
+    shown = Shown()
+    with Outputs([shown]) as outputs, Feed([]) as feed:
+        session = Session(feed=feed, scale=scale, outputs=outputs)
+        scale.update_block({n: (s.time, s.values) for n, s in minute.signals.items()})
+        session._show(due=True)
+        at[0] += 2.0
+        session._show(due=True)
+        at[0] += 58.0
+        session._show(due=True)
+    first, soon, late = shown.weighings
+    assert [s.age for s in first.signals] == [s.age for s in soon.signals]
+    assert all(s.fresh for s in first.signals if s.needed)
+    assert not any(s.fresh for s in late.signals if s.needed)
+    assert late.age == pytest.approx(first.age + 60.0)
+    assert "engine_load" in late.reason
+    assert "not come" in late.reason
+
+
 def test_a_lost_source_is_told_and_weighing_goes_on(minute, weighing, setup):
     class Lost:
         name = "gone"

@@ -71,3 +71,13 @@ def test_what_is_sealed_takes_no_earlier_sample():
     assert records.late == {"vehicle_speed": 1}
     records.add("vehicle_speed", NEWEST + 5.0, 3.0)
     assert records.newest == NEWEST + 5.0
+
+
+def test_a_value_that_is_asked_for_seldom_has_its_rate():
+    records = Records(lateness=200.0)
+    records.add_block({"vehicle_speed": (np.arange(0.0, 100.0, 0.2), np.ones(500))})
+    records.add_block({"ambient_temperature": (np.array([5.0, 35.0, 65.0]), np.full(3, 290.0))})
+    records.seal(99.0)
+    assert records.rate("ambient_temperature", 10.0) == pytest.approx(1.0 / 30.0)
+    assert records.rate("vehicle_speed", 10.0) == pytest.approx(5.0, rel=0.05)
+    assert records.rate("altitude", 10.0) == 0.0

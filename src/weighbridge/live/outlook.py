@@ -75,6 +75,7 @@ def outlook(
     good = half <= GOOD
     if not good:
         reason = f"within {100.0 * half:.1f} % so far"
+        reason = f"{missing}; {reason}" if silent else reason
     elif silent:
         reason = missing
     return Outlook(

@@ -274,10 +274,16 @@ class Records:
         return -math.inf if column is None else column.newest
 
     def rate(self, name: str, span: float) -> float:
-        """Sealed samples per second of a signal over the last ``span`` [s] that were sealed."""
+        """Sealed samples per second of a signal over the last ``span`` [s] that were sealed.
+
+        One that comes more seldom has the rate of its last two.
+        """
         column = self._columns.get(name)
         if column is None:
             return 0.0
         time = column.sealed[0]
         end = min(self.watermark, self.newest)
-        return float(time.size - time.searchsorted(end - span)) / span
+        count = time.size - int(time.searchsorted(end - span))
+        if count < 2 <= time.size:
+            return 1.0 / float(time[-1] - time[-2])
+        return count / span

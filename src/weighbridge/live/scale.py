@@ -240,17 +240,22 @@ class LiveScale:
         self._since = self._records.newest
         self._learned_at, self._learn_at = self._driven, self._driven + FIRST
 
-    def weighing(self) -> LiveWeighing:
-        """Return the mass as it is known now, and what would make it surer."""
+    def weighing(self, silence: float = 0.0) -> LiveWeighing:
+        """Return the mass as it is known now, and what would make it surer.
+
+        Parameters
+        ----------
+        silence : time since any sample came last [s]; who feeds the scale knows it
+        """
         mass, std, floor, at = self._mass()
-        health = tuple(self._health())
+        health = tuple(self._health(silence))
         found = self._outlook(mass, std, floor, health)
         newest = self._records.newest
         learned = self._learned
         return LiveWeighing(
             vehicle=self.vehicle.name,
             time=at,
-            age=newest - at if math.isfinite(at) else math.nan,
+            age=newest + silence - at if math.isfinite(at) else math.nan,
             status=found.status,
             reason=found.reason,
             mass=mass,
@@ -383,14 +388,14 @@ class LiveScale:
             self._since = learned.since
             self._driven_this_load = _time_on_the_move(drive, learned.since)
 
-    def _health(self) -> Iterable[SignalHealth]:
+    def _health(self, silence: float) -> Iterable[SignalHealth]:
         records = self._records
         needed = needed_signals(self.vehicle, records.names())
         for name in dict.fromkeys((*needed, *records.names())):
             yield SignalHealth(
                 name=name,
                 rate=records.rate(name, RATE_SPAN),
-                age=records.newest - records.newest_of(name)
+                age=records.newest + silence - records.newest_of(name)
                 if math.isfinite(records.newest)
                 else math.inf,
                 late=records.late.get(name, 0),

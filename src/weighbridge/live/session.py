@@ -11,6 +11,7 @@ from typing import Final
 
 from weighbridge.errors import WeighbridgeError
 from weighbridge.live.alerts import Alert
+from weighbridge.live.clock import now
 from weighbridge.live.feed import Feed
 from weighbridge.live.keeper import Keeper
 from weighbridge.live.outputs import Outputs
@@ -22,6 +23,9 @@ _LOG = logging.getLogger(__name__)
 
 WAIT: Final = 0.1
 """Samples are waited for so long at a time [s]."""
+
+SILENT: Final = 3.0
+"""When no sample has come for so long, all sources are silent [s]."""
 
 
 @dataclass(slots=True)
@@ -49,6 +53,7 @@ class Session:
     orders: Callable[[LiveScale], None] | None = None
     _shown: float = field(default=-float("inf"), init=False)
     _looked: float = field(default=-float("inf"), init=False)
+    _heard: tuple[float, float] = field(default=(-float("inf"), 0.0), init=False)
 
     def run(self, stop: Event) -> LiveWeighing:
         """Weigh until the sources end or ``stop`` is set; return the last weighing."""
@@ -83,7 +88,7 @@ class Session:
         if not due and newest - self._shown < self.period:
             return
         self._shown, self._looked = newest, monotonic()
-        weighing = self.scale.weighing()
+        weighing = self.scale.weighing(self._silence())
         for alert in self.alerts:
             event = alert.look(weighing)
             if event is not None:
@@ -92,6 +97,15 @@ class Session:
         lost = [f"{s.name}: {s.error}" for s in self.feed.states() if s.error and not s.ended]
         told = (*active, *lost, *self._doubts())
         self.outputs.show(replace(weighing, notes=(*told, *weighing.notes)))
+
+    def _silence(self) -> float:
+        """Time since any sample came [s]; 0 while some come."""
+        newest, then = self._heard
+        if self.scale.newest != newest:
+            self._heard = self.scale.newest, now()
+            return 0.0
+        silence = now() - then
+        return silence if silence > SILENT else 0.0
 
     def _doubts(self) -> list[str]:
         problem = "" if self.recorder is None else self.recorder.problem
