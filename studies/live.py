@@ -25,7 +25,7 @@ from weighbridge.errors import WeighbridgeError
 from weighbridge.live.weighing import LiveStatus
 
 HERE = Path(__file__).parent
-JUDGED = 9700
+JUDGED = 9600
 LOADS = {"calibration-1": 0.0, "calibration-2": 0.45, "calibration-3": 0.9}
 WEIGHED = {
     "drive-1": (0.95, "ordinary", 0.0),

@@ -71,8 +71,8 @@ def check_texts(name: str, given: object) -> None:
     check_all(name, given, str, "texts")
 
 
-def check_all(name: str, given: object, kind: type, expected: str) -> None:
-    """Refuse what is no series of one type; see `check_type`."""
+def check_all(name: str, given: object, kind: type | tuple[type, ...], expected: str) -> None:
+    """Refuse what is no series of such types; see `check_type`."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise ArgumentTypeError(f"{name} must be several {expected}, got {_shown(given)}")
     for one in given:

@@ -10,7 +10,10 @@ import weighbridge as wb
 
 WRONG = (3, 2.5, None, object(), [1, 2], {"a": 1}, b"x", {3}, np.arange(3.0), "\0")
 
-RESULTS = {"Inertia", "LiveStatus", "LiveWeighing", "Segment", "Status", "Weighing", "WeighingRow"}
+RESULTS = {
+    "CoastDown", "Inertia", "LiveStatus", "LiveWeighing", "MassBound", "Segment", "Status",
+    "Weighing", "WeighingRow",
+}  # fmt: skip
 """What the functions return; nobody makes them."""
 
 ERRORS = {"ConfigError", "DriveError", "MissingExtraError", "WeighbridgeError"}
@@ -39,6 +42,11 @@ def calls(short_drive, short_car, tmp_path_factory):
         "calibrate": (wb.calibrate, {"drives": drive, "mass": 1.0, "vehicle": None,
                                      "settings": None, "mapping": None}),
         "inspect_drive": (wb.inspect_drive, {"drive": drive, "vehicle": None}),
+        "mass_bound": (wb.mass_bound, {"drive": drive, "vehicle": short_car, "power": 9e4,
+                                       "power_std": 0.05}),
+        "coast_down": (wb.coast_down, {"drive": drive, "there": [(1.0, 20.0), (30.0, 50.0)],
+                                       "back": [(60.0, 80.0), (90.0, 110.0)],
+                                       "vehicle": short_car}),
         "estimate_inertia": (wb.estimate_inertia, {"drive": drive, "vehicle": short_car,
                                                    "method": "kalman-bucy", "settings": None}),
         "read_drive": (wb.read_drive, read),

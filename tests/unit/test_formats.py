@@ -90,7 +90,7 @@ def test_a_suffix_alone_is_no_name(tmp_path):
 @pytest.mark.parametrize(
     ("name", "mapping", "said"),
     [
-        ("log.gpx", NAMED, "GPX, which has no use for column, unit or format of"),
+        ("log.gpx", NAMED, "GPX, which has no use for column, unit, format or rate_hz of"),
         ("log.gpx", {"signals": NAMED["signals"]}, r"GPX, which has no use for \[signals\]"),
         ("log.vbo", NAMED, "VBOX, which has no use for column"),
         ("log.mf4", {**NAMED, "time": {"column": "x"}}, "MDF, which has no use for column"),

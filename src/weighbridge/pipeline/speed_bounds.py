@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
+from weighbridge.arguments import check_all, check_number, check_type
 from weighbridge.balance.law import rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError, DriveError
@@ -63,6 +64,11 @@ class MassBound:
     reason: str
 
 
+def _check_given(drive: Drive, vehicle: Vehicle) -> None:
+    check_type("drive", drive, Drive, "a drive, as read_drive returns it")
+    check_type("vehicle", vehicle, Vehicle, "a vehicle, as Vehicle.load returns it")
+
+
 def mass_bound(
     drive: Drive, vehicle: Vehicle, power: float, *, power_std: float = 0.05
 ) -> MassBound:
@@ -90,6 +96,9 @@ def mass_bound(
     ----------
     Bonferroni's inequality: Miller, Simultaneous Statistical Inference, 1981, ch. 1.
     """
+    _check_given(drive, vehicle)
+    check_number("power", power)
+    check_number("power_std", power_std)
     if not (math.isfinite(power) and power > 0.0):
         raise ConfigError(f"power must be a positive number of W, got {power}")
     if not 0.0 <= power_std < 0.5:
@@ -229,7 +238,14 @@ def coast_down(
     ----------
     SAE J1263, Road Load Measurement and Dynamometer Simulation Using Coastdown Techniques.
     """
-    vehicle = vehicle or Vehicle()
+    vehicle = Vehicle() if vehicle is None else vehicle
+    _check_given(drive, vehicle)
+    for name, spans in (("there", there), ("back", back)):
+        check_all(name, spans, (tuple, list), "pairs of instants")
+        for span in spans:
+            check_all(name, span, (int, float), "instants")
+            if len(span) != 2:
+                raise ConfigError(f"{name} must be several pairs of instants, got {span!r:.40}")
     if min(len(there), len(back)) < 2:
         raise ConfigError(
             f"{drive.name}: {len(there)} coast-downs there and {len(back)} back; two of each are "
