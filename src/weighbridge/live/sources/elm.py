@@ -11,8 +11,8 @@ from weighbridge.errors import ConfigError, SourceError
 from weighbridge.io.obd import parameters_of
 from weighbridge.live.source import Samples
 from weighbridge.live.sources.elm_text import Reply, read_reply, read_voltage
-from weighbridge.live.sources.kind import SourceOptions, checked_port, parted_rate
-from weighbridge.live.sources.links import BleLink, Link, SerialLink, TcpLink
+from weighbridge.live.sources.kind import SourceOptions, parted_rate
+from weighbridge.live.sources.links import BleLink, Link, SerialLink, tcp
 from weighbridge.live.sources.lock import DeviceLock
 from weighbridge.live.sources.polling import Pace, Poller
 from weighbridge.live.sources.schedule import PROBE, Request
@@ -46,11 +46,7 @@ def make_elm(text: str, options: SourceOptions) -> ElmSource:
     name = f"elm:{text}"
     kind, _, rest = text.partition(":")
     if kind == "tcp":
-        host, _, port = rest.rpartition(":")
-        if not host:
-            raise ConfigError(f"source {name!r} names no host; write elm:tcp:192.168.0.10:35000")
-        number = checked_port(port, name)
-        return ElmSource(name, (lambda: TcpLink(host, number),))
+        return ElmSource(name, (tcp(name, rest, "elm:tcp:192.168.0.10:35000"),))
     if kind == "ble":
         if not rest:
             raise ConfigError(f"source {name!r} names no address; write elm:ble:AA:BB:CC:DD:EE:FF")

@@ -254,6 +254,27 @@ class BleLink:
             self._loop.close()
 
 
+def tcp(name: str, place: str, example: str) -> Callable[[], Link]:
+    """Return what opens the way to a device at ``HOST:PORT``.
+
+    Parameters
+    ----------
+    name : of the source, for messages
+    place
+    example : of a name that can be used
+
+    Raises
+    ------
+    ConfigError
+        The place names no host, or no port.
+    """
+    host, _, port = place.rpartition(":")
+    if not host:
+        raise ConfigError(f"source {name!r} names no host; write {example}")
+    number = checked_port(port, name)
+    return lambda: TcpLink(host, number)
+
+
 def serial_or_tcp(kind: str, text: str, baud: int) -> Callable[[], Link]:
     """Return what opens the way to a device at ``PATH[@BAUD]`` or ``tcp:HOST:PORT``.
 
@@ -271,11 +292,7 @@ def serial_or_tcp(kind: str, text: str, baud: int) -> Callable[[], Link]:
     name = f"{kind}:{text}"
     before, _, rest = text.partition(":")
     if before == "tcp":
-        host, _, port = rest.rpartition(":")
-        if not host:
-            raise ConfigError(f"source {name!r} names no host; write {kind}:tcp:localhost:10110")
-        number = checked_port(port, name)
-        return lambda: TcpLink(host, number)
+        return tcp(name, rest, f"{kind}:tcp:localhost:10110")
     path, rate = parted_rate(text, "baud rate")
     if not path:
         raise ConfigError(f"source {name!r} names no port; write {kind}:/dev/ttyACM0")
