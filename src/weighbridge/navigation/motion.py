@@ -22,6 +22,10 @@ SLOW: Final = 0.4
 last few seconds, and masses by speed alone get worse from there on (README, What to expect)."""
 
 
+SLOPE: Final = 5.0
+"""Time over which the slope of a slow speed is still that of the vehicle [s]."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedSpeed:
     """The speed that an acceleration without an accelerometer is the slope of.
@@ -36,6 +40,20 @@ class RecordedSpeed:
     period: float
     step: float
     spread: float
+
+    @classmethod
+    def of(cls, speed: Signal) -> RecordedSpeed:
+        """Describe a speed: how often, how fine, and how much it changes over `SLOPE`."""
+        levels = np.unique(np.round(speed.values, 6))
+        coarse = levels.size > 2 and levels.size < 0.5 * len(speed)
+        time = speed.time[speed.time <= speed.time[-1] - SLOPE]
+        slope = (speed.at(time + SLOPE) - speed.at(time)) / SLOPE
+        known = slope[np.isfinite(slope)]
+        return cls(
+            period=speed.period,
+            step=float(np.median(np.diff(levels))) if coarse else 0.0,
+            spread=float(np.std(known)) if known.size else 0.0,
+        )
 
     @property
     def slow_text(self) -> str:
@@ -87,7 +105,6 @@ class Motion:
     speed_std : of ``speed`` where ``accel`` is its slope, as a smoother knows it; 0 where an
         accelerometer gave ``accel`` [m/s]
     specific_force_scale_std : relative, of the accelerometer's scale where it was corrected [-]
-    recorded_speed : the speed whose slope ``accel`` is; None where an accelerometer gave it
     measured_speed : samples of the speed that all of this was made from, true scale; None where an
         accelerometer was there as well
     notes : sentences on what was found and what was doubtful
@@ -118,9 +135,14 @@ class Motion:
     mounting_std: tuple[float, float, float] | None = None
     speed_std: float = 0.0
     specific_force_scale_std: float = 0.0
-    recorded_speed: RecordedSpeed | None = None
     measured_speed: Signal | None = None
     notes: tuple[str, ...] = ()
+
+    @property
+    def recorded_speed(self) -> RecordedSpeed | None:
+        """The speed whose slope ``accel`` is; None where an accelerometer gave it."""
+        speed = self.measured_speed
+        return None if speed is None else RecordedSpeed.of(speed)
 
     @property
     def rate(self) -> float:

@@ -9,18 +9,15 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.navigation.longitudinal import LONGEST_GAP, resample
-from weighbridge.navigation.motion import Motion, MotionSource, RecordedSpeed
+from weighbridge.navigation.motion import Motion, MotionSource
 from weighbridge.navigation.smoothing import GRADE_STD, smooth_grade, smooth_height, smooth_speed
-from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.signals import Drive, Floats
 
 SHORTEST: Final = 20.0
 """A shorter drive is not worth a look [s]."""
 
 SHORTEST_WAY: Final = 120.0
 """A shorter way shows no grade by its heights [m]."""
-
-SLOPE: Final = 5.0
-"""Time over which the slope of a slow speed is still that of the vehicle [s]."""
 
 
 def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
@@ -76,24 +73,9 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
         specific_force_std=float(np.median(accel_std)),
         grade_std=grade_std,
         speed_std=float(np.median(speed_std)),
-        recorded_speed=_recorded(speed),
         measured_speed=speed,
         notes=notes,
     )  # fmt: skip
-
-
-def _recorded(speed: Signal) -> RecordedSpeed:
-    """Describe a speed: how often, how fine, and how much it changes over `SLOPE`."""
-    levels = np.unique(np.round(speed.values, 6))
-    coarse = levels.size > 2 and levels.size < 0.5 * len(speed)
-    time = speed.time[speed.time <= speed.time[-1] - SLOPE]
-    slope = (speed.at(time + SLOPE) - speed.at(time)) / SLOPE
-    known = slope[np.isfinite(slope)]
-    return RecordedSpeed(
-        period=speed.period,
-        step=float(np.median(np.diff(levels))) if coarse else 0.0,
-        spread=float(np.std(known)) if known.size else 0.0,
-    )
 
 
 def _grade(
