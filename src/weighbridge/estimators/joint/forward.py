@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -40,9 +40,7 @@ def identify_joint(given: FilterInput, sizes: JointSizes) -> JointSetup:
 
     Windows weigh more once later ones are known: their noise counts as much more.
     """
-    before = disturbance.weights(
-        given.start, given.time, given.rows, given.y, given.noise, given.added, given.params
-    )
+    before = given.weight()
     known = {f.name: getattr(sizes, f.name) for f in fields(sizes)}
     return JointSetup(**known, attenuating_var=sizes.noise_information / before)
 
@@ -89,17 +87,11 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
     if not seen:
         return JointState()
 
-    def rows(end: int) -> tuple[Floats, ...]:
-        columns = (given.time, given.rows, given.y, given.noise, given.added)
-        return tuple(column[:end] for column in columns)
-
-    by_row = ("time", "rows", "y", "noise", "added", "stood", "odds", "traction")
-    part = replace(given, **{name: getattr(given, name)[:seen] for name in by_row})
+    part = given.first(seen)
     end, same, _ = averaged(part, setup.std, setup.settings)
-    total = disturbance.weights(given.start, *rows(seen), given.params)
-    jumps = np.flatnonzero(given.added[:seen].any(axis=1))
-    last = int(jumps[-1]) if jumps.size else 0
-    before = disturbance.weights(given.start, *rows(last), given.params) if last else 0.0
+    total = part.weight()
+    jumps = np.flatnonzero(part.added.any(axis=1))
+    before = part.first(int(jumps[-1])).weight() if jumps.size else 0.0
     low = same.cov[0, 0] * setup.attenuating_var * (total - before)
     load = load_change.initial_state(end)  # type: ignore[no-untyped-call]
     return JointState(

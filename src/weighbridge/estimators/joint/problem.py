@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -160,6 +160,19 @@ class FilterInput:
     stood: Floats
     odds: Floats
     traction: Floats
+
+    def first(self, count: int) -> FilterInput:
+        """Return the first so many windows."""
+        by_row = ("time", "rows", "y", "noise", "added", "stood", "odds", "traction")
+        return replace(self, **{name: getattr(self, name)[:count] for name in by_row})
+
+    def weight(self) -> float:
+        """Sum of the weights of all windows, each given those before it [1/N^2]."""
+        return float(
+            disturbance.weights(
+                self.start, self.time, self.rows, self.y, self.noise, self.added, self.params
+            )
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
