@@ -14,7 +14,7 @@ import numpy as np
 
 from weighbridge.calibration.run import run_calibration
 from weighbridge.calibration.settings import CalibrationSettings
-from weighbridge.papers.jensen2022 import without_weather
+from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.simulation import (
     Polling,

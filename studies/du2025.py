@@ -1,98 +1,45 @@
 """Figures of studies/du2025.md: robust least squares, EKF and their blend on more drives.
 
-Run from the checkout: ``python studies/du2025.py``. Recorded drives lie in
-``../shared/data`` and are not part of the project; without them their table says so.
+Run from the checkout: ``python studies/du2025.py``, or with the names of some parts, whose tables
+alone are made anew. Recorded drives lie in ``../shared/data`` and are not part of the project;
+without them their table says so.
 """
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import du2025_bus
 import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from du2025_bus import Curves, Part
 
 import weighbridge as wb
 from weighbridge.calibration.run import run_calibration
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.robust_rls import RobustRlsSettings
 from weighbridge.estimators.robust_rls import estimate as robust_rls
-from weighbridge.papers import du2025 as paper
-from weighbridge.papers.jensen2022 import without_weather
+from weighbridge.papers import du2025_methods as paper
+from weighbridge.papers.claims import markdown
+from weighbridge.papers.claims import tables as item_tables
+from weighbridge.papers.du2025 import ITEMS, reproduced
+from weighbridge.papers.du2025 import SEED as SEED_OF_PAPER
+from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import make_scenario, simulate_car
 
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "shared" / "data"
 EXAMPLE = HERE.parent / "examples" / "bmw-i3"
-SEED, DRIVES = 90_000, 20
+SEED = 90_000
 METHODS = (*paper.METHODS, "rls", "joint")
 
 
-def bus_table(done: paper.Reproduction) -> str:
-    lines = [
-        "| load, method | paper RMSE kg | as in the paper, mean kg | worst kg | below the paper's "
-        "| below half | largest error % | all effects, mean kg | worst kg | below the paper's "
-        "| below half | largest error % | 95 % interval holds % |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for load, theirs in paper.PAPER_RMSE.items():
-        for method, rmse in zip(paper.METHODS, theirs, strict=True):
-            row = f"| {load}, {method} | {rmse:.0f} "
-            for drives in (done.drives, done.road):
-                every = paper.cell(drives, load, method, "late_rmse")
-                worst = paper.cell(drives, load, method, "worst").max()
-                row += (
-                    f"| {every.mean():.0f} | {every.max():.0f} | {np.sum(every < rmse)} "
-                    f"| {np.sum(every < 0.5 * rmse)} | {100 * worst:.1f} "
-                )
-            held = paper.cell(done.road, load, method, "held").mean()
-            lines.append(row + f"| {100 * held:.0f} |")
-    return "\n".join(lines)
-
-
-def urban_table(vehicle: wb.Vehicle, axis: plt.Axes) -> str:
-    """Errors of the running mass before each change of load."""
-    errors = {m: [] for m in paper.METHODS}
-    held = {m: [] for m in paper.METHODS}
-    for seed in range(SEED + 500, SEED + 503):
-        made = simulate_car(make_scenario("bus-urban", payload=1400.0, seed=seed))
-        truth = made.truth
-        result = wb.weigh(made.drive, vehicle, method="hybrid").result
-        changes = np.flatnonzero(np.abs(np.diff(truth.mass)) > 0.05)
-        # A change of load takes many steps of the truth: its first one ends a stretch.
-        ends = changes[np.concatenate(([True], np.diff(changes) > 20))]
-        for method in paper.METHODS:
-            track = ESTIMATORS[method].track(result.balance, vehicle)
-            at = np.searchsorted(track.time, truth.time[ends])
-            off = track.running_mass[at] / truth.mass[ends] - 1.0
-            half = 1.96 * track.running_std[at] / truth.mass[ends]
-            told = np.isfinite(off)
-            errors[method].append(off[told])
-            held[method].append((np.abs(off) < half)[told])
-            if seed == SEED + 500:
-                rows = slice(None, None, 200)
-                axis.plot(track.time[rows], track.running_mass[rows], label=method, lw=1)
-        if seed == SEED + 500:
-            axis.plot(truth.time, truth.mass, "k--", lw=1, label="true")
-    axis.set_title("bus in a city")
-    lines = [
-        "| method | stretches | mean error % | RMS % | 95 % of them within % | worst % "
-        "| 95 % interval holds % |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for method, parts in errors.items():
-        off = 100.0 * np.concatenate(parts)
-        lines.append(
-            f"| {method} | {off.size} | {off.mean():+.1f} | {np.sqrt(np.mean(off**2)):.1f} "
-            f"| {np.percentile(np.abs(off), 95):.1f} | {np.abs(off).max():.1f} "
-            f"| {100.0 * np.mean(np.concatenate(held[method])):.0f} |"
-        )
-    return "\n".join(lines)
-
-
-def car_table(axis: plt.Axes) -> str:
+def car() -> Part:
     known = simulate_car(make_scenario("car-calibration", seed=SEED + 600))
     mass = float(np.mean(known.truth.mass))
     vehicle = run_calibration(without_weather(known.drive), mass).vehicle
@@ -109,20 +56,16 @@ def car_table(axis: plt.Axes) -> str:
         off = [100.0 * (t.mass / mass - 1.0) for t in (*tracks.values(), twice)]
         lines.append(f"| {k + 1}, {mass:.0f} | " + " | ".join(f"{x:+.1f}" for x in off) + " |")
         if k == 0:
-            for m in paper.METHODS:
-                axis.plot(tracks[m].time, tracks[m].running_mass, label=m, lw=1)
-            axis.axhline(mass, color="k", ls="--", lw=1)
-            axis.set_ylim(0.8 * mass, 1.2 * mass)
-            axis.set_title("simulated car")
-    return "\n".join(lines)
+            curves = Curves.of("simulated car", tracks, mass)
+    return Part({"car": "\n".join(lines)}, curves)
 
 
-def bmw_table(axis: plt.Axes) -> str:
+def bmw() -> Part:
     trips = sorted((DATA / "bmw-i3").glob("Trip*.csv"))
     if not trips:
-        return "The recorded drives are not here."
+        return Part({"bmw": "The recorded drives are not here."})
     vehicle = wb.Vehicle.load(EXAMPLE / "vehicle.toml")
-    masses, wander = {m: [] for m in METHODS}, {m: [] for m in METHODS}
+    masses, wander, shown = {m: [] for m in METHODS}, {m: [] for m in METHODS}, {}
     for path in trips:
         drive = wb.read_drive(path, EXAMPLE / "mapping.toml")
         weighed = wb.weigh(drive, vehicle, method="rls")
@@ -135,10 +78,9 @@ def bmw_table(axis: plt.Axes) -> str:
             late = track.running_mass[track.time > track.time[0] + 300.0]
             if np.isfinite(late).any():
                 wander[method].append(float(np.nanstd(late)))
-            if path == trips[0] and method in paper.METHODS:
-                axis.plot(track.time, track.running_mass, label=method, lw=1)
-    axis.set_title(f"recorded BMW i3, {trips[0].stem}")
-    axis.set_ylim(1200, 2000)
+            if path == trips[0]:
+                shown[method] = track
+    curves = Curves.of(f"recorded BMW i3, {trips[0].stem}", shown, 1600.0, drawn=False)
     lines = [
         "| method | trips weighed | median kg | a third % | wander kg |",
         "|---|---|---|---|---|",
@@ -153,37 +95,92 @@ def bmw_table(axis: plt.Axes) -> str:
             f"| {method} | {mass.size} of {len(trips)} | {np.median(mass):.0f} | {share:.1f} "
             f"| {np.median(wander[method]):.0f} |"
         )
-    return "\n".join(lines)
+    return Part({"bmw": "\n".join(lines)}, curves)
 
 
-def main() -> None:
+def items() -> Part:
+    """Reproduce as the command does, for the table of docs/methods/du2025.md."""
+    done = reproduced(SEED_OF_PAPER, None)
+    tables = item_tables("Du et al. 2025", ITEMS, done.figures)
+    return Part({"items": f"{done.title}.\n\n" + "\n".join(map(markdown, tables))})
+
+
+PARTS = {
+    "items": items,
+    "bus": du2025_bus.bus,
+    "opposite": du2025_bus.opposite,
+    "city": du2025_bus.city,
+    "second": du2025_bus.second,
+    "urban": du2025_bus.urban,
+    "bends": du2025_bus.bends,
+    "car": car,
+    "bmw": bmw,
+}
+"""What each makes: tables by the name of their place in the template, and curves of one drive."""
+
+METHOD_PAGE = HERE.parent / "docs" / "methods" / "du2025.md"
+SHOWN = ("bus", "urban", "car", "bmw")
+
+
+def draw(curves: dict[str, Curves]) -> None:
+    """Draw one drive of each kind."""
     figure, axes = plt.subplots(2, 2, figsize=(10, 7), constrained_layout=True)
-    done = paper.reproduce(seed=SEED, drives=DRIVES)
-    half = next(d for d in done.road if d.load == "half-load")
-    for method in paper.METHODS:
-        track = half.tracks[method]
-        axes[0, 0].plot(track.time[::20], track.running_mass[::20], label=method, lw=1)
-    axes[0, 0].axhline(half.true_mass, color="k", ls="--", lw=1)
-    axes[0, 0].set_ylim(0.85 * half.true_mass, 1.15 * half.true_mass)
-    axes[0, 0].set_title("bus on a straight road, half-load, all effects")
-    axes[0, 0].legend()
-    text = (HERE / "du2025.template.md").read_text(encoding="utf-8")
-    for name, table in (
-        ("bus", bus_table(done)),
-        ("urban", urban_table(done.vehicle, axes[0, 1])),
-        ("car", car_table(axes[1, 0])),
-        ("bmw", bmw_table(axes[1, 1])),
-    ):
-        print(table, flush=True)
-        text = text.replace(f"<!-- {name} -->", table)
-    for axis in axes.flat:
+    for axis, part in zip(axes.flat, SHOWN, strict=True):
+        curves[part].draw(axis)
         axis.set_xlabel("time s")
         axis.set_ylabel("mass kg")
         axis.grid(alpha=0.3)
+    axes[0, 0].legend()
     (HERE / "figures").mkdir(exist_ok=True)
     figure.savefig(HERE / "figures" / "du2025.png", dpi=110)
-    (HERE / "du2025.md").write_text(text, encoding="utf-8")
+
+
+def tables_of(page: Path) -> dict[str, str]:
+    """Tables that a page has already, by the marks before them."""
+    if not page.exists():
+        return {}
+    found = {}
+    for block in page.read_text(encoding="utf-8").split("\n\n"):
+        first, _, rest = block.partition("\n")
+        if first.startswith("<!-- ") and rest:
+            found[first.removeprefix("<!-- ").removesuffix(" -->")] = rest.strip()
+    return found
+
+
+def put_items(text: str) -> None:
+    """Write the items between their marks on the method's page."""
+    before, _, rest = METHOD_PAGE.read_text(encoding="utf-8").partition("<!-- items -->\n")
+    _, mark, after = rest.partition("<!-- end of items -->")
+    if not mark:
+        raise SystemExit(f"{METHOD_PAGE} has no marks around its items")
+    page = f"{before}<!-- items -->\n{text}\n{mark}{after}"
+    METHOD_PAGE.write_text(page, encoding="utf-8")
+
+
+def main(names: list[str]) -> None:
+    page = HERE / "du2025.md"
+    tables = tables_of(page)
+    curves = {}
+    asked = names or list(PARTS)
+    # Two at a time: each has a drive of 100 Hz in memory.
+    with ProcessPoolExecutor(2) as pool:
+        for name, running in [(n, pool.submit(PARTS[n])) for n in asked]:
+            done = running.result()
+            if name == "items":
+                put_items(done.tables["items"])
+                continue
+            tables |= done.tables
+            if done.curves is not None:
+                curves[name] = done.curves
+            for table in done.tables.values():
+                print(table, flush=True)
+            text = (HERE / "du2025.template.md").read_text(encoding="utf-8")
+            for place, table in tables.items():
+                text = text.replace(f"<!-- {place} -->", f"<!-- {place} -->\n{table}")
+            page.write_text(text, encoding="utf-8")
+    if set(SHOWN) <= set(curves):
+        draw(curves)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

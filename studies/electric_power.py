@@ -18,7 +18,7 @@ import numpy as np
 from accuracy_drives import compile_all, final_mass, scenario, shared_out
 
 import weighbridge as wb
-from weighbridge.papers.jensen2022 import without_weather
+from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import SimulatedDrive, random_vehicle, simulate_car, usual_polling
 from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from accuracy_drives import FULL, bare, calibrated, scenario, shared_out
 
-from weighbridge.papers.jensen2022 import without_weather
+from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.signals import Drive
 from weighbridge.simulation import (

@@ -443,7 +443,7 @@ def with_torque(page: str, text: str) -> str:
 def torque_tables() -> str:
     """Weigh by speed and recorded torque, and by joint without an accelerometer."""
     made = speed_torque.parts("judging")
-    simulated = [made[name]() for name in ("own", "second", "sheets")]
+    simulated = [made[name]() for name in ("own", "second", "sheets", "levels")]
     return "\n" + "\n".join([speed_torque.HEAD, *simulated]) + f"\n\n{made['recorded']()}\n"
 
 

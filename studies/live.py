@@ -3,7 +3,7 @@
 Run from the checkout: ``python studies/live.py``, which fills ``live.template.md`` and writes
 ``live.md``. It takes the foreign simulator's drives in ``../shared/data`` where they are, and makes
 vehicles of the second model with seeds that nothing else uses, in a folder that is removed. Each
-drive is fed to a `LiveScale` second by second, as ``weighbridge live --replay`` does.
+drive is fed to a `LiveScale` second by second, as ``weighbridge live --replay --rate max`` does.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +23,11 @@ from second_model import make_drive, random_vehicle
 
 import weighbridge as wb
 from weighbridge.errors import WeighbridgeError
+from weighbridge.live.replay import FASTEST_BLOCK, FASTEST_STEP
 from weighbridge.live.weighing import LiveStatus
 
 HERE = Path(__file__).parent
-JUDGED = 9600
+JUDGED = 9700
 LOADS = {"calibration-1": 0.0, "calibration-2": 0.45, "calibration-3": 0.9}
 WEIGHED = {
     "drive-1": (0.95, "ordinary", 0.0),
@@ -35,7 +37,6 @@ WEIGHED = {
 """Part of the payload, style, and part of it that is unloaded on the way."""
 
 MINUTES = (5.0, 10.0, 20.0)
-STEP = 1.0
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def run(name: str, folder: Path, car: wb.Vehicle) -> Run:
     drive = wb.read_drive(folder)
     truth = pl.read_parquet(folder / "truth.parquet")
     time, mass = truth["time_s"].to_numpy(), truth["mass_kg"].to_numpy()
-    scale = wb.LiveScale(car, info=drive.info)
+    scale = wb.LiveScale(car, info=drive.info, step=FASTEST_STEP)
 
     def told() -> Told:
         now = scale.weighing()
@@ -85,8 +86,9 @@ def run(name: str, folder: Path, car: wb.Vehicle) -> Run:
 
     after: dict[float, Told] = {}
     withdrawn = 0
-    for start in np.arange(drive.start, drive.end + STEP, STEP):
-        part = drive.between(start, start + STEP)
+    edges = drive.start + np.arange(0.0, drive.duration + 2.0 * FASTEST_BLOCK, FASTEST_BLOCK)
+    for start, end in pairwise(edges.tolist()):
+        part = drive.between(start, end)
         scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
         now = scale.weighing()
         withdrawn += now.status is LiveStatus.INCONSISTENT

@@ -14,17 +14,17 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.special import ndtr
 
 from weighbridge.inertia.filter import (
-    InertiaSettings,
     body_noise,
     corners,
     damping,
     estimate,
-    integration_std,
     inverse_interval,
     push_var,
     stiffness,
 )
+from weighbridge.inertia.integration import integration_std
 from weighbridge.inertia.ride_checks import ride_samples
+from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.papers import nguyen2024 as paper
 from weighbridge.pipeline.inertia import estimate_inertia
 from weighbridge.signals import Drive
@@ -34,8 +34,8 @@ from weighbridge.vehicle.model import Vehicle
 HERE = Path(__file__).parent
 
 # Judged here alone; the filter was made with seeds below 200, the roads of 9000 to 9029, and
-# random rides of 1, 21, 41, 43 and 9001.
-FIRST_SEED = 12_000
+# random rides of 1, 21, 41, 43 and 9001. An earlier table of seeds 12000 up had been looked at.
+FIRST_SEED = 182_000
 EXPERIMENTS = 30
 ROADS = 100
 SETTLED = 2.0
@@ -119,8 +119,8 @@ def bounds() -> str:
     velocities at that moment.
     """
     rows = []
-    for name in (paper.CASES[0].name, paper.CASES[5].name, paper.CASES[6].name):
-        sensors = next(case.sensors for case in paper.CASES if case.name == name)
+    for case in (paper.PAPERS_CASE, paper.AS_VARIANCE, paper.ORDINARY_SENSORS):
+        sensors = case.sensors
         ride = paper.suspension_of(TRUCK, sensors)
         body, push, step = body_noise(ride), np.sqrt(push_var(ride)), 1.0 / sensors.rate
         count = round(0.3 * sensors.rate)
@@ -139,7 +139,7 @@ def bounds() -> str:
                     noise = walk + body[j] ** 2 * np.eye(count)
                     stds.append(1.0 / np.sqrt(after[:, j] @ np.linalg.solve(noise, after[:, j])))
         outside = 2.0 * np.sum(ndtr(-0.05 / np.array(stds)))
-        rows.append((name, f"{100 * np.median(stds):.2f}", f"{100 * np.max(stds):.1f}",
+        rows.append((case.name, f"{100 * np.median(stds):.2f}", f"{100 * np.max(stds):.1f}",
                      f"{outside:.0f} of {len(stds)}"))  # fmt: skip
     return table(
         ("reading", "median least standard deviation %", "worst",
@@ -173,10 +173,11 @@ def coverage() -> tuple[str, str]:
         for k in range(ROADS):
             scenario = draw(rng, k, sensors=sensors)
             made = simulate_ride(scenario)
-            track = estimate(ride_samples(made.drive), ride)
+            samples = ride_samples(made.drive)
+            track = estimate(samples, ride)
             late = track.time > SETTLED
             # As in `weighbridge inertia`, with what the logger's rate costs.
-            std = np.hypot(track.alpha_std, track.alpha * integration_std(1.0 / hz))
+            std = np.hypot(track.alpha_std, track.alpha * integration_std(samples, ride))
             low, high = inverse_interval(track.reference, track.alpha, std, 0.95)
             inside = ((low <= made.inertias) & (made.inertias <= high))[late]
             held.append(np.mean(inside, axis=0))

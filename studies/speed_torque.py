@@ -1,6 +1,6 @@
 """Speed and recorded torque, no accelerometer: ``speed-torque-ekf`` beside ``joint``. Run me.
 
-    python studies/speed_torque.py [own|second|sheets|levels|recorded ...] [--tuning]
+    python studies/speed_torque.py [own|second|sheets|levels|recorded|logs ...] [--tuning]
 
 Each part prints its rows; ``python studies/galvao.py`` puts them all in ``galvao.md``. Every drive
 is stripped of its accelerometer first. A vehicle is calibrated for each of the two methods on three
@@ -10,6 +10,7 @@ the settings were chosen on.
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
@@ -28,19 +29,27 @@ from second_model import random_vehicle as second_vehicle
 import weighbridge as wb
 from weighbridge.errors import WeighbridgeError
 from weighbridge.navigation.select import without_accelerometer
-from weighbridge.papers.jensen2022 import without_weather
-from weighbridge.signals import Drive, Signal
-from weighbridge.simulation import random_vehicle, simulate_car
+from weighbridge.papers.jensen2022_drives import without_weather
+from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.simulation import SimulatedDrive, random_vehicle, simulate_car
 from weighbridge.vehicle.known import Known, describe
 
 METHODS: Final = ("speed-torque-ekf", "joint")
 OWN: Final = {"judging": 164_000, "tuning": 163_000}
 SECOND: Final = {"judging": 9520, "tuning": 9500}
+OWN_LEVELS: Final = {"judging": 184_000, "tuning": 163_000}
+SECOND_LEVELS: Final = {"judging": 9740, "tuning": 9500}
 KNOWN: Final = (0.0, 0.5, 0.9)
 WEIGHED: Final = (0.0, 0.3, 0.7, 1.0)
 SECOND_WEIGHED: Final = ((0.0, "ordinary"), (0.95, "ordinary"), (0.3, "city"), (0.6, "ordinary"))
 DATA: Final = Path(__file__).parents[2] / "shared" / "data"
 EXAMPLES: Final = Path(__file__).parents[1] / "examples"
+
+MAP_ERROR: Final = 0.003
+"""Standard deviation of a map's grade [rad], chosen."""
+
+MAP_LENGTH: Final = 100.0
+"""Way over which that error lasts [m], chosen."""
 
 HEAD: Final = (
     "| drives | method | weighed | RMS % | mean % | worst % | told, median ± % | within it |\n"
@@ -63,7 +72,7 @@ class Result(NamedTuple):
     std: float
 
 
-Seen = Callable[[Drive], Drive]
+Seen = Callable[[SimulatedDrive, int], Drive]
 
 
 def heights(drive: Drive) -> Drive:
@@ -76,6 +85,24 @@ def heights(drive: Drive) -> Drive:
 def nowhere(drive: Drive) -> Drive:
     """Leave speed and torque alone: the slope is a state."""
     return heights(drive).without("altitude", "latitude", "longitude")
+
+
+def on_a_map(drive: Drive, time: Floats, distance: Floats, grade: Floats, seed: int) -> Drive:
+    """Give a drive the grade of a map: the true one with errors that last `MAP_LENGTH`.
+
+    Parameters
+    ----------
+    time, distance, grade : (n,) of the truth [s], [m], [rad]
+    """
+    rng = np.random.default_rng([seed, 7])
+    knots = np.arange(0.0, float(distance[-1]) + MAP_LENGTH, MAP_LENGTH / 4.0)
+    kept, error = math.exp(-0.25), np.empty(knots.size)
+    error[0] = rng.normal(scale=MAP_ERROR)
+    for k in range(1, knots.size):
+        error[k] = kept * error[k - 1] + rng.normal(scale=MAP_ERROR * math.sqrt(1.0 - kept**2))
+    every = slice(None, None, max(1, round(1.0 / float(np.median(np.diff(time))))))
+    mapped = grade[every] + np.interp(distance[every], knots, error)
+    return nowhere(drive).with_signals(Signal("grade", time[every], mapped))
 
 
 def compared(
@@ -136,61 +163,85 @@ def rows(name: str, groups: Iterable[dict[str, list[Result]]]) -> str:
     return "\n".join(lines)
 
 
-def own_vehicle(seed: int, kind: str, seen: Seen, *, mapped: bool = False) -> dict[str, list]:
-    """Compare on one vehicle of our own simulator."""
+def by_heights(made: SimulatedDrive, seed: int) -> Drive:
+    """See a drive with GNSS heights."""
+    return heights(made.drive)
+
+
+def by_map(made: SimulatedDrive, seed: int) -> Drive:
+    """See a drive with the grade of a map."""
+    truth = made.truth
+    return on_a_map(made.drive, truth.time, truth.distance, truth.grade, seed)
+
+
+def blind(made: SimulatedDrive, seed: int) -> Drive:
+    """See a drive without a grade."""
+    return nowhere(made.drive)
+
+
+def own_vehicle(seed: int, kind: str, *seen: Seen) -> list[dict[str, list[Result]]]:
+    """Compare on one vehicle of our own simulator, its drives seen in several ways."""
     rng = np.random.default_rng(seed)
     car = random_vehicle(rng, kind)
 
-    def go(load: float, at: int) -> Recorded:
+    def go(load: float, at: int) -> list[Recorded]:
         made = simulate_car(scenario(car, rng, load=load * FULL[car.kind] * car.mass, seed=at))
-        mass, drive = made.truth.mass, seen(made.drive)
-        if mapped:
-            every = slice(None, None, max(1, made.truth.time.size // 5000))
-            grade = Signal("grade", made.truth.time[every], made.truth.grade[every])
-            drive = drive.with_signals(grade)
-        return Recorded(drive, float(mass[0]), float(np.mean(mass)))
+        mass = made.truth.mass
+        return [Recorded(view(made, at), float(mass[0]), float(np.mean(mass))) for view in seen]
 
     known = [go(load, seed + k) for k, load in enumerate(KNOWN)]
     weighed = [go(load, seed + 5 + k) for k, load in enumerate(WEIGHED)]
     sys.stderr.write(f"{kind} {seed}\n")
-    return compared(bare(car), known, weighed)
+    return [
+        compared(bare(car), [k[view] for k in known], [w[view] for w in weighed])
+        for view in range(len(seen))
+    ]
 
 
 def own(first: int, count: int = 12) -> str:
     """Vehicles of our own simulator, with GNSS heights."""
-    found = [own_vehicle(first + 20 * k, KINDS[k % len(KINDS)], heights) for k in range(count)]
+    found = [
+        own_vehicle(first + 20 * k, KINDS[k % len(KINDS)], by_heights)[0] for k in range(count)
+    ]
     return rows("own simulator, GNSS heights", found)
 
 
-def levels(first: int) -> str:
-    """The same by what tells the grade: a map, or nothing."""
-    seeds = [(first + 1000 + 20 * k, kind) for k, kind in enumerate(KINDS)]
-    by_map = [own_vehicle(seed, kind, heights, mapped=True) for seed, kind in seeds]
-    blind = [own_vehicle(seed, kind, nowhere) for seed, kind in seeds]
+def levels(seeds: str, count: int = len(KINDS), second_count: int = 4) -> str:
+    """Compare the same by what tells the grade: a map, or nothing."""
+    own_found = [
+        own_vehicle(OWN_LEVELS[seeds] + 20 * k, KINDS[k], by_map, blind) for k in range(count)
+    ]
+    second_found = [
+        second_one(SECOND_LEVELS[seeds] + k, k, mapped=True) for k in range(second_count)
+    ]
     return "\n".join(
         [
-            rows("own simulator, grade of a map", by_map),
-            rows("own simulator, no grade", blind),
+            rows("own simulator, grade of a map", [found[0] for found in own_found]),
+            rows("own simulator, no grade", [found[1] for found in own_found]),
+            rows("second model, grade of a map", second_found),
         ]
     )
 
 
+def second_one(seed: int, k: int, *, mapped: bool = False) -> dict[str, list[Result]]:
+    """Compare on one vehicle of the second model."""
+    kind = SECOND_KINDS[k % len(SECOND_KINDS)]
+    made = second_vehicle(kind, seed)
+    base = wb.Vehicle(name=kind, kind=CLASSES.get(kind, "car"))
+    sys.stderr.write(f"{kind} {seed}\n")
+    with tempfile.TemporaryDirectory() as home:
+        drives = [
+            _second_drive(Path(home), made, seed, load, style, number, mapped=mapped)
+            for number, (load, style) in enumerate(
+                [(load, "ordinary") for load in KNOWN] + list(SECOND_WEIGHED)
+            )
+        ]
+        return compared(base, drives[: len(KNOWN)], drives[len(KNOWN) :])
+
+
 def second(first: int, count: int = 10) -> str:
     """Vehicles, roads and drivers of the second model, with GNSS heights."""
-    found = []
-    for k in range(count):
-        seed, kind = first + k, SECOND_KINDS[k % len(SECOND_KINDS)]
-        made = second_vehicle(kind, seed)
-        base = wb.Vehicle(name=kind, kind=CLASSES.get(kind, "car"))
-        sys.stderr.write(f"{kind} {seed}\n")
-        with tempfile.TemporaryDirectory() as home:
-            drives = [
-                _second_drive(Path(home), made, seed, load, style, number)
-                for number, (load, style) in enumerate(
-                    [(load, "ordinary") for load in KNOWN] + list(SECOND_WEIGHED)
-                )
-            ]
-            found.append(compared(base, drives[: len(KNOWN)], drives[len(KNOWN) :]))
+    found = [second_one(first + k, k) for k in range(count)]
     kinds = [SECOND_KINDS[k % len(SECOND_KINDS)] for k in range(count)]
     heavy = [f for f, kind in zip(found, kinds, strict=True) if CLASSES.get(kind) in HEAVY]
     light = [f for f, kind in zip(found, kinds, strict=True) if CLASSES.get(kind) not in HEAVY]
@@ -207,14 +258,18 @@ HEAVY: Final = ("truck", "bus")
 
 
 def _second_drive(
-    home: Path, made: object, seed: int, load: float, style: str, number: int
+    home: Path, made: object, seed: int, load: float, style: str, number: int, *, mapped: bool
 ) -> Recorded:
     folder = home / str(number)
     room = max(made.gross - made.tare - DRIVER, 0.0)
     mass = made.tare + DRIVER + load * room
     make_drive(folder, made, mass=mass, seed=100 * seed + number, style=style)
-    truth = pl.read_parquet(folder / "truth.parquet")["mass_kg"]
-    return Recorded(heights(wb.read_drive(folder)), float(truth[0]), float(truth.mean()))
+    truth = pl.read_parquet(folder / "truth.parquet")
+    masses, drive = truth["mass_kg"], heights(wb.read_drive(folder))
+    if mapped:
+        course = (truth[name].to_numpy() for name in ("time_s", "distance_m", "grade_rad"))
+        drive = on_a_map(drive, *course, 100 * seed + number)
+    return Recorded(drive, float(masses[0]), float(masses.mean()))
 
 
 def sheets(first: int, count: int = 6) -> str:
@@ -279,11 +334,63 @@ def bmw_i3() -> str:
     return "\n".join(lines)
 
 
+def canedge() -> str:
+    """Eight files of one car whose mass and reference torque nobody tells: how far they agree."""
+    home = EXAMPLES / "canedge"
+    car = wb.Vehicle.load(home / "vehicle.toml")
+    reference = car.torque.reference_torque
+    folder = DATA / "canedge-obd-imu-gnss"
+    lines = [
+        "| CANedge file, no accelerometer | s | " + " | ".join(METHODS) + " |",
+        "|---|---|---|---|",
+    ]
+    found: dict[str, list[float]] = {method: [] for method in METHODS}
+    for path in sorted(folder.glob("*/*.MF4")):
+        drive = heights(wb.read_drive(path, home / "mapping.toml", folder / "canmod-gps.dbc"))
+        cells = []
+        for method in METHODS:
+            w = wb.weigh(drive, car, method)
+            if w.status == "converged":
+                found[method].append(w.mass / reference)
+                cells.append(f"{w.mass / reference:.2f} ± {1.96 * w.std / reference:.2f}")
+            else:
+                cells.append(str(w.status))
+        name = f"{path.parent.name}/{path.name[:8]}"
+        lines.append(f"| {name} | {drive.duration:.0f} | {' | '.join(cells)} |")
+    told = [
+        f"{np.mean(x):.2f}, sd {100.0 * np.std(x, ddof=1) / np.mean(x):.1f} % ({len(x)} files)"
+        if len(x) > 1
+        else f"{len(x)} files"
+        for x in found.values()
+    ]
+    lines.append(f"| mean | | {' | '.join(told)} |")
+    return "\n".join(lines) + "\n\nMasses in kg per N m of reference torque, 95 %."
+
+
+def single_logs() -> str:
+    """What the truck of 30 s and the car without a torque are told."""
+    truck = wb.read_drive(DATA / "j1939-truck" / "normal.log")
+    lines = ["| log | what `weigh --method speed-torque-ekf` says |", "|---|---|"]
+    w = wb.weigh(truck, EXAMPLES / "j1939-truck" / "vehicle.toml", METHODS[0])
+    lines.append(f"| J1939 truck, {truck.duration:.0f} s | `{w.status}`: {w.reason} |")
+    seat = EXAMPLES / "seat-leon"
+    for path in sorted((DATA / "seat-leon-obd").glob("*.csv")):
+        w = wb.weigh(path, seat / "vehicle.toml", METHODS[0], mapping=seat / "mapping.toml")
+        lines.append(f"| Seat Leon, {path.name[:10]} | `{w.status}`: {w.reason} |")
+    return "\n".join(lines)
+
+
 def recorded() -> str:
     """What the recorded and foreign logs allow."""
     if not DATA.is_dir():
         return "The recordings were not there when this page was made."
-    return "\n\n".join([f"{HEAD}\n{rows('foreign simulator, GNSS heights', foreign())}", bmw_i3()])
+    simulated = f"{HEAD}\n{rows('foreign simulator, GNSS heights', foreign())}"
+    return "\n\n".join([simulated, bmw_i3(), logs()])
+
+
+def logs() -> str:
+    """What the other recorded logs allow."""
+    return f"{canedge()}\n\n{single_logs()}"
 
 
 def parts(seeds: str) -> dict[str, Callable[[], str]]:
@@ -292,8 +399,9 @@ def parts(seeds: str) -> dict[str, Callable[[], str]]:
         "own": lambda: own(OWN[seeds]),
         "second": lambda: second(SECOND[seeds]),
         "sheets": lambda: sheets(SECOND[seeds]),
-        "levels": lambda: levels(OWN[seeds]),
+        "levels": lambda: levels(seeds),
         "recorded": recorded,
+        "logs": logs,
     }
 
 
