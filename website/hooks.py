@@ -1,0 +1,66 @@
+"""Events of mkdocs: pages from outside docs/, the reference, equations, notebooks."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import latex2mathml.converter
+from mkdocs.structure.files import File, Files
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from website import links, notebooks, reference
+
+_DISPLAY = re.compile(r'<div class="arithmatex">\\\[(.*?)\\\]</div>', re.DOTALL)
+_INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
+
+_WEIGHTS = (
+    *((name, 3.0) for name in ("start", "record", "data", "accuracy", "troubleshooting")),
+    *((f"{folder}/", 3.0) for folder in ("howto", "tutorials", "concepts")),
+    *((name, 0.3) for name in ("changelog", "papers", "studies/", "reference/", "licence")),
+)
+"""How much more a page counts in the search than others, by the begin of its place."""
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add what does not lie in docs/."""
+    made: dict[str, str] = {
+        **reference.python_pages(),
+        "reference/commands.md": reference.commands_page(),
+        "licence.md": "# Licence\n\n" + (links.HOME / "LICENSE").read_text(encoding="utf-8"),
+        **{
+            f"downloads/{page.stem}.ipynb": notebooks.notebook(page)
+            for page in notebooks.tutorials()
+        },
+    }
+    for place, text in made.items():
+        files.append(File.generated(config, place, content=text))
+    for place, source in links.outside_pages().items():
+        files.append(File.generated(config, place, abs_src_path=str(source)))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
+    """Turn links of the repository into those of the site; offer the notebook; weigh for search."""
+    place = page.file.src_uri
+    weight = next((w for begin, w in _WEIGHTS if place.startswith(begin)), 1.0)
+    page.meta.setdefault("search", {"boost": weight})
+    if place.startswith("tutorials/") and not place.endswith("index.md"):
+        name = Path(place).stem
+        offer = f"\n\n[Download as a notebook](../downloads/{name}.ipynb){{ .md-button }}\n"
+        markdown = markdown.rstrip() + offer
+    return markdown if place.startswith("reference/") else links.relinked(markdown, place)
+
+
+def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
+    """Write equations as MathML, which browsers draw without a script."""
+
+    def drawn(found: re.Match[str], display: str) -> str:
+        source = found[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
+        return latex2mathml.converter.convert(source, display=display)
+
+    html = _DISPLAY.sub(lambda found: f'<div class="equation">{drawn(found, "block")}</div>', html)
+    return _INLINE.sub(lambda found: drawn(found, "inline"), html)

@@ -1,0 +1,139 @@
+"""Pages of the reference: every public name, and every command with its options."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any, get_args
+
+from typer.main import get_command
+
+GROUPS = {
+    "Weigh": (
+        "weigh", "compare", "calibrate", "inspect_drive", "Weighing", "WeighingRow", "Segment",
+        "Status", "CalibrationSettings",
+    ),
+    "Vehicle": ("Vehicle",),
+    "Drives": (
+        "read_drive", "read_drives", "read_frame", "to_frames", "Drive", "DriveInfo", "Signal",
+        "Problem",
+    ),
+    "Live": ("LiveScale", "LiveWeighing", "LiveStatus"),
+    "Inertia from the ride": ("estimate_inertia", "Inertia", "InertiaFilter", "InertiaSettings"),
+    "Speed alone": ("mass_bound", "MassBound", "coast_down", "CoastDown"),
+    "Errors": ("WeighbridgeError", "DriveError", "ConfigError", "MissingExtraError"),
+}  # fmt: skip
+"""Names of ``import weighbridge as wb``, in the order in which a reader meets them."""
+
+MODULES = {
+    "reference/fleet.md": ("Fleet", ("weighbridge.fleet",)),
+    "reference/simulation.md": ("Simulation", ("weighbridge.simulation",)),
+    "reference/parts.md": (
+        "Parts to build on",
+        ("weighbridge.io", "weighbridge.signals", "weighbridge.balance", "weighbridge.estimators"),
+    ),
+}
+"""Pages by module: title, and the modules whose ``__all__`` they hold."""
+
+RECORDS = (
+    "weighbridge.vehicle.torque_source.TorqueSource",
+    "weighbridge.vehicle.classes.VehicleClass",
+    "weighbridge.live.sources.kind.SourceKind",
+)
+"""Records that a package of another may hand in, beside those of the modules."""
+
+
+def groups() -> dict[str, tuple[str, ...]]:
+    """Return `GROUPS`; public names that stand in none are in one of their own."""
+    told = {name for names in GROUPS.values() for name in names} | {"fleet"}
+    rest = tuple(n for n in import_module("weighbridge").__all__ if n not in told)
+    return {**GROUPS, "Others": rest} if rest else GROUPS
+
+
+def python_pages() -> dict[str, str]:
+    """Return the pages of the Python reference by their place."""
+    lines = ["# Python", "", "`import weighbridge as wb` gives these names as `wb.NAME`.", ""]
+    for title, names in groups().items():
+        lines += [f"## {title}", ""]
+        for name in names:
+            lines += _entry(f"weighbridge.{name}")
+    pages = {"reference/python.md": "\n".join(lines)}
+    for place, (title, modules) in MODULES.items():
+        lines = [f"# {title}", ""]
+        for module in modules:
+            lines += [f"## `{module}`", ""]
+            for name in import_module(module).__all__:
+                lines += _entry(f"{module}.{name}")
+        if place.endswith("parts.md"):
+            lines += ["## Records of entry points", ""]
+            for name in RECORDS:
+                lines += _entry(name)
+        pages[place] = "\n".join(lines)
+    return pages
+
+
+def commands_page() -> str:
+    """Return the page of all commands: use, what each does, its options."""
+    from weighbridge.cli.main import app
+
+    lines = ["# Commands", "", "`weighbridge COMMAND --help` says the same on a terminal.", ""]
+    lines += [
+        "Exit status: 0 a mass was found. 1 the data cannot carry a mass, and the reason is told. "
+        "2 bad input or wrong usage, told in one line. 130 interrupted. 141 nobody reads on.",
+        "",
+    ]
+    _tell(get_command(app), "weighbridge", lines)
+    return "\n".join(lines)
+
+
+def _entry(name: str) -> list[str]:
+    return [f"::: {name}", "    options:", "      heading_level: 3", ""]
+
+
+def _tell(command: Any, words: str, lines: list[str]) -> None:
+    """Add a command and the commands below it to the lines of the page."""
+    inside = getattr(command, "commands", None)
+    if words != "weighbridge":
+        own = getattr(command, "fallback", command)
+        lines += [f"## {words}", "", _paragraphs(getattr(command, "help", "") or ""), ""]
+        rows = [_row(p) for p in own.params if p.name != "help" and not p.hidden]
+        if rows:
+            lines += ["| argument or option | value | meaning |", "|---|---|---|", *rows, ""]
+    for name, below in (inside or {}).items():
+        if not getattr(below, "hidden", False):
+            _tell(below, f"{words} {name}", lines)
+
+
+def _paragraphs(text: str) -> str:
+    """Set the help of a command; its example is a block."""
+    parts = []
+    for part in text.replace("\f", "\n\n").split("\n\n"):
+        said = " ".join(part.split())
+        if said.startswith("Example: "):
+            said = f"    {said.removeprefix('Example: ')}"
+        parts.append(said)
+    return "\n\n".join(parts)
+
+
+def _row(parameter: Any) -> str:
+    """Return the row of an argument or an option."""
+    said = " ".join((parameter.help or "").split())
+    if not hasattr(parameter, "is_flag"):
+        return f"| `{(parameter.metavar or parameter.name).upper()}` | | {_cell(said)} |"
+    names = ", ".join(f"`{n}`" for n in (*parameter.opts, *parameter.secondary_opts))
+    value = "" if parameter.is_flag else parameter.metavar or _kind(parameter)
+    default = parameter.default
+    if isinstance(default, str | int | float) and default != "" and not parameter.is_flag:
+        said = f"{said} Otherwise {default}."
+    return f"| {names} | {_cell(value)} | {_cell(said)} |"
+
+
+def _kind(parameter: Any) -> str:
+    """Return what the value of an option is, by its annotation."""
+    kind = parameter.type_descriptor.annotation
+    kind = (get_args(kind) or (kind,))[0]
+    return {Path: "path", str: "text", float: "number", int: "whole number"}.get(kind, "")
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
