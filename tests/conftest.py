@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,10 @@ from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.simulation.simulate import SimulatedDrive
+
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -77,3 +82,15 @@ def assert_damage_is_told(
         assert_salvaged(path)
 
     return check
+
+
+@pytest.fixture
+def browser():
+    """Headless Chromium of playwright; skips where one of them is not installed."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium is installed")
+    with sync_api.sync_playwright() as play:
+        chromium = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()

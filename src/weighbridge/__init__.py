@@ -11,13 +11,18 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from weighbridge.version import VERSION
+
+__version__ = VERSION
 
 if TYPE_CHECKING:
+    from weighbridge import fleet
     from weighbridge.calibration.run import calibrate
     from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError, DriveError, MissingExtraError, WeighbridgeError
     from weighbridge.estimators import Segment, Status
+    from weighbridge.inertia.filter import InertiaFilter
+    from weighbridge.inertia.settings import InertiaSettings
     from weighbridge.io import read_drive, read_drives, read_frame, to_frames
     from weighbridge.live.scale import LiveScale
     from weighbridge.live.weighing import LiveStatus, LiveWeighing
@@ -40,6 +45,8 @@ _HOMES = {
     "DriveError": "weighbridge.errors",
     "DriveInfo": "weighbridge.signals",
     "Inertia": "weighbridge.pipeline.inertia",
+    "InertiaFilter": "weighbridge.inertia.filter",
+    "InertiaSettings": "weighbridge.inertia.settings",
     "LiveScale": "weighbridge.live.scale",
     "LiveStatus": "weighbridge.live.weighing",
     "LiveWeighing": "weighbridge.live.weighing",
@@ -71,6 +78,8 @@ __all__ = [
     "DriveError",
     "DriveInfo",
     "Inertia",
+    "InertiaFilter",
+    "InertiaSettings",
     "LiveScale",
     "LiveStatus",
     "LiveWeighing",
@@ -88,6 +97,7 @@ __all__ = [
     "coast_down",
     "compare",
     "estimate_inertia",
+    "fleet",
     "inspect_drive",
     "mass_bound",
     "read_drive",
@@ -100,6 +110,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import the public names when they are first used, so that importing costs nothing."""
+    if name == "fleet":
+        return import_module("weighbridge.fleet")
     home = _HOMES.get(name)
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

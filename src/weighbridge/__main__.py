@@ -10,6 +10,8 @@ def run() -> None:
     """Run the command line."""
     # Products are of small matrices: threads would wait for each other longer than they work.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Colours of its messages would end with a control character on our standard output.
+    os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
     try:
         from weighbridge.cli.main import run as run_commands
 

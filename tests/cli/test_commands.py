@@ -301,6 +301,17 @@ def test_data_sheet_without_gearings_is_told_to_be_uncalibrated(weighbridge, tmp
     assert any("not made by a calibration" in w for w in result["warnings"])
 
 
+def test_a_fleet_is_simulated_once(weighbridge, tmp_path):
+    words = ("simulate", "fleet", "-o", tmp_path / "fleet", "--vehicles", 1, "--days", 1,
+             "--drives", 1, "--minutes", 2, "--seed", 169112, "--workers", 1)  # fmt: skip
+    ran = weighbridge(*words)
+    assert (ran.code, "1 drives of 1 vehicles" in ran.out) == (0, True)
+    assert len(list((tmp_path / "fleet" / "drives" / "truck001").iterdir())) == 1
+    again = weighbridge(*words)
+    assert (again.code, "exists already" in again.err) == (2, True)
+    assert weighbridge("simulate", "fleet", "--help").code == 0
+
+
 def test_simulate_writes_a_folder_once(weighbridge, tmp_path):
     folder = tmp_path / "new" / "drive"
     words = ("simulate", "car-short", "-o", folder, "--mass", 1700, "--format", "csv")

@@ -25,7 +25,8 @@ def test_ride_is_simulated_and_weighed(weighbridge, ride, tmp_path):
     assert ran.code == 0, ran.err
     assert "sprung mass" in ran.out
     assert "payload" in ran.out
-    assert re.search(r"^mass \d+ kg, 95 % between \d+ and \d+ kg: front axle", ran.out, re.M)
+    assert re.search(r"^mass \d+ kg, 95 % between \d+ and \d+ kg$", ran.out, re.M)
+    assert re.search(r"^rear axle \d+ kg, 95 % between \d+ and \d+ kg$", ran.out, re.M)
     assert pl.read_parquet(track).height > 1000
     assert report.stat().st_size > 10_000
 

@@ -160,6 +160,68 @@ def test_a_log_with_a_retarder_leads_to_a_truck_file():
     assert then.endswith("--vehicle base.toml")
 
 
+@pytest.fixture
+def percent_drive(loaded):
+    """A drive of a truck that tells its torque in percent, and nothing else of it."""
+    from weighbridge.io import read_drive
+    from weighbridge.signals import Signal
+
+    drive = read_drive(loaded.folder)
+    load = drive.signals["engine_load"]
+    drive = drive.without("engine_load", "mass_air_flow", "engine_torque")
+    return drive.with_signals(
+        Signal("engine_torque_fraction", load.time, load.values),
+        Signal("retarder_torque", load.time, 0.0 * load.time),
+    )
+
+
+def next_lines(drive, vehicle=None):
+    from weighbridge.cli.inspect import _Given, _next
+    from weighbridge.pipeline.inspection import inspect_drive
+
+    found = replace(inspect_drive(drive, vehicle), problems=())
+    path = Path("truck.toml") if vehicle is not None else None
+    return found, _next(found, Path("day"), 1, _Given(vehicle, path, None, None, False))
+
+
+def test_percent_torque_without_its_reference_is_what_is_nearest(percent_drive):
+    from weighbridge.vehicle.known import Known, describe
+
+    found, (first, then) = next_lines(percent_drive)
+    assert found.ways[0].torque == "percent"
+    assert found.ways[0].needs == ("reference_torque (or reference_torque_nm in the vehicle file)",)
+    assert first.startswith(
+        "next: weighbridge vehicle new --class truck --torque percent --reference-torque NM "
+        "-o base.toml"
+    )
+    assert then == "then: weighbridge inspect day --vehicle base.toml"
+    truck = describe(Known(kind="truck", torque="percent")).vehicle
+    _, (only,) = next_lines(percent_drive, truck)
+    assert "reference_torque_nm under [torque] of truck.toml" in only
+    truck = describe(Known(kind="truck", torque="percent", reference_torque=1800.0)).vehicle
+    found, lines = next_lines(percent_drive, truck)
+    assert found.ways[0].chosen
+    assert lines[0] == "next: weighbridge weigh day --vehicle truck.toml"
+
+
+def test_the_torque_in_percent_goes_into_the_next_command(percent_drive):
+    from weighbridge.signals import Signal
+    from weighbridge.vehicle.known import Known, describe
+
+    reference = Signal("reference_torque", np.array([percent_drive.start]), np.array([1800.0]))
+    drive = percent_drive.with_signals(reference)
+    _, (first, then) = next_lines(drive)
+    assert "vehicle new --class truck --torque percent -o base.toml" in first
+    assert then.startswith("then: weighbridge calibrate day")
+    # A file that weighs by a torque that the drive lacks leads to no weighing.
+    truck = describe(Known(kind="truck", torque="measured")).vehicle
+    _, (only,) = next_lines(drive, truck)
+    assert only == (
+        "next: the vehicle file weighs by torque in N m, and the drive holds torque in percent; "
+        "make a vehicle file of it: calibrate --torque percent, or vehicle new --torque percent"
+    )
+
+
 def test_warnings_of_several_drives_are_a_few_lines():
     from weighbridge.cli.weigh import result_table, warning_lines
     from weighbridge.pipeline.weighing import without_mass

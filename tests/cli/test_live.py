@@ -3,12 +3,13 @@
 import json
 import math
 
+import polars as pl
 import pytest
 
 import weighbridge as wb
 
 
-def test_a_replay_ends_with_a_mass(weighbridge, loaded, car, tmp_path):
+def test_a_replay_ends_with_a_mass(weighbridge, loaded, car, changed, tmp_path):
     lines, kept = tmp_path / "lines.jsonl", tmp_path / "kept"
     ran = weighbridge(
         "live", "--vehicle", car, "--replay", loaded.folder, "--rate", "max",
@@ -26,19 +27,18 @@ def test_a_replay_ends_with_a_mass(weighbridge, loaded, car, tmp_path):
     assert (tmp_path / "car.state").exists()
     drive = wb.read_drive(kept)
     assert len(drive.signals["accel_x"]) == len(wb.read_drive(loaded.folder).signals["accel_x"])
-    # Where the state stays, the next run begins with it.
-    again = weighbridge(
-        "live", "--vehicle", car, "--replay", loaded.folder, "--rate", "max",
-        "--state", tmp_path / "car.state", "--json", "-",
-    )  # fmt: skip
+    # Where the state stays, the next run begins with it; what was recorded stays as it is.
+    later = {t: lambda f: f.with_columns(pl.col("time_s") + 900.0) for t in ("imu", "obd", "gnss")}
+    words = ("--rate", "max", "--state", tmp_path / "car.state", "--json", "-", "--record", kept)
+    again = weighbridge("live", "--vehicle", car, "--replay", changed(**later), *words)
     assert "going on from" in again.err
+    assert "kept-2" in again.err
+    assert wb.read_drive(kept).duration == drive.duration
     first = json.loads(again.out.splitlines()[0])
     assert math.isclose(first["mass_kg"], last["mass_kg"], rel_tol=0.005)
 
 
 def test_no_mass_is_exit_1(weighbridge, loaded, car, changed):
-    import polars as pl
-
     brief = changed(
         imu=lambda t: t.filter(pl.col("time_s") < 40.0),
         obd=lambda t: t.filter(pl.col("time_s") < 40.0),
@@ -95,3 +95,20 @@ def test_a_ticket_calibrates(weighbridge, known, car, tmp_path):
     assert ran.code in (0, 1), ran.err
     assert "written" in ran.err
     assert wb.Vehicle.load(out).provenance.masses == pytest.approx((known.mass,), abs=1.0)
+    assert " in every mass, the one before ± " in ran.err
+
+
+@pytest.mark.slow
+def test_a_ticket_of_a_short_drive_makes_no_worse_file(weighbridge, loaded, car, tmp_path):
+    out = tmp_path / "worse.toml"
+    words = ("--replay", loaded.folder, "--rate", "max", "--ticket", f"{loaded.mass:.0f}")
+    ran = weighbridge("live", "--vehicle", car, *words, "-o", out)
+    assert ran.code == 0, ran.err
+    assert f"{out} is not written: made of this drive alone it would leave ± " in ran.err
+    assert "drive half an hour or more" in ran.err
+    assert not out.exists()
+    # A file that contradicts the ticket is replaced, and it is said how much that leaves.
+    words = (*words[:-1], f"{1.2 * loaded.mass:.0f}")
+    ran = weighbridge("live", "--vehicle", car, *words, "-o", out)
+    assert "the vehicle file before says " in ran.err
+    assert out.exists()

@@ -1,8 +1,10 @@
 """``weighbridge map``: from a foreign log to a mapping that reads it."""
 
 import json
+import math
 import os
 
+import numpy as np
 import polars as pl
 import pytest
 
@@ -53,7 +55,7 @@ def test_from_foreign_tables_to_a_mass_in_three_commands(
 
 
 def test_a_dongle_and_a_phone_on_clocks_of_their_own(weighbridge, loaded, car, tmp_path):
-    """README's: the adapter's app writes times of day, the phone seconds since its start."""
+    """As in docs/data.md: the app writes times of day, the phone seconds since its start."""
     trip, mapping = tmp_path / "trip", tmp_path / "map.toml"
     trip.mkdir()
     tables = {n: pl.read_parquet(loaded.folder / f"{n}.parquet") for n in ("obd", "imu", "gnss")}
@@ -117,15 +119,46 @@ def test_units_are_asked_for_where_asked_to(weighbridge, foreign, tmp_path, monk
     assert [q for q in asked if q.startswith("unit of Zeit")]
 
 
+def nameless(folder):
+    """Write a log of 20 Hz whose names tell nothing but the time."""
+    rows = [f"{k / 20:.2f},{40 + 10 * math.sin(k / 50):.2f},{k % 7}" for k in range(2000)]
+    path = folder / "x.csv"
+    path.write_text("\n".join(["time_s,qwert,asdf", *rows]))
+    return path
+
+
+def test_columns_that_no_name_tells_are_asked_for(weighbridge, tmp_path, monkeypatch):
+    log, mapping = nameless(tmp_path), tmp_path / "m.toml"
+    assert "--ask asks what they are" in weighbridge("map", log).err
+    asked = answers(monkeypatch, {"qwert, 30": "vehicle_speed", "qwert is vehicle_speed": "mph"})
+    ran = weighbridge("map", log, "-o", mapping, "--ask")
+    assert ran.code == 0, ran.err
+    assert [question.split(",")[0] for question in asked if "what is it" in question] == [
+        "qwert",
+        "asdf",
+    ]
+    speed = read_drive(log, mapping).signals["vehicle_speed"].values
+    assert speed.mean() == pytest.approx(40.0 * 0.44704, rel=0.02)
+    assert "left out" not in ran.err
+
+
+def test_no_answer_to_any_column_is_a_refusal(weighbridge, tmp_path, monkeypatch):
+    answers(monkeypatch, {})
+    ran = weighbridge("map", nameless(tmp_path), "-o", tmp_path / "m.toml", "--ask")
+    assert ran.code == 2
+    assert "no column of it was named" in ran.err
+    assert not (tmp_path / "m.toml").exists()
+
+
 def test_what_is_doubted_is_asked_for_and_nothing_else(weighbridge, tmp_path, monkeypatch):
-    rows = (f"{k},{k / 5:.1f},{1.7e9 + k / 5:.1f},{9 + k % 7},48.1,11.5,900" for k in range(300))
-    head = "n,Time (s),Unix time,Speed (km/h),Latitude (deg),Longitude (deg),RPM (rpm)"
+    rows = (f"{k},{k / 5:.1f},{1.7e9 + k / 5:.1f},{9 + k % 7},48.1,11.5,900,30" for k in range(300))
+    head = "n,Time (s),Unix time,Speed (km/h),Latitude (deg),Longitude (deg),RPM (rpm),Load (%)"
     (tmp_path / "x.csv").write_text("\n".join([head, *rows]))
     asked = answers(monkeypatch, {"the time": "Unix time", "Speed": "gnss_speed"})
     ran = weighbridge("map", tmp_path / "x.csv", "-o", tmp_path / "m.toml", "--ask")
     assert ran.code == 0
     assert len(asked) == 2
-    assert "which column is the time (Time (s), Unix time)" in asked[0]
+    assert "which column is the time (Unix time, Time (s))" in asked[0]
     assert "Speed (km/h), 9 to 15 kmh, is taken for vehicle_speed" in asked[1]
     text = (tmp_path / "m.toml").read_text()
     assert 'column = "Unix time"' in text
@@ -194,3 +227,36 @@ def test_the_command_named_next_reads_one_of_several_drives(weighbridge, tmp_pat
     assert f"next: {command}" in " ".join(ran.out.split())
     for folder in folders:
         assert weighbridge("inspect", folder, "--mapping", mapping).code == 0
+
+
+@pytest.fixture
+def torqueless(tmp_path):
+    time = np.arange(0.0, 20.0, 0.5)
+    columns = {"zeit_s": time, "v_kmh": 2.0 * time, "rpm": 900.0 + 50.0 * time, "kx7": 5.0 * time}
+    path = tmp_path / "day.parquet"
+    pl.DataFrame(columns).write_parquet(path)
+    return path
+
+
+def test_a_log_of_which_no_column_is_a_torque_says_what_to_do(
+    weighbridge, torqueless, tmp_path, monkeypatch
+):
+    mapping = tmp_path / "m.toml"
+    told = " ".join(weighbridge("map", torqueless, "-o", mapping).err.split())
+    assert "no column taken is a torque, a load or a power" in told
+    asked = answers(monkeypatch, {"kx7, 0 to 97.5": "engine_torque_fraction", "unit": "pct"})
+    ran = weighbridge("map", torqueless, "-o", mapping, "--ask", "--force")
+    assert ran.code == 0
+    assert any(question.startswith("kx7, 0 to 97.5") for question in asked)
+    assert "no column taken" not in ran.err
+    read = read_drive(torqueless, mapping)
+    assert read.signals["engine_torque_fraction"].values.max() == pytest.approx(0.975)
+
+
+def test_a_folder_of_foreign_names_leads_to_a_mapping_of_the_folder(weighbridge, foreign):
+    ran = weighbridge("inspect", foreign)
+    assert ran.code == 2
+    assert f"weighbridge map {foreign} -o map.toml" in " ".join(ran.err.split())
+    (foreign / "phone.csv").unlink()
+    alone = " ".join(weighbridge("inspect", foreign).err.split())
+    assert f"weighbridge map {foreign / 'auto.csv'} -o map.toml" in alone

@@ -69,7 +69,7 @@ def test_calibrate_says_which_drives_it_wants_the_masses_of(weighbridge, day, tm
     ran = weighbridge("calibrate", day, *masses, "-o", tmp_path / "car.toml")
     assert ran.code == 2
     assert "3 masses for 2 drives in 1 recording(s)" in ran.err
-    assert "day holds 2 drives: 0–240 s, 1140–1380 s" in ran.err
+    assert "day holds 2 drives: 0 to 240 s, 1140 to 1380 s" in ran.err
 
 
 def test_masses_are_of_all_or_of_each_recording_or_of_each_drive():

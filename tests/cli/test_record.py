@@ -101,13 +101,29 @@ def test_sources_that_cannot_be_are_refused_and_no_folder_is_made(
     assert not (tmp_path / "drive").exists()
 
 
-def test_a_source_that_says_nothing_is_told(weighbridge, tmp_path):
-    words = ("--check", "0.3", "--duration", "0.3")
+@pytest.mark.parametrize(
+    ("check", "says"),
+    [("0.3", "no sample came within 0.3 s (lines:udp:"), ("0", "nothing was recorded")],
+)
+def test_a_source_that_says_nothing_is_told(weighbridge, tmp_path, check, says):
+    words = ("--check", check, "--duration", "0.3")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     ran = weighbridge("record", "--source", f"lines:udp:{port}", *words, "-o", tmp_path / "drive")
     assert ran.code == 2
-    assert "no sample yet" in ran.err
-    assert "no speed (such as vehicle_speed) has come" in ran.err
-    assert "nothing was recorded, no sample came; check the sources" in ran.err
+    assert says in ran.err
+    assert len(ran.err.splitlines()) == 1
+    assert not (tmp_path / "drive").exists()
+
+
+def test_a_source_that_is_out_of_reach_ends_it(weighbridge, tmp_path):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    words = ("--source", f"elm:tcp:127.0.0.1:{port}", "--check", "0.5", "-o", tmp_path / "drive")
+    ran = weighbridge("record", *words)
+    assert ran.code == 2
+    assert "cannot be reached" in ran.err.splitlines()[-1]
+    assert "Traceback" not in ran.err
+    assert not (tmp_path / "drive").exists()

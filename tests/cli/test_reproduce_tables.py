@@ -3,8 +3,11 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import pytest
+
 from weighbridge.cli import reproduce
 from weighbridge.papers import jensen2022, reproduced
+from weighbridge.papers.claims import Item
 from weighbridge.report.table import Table
 
 LONG = "as in the paper, half-load, seed 777"
@@ -51,10 +54,73 @@ def test_a_page_begins_with_the_papers_figures(tmp_path):
 
 def test_jensens_page_begins_so_too(tmp_path, monkeypatch):
     given = {}
-    nothing = SimpleNamespace(drives=(), calibration=None)
+    nothing = SimpleNamespace(
+        drives=(), calibration=None, seed=5, last_seed=6, settings=jensen2022.Settings()
+    )
     monkeypatch.setattr(jensen2022, "reproduce", lambda **_: nothing)
-    monkeypatch.setattr(jensen2022, "_drives_table", lambda _: made(True).tables[0])
-    monkeypatch.setattr(jensen2022, "_comparisons", lambda _: made(True).comparisons)
+    monkeypatch.setattr(jensen2022, "drives_table", lambda _: made(True).tables[0])
+    monkeypatch.setattr(jensen2022, "comparisons", lambda _: made(True).comparisons)
+    monkeypatch.setattr(jensen2022, "figures", lambda _: {})
+    monkeypatch.setattr("weighbridge.papers.jensen2022_figures.panels", lambda _: ())
     monkeypatch.setattr("weighbridge.report.write_report", lambda *_, **k: given.update(k))
-    jensen2022.reproduced(1, None).write_report(tmp_path / "page.html")
+    done = jensen2022.reproduced(5, None)
+    done.write_report(tmp_path / "page.html")
     assert [t.columns[0] for t in given["tables"]] == ["figure", "drive"]
+    assert "seeds 5 to 6, not held out" in done.title
+
+
+def test_a_report_as_markdown_has_the_items_of_every_paper_that_has_some(
+    weighbridge, tmp_path, monkeypatch
+):
+    item = Item("eq. 1", "`law.py`", True, "", "1 kg", "{mass}", True)
+    done = replace(made(good=True), title="A paper, seeds 5 to 6", figures={"mass": "2 kg"})
+    monkeypatch.setattr("weighbridge.papers.paper", lambda _: lambda *_: done)
+    monkeypatch.setattr(
+        "weighbridge.papers.items_of", lambda name: (item,) if name == "galvao" else ()
+    )
+    page = tmp_path / "papers.md"
+    assert weighbridge("reproduce", "all", "--report", page).code == 0
+    text = page.read_text(encoding="utf-8")
+    assert text.count("## A paper\n") == 1
+    assert "seeds 5 to 6" in text
+    assert "| eq. 1 | `law.py` | yes |  | 1 kg | 2 kg |" in text
+    again = weighbridge("reproduce", "all", "--report", page)
+    assert again.code == 0
+    notes = tmp_path / "notes.md"
+    notes.write_text("# Notes\n", encoding="utf-8")
+    kept = weighbridge("reproduce", "all", "--report", notes)
+    assert kept.code == 2
+    assert "is there already and is no list of items" in kept.err
+    html = tmp_path / "papers.html"
+    assert weighbridge("reproduce", "all", "--report", html).code == 0
+    assert "eq. 1" in html.read_text(encoding="utf-8")
+
+
+def test_settings_reach_the_reproduction_by_name(weighbridge, monkeypatch):
+    asked = []
+
+    def paper(name):
+        return lambda *given: asked.append((name, *given)) or made(good=True)
+
+    monkeypatch.setattr("weighbridge.papers.paper", paper)
+    words = ("--set", "printed.forgetting=0.998", "--set", "conditions.wind=0")
+    assert weighbridge("reproduce", "jensen2022", *words).code == 0
+    ((name, seed, _, settings),) = asked
+    assert (name, seed) == ("jensen2022", jensen2022.SEED)
+    assert settings.printed.forgetting == 0.998
+    assert settings.conditions.wind == 0.0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("all", "--set", "rls.forgetting=0.99"), "all has no settings to change"),
+        (("nguyen2024", "--set", "noise=1"), "nguyen2024 has no settings to change"),
+        (("jensen2022", "--set", "windows=1"), "there is no setting 'windows'"),
+        (("jensen2022", "--set", "rls.forgetting=2"), "forgetting must be in"),
+    ],
+)
+def test_settings_that_are_not_there_are_refused(weighbridge, words, said):
+    ran = weighbridge("reproduce", *words)
+    assert ran.code == 2
+    assert said in ran.err

@@ -1,5 +1,7 @@
 """What reaches the terminal: no control character of a file, and a quiet end."""
 
+import base64
+import gzip
 import json
 import os
 import re
@@ -114,7 +116,9 @@ def test_names_and_units_inside_files(weighbridge, drive, tmp_path, car):
     page = report.read_text(encoding="utf-8")
     own = page[: page.index("<script>")]
     assert not ACTS.search(own)
-    figures = json.loads(re.search(r'id="figures">(.*?)</script>', page, re.DOTALL)[1])
+    data = re.search(r'id="figures">(.*?)</script>', page, re.DOTALL)[1]
+    figures = json.loads(gzip.decompress(base64.b64decode(data)))
+    assert figures
     assert not ACTS.search(json.dumps(figures, ensure_ascii=False))
     assert "\\x1b[31mcar" in own
     harmless(weighbridge("inspect", drive), "\\x1b")

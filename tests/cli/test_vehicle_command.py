@@ -104,3 +104,17 @@ def test_a_calibration_keeps_the_mapping_it_read_with(weighbridge, known, tmp_pa
     ran = weighbridge("calibrate", day, *words, "-o", path)
     assert ran.code == 0, ran.err
     assert Vehicle.load(path).mapping == "../map.toml"
+
+
+def test_a_mapping_that_a_vehicle_file_names_and_is_gone(weighbridge, loaded, car, tmp_path):
+    named = tmp_path / "named.toml"
+    named.write_text(car.read_text().replace("[vehicle]", '[vehicle]\nmapping = "gone.toml"', 1))
+    for words in (("weigh", loaded.folder), ("inspect", loaded.folder)):
+        ran = weighbridge(*words, "--vehicle", named)
+        assert ran.code == 2
+        assert f"{named}: the mapping that it names" in ran.err
+        assert "give --mapping FILE" in ran.err
+        assert ran.err.count("\n") == 1
+    assert "drives are read by gone.toml" in " ".join(
+        weighbridge("vehicle", "show", named).out.split()
+    )

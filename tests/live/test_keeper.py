@@ -16,8 +16,8 @@ def car():
     return Vehicle(name="van", tare=2000.0, driveline=Driveline(gearings=(40.0, 20.0, 12.0)))
 
 
-def restored(keeper, car):
-    return keeper.restored(car, lateness=1.0, info=DriveInfo())
+def restored(keeper, car, start=10.0):
+    return keeper.restored(car, lateness=1.0, info=DriveInfo(), start=start)
 
 
 def test_nothing_there_is_a_new_scale(car, tmp_path):
@@ -47,6 +47,41 @@ def test_a_damaged_state_is_set_aside(car, tmp_path):
     assert not path.exists()
     assert (tmp_path / "car.state.bad").exists()
     assert scale.weighing().driven == 0.0
+
+
+@pytest.mark.parametrize("start", [1.79e9 - 900.0, 1.79e9 - 90.0, 30.0])
+def test_a_state_that_is_later_than_its_samples_is_set_aside(car, tmp_path, start):
+    """That of an emulated drive at five times the rate, or a computer whose clock begins anew."""
+    path = tmp_path / "car.state"
+    scale = wb.LiveScale(car)
+    for k in range(100):
+        scale.update(1.79e9 + 0.1 * k, "vehicle_speed", 10.0)
+    Keeper(path).write(scale)
+    new, said = restored(Keeper(path), car, start)
+    assert "later than those that come" in said
+    assert "e+" not in said
+    assert "set aside as car.state.bad" in said
+    assert not path.exists()
+    assert new.weighing().driven == 0.0
+    for k in range(100):
+        new.update(start + 0.1 * k, "vehicle_speed", 10.0)
+    found = new.weighing()
+    assert not found.notes
+    speed = next(s for s in found.signals if s.name == "vehicle_speed")
+    assert (speed.late, speed.unfit) == (0, 0)
+
+
+@pytest.mark.parametrize(("after", "goes_on"), [(3000.0, True), (4000.0, False), (90_000.0, False)])
+def test_a_state_of_another_hour_is_not_gone_on_from(car, tmp_path, after, goes_on):
+    scale = wb.LiveScale(car)
+    for k in range(100):
+        scale.update(1.79e9 + 0.1 * k, "vehicle_speed", 10.0)
+    path = tmp_path / "car.state"
+    Keeper(path).write(scale)
+    again, said = restored(Keeper(path), car, 1.79e9 + after)
+    assert (again.weighing().driven > 0.0) == goes_on
+    assert ("load may have changed" in said) != goes_on
+    assert path.exists()
 
 
 def test_a_state_of_another_vehicle_is_set_aside(car, tmp_path):

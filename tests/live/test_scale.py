@@ -12,8 +12,10 @@ import weighbridge as wb
 from tests.live.conftest import SHORT
 from weighbridge.errors import ConfigError
 from weighbridge.live.learning import REST, _nothing
+from weighbridge.live.records import LATENESS
 from weighbridge.live.weighing import LiveStatus
-from weighbridge.pipeline.forward import forward_weigh
+from weighbridge.pipeline.forward import forward_weigh, identify_forward, lateness
+from weighbridge.signals.recent import STEP
 from weighbridge.simulation import MIDSIZE, Loading, Scenario, short_route, simulate_car
 
 
@@ -84,6 +86,36 @@ def test_single_samples_are_blocks_of_one(short, weighing, setup, forward):
     assert scale.weighing().std == forward.std[-1]
 
 
+@pytest.mark.parametrize("step", [0.25, 1.0])
+def test_other_steps_are_those_of_the_setup(short, weighing, step):
+    setup = identify_forward(weighing, step)
+    part = short.between(short.start, short.start + 0.5 * SHORT)
+    forward = forward_weigh(part, setup)
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    told = fed(scale, part, even(part, 3.0))
+    assert told.std == forward.std[-1]
+    assert told.mass == forward.state.mass - scale._state.burnt
+
+
+def test_a_step_that_rounds_is_refused(car):
+    with pytest.raises(ConfigError, match=r"step of 0\.3 s .* 0\.25, 0\.5, 1"):
+        wb.LiveScale(car, step=0.3)
+
+
+def test_what_is_told_is_as_old_as_lateness_look_ahead_and_step(short, weighing, setup):
+    """Samples come in blocks of 0.1 s, as from a source."""
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    ages = []
+    for block in blocks(short, even(short, 0.1)):
+        scale.update_block(block)
+        ages.append(scale.newest - scale._mass()[-1])
+    ages = np.array([a for a in ages if np.isfinite(a)])[300:]
+    # A torque reading, and so a row, comes a tenth of a second after the one before.
+    row = 1.5 * setup.period
+    assert np.percentile(ages, 99.0) < LATENESS + lateness(setup) + STEP + row
+    assert np.percentile(ages, 1.0) > LATENESS
+
+
 def test_a_scale_learns_and_weighs(car, loaded, weighing):
     scale = wb.LiveScale(car, info=loaded.drive.info)
     drive = loaded.drive
@@ -125,7 +157,7 @@ def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
     [
         (lambda b: b[: len(b) // 2], "damaged"),
         (lambda b: b.replace('"d"', '"x"', 1), "damaged"),
-        (lambda b: b.replace('checkpoint": 1', 'checkpoint": 9', 1), "version 9"),
+        (lambda b: b.replace('checkpoint": 2', 'checkpoint": 9', 1), "version 9"),
         (lambda b: "\xff" + b, "damaged"),
         (lambda b: "", "damaged"),
     ],

@@ -2,8 +2,10 @@
 
 from threading import Event
 
+import numpy as np
 import pytest
 
+import weighbridge as wb
 from weighbridge.errors import ConfigError, SourceError
 from weighbridge.live.alerts import Alert
 from weighbridge.live.feed import Feed
@@ -113,7 +115,7 @@ def test_orders_of_a_person(short, weighing, setup):
     scale = LiveScale(weighing.vehicle, setup=setup, info=short.info)
     assert "nothing is weighed yet" in order(scale, "t")
     scale.update_block({n: (s.time, s.values) for n, s in short.signals.items()})
-    assert "tared at" in order(scale, "t")
+    assert "tare " in order(scale, "t")
     assert "changed" in order(scale, "l")
     assert order(scale, "x") == ""
 
@@ -133,6 +135,17 @@ def test_a_replay_at_a_rate_takes_its_time(minute):
     assert monotonic() - begun >= 0.15
     count = {n: sum(len(b[n][0]) for b in blocks if n in b) for n in part.signals}
     assert count == {n: len(s) for n, s in part.signals.items()}
+
+
+@pytest.mark.parametrize("start", [0.0, 17.3, 1.6e9 + 0.7])
+def test_a_replay_leaves_no_sample_between_two_blocks(start):
+    """Stamps of 10 Hz lie where blocks of 0.1 s meet, as far as numbers are exact."""
+    time = start + 0.1 * np.arange(400)
+    drive = wb.Drive("even", {"vehicle_speed": wb.Signal("vehicle_speed", time, time - start)})
+    blocks = []
+    Replay(drive, 1e6).run(blocks.append, Event())
+    came = np.concatenate([b["vehicle_speed"][0] for b in blocks])
+    np.testing.assert_array_equal(came, time)
 
 
 def test_a_replay_does_not_wait_for_days_of_silence(minute):

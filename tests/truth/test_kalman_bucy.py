@@ -8,11 +8,11 @@ from scipy.stats import truncnorm
 
 from weighbridge.inertia.filter import (
     InertiaFilter,
-    InertiaSettings,
     RideSamples,
     fixed_params,
     run_filter,
 )
+from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.papers.nguyen2024 import suspension_of

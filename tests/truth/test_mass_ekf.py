@@ -207,16 +207,22 @@ def test_a_change_of_load_at_a_stop_is_followed():
     assert mass[-1] == pytest.approx(0.8 * MASS, rel=0.02)
 
 
-def hybrid_params():
+def hybrid_params(blend=hybrid_mass.SPEED):
     return hybrid_mass.HybridParams(
         rls=robust_rls.RobustRlsParams(
-            0.5, 0.02, 0.8, 0.95, 20.0, 1.5, 100.0, 10, 0.03, 1.0, 0.03, 10.0
+            0.5, 0.02, 0.8, 0.95, 20.0, 1.5, True, 100.0, 10, 0.03, 1.0, 0.03, 10.0
         ),
         ekf=PARAMS,
         first_information=2.0,
+        start_mass=0.0,
         start_std=0.1,
+        blend=blend,
         blend_speed=8.0,
         blend_width=1.5,
+        share=0.4,
+        correlation=0.7,
+        forgetting=0.98,
+        caution=10.0,
     )
 
 
@@ -247,7 +253,7 @@ def test_batch_equals_sample_by_sample_to_the_last_bit():
         assert (passed and np.isfinite(seen)) == taken[k]
     assert np.array_equal(state.cov, last.cov)
 
-    params = hybrid_params()
+    params = hybrid_params(hybrid_mass.INNOVATIONS)
     begin = hybrid_mass.initial_state(robust_rls.initial_state(0.0, 1e-9), params)
     last, *tracks = hybrid_mass.run(begin, table, phi, y, params)
     mass, var, share, rls_mass, ekf_mass, *means, taken = tracks
@@ -290,8 +296,55 @@ def test_the_blend_is_of_the_two_filters_run_alone():
 
 def test_the_share_falls_smoothly_from_one_to_nothing():
     speed = np.linspace(0.0, 30.0, 301)
-    share = np.array([hybrid_mass.share_of_rls(v, 8.0, 1.5) for v in speed])
+    share = np.array([hybrid_mass.share_at(v, 8.0, 1.5) for v in speed])
     assert share[0] > 0.99
     assert share[-1] < 0.01
     assert np.all(np.diff(share) < 0.0)
     assert np.abs(np.diff(share, 2)).max() < 1e-3
+
+
+def test_shares_by_variances_are_those_of_two_correlated_measurements():
+    nothing = hybrid_mass.Rivals(0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def share(blend, first, second):
+        params = hybrid_params(blend)
+        return hybrid_mass.share_of_rls(0.3, 10.0, first, second, nothing, params)
+
+    # Generalised least squares of one number, measured twice with errors of correlation 0.7.
+    for first, second in ((8.0, 9.0), (9.0, 5.0)):
+        common = 0.7 * np.sqrt(first * second)
+        inverse = np.linalg.inv([[first, common], [common, second]])
+        best = inverse.sum(axis=0)[0] / inverse.sum()
+        assert 0.0 < best < 1.0
+        assert share(hybrid_mass.COVARIANCE, first, second) == pytest.approx(best)
+    # Where the better one is better than the correlation, it has all.
+    assert share(hybrid_mass.COVARIANCE, 100.0, 4.0) == 0.0
+    assert share(hybrid_mass.VARIANCE, 1.0, 3.0) == pytest.approx(0.75)
+    assert share(hybrid_mass.INTERSECTION, 1.0, 3.0) == 1.0
+    assert share(hybrid_mass.INTERSECTION, 3.0, 1.0) == 0.0
+    assert share(hybrid_mass.SHARE, 3.0, 1.0) == 0.4
+
+
+def test_the_share_by_innovations_is_that_which_would_have_foretold_best():
+    rng = np.random.default_rng(5)
+    phi, mass, heavy, light = rng.uniform(0.1, 1.0, 400), 10_000.0, 10_600.0, 9900.0
+    y = phi * mass + rng.normal(0.0, 300.0, 400)
+    # Offset of the Kalman filter's grade: 0.001 rad of a heavier mass.
+    kalman = y - (phi - 9.81 * 0.001) * heavy
+    least = y - phi * light
+    for caution in (0.0, 10.0):
+        params = hybrid_params(hybrid_mass.INNOVATIONS)._replace(forgetting=1.0, caution=caution)
+        rivals = hybrid_mass.Rivals(heavy, 0.001, 0.0, 0.0, 0.0)
+        for k in range(400):
+            rivals = hybrid_mass.compare(rivals, phi[k], y[k], least[k], params)
+        share = hybrid_mass.share_of_rls(0.0, 10.0, 1.0, 1.0, rivals, params)
+        apart = kalman - least
+        best = np.linalg.lstsq(apart[:, None], kalman, rcond=None)[0][0]
+        if caution == 0.0:
+            assert share == pytest.approx(best, rel=1e-9)
+        else:
+            shrunk = kalman @ apart / (apart @ apart + caution * rivals.noise_var)
+            assert share == pytest.approx(shrunk, rel=1e-9)
+            assert share < best
+    assert 0.7 < best < 1.0
+    assert np.sqrt(rivals.noise_var) == pytest.approx(np.sqrt(np.mean(kalman**2)), rel=0.3)

@@ -15,6 +15,7 @@ def params(**changed):
         "forgetting": 0.98,
         "kept_information": 0.0,
         "threshold": np.inf,
+        "weight_information": True,
         "scale_windows": 100.0,
         "settle_windows": 10,
         "offset_std": 0.0,

@@ -23,6 +23,7 @@ from weighbridge.report.calibration_panels import calibration_facts
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.model import Driveline, TorqueModel
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 pytestmark = pytest.mark.skipif(
     bool(config.DISABLE_JIT), reason="a whole drive takes minutes without the compiler"
@@ -162,6 +163,13 @@ def test_measured_gear_signal(empty):
     assert weigh(drive, car).mass == pytest.approx(truth.mass.mean(), rel=0.02)
 
 
+def test_gear_ratios_of_another_vehicle_are_refused(empty, car):
+    of_another = tuple(1.25 * g for g in (*car.driveline.gearings[:3], 17.5))
+    base = Vehicle(driveline=Driveline(gearings=of_another))
+    with pytest.raises(DriveError, match=r"lie at a gearing of the vehicle file: its gear ratios"):
+        calibrate(empty.drive, vehicle=base)
+
+
 def test_gears_that_are_named_and_not_found_are_told(empty):
     time = np.arange(100.0)
     gears = np.where(time < 2, 9, 1 + np.arange(100) % 8)
@@ -184,6 +192,10 @@ def test_percent_of_a_reference_torque(empty):
     car = calibrate(drive, vehicle=known, settings=settings)
     direct = calibrate(with_torque(empty))
     assert car.torque.coefficients == pytest.approx(direct.torque.coefficients, rel=1e-3, abs=0.05)
+    assert car.torque.told_reference_torque is None
+    told = Signal("reference_torque", np.arange(0.0, 60.0, 5.0), np.full(12, 250.0))
+    car = calibrate(drive.with_signals(told), settings=settings)
+    assert car.torque.told_reference_torque == 250.0
 
 
 def test_known_speed_scale_stays_where_the_drive_shows_none(empty):
@@ -349,7 +361,7 @@ def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monke
 
     monkeypatch.setattr(self_weighing.joint, "estimate", estimate)
     burnt = SimpleNamespace(table=SimpleNamespace(fuel_burnt=np.zeros(2)))
-    problem = SimpleNamespace(masses=[8400.0])
+    problem = SimpleNamespace(masses=[8400.0], source=TORQUE_SOURCES["measured"])
     monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [burnt])
     scaled = self_weighing.self_weighed(problem, base, None, self_weighing.BY_JOINT)
     assert estimate(None, scaled, False).mass == pytest.approx(8400.0, rel=1e-3)
@@ -362,6 +374,25 @@ def test_a_mass_that_jumps_with_the_scale_does_not_mislead_the_calibration(monke
     lost = self_weighing.self_weighed(problem, base, None, self_weighing.BY_JOINT)
     # What the scale cannot mend is in the interval.
     assert lost.provenance.mass_scale_std > 0.15
+
+
+@pytest.mark.parametrize(("count", "left"), [(1, 0.0170), (4, 0.0134)])
+def test_a_battery_leaves_open_what_differs_from_drive_to_drive(monkeypatch, count, left):
+    base = Vehicle(torque=TorqueModel(source="battery", coefficients=(0.0, 1.0)))
+    known = SimpleNamespace(mass=1500.0, bound_std=1e-9, sensitivity=np.zeros(1))
+    monkeypatch.setattr(self_weighing.joint, "estimate", lambda *_, **__: known)
+    burnt = SimpleNamespace(table=SimpleNamespace(fuel_burnt=np.zeros(2)))
+    monkeypatch.setattr(self_weighing, "rebalanced", lambda problem, car: [burnt] * count)
+
+    def made(source):
+        problem = SimpleNamespace(masses=[1500.0] * count, source=TORQUE_SOURCES[source])
+        done = self_weighing.self_weighed(problem, base, None, self_weighing.BY_JOINT)
+        return done.provenance.mass_scale_std
+
+    # The drive that is weighed differs, and so does each of the calibration.
+    between = 0.012 * np.sqrt(1.0 + 1.0 / count)
+    assert made("battery") == pytest.approx(np.hypot(made("measured"), between))
+    assert made("battery") == pytest.approx(left, abs=5e-4)
 
 
 def test_a_saved_file_weighs_as_the_fit_does(car, loaded, tmp_path):

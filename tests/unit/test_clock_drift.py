@@ -148,8 +148,96 @@ def test_a_part_that_fits_at_no_lag_is_left_out(made, car, mass):
     """Minutes of the inertial sensor are lost, and its clock counts rows."""
     cut = without_inertial(made.drive, [(500.0, 600.0)])
     told = wb.weigh(retimed(cut, {"imu"}, lambda t: np.where(t > 550.0, t - 99.9, t)), car)
-    assert any("at any lag of its clock; the rows of obd were left out" in w for w in told.warnings)
+    assert any("at any lag of its clock; the samples of imu were" in w for w in told.warnings)
     assert told.mass == pytest.approx(mass, rel=0.02)
+
+
+def inertial_as(drive, change, start=500.0, end=800.0):
+    """Put what ``change`` makes of the samples before a time in the place of those in it."""
+    return drive.with_signals(
+        *(
+            replace(s, values=np.where((s.time > start) & (s.time < end), change(s), s.values))
+            for s in drive.signals.values()
+            if QUANTITIES[s.name].table == "imu"
+        )
+    )
+
+
+def test_an_inertial_sensor_that_froze_is_left_out_and_not_the_bus(made, car, mass):
+    frozen = inertial_as(made.drive, lambda s: s.at(np.full(len(s), 500.0)))
+    told = wb.weigh(frozen, car)
+    assert told.mass == pytest.approx(mass, rel=0.02)
+    (note,) = [w for w in told.warnings if "repeats its values" in w]
+    assert note.startswith("the inertial sensor repeats its values for 300.0 s from 500")
+    assert not any("obd" in w or "leans" in w for w in told.warnings)
+
+
+@pytest.mark.parametrize("gnss", [True, False])
+def test_an_inertial_sensor_that_goes_on_as_at_rest_is_left_out(made, car, mass, gnss):
+    rng = np.random.default_rng(92)
+
+    def resting(s):
+        noise = 0.03 if s.name.startswith("accel") else 0.002
+        return np.mean(s.values) + noise * rng.normal(size=len(s))
+
+    drive = made.drive
+    if not gnss:
+        drive = drive.without(*(n for n in drive.signals if QUANTITIES[n].table == "gnss"))
+    told = wb.weigh(inertial_as(drive, resting, 450.0, 950.0), car)
+    assert told.mass == pytest.approx(mass, rel=0.025)
+    said = "samples of imu were left out" if gnss else "either may be wrong, and both were"
+    assert sum(said in w for w in told.warnings) == 1
+    assert not any("pauses" in w for w in told.warnings)
+
+
+def test_wheels_that_turn_while_the_vehicle_stands_leave_the_inertial_sensor(made):
+    """A roller bench: GNSS and the inertial sensor stand, the bus drives."""
+    there = (500.0, 860.0)
+    rest = made.drive.between(0.0, 10.0)
+    still = {n: np.median(s.values) for n, s in rest.signals.items()}
+    bench = made.drive.with_signals(
+        *(
+            replace(
+                s, values=np.where((s.time > there[0]) & (s.time < there[1]), still[n], s.values)
+            )
+            for n, s in made.drive.signals.items()
+            if QUANTITIES[n].table in {"imu", "gnss"} and n in still
+        )
+    )
+    noise = np.random.default_rng(93).normal(0.0, 0.02, len(bench.signals["accel_x"]))
+    shaken = [bench.signals[f"accel_{a}"] for a in "xyz"]
+    bench = bench.with_signals(*(replace(s, values=s.values + noise) for s in shaken))
+    settled = mend_clocks(bench)
+    assert any("the rows of obd were left out" in p.text for p in settled.problems)
+    assert len(settled.signals["accel_x"]) == len(made.drive.signals["accel_x"])
+
+
+def in_turns(drive, on, period):
+    """Keep the rows of the bus of the first ``on`` of each ``period`` seconds."""
+    return drive.with_signals(
+        *(
+            replace(s, time=s.time[keep], values=s.values[keep])
+            for s in drive.signals.values()
+            if QUANTITIES[s.name].table == "obd"
+            for keep in [s.time % period < on]
+        )
+    )
+
+
+@pytest.mark.parametrize(("on", "period"), [(10.0, 20.0), (30.0, 60.0)])
+def test_a_bus_that_is_recorded_in_turns_has_a_sound_clock(made, car, mass, on, period):
+    told = wb.weigh(in_turns(made.drive, on, period), car)
+    assert told.mass == pytest.approx(mass, rel=0.025)
+    assert not any("clock of obd" in w for w in told.warnings)
+
+
+def test_a_step_of_a_clock_that_is_recorded_in_turns_is_found(made):
+    late = retimed(in_turns(made.drive, 10.0, 20.0), {"obd"}, lambda t: t + 2.0 * (t > 700.0))
+    settled = mend_drive(late)
+    assert any("the clock of obd jumps by +" in p.text for p in settled.problems)
+    found = lags(settled)
+    assert found.lag.size > 0.8 * found.pieces > 0
+    assert np.ptp(found.lag) < 0.4
 
 
 def test_a_gap_of_the_inertial_sensor_leaks_no_zeros(made):

@@ -331,6 +331,15 @@ def test_a_clock_goes_before_a_counter(tmp_path):
     assert found.row_rate is None
 
 
+def test_a_date_goes_before_milliseconds_since_the_start(tmp_path):
+    rows = [
+        f"{1000 * t:.0f},2026-05-04 10:{int(t // 60):02d}:{t % 60:06.3f},{v:.0f}"
+        for t, v in zip(T, SPEED, strict=True)
+    ]
+    path = written(tmp_path / "log.csv", ["time_ms,date,Vehicle speed (km/h)", *rows])
+    assert draft(path).time == "date"
+
+
 def test_a_counter_that_falls_or_leaps_counts_no_rows(tmp_path):
     for numbers in (np.arange(ROWS) % 256, 3 * np.arange(ROWS)):
         rows = [f"{k},{v:.1f}" for k, v in zip(numbers, SPEED, strict=True)]

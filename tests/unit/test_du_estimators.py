@@ -12,6 +12,7 @@ from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ESTIMATORS, Status, ekf, hybrid, robust_rls
 from weighbridge.kernels import mass_ekf as kernel
+from weighbridge.kernels import robust_rls as rls_kernel
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 
 METHODS = ("robust-rls", "ekf", "hybrid")
@@ -185,14 +186,122 @@ def test_counting_the_grade_twice_makes_a_climbing_bus_light():
 
 def test_the_ekf_alone_is_the_one_of_the_blend():
     made = balance()
-    fast = hybrid.HybridSettings(blend_speed=-1e3)
+    fast = hybrid.HybridSettings(blend="speed", blend_speed=-1e3)
     alone, blended = ekf.estimate(made, BUS), hybrid.estimate(made, BUS, fast)
     assert np.array_equal(alone.running_mass, blended.running_mass, equal_nan=True)
-    slow = hybrid.HybridSettings(blend_speed=1e3)
+    slow = hybrid.HybridSettings(blend="speed", blend_speed=1e3)
     least, blended = robust_rls.estimate(made, BUS), hybrid.estimate(made, BUS, slow)
     told = np.isfinite(least.running_mass)
     assert np.array_equal(told, np.isfinite(blended.running_mass))
     assert np.array_equal(least.running_mass[told], blended.running_mass[told])
+
+
+def test_every_row_by_itself_with_a_factor_is_the_textbooks_recursion():
+    made = balance(minutes=2.0)
+    settings = robust_rls.RobustRlsSettings(
+        window=0.0, forgetting=0.999, kept_information=0.0, offset_std=0.0, threshold=1e9
+    )
+    found = robust_rls.estimate(made, BUS, settings).running_mass
+    phi, y, valid = robust_rls.rows(made.table, BUS, settings)
+    # Du et al. 2025, eq. 15, in the order of print; P starts without knowledge.
+    mass, cov = 0.0, 1e9
+    for k in np.flatnonzero(valid):
+        gain = cov * phi[k] / (0.999 + phi[k] ** 2 * cov)
+        mass += gain * (y[k] - phi[k] * mass)
+        cov *= (1.0 - gain * phi[k]) / 0.999
+    assert found[-1] == pytest.approx(mass, rel=1e-6)
+    # A cruise forgets what told the mass; the mass stays told.
+    assert np.isfinite(found[np.flatnonzero(np.isfinite(found))[0] :]).all()
+
+
+def test_hubers_weight_stays_out_of_the_covariance_as_in_eq_20():
+    start = rls_kernel.RobustRlsState(
+        10_000.0, 0.0, 50.0, 0.0, 0.0, 300.0**2, 100, 0, 0.0, 0.0, 0.0, 0.0
+    )
+    found = []
+    for counts in (True, False):
+        settings = robust_rls.RobustRlsFilter(
+            weight_information=counts, offset_std=0.0, forgetting=0.99
+        )
+        params = robust_rls.parameters(settings, 0.1)
+        found.append(rls_kernel.fold(start, 0.8, 14_000.0, params))
+    (counted, weight), (printed, same) = found
+    assert weight == same
+    assert 0.05 < weight < 0.2
+    assert counted.information == pytest.approx(0.99 * 50.0 + weight * 0.64)
+    assert printed.information == pytest.approx(0.99 * 50.0 + 0.64)
+    # Eq. 20: gain of the plain filter, times the weight.
+    gain = 0.8 / 50.0 / (0.99 + 0.64 / 50.0)
+    assert printed.mass == pytest.approx(10_000.0 + gain * weight * 6000.0)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_rolling_coefficient_too_low_makes_a_bus_heavy(method):
+    within = {"robust-rls": "", "ekf": "start.", "hybrid": "ekf.start."}[method]
+    made = balance(grade=0.0)
+    estimator = ESTIMATORS[method]
+    alone = {f"{within}offset_std": 0.0}
+    if method != "robust-rls":
+        before = within.removesuffix("start.")
+        alone |= {f"{before}grade_offset": 0.0, f"{before}offset_walk": 0.0}
+    low = estimator.settings_of(alone | {f"{within}rolling_coefficient": 0.0005})
+    right = estimator.settings_of(alone)
+    assert estimator.track(made, BUS, right).mass == pytest.approx(10_000.0, rel=0.01)
+    assert estimator.track(made, BUS, low).mass > 10_300.0
+
+
+def test_what_a_sensor_ahead_reads_in_bends_is_taken_off():
+    made = balance(minutes=10.0)
+    table = made.table
+    # Bends of 0.3 rad/s wherever the bus pulls hard, and a sensor 4 m ahead of the rear axle.
+    rate = np.where(table.accel > 0.4, 0.3, 0.0)
+    heading = np.mod(np.cumsum(rate) / 20.0, 2.0 * np.pi)
+    read = table.specific_force - 4.0 * rate**2
+    bent = replace(made, table=replace(table, heading=heading, specific_force=read))
+    straight = robust_rls.estimate(bent, BUS, robust_rls.RobustRlsSettings())
+    ahead = robust_rls.estimate(bent, BUS, robust_rls.RobustRlsSettings(sensor_ahead=4.0))
+    assert straight.mass > 12_000.0
+    assert ahead.mass == pytest.approx(10_000.0, rel=0.02)
+
+
+def test_a_start_mass_is_held_by_what_it_is_worth():
+    made = balance(minutes=2.0)
+    first = {}
+    for worth in (0.0, 1.0, 100.0):
+        settings = robust_rls.RobustRlsSettings(
+            start_mass=8000.0, start_information=worth, first_information=0.1
+        )
+        track = robust_rls.estimate(made, BUS, settings)
+        first[worth] = track.running_mass[track.time > 20.0][0]
+    assert 8000.0 < first[100.0] < first[1.0] < first[0.0] * 1.001
+    assert first[100.0] < 9500.0
+    assert first[0.0] == pytest.approx(10_000.0, rel=0.03)
+
+
+@pytest.mark.parametrize("method", ["ekf", "hybrid"])
+def test_the_kalman_filter_starts_from_a_given_mass_at_once(method):
+    name = {"ekf": "start_mass", "hybrid": "ekf.start_mass"}[method]
+    estimator = ESTIMATORS[method]
+    track = estimator.track(balance(), BUS, estimator.settings_of({name: 12_000}))
+    assert track.running_mass[0] == 12_000.0
+    assert track.running_mass[-1] == pytest.approx(10_000.0, rel=0.03)
+
+
+@pytest.mark.parametrize("blend", list(hybrid.Blend))
+def test_every_blend_lies_between_both_filters(blend):
+    made = balance()
+    blended = hybrid.estimate(made, BUS, hybrid.HybridSettings(blend=blend)).running_mass
+    least = robust_rls.estimate(made, BUS).running_mass
+    kalman = ekf.estimate(made, BUS).running_mass
+    told = np.isfinite(blended)
+    assert told.sum() > 1000
+    low, high = np.minimum(least, kalman)[told], np.maximum(least, kalman)[told]
+    assert np.all(blended[told] >= low - 1e-6)
+    assert np.all(blended[told] <= high + 1e-6)
+    if blend is hybrid.Blend.SHARE:
+        assert blended[told] == pytest.approx(0.5 * (low + high))
+    # A command gives the name as a word.
+    assert ESTIMATORS["hybrid"].settings_of({"blend": blend.value}).blend is blend
 
 
 @pytest.mark.parametrize(
@@ -203,6 +312,11 @@ def test_the_ekf_alone_is_the_one_of_the_blend():
         (ekf.EkfSettings, {"speed_noise": np.nan}, "speed_noise must be a positive number"),
         (ekf.EkfSettings, {"mass_walk": -1.0}, "mass_walk must be zero or positive"),
         (hybrid.HybridSettings, {"blend_width": 0.0}, "blend_width must be positive, got 0"),
+        (hybrid.HybridSettings, {"blend": "wind"}, "blend must be one of speed, .*, got wind"),
+        (hybrid.HybridSettings, {"blend_share": 2.0}, "blend_share must be between -1 and 1"),
+        (robust_rls.RobustRlsSettings, {"forgetting": 0.5}, r"forgetting must be in \(0.9, 1\]"),
+        (robust_rls.RobustRlsSettings, {"rolling_coefficient": -0.1}, "must be zero or positive"),
+        (ekf.EkfSettings, {"start_mass": 0.0}, "start_mass must be a positive number, got 0"),
     ],
 )
 def test_impossible_settings_are_refused(settings, bad, said):

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 import weighbridge as wb
 from weighbridge.balance.bandwidth import smoothed_torque
+from weighbridge.balance.delay import estimate_torque_delay
 from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.gear_fit import share_on_gears
 from weighbridge.balance.torque_drift import steadied
@@ -19,10 +20,12 @@ from weighbridge.checks.mending import mended
 from weighbridge.errors import DriveError
 from weighbridge.estimators import Status, joint
 from weighbridge.estimators.joint import changing
+from weighbridge.estimators.joint.bend import BENT
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.judging import Evidence, judge
-from weighbridge.navigation.select import find_motion
-from weighbridge.pipeline.weighing import below_tare, weigh_balance
+from weighbridge.navigation.select import find_motion, without_accelerometer
+from weighbridge.pipeline.notes import below_tare
+from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.signals import QUANTITIES, Drive, Signal
 from weighbridge.simulation import simulate_car
 from weighbridge.simulation.named import make_scenario
@@ -468,10 +471,23 @@ def test_torque_that_keeps_its_lag_is_left_alone(fleet, kind):
     drive = fleet.drive(kind)
     motion = find_motion(drive, fleet.files[kind])
 
-    kept, notes = steadied(drive, fleet.files[kind], motion, 0.0)
+    kept, notes, _ = steadied(drive, fleet.files[kind], motion, 0.0)
 
     assert kept is drive
     assert notes == ()
+
+
+def test_a_balance_worked_out_before_finds_the_same_delay(fleet):
+    drive, car = fleet.drive("truck"), fleet.files["truck"]
+    motion = find_motion(drive, car)
+    _, _, begun = steadied(drive, car, motion, 0.0)
+    elsewhere = force_balance(drive, car, motion, delay=0.3)
+
+    delay = estimate_torque_delay(drive, car, motion)
+
+    assert begun.delay == 0.0
+    assert estimate_torque_delay(drive, car, motion, begun) == delay
+    assert estimate_torque_delay(drive, car, motion, elsewhere) == delay
 
 
 def test_torque_whose_lag_wanders_is_refused(fleet):
@@ -588,3 +604,68 @@ def test_a_table_that_is_a_second_late_as_a_whole_is_moved(fleet, kind):
     torque = drive.signals[SOURCE[kind]]
     with pytest.raises(DriveError, match="its torque lies"):
         fleet.weigh_alone(kind, drive.with_signals(replace(torque, time=torque.time + 1.0)))
+
+
+def bent_above(part, less):
+    def change(_, x):
+        knee = part * np.percentile(x, 99.0)
+        return np.where(x > knee, knee + (1.0 - less) * (x - knee), x)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("electric", bent_above(0.33, 0.5)),
+        ("truck", bent_above(0.5, 0.23)),
+        ("car", bent_above(0.5, 0.3)),
+    ],
+)
+def test_a_torque_that_reads_otherwise_at_its_top_makes_no_mass(fleet, kind, change):
+    """Another motor, another map of the engine: by no witness."""
+    found = fleet.weigh_alone(kind, with_signal(fleet.drive(kind), SOURCE[kind], change))
+    assert found.status is Status.INCONSISTENT
+    assert "otherwise than in the calibration" in found.reason
+
+
+@pytest.mark.parametrize("kind", SOURCE)
+def test_a_torque_that_reads_too_low_throughout_bends_no_more_than_an_undamaged_one(fleet, kind):
+    """The scale of the reading is the mass's, and no bend of it."""
+    low = with_signal(fleet.drive(kind), SOURCE[kind], lambda _, x: 0.93 * x)
+    bends = [
+        joint.estimate(fleet.weigh_alone(kind, d).result.balance, fleet.files[kind]).bend
+        for d in (fleet.drive(kind), low)
+    ]
+    assert all(abs(b.part) < BENT / 1.5 for b in bends)
+    assert bends[0].part == pytest.approx(bends[1].part, abs=0.03)
+
+
+def test_a_bend_that_a_person_vouches_for_is_weighed(fleet):
+    drive = with_signal(fleet.drive("truck"), SOURCE["truck"], bent_above(0.5, 0.23))
+    trusted = replace(drive, info=replace(drive.info, trusted=(SOURCE["truck"],)))
+    assert fleet.weigh_alone("truck", trusted).status is Status.CONVERGED
+
+
+def test_without_an_accelerometer_no_bend_is_looked_for(fleet):
+    drive = without_accelerometer(fleet.drive("car"))
+    found = fleet.weigh_alone("car", drive)
+    assert found.result.bend is None
+    assert "otherwise than in the calibration" not in found.reason
+
+
+def held(t, x):
+    """For 10 s of every 35 s the reading repeats a value."""
+    for begin in range(60, 1150, 35):
+        within = (t >= begin) & (t < begin + 10)
+        x[within] = x[np.argmax(within)]
+    return x
+
+
+@pytest.mark.parametrize("kind", ["car", "truck"])
+def test_a_torque_that_is_held_now_and_then_is_left_out_there(fleet, kind):
+    found = fleet.weigh_alone(kind, with_signal(fleet.drive(kind), SOURCE[kind], held))
+    assert any("repeats one value while the vehicle goes on" in w for w in found.warnings)
+    assert found.status is not Status.CONVERGED or abs(found.mass - fleet.mass(kind)) < (
+        2.0 * found.std
+    )

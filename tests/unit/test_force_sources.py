@@ -7,7 +7,7 @@ import pytest
 
 import weighbridge as wb
 from weighbridge.errors import DriveError
-from weighbridge.papers.jensen2022 import without_weather
+from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import make_scenario, random_vehicle, simulate_car, usual_polling
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.model import Driveline, TorqueModel

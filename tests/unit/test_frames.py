@@ -54,6 +54,9 @@ def test_clock_set_forward_keeps_the_longest_part():
     frames, problems = settle_clock(make(time), "x.log")
     assert frames.time[0] == 1.6e9
     assert "5 of 35 frames" in problems[0].text
+    # A clock that counts from 1970 is told as a time of day.
+    assert "first from 4 s to" in problems[0].text
+    assert "e+09" not in problems[0].text
 
 
 def test_frames_a_little_out_of_order_are_sorted_without_a_word():

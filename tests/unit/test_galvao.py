@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from weighbridge.papers import PAPERS, galvao
+from weighbridge.papers.galvao_figures import item_figures
+from weighbridge.papers.galvao_statistics import rank_correlation, slope
+from weighbridge.papers.galvao_torque import TorqueTrial, torque_figures, torque_table, torque_trial
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +31,13 @@ def done(three):
         starts=((800.0, 800.4, 810.0), (2000.0, 1999.0, 1900.0)),
         stated=((900.0, 900.1, 0.5),),
         trials=(trial, trial),
+        torque=TorqueTrial(
+            masses=np.array([1092.0, 1092.0, 1092.0, 1292.0, 1492.0]),
+            by_grade=np.array([1092.0, 1081.08, 1102.92, 1292.0, np.nan]),
+            by_grade_std=np.full(5, 30.0),
+            blind=np.array([1092.0, 982.8, 982.8, 1292.0, 1492.0]),
+            blind_std=np.full(5, 40.0),
+        ),
     )
 
 
@@ -63,8 +73,8 @@ def test_what_falls_behind_is_told(done):
 
 
 def test_tables_have_a_text_for_every_column(done):
-    for made in (galvao.tests_table, galvao.starts_table, galvao.trials_table):
-        table = made(done)
+    tables = [made(done) for made in (galvao.tests_table, galvao.starts_table, galvao.trials_table)]
+    for table in (*tables, torque_table(done.torque)):
         assert all(len(row) == len(table.columns) for row in table.rows)
 
 
@@ -76,10 +86,10 @@ def test_report_has_the_papers_nine_figures(done):
 
 def test_slope_is_that_of_the_straight_line():
     masses = np.array([1000.0, 1100.0, 1300.0, 1400.0])
-    found, std = galvao.slope(masses, 300.0 + 0.5 * masses)
+    found, std = slope(masses, 300.0 + 0.5 * masses)
     assert found == pytest.approx(0.5)
     assert std == pytest.approx(0.0, abs=1e-9)
-    assert galvao.rank_correlation(masses, np.array([1.0, 2.0, 3.0, 1e9])) == pytest.approx(1.0)
+    assert rank_correlation(masses, np.array([1.0, 2.0, 3.0, 1e9])) == pytest.approx(1.0)
 
 
 def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
@@ -88,3 +98,24 @@ def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
     galvao.reproduced(1234, None).write_report(page)
     text = page.read_text(encoding="utf-8")
     assert text.index("largest error from 1500 kg") < text.index("Test 01")
+
+
+def test_recorded_torque_weighs_the_load_where_speed_alone_does_not():
+    done = torque_trial(1234, galvao.easy_route(1234))
+    assert np.max(np.abs(done.errors(done.by_grade))) < 0.05
+    gain = np.polyfit(done.masses, done.by_grade, 1)[0]
+    assert gain == pytest.approx(1.0, abs=0.15)
+
+
+def test_errors_of_recorded_torque_are_told(done):
+    said = torque_figures(done.torque)
+    assert said["torque errors"].startswith("errors 0.0 / 1.0 / 1.0 %")
+    assert said["blind torque errors"].startswith("errors 0.0 / 10.0 / 10.0 %")
+    last = torque_table(done.torque).rows[-1]
+    assert last[2] == "no mass"
+
+
+def test_the_error_that_stays_is_that_of_the_run(done):
+    said = item_figures(done)["printed late errors"]
+    ends = [100.0 * abs(t.printed.mass[t.printed.used][-1] / t.mass - 1.0) for t in done.tests]
+    assert said.endswith(f"at the end {' / '.join(f'{x:.0f}' for x in ends)} %")

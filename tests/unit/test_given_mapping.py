@@ -81,6 +81,17 @@ def test_a_flat_mapping_is_for_all_frames_without_a_word(short_drive):
     assert not [p for p in drive.problems if "is not there" in p.text]
 
 
+def test_a_mapping_of_files_is_for_frames_by_their_columns(short_drive):
+    frames, flat = own_frames(short_drive.drive)
+    tables = {}
+    for table, frame in frames.items():
+        there = {n: s for n, s in flat["signals"].items() if s["column"] in frame.columns}
+        tables[f"of_{table}"] = {"files": f"2026-*_{table}.csv", "signals": there}
+    drive = wb.read_frame(frames, {"tables": tables})
+    assert set(drive.signals) == set(flat["signals"])
+    assert not [p for p in drive.problems if "is not there" in p.text]
+
+
 def test_what_no_frame_has_is_told_once(short_drive):
     frames, mapping = own_frames(short_drive.drive)
     mapping["signals"]["gear"] = {"column": "TCU_GearAct"}

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numba import config
+from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from weighbridge.checks import check_drive
@@ -189,6 +190,19 @@ def test_a_small_scale_that_gravity_denies_is_left_to_the_squat(any_vehicle):
     assert 0.01 < motion.specific_force_scale_std < 0.03
 
 
+def test_without_gnss_other_tyres_may_be_what_looks_like_a_scale(any_vehicle):
+    drive, right = any_vehicle
+    alone = drive.without(
+        *(n for n in drive.signals if n.startswith(("gnss", "lat", "lon", "alt")))
+    )
+    speed = drive.signals["vehicle_speed"]
+    faster = Signal(speed.name, speed.time, 1.05 * speed.values)
+    motion = inertial_motion(alone.with_signals(faster), known(right))
+    assert any("the tyres" in note for note in motion.notes)
+    assert 0.025 < motion.specific_force_scale_std < 0.045
+    assert not any("the tyres" in note for note in inertial_motion(alone, known(right)).notes)
+
+
 def test_frozen_stretches_are_left_out(car):
     drive, plain = car
     for name in ("accel_x", "gyro_y"):
@@ -298,3 +312,31 @@ def test_axes_swapped_on_the_way_are_told(car):
     assert not any(p.serious for p in check_drive(drive))
     (problem,) = [p for p in check_drive(replaced(drive, ACCEL, force)) if p.serious]
     assert "cut this part off" in problem.text
+
+
+@pytest.mark.parametrize("degrees", [3.0, -3.0])
+def test_a_holder_that_nods_is_no_unit_of_the_speed(any_vehicle, degrees):
+    drive, _ = any_vehicle
+    time = drive.signals["accel_x"].time
+    speed = drive.signals["vehicle_speed"]
+    coarse = np.arange(0.0, time[-1], 0.1)
+    smooth = gaussian_filter1d(np.interp(coarse, speed.time, speed.values), 5.0)
+    angle = np.radians(degrees) * np.interp(time, coarse, np.gradient(smooth, 0.1))
+    force, rate = columns(drive, ACCEL), columns(drive, GYRO)
+    for old in (force, rate):
+        x, z = old[:, 0].copy(), old[:, 2].copy()
+        old[:, 0] = np.cos(angle) * x + np.sin(angle) * z
+        old[:, 2] = np.cos(angle) * z - np.sin(angle) * x
+    rate[:, 1] -= np.gradient(angle, time)
+    nodding = replaced(replaced(drive, ACCEL, force), GYRO, rate)
+    with pytest.raises(DriveError, match=r"turns by [23]\.\d deg per m/s\^2 .* holder gives way"):
+        inertial_motion(nodding)
+
+
+@pytest.mark.parametrize("scale", [0.621, 1.609])
+def test_a_speed_in_another_unit_is_no_holder_that_nods(any_vehicle, scale):
+    drive, _ = any_vehicle
+    speed = drive.signals["vehicle_speed"]
+    other = drive.with_signals(Signal(speed.name, speed.time, scale * speed.values))
+    with pytest.raises(DriveError, match="set its unit"):
+        inertial_motion(other.without("gnss_speed", "latitude", "longitude", "altitude"))

@@ -7,11 +7,14 @@ import numpy as np
 import polars as pl
 import pytest
 from numpy.testing import assert_allclose
+from tests.unit.test_report import unpacked
 
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.inertia.filter import integration_std
+from weighbridge.inertia.filter import InertiaFilter, RideSamples, run_filter
+from weighbridge.inertia.integration import integration_std
 from weighbridge.inertia.load_changes import jumps
 from weighbridge.inertia.ride_checks import ride_samples
+from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.inertia.suspension import check_suspension
 from weighbridge.io import read_drive
 from weighbridge.papers.nguyen2024 import suspension_of
@@ -72,6 +75,42 @@ def test_axle_loads_balance_about_the_centre_of_gravity(found):
     assert_allclose(front + rear, found.mass)
     assert_allclose((front - 266.0) * 2.4, (rear - 427.0) * 1.685)
     assert_allclose(found.payload, found.mass - 6087.0)
+
+
+def test_intervals_of_axle_loads_and_payload_are_those_of_the_mass(found):
+    lightest, heaviest = found.mass_interval()
+    front, rear = found.axle_load_intervals()
+    assert_allclose((front[0] + rear[0], front[1] + rear[1]), (lightest, heaviest))
+    assert front[0] < found.axle_loads[0] < front[1]
+    assert rear[0] < found.axle_loads[1] < rear[1]
+    assert_allclose(found.payload_interval(), (lightest - 6087.0, heaviest - 6087.0))
+
+
+def test_settings_by_name_are_those_of_the_filter(made):
+    given = {"process_densities": [1.0] * 6, "noise_densities": [5e-5, 5e-4, 5e-4]}
+    told = estimate_inertia(made.drive, CAR, "extended", settings=given)
+    usual = estimate_inertia(made.drive, CAR, "extended")
+    assert any("was run with process_densities" in text for text in told.warnings)
+    # A density of 1 kg²/s lets the mass move by a kilogram in a second.
+    off = [abs(w.track.parameters[-1, 0] / made.inertias[-1, 0] - 1.0) for w in (told, usual)]
+    assert off[0] > 0.03 > 1.5 * off[1]
+    with pytest.raises(ConfigError, match="noise_densities must be 3 positive numbers"):
+        estimate_inertia(made.drive, CAR, settings={"noise_densities": [1.0]})
+    with pytest.raises(ConfigError, match="there is no setting 'jumprate'"):
+        estimate_inertia(made.drive, CAR, settings={"jumprate": 1.0})
+
+
+def test_a_filter_fed_sample_by_sample_ends_where_the_ride_does(made):
+    samples = ride_samples(made.drive)
+    live = InertiaFilter(RIDE, samples.period)
+    for row in zip(samples.time, samples.travel, samples.rate, samples.velocity, strict=True):
+        live.update(*row)
+    whole = run_filter(samples, RIDE, InertiaSettings())
+    assert np.array_equal(live.parameters, whole.parameters[-1])
+    low, high = live.interval()
+    assert np.all((low < live.parameters) & (live.parameters < high))
+    with pytest.raises(ConfigError, match="period must be a positive number"):
+        InertiaFilter(RIDE, 0.0)
 
 
 def test_json_and_track_say_the_same(found, tmp_path):
@@ -377,19 +416,36 @@ def test_what_is_refused_has_no_interval_to_widen():
 
 def test_slow_sampling_integrates_a_hop_to_less_and_the_interval_knows_it(found):
     for hz in (100.0, 200.0):
-        time = np.arange(0.0, 2.0, 1.0 / hz)
+        time = np.arange(0.0, 20.0, 1.0 / hz)
         force = np.exp(2j * np.pi * 12.0 * time)
         steps = (5.0 * force[2:] + 8.0 * force[1:-1] - force[:-2]) / (12.0 * hz)
         exact = np.diff(force[1:]) / (2j * np.pi * 12.0)
         lost = 1.0 - np.abs(steps).mean() / np.abs(exact).mean()
-        assert integration_std(1.0 / hz) == pytest.approx(lost, rel=1e-6)
         assert lost > 0.0
-    assert np.all(found.model_std >= integration_std(1.0 / SENSORS.rate))
+        # A ride of that frequency alone, of all four wheels: only the heave moves.
+        hopping = RideSamples(
+            time=time,
+            travel=0.01 * np.repeat(force.real[:, np.newaxis], 4, axis=1),
+            rate=np.zeros((time.size, 4)),
+            velocity=np.zeros((time.size, 3)),
+        )
+        told = integration_std(hopping, CAR.ride)
+        assert told[0] == pytest.approx(lost, rel=1e-3)
+    assert np.all(found.model_std >= integration_std(ride_samples(found.drive), found.ride))
+
+
+def test_a_still_ride_has_no_loss():
+    still = RideSamples(
+        time=np.arange(100.0) / 100.0, travel=np.zeros((100, 4)), rate=np.zeros((100, 4)),
+        velocity=np.zeros((100, 3)),
+    )  # fmt: skip
+    assert np.all(integration_std(still, CAR.ride) == 0.0)
 
 
 def test_report_opens_offline(found, tmp_path):
     found.report(tmp_path / "ride.html")
     text = (tmp_path / "ride.html").read_text(encoding="utf-8")
     assert "Sprung mass" in text
-    assert "front left spring" in text
+    assert text.index('class="answer ') < text.index("At the end of the drive")
+    assert "front left spring" in unpacked(text, "figures")
     assert "http://" not in text.split("<script>")[0]

@@ -36,7 +36,13 @@ def test_an_edit_of_a_called_kernel_is_noticed(tmp_path, monkeypatch):
     package = tmp_path / "weighbridge"
     kernels = package / "kernels"
     kernels.mkdir(parents=True)
-    for name in ("__init__.py", "constants.py", "kernels/__init__.py", "kernels/_jit.py"):
+    for name in (
+        "__init__.py",
+        "version.py",
+        "constants.py",
+        "kernels/__init__.py",
+        "kernels/_jit.py",
+    ):
         shutil.copy(SOURCE / name, package / name)
     (kernels / "caller.py").write_text(CALLER)
 

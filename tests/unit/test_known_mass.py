@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from weighbridge.calibration.known_mass import check_mass, scale_doubt
+import weighbridge as wb
+from weighbridge.calibration.known_mass import POUND, check_mass, drag_doubt, scale_doubt
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.signals import Drive
 from weighbridge.signals.drive import DriveInfo
-from weighbridge.vehicle.model import TorqueModel, Vehicle
+from weighbridge.simulation import simulate_car
+from weighbridge.simulation.named import make_scenario
+from weighbridge.vehicle.model import RoadLoad, TorqueModel, Vehicle
 
 DRIVE = Drive("drive", {})
 
@@ -67,3 +70,36 @@ def test_a_mass_of_a_truck_leads_to_its_class():
         with pytest.raises(ConfigError, match=words):
             check_mass(DRIVE, kg, Vehicle(kind="car"))
     check_mass(DRIVE, 10_203.0, Vehicle(kind="truck"))
+
+
+def test_a_mass_in_pounds_is_doubted_by_fuel_and_drag_and_at_each_weighing():
+    """An engine load has no scale of its own: air drag and the fuel burnt are what checks it."""
+    made = make_scenario("compact-calibration", seed=63)
+    known = simulate_car(replace(made, duration=1200.0))
+    mass = float(known.truth.mass[0])
+    bare = replace(known.drive, info=replace(known.drive.info, mass=None))
+    assert wb.calibrate([bare], mass=mass).provenance.doubts == ()
+    heavy = wb.calibrate([bare], mass=mass / POUND)
+    said = " ".join(heavy.provenance.doubts)
+    assert "of its fuel into work at the wheels, which no engine does" in said
+    assert "check the mass and the class" in said
+    assert set(heavy.provenance.doubts) <= set(wb.weigh(bare, heavy).warnings)
+
+
+@pytest.mark.parametrize(
+    ("area", "source", "said"),
+    [
+        (1.4, "load", "too heavy"),
+        (0.02, "load", "too light"),
+        (0.9, "load", ""),
+        (1.4, "measured", ""),
+    ],
+)
+def test_a_drag_area_that_no_car_has_is_told(area, source, said):
+    car = Vehicle(
+        kind="car",
+        road_load=RoadLoad(drag_area=area),
+        torque=TorqueModel(source=source, coefficients=(0.0, 1.0)),
+    )
+    told = drag_doubt(car, [2568.0])
+    assert (said in told) if said else not told

@@ -71,7 +71,14 @@ def broker(port=0):
     async def crash():
         for server in made["broker"]._servers.values():
             server.instance.close()
-        for transport in list(loop._transports.values()):
+        transports = list(loop._transports.values())
+        for transport in transports:
+            transport.pause_reading()
+        # A confirmation is noted only after it was sent: what was read is confirmed and noted.
+        end = loop.time() + 5.0
+        while Taken.open and loop.time() < end:
+            await asyncio.sleep(0.01)
+        for transport in transports:
             transport.abort()
         tasks = asyncio.all_tasks() - {asyncio.current_task()}
         for task in tasks:

@@ -5,7 +5,6 @@ import http.client
 import json
 import math
 import re
-import shutil
 import threading
 from importlib.resources import files
 
@@ -233,22 +232,6 @@ def test_a_weighing_without_a_time_adds_no_point():
     assert history.since(0) == {"fresh": True, "time": [], "mass": [], "low": [], "high": []}
 
 
-CHROMIUM = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-
-
-@pytest.fixture
-def browser():
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    if CHROMIUM is None:
-        pytest.skip("no Chromium is installed")
-    with sync_api.sync_playwright() as play:
-        chromium = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
-
-
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
@@ -300,3 +283,22 @@ def test_names_that_are_markup_are_shown_as_text(page, browser):
     assert tab.inner_text("#vehicle") == "<img src=x onerror=alert(1)>"
     assert tab.inner_text("#notes li") == "<b>bold</b>"
     assert tab.query_selector("#vehicle img") is None
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_the_chart_begins_with_a_mass_and_a_missing_limit_is_explained(page, browser):
+    page.show(weighing(mass=math.nan, std=math.nan, gross=None))
+    tab = browser.new_page()
+    tab.goto(page.name)
+    tab.wait_for_function("document.getElementById('mass').textContent === '–'")
+    tab.wait_for_selector("#no-points")
+    assert tab.query_selector("canvas") is None
+    assert "no permitted mass in the vehicle file" in tab.inner_text("#no-limit")
+    assert not tab.is_visible("#overload")
+    page.show(weighing(time=301.0, tared=2150.0))
+    tab.wait_for_selector("canvas")
+    assert not tab.is_visible("#no-points")
+    assert tab.inner_text("#payload-name") == "Payload since the tare"
+    assert tab.inner_text("#payload") == "−50 kg"
+    assert tab.is_visible("#overload")

@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import logging
 import math
 
 import pytest
@@ -117,3 +118,43 @@ def test_plain_lines_go_on_when_the_clock_begins_anew():
     for time in (5000.0, 5001.0, 10.0, 11.0):
         view.show(weighing(time))
     assert len(out.getvalue().splitlines()) == 2
+
+
+def test_log_lines_stand_above_the_view_and_not_in_it():
+    out = io.StringIO()
+    handler = logging.StreamHandler(out)
+    logging.getLogger().addHandler(handler)
+    try:
+        view = TerminalView(Console(file=out, force_terminal=True, width=80, height=24))
+        view.show(weighing())
+        before = len(out.getvalue())
+        logging.getLogger("weighbridge.live").warning("the adapter is gone")
+        told = out.getvalue()[before:]
+        view.close()
+    finally:
+        logging.getLogger().removeHandler(handler)
+    # The view is wiped, the line stands where it began, and the view follows.
+    assert told.index("\x1b[2K") < told.index("the adapter is gone") < told.index("weighed")
+    assert handler.stream is out
+
+
+def test_a_payload_below_nothing_and_a_missing_limit_are_told():
+    tared = weighing(tared=2150.0, gross=None)
+    shown = text(lines(tared, 80, 40))
+    assert "payload since the tare −50 kg, no permitted mass in the vehicle file" in shown
+    assert "payload 0 kg" in text(lines(weighing(mass=1799.8), 80, 40))
+
+
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (60, 20)])
+def test_the_last_view_leaves_room_for_what_is_said_after_it(width, height):
+    """Its first line, which names the vehicle, stays on the screen however many notes there are."""
+    out = io.StringIO()
+    console = Console(file=out, force_terminal=True, width=width, height=height)
+    view = TerminalView(console)
+    for count in range(20):
+        notes = tuple(f"Note {k} of a drive that has many." for k in range(count))
+        view.show(weighing(notes=notes))
+    view.close()
+    last = out.getvalue().rsplit("\x1b[2K", 1)[-1]
+    assert weighing().vehicle in last
+    assert last.count("\n") <= height - 4

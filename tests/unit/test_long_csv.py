@@ -1,13 +1,14 @@
 """Long tables: one row for each value, as Car Scanner exports them."""
 
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.io import read_drive
+from weighbridge.io import read_drive, read_frame
 from weighbridge.io.draft import Draft
 from weighbridge.io.formats import format_of
 from weighbridge.io.mapping_text import mapping_text
@@ -48,6 +49,31 @@ def test_from_a_log_of_car_scanner_to_signals(tmp_path):
     assert_allclose(np.degrees(drive.signals["latitude"].values), 45.0 + 1e-4 * np.arange(2, 10))
     assert_allclose(np.diff(drive.signals["latitude"].time), 2.0)
     assert "left out 20 of 80 rows" in " ".join(p.text for p in drive.problems)
+
+
+@pytest.mark.parametrize("kind", ["polars", "pandas", "categories"])
+def test_a_data_frame_is_turned_as_the_file_is(tmp_path, kind):
+    path = tmp_path / "trip.csv"
+    path.write_text(scanner())
+    by_file = mapped(path, tmp_path)
+    frame = pl.read_csv(path, separator=";", infer_schema=False).drop("")
+    if kind == "categories":
+        frame = frame.with_columns(pl.col("PID").cast(pl.Categorical))
+    given = frame.to_pandas() if kind == "pandas" else frame
+    drive = read_frame(given, tmp_path / "map.toml")
+    assert set(drive.signals) == set(by_file.signals)
+    for name, signal in by_file.signals.items():
+        assert_allclose(drive.signals[name].time, signal.time)
+        assert_allclose(drive.signals[name].values, signal.values)
+
+
+def test_a_data_frame_of_canonical_names_needs_no_mapping():
+    time = np.arange(20.0)
+    speed = pl.DataFrame({"time_s": time, "name": "vehicle_speed_kmh", "value": 3.6 * time})
+    engine = pl.DataFrame({"time_s": time + 0.5, "name": "engine_speed_rpm", "value": 900.0 + time})
+    drive = read_frame(pl.concat([speed, engine]).sort("time_s"))
+    assert_allclose(drive.signals["vehicle_speed"].values, time)
+    assert_allclose(drive.signals["engine_speed"].time, time + 0.5)
 
 
 def test_a_trip_over_midnight_goes_on(tmp_path):

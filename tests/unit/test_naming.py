@@ -116,6 +116,13 @@ def test_apps_that_nothing_was_made_for():
         ("cur_gear", "gear"),
         ("amb_temp", "ambient_temperature"),
         ("gps_kmh", "gnss_speed"),
+        ("m_ist_proz", "engine_torque_fraction"),
+        ("m_ref", "reference_torque"),
+        ("Bezugsmoment", "reference_torque"),
+        ("m_ret_proz", "retarder_torque"),
+        ("laenge", "longitude"),
+        ("hoehe_m", "altitude"),
+        ("m_soll_proz", ""),
     ],
 )
 def test_shortened_words_are_spelled_out(name, meant):

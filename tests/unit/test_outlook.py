@@ -49,3 +49,16 @@ def test_json_says_what_the_words_say(noise, floor):
         by_json = line[f"minutes_to_{percent}_percent"] is None
         by_json = by_json and line["reach_percent"] >= percent
         assert by_json == ("not by driving like this" in remaining_text(minutes, percent))
+
+
+def test_minutes_of_a_mass_that_waits_for_a_look_fall_with_the_driving():
+    def minutes(since, wait):
+        given = {"driven": 300.0, "reason": "", "silent": (), "first": 60.0}
+        return outlook(2000.0, 60.0, 0.005, **given, since=since, wait=wait).minutes_to_2
+
+    at_look = minutes(0.0, 150.0)
+    assert at_look > 10.0
+    assert minutes(120.0, 30.0) == pytest.approx(at_look - 2.0)
+    # The interval is no narrower before the next look, however much was driven.
+    assert minutes(60.0 * at_look, 45.0) == pytest.approx(0.75)
+    assert minutes(0.0, 60.0 * at_look + 60.0) == pytest.approx(at_look + 1.0)

@@ -52,6 +52,7 @@ def test_pauses_part_a_day(trips):
             part.signals["vehicle_speed"].values, trip.signals["vehicle_speed"].values
         )
         assert "holds 3 drives" in part.problems[-1].text
+        assert part.problems[-1].text.endswith(f"{part.start:.0f} to {part.end:.0f} s")
     assert parted(parts[0])[0] is parts[0]
     assert not find_cuts(behind(trips, PAUSE - 60.0))
 
@@ -209,3 +210,40 @@ def test_zeros_where_no_value_was_are_left_out(trips):
     assert (kept.signals["vehicle_speed"].values == speed.values[~lost]).all()
     assert "leap away and return at once" in kept.problems[-1].text
     assert without_spikes(trips[0]) is trips[0]
+
+
+def from_standstill(trips, *names):
+    """Recordings that each begin at standstill and end amid driving, on one clock."""
+    cut = []
+    for trip in trips:
+        speed = trip.signals["vehicle_speed"]
+        fast = speed.time[(speed.values > 15.0) & (speed.time > trip.start + 120.0)]
+        signals = {
+            n: Signal(n, s.time[s.time < fast[10]], s.values[s.time < fast[10]])
+            for n, s in trip.signals.items()
+            if n in names
+        }
+        cut.append(replace(trip, signals=signals))
+    return behind(cut, 0.25), cut
+
+
+def test_recordings_that_begin_at_standstill_are_parted(trips):
+    day, cut = from_standstill(trips, "vehicle_speed", "engine_speed", "engine_load")
+    cuts = find_splices(day)
+    assert [c.why for c in cuts] == ["starts from standstill amid driving"] * 2
+    ends = np.cumsum([trip.duration + 0.25 for trip in cut])[:2]
+    assert [c.begin for c in cuts] == pytest.approx(ends, abs=1.0)
+    assert [p.name for p in parted(day)] == [f"day part {k} of 3" for k in (1, 2, 3)]
+    # Nothing else tells a splice from a speed that drops out.
+    alone, _ = from_standstill(trips, "vehicle_speed")
+    assert not find_splices(alone)
+
+
+@pytest.mark.parametrize("lasts", [3.0, 20.0, 60.0])
+def test_a_speed_that_drops_out_is_no_splice(trips, lasts):
+    for trip in trips:
+        speed = trip.signals["vehicle_speed"]
+        for start in trip.start + np.arange(60.0, 400.0, 20.0):
+            gone = (speed.time >= start) & (speed.time < start + lasts)
+            dropped = Signal("vehicle_speed", speed.time, np.where(gone, 0.0, speed.values))
+            assert not find_splices(trip.with_signals(dropped))

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive, read_table, write_drive
 from weighbridge.io.parts import join_parts, part_files
-from weighbridge.live.recorder import Recorder
+from weighbridge.live.recorder import Recorder, free_folder
 from weighbridge.signals import DriveInfo
 
 BEGIN = 1_790_000_000.25
@@ -200,7 +200,7 @@ def test_two_recordings_into_one_folder_do_not_mix(tmp_path):
 
 FULL = """
 import resource, signal, sys
-from weighbridge.live.recorder import Recorder
+from weighbridge.live.recorder import Recorder, free_folder
 from tests.unit.test_recorder import Clock, second
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 clock = Clock()
@@ -268,7 +268,7 @@ def test_a_disk_that_hangs_ends_the_recording(tmp_path, monkeypatch):
 
 KILLED = """
 import os, signal, sys
-from weighbridge.live.recorder import Recorder
+from weighbridge.live.recorder import Recorder, free_folder
 from tests.unit.test_recorder import Clock, second
 clock = Clock()
 recorder = Recorder(sys.argv[1], clock=clock)
@@ -293,7 +293,7 @@ FOREVER = """
 import sys
 from itertools import count
 from threading import Event
-from weighbridge.live.recorder import Recorder
+from weighbridge.live.recorder import Recorder, free_folder
 from tests.unit.test_recorder import Clock, second
 clock = Clock()
 recorder = Recorder(sys.argv[1], clock=clock)
@@ -377,3 +377,25 @@ def test_memory_does_not_grow_with_the_drive(tmp_path):
     # 154 samples a second, for half a minute.
     assert max(held) <= 31 * 154
     recorder.close()
+
+
+def test_a_recording_goes_on_beside_one_that_is_there(tmp_path):
+    """A service that starts again after a power cut keeps what was recorded."""
+    asked = tmp_path / "drive"
+    for k, name in enumerate(("drive", "drive-2", "drive-3")):
+        folder = free_folder(asked)
+        assert folder == tmp_path / name
+        with Recorder(folder) as recorder:
+            recorder.put(second(k))
+    starts = [read_drive(tmp_path / n).info.start_time for n in ("drive", "drive-2", "drive-3")]
+    assert len(set(starts)) == 3
+
+
+def test_a_folder_that_was_made_for_nothing_goes(tmp_path):
+    with Recorder(tmp_path / "drive"):
+        pass
+    assert not (tmp_path / "drive").exists()
+    (tmp_path / "there").mkdir()
+    with Recorder(tmp_path / "there"):
+        pass
+    assert (tmp_path / "there").exists()

@@ -1,6 +1,7 @@
 """The report page: what it says, and that it needs nothing from outside."""
 
 import base64
+import gzip
 import json
 import re
 import subprocess
@@ -18,7 +19,7 @@ from weighbridge.estimators import MassTrack, Segment, Status
 from weighbridge.navigation.motion import Motion
 from weighbridge.pipeline.weighing import Weighing
 from weighbridge.report import mass_figure, write_report
-from weighbridge.report.page import Page
+from weighbridge.report.document import Page, packed
 from weighbridge.report.style import REASON_STYLE, Panel, blank
 from weighbridge.report.table import Table
 from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
@@ -201,8 +202,13 @@ def written(tmp_path, weighings, **options):
 
 
 def figures(html):
-    found = re.search(r'<script type="application/json" id="figures">(.*?)</script>', html, re.S)
-    return json.loads(found.group(1))
+    return json.loads(unpacked(html, "figures"))
+
+
+def unpacked(html, key):
+    """Unpack a text that the page carries."""
+    found = re.search(rf'<script type="text/plain" id="{key}">(.*?)</script>', html, re.S)
+    return gzip.decompress(base64.b64decode(found.group(1))).decode()
 
 
 def numbers(array):
@@ -222,7 +228,13 @@ def test_page_answers_first(tmp_path):
     answer = f"1500 ± {half:.0f} kg"
     assert answer in page.text
     assert page.text.index(answer) < page.text.index("payload")
-    for said in ("+100 kg", "test car", "rls", "30.0 min", "The torque delay was found"):
+    for said in (
+        f"+100 ± {half:.0f} kg",
+        "test car",
+        "rls",
+        "30.0 min",
+        "The torque delay was found",
+    ):
         assert said in page.text
     assert page.matched
 
@@ -267,7 +279,7 @@ def test_figure_data_cannot_end_their_script():
     figure.add_scatter(x=[0.0], y=[0.0], name="</script><script>")
     page = Page()
     page.place([Panel(title="t", figure=figure)])
-    assert "<" not in page.data()
+    assert re.fullmatch("[A-Za-z0-9+/=]+", packed(page.data()))
     assert json.loads(page.data())["figure-1"]["data"][0]["name"] == "</script><script>"
 
 
@@ -279,8 +291,9 @@ def test_several_drives_are_compared_in_a_table(tmp_path):
     rows = [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row) for row in cells[:4]]
     low, high = known.interval(0.95)
     interval = f"{low:.0f} to {high:.0f} kg"
-    assert rows[1] == ["plain", "1500 kg", interval, "+100 kg", "–", "–", "converged"]
-    assert rows[2] == ["known", "1500 kg", interval, "–", "1470 kg", "+2.0 %", "converged"]
+    sure = f"fine: ± {100.0 * 0.5 * (high - low) / MASS:.1f} %"
+    assert rows[1] == ["plain", "1500 kg", interval, "+100 kg", "–", "–", sure]
+    assert rows[2] == ["known", "1500 kg", interval, "–", "1470 kg", "+2.0 %", sure]
     assert rows[3][:6] == ["poor", "–", "–", "–", "–", "–"]
     assert "only 3 usable samples" in rows[3][6]
     page = Elements(html)
@@ -363,7 +376,7 @@ def test_legend_counts_every_sample(tmp_path):
     assert told["bad fit"] == "1"
     rare = next(t for t in speed["data"] if t["name"] == "bad fit (1)")
     kmh = 3.6 * weighing.result.balance.table.speed[1003]
-    assert_allclose(numbers(rare["y"]), [kmh], rtol=1e-6)
+    assert_allclose(numbers(rare["y"]), [kmh], rtol=2e-5)
 
 
 def test_every_figure_has_title_units_and_caption(tmp_path):
@@ -405,14 +418,12 @@ def test_calibration_without_gears_or_engine_speed_leaves_sentences(tmp_path):
 
 
 def test_long_drive_stays_small(tmp_path):
-    from plotly.offline import get_plotlyjs
-
     html = written(tmp_path, [make_weighing(hours=1.25)])
-    assert html.count(get_plotlyjs()) == 1
-    assert len(html.encode()) < 6_000_000
+    assert html.count('id="library"') == 1
+    assert len(html.encode()) < 800_000
     twice = written(tmp_path, [make_weighing(hours=1.25), make_weighing(hours=4.0)])
-    assert html.count("Plotly.newPlot(place") == twice.count("Plotly.newPlot(place") == 1
-    assert len(twice) < len(html) + 600_000
+    assert twice.count('id="library"') == 1
+    assert len(twice) < len(html) + 200_000
 
 
 def test_nothing_to_report_and_nowhere_to_write_are_said(tmp_path):
@@ -430,8 +441,8 @@ def test_mass_figure_draws_the_answer():
     assert_allclose(traces["true mass 1520 kg"].y, 1520.0)
     running = traces["running mass"]
     first = np.argmax(weighing.result.used)
-    assert_allclose(running.x[0], (weighing.result.time[first] - 50.0) / 60.0, rtol=1e-5)
-    assert_allclose(running.y[0], weighing.result.running_mass[first], rtol=1e-6)
+    assert_allclose(running.x[0], (weighing.result.time[first] - 50.0) / 60.0, rtol=2e-5)
+    assert_allclose(running.y[0], weighing.result.running_mass[first], rtol=2e-5)
     low, high = figure.layout.yaxis.range
     assert low < 0.95 * MASS < 1.05 * MASS < high
     assert "1500 kg" in figure.layout.title.text

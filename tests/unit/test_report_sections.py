@@ -24,8 +24,13 @@ from weighbridge.report.information_section import (
     manoeuvres,
 )
 from weighbridge.report.methods_section import method_style, methods_section
-from weighbridge.report.residual_section import bin_width, binned, residual_section
-from weighbridge.report.slow_section import slow_section, wind_at_vehicle
+from weighbridge.report.residual_section import (
+    WITH_SLOW,
+    bin_width,
+    binned,
+    residual_section,
+)
+from weighbridge.report.slow_section import LONGEST_ARROW, slow_section, wind_at_vehicle
 from weighbridge.report.style import band, blank
 from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.vehicle.model import Provenance
@@ -35,11 +40,13 @@ CAR = replace(VEHICLE, provenance=Provenance(mass_scale_std=0.005, method="joint
 RATE = 4.0
 
 
-def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0.0), load=None):
+def driven(
+    speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0.0), load=None, extra=0.0
+):
     """Weigh a car by joint from forces that obey Newton's law.
 
     ``wind`` and ``reported`` are what blows at the car from north and east [m/s]; ``load`` is
-    added to the mass at each row.
+    added to the mass at each row, ``extra`` a force that always holds back [N].
     """
     rng = np.random.default_rng(8)
     n = speed.size
@@ -64,6 +71,7 @@ def driven(speed, *, grade=None, heading=None, wind=(0.0, 0.0), reported=(0.0, 0
         mass * (specific + 9.80665 * road.rolling_coefficient)
         + rotating * accel
         + drag(wind)
+        + extra
         + rng.normal(scale=40.0, size=n)
     )
     reason = np.zeros(n, dtype=np.uint8)
@@ -225,8 +233,12 @@ def test_wind_has_the_sign_of_the_weather(round_trip, share):
     assert_allclose(np.degrees(np.median(wind.blows_to)), 140.0, atol=12.0)
     panels = {p.title.split(",")[0]: p for p in slow_section(w).panels}
     assert "Wind from the north-west" in panels
-    arrows = next(t for t in panels["How the wind blew"].figure.data if t.marker.symbol == "arrow")
-    assert_allclose(np.median(arrows.marker.angle), 140.0, atol=12.0)
+    blew = next(p for title, p in panels.items() if title.startswith("How the wind blew"))
+    tails = [(a.ax, a.ay) for a in blew.figure.layout.annotations if a.showarrow]
+    assert 3 < len(tails) <= 12
+    # Pixels count downwards: from the tail, right and down is south-east.
+    assert_allclose([np.degrees(np.arctan2(-x, y)) for x, y in tails], 140.0, atol=25.0)
+    assert max(np.hypot(x, y) for x, y in tails) == pytest.approx(LONGEST_ARROW)
     names = {t.name for t in panels["Wind from the north-west"].figure.data}
     assert ("reported, from east" in names) == (share > 0.0)
 
@@ -234,12 +246,15 @@ def test_wind_has_the_sign_of_the_weather(round_trip, share):
 def test_residual_is_highest_driving_against_the_wind(round_trip):
     w = round_trip[0.0]
     panel = next(p for p in residual_section(w, ()).panels if "heading" in p.title)
-    mean = next(t for t in panel.figure.data if t.name == "mean and spread")
+    mean = next(t for t in panel.figure.data if t.name == WITH_SLOW)
     crest = float(mean.x[np.argmax(mean.y)])
     assert abs(crest - 320.0) <= 30.0
     # Drag of 30 m/s less that of 25 m/s, with the car's speed wandering around it.
     at_crest = 0.6 * 0.6 * ((25.0 + 5.0) ** 2 - 25.0**2)
     assert_allclose(max(mean.y), at_crest, rtol=0.2)
+    # What the drive told of wind and slow forces is taken off: no crest is left.
+    left = next(t for t in panel.figure.data if t.name == "mean and spread")
+    assert max(np.abs(left.y)) < 0.1 * at_crest
 
 
 def test_a_car_that_goes_one_way_tells_no_wind():
@@ -305,7 +320,7 @@ def test_joint_is_compared_without_an_accelerometer_too():
 
 def test_methods_are_shown_with_their_intervals_or_why_not():
     w = weighed_by_rls()
-    section = methods_section(compare(w), 1600.0)
+    section = methods_section(w, compare(w), 1600.0)
     rows = {row[0]: row[1:] for row in section.table.rows}
     low, high = w.interval(0.95)
     assert rows["rls"][:2] == (f"{w.mass:.0f} kg", f"{low:.0f} to {high:.0f} kg")
@@ -313,6 +328,7 @@ def test_methods_are_shown_with_their_intervals_or_why_not():
     assert "no vehicle_speed" in rows["speed-ekf"][-1]
     masses = section.panels[0].figure
     mark = next(t for t in masses.data if t.y == ("rls",))
+    assert rows["rls"][5] == "the answer"
     assert_allclose([mark.x[0] - mark.error_x.arrayminus[0], mark.x[0] + mark.error_x.array[0]],
                     [low, high])  # fmt: skip
     assert "speed-ekf" not in {t.y[0] for t in masses.data}

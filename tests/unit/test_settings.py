@@ -41,6 +41,9 @@ def test_settings_within_settings_are_reached_by_dots():
         ("rls", {"gate.inner": 1.0}, "setting gate has none within"),
         ("hybrid", {"ekf": 3.0}, "ekf takes one of ekf.start.window"),
         ("hybrid", {"ekf.start.count_grade_twice": 1}, "takes true or false, got 1"),
+        ("hybrid", {"blend": "wind"}, "blend takes one of .*speed.*, got 'wind'"),
+        ("hybrid", {"blend": 1.0}, "blend takes one of .*speed.*, got 1.0"),
+        ("hybrid", {"ekf.start_mass": "speed"}, "takes a number, got 'speed'"),
         ("speed-ekf", {"process_var": [1.0, 2.0]}, "takes 3 numbers in brackets, got list"),
     ],
 )
@@ -56,14 +59,16 @@ def test_a_method_without_settings_says_so():
 
 
 def test_texts_are_read_as_toml():
-    assert parsed(["forgetting=0.999", "a.b = true", "process_var=[0.1, 1e-12, 5e-3]"]) == {
+    texts = ["forgetting=0.999", "a.b = true", "process_var=[0.1, 1e-12, 5e-3]", "blend=speed"]
+    assert parsed(texts) == {
         "forgetting": 0.999,
         "a.b": True,
+        "blend": "speed",
         "process_var": [0.1, 1e-12, 5e-3],
     }
 
 
-@pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=five", "gate=1\nmass=2"])
+@pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=5,0", "gate=1\nmass=2"])
 def test_a_text_of_another_form_is_one_sentence(text):
     with pytest.raises(ConfigError, match=r"write NAME=VALUE|is expected after =") as refused:
         parsed([text])

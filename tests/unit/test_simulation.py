@@ -669,6 +669,14 @@ def test_scenarios_are_named_as_they_are_called():
         assert made.payload == 71.0
 
 
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_payload_is_checked_against_the_limits_of_its_own_vehicle(name):
+    empty = make_scenario(name).car.mass
+    assert make_scenario(name, payload=0.6 * empty).mass == pytest.approx(1.6 * empty)
+    with pytest.raises(ConfigError, match=f"car of {empty}"):
+        make_scenario(name, payload=2.0 * empty)
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [

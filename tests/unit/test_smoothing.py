@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from weighbridge.navigation.smoothing import smooth_grade, smooth_height, smooth_speed
+from weighbridge.navigation.smoothing import GRADE_NOISE, smooth_grade, smooth_height, smooth_speed
 from weighbridge.signals import Signal
 
 
@@ -64,3 +64,18 @@ def test_a_noisy_measured_grade_is_drawn_towards_level():
     assert slope(grade, raw) < 0.7
     assert slope(grade, found) == pytest.approx(1.0, abs=0.05)
     assert np.std(grade - found) == pytest.approx(np.sqrt(np.mean(std**2)), rel=0.15)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.01])
+def test_a_grade_that_never_changes_is_as_unsure_as_any(value):
+    time = np.arange(0.0, 600.0, 0.5)
+    found, std = smooth_grade(Signal("grade", time, np.full(time.size, value)), time, 15.0 * time)
+    assert np.all(found == value)
+    assert np.all(std == GRADE_NOISE)
+
+
+def test_a_grade_that_changes_once_has_a_finite_std():
+    time = np.arange(0.0, 600.0, 0.5)
+    values = np.where(time < 599.0, 0.0, 0.3)
+    found, std = smooth_grade(Signal("grade", time, values), time, 15.0 * time)
+    assert np.all(np.isfinite(found) & np.isfinite(std))

@@ -1,5 +1,6 @@
 """Speed and recorded torque, no accelerometer: masses of simple drives, and when there is none."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -221,6 +222,40 @@ def test_calibration_takes_a_constant_bias_out():
     assert found.status == "converged", found.reason
     assert found.mass == pytest.approx(MASS + 150.0, rel=0.04)
     assert not any("was calibrated for" in text for text in found.warnings)
+
+
+def test_without_a_calibration_both_jacobians_widen_the_interval():
+    """Their masses bound the true one; a calibration takes the bias out."""
+    noisy = drive(5, noise=0.08)
+    made = replace(CAR, provenance=replace(CAR.provenance, mass_scale_std=0.01))
+    known = wb.weigh(noisy, made, METHOD)
+    turned = wb.weigh(noisy, made, METHOD, settings={"measured_jacobian": False})
+    apart = abs(math.log(turned.result.mass / known.result.mass))
+    assert apart > 0.02
+    sheet = wb.weigh(noisy, CAR, METHOD)
+    share = speed_torque_ekf.BOUNDS_SHARE * apart
+    found = speed_torque_ekf.jacobian_std(
+        sheet.result.balance, CAR, speed_torque_ekf.SpeedTorqueSettings(), sheet.result.mass
+    )
+    assert found == pytest.approx(share, rel=0.05)
+    assert sheet.std / sheet.mass > share
+
+
+def test_a_grade_that_is_less_sure_than_in_the_calibration_widens_the_interval():
+    car = wb.calibrate(
+        [drive(11), drive(12, mass=MASS + 300.0)],
+        [MASS, MASS + 300.0],
+        vehicle=replace(CAR, torque=TorqueModel(), road_load=RoadLoad(), timing=Timing()),
+        settings=wb.CalibrationSettings(method=METHOD),
+    )
+    assert 0.0 < car.provenance.unmeasured_grade < 0.015
+    alike, blind = wb.weigh(drive(13), car, METHOD), wb.weigh(drive(13, height=False), car, METHOD)
+    said = "masses come out some percent light"
+    assert not any(said in text for text in alike.warnings)
+    assert any(said in text for text in blind.warnings)
+    apart = 0.02 - car.provenance.unmeasured_grade
+    assert blind.std / blind.mass > speed_torque_ekf.GRADE_STD * apart
+    assert abs(blind.mass - MASS) < 2.0 * blind.std
 
 
 def test_means_over_spans_are_those_of_the_line_between():

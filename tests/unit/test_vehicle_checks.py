@@ -108,6 +108,30 @@ def test_two_reference_torques_in_turn_are_both_told_and_settled_by_the_vehicle_
     assert "reference_torque_nm under [torque] of the vehicle file" in problem.text
 
 
+def test_a_reference_torque_that_is_not_that_of_the_calibration():
+    time = np.arange(0.0, 900.0, 5.0)
+    found = drive(driven(SMALL, 1)).with_signals(
+        Signal("reference_torque", time, np.full(time.size, 2415.0))
+    )
+
+    def problems(source, told):
+        coefficients = (0.0, 1.0)
+        return check_vehicle(
+            found,
+            Vehicle(
+                torque=TorqueModel(
+                    source=source, coefficients=coefficients, told_reference_torque=told
+                )
+            ),
+        )
+
+    (problem,) = problems("percent", 2100.0)
+    assert problem.serious
+    assert "is 2415 N m, and was 2100 N m in the calibration" in problem.text
+    assert [p.serious for p in problems("measured", 2100.0)] == [False]
+    assert list(problems("percent", 2400.0)) == list(problems("percent", None)) == []
+
+
 def test_the_reference_torque_that_is_taken():
     time = np.arange(0.0, 900.0, 5.0)
     fraction = Signal("engine_torque_fraction", time, np.full(time.size, 0.5))

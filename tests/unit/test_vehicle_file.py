@@ -1,6 +1,7 @@
 """Vehicle files: what is saved is loaded again, and mistakes are told with their line."""
 
 import math
+import re
 import tomllib
 from dataclasses import replace
 
@@ -338,6 +339,18 @@ speed_range_rpm = [900, 4000]"""
 
 
 DRAGGED = "[dragged]\nengine_speed_rpm = [900, 2000]\nscatter = 0.01\nspan = 0.8"
+
+
+def test_all_mistakes_are_told_at_once(tmp_path):
+    path = tmp_path / "car.toml"
+    path.write_text(
+        '[vehicle]\nclas = "car"\n[driveline]\nwheel_radius = 0.3\ngear_ratios = [3.0, 2.0]\n'
+        '[road_load]\ndrag_area_m2 = "x"\nfoo = 1\n[mountin]\na = 1\n'
+    )
+    with pytest.raises(ConfigError) as told:
+        Vehicle.load(path)
+    lines = [int(n) for n in re.findall(r"line (\d+)", str(told.value))]
+    assert sorted(lines) == [2, 4, 7, 8, 9]
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,8 @@ from weighbridge.balance import force_balance
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.judging import uncalibrated_std
 from weighbridge.estimators.rls import estimate
-from weighbridge.pipeline.weighing import Weighing, overload, without_mass
+from weighbridge.pipeline.notes import overload
+from weighbridge.pipeline.weighing import Weighing, without_mass
 from weighbridge.results.row import unread_row
 from weighbridge.results.weighing import TRACK_COLUMNS
 from weighbridge.signals import Drive, DriveInfo, Signal

@@ -21,15 +21,27 @@ TURN_TIME: Final = 1.0
 """Time over which the yaw rate is taken, as the difference of headings [s]."""
 
 
+def yaw_rate(time: Floats, heading: Floats, rate: float) -> Floats:
+    """Return the yaw rate (n,) [rad/s]; NaN where the heading is unknown.
+
+    Parameters
+    ----------
+    time : (n,) [s]
+    heading : (n,) [rad]
+    rate : of the rows [Hz]
+    """
+    half = max(1, round(0.5 * TURN_TIME * rate))
+    index = np.arange(time.size)
+    before, after = np.maximum(index - half, 0), np.minimum(index + half, index.size - 1)
+    turn = heading[after] - heading[before]
+    turn = np.mod(turn + np.pi, 2.0 * np.pi) - np.pi
+    span = time[after] - time[before]
+    return np.asarray(turn / np.where(span > 0.0, span, np.inf))
+
+
 def lateral_acceleration(motion: Motion) -> Floats:
     """Return yaw rate times speed (n,) [m/s^2]; NaN where the heading is unknown."""
-    half = max(1, round(0.5 * TURN_TIME * motion.rate))
-    index = np.arange(motion.time.size)
-    before, after = np.maximum(index - half, 0), np.minimum(index + half, index.size - 1)
-    turn = motion.heading[after] - motion.heading[before]
-    turn = np.mod(turn + np.pi, 2.0 * np.pi) - np.pi
-    span = motion.time[after] - motion.time[before]
-    return np.asarray(motion.speed * turn / np.where(span > 0.0, span, np.inf))
+    return np.asarray(motion.speed * yaw_rate(motion.time, motion.heading, motion.rate))
 
 
 def cornering(motion: Motion, time: Floats) -> Bools:

@@ -7,11 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.force_balance import force_balance
+from weighbridge.balance.force_balance import force_balance, force_rows
 from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
+from weighbridge.signals.interpolation import interpolate
 from weighbridge.vehicle.model import Vehicle
 
 EARLIEST: Final = -0.4
@@ -38,6 +39,9 @@ ELSEWHERE: Final = 1.5
 _SOUGHT: Final = 30.0
 """Farthest that such a clock is looked for [s]: as far as clocks of tables are put together."""
 
+_STEP: Final = 0.25
+"""Rows nearer to each other tell nothing more of a shift of half seconds [s]."""
+
 _CLEARER: Final = 0.5
 """Misfit there over the misfit near by at which it is one [-]: at 4 s it was 0.09, in an undamaged
 drive the misfit 2 s away is 18 times that near by."""
@@ -53,7 +57,7 @@ def best_delay(
     end: float = LATEST,
     farthest: float = FARTHEST,
 ) -> float:
-    """Minimise ``misfit`` over the delay: a coarse grid, a fine one, a parabola.
+    """Minimise ``misfit`` over the delay: a coarse grid, steps downhill, a parabola.
 
     Where the best of the coarse grid lies at an end, the grid goes on beyond it.
 
@@ -68,7 +72,7 @@ def best_delay(
     float
         Delay [s]; NaN where no delay can be told or the best lies at the farthest.
     """
-    step = 0.1
+    step = 0.2
     grid = np.arange(start, end + 0.5 * step, step)
     scores = np.array([misfit(float(delay)) for delay in grid])
     while np.isfinite(scores).all() and int(np.argmin(scores)) in (0, grid.size - 1):
@@ -82,13 +86,37 @@ def best_delay(
     if not np.isfinite(scores).all():
         return float("nan")
     best = int(np.argmin(scores))
-    centre = vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
-    fine = np.asarray(centre + 0.02 * np.arange(-5, 6), dtype=np.float64)
-    scores = np.array([misfit(float(delay)) for delay in fine])
-    best = int(np.argmin(scores)) if np.isfinite(scores).all() else 0
-    if best in (0, fine.size - 1):
-        return float("nan")
-    return vertex(fine[best - 1 : best + 2], scores[best - 1 : best + 2])
+    for finer, most in ((0.5 * step, 1), (0.02, 4)):
+        centre = vertex(grid[best - 1 : best + 2], scores[best - 1 : best + 2])
+        around = _downhill(misfit, centre, finer, most)
+        if around is None:
+            return float("nan")
+        grid, scores = around
+        best = 1
+    return vertex(grid, scores)
+
+
+def _downhill(
+    misfit: Callable[[float], float], centre: float, step: float, most: int
+) -> tuple[Floats, Floats] | None:
+    """Go downhill from ``centre`` to three delays whose middle one is lowest; and their misfits.
+
+    None where it is not reached in ``most`` steps to one side.
+    """
+    found: dict[int, float] = {}
+    at = 0
+    while abs(at) <= most:
+        for k in (at - 1, at, at + 1):
+            if k not in found:
+                found[k] = misfit(centre + k * step)
+        low, middle, high = (found[k] for k in (at - 1, at, at + 1))
+        if not np.isfinite([low, middle, high]).all():
+            return None
+        if middle <= low and middle <= high:
+            delays = np.array([centre + step * k for k in (at - 1, at, at + 1)])
+            return delays, np.array([low, middle, high])
+        at += -1 if low < high else 1
+    return None
 
 
 def beyond(grid: Floats, scores: Floats, step: float, farthest: float) -> Floats:
@@ -121,25 +149,44 @@ def delay_std(misfit: Callable[[float], float], delay: float, rows: float) -> fl
     return float(np.sqrt(2.0 * middle / (rows * curvature)))
 
 
-def estimate_torque_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> float:
+def estimate_torque_delay(
+    drive: Drive, vehicle: Vehicle, motion: Motion, begun: ForceBalance | None = None
+) -> float:
     """Find the delay at which traction explains specific force best [s]; NaN if untold.
 
     A forward fit and an inverse one differ, but their product, the
     correlation, depends on the delay alone.
+
+    Parameters
+    ----------
+    drive, vehicle, motion
+    begun : balance of these at a delay, where it is worked out already
 
     Raises
     ------
     DriveError
         The drive lacks what the torque source needs.
     """
-    return best_delay(_misfit(drive, vehicle, motion, np.arange(EARLIEST, 0.41, 0.1)))
+    return best_delay(_misfit(drive, vehicle, motion, np.arange(EARLIEST, 0.41, 0.4), begun))
 
 
-def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, known: float) -> float:
+def clock_shift(
+    drive: Drive,
+    vehicle: Vehicle,
+    motion: Motion,
+    known: float,
+    begun: ForceBalance | None = None,
+) -> float:
     """Find by how much the torque is later than ``known`` [s]; 0 where it is not, or untold.
 
     Less than `SAME_CLOCK` is no other clock. As much as 0.8 s is believed where it leaves half of
     the misfit or less, little where the misfit is lower there on both sides.
+
+    Parameters
+    ----------
+    drive, vehicle, motion
+    known : lateness of the torque in the calibration [s]
+    begun : as of `estimate_torque_delay`
 
     Raises
     ------
@@ -147,7 +194,7 @@ def clock_shift(drive: Drive, vehicle: Vehicle, motion: Motion, known: float) ->
         The drive lacks what the torque source needs.
     """
     shifts = np.array([-0.8, -_NEAR_BY, 0.0, _NEAR_BY, 0.8])
-    misfit = _misfit(drive, vehicle, motion, known + shifts)
+    misfit = _misfit(drive, vehicle, motion, known + shifts, begun)
     scores = np.array([misfit(float(known + shift)) for shift in shifts])
     if not np.isfinite(scores).all():
         return 0.0
@@ -176,17 +223,24 @@ def far_shift(balance: ForceBalance, vehicle: Vehicle) -> float:
     table = balance.table
     known = np.isfinite(table.specific_force)
     force = force_on_mass(table, vehicle)
-    rows = table.usable & np.isfinite(force)
-    if np.count_nonzero(rows) < 100 or np.count_nonzero(known) < 100:
+    rows = np.flatnonzero(table.usable & np.isfinite(force))
+    if rows.size < 100 or np.count_nonzero(known) < 100:
         return 0.0
+    rows = rows[:: _thinned(table.time[rows])]
     time, specific = table.time[known], table.specific_force[known]
     shifts = np.arange(-_SOUGHT, _SOUGHT + 0.25, 0.5)
-    moved = (np.interp(table.time[rows] + s, time, specific) for s in shifts)
+    moved = (interpolate(table.time[rows] + s, time, specific) for s in shifts)
     misfit = 1.0 - np.array([_correlation(force[rows], m) for m in moved])
     best = int(np.argmin(misfit))
     near = float(misfit[np.abs(shifts) < ELSEWHERE].min())
     far = abs(shifts[best]) >= ELSEWHERE and misfit[best] < _CLEARER * near
     return float(shifts[best]) if far else 0.0
+
+
+def _thinned(time: Floats) -> int:
+    """Every how many rows two are `_STEP` apart, as a rule; no more than leave a hundred."""
+    apart = float(np.median(np.diff(time)))
+    return max(1, min(int(_STEP / apart) if apart > 0.0 else 1, time.size // 100))
 
 
 def _little(
@@ -206,21 +260,30 @@ def _little(
 
 
 def _misfit(
-    drive: Drive, vehicle: Vehicle, motion: Motion, delays: Floats
+    drive: Drive,
+    vehicle: Vehicle,
+    motion: Motion,
+    delays: Floats,
+    begun: ForceBalance | None = None,
 ) -> Callable[[float], float]:
     """One less the correlation of force and specific force, over rows usable at all ``delays``."""
-
-    def at(delay: float) -> ForceTable:
-        return force_balance(drive, vehicle, motion, delay=delay).table
-
-    views = {float(delay): at(float(delay)) for delay in delays}
+    views: dict[float, ForceTable] = {}
+    setup = None
+    for delay in sorted(map(float, delays), key=abs):
+        if setup is None and begun is not None and begun.delay == delay:
+            balance = begun
+        else:
+            balance = force_balance(drive, vehicle, motion, delay=delay, setup=setup)
+        views[delay], setup = balance.table, balance.setup
     # Rows that come and go with the delay would make its misfit rough.
     common = np.logical_and.reduce(
         [table.usable & np.isfinite(table.traction_force) for table in views.values()]
     )
 
     def misfit(delay: float) -> float:
-        table = views[delay] if delay in views else at(delay)
+        table = views.get(delay)
+        if table is None:
+            table = force_rows(drive, vehicle, motion, delay, setup)
         rows = common & np.isfinite(table.traction_force) & np.isfinite(table.specific_force)
         if np.count_nonzero(rows) < 100:
             return float("nan")

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.balance.braking import Brakes, find_brakes
+from weighbridge.balance.braking import Brakes, find_brakes, retarder_untold
 from weighbridge.balance.coarse import coarse_std
 from weighbridge.balance.cornering import cornering
 from weighbridge.balance.filled import Fill, filled, identify_fill
@@ -92,10 +92,25 @@ def force_balance(
         motion=motion,
         brake_hidden=brakes.hidden,
         switch_dead=brakes.switch_dead,
+        retarder_untold=retarder_untold(drive, vehicle),
         coarse_std=coarse_std(source, reason == Reason.USED),
         setup=setup,
         delay=delay,
     )
+
+
+def force_rows(
+    drive: Drive, vehicle: Vehicle, motion: Motion, delay: float, setup: ForceSetup | None
+) -> ForceTable:
+    """Return the rows of `force_balance` without reasons and noise: enough to compare forces.
+
+    Parameters
+    ----------
+    drive, vehicle, motion, delay, setup : as of `force_balance`
+    """
+    source = source_signal(drive, vehicle)
+    lag = vehicle.timing.torque_lag
+    return _read(drive, vehicle, motion, source, delay, lag, setup).table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

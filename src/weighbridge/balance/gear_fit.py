@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.balance.table import ForceBalance
 from weighbridge.signals import Floats
+from weighbridge.signals.instants import span
 from weighbridge.vehicle.gear import steady
 from weighbridge.vehicle.model import Vehicle
 
@@ -70,7 +71,7 @@ def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> str:
         if share < ENOUGH:
             begin, end = float(time[part][0]), float(time[part][-1])
             return (
-                f"from {begin:.6g} to {end:.6g} s, beside a pause of the recording, only "
+                f"from {span(begin, end)}, beside a pause of the recording, only "
                 f"{100.0 * share:.0f} % of the steady ratios of engine to vehicle speed lie at a "
                 f"gearing of {vehicle.name}: another vehicle's trip; cut the recording there"
             )

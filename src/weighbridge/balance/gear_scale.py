@@ -13,6 +13,7 @@ import numpy as np
 from weighbridge.balance.gear_fit import FEWEST_RATIOS, held_ratios
 from weighbridge.balance.table import ForceBalance
 from weighbridge.signals import Bools, Floats
+from weighbridge.signals.instants import span
 from weighbridge.vehicle.model import Vehicle
 
 NEAR: Final = 0.02
@@ -88,7 +89,7 @@ def _changing(time: Floats, ratio: Floats, gearings: Floats, name: str) -> str:
         return ""
     begin, end = float(time[off][0]), float(time[off][-1])
     return (
-        f"from {begin:.6g} to {end:.6g} s engine over vehicle speed is {scale:.2f} times what the "
+        f"from {span(begin, end)} engine over vehicle speed is {scale:.2f} times what the "
         f"gearings of {name} need, and elsewhere it is right: the unit of one of the speeds "
         "changes; cut the recording there"
     )

@@ -186,6 +186,7 @@ class ForceBalance:
     brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading tells
         where it is braked
     switch_dead : the brake switch contradicts the motion and is not used
+    retarder_untold : a retarder may slow the vehicle that the drive does not tell of
     coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
     setup : what a whole drive tells of its force side; None where it was not looked for
     delay : lateness of the torque, which is off its instants [s]
@@ -196,6 +197,7 @@ class ForceBalance:
     motion: Motion
     brake_hidden: bool = False
     switch_dead: bool = False
+    retarder_untold: bool = False
     coarse_std: float = 0.0
     setup: ForceSetup | None = None
     delay: float = 0.0

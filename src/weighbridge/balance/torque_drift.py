@@ -14,10 +14,11 @@ import numpy as np
 
 from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.law import drag_force
-from weighbridge.balance.table import ForceTable
+from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.errors import DriveError
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.signals.interpolation import interpolate
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -75,7 +76,7 @@ def force_lags(table: ForceTable, vehicle: Vehicle, motion: Motion) -> ForceLags
         here = np.flatnonzero(usable[first:last]) + first
         if here.size < FEWEST_ROWS:
             continue
-        moved = np.interp(table.time[here] - SHIFTS[:, None], motion.time, specific)
+        moved = interpolate(table.time[here] - SHIFTS[:, None], motion.time, specific)
         whole = np.isfinite(moved).all(axis=0)
         if np.count_nonzero(whole) < FEWEST_ROWS:
             continue
@@ -102,7 +103,7 @@ def _best(force: Floats, moved: Floats) -> float:
 
 def steadied(
     drive: Drive, vehicle: Vehicle, motion: Motion, delay: float
-) -> tuple[Drive, tuple[str, ...]]:
+) -> tuple[Drive, tuple[str, ...], ForceBalance | None]:
     """Move the stamps of a torque that drifts, so that it stays as late as it began.
 
     Parameters
@@ -114,6 +115,7 @@ def steadied(
     -------
     drive : as it was where nothing drifts
     notes : what was moved, one sentence
+    balance : of that drive and delay, for whoever needs it next; None where it was not worked out
 
     Raises
     ------
@@ -122,27 +124,30 @@ def steadied(
     """
     source = source_of(vehicle)
     if motion.source in BY_SPEED or drive.info.trusted or source.combined is not None:
-        return drive, ()
+        return drive, (), None
     carrier = source.carrier(drive)
-    before = force_lags(force_balance(drive, vehicle, motion, delay=delay).table, vehicle, motion)
+    balance = force_balance(drive, vehicle, motion, delay=delay)
+    before = force_lags(balance.table, vehicle, motion)
     slope, scatter = _line(before)
     reach = float(np.ptp(before.time)) if before.time.size else 0.0
     if abs(slope) * reach <= max(DRIFTS, SURE * scatter):
         if before.lag.size >= FEWEST_PARTS and np.ptp(_median_of_three(before.lag)) > WANDERS:
             raise _wanders(drive, carrier, before)
-        return drive, ()
+        return drive, (), balance
     moved = carrier.time - slope * (carrier.time - before.time[0])
     rising = np.concatenate(([True], np.diff(np.maximum.accumulate(moved)) > 0.0))
     mended = drive.with_signals(Signal(carrier.name, moved[rising], carrier.values[rising]))
-    after = force_lags(force_balance(mended, vehicle, motion, delay=delay).table, vehicle, motion)
+    balance = force_balance(mended, vehicle, motion, delay=delay)
+    after = force_lags(balance.table, vehicle, motion)
     if after.lag.size >= FEWEST_PARTS and np.ptp(_median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)
     grows = "later and later" if slope > 0.0 else "earlier and earlier"
-    return mended, (
+    note = (
         f"{carrier.name} comes {grows} against the motion, by {abs(slope) * reach:.1f} s over "
         f"{reach:.0f} s, as by a queue that fills or a clock of its own; its stamps were "
-        "moved back",
+        "moved back"
     )
+    return mended, (note,), balance
 
 
 def _wanders(drive: Drive, carrier: Signal, found: ForceLags) -> DriveError:

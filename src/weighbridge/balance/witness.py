@@ -17,7 +17,9 @@ from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
 from weighbridge.errors import DriveError
+from weighbridge.kernels.robust_line import lines_without_parts, robust_line
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.signals.interpolation import interpolate
 from weighbridge.vehicle.air import standard_pressure
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
 from weighbridge.vehicle.torque import source_of
@@ -302,34 +304,16 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
     drive after another (Efron, Stein, Ann. Statist. 9, 1981).
     """
     middle = float(np.mean(predicted))
-    columns = np.column_stack([predicted - middle, np.ones_like(predicted)])
-    scale, level = robust_fit(columns, reading)
+    off = predicted - middle
+    reading = np.ascontiguousarray(reading)
+    scale, level = robust_line(off, reading, 0, 0, ROUNDS)
     # Each is fitted anew: which of two clusters of rows is the outlier may hang on one part.
     size = -(-reading.size // BLOCKS)
     begin = (np.arange(BLOCKS) * (reading.size - size)) // (BLOCKS - 1)
-    row = np.arange(reading.size - size)
-    kept = row + np.where(row >= begin[:, None], size, 0)
-    left_out = _robust_lines((predicted - middle)[kept], reading[kept])
+    left_out = lines_without_parts(off, reading, begin, size, ROUNDS)
     spread = (BLOCKS - 1) / BLOCKS * np.sum((left_out - np.mean(left_out, 0)) ** 2, 0)
     scale_std, level_std = np.sqrt(spread)
     return Comparison(float(scale), float(scale_std), float(level), float(level_std), middle)
-
-
-def _robust_lines(x: Floats, y: Floats) -> Floats:
-    """Slope and level (k, 2) of each of k lines through points (k, m), with Huber's weights."""
-    weight = np.ones_like(y)
-    least = 1e-12 * float(np.abs(y).max())
-    found = np.zeros((y.shape[0], 2))
-    for _ in range(ROUNDS):
-        total = weight.sum(axis=1)
-        x_mean, y_mean = (weight * x).sum(axis=1) / total, (weight * y).sum(axis=1) / total
-        dx = x - x_mean[:, None]
-        slope = (weight * dx * y).sum(axis=1) / np.maximum((weight * dx * dx).sum(axis=1), 1e-300)
-        found = np.column_stack([slope, y_mean - slope * x_mean])
-        off = np.abs(y - found[:, :1] * x - found[:, 1:])
-        limit = 2.0 * np.median(off, axis=1)[:, None] + least
-        weight = np.minimum(1.0, limit / np.maximum(off, 1e-300))
-    return found
 
 
 def robust_fit(columns: Floats, y: Floats) -> Floats:
@@ -374,7 +358,7 @@ def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following
         kept = np.exp(-period / blur) if blur > 0.0 else 0.0
         delayed, _ = lfilter([1.0 - kept], [1.0, -kept], predicted, zi=[kept * predicted[0]])
         for j, delay in enumerate(DELAYS):
-            moved = np.interp(rows.time - delay, rows.time, delayed)[rows.driving]
+            moved = interpolate(rows.time - delay, rows.time, delayed)[rows.driving]
             left[i, j] = 1.0 - _correlation(moved, reading) ** 2
     best = int(np.argmin(left.min(axis=1)))
     usual = int(np.argmin(np.abs(np.array(BLURS) - (relation.blur or 0.0))))

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance
+from weighbridge.calibration.doubted_motion import doubted_gains
 from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
@@ -40,7 +41,7 @@ OVER: Final = 1.02
 def doubted_masses(
     vehicle: Vehicle, balances: Sequence[ForceBalance], masses: Sequence[float]
 ) -> list[str]:
-    """Say which masses of a calibration are doubtful, one sentence each.
+    """Say which masses of a calibration are doubtful, or motions, one sentence each.
 
     Parameters
     ----------
@@ -60,6 +61,7 @@ def doubted_masses(
         for name, kg in zip(names, masses, strict=True)
         if gross is not None and kg > OVER * gross
     ]
+    contradictions += doubted_gains(names, [b.motion for b in balances])
     fit = vehicle.provenance.fit
     if fit is None or not fit.refined or len(masses) < 2:
         return contradictions

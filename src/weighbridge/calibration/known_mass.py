@@ -6,10 +6,13 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.balance import ForceBalance
+from weighbridge.constants import PETROL_HEATING_VALUE
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.signals import Drive
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import scale_std, usual_efficiency
+from weighbridge.vehicle.fuel import SEEN
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -25,6 +28,13 @@ OVERLOAD: Final = 1.25
 SURE: Final = 0.3
 """Scale of a measured torque that is off by more is the mass's fault [-]: makers allow torque
 5 %, and their reference torques were found 15 % off."""
+
+BEST_DIESEL, BEST_PETROL = 0.45, 0.38
+"""Work at the wheels over the energy of the fuel that no drive reaches [-], by fuel rate and by air
+flow and its ratio: the best engines have as much at their best point, and nothing of it is lost."""
+
+DRAG_FAR: Final = 2.5
+"""Standard deviations of the class from which a drag area is told [-]."""
 
 DOUBTFUL: Final = 3.0
 """Standard deviations from which such a scale is told [-]."""
@@ -120,3 +130,59 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
             "torque's unit"
         )
     return f"{text}: check the mass"
+
+
+def fuel_doubt(drive: Drive, balance: ForceBalance, kg: float) -> str:
+    """Compare the work that a mass makes of the torque with the fuel that was burnt for it.
+
+    Parameters
+    ----------
+    drive, balance : of the calibration, by the file that was made
+    kg : mass it was calibrated with [kg]
+
+    Returns
+    -------
+    One sentence; empty where the work is possible, or no fuel was recorded
+    """
+    by_rate = drive.has("fuel_rate")
+    if not (by_rate or (drive.has("mass_air_flow") and drive.has("lambda_1"))):
+        return ""
+    best = BEST_DIESEL if by_rate else BEST_PETROL
+    table = balance.table
+    power = np.maximum(np.nan_to_num(table.traction_force * table.speed), 0.0)
+    span = np.minimum(np.diff(table.time), SEEN)
+    work = float(np.sum(span * 0.5 * (power[1:] + power[:-1])))
+    energy = PETROL_HEATING_VALUE * float(table.fuel_burnt[-1])
+    if not energy > 0.0 or work <= best * energy:
+        return ""
+    return (
+        f"with {kg:.0f} kg {drive.name} would have made {100.0 * work / energy:.0f} % of its fuel "
+        f"into work at the wheels, which no engine does ({kg:.0f} lb are {kg * POUND:.0f} kg): "
+        "check the mass, and the units of air flow and fuel rate"
+    )
+
+
+def drag_doubt(vehicle: Vehicle, masses: list[float]) -> str:
+    """Compare the air drag that a scale by mass alone gives a vehicle with that of its class.
+
+    Parameters
+    ----------
+    vehicle : calibrated
+    masses : it was calibrated with [kg]
+
+    Returns
+    -------
+    One sentence; empty where the drag is usual, or the torque has a scale of its own
+    """
+    if source_of(vehicle).signed:
+        return ""
+    (usual, std), area = vehicle.of_class.drag_area, vehicle.road.drag_area.value
+    if abs(area - usual) <= DRAG_FAR * std:
+        return ""
+    listed = " and ".join(f"{kg:.0f}" for kg in masses)
+    heavy = "heavy" if area > usual else "light"
+    return (
+        f"with {listed} kg {vehicle.name} has a drag area of {area:.2f} m², and a {vehicle.kind} "
+        f"has {usual:g} ± {std:g}: if the mass given is too {heavy}, every mass is so by as much; "
+        "check the mass and the class"
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Final
@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.arguments import check_number, check_type
+from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.known_mass import check_mass
 from weighbridge.calibration.recording import Recording
@@ -110,8 +111,11 @@ def problem_of(
     mass: float | Sequence[float] | None,
     vehicle: Vehicle | None,
     settings: CalibrationSettings,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Problem:
     """Check what was given, and find motion, gears and torque source of the drives.
+
+    ``progress`` is told of drives done of all.
 
     Raises
     ------
@@ -131,7 +135,11 @@ def problem_of(
         if why := source.refusal(drive, base.driveline.driven):
             raise DriveError(f"{drive.name}: {why}")
     given, base = base.driveline, _held(base, source)
-    found = [find_motion(drive, base) for drive in drives]
+    found = []
+    for drive in drives:
+        found.append(find_motion(drive, base))
+        if progress is not None:
+            progress(len(found), len(drives))
     motions, squat = _one_squat(found, masses, base.of_class)
     gears, draft = _draft(drives, motions, base, source)
     draft = replace(draft, mounting=_mounting(motions, base.mounting, squat))
@@ -142,10 +150,13 @@ def problem_of(
             f"order {order}: torque source {source.name!r} has an offset and a scale only; "
             "leave --order out"
         )
+    recordings = tuple(
+        Recording.of(*one, draft, source) for one in zip(drives, motions, masses, strict=True)
+    )
+    if given.gearings and source.gearing is None:
+        _refuse_foreign_gears(recordings)
     return Problem(
-        recordings=tuple(
-            Recording.of(*one, draft, source) for one in zip(drives, motions, masses, strict=True)
-        ),
+        recordings=recordings,
         base=base,
         draft=draft,
         given=given,
@@ -155,6 +166,25 @@ def problem_of(
         curved=settings.curved and modelled,
         grid=settings.grid,
     )
+
+
+def _refuse_foreign_gears(recordings: Sequence[Recording]) -> None:
+    """Refuse gears that were given and are not those of the drives, as `weigh` would.
+
+    Raises
+    ------
+    DriveError
+        A drive's ratios of engine to vehicle speed lie elsewhere.
+    """
+    for recording in recordings:
+        share = share_on_gears(recording.balance(0.0), recording.draft)
+        if share is not None and share < ENOUGH:
+            raise DriveError(
+                f"{recording.drive.name}: only {100.0 * share:.0f} % of the steady ratios of "
+                "engine to vehicle speed lie at a gearing of the vehicle file: its gear ratios, "
+                "final drive or wheel radius are not this vehicle's; leave the ratios out, and "
+                "the drives show them"
+            )
 
 
 def _held(base: Vehicle, source: TorqueSource) -> Vehicle:

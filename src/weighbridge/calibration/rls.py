@@ -10,6 +10,7 @@ import numpy as np
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.delay import best_delay, delay_std
 from weighbridge.balance.law import ROAD_PARAMETERS
+from weighbridge.calibration.doubted_motion import gain_std
 from weighbridge.calibration.fitted import (
     NOT_TOLD,
     Fitted,
@@ -251,7 +252,9 @@ def _self_weighed(
     scale, std = _own_masses(rebalanced(problem, vehicle), vehicle, problem.masses)
     unexplained = 0.3 * max(0.0, 1.0 - fitted.r_squared)
     bounds = 0.03 * sum(name in held for name in ROAD_PARAMETERS[:2])
-    left = float(np.sqrt(std**2 + problem.source.transfer_std**2 + unexplained**2 + bounds**2))
+    gains = gain_std(r.motion for r in problem.recordings)
+    parts = (std, problem.source.transfer_std, unexplained, bounds, gains)
+    left = float(np.linalg.norm(parts))
     return replace(
         vehicle,
         torque=vehicle.torque.scaled(scale),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
@@ -15,7 +16,7 @@ from weighbridge.balance.witness_learning import learn_witnesses
 from weighbridge.calibration.doubted_masses import doubted_masses, unbacked_scale, with_doubts
 from weighbridge.calibration.fitted import Fitted, fitted_rows, noted, rebalanced
 from weighbridge.calibration.joint import fit_joint, fit_speed_torque
-from weighbridge.calibration.known_mass import scale_doubt
+from weighbridge.calibration.known_mass import drag_doubt, fuel_doubt, scale_doubt
 from weighbridge.calibration.problem import Problem, checked, problem_of
 from weighbridge.calibration.rls import fit_rls
 from weighbridge.calibration.settings import CalibrationSettings
@@ -35,6 +36,7 @@ from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive
 from weighbridge.vehicle.fits import JOINT, RLS, SPEED_TORQUE_EKF
 from weighbridge.vehicle.model import Driveline, Vehicle
+from weighbridge.vehicle.torque_sources import SAME_REFERENCE, reference_torques
 
 if TYPE_CHECKING:
     from weighbridge.io.mapping import MappingSource
@@ -45,6 +47,8 @@ FITTERS: Final[dict[str, Callable[[Problem], Fitted]]] = {
     SPEED_TORQUE_EKF.name: fit_speed_torque,
 }
 """What fits the torque for each method."""
+
+_LOG = logging.getLogger(__name__)
 
 FEW_SAMPLES: Final = 2000
 """Fewer usable samples, some twenty minutes of driving, make a poor calibration."""
@@ -109,19 +113,25 @@ def run_calibration(
     *,
     vehicle: Vehicle | None = None,
     settings: CalibrationSettings | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Calibration:
-    """As `calibrate`, keeping what the report shows."""
+    """As `calibrate`, keeping what the report shows; ``progress`` is told of parts done of all."""
     settings = settings or CalibrationSettings()
+    tell = progress or (lambda done, total: None)
     if not settings.fit.torque:
         raise ConfigError(f"method {settings.method} has no torque fit; use run_speed_calibration")
-    problem = problem_of(drives, mass, vehicle, settings)
+    problem = problem_of(drives, mass, vehicle, settings, progress=lambda k, n: tell(k, 3 * n))
     fitted = FITTERS[settings.method](problem)
+    tell(5, 9)
     rows = fitted_rows(fitted.vehicle, problem, fitted.rows)
     recorded = [r.drive for r in problem.recordings]
     motions = {r.motion.source for r in problem.recordings}
     witnesses, contradictions = learn_witnesses(recorded, fitted.vehicle)
     done = replace(
         fitted.vehicle,
+        torque=replace(
+            fitted.vehicle.torque, told_reference_torque=_told_reference(recorded, problem)
+        ),
         witnesses=witnesses or fitted.vehicle.witnesses,
         provenance=replace(
             fitted.vehicle.provenance,
@@ -131,12 +141,20 @@ def run_calibration(
             residual_std=rows.residual_std,
             samples=int(rows.time.size),
             motion=motions.pop() if len(motions) == 1 else None,
+            unmeasured_grade=_unmeasured_grade(problem),
         ),
     )
     balances = tuple(rebalanced(problem, done))
-    doubt = scale_doubt(done, problem.masses, problem.names)
+    of_masses = [
+        scale_doubt(done, problem.masses, problem.names),
+        drag_doubt(done, problem.masses),
+        *(fuel_doubt(*each) for each in zip(recorded, balances, problem.masses, strict=True)),
+    ]
     few = f"made from {rows.time.size} samples only; poll faster, or drive longer"
-    doubts = [*([doubt] if doubt else []), *doubted_masses(done, balances, problem.masses)]
+    doubts = [
+        *(doubt for doubt in of_masses if doubt),
+        *doubted_masses(done, balances, problem.masses),
+    ]
     others = [
         *([few] if rows.time.size < FEW_SAMPLES else []),
         *_other_masses(recorded, problem.masses),
@@ -150,6 +168,10 @@ def run_calibration(
     if problem.source.gearing is not None:
         done = _with_gears(done, problem.given)
     _refuse_useless(done)
+    _LOG.info(
+        "%s: %s fit of %d drives, %d samples, R² %.4f",
+        done.name, settings.method, len(recorded), rows.time.size, rows.r_squared,
+    )  # fmt: skip
     return Calibration(
         vehicle=done,
         gears=problem.gears,
@@ -158,6 +180,23 @@ def run_calibration(
         search=fitted.search,
         held=fitted.held,
     )
+
+
+def _unmeasured_grade(problem: Problem) -> float:
+    """What of the grade nothing has measured, over all drives [rad]."""
+    left = [r.motion.unmeasured_grade for r in problem.recordings]
+    return round(float(np.sqrt(np.mean(np.square(left)))), 5)
+
+
+def _told_reference(drives: Sequence[Drive], problem: Problem) -> float | None:
+    """Return what all drives say that 100 % are [N m]; None where one says nothing, or another."""
+    told = [drive.get("reference_torque") for drive in drives]
+    if not problem.source.needs_reference:
+        return None
+    said = [value for signal in told if signal for value, _ in reference_torques(signal)]
+    if len(said) != len(drives) or max(said) > (1.0 + SAME_REFERENCE) * min(said):
+        return None
+    return float(np.median(said))
 
 
 def _with_notes(

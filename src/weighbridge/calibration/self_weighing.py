@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance
+from weighbridge.calibration.doubted_motion import gain_std
 from weighbridge.calibration.fitted import rebalanced
 from weighbridge.calibration.problem import Problem
 from weighbridge.errors import DriveError
@@ -127,9 +128,15 @@ def self_weighed(
         # Levels of noise may fall into another optimum, and the mass jump with them.
         slope = float(np.clip((tried[-1][1] - ratio) / (scale - before), *SLOPES))
     scale, ratio, bound, direction, count = min(tried, key=lambda t: abs(t[1] - 1.0))
-    each = float(np.hypot(TRANSFER_STD[1], UNMODELLED * bound))
-    # Where the torque could not be fitted anew, what its own fit left open stays.
-    known = math.hypot(TRANSFER_STD[0], vehicle.provenance.mass_scale_std or 0.0, ratio - 1.0)
+    between = problem.source.between_std
+    each = math.hypot(TRANSFER_STD[1], between, UNMODELLED * bound)
+    # Where the torque could not be fitted anew, what its own fit left open stays. The drive that
+    # is weighed differs from others as those of the calibration do.
+    known = math.hypot(
+        TRANSFER_STD[0], between, vehicle.provenance.mass_scale_std or 0.0, ratio - 1.0
+    )
+    if cov is not None:
+        known = math.hypot(known, gain_std(r.motion for r in problem.recordings))
     open_cov: tuple[float, ...] = ()
     if cov is not None:
         # The torque coefficients are scaled, and their errors with them.

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Final
 
 from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates, check_splices
+from weighbridge.checks.digits import with_half_digits
 from weighbridge.checks.engine import check_engine_speed, check_friction, check_whole_torque
 from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
@@ -34,7 +35,6 @@ __all__ = ["check_drive", "mend_drive", "refuse_serious"]
 _Check = Callable[[Drive, "Vehicle | None"], Iterator[Problem]]
 
 _CHECKS: Final[tuple[_Check, ...]] = (
-    check_pauses,
     check_splices,
     check_stuck,
     check_frozen,
@@ -80,7 +80,9 @@ def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     found = tuple(check_overlap(drive, vehicle))
     if any(p.serious for p in found):
         return drive.with_problems(*found)
-    drive = without_spikes(without_strays(drive, vehicle))
+    drive = with_half_digits(without_spikes(without_strays(drive, vehicle)))
+    # Before rows are left out: a pause is one of the recording.
+    found = (*found, *check_pauses(drive, vehicle))
     if not any(p.serious for p in check_range(drive, vehicle)):
         drive = mend_clocks(drive)
     problems = [*drive.problems[len(earlier) :], *found]

@@ -9,11 +9,17 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import EARTH_RADIUS
-from weighbridge.signals import QUANTITIES, Drive, Floats, Problem
+from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
+from weighbridge.signals.instants import instant, span
 from weighbridge.signals.parts import find_splices
 from weighbridge.vehicle.model import Vehicle
+
+# An inertial sensor with so much between its samples is slow, not in milliseconds [s], where it
+# runs over this part of the time of the speed [-].
+_SLOW_SENSOR: Final = 5.0
+_SAME_TIME: Final = 0.5
 
 # A pause in which nothing was recorded is told [s].
 _PAUSE: Final = 60.0
@@ -35,7 +41,15 @@ def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         s = max(signals, key=len)
         period, name = s.period, f"{table} ({s.name})"
         slow, fast = (0.5, 5e-5) if table in ("imu", "ride") else (30.0, 5e-4)
-        if period > slow or (period > 2.0 and s.duration > 2 * 86_400.0):
+        if slow < period < _SLOW_SENSOR and _as_long_as_speed(drive, s):
+            yield Problem(
+                "",
+                f"{name} has one sample every {period:.4g} s, over the same time as the speed; "
+                "navigation needs 0.1 s or less: record it faster, or leave accel_x..z and "
+                "gyro_x..z out to weigh by speed alone",
+                serious=True,
+            )
+        elif period > slow or (period > 2.0 and s.duration > 2 * 86_400.0):
             yield Problem(
                 "",
                 f"{name} has one sample every {period:.4g} s; if its time is in milliseconds, "
@@ -49,6 +63,16 @@ def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 "name the column time_s or set the unit in [time] of the mapping",
                 serious=True,
             )
+
+
+def _as_long_as_speed(drive: Drive, signal: Signal) -> bool:
+    """Tell whether a signal of another table runs over the same time as the speed."""
+    speed = drive.speed
+    if speed is None or len(speed) < 10:
+        return False
+    shared = min(signal.time[-1], speed.time[-1]) - max(signal.time[0], speed.time[0])
+    longer = max(signal.duration, speed.duration)
+    return bool(shared > _SAME_TIME * longer)
 
 
 def check_overlap(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -67,7 +91,7 @@ def check_overlap(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         if shared <= 0.1 * shorter:
             yield Problem(
                 "",
-                f"{a} runs from {a0:.6g} to {a1:.6g} s and {b} from {b0:.6g} to {b1:.6g} s: "
+                f"{a} runs from {span(a0, a1)} and {b} from {span(b0, b1)}: "
                 "write both on one clock (a constant goes into offset_s in [time] of a mapping)",
                 serious=True,
             )
@@ -80,10 +104,10 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     clocks: dict[str, dict[int, Floats]] = {}
     for s in drive.signals.values():
         clocks.setdefault(QUANTITIES[s.name].table, {})[id(s.time)] = s.time
-    tables = {t: np.unique(np.concatenate(list(c.values()))) for t, c in clocks.items()}
+    tables = {t: _united(list(c.values())) for t, c in clocks.items()}
     if not tables:
         return
-    whole = _pauses(np.unique(np.concatenate(list(tables.values()))))
+    whole = [] if _goes_on(list(tables.values())) else _pauses(_united(list(tables.values())))
     if whole:
         start, length = max(whole, key=lambda p: p[1])
         speed = drive.speed
@@ -102,7 +126,7 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         )
         yield Problem(
             "",
-            f"nothing was recorded {several}for {length:.0f} s from {start:.6g} s, {why}",
+            f"nothing was recorded {several}for {length:.0f} s from {instant(start)}, {why}",
         )
     for table, time in tables.items():
         own = [p for p in _pauses(time) if not any(abs(p[0] - w[0]) < _PAUSE for w in whole)]
@@ -114,7 +138,7 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             harmless = "a tunnel or a car park is harmless, but " if table == "gnss" else ""
             yield Problem(
                 "",
-                f"{table} pauses {several}for {length:.0f} s from {start:.6g} s while the rest "
+                f"{table} pauses {several}for {length:.0f} s from {instant(start)} while the rest "
                 f"goes on; {harmless}if its clock was set there, cut the recording",
             )
 
@@ -125,8 +149,8 @@ def check_splices(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         times = f"{len(found)} times, first" if len(found) > 1 else "once,"
         yield Problem(
             "",
-            f"there are {found[0].why}, {times} at {found[0].end:.6g} s, as where recordings are "
-            "put one behind another: weighbridge weigh parts them, and read_drives in Python",
+            f"there are {found[0].why}, {times} at {instant(found[0].end)}, as where recordings "
+            "are put one behind another: weighbridge weigh parts them, and read_drives in Python",
         )
 
 
@@ -149,10 +173,30 @@ def _way_agrees(drive: Drive, start: float, length: float) -> bool:
     return gone > _WENT and _BENT * gone < apart < 1.1 * gone + 30.0
 
 
+def _united(clocks: list[Floats]) -> Floats:
+    """All instants of some clocks, in order [s]."""
+    return clocks[0] if len(clocks) == 1 else np.unique(np.concatenate(clocks))
+
+
+def _goes_on(clocks: list[Floats]) -> bool:
+    """Tell whether one clock alone shows that nothing paused."""
+    clocks = [time for time in clocks if time.size]
+    if not clocks:
+        return False
+    start, end = min(time[0] for time in clocks), max(time[-1] for time in clocks)
+    return any(
+        time[0] - start <= _PAUSE and end - time[-1] <= _PAUSE and np.diff(time).max() <= _PAUSE
+        for time in clocks
+        if time.size > 1
+    )
+
+
 def _pauses(time: Floats) -> list[tuple[float, float]]:
     """Start and length of the pauses of a clock [s]."""
     if time.size < 10:
         return []
     step = np.diff(time)
+    if step.max() <= _PAUSE:
+        return []
     pause = (step > max(_PAUSE, 10.0 * float(np.median(step)))) & (step <= NO_DRIVE)
     return [(float(time[k]), float(step[k])) for k in np.flatnonzero(pause)]

@@ -169,6 +169,10 @@ def piled(signal: Signal, *, lowest: bool = False) -> Bools:
     return np.asarray(at_end)
 
 
+_OFTEN: Final = 3
+"""A reading that is cut off is held at its top so often at least."""
+
+
 def clipped(signal: Signal, highest: float) -> Bools:
     """Mark samples at the top of a reading that was cut off below what the engine gives.
 
@@ -188,7 +192,9 @@ def clipped(signal: Signal, highest: float) -> Bools:
     top = float(values.max())
     runs = runs_of(signal)
     at_top = values[runs.first] == top
-    piled = int(np.sum(runs.length[at_top & (runs.length > 1)]))
-    if top >= CUT * highest or piled < PILED * values.size:
+    held = runs.length[at_top & (runs.length > 1)]
+    piled = int(np.sum(held))
+    # A driver who accelerates once or twice holds the pedal at a top as well.
+    if held.size < _OFTEN or top >= CUT * highest or piled < PILED * values.size:
         return nothing
     return np.asarray(values == top)

@@ -11,6 +11,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.navigation.frozen import frozen_stretches
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
 
 _TOLD: Final = 5.0
@@ -48,9 +49,11 @@ def _told(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
     total = float(lengths.sum())
     k = int(np.argmax(lengths))
     verb = "repeats" if len(names) == 1 else "repeat"
-    text = (
-        f"{', '.join(names)} {verb} one value for {lengths[k]:.1f} s from {stretches[k, 0]:.6g} s"
-    )
+    since = instant(stretches[k, 0])
+    who = f"{', '.join(names)} {verb} one value"
+    if set(names) == set(IMU_SIGNALS):
+        who = "the inertial sensor repeats its values"
+    text = f"{who} for {lengths[k]:.1f} s from {since}"
     if lengths.size > 1:
         text += f", and in {lengths.size} stretches for {total:.1f} s in all"
     left = axis.duration - total

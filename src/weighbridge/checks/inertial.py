@@ -15,9 +15,11 @@ import numpy as np
 
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
+from weighbridge.navigation.aiding import resolution
 from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.instants import span
 from weighbridge.vehicle.model import Vehicle
 
 # Samples enough for a median; more would only take time.
@@ -37,6 +39,12 @@ _SOME: Final = 100
 # mean of two by less.
 _AGAINST: Final = 0.12
 _CHANCE: Final = 2.4
+
+_BY_TILT: Final = (
+    "one axis of the inertial sensor has the wrong sign; correct it in the mapping (factor = -1)"
+)
+# A gyro of larger steps shows no tilt any more [rad/s]: rounded to 0.01 it does, cut to 0.02 not.
+_COARSE_RATE: Final = 0.015
 
 # Specific force per change of speed above which the speed is in another unit [-].
 _STEEPEST: Final = 1.3
@@ -74,8 +82,10 @@ def _check_parts(drive: Drive) -> Iterator[Problem]:
         if accel is None or gyro is None:
             continue
         for problem in _check_axes(part, accel, gyro):
-            text = f"from {start:.0f} to {end:.0f} s {problem.text}; or cut this part off"
-            yield replace(problem, text=text)
+            text = f"from {span(round(start), round(end))} {problem.text}"
+            yield replace(
+                problem, text=f"{text}; or cut this part off" if problem.serious else text
+            )
             return
 
 
@@ -200,6 +210,13 @@ def _check_axes(
         found = _against_course(gyro, turns, bias, down)
     if found is None and speed is not None and len(speed) > 20:
         found = _against_speed(speed, at, force, rate, full, down)
+        step = max(resolution(np.round(s.values, 9)) for s in gyro)
+        if found is not None and found.text.endswith(_BY_TILT) and step > _COARSE_RATE:
+            text = (
+                f"the gyro is recorded in steps of {step:.2g} rad/s, too coarse to tell whether "
+                "the signs of its axes are right; record it with more digits"
+            )
+            found = Problem(found.signal, text)
     if found is not None:
         yield found
 
@@ -308,8 +325,7 @@ def _inner(full: Bools) -> Bools:
 def _mirrored(name: str, said: str, felt: str) -> Problem:
     return Problem(
         name,
-        f"the gyro says {said} where the accelerometer says {felt}: one axis of the inertial "
-        "sensor has the wrong sign; correct it in the mapping (factor = -1)",
+        f"the gyro says {said} where the accelerometer says {felt}: {_BY_TILT}",
         serious=True,
     )
 

@@ -10,6 +10,7 @@ from weighbridge.checks.false_samples import clipped, isolated, piled, repeated
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.signals import Bools, Drive, Problem, Signal
+from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
 
 WIDENED: Final = 1.02
@@ -55,8 +56,8 @@ def _without_frozen(drive: Drive, name: str, marked: Bools) -> Drive:
     often = f"{begins.size} times, " if begins.size > 1 else ""
     text = (
         f"{name} repeats one value while the vehicle goes on, {often}first from "
-        f"{signal.time[begins[0]]:.6g} s, for {lasted:.0f} s in all: its source froze, and those "
-        "rows are left out"
+        f"{instant(signal.time[begins[0]])}, for {lasted:.0f} s in all: its source froze, and "
+        "those rows are left out"
     )
     return drive.with_signals(_without(signal, marked)).with_problems(Problem(name, text))
 
@@ -166,7 +167,7 @@ def _ends(drive: Drive, names: list[str]) -> list[Problem]:
             notes.append(
                 Problem(
                     name,
-                    f"{name} ends at {signal.time[-1]:.6g} s, {early:.0f} s before the drive: "
+                    f"{name} ends at {instant(signal.time[-1])}, {early:.0f} s before the drive: "
                     "what comes after is not weighed by it",
                 )
             )
@@ -174,7 +175,7 @@ def _ends(drive: Drive, names: list[str]) -> list[Problem]:
             notes.append(
                 Problem(
                     name,
-                    f"{name} begins at {signal.time[0]:.6g} s, {late:.0f} s after the drive: "
+                    f"{name} begins at {instant(signal.time[0])}, {late:.0f} s after the drive: "
                     "what comes before is not weighed by it",
                 )
             )

@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.checks.needed import needed, show
 from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
+from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
 
 FEW: Final = 0.01
@@ -97,6 +98,6 @@ def _problem(s: Signal, out: Bools, done: str, *, serious: bool) -> Problem:
         s.name,
         f"{np.count_nonzero(out)} of {len(s)} values of {s.name} are outside "
         f"{show(s.name, q.low)} to {show(s.name, q.high)}, such as "
-        f"{show(s.name, float(s.values[k]))} at {s.time[k]:.6g} s{done}; check its unit",
+        f"{show(s.name, float(s.values[k]))} at {instant(s.time[k])}{done}; check its unit",
         serious=serious,
     )

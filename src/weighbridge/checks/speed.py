@@ -15,6 +15,7 @@ import numpy as np
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals.instants import instant
 from weighbridge.signals.parts import find_splices
 from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.classes import FASTEST, STRONGEST
@@ -100,9 +101,9 @@ def _check_alone(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> Iterat
     if why and (jumps := find_splices(drive)):
         yield Problem(
             speed.name,
-            f"{speed.name} {why}; {len(jumps)} times, first at {jumps[0].end:.6g} s, the recording "
-            "jumps as several do that were put one behind another: weighbridge weigh parts it, "
-            "and so does read_drives in Python",
+            f"{speed.name} {why}; {len(jumps)} times, first at {instant(jumps[0].end)}, the "
+            "recording jumps as several do that were put one behind another: weighbridge weigh "
+            "parts it, and so does read_drives in Python",
             serious=True,
         )
     elif why:

@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.checks.needed import show
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals.instants import instant
 
 FEW: Final = 0.01
 """Part of the samples up to which spikes are few; at least one [-]."""
@@ -74,8 +75,8 @@ def without_spikes(drive: Drive) -> Drive:
             Problem(
                 name,
                 f"{count} of {len(signal)} samples of {name} leap away and return at once, such "
-                f"as {show(name, float(signal.values[worst]))} at {signal.time[worst]:.6g} s: they "
-                "are left out",
+                f"as {show(name, float(signal.values[worst]))} at {instant(signal.time[worst])}: "
+                "they are left out",
             )
         )
     return drive

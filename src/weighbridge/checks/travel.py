@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.checks.needed import show
 from weighbridge.signals import Bools, Drive, Problem, Signal
+from weighbridge.signals.instants import instant
 from weighbridge.signals.runs import marked_runs
 from weighbridge.signals.words import counted
 from weighbridge.vehicle.model import Vehicle
@@ -29,7 +30,7 @@ def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     if length > 600.0:
         yield Problem(
             s.name,
-            f"the vehicle stands for {length / 60.0:.0f} min from {start:.6g} s; "
+            f"the vehicle stands for {length / 60.0:.0f} min from {instant(start)}; "
             "if it was loaded there, look at the mass of each segment",
         )
     # No car brakes or accelerates at 1.5 g: a piece of the recording is missing there.
@@ -41,7 +42,7 @@ def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
             s.name,
             f"{s.name} jumps {counted(count, 'time')}, as from "
             f"{show(s.name, float(s.values[k]))} to {show(s.name, float(s.values[k + 1]))} "
-            f"within {step[k]:.2g} s at {s.time[k]:.6g} s; "
+            f"within {step[k]:.2g} s at {instant(s.time[k])}; "
             "a piece may be cut out of the recording there",
         )
 

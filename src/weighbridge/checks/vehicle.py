@@ -9,9 +9,10 @@ import numpy as np
 
 from weighbridge.errors import DriveError
 from weighbridge.signals import Drive, Floats, Problem
+from weighbridge.signals.instants import instant
 from weighbridge.vehicle.gear import detect_gearings, effective_gearing, steady
 from weighbridge.vehicle.model import TorqueModel, Vehicle
-from weighbridge.vehicle.torque_sources import reference_torques
+from weighbridge.vehicle.torque_sources import SAME_REFERENCE, reference_torques
 
 # Whoever changes vehicles takes longer than this [s], and the vehicle left stands.
 _PAUSE: Final = 5.0
@@ -40,18 +41,29 @@ def check_vehicle(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Find several reference torques: a constant of an engine."""
+    """Find several reference torques, or another than that of the calibration."""
     reference = drive.get("reference_torque")
     if reference is None or len(reference) < 2:
         return
     reported = reference_torques(reference)
-    if len(reported) < 2:
-        return
     model = TorqueModel() if vehicle is None else vehicle.torque
+    if len(reported) < 2:
+        told, known = reported[0][0] if reported else None, model.told_reference_torque
+        if told and known and abs(told / known - 1.0) > SAME_REFERENCE:
+            yield Problem(
+                reference.name,
+                f"reference_torque is {told:.0f} N m, and was {known:.0f} N m in the calibration: "
+                "it is a constant of an engine, and a mass would be wrong by as much if the "
+                "percentages are of the same torque as before; correct it where it is wrong, "
+                "calibrate again where the engine is another or mapped anew, or name "
+                "reference_torque in trusted of drive.toml where it is right",
+                serious=model.of_source.needs_reference,
+            )
+        return
     values = np.array([value for value, _ in reported])
     nearest = np.argmin(np.abs(reference.values[:, None] - values[None, :]), axis=1)
     once = bool(np.count_nonzero(np.diff(nearest)) < len(reported))
-    which = " and ".join(f"{value:.0f} N m from {time:.6g} s" for value, time in reported)
+    which = " and ".join(f"{value:.0f} N m from {instant(time)}" for value, time in reported)
     said = (
         f"reference_torque is {which}{'' if once else ', in turn'}: it is a constant of an engine"
     )
@@ -92,6 +104,8 @@ def _check_gears(drive: Drive) -> Iterator[Problem]:
         parts = [moving & (time < cut), moving & (time >= cut)]
         if min(np.count_nonzero(p) for p in parts) < _ENOUGH:
             continue
+        if _in_common(*(gearing[p] for p in parts)) > _FOREIGN + 1.0 - _OWN:
+            continue
         before, after = (_gears(time[p], engine.values[p], wheels[p], gearing[p]) for p in parts)
         if not _apart(before, after):
             continue
@@ -100,7 +114,7 @@ def _check_gears(drive: Drive) -> Iterator[Problem]:
         if min(own) > _OWN and max(foreign) < _FOREIGN:
             yield Problem(
                 "engine_speed",
-                f"the gears change at {cut:.6g} s: {100.0 * own[0]:.0f} % of the samples before "
+                f"the gears change at {instant(cut)}: {100.0 * own[0]:.0f} % of the samples before "
                 f"lie on gears of their own and {100.0 * foreign[0]:.0f} % on those after, as with "
                 "two vehicles in one recording; split it there if so",
             )
@@ -125,6 +139,18 @@ def _gears(time: Floats, engine_speed: Floats, wheels: Floats, gearing: Floats) 
     except DriveError:
         return np.empty(0)
     return np.array([g for g in found if _on(gearing, np.array([g])) > _SHOWN])
+
+
+def _in_common(before: Floats, after: Floats) -> float:
+    """Part of the samples that two parts have in common, by the distribution of their ratios.
+
+    Where it is large, samples of one part lie on gears of the other, whatever the gears are.
+    """
+    a, b = (np.rint(np.log(part) / _NEAR).astype(np.int64) for part in (before, after))
+    least = min(a.min(), b.min())
+    size = max(a.max(), b.max()) - least + 1
+    shares = (np.bincount(part - least, minlength=size) / part.size for part in (a, b))
+    return float(np.minimum(*shares).sum())
 
 
 def _apart(a: Floats, b: Floats) -> bool:

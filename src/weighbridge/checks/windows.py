@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from weighbridge.constants import EARTH_RADIUS
+from weighbridge.kernels.interpolation import seen_windows, trapezoid_means
 from weighbridge.signals import Bools, Drive, Floats, Signal
 
 
@@ -27,27 +28,8 @@ def means(signal: Signal, at: Floats) -> tuple[Floats, Bools]:
     full : (n,) no gap of more than a quarter of the window in or at it
     """
     t, v = signal.time, signal.values
-    # In place: several copies of a day's samples at 200 Hz would fill the memory.
-    area = np.zeros(t.size)
-    pieces = area[1:]
-    np.add(v[1:], v[:-1], out=pieces)
-    pieces *= 0.5
-    pieces *= np.diff(t)
-    np.cumsum(pieces, out=pieces)
-    mean = np.diff(np.interp(at, t, area)) / np.diff(at)
-    return mean, _full(signal, at)
-
-
-def _full(signal: Signal, at: Floats) -> Bools:
-    t = signal.time
     limit = 0.25 * float(at[1] - at[0])
-    gaps = np.flatnonzero(np.diff(t) > limit)
-    gap_starts, gap_ends = t[gaps], t[gaps + 1]
-    inside = (at[:-1] >= t[0] - limit) & (at[1:] <= t[-1] + limit)
-    # A gap touches a window that starts before it ends and ends after it starts.
-    ended = np.searchsorted(gap_ends, at[:-1], side="right")
-    begun = np.searchsorted(gap_starts, at[1:], side="left")
-    return np.asarray(inside & (begun <= ended))
+    return trapezoid_means(at, t, v), seen_windows(at, t, limit)
 
 
 def track(

@@ -11,6 +11,7 @@ from weighbridge.balance.disagreement import DOUBTFUL, Finding, difference, find
 from weighbridge.balance.witness import BY_SIGNAL
 from weighbridge.checks.frozen import frozen
 from weighbridge.signals import Drive, Problem, Signal
+from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -73,7 +74,7 @@ def _reading_off(
     """Say by how much the reading is off, by which witnesses, and what to do."""
     names = " and ".join(f.signal for f in together)
     if worst.before:
-        source = f"from {worst.start:.6g} s on against before"
+        source = f"from {instant(worst.start)} on against before"
     else:
         source = f"by the calibration of {vehicle.name}{_when(worst)}"
     if worst.blur > 0.0:
@@ -121,5 +122,5 @@ def _part(finding: Finding) -> bool:
 def _when(finding: Finding) -> str:
     """In which part of the drive, in words."""
     if np.isfinite(finding.start):
-        return f" from {finding.start:.6g} s on"
-    return f" until {finding.end:.6g} s" if np.isfinite(finding.end) else ""
+        return f" from {instant(finding.start)} on"
+    return f" until {instant(finding.end)}" if np.isfinite(finding.end) else ""

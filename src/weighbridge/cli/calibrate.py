@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated, Any, Final, Optional
 
 import typer
 
@@ -14,22 +14,32 @@ from weighbridge.cli.options import (
     DrivePaths,
     MappingPath,
     Whole,
+    chosen_mapping,
     load_parts,
 )
 from weighbridge.cli.own_masses import own_mass_lines
+from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
-from weighbridge.cli.terminal import complain, console, say
+from weighbridge.cli.terminal import console, say
 from weighbridge.cli.terminal import shown as _shown
+from weighbridge.cli.verbosity import notice, say_written
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rich.table import Table
 
+    from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.calibration.speed import SpeedCalibration
     from weighbridge.results.calibration import Calibration
     from weighbridge.signals import Drive
     from weighbridge.vehicle.model import Vehicle
+
+# Time that reading and fitting take, in weighings of the drive.
+_READING: Final = 0.1
+_FITTING: Final = 3.0
+
+_LEFT: Final[dict[str, Any]] = {"title_justify": "left", "caption_justify": "left"}
 
 
 def _kilograms(text: str) -> float:
@@ -113,10 +123,9 @@ def calibrate(
 
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
-    from weighbridge.calibration.run import run_calibration, run_speed_calibration
     from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError
-    from weighbridge.pipeline.given import mapping_beside, mapping_of
+    from weighbridge.pipeline.given import mapping_beside
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -124,14 +133,9 @@ def calibrate(
     if torque is not None and torque not in TORQUE_SOURCES:
         raise ConfigError(f"--torque {torque}: must be {TORQUE_SOURCES.names}")
     base = Vehicle.load(vehicle) if vehicle is not None else None
-    chosen = mapping_of(base, vehicle, mapping)
+    chosen = chosen_mapping(base, vehicle, mapping)
     read = inputs(drives, vehicle, chosen, dbc)
     refuse_results(read, [Result("--output", output, "vehicle file")])
-    parts = [load_parts(path, chosen, dbc, whole=whole) for path in drives]
-    masses = masses_of_parts(parts, mass)
-    recorded = [drive for held in parts for drive in held]
-    for held in (h for h in parts if len(h) > 1):
-        complain(f"  note: {_told_parts(held)}")
     settings = CalibrationSettings(
         order=order,
         source=torque,
@@ -141,27 +145,56 @@ def calibrate(
     )
     if not settings.fit.torque:
         _refuse_torque_options(torque, order, grid, straight)
-        by_speed = run_speed_calibration(recorded, masses, vehicle=base)
-        car, found = by_speed.vehicle, speed_table(by_speed)
-        doubts = by_speed.warnings
-        if tare is not None:
-            car = _with_tare(car, tare, min(rows.mass for rows in by_speed.rows))
-    else:
-        done = run_calibration(recorded, masses, vehicle=base, settings=settings)
+    with progress("calibrating", len(drives) * (_READING + _FITTING + 1.0)) as bar:
+        parts = []
+        for path in drives:
+            bar.begin(f"reading {path.name}", _READING)
+            parts.append(load_parts(path, chosen, dbc, whole=whole))
+        recorded = [drive for held in parts for drive in held]
+        masses = masses_of_parts(parts, mass)
+        for held in (h for h in parts if len(h) > 1):
+            notice(f"  note: {_told_parts(held)}")
+        bar.total = len(drives) * _READING + len(recorded) * (_FITTING + 1.0)
+        bar.begin(f"fitting {_counted(len(recorded))}", len(recorded) * _FITTING)
+        car, found, notes = _fitted(recorded, masses, base, settings, tare, bar.within)
+        if chosen is not None:
+            car = replace(car, mapping=mapping_beside(chosen, output))
+        car.save(output)
+        if settings.fit.torque:
+            bar.begin("weighing by it", len(recorded))
+            notes += list(own_mass_lines(car, recorded, bar.within))
+    console().print(found)
+    for line in notes:
+        say(line)
+    say_written(output)
+
+
+def _fitted(
+    recorded: list[Drive],
+    masses: list[float] | None,
+    base: Vehicle | None,
+    settings: CalibrationSettings,
+    tare: float | None,
+    tell: Callable[[int, int], None],
+) -> tuple[Vehicle, Table, list[str]]:
+    """Fit a vehicle; return it, what the terminal shows of it, and notes."""
+    from weighbridge.calibration.run import run_calibration, run_speed_calibration
+
+    if settings.fit.torque:
+        done = run_calibration(recorded, masses, vehicle=base, settings=settings, progress=tell)
         if tare is not None:
             lightest = min(done.vehicle.provenance.masses)
             done = replace(done, vehicle=_with_tare(done.vehicle, tare, lightest))
-        car, found, doubts = done.vehicle, table(done), ()
-    if chosen is not None:
-        car = replace(car, mapping=mapping_beside(chosen, output))
-    car.save(output)
-    console().print(found)
-    for doubt in doubts:
-        say(f"  note: {doubt}")
-    if settings.fit.torque:
-        for line in own_mass_lines(car, recorded):
-            say(line)
-    say(f"written: {output}")
+        return done.vehicle, table(done), []
+    by_speed = run_speed_calibration(recorded, masses, vehicle=base)
+    car = by_speed.vehicle
+    if tare is not None:
+        car = _with_tare(car, tare, min(rows.mass for rows in by_speed.rows))
+    return car, speed_table(by_speed), [f"  note: {doubt}" for doubt in by_speed.warnings]
+
+
+def _counted(drives: int) -> str:
+    return "1 drive" if drives == 1 else f"{drives} drives"
 
 
 def _with_tare(car: Vehicle, tare: float, lightest: float) -> Vehicle:
@@ -213,7 +246,9 @@ def masses_of_parts(
 
 def _told_parts(held: Sequence[Drive]) -> str:
     """Say which drives a recording holds, in the order their masses are given."""
-    spans = ", ".join(f"{d.start:.0f}–{d.end:.0f} s" for d in held)
+    from weighbridge.signals.instants import span
+
+    spans = ", ".join(span(float(round(d.start)), float(round(d.end))) for d in held)
     name = held[0].name.rsplit(" part ", 1)[0]
     return f"{_shown(name)} holds {len(held)} drives: {spans}"
 
@@ -235,7 +270,7 @@ def speed_table(done: SpeedCalibration) -> Table:
 
     model = done.vehicle.speed_model
     assert model is not None
-    shown = Table(title=f"speed model of {_shown(done.vehicle.name)}", title_justify="left")
+    shown = Table(title=f"speed model of {_shown(done.vehicle.name)}", **_LEFT)
     shown.add_column("parameter")
     shown.add_column("value", justify="right")
     shown.add_row("known mass (kg)", ", ".join(f"{rows.mass:.0f}" for rows in done.rows))
@@ -256,7 +291,7 @@ def table(done: Calibration) -> Table:
     from rich.table import Table
 
     vehicle = done.vehicle
-    shown = Table(title=f"calibration of {_shown(vehicle.name)}", title_justify="left")
+    shown = Table(title=f"calibration of {_shown(vehicle.name)}", **_LEFT)
     shown.add_column("parameter")
     shown.add_column("value", justify="right")
     shown.add_column("std", justify="right")

@@ -20,6 +20,7 @@ from weighbridge.cli.results import (
     refuse_results,
 )
 from weighbridge.cli.terminal import say
+from weighbridge.cli.verbosity import say_written
 from weighbridge.errors import ConfigError, DriveError
 
 
@@ -75,4 +76,4 @@ def convert(
         say(f"  {line}")
     for problem in recorded.problems:
         say(f"  note: {problem.text}")
-    say(f"written: {out}, {len(recorded.signals)} signals")
+    say_written(f"{out}, {len(recorded.signals)} signals")

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Result, inputs, refuse_results
-from weighbridge.cli.terminal import complain, console, say
+from weighbridge.cli.terminal import console, say
+from weighbridge.cli.verbosity import quiet
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.weighing import Weighing
@@ -34,33 +36,46 @@ def demo(
     from dataclasses import replace
 
     from weighbridge.calibration.run import run_calibration
-    from weighbridge.pipeline.weighing import weigh
+    from weighbridge.pipeline.weighing import DEFAULT_METHOD, weigh
     from weighbridge.report import write_report
     from weighbridge.simulation import make_scenario, simulate_car
 
     refuse_results(inputs(), [Result("--output", output, "report")])
-    tell = complain if sys.stderr.isatty() else _keep_quiet
-    tell("simulating and calibrating: one drive of known mass")
-    known = simulate_car(make_scenario("car-calibration", seed=seed))
-    calibration = run_calibration(known.drive, float(known.truth.mass.mean()))
-    car = replace(calibration.vehicle, name="simulated midsize car", tare=known.scenario.car.mass)
     weighed: list[tuple[Weighing, float]] = []
-    for k, load in enumerate(LOADS, 1):
-        tell(f"simulating and weighing: {load:+.0f} kg")
-        chosen = replace(make_scenario("car", payload=load, seed=seed + k), name=f"{load:+.0f} kg")
-        made = simulate_car(chosen)
-        weighed.append((weigh(made.drive, car), float(made.truth.mass.mean())))
+    comparisons: list[tuple[Weighing, ...]] = []
+    # Shares of the work: a calibration takes twice as long as what is done with each drive.
+    with progress("demo", 5 + 3 * len(LOADS)) as bar:
+        bar.begin("simulating a drive of known mass", 2)
+        known = simulate_car(make_scenario("car-calibration", seed=seed), bar.within)
+        bar.begin("calibrating by it", 2)
+        calibration = run_calibration(
+            known.drive, float(known.truth.mass.mean()), progress=bar.within
+        )
+        car = replace(
+            calibration.vehicle, name="simulated midsize car", tare=known.scenario.car.mass
+        )
+        for k, load in enumerate(LOADS, 1):
+            name = f"{load:+.0f} kg"
+            bar.begin(f"simulating a drive with {name}")
+            chosen = replace(make_scenario("car", payload=load, seed=seed + k), name=name)
+            made = simulate_car(chosen, bar.within)
+            bar.begin(f"weighing it by {DEFAULT_METHOD}")
+            weighed.append((weigh(made.drive, car), float(made.truth.mass.mean())))
+            bar.begin("weighing it by every method")
+            comparisons.append(weighed[-1][0].compare())
+        bar.begin("writing the report")
+        write_report(
+            [w for w, _ in weighed],
+            output,
+            calibration=calibration,
+            truth={w.drive.name: mass for w, mass in weighed},
+            title="weighbridge demo: a simulated car, weighed three times",
+            comparisons=comparisons,
+        )
     _show(weighed)
-    write_report(
-        [w for w, _ in weighed],
-        output,
-        calibration=calibration,
-        truth={w.drive.name: mass for w, mass in weighed},
-        title="weighbridge demo: a simulated car, weighed three times",
-        comparisons=[w.compare() for w, _ in weighed],
-    )
-    say("told beside the recordings: the wind of the weather report")
-    say(f"report: {output}")
+    if not quiet():
+        say("told beside the recordings: the wind of the weather report")
+        say(f"report: {output}")
     if open_report and sys.stdout.isatty():
         import webbrowser
 
@@ -79,7 +94,3 @@ def _show(weighed: list[tuple[Weighing, float]]) -> None:
         numbers = (f"{truth:.0f}", f"{w.mass:.0f}", f"{low:.0f}", f"{high:.0f}", f"{error:+.2f}")
         table.add_row(w.drive.name, *numbers)
     console().print(table)
-
-
-def _keep_quiet(text: str) -> None:
-    """Say nothing in a pipe."""

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 from threading import Event
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from weighbridge.cli.options import DbcPaths, MappingPath, load
-from weighbridge.cli.terminal import complain, say
+from weighbridge.cli.terminal import console, say
+from weighbridge.cli.verbosity import notice, watched
+
+if TYPE_CHECKING:
+    from weighbridge.live.emulator.played import Played
 
 _GLANCE: Final = 0.2
 _WITHOUT: Final = {
@@ -51,13 +55,52 @@ def emulate(
     with devices(played, adapter=adapter, receiver=receiver, sensor=sensor, stop=stop) as sources:
         for kind, words in _WITHOUT.items():
             if not any(source.startswith(kind) for source in sources):
-                complain(words)
+                notice(words)
         say("weighbridge live --vehicle VEHICLE.toml" + _options(sources, rate))
-        complain("the vehicle begins to drive when this is typed in another terminal")
-        while not played.ended:
-            if played.begun.wait(_GLANCE):
-                stop.wait(_GLANCE)
-        complain("the drive is over; end the other command with q or Ctrl-C")
+        notice("the vehicle begins to drive when this is typed in another terminal")
+        with _Progress(played) as progress:
+            while not played.ended:
+                if played.begun.wait(_GLANCE):
+                    progress.draw()
+                    stop.wait(_GLANCE)
+        notice("the drive is over; end the other command with q or Ctrl-C")
+
+
+class _Progress:
+    """How much of the drive is over, in place on a terminal; nothing elsewhere."""
+
+    def __init__(self, played: Played) -> None:
+        from rich.live import Live
+
+        screen = console(stderr=True)
+        self._played = played
+        self._live = Live(console=screen, auto_refresh=False) if watched() else None
+
+    def __enter__(self) -> _Progress:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def draw(self) -> None:
+        """Draw what is over by now."""
+        if self._live is not None:
+            self._live.update(progress_text(self._played), refresh=True)
+
+
+def progress_text(played: Played) -> str:
+    """Write the time of the drive, in minutes and seconds, and its share of the whole."""
+    whole = played.end - played.start
+    done = min(max(played.time - played.start, 0.0), whole)
+    share = 100.0 * done / whole if whole > 0.0 else 100.0
+    return f"driven {_clock(done)} of {_clock(whole)} min, {share:.0f} %"
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
 
 
 def _options(sources: list[str], rate: float) -> str:

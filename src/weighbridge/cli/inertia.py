@@ -9,21 +9,22 @@ import typer
 
 from weighbridge.cli.options import (
     DbcPaths,
+    JsonPath,
     MappingPath,
+    OneDrive,
     ReportPath,
+    chosen_mapping,
     load,
 )
-from weighbridge.cli.results import asked_for, inputs, refuse_results
-from weighbridge.cli.terminal import say, say_json
+from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
+from weighbridge.cli.terminal import say
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.inertia import Inertia
 
 
 def inertia(
-    drive: Annotated[
-        Path, typer.Argument(help="Drive: folder of tables, or log file.", show_default=False)
-    ],
+    drive: OneDrive,
     vehicle: Annotated[
         Path,
         typer.Option("--vehicle", help="Vehicle file with its suspension.", show_default=False),
@@ -35,10 +36,15 @@ def inertia(
             help="kalman-bucy, or with one fixed process noise inverse, extended, printed.",
         ),
     ] = "kalman-bucy",
-    json_path: Annotated[
-        Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option("--json", help="Write a JSON object to a file, or - for here."),
+    settings: Annotated[
+        Optional[list[str]],  # noqa: UP045  (typer reads the annotation at run time)
+        typer.Option(
+            "--set",
+            help="Change a setting of the filter, such as jump_rate=1e-3; repeat it for more.",
+            metavar="NAME=VALUE",
+        ),
     ] = None,
+    json_path: JsonPath = None,
     track: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--track", help="Write the parameters over time: .csv or .parquet."),
@@ -54,26 +60,22 @@ def inertia(
 
     Example: weighbridge inertia ride/ --vehicle truck.toml --report ride.html
     """
-    from weighbridge.pipeline.given import mapping_of
+    from weighbridge.estimators.settings import parsed
     from weighbridge.pipeline.inertia import estimate_inertia
     from weighbridge.vehicle.model import Vehicle
-    from weighbridge.whole import write_whole
 
+    changes = parsed(settings or ())
     car = Vehicle.load(vehicle)
-    chosen = mapping_of(car, vehicle, mapping)
+    chosen = chosen_mapping(car, vehicle, mapping)
     refuse_results(
         inputs([drive], vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
     )
-    found = estimate_inertia(load(drive, chosen, dbc), car, method)
+    found = estimate_inertia(load(drive, chosen, dbc), car, method, settings=changes)
     if track is not None:
         found.write_track(track)
     if report is not None:
         found.report(report)
-    if json_path == "-":
-        say_json(found.to_json())
-    else:
-        if json_path is not None:
-            write_whole(json_path, found.to_json() + "\n")
+    if not write_json(json_path, found.to_json()):
         _show(found)
     if found.status != "converged":
         raise typer.Exit(1)
@@ -91,19 +93,29 @@ def _show(found: Inertia) -> None:
                     f"{name}: {what} {found.values[k]:.0f} {unit}, "
                     f"95 % between {low[k]:.0f} and {high[k]:.0f} {unit}"
                 )
-        front, rear = found.axle_loads
-        lightest, heaviest = found.mass_interval()
-        say(
-            f"mass {found.mass:.0f} kg, 95 % between {lightest:.0f} and {heaviest:.0f} kg: "
-            f"front axle {front:.0f} kg, rear axle {rear:.0f} kg"
-        )
+        say(f"mass {found.mass:.0f} kg, {_between(found.mass_interval())}")
+        for axle, load_, interval in zip(
+            ("front", "rear"), found.axle_loads, found.axle_load_intervals(), strict=True
+        ):
+            say(f"{axle} axle {load_:.0f} kg, {_between(interval)}")
         if found.vehicle.tare is not None:
-            say(f"payload {found.payload:.0f} kg over a tare of {found.vehicle.tare:.0f} kg")
+            say(
+                f"payload {found.payload:.0f} kg over a tare of {found.vehicle.tare:.0f} kg, "
+                f"{_between(found.payload_interval())}"
+            )
         if len(found.segments) > 1:
+            from weighbridge.signals.instants import span
+
             say("the load changed:")
             for s in found.segments:
-                say(f"  {s.start:.1f} to {s.end:.1f} s: sprung mass {s.values[0]:.0f} kg")
+                when = span(round(s.start, 1), round(s.end, 1))
+                say(f"  {when}: sprung mass {s.values[0]:.0f} kg")
     else:
         say(f"{name}: no mass ({found.status}): {found.reason}")
     for warning in found.warnings:
         say(f"  note: {warning}")
+
+
+def _between(interval: tuple[float, float]) -> str:
+    low, high = interval
+    return f"95 % between {low:.0f} and {high:.0f} kg"

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple, Optional
 
 import typer
 
-from weighbridge.cli.options import DbcPaths, DrivePaths, MappingPath, Whole, load_parts
+from weighbridge.cli.options import (
+    DbcPaths,
+    DrivePaths,
+    MappingPath,
+    Whole,
+    chosen_mapping,
+    load_parts,
+)
 from weighbridge.cli.terminal import console, say, shown
 
 if TYPE_CHECKING:
@@ -46,12 +53,11 @@ def inspect(
 
     Example: weighbridge inspect drive/ --vehicle car.toml
     """
-    from weighbridge.pipeline.given import mapping_of
     from weighbridge.pipeline.inspection import inspect_drive
     from weighbridge.vehicle.model import Vehicle
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
-    chosen = mapping_of(car, vehicle, mapping)
+    chosen = chosen_mapping(car, vehicle, mapping)
     screen = console(highlight=False)
     if not screen.is_terminal:
         screen.width = _WIDTH
@@ -98,17 +104,15 @@ def _next(found: Inspection, path: Path, parts: int, given: _Given) -> list[str]
     if any(p.serious for p in found.problems):
         return ["next: settle what is serious above, then inspect again"]
     if not _weighable(found):
-        return ["next: record what the nearest way lacks"]
+        return _what_lacks(found, path, given)
     car, base = given.car, None
     lines = []
     if car is None and _heavy(found):
         base = Path("base.toml")
-        named = f" --mapping {given.mapping}" if given.mapping is not None else ""
-        lines.append(
-            f"next: weighbridge vehicle new --class truck{named} -o {base} "
-            "(or bus, van): the log is none of a car"
-        )
+        lines.append(f"next: {_new_vehicle(found, given, base)}: the log is none of a car")
     weighs = car is not None and can_weigh(car)
+    if car is not None and weighs and not any(w.chosen for w in found.ways):
+        return [_other_torque(found, car)]
     if weighs:
         lines.append(" ".join(["next: weighbridge weigh", str(path), *given.options()]))
     if car is None or not weighs or by_data_sheet(car):
@@ -123,11 +127,61 @@ def _next(found: Inspection, path: Path, parts: int, given: _Given) -> list[str]
     return lines
 
 
+def _what_lacks(found: Inspection, path: Path, given: _Given) -> list[str]:
+    """Say how to go on where no way to weigh is open: record more, or state what 100 % are."""
+    from weighbridge.pipeline.inspection import REFERENCE_NEEDED
+
+    if found.ways[0].needs != (REFERENCE_NEEDED,):
+        return ["next: record what the nearest way lacks, or name its column in the mapping"]
+    if given.vehicle is not None:
+        return [
+            f"next: state what 100 % of the torque are, reference_torque_nm under [torque] of "
+            f"{given.vehicle}, then inspect again"
+        ]
+    base = Path("base.toml")
+    # The new file names the mapping.
+    options = " ".join(given._replace(mapping=None).options(base))
+    return [
+        f"next: {_new_vehicle(found, given, base)}, with the torque that 100 % are as NM",
+        f"then: weighbridge inspect {path} {options}",
+    ]
+
+
+def _new_vehicle(found: Inspection, given: _Given, base: Path) -> str:
+    """Command that writes the vehicle file of a log, by the torque of its best way."""
+    from weighbridge.vehicle.torque_sources import MEASURED, TORQUE_SOURCES
+
+    source = TORQUE_SOURCES[found.ways[0].torque]
+    words = ["weighbridge vehicle new --class", "truck" if _heavy(found) else "car"]
+    if source.signed and source.name != MEASURED:
+        words.append(f"--torque {source.name}")
+    if found.ways[0].needs:
+        words.append("--reference-torque NM")
+    words += [*given._replace(vehicle=None, dbc=None, whole=False).options(), f"-o {base}"]
+    others = "bus, van" if _heavy(found) else "van, bus, truck"
+    return f"{' '.join(words)} (or {others})"
+
+
+def _other_torque(found: Inspection, car: Vehicle) -> str:
+    """Say that a drive tells torque in another way than the vehicle file weighs by."""
+    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+    told, asked = TORQUE_SOURCES[found.ways[0].torque], car.torque.of_source
+    remedy = f"make a vehicle file of it: calibrate --torque {told.name}"
+    if told.signed:
+        remedy += f", or vehicle new --torque {told.name}"
+    return (
+        f"next: the vehicle file weighs by {asked.title}, and the drive holds {told.title}; "
+        f"{remedy}"
+    )
+
+
 def _heavy(found: Inspection) -> bool:
     """Whether a drive without a vehicle file seems to be of a truck or bus."""
     reference = found.drive.get("reference_torque")
     strong = reference is not None and len(reference) and float(reference.values.max()) > _STRONG
-    return found.drive.has("retarder_torque") or bool(strong)
+    by_j1939 = any(line.startswith("J1939") for line in found.drive.contents)
+    return found.drive.has("retarder_torque") or by_j1939 or bool(strong)
 
 
 def _show(screen: Console, found: Inspection, every_way: bool) -> None:

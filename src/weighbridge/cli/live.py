@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.options import DbcPaths, MappingPath, load
+from weighbridge.cli.options import DbcPaths, MappingPath, chosen_mapping, load
 from weighbridge.cli.results import (
     Result,
     asked_for,
@@ -20,6 +20,7 @@ from weighbridge.cli.results import (
     refuse_results,
 )
 from weighbridge.cli.terminal import complain, console, say
+from weighbridge.cli.verbosity import notice, quiet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from weighbridge.live.alerts import Alert
     from weighbridge.live.keeper import Keeper
     from weighbridge.live.outputs import Output
+    from weighbridge.live.recorder import Recorder
     from weighbridge.live.scale import LiveScale
     from weighbridge.live.session import Session
     from weighbridge.live.source import Source
@@ -153,9 +155,7 @@ def live(
     from weighbridge.live.feed import Feed
     from weighbridge.live.keys import keys
     from weighbridge.live.outputs import Outputs
-    from weighbridge.live.recorder import Recorder
     from weighbridge.live.session import Session
-    from weighbridge.pipeline.given import mapping_of
     from weighbridge.vehicle.model import Vehicle
 
     if (ticket is None) != (out is None):
@@ -165,7 +165,7 @@ def live(
     if bool(source) == (replay is not None):
         raise ConfigError("give --source KIND:PLACE once or more, or --replay DRIVE")
     car = Vehicle.load(vehicle)
-    chosen = mapping_of(car, vehicle, mapping)
+    chosen = chosen_mapping(car, vehicle, mapping)
     kept = _state_file(state, replay, vehicle)
     results = asked_for(track=None, report=None, json=json_path)
     if out is not None:
@@ -177,8 +177,8 @@ def live(
     refuse_results(read, results)
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     speed = _speed(rate, replayed=replay is not None)
-    sources, info = _sources(source or (), replay, speed, chosen, dbc, listen_only)
-    scale, keeper = _scale(car, kept, lateness, info)
+    sources, info, start = _sources(source or (), replay, speed, chosen, dbc, listen_only)
+    scale, keeper = _scale(car, kept, lateness, info, start, _step(replay, speed))
     with (
         at_rate(1.0 if replay is not None else speed),
         keys(wanted=not any(s.name == "lines:-" for s in sources)) as pressed,
@@ -191,7 +191,7 @@ def live(
             outputs=outputs,
             period=every,
             keeper=keeper,
-            recorder=None if record is None else Recorder(record, info),
+            recorder=None if record is None else _recorder(record, info),
             alerts=_alerts(above, below, car),
         )
         last = _run(session, pressed)
@@ -217,21 +217,22 @@ def _sources(
     mapping: Path | None,
     dbc: list[str] | None,
     listen_only: bool,
-) -> tuple[list[Source], DriveInfo]:
-    """Make the sources, and tell what is known beside their samples."""
+) -> tuple[list[Source], DriveInfo, float]:
+    """Make the sources; tell what is known beside their samples, and when they begin [s]."""
     from weighbridge.live.replay import Replay
     from weighbridge.signals import DriveInfo
 
     if replay is None:
+        from weighbridge.live.clock import now
         from weighbridge.live.sources import parse_source
 
         made = [
             parse_source(text, dbc=dbc or (), mapping=mapping, listen_only=listen_only)
             for text in texts
         ]
-        return made, DriveInfo()
+        return made, DriveInfo(), now()
     drive = load(replay, mapping, dbc)
-    return [Replay(drive, speed)], drive.info
+    return [Replay(drive, speed)], drive.info, drive.start
 
 
 def _speed(rate: str, *, replayed: bool) -> float:
@@ -249,6 +250,14 @@ def _speed(rate: str, *, replayed: bool) -> float:
     return speed
 
 
+def _step(replay: Path | None, speed: float) -> float:
+    """Choose the step of the scale [s]: nobody waits for what a replay shows on its fastest way."""
+    from weighbridge.live.replay import FASTEST_STEP
+    from weighbridge.signals.recent import STEP
+
+    return FASTEST_STEP if replay is not None and math.isinf(speed) else STEP
+
+
 def _state_file(state: str | None, replay: Path | None, vehicle: Path) -> Path | None:
     """Choose the file that keeps the state; None for none."""
     if state is not None:
@@ -257,20 +266,30 @@ def _state_file(state: str | None, replay: Path | None, vehicle: Path) -> Path |
 
 
 def _scale(
-    car: Vehicle, state: Path | None, lateness: float, info: DriveInfo
+    car: Vehicle, state: Path | None, lateness: float, info: DriveInfo, start: float, step: float
 ) -> tuple[LiveScale, Keeper | None]:
     """Go on from the state that was kept, or begin anew."""
     from weighbridge.live.keeper import Keeper
     from weighbridge.live.scale import LiveScale
 
     if state is None:
-        return LiveScale(car, lateness=lateness, info=info), None
+        return LiveScale(car, lateness=lateness, info=info, step=step), None
     refuse_missing_folder(state)
     keeper = Keeper(state)
-    scale, found = keeper.restored(car, lateness=lateness, info=info)
+    scale, found = keeper.restored(car, lateness=lateness, info=info, start=start, step=step)
     if found:
         complain(found)
     return scale, keeper
+
+
+def _recorder(folder: Path, info: DriveInfo) -> Recorder:
+    """Record into a folder, or beside it where it holds a drive: a service starts again."""
+    from weighbridge.live.recorder import Recorder, free_folder
+
+    free = free_folder(folder)
+    if free != folder:
+        complain(f"{folder} holds something and stays as it is: recorded into {free}")
+    return Recorder(free, info)
 
 
 def _outputs(
@@ -291,9 +310,9 @@ def _outputs(
         from weighbridge.live.outputs.page import Page
 
         shown = Page(*_address(page))
-        complain(f"page: {shown.name}")
+        notice(f"page: {shown.name}")
         made.append(shown)
-    return [*made, terminal(console(stderr=True))]
+    return made if quiet() else [*made, terminal(console(stderr=True))]
 
 
 def _address(text: str) -> tuple[str, int]:
@@ -343,8 +362,12 @@ def _run(session: Session, pressed: Callable[[], str]) -> LiveWeighing:
 
 
 def _calibrate(scale: LiveScale, ticket: float, car: Vehicle, out: Path) -> None:
-    """Calibrate by the mass of a weighbridge and write the vehicle file."""
-    from weighbridge.calibration.run import calibrate
+    """Calibrate by the mass of a weighbridge; write the vehicle file unless it is a worse one."""
+    from weighbridge.live.ticket import calibrated_by_ticket
 
-    calibrate([scale.recorded()], mass=ticket, vehicle=car).save(out)
-    complain(f"written: {out}")
+    found = calibrated_by_ticket(scale.recorded(), ticket, car)
+    if found.vehicle is None:
+        complain(f"{out} is not written: {found.told}")
+        return
+    found.vehicle.save(out)
+    complain(f"written: {out}; {found.told}")

@@ -16,10 +16,14 @@ import typer
 
 from weighbridge import __version__
 from weighbridge.cli import (
+    bound,
     calibrate,
+    coast,
     convert,
     demo,
+    doctor,
     emulate,
+    fleet,
     inertia,
     inspect,
     live,
@@ -32,6 +36,7 @@ from weighbridge.cli import (
 )
 from weighbridge.cli.listed import TellsMethods, TellsSources
 from weighbridge.cli.terminal import STREAM, complain, guarded, leave_quietly, say
+from weighbridge.cli.verbosity import EveryCommand, Quiet, Verbose, asked_anew
 from weighbridge.errors import WeighbridgeError
 from weighbridge.visible import visible_text
 
@@ -41,9 +46,9 @@ _NOBODY_READS: Final = 141
 
 app = typer.Typer(
     name="weighbridge",
+    cls=EveryCommand,
     help="Weigh a road vehicle while it drives, from data it already has.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     epilog="Start with: weighbridge demo",
 )
@@ -54,13 +59,17 @@ app.command(cls=TellsSources)(calibrate.calibrate)
 app.command(cls=TellsMethods)(weigh.weigh)
 app.command()(live.live)
 app.command()(inertia.inertia)
-app.command()(simulate.simulate)
+app.command()(bound.bound)
+app.command()(coast.coast)
 app.command()(convert.convert)
 app.command()(record.record)
 app.command()(emulate.emulate)
 app.command()(reproduce.reproduce)
 app.command("map")(map.map_log)
+app.command()(doctor.doctor)
 app.add_typer(vehicle.app, name="vehicle")
+app.add_typer(fleet.app, name="fleet")
+app.add_typer(simulate.app, name="simulate")
 
 
 def _print_version(wanted: bool) -> None:
@@ -77,6 +86,8 @@ def options(
             "--version", callback=_print_version, is_eager=True, help="Print the version."
         ),
     ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Weigh a road vehicle while it drives, from data it already has."""
 
@@ -85,7 +96,8 @@ def run() -> None:
     """Run the command line; a mistake of the caller is one line and exit status 2."""
     words = sys.argv[1:]
     # A help page is ours alone: its colours may pass.
-    with guarded(styled=not words or "--help" in words), _interruptible() as interrupted:
+    styled = not words or "--help" in words
+    with guarded(styled), asked_anew(), _interruptible() as interrupted:
         try:
             code = _started(words)
             sys.stdout.flush()

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Optional
 import typer
 
 from weighbridge.cli.options import DbcPaths
+from weighbridge.cli.progress import each
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
-from weighbridge.cli.terminal import complain, console, say, shown
+from weighbridge.cli.terminal import console, say, shown
+from weighbridge.cli.verbosity import notice, quiet, say_written
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,6 +23,12 @@ if TYPE_CHECKING:
 
     from weighbridge.io.dbc import Database
     from weighbridge.io.draft import Draft
+
+_NO_TORQUE = (
+    "  no column taken is a torque, a load or a power, without which nothing can be weighed. "
+    "If one that is not taken is, type the command again with --ask, which asks; or name it in the "
+    "mapping, as engine_torque, engine_torque_fraction, engine_load or engine_power"
+)
 
 _SHOWN = 12
 """Columns that are not taken, named at most."""
@@ -63,37 +71,37 @@ def map_log(
     Example: weighbridge map trip.csv -o map.toml
     """
     from weighbridge.errors import DriveError
+    from weighbridge.io.draft import tells_torque
     from weighbridge.io.draft_alike import kinds
+    from weighbridge.io.draft_speeds import with_compared_speeds
     from weighbridge.io.mapping_text import mapping_text
     from weighbridge.whole import whole_file
 
     if output is not None:
         refuse_results(inputs(logs, dbc=dbc), [Result("--output", output, "mapping")])
         refuse_overwriting(output, force, "mapping")
-    drafts: list[Draft] = []
-    refused: dict[Path, str] = {}
-    for path, draft in _files(logs, dbc or []):
-        try:
-            found = draft(path)
-        except DriveError as error:
-            refused[path] = str(error)
-            continue
-        drafts.append(found)
-    if not drafts:
-        raise DriveError("; ".join(refused.values()))
-    drafts = _settled(kinds(drafts, tuple(refused)), rate, ask)
+    drafts, refused = _drafts(_files(logs, dbc or []), ask)
+    drafts = with_compared_speeds(kinds(drafts, tuple(refused)))
+    drafts = _settled(drafts, rate, ask)
+    if nameless := [found for found in drafts if not found.known]:
+        raise DriveError(f"{nameless[0].path}: no column of it was named; nothing was written")
     screen = console(stderr=output is None)
-    for found in drafts:
-        _show(found, screen)
+    if output is not None or not quiet():
+        for found in drafts:
+            _show(found, screen)
     for sentence in refused.values():
-        complain(f"  left out: {sentence}")
+        notice(f"  left out: {sentence}")
+    if not tells_torque(*drafts):
+        notice(_NO_TORQUE)
     text = mapping_text(drafts, tuple(refused))
     if output is None:
         sys.stdout.write(text)
         return
     with whole_file(output) as part:
         part.write_text(text, encoding="utf-8")
-    say(f"written: {output}")
+    say_written(output)
+    if quiet():
+        return
     if any(found.rate_unknown for found in drafts):
         say(f"next: weighbridge map {shlex.join(map(str, logs))} --rate HZ -o {output} --force")
         return
@@ -101,6 +109,35 @@ def map_log(
     words = ["weighbridge", "inspect", drive, "--mapping", output]
     words += [word for d in dbc or () for word in ("--dbc", d)]
     say(f"next: {shlex.join(map(str, words))}")
+
+
+def _drafts(
+    files: list[tuple[Path, Callable[[Path], Draft]]], ask: bool
+) -> tuple[list[Draft], dict[Path, str]]:
+    """Draft the mapping of each file; say why where that cannot be.
+
+    Where no column of any file is known by its name, ``ask`` keeps them all: a person may know.
+    """
+    from weighbridge.errors import DriveError
+    from weighbridge.io.draft import UnknownColumnsError
+
+    drafts: list[Draft] = []
+    unknown: list[Draft] = []
+    refused: dict[Path, str] = {}
+    for path, draft in each(files, "reading", lambda file: file[0].name):
+        try:
+            drafts.append(draft(path))
+        except UnknownColumnsError as error:
+            refused[path] = str(error)
+            unknown.append(error.found)
+        except DriveError as error:
+            refused[path] = str(error)
+    if ask and not drafts:
+        drafts = unknown
+        refused = {p: why for p, why in refused.items() if p not in {d.path for d in unknown}}
+    if not drafts:
+        raise DriveError("; ".join(refused.values()))
+    return drafts, refused
 
 
 def _files(logs: list[Path], dbc: list[str]) -> list[tuple[Path, Callable[[Path], Draft]]]:
@@ -159,7 +196,12 @@ def _settled(drafts: list[Draft], rate: float | None, ask: bool) -> list[Draft]:
         if not 0.0 < rate < float("inf"):
             raise ConfigError(f"--rate must be more than 0 rows per second, got {rate:g}")
         drafts = [_rated(found, rate) for found in drafts]
-    return [asked(found) for found in drafts] if ask else drafts
+    if not ask:
+        return drafts
+    from weighbridge.io.draft import tells_torque
+
+    torque = tells_torque(*drafts)
+    return [asked(found, torque=torque) for found in drafts]
 
 
 def _rated(found: Draft, rate: float) -> Draft:

@@ -21,10 +21,17 @@ _NONE = "none"
 """Answer that leaves a column out."""
 
 
-def asked(found: Draft) -> Draft:
+def asked(found: Draft, *, torque: bool = True) -> Draft:
     """Ask about a draft: its time, then each column whose meaning or unit is not sure.
 
+    Where no column is known by its name, or none of the log tells a torque, each is asked about.
+
     Where nobody answers, what was drafted stays, with its doubts.
+
+    Parameters
+    ----------
+    found
+    torque : some column of the log tells one
     """
     from weighbridge.io.draft import timed
 
@@ -32,9 +39,12 @@ def asked(found: Draft) -> Draft:
         if found.times:
             time = _asked_time(found)
             found = found if time is found.times[0] else timed(found, time)
+        nameless = not found.known or not torque
         for name in [c.name for c in found.columns]:
             columns = {c.name: c for c in found.columns}
             taken = {c.quantity for c in found.known if c.name != name}
+            if nameless:
+                columns[name] = _asked_meaning(columns[name], taken)
             columns[name] = _asked_unit(_asked_quantity(columns[name], taken))
             found = replace(found, columns=tuple(columns.values()))
     except typer.Abort:
@@ -80,6 +90,23 @@ def _asked_rate(time: DraftTime) -> DraftTime:
         if 0.0 < rate < float("inf"):
             return replace(time, row_rate=rate, doubts=[])
         complain(f"{told!r} is no rate")
+
+
+def _asked_meaning(column: DraftColumn, taken: set[str]) -> DraftColumn:
+    """Ask what a column is where no name of the log tells of any."""
+    from weighbridge.signals import QUANTITIES
+
+    if column.quantity or not column.count:
+        return column
+    told = _answer(
+        f"{shown(column.name)}, {column.low:.4g} to {column.high:.4g}; what is it (a quantity of "
+        f"docs/files.md such as vehicle_speed, or {_NONE})",
+        [*(q for q in QUANTITIES if q not in taken), _NONE],
+        _NONE,
+    )
+    if told == _NONE:
+        return column
+    return replace(column, quantity=told, unit=QUANTITIES[told].suffix, doubt="")
 
 
 def _asked_quantity(column: DraftColumn, taken: set[str]) -> DraftColumn:

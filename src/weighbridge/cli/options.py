@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from weighbridge.signals import Drive
+    from weighbridge.vehicle.model import Vehicle
 
 DrivePaths = Annotated[
     list[Path],
@@ -17,6 +18,13 @@ DrivePaths = Annotated[
         "(joined by time), or one log.",
         show_default=False,
     ),
+]
+OneDrive = Annotated[
+    Path, typer.Argument(help="Drive: folder of tables, or log file.", show_default=False)
+]
+JsonPath = Annotated[
+    Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
+    typer.Option("--json", help="Write a JSON object to a file, or - for here."),
 ]
 MappingPath = Annotated[
     Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
@@ -39,6 +47,26 @@ Whole = Annotated[
     bool,
     typer.Option("--whole", help="Take each recording as one drive, whatever it holds."),
 ]
+
+
+def chosen_mapping(vehicle: Vehicle | None, home: Path | None, asked: Path | None) -> Path | None:
+    """Return the mapping asked for, else the one that the vehicle file names.
+
+    Raises
+    ------
+    ConfigError
+        The one that the vehicle file names is not there.
+    """
+    from weighbridge.errors import ConfigError
+    from weighbridge.pipeline.given import mapping_of
+
+    found = mapping_of(vehicle, home, asked)
+    if asked is None and found is not None and not found.exists():
+        raise ConfigError(
+            f"{home}: the mapping that it names, {found}, is not there: put it there, give "
+            "--mapping FILE, or leave out the line mapping"
+        )
+    return found
 
 
 def load(path: Path, mapping: Path | None, dbc: list[str] | None = None) -> Drive:

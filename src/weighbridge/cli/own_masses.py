@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -10,20 +10,25 @@ if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
 
 
-def own_mass_lines(car: Vehicle, drives: Sequence[Drive]) -> Iterator[str]:
+def own_mass_lines(
+    car: Vehicle, drives: Sequence[Drive], progress: Callable[[int, int], None] | None = None
+) -> Iterator[str]:
     """Say what each drive weighs with its own calibration, and what `weigh` would note of it.
 
     Parameters
     ----------
     car : as calibrated
     drives : of the calibration, in its order
+    progress : told of drives weighed of all
     """
     from weighbridge.errors import WeighbridgeError
     from weighbridge.pipeline.weighing import DEFAULT_METHOD, weigh
 
     made = car.provenance
     yield "its own drives, weighed with it (they made it, so this is no proof of others):"
-    for drive, kg in zip(drives, made.masses, strict=True):
+    for k, (drive, kg) in enumerate(zip(drives, made.masses, strict=True)):
+        if progress is not None:
+            progress(k, len(drives))
         try:
             own = weigh(drive, car, made.method or DEFAULT_METHOD)
         except WeighbridgeError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import select
 import signal
 import sys
 import threading
@@ -14,7 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Final, Optional
 import typer
 
 from weighbridge.cli.options import DbcPaths, MappingPath
-from weighbridge.cli.terminal import complain, console, say
+from weighbridge.cli.terminal import complain, console
+from weighbridge.cli.verbosity import notice, say_written, watched
 from weighbridge.errors import ConfigError, DriveError
 
 if TYPE_CHECKING:
@@ -79,7 +81,7 @@ def record(
         for s in source
     ]
     recorder = Recorder(output, DriveInfo(vehicle=car.name if car is not None else None))
-    with Feed(sources) as feed:
+    with recorder, Feed(sources) as feed:
         look(feed, needs(car), check)
         until = monotonic() + duration if duration is not None else float("inf")
         with _ended() as ended:
@@ -88,7 +90,7 @@ def record(
         raise DriveError(recorder.problem)
     if not arrived.count:
         raise DriveError(f"{output}: nothing was recorded, no sample came; check the sources")
-    say(f"written: {output}, {len(arrived.names)} signals, {arrived.count} samples")
+    say_written(f"{output}, {len(arrived.names)} signals, {arrived.count} samples")
 
 
 def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
@@ -98,6 +100,8 @@ def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
     ------
     ConfigError
         The person at the terminal wants no drive without it.
+    DriveError
+        Nothing came at all, and nobody is there to ask.
     """
     from weighbridge.live.arrival import Arrivals
 
@@ -112,6 +116,13 @@ def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
             whole = not any(arrivals.of(need).lacking for need in wanted)
             if whole and monotonic() - begun >= min(_LEAST_CHECK, seconds):
                 break
+    asked = sys.stdin.isatty() and sys.stderr.isatty()
+    if not arrivals.count and not asked:
+        lost = [f"{state.name}: {state.error}" for state in feed.states() if state.error]
+        raise DriveError(
+            f"no sample came within {seconds:g} s ({'; '.join(lost)}); check the sources, or give "
+            "--check 0 to wait for them"
+        )
     missing = [found for need in wanted if (found := arrivals.of(need)).lacking]
     for state in feed.states():
         if state.error:
@@ -120,10 +131,25 @@ def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
         such = "such as " if len(found.need.sets) > 1 else ""
         names = ", ".join(found.lacking)
         complain(f"no {found.need.name} ({such}{names}) has come; {found.need.why}")
-    if missing and sys.stdin.isatty() and sys.stderr.isatty():
+    if missing and asked:
         names = ", ".join(found.need.name for found in missing)
-        if not typer.confirm(f"Record without {names}?", err=True):
+        if not _confirmed(f"Record without {names}?"):
             raise ConfigError(f"not recorded: {names} did not come; check the sources")
+
+
+def _confirmed(question: str) -> bool:
+    """Ask a person; Ctrl-C ends it at once, whichever thread the system tells of it."""
+    try:
+        waiting = [sys.stdin.fileno()]
+    except (AttributeError, OSError, ValueError):
+        waiting = []
+    if sys.platform == "win32" or not waiting:
+        return typer.confirm(question, err=True)
+    sys.stderr.write(f"{question} [y/N]: ")
+    sys.stderr.flush()
+    while not select.select(waiting, [], [], _WAIT)[0]:
+        pass
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 def run(feed: Feed, recorder: Recorder, ended: Callable[[], bool]) -> Arrivals:
@@ -134,7 +160,7 @@ def run(feed: Feed, recorder: Recorder, ended: Callable[[], bool]) -> Arrivals:
     begun = told = monotonic()
     screen = console(stderr=True)
     try:
-        with screen.status("recording") if screen.is_terminal else contextlib.nullcontext() as line:
+        with screen.status("recording") if watched() else contextlib.nullcontext() as line:
             while not (ended() or feed.ended or recorder.problem):
                 blocks = feed.read(_WAIT)
                 for samples in blocks:
@@ -145,7 +171,7 @@ def run(feed: Feed, recorder: Recorder, ended: Callable[[], bool]) -> Arrivals:
                     line.update(_told(feed, arrivals, monotonic() - begun))
                 elif monotonic() - told >= _TOLD:
                     told = monotonic()
-                    complain(_told(feed, arrivals, told - begun))
+                    notice(_told(feed, arrivals, told - begun))
     finally:
         recorder.close()
     return arrivals
@@ -162,7 +188,7 @@ def _told(feed: Feed, arrivals: Arrivals, seconds: float) -> str:
 def _table(wanted: tuple[Need, ...], arrivals: Arrivals) -> Iterator[Callable[[], None]]:
     """Show on a terminal what arrives; nothing elsewhere."""
     screen = console(stderr=True)
-    if not screen.is_terminal:
+    if not watched():
         yield lambda: None
         return
     from rich.live import Live

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
-from weighbridge.cli.results import Result, inputs, refuse_results
+from weighbridge.cli.progress import progress
+from weighbridge.cli.results import Kind, Result, inputs, refuse_results
 from weighbridge.cli.terminal import console, say
+from weighbridge.cli.verbosity import say_written
 
 if TYPE_CHECKING:
     from weighbridge.papers import Reproduced
+    from weighbridge.papers.claims import Section
 
 
 def reproduce(
@@ -24,10 +26,23 @@ def reproduce(
         typer.Option(
             "--report",
             help="Write a report with the paper's figures from our data; of all papers, the "
-            "paper's name goes before the suffix.",
+            "paper's name goes before the suffix. As .md: every equation, table and figure of the "
+            "papers, where it is, and our figure of this run.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the simulated drives.")] = 777,
+    seed: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--seed", min=0, help="Of the simulated drives; the paper's own by default."),
+    ] = None,
+    changes: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            "--set",
+            help="Change what a paper varies, such as printed.forgetting=0.998; repeat it for "
+            "more. For jensen2022.",
+            metavar="NAME=VALUE",
+        ),
+    ] = None,
 ) -> None:
     """Reproduce a published system on simulated drives; exits with 1 where we fall behind.
 
@@ -39,37 +54,74 @@ def reproduce(
     if paper != "all" and paper not in papers.PAPERS:
         raise ConfigError(f"{paper}: known papers are {', '.join(papers.PAPERS)} and all")
     names = list(papers.PAPERS) if paper == "all" else [paper]
-    pages: dict[str, Path] = {}
-    if report is not None:
-        for name in names:
-            pages[name] = report if paper != "all" else report.with_stem(f"{report.stem}-{name}")
-    refuse_results(inputs(), [Result("--report", page, "report") for page in pages.values()])
+    settings = _settings(paper, changes or [])
+    pages = _pages(report, names, every=paper == "all")
+    written = dict.fromkeys([*pages.values(), *([report] if report is not None else [])])
+    refuse_results(inputs(), [Result("--report", page, _kind(page)) for page in written])
     behind: list[str] = []
+    sections: list[Section] = []
     for name in names:
-        done = papers.paper(name)(seed, _bar())
+        first = papers.seed_of(name) if seed is None else seed
+        asked = (settings,) if settings is not None else ()
+        with progress(f"reproducing {name}") as bar:
+            done = papers.paper(name)(first, bar.tell, *asked)
         show(done)
         behind += [f"{name}: {figure}" for figure in done.behind]
+        if papers.items_of(name):
+            sections.append(papers.section_of(name, done))
         if name in pages:
             done.write_report(pages[name])
-            say(f"written: {pages[name]}")
+            say_written(pages[name])
+    if report is not None and report not in pages.values():
+        _write_items(report, sections)
+        say_written(report)
     for figure in behind:
         say(f"behind, {figure}")
     if behind:
         raise typer.Exit(1)
 
 
-def _bar() -> Any:
-    """Show progress on a terminal, nothing in a pipe."""
-    if not sys.stderr.isatty():
+def _kind(page: Path) -> Kind:
+    return "list of items" if page.suffix.lower() == ".md" else "report"
+
+
+def _settings(paper: str, changes: list[str]) -> Any:
+    """Settings of a paper's reproduction; None where nothing was asked for."""
+    from weighbridge import papers
+    from weighbridge.errors import ConfigError
+    from weighbridge.estimators.settings import changed, parsed
+
+    if not changes:
         return None
+    kind = papers.settings_of(paper) if paper != "all" else None
+    if kind is None:
+        raise ConfigError(
+            f"--set {changes[0]}: {paper} has no settings to change; name one paper that has, such "
+            "as jensen2022"
+        )
+    return changed(kind(), parsed(changes))
 
-    def show_progress(done: int, total: int) -> None:
-        end = "\n" if done == total else ""
-        # Back to the begin of the line: a control character of ours.
-        below = getattr(sys.stderr, "below", sys.stderr)
-        print(f"\r{done} of {total} steps", end=end, file=below, flush=True)
 
-    return show_progress
+def _pages(report: Path | None, names: list[str], *, every: bool) -> dict[str, Path]:
+    """Page of each paper; none for a list of items."""
+    if report is None or report.suffix.lower() == ".md":
+        return {}
+    if not every:
+        return {names[0]: report}
+    return {name: report.with_stem(f"{report.stem}-{name}") for name in names}
+
+
+def _write_items(report: Path, sections: list[Section]) -> None:
+    """Write every item of the papers that have records, as Markdown or as a page."""
+    from weighbridge.papers.claims import document
+    from weighbridge.report.study import write_study
+    from weighbridge.whole import write_whole
+
+    if report.suffix.lower() == ".md":
+        write_whole(report, document(sections))
+        return
+    tables = [table for section in sections for table in section.tables]
+    write_study("The papers, item by item", tables, [], report)
 
 
 def show(done: Reproduced) -> None:

@@ -10,14 +10,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
+from weighbridge.cli.terminal import say_json
 from weighbridge.errors import ConfigError
-from weighbridge.whole import is_stream
+from weighbridge.whole import is_stream, write_whole
 
-Kind = Literal["report", "JSON file", "track", "vehicle file", "mapping", "MF4", "state"]
+Kind = Literal[
+    "report", "list of items", "JSON file", "track", "vehicle file", "mapping", "MF4", "state"
+]
 
 # What a file of each kind shows at its beginning.
 _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
     "report": re.compile(rb"\A\s*<(?:!doctype\s+html|html)\b", re.IGNORECASE),
+    "list of items": re.compile(rb"\A# The papers, item by item\b"),
     "JSON file": re.compile(rb"\A\s*\{"),
     # Columns that no drive has and no truth; a Parquet file names them within its first page.
     "track": re.compile(rb"\A[^\r\n]*\btime_s\b[^\r\n]*(?:\bstd_kg\b|\bsprung_mass_std_kg\b)"),
@@ -141,6 +145,16 @@ def refuse_results(read: Inputs, results: Sequence[Result]) -> None:
                     f"{path}: is there already and is no {result.kind}; name another file for "
                     f"{result.option}, or remove this one"
                 )
+
+
+def write_json(path: str | None, text: str) -> bool:
+    """Write JSON to a file, or print it where the path is -; tell whether it was printed."""
+    if path == "-":
+        say_json(text)
+        return True
+    if path is not None:
+        write_whole(path, text + "\n")
+    return False
 
 
 def refuse_folder(read: Inputs, folder: Path) -> None:

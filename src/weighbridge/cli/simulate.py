@@ -1,4 +1,4 @@
-"""``weighbridge simulate``: a drive with known truth."""
+"""``weighbridge simulate``: a drive with known truth, or the drives of a fleet."""
 
 from __future__ import annotations
 
@@ -7,17 +7,23 @@ from typing import Annotated, Optional
 
 import typer
 
+from weighbridge.cli.fleet import RunsDrives, Unnamed
+from weighbridge.cli.progress import progress
 from weighbridge.cli.results import inputs, refuse_folder, refuse_overwriting
 from weighbridge.cli.terminal import say
 
+app = typer.Typer(cls=RunsDrives, help="Simulate a drive, or the drives of a fleet.")
 
+
+@app.command("run", cls=Unnamed, hidden=True)
 def simulate(
     scenario: Annotated[
         str,
         typer.Argument(
             help="car, car-calibration, car-short, car-loading, highway, compact, "
             "compact-calibration, electric, bus, bus-urban, bus-calibration, diesel, "
-            "diesel-calibration, van, van-calibration, truck, truck-calibration or ride.",
+            "diesel-calibration, van, van-calibration, truck, truck-calibration or ride; fleet has "
+            "options of its own: weighbridge simulate fleet --help.",
             show_default=False,
         ),
     ],
@@ -82,10 +88,49 @@ def simulate(
         chosen = replace(chosen, wind_from=scalar_to_si(wind_from, "deg"))
     if without:
         chosen = replace(chosen, effects=chosen.effects.without(*without))
-    made = simulate_car(chosen)
-    made.write(output, format=table)  # type: ignore[arg-type]
+    with progress(f"simulating {scenario}", 1.2) as bar:
+        bar.begin(f"simulating {scenario}")
+        made = simulate_car(chosen, bar.within)
+        bar.begin(f"writing {output}", 0.2)
+        made.write(output, format=table)  # type: ignore[arg-type]
     minutes = made.drive.duration / 60.0
     say(f"{output}: {minutes:.1f} min, {made.truth.mass[0]:.0f} kg at the start")
+
+
+@app.command()
+def fleet(
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", help="Folder to make; it must be new.", show_default=False),
+    ],
+    vehicles: Annotated[int, typer.Option("--vehicles", help="Of the fleet.")] = 50,
+    days: Annotated[int, typer.Option("--days", help="Of drives.")] = 5,
+    drives: Annotated[int, typer.Option("--drives", help="Of each vehicle and day.")] = 4,
+    minutes: Annotated[float, typer.Option("--minutes", help="Length of a drive.")] = 20.0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of everything random.")] = 1,
+    start: Annotated[str, typer.Option("--start", help="First day.")] = "2026-05-04",
+    workers: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--workers", help="Processes; one per core unless given."),
+    ] = None,
+) -> None:
+    """Simulate days of trucks, vans, buses and cars: loads, overloads, trailers, broken sensors.
+
+    Writes drives, vehicle files, drives.csv, tickets.csv of weighed departures and truth.csv; the
+    same for the same seed, by any number of processes.
+
+    Example: weighbridge simulate fleet -o fleet/ --vehicles 10 --days 2 --minutes 10
+    """
+    from weighbridge.simulation.fleet import FleetSettings
+    from weighbridge.simulation.fleet_files import write_fleet
+
+    settings = FleetSettings(
+        vehicles=vehicles, days=days, drives=drives, minutes=minutes, seed=seed, start=start
+    )
+    with progress("simulating the drives") as bar:
+        count = write_fleet(output, settings, workers=workers, tell=bar.tell)
+    say(f"{output}: {count} drives of {vehicles} vehicles; weigh them with")
+    say(f"  weighbridge fleet {output}/drives.csv --vehicles {output}/vehicles -o RESULTS")
 
 
 def _simulate_ride(

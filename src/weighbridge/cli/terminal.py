@@ -61,7 +61,7 @@ class Terminal(io.TextIOBase):
 
     def isatty(self) -> bool:
         """Tell whether a person reads along."""
-        return self.below.isatty()
+        return os.environ.get("TTY_COMPATIBLE") != "0" and self.below.isatty()
 
     def fileno(self) -> int:
         """Return the number of the open file."""
@@ -142,6 +142,22 @@ def shown(text: str) -> str:
     from rich.markup import escape
 
     return escape(visible(cut(text)))
+
+
+def say_notes(notes: Iterable[str], screen: Console) -> None:
+    """Print notes below a result: broken between words on a terminal, one line each elsewhere."""
+    if not screen.is_terminal:
+        for note in notes:
+            say(f"  note: {note}")
+        return
+    from rich.table import Table
+
+    grid = Table.grid(padding=(0, 1))
+    grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
+    for note in notes:
+        grid.add_row("  note:", shown(note))
+    screen.print(grid, highlight=False)
 
 
 def leave_quietly() -> None:

@@ -11,6 +11,7 @@ from weighbridge.cli.listed import TellsSources
 from weighbridge.cli.options import MappingPath
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say, shown
+from weighbridge.cli.verbosity import say_written
 
 if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
@@ -136,7 +137,7 @@ def new(
     )
     save_vehicle(made.vehicle, output, made.origins)
     _print(output, made.vehicle)
-    say(f"written: {output}")
+    say_written(output)
 
 
 @app.command()

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
@@ -14,20 +15,32 @@ from weighbridge.cli.options import (
     MappingPath,
     ReportPath,
     Whole,
+    chosen_mapping,
     load_parts,
 )
-from weighbridge.cli.results import asked_for, inputs, refuse_results
-from weighbridge.cli.terminal import complain, console, say, say_json, shown
+from weighbridge.cli.progress import Bar, progress
+from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
+from weighbridge.cli.terminal import console, say, say_notes, shown
+from weighbridge.cli.verbosity import say_written
 from weighbridge.whole import is_stream
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
     from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.signals import Drive
     from weighbridge.vehicle.model import Vehicle
 
 # Width of the table where no terminal gives one: a reason needs room.
 _WIDTH = 160
+
+# Narrower, reasons stand below the table, and durations are left out.
+_ROOMY = 110
+
+# Time that a comparison and a report take, in weighings of the drive.
+_COMPARING = 1.5
+_REPORTING = 0.3
 
 # Warnings of one drive that are printed below a table of several.
 _NOTED = 3
@@ -59,6 +72,15 @@ _Compare = Annotated[
         "--compare", help="Weigh by every method; show them side by side, in the report too."
     ),
 ]
+_Tiles = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--tiles",
+        help="Draw the maps of the report over tiles of this address, with {z}, {x} and {y}; the "
+        "page then asks that server.",
+        metavar="URL",
+    ),
+]
 
 
 def weigh(
@@ -70,6 +92,7 @@ def weigh(
     track: _Track = None,
     report: ReportPath = None,
     compare: _Compare = False,
+    tiles: _Tiles = None,
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
@@ -84,44 +107,46 @@ def weigh(
     """
     from weighbridge.errors import ConfigError
     from weighbridge.estimators.settings import parsed
-    from weighbridge.pipeline.given import mapping_of
     from weighbridge.vehicle.model import Vehicle
-    from weighbridge.whole import write_whole
 
     if track is not None and len(drives) > 1:
         raise ConfigError("--track takes one drive; weigh them one by one, or use --json")
+    if tiles is not None:
+        from weighbridge.report.tiles import Tiles
+
+        if report is None:
+            raise ConfigError("--tiles draws maps of a report; name it with --report FILE.html")
+        Tiles(tiles)
     car = Vehicle.load(vehicle)
-    chosen = mapping_of(car, vehicle, mapping)
+    chosen = chosen_mapping(car, vehicle, mapping)
     refuse_results(
         inputs(drives, vehicle, chosen, dbc), asked_for(track=track, report=report, json=json_path)
     )
-    weighed, failed = _weighed(
-        drives,
-        car,
-        method,
-        parsed(changes or []),
-        chosen,
-        dbc,
-        whole=whole,
-        alone=track is not None,
-    )
-    compared = [w.compare() for w in weighed] if compare else []
-    if track is not None:
-        weighed[0].write_track(track)
-    if report is not None:
-        from weighbridge.report import write_report
+    settings = parsed(changes or [])
+    shares = 1.0 + _COMPARING * compare + _REPORTING * (report is not None)
+    with progress("weighing", len(drives) * shares) as bar:
+        given = partial(load_parts, mapping=chosen, dbc=dbc, whole=whole)
+        weighed, failed = _weighed(
+            drives, given, car, method, settings, bar, alone=track is not None
+        )
+        bar.total = len(drives) + len(weighed) * (shares - 1.0)
+        compared = []
+        for w in weighed if compare else []:
+            bar.begin(f"weighing {w.drive.name} by every method", _COMPARING)
+            compared.append(w.compare())
+        if track is not None:
+            weighed[0].write_track(track)
+        if report is not None:
+            from weighbridge.report import write_report
 
-        if not weighed:
-            raise ConfigError(f"--report {report}: none of the drives could be read")
-        write_report(weighed, report, comparisons=compared)
+            if not weighed:
+                raise ConfigError(f"--report {report}: none of the drives could be read")
+            bar.begin("writing the report", len(weighed) * _REPORTING)
+            write_report(weighed, report, comparisons=compared, tiles=tiles)
     lines = [w.to_json() for w in weighed] + [
         _failure(name, why, car, method) for name, why in failed
     ]
-    if json_path == "-":
-        say_json("\n".join(lines))
-    else:
-        if json_path is not None:
-            write_whole(json_path, "\n".join(lines) + "\n")
+    if not write_json(json_path, "\n".join(lines)):
         _show(weighed, failed, compared)
     _tell_written([json_path, track, report], beside_json=json_path == "-")
     if failed:
@@ -132,27 +157,27 @@ def weigh(
 
 def _weighed(
     drives: list[Path],
+    given: Callable[[Path], list[Drive]],
     car: Vehicle,
     method: str,
     settings: dict[str, object],
-    mapping: Path | None,
-    dbc: list[str] | None,
+    bar: Bar,
     *,
-    whole: bool,
     alone: bool,
 ) -> tuple[list[Weighing], list[tuple[str, str]]]:
     """Weigh every drive of the recordings; name those that could not be, and why.
 
-    ``alone`` refuses a recording of several drives.
+    ``given`` reads the drives of a recording, and ``alone`` refuses one of several.
     """
     from weighbridge.errors import ConfigError, WeighbridgeError
     from weighbridge.pipeline.weighing import weigh as weigh_drive
 
     weighed: list[Weighing] = []
     failed: list[tuple[str, str]] = []
-    for path in _progress(drives):
+    for path in drives:
+        bar.begin(f"weighing {path.name}")
         try:
-            parts = load_parts(path, mapping, dbc, whole=whole)
+            parts = given(path)
         except WeighbridgeError as error:
             if len(drives) == 1:
                 raise
@@ -163,7 +188,8 @@ def _weighed(
                 f"--track takes one drive, and {path} holds {len(parts)}: use --json, or --whole "
                 "to take them as one"
             )
-        for drive in parts:
+        for k, drive in enumerate(parts):
+            bar.within(k, len(parts))
             try:
                 weighed.append(weigh_drive(drive, car, method, settings=settings))
             except WeighbridgeError as error:
@@ -177,16 +203,7 @@ def _tell_written(paths: list[str | Path | None], *, beside_json: bool) -> None:
     """Name the files that were written, out of the way of JSON on standard output."""
     for path in paths:
         if path is not None and str(path) != "-" and not is_stream(path):
-            (complain if beside_json else say)(f"written: {path}")
-
-
-def _progress(drives: list[Path]) -> Any:
-    """Show a bar on a terminal while several drives are weighed."""
-    if len(drives) == 1 or not sys.stderr.isatty():
-        return drives
-    from rich.progress import track
-
-    return track(drives, description="weighing", console=console(stderr=True), transient=True)
+            say_written(path, aside=beside_json)
 
 
 def _failure(name: str, why: str, car: Vehicle, method: str) -> str:
@@ -205,19 +222,25 @@ def _show(
     screen = console()
     if not screen.is_terminal:
         screen.width = _WIDTH
+    narrow = screen.width < _ROOMY
     if len(weighed) == 1 and not failed:
-        _show_one(weighed[0])
+        _show_one(weighed[0], screen)
     else:
-        screen.print(result_table(weighed, failed))
-        for line in warning_lines(weighed):
-            screen.print(f"  note: {shown(line)}", no_wrap=True, overflow="ellipsis")
+        screen.print(result_table(weighed, failed, narrow=narrow))
+        if narrow:
+            for line in reason_lines(weighed, failed):
+                screen.print(shown(line), highlight=False)
+        say_notes(warning_lines(weighed), screen)
     for methods in compared:
-        screen.print(method_table(methods))
+        screen.print(method_table(methods, narrow=narrow))
+        without = [w for w in methods if w.status != "converged"]
+        for w in without if narrow else ():
+            screen.print(shown(f"{w.method}: no mass: {w.reason}"), highlight=False)
         if note := made_for(methods):
-            say(f"  note: {note}")
+            say_notes([note], screen)
 
 
-def _show_one(w: Weighing) -> None:
+def _show_one(w: Weighing, screen: Console) -> None:
     if w.status == "converged":
         low, high = w.interval(0.95)
         say(f"{w.drive.name}: {w.mass:.0f} kg, 95 % between {low:.0f} and {high:.0f} kg")
@@ -230,21 +253,21 @@ def _show_one(w: Weighing) -> None:
         say(f"from {minutes:.1f} min of {w.drive.duration / 60.0:.1f} min, method {w.method}")
     else:
         say(f"{w.drive.name}: no mass ({w.status}): {w.reason}")
-    for warning in w.warnings:
-        say(f"  note: {warning}")
+    say_notes(w.warnings, screen)
 
 
-def method_table(methods: tuple[Weighing, ...]) -> Table:
-    """One row a method: its mass of one drive, or why there is none."""
-    from rich.table import Table
+def method_table(methods: tuple[Weighing, ...], *, narrow: bool = False) -> Table:
+    """One row a method: its mass of one drive, or why there is none.
 
-    table = Table(title=shown(methods[0].drive.name), title_justify="left")
+    A ``narrow`` one has the status alone, and no payload.
+    """
+    table = _table(narrow=narrow)
+    table.title = shown(methods[0].drive.name)
     table.add_column("method", no_wrap=True)
-    for name in ("mass kg", "95 % from", "to", "payload kg"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("status or reason")
+    kept = 3 if narrow else 4
+    _add_outcome_columns(table, kept, narrow=narrow)
     for w in methods:
-        table.add_row(w.method, *_numbers(w), _outcome(w))
+        table.add_row(w.method, *_numbers(w)[:kept], _outcome(w, narrow=narrow))
     return table
 
 
@@ -272,8 +295,28 @@ def _numbers(w: Weighing) -> list[str]:
     return [f"{x:.0f}" if x == x else "" for x in (w.mass, *w.interval(0.95), w.payload)]
 
 
-def _outcome(w: Weighing) -> str:
-    return str(w.status) if w.status == "converged" else shown(f"{w.status}: {w.reason}")
+def _table(*, narrow: bool) -> Table:
+    """Make an empty table; a narrow one spends no room on lines between the columns."""
+    from rich import box
+    from rich.table import Table
+
+    if narrow:
+        return Table(title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    return Table(title_justify="left")
+
+
+def _add_outcome_columns(table: Table, kept: int, *, narrow: bool) -> None:
+    """Add the first columns of numbers, and the outcome; a heading may break, a number may not."""
+    for name in ("mass kg", "95 % from", "to", "payload kg")[:kept]:
+        widest = max(map(len, name.split()))
+        table.add_column(name, justify="right", min_width=max(widest, 5), no_wrap=not narrow)
+    table.add_column("status" if narrow else "status or reason", no_wrap=narrow)
+
+
+def _outcome(w: Weighing, *, narrow: bool) -> str:
+    if narrow or w.status == "converged":
+        return str(w.status)
+    return shown(f"{w.status}: {w.reason}")
 
 
 def warning_lines(weighed: list[Weighing]) -> list[str]:
@@ -296,31 +339,38 @@ def warning_lines(weighed: list[Weighing]) -> list[str]:
     return lines
 
 
-def result_table(weighed: list[Weighing], failed: list[tuple[str, str]]) -> Table:
-    """One row a drive: its mass, or why there is none."""
-    from rich.table import Table
+def reason_lines(weighed: list[Weighing], failed: list[tuple[str, str]]) -> list[str]:
+    """Say why drives have no mass, for a table that has no room for it."""
+    without = [w for w in weighed if w.status != "converged"]
+    return [f"{w.drive.name}: no mass ({w.status}): {w.reason}" for w in without] + [
+        why if name in why else f"{name}: {why}" for name, why in failed
+    ]
 
+
+def result_table(
+    weighed: list[Weighing], failed: list[tuple[str, str]], *, narrow: bool = False
+) -> Table:
+    """One row a drive: its mass, or why there is none.
+
+    A ``narrow`` one has the status alone, and not how long the drive was.
+    """
     from weighbridge.vehicle.data_sheet import by_data_sheet
     from weighbridge.vehicle.telling import worth
 
-    table = Table(title_justify="left")
+    table = _table(narrow=narrow)
     if weighed and by_data_sheet(weighed[0].vehicle):
         car = weighed[0].vehicle
         table.title = shown(f"{car.name} {worth(car)}")
-    table.add_column("drive", no_wrap=True)
-    table.add_column("min", justify="right")
-    table.add_column("used", justify="right")
-    for name in ("mass kg", "95 % from", "to", "payload kg"):
+    times = () if narrow else ("min", "used")
+    table.add_column("drive", overflow="fold")
+    for name in times:
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("status or reason")
+    _add_outcome_columns(table, 4, narrow=narrow)
     for w in weighed:
-        table.add_row(
-            shown(w.drive.name),
-            f"{w.drive.duration / 60.0:.1f}",
-            f"{w.used_time / 60.0:.1f}",
-            *_numbers(w),
-            _outcome(w),
-        )
+        minutes = [f"{t / 60.0:.1f}" for t in (w.drive.duration, w.used_time)]
+        cells = (*minutes[: len(times)], *_numbers(w), _outcome(w, narrow=narrow))
+        table.add_row(shown(w.drive.name), *cells)
     for name, why in failed:
-        table.add_row(shown(name), "", "", "", "", "", "", shown(f"unreadable: {why}"))
+        outcome = "unreadable" if narrow else shown(f"unreadable: {why}")
+        table.add_row(shown(name), *[""] * (len(times) + 4), outcome)
     return table

@@ -62,13 +62,8 @@ def sensitivity(
     """
     noise = np.where(taken, noise, UNSEEN * noise)
     start = start._replace(x=np.zeros_like(start.x))
-    params = params._replace(gate=np.inf)
-    moved = []
-    for column in columns.T:
-        y = np.ascontiguousarray(column)
-        state, *_ = disturbance.run(start, time, rows, y, noise, added, params)
-        moved.append(float(state.x[0]))
-    return np.array(moved)
+    columns = np.ascontiguousarray(columns)
+    return np.asarray(disturbance.weighed(start, time, rows, columns, noise, added, params))
 
 
 def from_triangle(values: tuple[float, ...]) -> Floats:

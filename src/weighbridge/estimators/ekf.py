@@ -12,6 +12,7 @@ from weighbridge.balance.averaging import PAUSE
 from weighbridge.balance.instants import SLOWEST_GEARED
 from weighbridge.balance.law import drag_factor, rotating_mass
 from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError
 from weighbridge.estimators import robust_rls
 from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.track import MassTrack
@@ -29,6 +30,7 @@ class EkfFilter:
     Attributes
     ----------
     start : the least squares whose first estimate starts the filter
+    start_mass : that it starts from, in place of theirs [kg]
     start_std : of the mass it starts from, relative [-]
     speed_noise : error of the speed that stays for a second [m/s]
     grade_noise : error of the grade that stays for a second [rad]
@@ -41,10 +43,12 @@ class EkfFilter:
     grade_offset : of the measured grade, at the start [rad]: zero of the
         accelerometer, lean of the vehicle
     offset_walk : change of that offset in one second [rad]
-    gate : speed innovations beyond this many standard deviations are left out [-]
+    gate : speed innovations beyond this many standard deviations are left out [-]; inf leaves none
+        out, as the paper
     """
 
     start: robust_rls.RobustRlsFilter = field(default_factory=robust_rls.RobustRlsFilter)
+    start_mass: float | None = None
     start_std: float = 0.3
     speed_noise: float = 0.01
     grade_noise: float = 0.004
@@ -57,8 +61,11 @@ class EkfFilter:
     gate: float = 5.0
 
     def __post_init__(self) -> None:
-        for name in ("start_std", "speed_noise", "grade_noise", "accel_walk", "gate"):
+        for name in ("start_std", "speed_noise", "grade_noise", "accel_walk"):
             positive(name, getattr(self, name))
+        if not self.gate > 0.0:
+            raise ConfigError(f"gate must be positive, got {self.gate}")
+        positive("start_mass", self.start_mass)
         for name in ("grade_walk", "mass_walk", "load_walk", "grade_offset", "offset_walk"):
             not_negative(name, getattr(self, name))
 
@@ -164,11 +171,17 @@ def estimate(
     Du et al. 2025, eqs. 21-33.
     """
     settings = settings or EkfSettings()
+    balance, vehicle = robust_rls.as_set(balance, vehicle, settings.start)
     table = balance.table
     phi, y, valid = robust_rls.rows(table, vehicle, settings.start)
     rls_params = robust_rls.parameters(settings.start, robust_rls.row_period(table.time))
     _, theta, _, information, mean_phi, mean_y, _ = rls_kernel.run(
-        robust_rls.initial_state(), table.time, phi, y, valid, rls_params
+        robust_rls.initial_state(settings.start, rls_params.window),
+        table.time,
+        phi,
+        y,
+        valid,
+        rls_params,
     )
     fit = robust_rls.window_fit(table.time, mean_phi, mean_y, rls_params)
     params = parameters(settings, vehicle, robust_rls.row_period(table.time))
@@ -176,10 +189,12 @@ def estimate(
     informed = np.flatnonzero(information * rls_params.window >= settings.start.first_information)
     n = table.time.size
     mass, var, taken = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool)
-    if informed.size:
-        k = int(informed[0])
+    first = settings.start_mass
+    if (informed.size or first is not None) and n:
+        k = 0 if first is not None else int(informed[0])
+        first = float(theta[k]) if first is None else first
         start = kernel.initial_state(
-            theta[k], (settings.start_std * theta[k]) ** 2, kernel.row_at(rows, k), params
+            first, (settings.start_std * first) ** 2, kernel.row_at(rows, k), params
         )
         _, mass, var, _, taken = kernel.run(start, rows, k, params)
     return robust_rls.finish(

@@ -93,6 +93,18 @@ def lacks_accelerometer(vehicle: Vehicle, motion: Motion) -> bool:
     return with_one and motion.source in BY_SPEED
 
 
+def grade_apart(vehicle: Vehicle, motion: Motion) -> float:
+    """How much surer or less sure the grade of a drive is than that of the calibration [rad].
+
+    0 where either had an accelerometer, or nothing was fitted.
+    """
+    made = vehicle.provenance
+    known = made.unmeasured_grade if made.torque_fitted and made.motion in BY_SPEED else None
+    if known is None or motion.source not in BY_SPEED:
+        return 0.0
+    return abs(motion.unmeasured_grade - known)
+
+
 def uncalibrated_std(vehicle: Vehicle, motion: Motion) -> float:
     """Relative standard deviation by what a data sheet leaves open [-]."""
     holds_squat = motion.source not in BY_SPEED and motion.squat is None

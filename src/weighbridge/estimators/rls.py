@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
+from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged
 from weighbridge.estimators.gate import GateSettings
@@ -32,8 +35,13 @@ class RlsSettings(GateSettings):
         rates it is changed so that the memory in seconds stays
     initial_mass : [kg]
     initial_gain : p(0) [s^4/m^2]
-    gate : rows with a larger normalised innovation are left out [-]
+    gate : rows with a larger normalised innovation are left out, ``inf`` for none, as in the
+        paper [-]
     settle_rows : rows before the gate closes
+    wind_up_guard : nothing is forgotten where the gain would grow beyond its start; the paper
+        has no such guard
+    every_row : every row with rising speed and a gear, as the paper has it: those of shifts,
+        curves, a slipping clutch and a dragged engine too
     """
 
     forgetting: float = 0.9995
@@ -41,6 +49,8 @@ class RlsSettings(GateSettings):
     initial_gain: float = 1000.0
     gate: float = 5.0
     settle_rows: int = 200
+    wind_up_guard: bool = True
+    every_row: bool = False
 
     def __post_init__(self) -> None:
         GateSettings.__post_init__(self)
@@ -48,7 +58,19 @@ class RlsSettings(GateSettings):
             raise ConfigError(f"forgetting must be in (0.9, 1], got {self.forgetting}")
         if not self.initial_gain > 0.0:
             raise ConfigError(f"initial_gain must be positive, got {self.initial_gain}")
+        if not self.gate > 0.0:
+            raise ConfigError(f"gate must be positive, got {self.gate}")
 
+
+_LEFT_OUT_SINCE: Final = (
+    Reason.BRAKING,
+    Reason.SHIFTING,
+    Reason.CLUTCH_SLIPPING,
+    Reason.OVERRUN,
+    Reason.EXTRAPOLATED,
+    Reason.CORNERING,
+)
+"""Reasons against a row that the paper does not know."""
 
 PAPER_RATE: Final = 4.0
 """Rate at which the forgetting factor of the paper applies [Hz] (sec. 7.1)."""
@@ -59,7 +81,7 @@ def parameters(settings: RlsSettings, period: float) -> kernel.RlsParams:
     forgetting = settings.forgetting ** (PAPER_RATE * period)
     return kernel.RlsParams(
         forgetting=forgetting,
-        cov_limit=np.array([settings.initial_gain]),
+        cov_limit=np.array([settings.initial_gain if settings.wind_up_guard else np.inf]),
         gate=settings.gate,
         scale_rows=400.0,
         settle_rows=settings.settle_rows,
@@ -89,17 +111,10 @@ def estimate(
     """
     settings = settings or RlsSettings()
     table = balance.table
-    phi, y = regression(table, vehicle)
-    row_reason = table.reason.copy()
-    row_reason[(row_reason == 0) & (table.accel <= 0.0)] = Reason.NOT_ACCELERATING
-    row_reason[(row_reason == 0) & ~(np.isfinite(phi) & np.isfinite(y))] = Reason.NO_MOTION
+    phi, y, row_reason = _rows(balance, vehicle, settings)
     valid = row_reason == 0
-    period = float(np.median(np.diff(table.time))) if table.time.size > 1 else 1.0 / PAPER_RATE
-    state = kernel.initial_state(  # type: ignore[no-untyped-call]
-        [settings.initial_mass], [[settings.initial_gain]]
-    )
-    state, theta, var, _, taken = kernel.run(
-        state, table.time, phi[:, None], y, valid, parameters(settings, period)
+    _, theta, var, _, taken = kernel.run(
+        _start(settings), table.time, phi[:, None], y, valid, parameters(settings, _period(table))
     )
     row_reason[valid & ~taken] = Reason.BAD_FIT
     used = row_reason == Reason.USED
@@ -138,6 +153,67 @@ def estimate(
         reason=found.reason,
         segments=segments(balance, vehicle, phi, used, part, settings),
     )
+
+
+def run_in_turn(
+    balances: Sequence[ForceBalance], vehicle: Vehicle, settings: RlsSettings | None = None
+) -> tuple[Floats, ...]:
+    """Running mass of drives one after another: the filter keeps what it has learnt.
+
+    Parameters
+    ----------
+    balances : in the order driven
+    vehicle
+    settings : the paper's when None
+
+    Returns
+    -------
+    (n,) of each drive [kg]
+
+    References
+    ----------
+    Jensen et al. 2022, fig. 13.
+    """
+    settings = settings or RlsSettings()
+    state, end, found = _start(settings), 0.0, []
+    for balance in balances:
+        table = balance.table
+        phi, y, row_reason = _rows(balance, vehicle, settings)
+        # Times go on as well: blocks of dependent rows end with them.
+        time = table.time - table.time[0] + end
+        end = float(time[-1]) + BLOCK
+        state, theta, *_ = kernel.run(
+            state, time, phi[:, None], y, row_reason == 0, parameters(settings, _period(table))
+        )
+        found.append(np.asarray(theta[:, 0]))
+    return tuple(found)
+
+
+def _rows(
+    balance: ForceBalance, vehicle: Vehicle, settings: RlsSettings
+) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+    """Regressor and right-hand side (n,) of a drive, and why a row is not taken (n,)."""
+    table = balance.table
+    phi, y = regression(table, vehicle)
+    reason = table.reason.copy()
+    if settings.every_row:
+        reason[np.isin(reason, _LEFT_OUT_SINCE)] = Reason.USED
+    reason[(reason == 0) & (table.accel <= 0.0)] = Reason.NOT_ACCELERATING
+    reason[(reason == 0) & ~(np.isfinite(phi) & np.isfinite(y))] = Reason.NO_MOTION
+    return phi, y, reason
+
+
+def _start(settings: RlsSettings) -> kernel.RlsState:
+    """State before the first row."""
+    start: kernel.RlsState = kernel.initial_state(  # type: ignore[no-untyped-call]
+        [settings.initial_mass], [[settings.initial_gain]]
+    )
+    return start
+
+
+def _period(table: ForceTable) -> float:
+    """Time between rows [s]."""
+    return float(np.median(np.diff(table.time))) if table.time.size > 1 else 1.0 / PAPER_RATE
 
 
 def block_jackknife(

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
+from weighbridge.balance.cornering import yaw_rate
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import GRAVITY
+from weighbridge.errors import ConfigError
 from weighbridge.estimators.fit_std import Fitted, judged
 from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.judging import (
@@ -27,7 +29,7 @@ from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.possible import not_negative, positive
+from weighbridge.vehicle.possible import not_negative, positive, within
 
 DEPENDENCE: Final = 5.0
 """Rows nearer than this share their error, in the running standard deviation [s]."""
@@ -50,13 +52,24 @@ class RobustRlsFilter:
 
     Attributes
     ----------
-    window : length of the means that are folded in [s]
+    window : length of the means that are folded in [s]; 0 folds each row in by itself,
+        as the paper
     memory : time in which the weight of a row falls to 1/e [s]; 10 s is the
         paper's factor of 0.999 at 100 Hz
+    forgetting : weight that the past keeps at each fold, in its place, in (0.9, 1] [-];
+        the paper has 0.999 at each row
+    start_mass, start_information : mass before the drive [kg] and the squared regressors
+        that it is worth, over time [(m/s^2)^2 s]; nothing is known at 0, as in the paper
     kept_information : sum over time of the squared regressor below which nothing
         is forgotten that is not replaced [(m/s^2)^2 s]; 0 forgets as the paper
     first_information : the same, from which a mass is told [(m/s^2)^2 s]
     threshold : Huber's, in standard deviations of the innovation [-]
+    weight_information : Huber's weight counts in the covariance, too; not so in eq. 20
+    rolling_coefficient : in place of that of the vehicle file and its growth with speed [-];
+        the paper's Table 1 has 0.0005
+    sensor_ahead : of the accelerometer, ahead of the rear axle [m]; in a bend it reads the
+        yaw rate times its lateral speed, eq. 9 of the paper, which is taken off. None takes
+        nothing off, as the paper on a straight road
     offset_std : of an offset of the force over the mass, estimated beside it
         [m/s^2]: rolling resistance, zero of the accelerometer; 0 for the paper's
         single parameter
@@ -68,18 +81,30 @@ class RobustRlsFilter:
 
     window: float = 0.5
     memory: float = 10.0
+    forgetting: float | None = None
+    start_mass: float = 0.0
+    start_information: float = 0.0
     kept_information: float = 10.0
     first_information: float = 1.0
     threshold: float = 1.5
+    weight_information: bool = True
+    rolling_coefficient: float | None = None
+    sensor_ahead: float | None = None
     offset_std: float = 0.03
     offset_memory: float = 100.0
     count_grade_twice: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("window", "memory", "first_information", "threshold", "offset_memory"):
+        for name in ("memory", "first_information", "threshold", "offset_memory"):
             positive(name, getattr(self, name))
-        for name in ("kept_information", "offset_std"):
+        for name in (
+            "window", "start_mass", "start_information", "kept_information", "offset_std",
+            "rolling_coefficient",
+        ):  # fmt: skip
             not_negative(name, getattr(self, name))
+        if self.forgetting is not None and not 0.9 < self.forgetting <= 1.0:
+            raise ConfigError(f"forgetting must be in (0.9, 1], got {self.forgetting:g}")
+        within("sensor_ahead", self.sensor_ahead, -20.0, 20.0, "m")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +114,32 @@ class RobustRlsSettings(GateSettings, RobustRlsFilter):
     def __post_init__(self) -> None:
         RobustRlsFilter.__post_init__(self)
         GateSettings.__post_init__(self)
+
+
+class Known(NamedTuple):
+    """Rows and vehicle that a filter takes as they are."""
+
+    balance: ForceBalance
+    vehicle: Vehicle
+
+
+def as_set(balance: ForceBalance, vehicle: Vehicle, settings: RobustRlsFilter) -> Known:
+    """Return rows and vehicle as the settings have them: rolling resistance, bends."""
+    if settings.rolling_coefficient is not None:
+        load = replace(
+            vehicle.road_load,
+            rolling_coefficient=settings.rolling_coefficient,
+            rolling_speed_coefficient=0.0,
+        )
+        vehicle = replace(vehicle, road_load=load)
+    table = balance.table
+    if settings.sensor_ahead is not None:
+        # The rear axle does not drift: ahead of it the lateral speed is yaw rate times distance.
+        turning = np.nan_to_num(yaw_rate(table.time, table.heading, 1.0 / row_period(table.time)))
+        force = table.specific_force + settings.sensor_ahead * turning**2
+        table = replace(table, specific_force=force)
+        balance = replace(balance, table=table)
+    return Known(balance, vehicle)
 
 
 def rows(
@@ -116,13 +167,17 @@ def row_period(time: Floats) -> float:
 def parameters(settings: RobustRlsFilter, period: float) -> kernel.RobustRlsParams:
     """Make the kernel's parameters for rows ``period`` apart [s]."""
     window = max(settings.window, period)
+    forgetting = settings.forgetting
+    if forgetting is None:
+        forgetting = float(np.exp(-window / settings.memory))
     return kernel.RobustRlsParams(
         window=window,
         period=period,
         pause=max(PAUSE, 2.5 * period),
-        forgetting=float(np.exp(-window / settings.memory)),
+        forgetting=forgetting,
         kept_information=settings.kept_information / window,
         threshold=settings.threshold,
+        weight_information=settings.weight_information,
         scale_windows=100.0,
         settle_windows=10,
         offset_std=settings.offset_std,
@@ -132,9 +187,16 @@ def parameters(settings: RobustRlsFilter, period: float) -> kernel.RobustRlsPara
     )
 
 
-def initial_state() -> kernel.RobustRlsState:
-    """Start at a mass of zero, as the paper, and with next to no information."""
-    return kernel.initial_state(0.0, 1e-9)  # type: ignore[no-untyped-call,no-any-return]
+def initial_state(settings: RobustRlsFilter, window: float) -> kernel.RobustRlsState:
+    """Start as the settings have it: from a mass of zero that is worth next to nothing, usually.
+
+    Parameters
+    ----------
+    settings
+    window : length of what is folded in [s]
+    """
+    worth = max(settings.start_information / window, 1e-9)
+    return kernel.initial_state(settings.start_mass, worth)  # type: ignore[no-untyped-call,no-any-return]
 
 
 def window_reason(table: ForceTable, valid: Bools, mean_phi: Floats) -> NDArray[np.uint8]:
@@ -279,13 +341,16 @@ def estimate(
     Du et al. 2025, eqs. 13-20.
     """
     settings = settings or RobustRlsSettings()
+    balance, vehicle = as_set(balance, vehicle, settings)
     table = balance.table
     phi, y, valid = rows(table, vehicle, settings)
     params = parameters(settings, row_period(table.time))
     _, running, var, information, mean_phi, mean_y, _ = kernel.run(
-        initial_state(), table.time, phi, y, valid, params
+        initial_state(settings, params.window), table.time, phi, y, valid, params
     )
-    informed = information * params.window >= settings.first_information
+    # Once told, a mass stays told: forgetting may leave less behind it later.
+    most = np.maximum.accumulate(information) if information.size else information
+    informed = most * params.window >= settings.first_information
     return finish(
         "robust-rls",
         balance,

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from enum import StrEnum
+from typing import Any, Final
 
 from weighbridge.arguments import type_name
 from weighbridge.errors import ConfigError
+
+WORD: Final = re.compile(r"(?!(true|false|nan|inf)$)[a-z][a-z-]*")
+"""A choice, which a command has without quotes."""
 
 
 def changed(settings: Any, given: Mapping[str, object]) -> Any:
@@ -16,7 +21,8 @@ def changed(settings: Any, given: Mapping[str, object]) -> Any:
 
     Parameters
     ----------
-    settings : a frozen dataclass of numbers, switches, tuples of numbers and settings within
+    settings : a frozen dataclass of numbers, switches, choices, tuples of numbers and settings
+        within; None stands for a number that another part of the vehicle or drive gives
     given : new values by name; ``ekf.start.threshold`` names one of settings within
 
     Raises
@@ -36,7 +42,7 @@ def differences(settings: Any) -> str:
 
 
 def parsed(texts: Sequence[str]) -> dict[str, object]:
-    """Read values as a command has them: ``name=value``, the value as in TOML.
+    """Read values as a command has them: ``name=value``, the value as in TOML or one word.
 
     Raises
     ------
@@ -50,11 +56,14 @@ def parsed(texts: Sequence[str]) -> dict[str, object]:
             raise ConfigError(f"{text!r}: write NAME=VALUE, such as forgetting=0.999")
         if name in found:
             raise ConfigError(f"{name} is set twice; give it once")
+        if WORD.fullmatch(value):
+            found[name] = value
+            continue
         try:
             found[name] = tomllib.loads(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:
             raise ConfigError(
-                f"{text!r}: a number, true, false or [numbers] is expected after ="
+                f"{text!r}: a number, true, false, a word or [numbers] is expected after ="
             ) from None
     return found
 
@@ -91,13 +100,18 @@ def _like(old: Any, name: str, value: Any) -> Any:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     if isinstance(old, bool):
         fits, wanted = isinstance(value, bool), "true or false"
+    elif isinstance(old, StrEnum):
+        choices = [choice.value for choice in type(old)]
+        fits, wanted = value in choices, f"one of {', '.join(choices)}"
+        value = type(old)(value) if fits else value
     elif isinstance(old, int):
         fits, wanted = number and value == int(value), "a whole number"
         value = int(value) if fits else value
     elif isinstance(old, tuple):
-        fits = isinstance(value, list | tuple) and len(value) == len(old)
+        # An empty one says that there may be numbers; the settings know how many.
+        fits = isinstance(value, list | tuple) and (not old or len(value) == len(old))
         fits = fits and all(isinstance(v, int | float) for v in value)
-        wanted = f"{len(old)} numbers in brackets"
+        wanted = f"{len(old) or ''} numbers in brackets".strip()
         value = tuple(map(float, value)) if fits else value
     elif dataclasses.is_dataclass(old):
         fits, wanted = isinstance(value, type(old)), f"one of {', '.join(_values(old, f'{name}.'))}"

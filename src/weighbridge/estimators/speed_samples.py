@@ -82,7 +82,9 @@ def sampled(
         rotating=mean(law.rotating_mass(vehicle, table.gearing)),
         grade=mean(table.grade) if measured_grade else nothing,
         accel=accel if measured_jacobian else np.full(time.size, np.nan),
-        columns=np.ascontiguousarray(np.column_stack(columns) if columns else nothing[:, :0]),
+        columns=np.ascontiguousarray(
+            np.column_stack(columns) if columns else np.empty((time.size, 0))
+        ),
         on=covered(table.time, known, time),
     )
 

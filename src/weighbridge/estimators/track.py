@@ -14,6 +14,7 @@ from weighbridge.balance import ForceBalance, Reason
 from weighbridge.signals import Bools, Floats
 
 if TYPE_CHECKING:
+    from weighbridge.estimators.joint.bend import TorqueBend
     from weighbridge.estimators.joint.possible import PossibleChange
     from weighbridge.estimators.joint.problem import FilterInput, JointSizes
     from weighbridge.estimators.joint.slow_errors import SlowErrors
@@ -71,6 +72,7 @@ class MassTrack:
     slow_errors : what was estimated beside the mass; None where a method does not
     filter_input : what the filter of the joint estimator was given; None of other methods
     possible_change : of the load that was not found and may have been; None of other methods
+    bend : of the torque's reading; None of other methods and without an accelerometer
     sizes : of noise and states, by which the joint estimator runs forward; None of other methods
     """
 
@@ -93,6 +95,7 @@ class MassTrack:
     slow_errors: SlowErrors | None = None
     filter_input: FilterInput | None = None
     possible_change: PossibleChange | None = None
+    bend: TorqueBend | None = None
     sizes: JointSizes | None = None
 
     @property

@@ -15,7 +15,9 @@ from typing import Final, Literal
 import numpy as np
 from scipy.special import ndtri
 
+from weighbridge.arguments import as_floats, check_number, check_type
 from weighbridge.errors import ConfigError
+from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.signals import Bools, Floats
@@ -33,9 +35,6 @@ HYPOTHESES: Final = 32
 _LONGEST: Final = 0.012
 """Longest step over which the suspension force is integrated [s]: an axle hops at some 12 Hz,
 and a seventh of its period is still a smooth piece."""
-
-_HOP: Final = 12.0
-"""Frequency at which an axle hops [Hz], as above."""
 
 _FORMS: Final = {
     "printed": kalman_bucy.PRINTED,
@@ -84,51 +83,6 @@ class RideSamples:
             time=self.time[part], travel=self.travel[part], rate=self.rate[part],
             velocity=self.velocity[part],
         )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InertiaSettings:
-    """What the filters assume beside the vehicle file.
-
-    Attributes
-    ----------
-    range : least and largest parameter over that of the vehicle file [-]
-    start_std : standard deviation of the inverse parameter at the start, relative [-]
-    jump_rate : jumps expected per time [1/s]
-    jump_std : standard deviation of the inverse parameter after a jump, relative [-]
-    spawn : time between two hypotheses of a jump [s]
-    push_drift : growth of the angular acceleration that braking, starting or turning
-        causes, over the root of time; without offset_std not used [rad/s^2.5]
-    push_rate : beginnings and ends of braking and turning expected per time [1/s]
-    drift : relative growth of the inverse parameter's standard deviation over the root
-        of time [1/s^0.5]
-    offset_std : standard deviation of the constant acceleration that sensor offsets and
-        the weight of the payload seem to cause; 0 for none, as printed [m/s^2], [rad/s^2].
-        The filters without jumps take the mean off the travel instead
-    offset_drift : its growth over the root of time [m/s^2.5], [rad/s^2.5]
-    process : spectral density of the fixed process noise of velocities [m^2/s^3] and of
-        parameters relative to the vehicle file's [1/s]; for the filters without jumps
-    """
-
-    range: tuple[float, float] = (0.125, 8.0)
-    start_std: float = 1.0
-    jump_rate: float = 1e-4
-    jump_std: float = 1.0
-    spawn: float = 2e-3
-    push_drift: float = 1.0
-    push_rate: float = 0.3
-    drift: float = 3e-5
-    offset_std: float = 10.0
-    offset_drift: float = 3e-3
-    process: tuple[float, float] = (1e-6, 0.01)
-
-    def __post_init__(self) -> None:
-        low, high = self.range
-        if not 0.0 < low < 1.0 < high:
-            raise ConfigError(f"range must be two numbers around 1, got {self.range}")
-        for name in ("start_std", "jump_rate", "jump_std", "spawn"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,13 +183,13 @@ def body_noise(ride: Ride) -> Floats:
 
 def push_var(ride: Ride) -> Floats:
     """(3,) variance of the reference's acceleration from the suspension sensors' noise."""
-    spring, damper = _accelerations(ride)
+    spring, damper = accelerations(ride)
     return np.asarray(
         np.sum((spring * ride.travel_noise) ** 2 + (damper * ride.rate_noise) ** 2, axis=1)
     )
 
 
-def _accelerations(ride: Ride) -> tuple[Floats, Floats]:
+def accelerations(ride: Ride) -> tuple[Floats, Floats]:
     """(3, 4) acceleration of the reference per travel and per rate at each wheel."""
     arms = corners(ride).T / reference(ride)[:, np.newaxis]
     return np.ascontiguousarray(arms * stiffness(ride)), np.ascontiguousarray(arms * damping(ride))
@@ -246,24 +200,11 @@ def longest_step(period: float) -> float:
     return max(_LONGEST, 1.5 * period)
 
 
-def integration_std(period: float) -> float:
-    """Part by which a ride of that period may draw the inverse parameters [-].
-
-    The parabola through three samples (weights 5, 8, -1 of 12) integrates a sine of the axles'
-    hop to less than its amplitude; on a rough road most of what is known comes from there. It
-    is 0.5 % at 100 Hz and 0.03 % at 200 Hz, the same at all times, so no noise of the filter.
-    """
-    turn = np.exp(-2j * math.pi * _HOP * period)
-    parabola = (5.0 + 8.0 * turn - turn**2) / 12.0
-    exact = (1.0 - turn) / (2j * math.pi * _HOP * period)
-    return abs(1.0 - float(abs(parabola / exact)))
-
-
 def jump_params(
     ride: Ride, period: float, settings: InertiaSettings, noise_factor: float = 1.0
 ) -> kernel.InertiaParams:
     """Put together what the filter with jumps reads."""
-    spring, damper = _accelerations(ride)
+    spring, damper = accelerations(ride)
     low, high = settings.range
     push = settings.push_drift if settings.offset_std > 0.0 else 0.0
     return kernel.InertiaParams(
@@ -295,41 +236,90 @@ def jump_state(params: kernel.InertiaParams, settings: InertiaSettings) -> kerne
 
 
 class InertiaFilter:
-    """Sample by sample: what `run_filter` gives for all samples, to the last bit.
+    """Sample by sample, as they come: what a whole ride gives, to the last bit.
 
     Parameters
     ----------
-    ride : the vehicle's suspension
+    ride : the vehicle's suspension, `Vehicle.ride`
     period : between samples, roughly [s]
     settings : of the filter
+
+    Raises
+    ------
+    ConfigError
+        The period is not positive.
     """
 
     def __init__(self, ride: Ride, period: float, settings: InertiaSettings | None = None) -> None:
+        check_type("ride", ride, Ride, "the ride of a weighbridge.Vehicle")
+        check_number("period", period)
+        kinds = (InertiaSettings, type(None))
+        check_type("settings", settings, kinds, "a weighbridge.InertiaSettings")
+        if not 0.0 < period < math.inf:
+            raise ConfigError(f"period must be a positive number of seconds, got {period}")
         chosen = settings or InertiaSettings()
         self.reference = reference(ride)
         self.params = jump_params(ride, period, chosen)
         self.state = jump_state(self.params, chosen)
+        self._alpha = np.ones(3)
+        self._alpha_std = np.full(3, chosen.start_std)
 
     def update(
         self, time: float, travel: Floats, rate: Floats, velocity: Floats
     ) -> kernel.InertiaSample:
-        """Fold one sample in; parameters are ``reference / sample.alpha``.
+        """Fold one sample in.
 
         Parameters
         ----------
         time : after the sample before [s]
-        travel, rate : (4,) [m], [m/s]
-        velocity : (3,) [m/s], [rad/s]; NaN where it was not measured
+        travel, rate : (4,) of the suspension front left, front right, rear left, rear right,
+            positive in extension [m], [m/s]
+        velocity : (3,) vertical up [m/s], roll right side down and pitch nose up [rad/s]; NaN
+            where it was not measured
+
+        Returns
+        -------
+        InertiaSample
+            What the filter knows of this sample; ``alpha`` is the vehicle file's parameters
+            over those found.
+
+        Raises
+        ------
+        ConfigError
+            There are more or fewer values.
         """
-        self.state, sample = kernel.step(
-            self.state,
-            float(time),
-            np.asarray(travel, dtype=np.float64),
-            np.asarray(rate, dtype=np.float64),
-            np.asarray(velocity, dtype=np.float64),
-            self.params,
-        )
+        check_number("time", time)
+        given = {"travel": (travel, 4), "rate": (rate, 4), "velocity": (velocity, 3)}
+        measured = [_several(name, values, count) for name, (values, count) in given.items()]
+        self.state, sample = kernel.step(self.state, float(time), *measured, self.params)
+        self._alpha, self._alpha_std = sample.alpha, sample.alpha_std
         return sample  # type: ignore[no-any-return]
+
+    @property
+    def parameters(self) -> Floats:
+        """(3,) sprung mass [kg], roll and pitch inertia [kg m^2] as known by now."""
+        return np.asarray(self.reference / self._alpha)
+
+    def interval(self, level: float = 0.95) -> tuple[Floats, Floats]:
+        """(3,) bounds that hold them by the filter alone; the file's ``force_std`` is not in them.
+
+        Raises
+        ------
+        ConfigError
+            The level is not between 0 and 1.
+        """
+        check_number("level", level)
+        if not 0.0 < level < 1.0:
+            raise ConfigError(f"level must be between 0 and 1, got {level}")
+        return inverse_interval(self.reference, self._alpha, self._alpha_std, level)
+
+
+def _several(name: str, values: object, count: int) -> Floats:
+    """Values of one sample as an array of doubles."""
+    array = as_floats(name, values)
+    if array.shape != (count,):
+        raise ConfigError(f"{name} must be {count} numbers, got an array of shape {array.shape}")
+    return array
 
 
 def estimate(
@@ -396,15 +386,20 @@ def fixed_params(
     ride: Ride, period: float, method: Method, settings: InertiaSettings
 ) -> kalman_bucy.KalmanBucyParams:
     """Put together what the filters with one fixed process noise read."""
-    spring, damper = _accelerations(ride)
+    spring, damper = accelerations(ride)
     low, high = settings.range
     bounds = (1.0 / high, 1.0 / low) if method == "inverse" else (low, high)
     of_velocity, of_parameter = settings.process
+    process = np.repeat((of_velocity, of_parameter), 3)
+    if settings.process_densities:
+        process = np.array(settings.process_densities)
+        process[3:] /= reference(ride) ** 2
+    noise = np.array(settings.noise_densities or body_noise(ride) ** 2 * period)
     return kalman_bucy.KalmanBucyParams(
         spring=spring,
         damper=damper,
-        process=np.diag((*3 * (of_velocity,), *3 * (of_parameter,))),
-        noise=body_noise(ride) ** 2 * period,
+        process=np.diag(process),
+        noise=noise,
         lowest=bounds[0],
         highest=bounds[1],
         longest=longest_step(period),

@@ -166,7 +166,8 @@ def _nothing(
             return f"{seen}; {diagnosis[0]}: let the logger ask for current data (service 01)"
         return (
             f"{seen}; they are neither OBD-II answers nor J1939: "
-            "give the vehicle's DBC with --dbc and name its signals in a mapping"
+            "give the vehicle's DBC with --dbc and name its signals in a mapping, which "
+            "weighbridge map LOG --dbc FILE -o map.toml drafts"
         )
     if mapping is not None and (why := [*done.problems, *done.lacking]):
         return f"{seen}; {why[0].text}"

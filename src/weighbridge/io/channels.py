@@ -25,7 +25,7 @@ from weighbridge.io.mapping import (
     MappedSignal,
     TableMapping,
     TimeColumn,
-    how_to_name,
+    UnnamedError,
     lacking,
     resolved_unit,
 )
@@ -176,7 +176,7 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
     if not wanted and (found.frames is None or not len(found.frames)):
         names = column_list(c.name for c in found.channels) if found.channels else "no channels"
         source = f"that {mapping.source} names" if mapping and mapping.signals else "that is known"
-        raise DriveError(f"{path} has no channel {source}; it has {names}: {how_to_name(path)}")
+        raise UnnamedError(f"{path} has no channel {source}; it has {names}", path)
     offset = mapping.time.offset if mapping is not None else 0.0
     clocks: dict[int, tuple[Floats, list[tuple[str, Floats]]]] = {}
     for name, (channel, suffix, signal) in wanted.items():

@@ -18,7 +18,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "rad/s": "radps", "deg/s": "degps", "°/s": "degps", "dps": "degps",
     "°": "deg", "degrees": "deg", "radians": "rad",
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
-    "%": "pct", "percent": "pct", "-": "ratio", "1": "ratio",
+    "%": "pct", "percent": "pct", "prozent": "pct", "proz": "pct", "-": "ratio", "1": "ratio",
     "°c": "degc", "℃": "degc", "c": "degc", "deg c": "degc", "celsius": "degc",
     "°f": "degf", "℉": "degf", "f": "degf", "â°c": "degc", "â°": "deg",
     "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",

@@ -18,6 +18,7 @@ from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, stated_unit, suff
 from weighbridge.io.draft_column import DraftColumn, checked
 from weighbridge.io.draft_time import DraftTime, find_times, is_number
 from weighbridge.io.naming import Named, recognise_all, words_of
+from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
     SEPARATORS,
     RawTable,
@@ -25,12 +26,12 @@ from weighbridge.io.table import (
     cells,
     column_list,
     head,
-    read_parquet,
     read_text,
 )
 from weighbridge.signals import QUANTITIES, Floats
 from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.units import UNITS, to_si
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 HEAD_LINES: Final = 60
 """Lines at the beginning that tell how a text is written."""
@@ -40,6 +41,9 @@ EVEN: Final = 0.7
 
 _STRANGE_UNIT: Final = re.compile(r"[\[(]\s*([^\])\s]*[/•*·][^\])]*?)\s*[\])]\s*$")
 """A unit of two at the end of a name, such as lb/min."""
+
+_BESIDE: Final = frozenset(("engine_speed", "vehicle_speed", "gnss_speed"))
+"""Signals of a torque source that tell no torque by themselves."""
 
 _AXES: Final = (("x",), ("y",), ("z",))
 """Names of columns that tell an axis and no more."""
@@ -111,6 +115,19 @@ class Draft:
         return (*self.doubts, *(f"{c.name!r}: {c.doubt}" for c in self.columns if c.doubt))
 
 
+class UnknownColumnsError(DriveError):
+    """None of a table's columns is known by its name; a person may know them.
+
+    Attributes
+    ----------
+    found : the draft so far, whose columns are no quantity
+    """
+
+    def __init__(self, text: str, found: Draft) -> None:
+        super().__init__(text)
+        self.found = found
+
+
 def draft(path: Path) -> Draft:
     """Look at a table and draft how it is to be read.
 
@@ -120,8 +137,10 @@ def draft(path: Path) -> Draft:
 
     Raises
     ------
+    UnknownColumnsError
+        None of its columns is known.
     DriveError
-        It is no table, has no time, or none of its columns is known.
+        It is no table.
     """
     units: dict[str, str] = {}
     if path.suffix.lower() in (".parquet", ".pq"):
@@ -143,14 +162,6 @@ def draft(path: Path) -> Draft:
         for name, found in zip(names, named, strict=True)
     )
     columns = checked(columns)
-    if not any(c.quantity for c in columns):
-        if doubts := [f"{c.name!r} is {c.doubt}" for c in columns if c.doubt]:
-            raise DriveError(f"{path}: none of its columns can be taken: {'; '.join(doubts[:3])}")
-        timeless = "no column that can be its time, and " if time.row_rate is not None else ""
-        raise DriveError(
-            f"{path} has {timeless}no column that is known by its name; it has "
-            f"{column_list(raw.names)}: write [time] and [signals] of a mapping by hand"
-        )
     found = Draft(
         path=path,
         text=text,
@@ -163,7 +174,47 @@ def draft(path: Path) -> Draft:
         rows=raw.rows,
         times=tuple(times),
     )
+    if not tells_torque(found):
+        # A person may know which of the others does, by its values.
+        found = replace(found, columns=tuple(_numbers(raw, c) for c in columns))
+    if not found.known:
+        raise UnknownColumnsError(_unknown(found, raw.names), timed(found, time))
     return timed(found, time)
+
+
+def tells_torque(*drafts: Draft) -> bool:
+    """Whether the columns that are known hold a torque, a load or what does instead."""
+    known = {c.quantity for one in drafts for c in one.known}
+    sets = (s for source in TORQUE_SOURCES.values() for s in (source.signals, *source.others))
+    return any(set(signals) - _BESIDE <= known for signals in sets)
+
+
+def _unknown(found: Draft, names: Sequence[str]) -> str:
+    """Say that none of a table's columns can be taken, and what helps."""
+    if doubts := [f"{c.name!r} is {c.doubt}" for c in found.columns if c.doubt]:
+        return f"{found.path}: none of its columns can be taken: {'; '.join(doubts[:3])}"
+    counted = found.times[0].row_rate is not None
+    timeless = "no column that can be its time, and " if counted else ""
+    return (
+        f"{found.path} has {timeless}no column that is known by its name; it has "
+        f"{column_list(names)}: --ask asks what they are, or write [time] and [signals] of a "
+        "mapping by hand"
+    )
+
+
+def _numbers(raw: RawTable, column: DraftColumn) -> DraftColumn:
+    """Give a column that is not known its values, by which a person may know it."""
+    if column.quantity:
+        return column
+    try:
+        values, _ = raw.numbers(raw.names.index(column.name))
+    except DriveError:
+        return column
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return column
+    low, usual, high = (float(x) for x in np.quantile(known, (0.0, 0.5, 1.0)))
+    return replace(column, low=low, usual=usual, high=high, count=int(known.size))
 
 
 def timed(found: Draft, time: DraftTime) -> Draft:

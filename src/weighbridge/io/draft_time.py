@@ -116,8 +116,10 @@ def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) ->
     ]
     if not found:
         return [_counted(raw, _told_rate(above))]
-    # The finer of several clocks; where they are alike, the first.
-    found.sort(key=lambda t: (-round(_resolution(t.seconds), 3), t.index))
+    # The finer of several clocks; where they are alike, one that other files can share, a date.
+    found.sort(
+        key=lambda t: (-round(_resolution(t.seconds), 3), not since_1970(t.seconds), t.index)
+    )
     best, *others = found
     if others:
         names = column_list(t.column for t in others)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.signals import Floats, Problem
+from weighbridge.signals.instants import instant
 from weighbridge.signals.words import counted
 
 EXTENDED_MASK = 0x1FFFFFFF
@@ -165,9 +166,8 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
             wrap = next((w for w in _WRAPS if abs(step[k] + w) < 0.01 * w), None)
             if wrap is not None:
                 shift[k + 1 :] += wrap
-                problems.append(
-                    Problem("", f"{source}: the clock wraps around at {time[k]:.6g} s; mended")
-                )
+                at = instant(float(time[k]))
+                problems.append(Problem("", f"{source}: the clock wraps around at {at}; mended"))
             else:
                 cuts.append(int(k) + 1)
         time = time + shift
@@ -180,8 +180,8 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
             problems.append(
                 Problem(
                     "",
-                    f"{source}: the clock jumps {counted(len(cuts), 'time')} (by "
-                    f"{step[cuts[0] - 1]:.6g} s, {time[cuts[0] - 1] - time[0]:.6g} s in); "
+                    f"{source}: the clock jumps {counted(len(cuts), 'time')} (first from "
+                    f"{instant(float(time[cuts[0] - 1]))} to {instant(float(time[cuts[0]]))}); "
                     f"{time.size - int(lengths[best])} of {time.size} frames outside the longest "
                     "part were left out; split the log there to read the others",
                 )

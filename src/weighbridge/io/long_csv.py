@@ -67,7 +67,11 @@ def _time_place(names: list[str]) -> int | None:
 def is_long(head: bytes) -> bool:
     """Tell whether a text begins with the header of a long table."""
     line = head.removeprefix(b"\xef\xbb\xbf").split(b"\n", 1)[0].decode("utf-8", "replace")
-    names = cells(line.strip("\r "), max(SEPARATORS, key=line.count))
+    return are_long(cells(line.strip("\r "), max(SEPARATORS, key=line.count)))
+
+
+def are_long(names: list[str]) -> bool:
+    """Tell whether columns are those of a long table."""
     return (
         3 <= len(names) <= _MOST
         and _place(names, _NAMES) is not None
@@ -85,7 +89,21 @@ def open_long(path: Path, time: TimeColumn) -> Recording:
         It has no rows, no time that can be read, too many names, or a name whose units do not
         convert into one another.
     """
-    raw = read_text(path)
+    return recording_of(read_text(path), time)
+
+
+def names_in(raw: RawTable) -> tuple[str, ...]:
+    """Names that the rows of a long table have."""
+    named = _place(list(raw.names), _NAMES)
+    if named is None:
+        return ()
+    texts = raw.column(named).cast(pl.String).str.strip_chars()
+    return tuple(texts.drop_nulls().unique(maintain_order=True))
+
+
+def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
+    """Turn a long table that was read, as `open_long` does; errors are its."""
+    path = raw.path
     names = list(raw.names)
     named, valued = _place(names, _NAMES), _place(names, _VALUES)
     if named is None or valued is None:
@@ -104,7 +122,9 @@ def open_long(path: Path, time: TimeColumn) -> Recording:
             "time": seconds,
             "name": raw.column(named).cast(pl.String).str.strip_chars(),
             "value": _numbers(raw.column(valued), thousands),
-            "unit": pl.lit("", pl.String) if united is None else raw.column(united).cast(pl.String),
+            "unit": pl.repeat("", raw.rows, eager=True)
+            if united is None
+            else raw.column(united).cast(pl.String),
         }
     )
     known = table.drop_nulls(["name", "value"]).filter(pl.col("time").is_finite())

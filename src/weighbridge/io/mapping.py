@@ -371,14 +371,27 @@ def _signal(parent: Section, name: str) -> MappedSignal:
     return signal
 
 
+class UnnamedError(DriveError):
+    """A log has names of its own, and no mapping says what they are.
+
+    Attributes
+    ----------
+    what : what was read, without the remedy
+    """
+
+    def __init__(self, what: str, path: Path) -> None:
+        super().__init__(f"{what}: {how_to_name(path)}")
+        self.what = what
+
+
 def how_to_name(path: Path) -> str:
     """Say how names of a log's own become known, with the command that does most of it.
 
     Parameters
     ----------
-    path : of the log; of a data frame, its name
+    path : of the log, or of the folder of a drive; of a data frame, its name
     """
-    if not path.is_file():
+    if not path.exists():
         return "name them by a mapping (mapping=)"
     return f"name them by a mapping: weighbridge map {shlex.quote(str(path))} -o map.toml"
 

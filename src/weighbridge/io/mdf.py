@@ -29,7 +29,7 @@ from weighbridge.io.log import Log
 from weighbridge.io.mapping import (
     MappedSignal,
     TableMapping,
-    how_to_name,
+    UnnamedError,
     lacking,
     resolved_unit,
 )
@@ -206,7 +206,7 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
             )
         names = column_list(channels) if channels else "no channels"
         hint = f"named in {mapping.source}" if mapping else "with a canonical name"
-        raise DriveError(f"{path} has no channel {hint}; it has {names}: {how_to_name(path)}")
+        raise UnnamedError(f"{path} has no channel {hint}; it has {names}", path)
     clocks: dict[int, list[tuple[str, Floats]]] = {}
     times: dict[int, Floats] = {}
     offset = mapping.time.offset if mapping else 0.0

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-import stat
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.arguments import check_path, check_type
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import tabular
 from weighbridge.io.bus import decode
@@ -26,13 +24,24 @@ from weighbridge.io.frames import Frames, join_frames, settle_clock
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import MappingSource, TableMapping, load_mapping, mapping_for, none_fits
+from weighbridge.io.mapping import (
+    MappingSource,
+    TableMapping,
+    UnnamedError,
+    how_to_name,
+    load_mapping,
+    mapping_for,
+    none_fits,
+)
+from weighbridge.io.parquet import read_parquet
 from weighbridge.io.parts import part_folders, read_parts
+from weighbridge.io.paths import given_paths, is_folder
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
-from weighbridge.io.table import read_parquet, read_text, start_text
+from weighbridge.io.table import read_text, start_text
 from weighbridge.signals import Drive, DriveInfo, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
+from weighbridge.signals.instants import instant
 from weighbridge.signals.parts import numbered, parted
 from weighbridge.visible import visible
 from weighbridge.whole import REPLACING
@@ -123,9 +132,9 @@ def _opened(
 ) -> _Opened:
     """Name of a drive, its files, and what they are read with."""
     if not isinstance(path, str | Path):
-        path = _paths("path", path)
+        path = given_paths("path", path)
     mappings = load_mapping(mapping) if mapping is not None else ()
-    databases = load_dbcs(_paths("dbc", [dbc] if isinstance(dbc, str | Path) else dbc))
+    databases = load_dbcs(given_paths("dbc", [dbc] if isinstance(dbc, str | Path) else dbc))
     info = DriveInfo()
     if not isinstance(path, str | Path):
         paths = [Path(p) for p in path]
@@ -141,15 +150,6 @@ def _opened(
         logs, info = _read_folder(path, mappings)
         return path.resolve().name, logs, info, mappings, databases
     return path.stem, _read_files([(path, None)], mappings), info, mappings, databases
-
-
-def _paths(name: str, given: Iterable[str | Path]) -> list[str | Path]:
-    """Several paths, each checked."""
-    check_type(name, given, Iterable, "a path, as text or pathlib.Path, or a list of them")
-    paths = list(given)
-    for one in paths:
-        check_path(f"each {name}", one)
-    return paths
 
 
 def read_table(path: str | Path) -> dict[str, Floats]:
@@ -227,25 +227,13 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
         ]
         if not files and not parts:
             raise none_fits(folder, there, mappings)
-    return _read_files([(f, None) for f in files], mappings) + parts, info
-
-
-def is_folder(path: Path) -> bool:
-    """Tell whether a path is a folder.
-
-    Raises
-    ------
-    DriveError
-        The path can be none: its name is too long, or its links lead round.
-    """
     try:
-        # Raises where `Path.is_dir` would answer no, or in some versions raise.
-        return stat.S_ISDIR(path.stat().st_mode)
-    except FileNotFoundError:
-        raise DriveError(f"{path}: no such file or folder") from None
-    except (OSError, ValueError) as e:
-        reason = e.strerror if isinstance(e, OSError) else e
-        raise DriveError(f"{path} cannot be read: {reason}") from None
+        return _read_files([(f, None) for f in files], mappings) + parts, info
+    except UnnamedError as error:
+        if mappings or len(files) == 1:
+            raise
+        # One mapping is for all files of the folder.
+        raise DriveError(f"{error.what}: {how_to_name(folder)}") from None
 
 
 def _read_files(
@@ -471,9 +459,9 @@ def _joined(
     for (log_a, a), (log_b, b) in pairwise(parts):
         if b.time[0] <= a.time[-1]:
             raise DriveError(
-                f"{name} is both in {log_a.path} (up to {a.time[-1]:.6g} s) and "
-                f"in {log_b.path} (from {b.time[0]:.6g} s); read them as drives of their own, "
-                "or leave one out"
+                f"{name} is both in {log_a.path} (up to {instant(float(a.time[-1]))}) and "
+                f"in {log_b.path} (from {instant(float(b.time[0]))}); read them as drives of "
+                "their own, or leave one out"
             )
     key = tuple(id(s.time) for _, s in parts)
     if key not in clocks:

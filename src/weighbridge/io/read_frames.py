@@ -12,12 +12,15 @@ import polars as pl
 
 from weighbridge.arguments import check_text, type_name
 from weighbridge.errors import ConfigError
+from weighbridge.io.channels import log_of
 from weighbridge.io.columns import UnitlessColumnError, parse_column, time_unit
 from weighbridge.io.log import Log
+from weighbridge.io.long_csv import are_long, names_in, recording_of
 from weighbridge.io.mapping import (
     MappedSignal,
     MappingSource,
     TableMapping,
+    TimeColumn,
     load_mapping,
     mapping_for,
 )
@@ -57,8 +60,10 @@ def read_frame(
         (``time_s``, ``vehicle_speed_kmh``, …) or those of ``mapping``. An index of pandas that has
         a name is a column as well; one of dates, and asammdf's ``timestamps``, is the time.
         Several: by names such as ``imu``, ``obd`` and ``gnss``, for which a mapping's ``files``
-        are patterns; a mapping without ``files`` is for all, and each signal is looked for in
-        every frame
+        are patterns; where none fits a name, as with a mapping made from files, the table is
+        taken that names most of the frame's columns. A mapping without ``files`` is for all, and
+        each signal is looked for in every frame. One with a row for each value (time, name, value
+        and perhaps unit) is turned, as such a file is
     mapping : mapping TOML, or a dictionary of the same form
     name : of the drive
 
@@ -78,10 +83,14 @@ def read_frame(
 
 def _read(raws: list[RawTable], mappings: tuple[TableMapping, ...]) -> list[Log]:
     """Read each table by the mapping that is for it, else by canonical names."""
-    known = [mapping_for(raw.path, mappings) for raw in raws]
+    known = [_mapping_of(raw, mappings) for raw in raws]
     logs = []
     for raw, mapping in zip(raws, known, strict=True):
         own = raw.path.name if raw.path.name in TABLES else None
+        if _is_long(raw, mapping):
+            time = mapping.time if mapping is not None else TimeColumn()
+            logs.append(log_of(raw.path, recording_of(raw, time), own, mapping))
+            continue
         named = mapping is not None and any(_has(raw, s) for s in mapping.signals)
         if mapping is None or not mapping.signals or (not named and _is_canonical(raw, own)):
             logs.append(read_canonical(raw, own))
@@ -89,6 +98,20 @@ def _read(raws: list[RawTable], mappings: tuple[TableMapping, ...]) -> list[Log]
         alike = [r for r, m in zip(raws, known, strict=True) if m is mapping]
         logs.append(read_mapped(raw, _part_of(mapping, raw, alike) if named else mapping))
     return logs
+
+
+def _mapping_of(raw: RawTable, mappings: tuple[TableMapping, ...]) -> TableMapping | None:
+    """The mapping whose pattern fits a frame's name, else the one with most of its columns."""
+    named = mapping_for(raw.path, mappings)
+    if named is not None or not mappings:
+        return named
+    if are_long(list(raw.names)):
+        rows = set(names_in(raw))
+        held = [sum(s.column in rows for s in mapping.signals) for mapping in mappings]
+    else:
+        held = [sum(_has(raw, signal) for signal in mapping.signals) for mapping in mappings]
+    most = max(held)
+    return mappings[held.index(most)] if most else None
 
 
 def _part_of(mapping: TableMapping, raw: RawTable, alike: list[RawTable]) -> TableMapping:
@@ -103,6 +126,12 @@ def _part_of(mapping: TableMapping, raw: RawTable, alike: list[RawTable]) -> Tab
         if _has(raw, s) or (raw is first and not any(_has(r, s) for r in alike))
     )
     return replace(mapping, signals=tuple(taken))
+
+
+def _is_long(raw: RawTable, mapping: TableMapping | None) -> bool:
+    """Tell whether a table has a row for each value, and no mapping names its columns."""
+    named = mapping is not None and any(_has(raw, signal) for signal in mapping.signals)
+    return not named and are_long(list(raw.names))
 
 
 def _has(raw: RawTable, signal: MappedSignal) -> bool:

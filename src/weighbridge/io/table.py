@@ -1,4 +1,4 @@
-"""Tables of numbers: CSV and other separated text, and Parquet."""
+"""Tables of numbers, and their reader for CSV and other separated text."""
 
 from __future__ import annotations
 
@@ -37,9 +37,6 @@ _HEAD: Final = 1 << 18
 """Bytes at the beginning of a text that hold its header and its first rows."""
 
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
-
-_ROWS: Final = 1 << 18
-"""Rows of a Parquet table read at a time."""
 
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
@@ -324,64 +321,6 @@ def _parse(
             return parse(pl.String)
         except PARSE_ERRORS as e:
             raise DriveError(f"{path} is not a readable table: {first_line(e)}") from None
-
-
-def read_parquet(path: Path, text_format: TextFormat | None = None) -> RawTable:
-    """Read a Parquet table.
-
-    Raises
-    ------
-    DriveError
-        Not a Parquet file, or only the first part of one.
-    """
-    try:
-        with path.open("rb") as file, quietly():
-            # A path is no pattern, by which a file would be joined with its neighbours; one that
-            # is no text cannot be handed over.
-            source = path.absolute() if _is_text(path) else file
-            table = pl.scan_parquet(source, glob=False, hive_partitioning=False)
-            schema = table.collect_schema()
-            names = tuple(schema.names())
-            kinds = [kind == pl.Float64 for kind in schema.dtypes()]
-            if len(names) <= MOST_COLUMNS:
-                plain = {k: _numbers(table, names[k]) for k, there in enumerate(kinds) if there}
-                others = [k for k, there in enumerate(kinds) if not there]
-                frame = table.select([pl.col(names[k]).alias(str(k)) for k in others]).collect()
-    except (*PARSE_ERRORS, OSError) as e:
-        raise DriveError(
-            f"{path} is not a readable Parquet file ({first_line(e)}); "
-            "it may have been cut off: copy or convert it again"
-        ) from None
-    if len(names) > MOST_COLUMNS:
-        raise DriveError(f"{path} has {len(names)} columns, and a table may have {MOST_COLUMNS}")
-    return RawTable(path, names, frame, plain=plain)
-
-
-def _is_text(path: Path) -> bool:
-    """Tell whether a path can be written in UTF-8."""
-    try:
-        str(path.absolute()).encode()
-    except UnicodeEncodeError:
-        return False
-    return True
-
-
-def _numbers(table: pl.LazyFrame, name: str) -> tuple[Floats, int]:
-    """Read a column of numbers by and by, so that it is in the memory once.
-
-    Returns
-    -------
-    values : (n,) NaN where a cell is empty
-    nans : cells that are not-a-number
-    """
-    column = table.select(pl.col(name))
-    values = np.empty(int(table.select(pl.len()).collect().item()))
-    nans = 0
-    for first in range(0, values.size, _ROWS):
-        part = column.slice(first, _ROWS).collect()[name]
-        values[first : first + _ROWS] = part.to_numpy()
-        nans += int(part.is_nan().sum() or 0)
-    return values, nans
 
 
 def time_seconds(

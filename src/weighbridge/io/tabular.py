@@ -18,12 +18,12 @@ from weighbridge.io.columns import (
     time_unit,
 )
 from weighbridge.io.log import Log
-from weighbridge.io.mapping import TableMapping, how_to_name, lacking, resolved_unit
+from weighbridge.io.mapping import TableMapping, UnnamedError, lacking, resolved_unit
+from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
     SEPARATORS,
     RawTable,
     column_list,
-    read_parquet,
     read_text,
     time_seconds,
 )
@@ -85,11 +85,12 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
         else:
             wanted[found[0].name] = (i, found[1])
     if time_index is None:
-        raise DriveError(_no_time(raw, bool(wanted)))
+        raise _no_time(raw, bool(wanted))
     if not wanted:
-        raise DriveError(
+        raise UnnamedError(
             f"{raw.path} has no column with a canonical name and unit (such as vehicle_speed_kmh); "
-            f"it has {column_list(raw.names)}: {how_to_name(raw.path)}"
+            f"it has {column_list(raw.names)}",
+            raw.path,
         )
     if unknown:
         log.problems.append(Problem("", f"{raw.path.name}: {_unknown_text(unknown)}"))
@@ -212,15 +213,16 @@ def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floa
         )
 
 
-def _no_time(raw: RawTable, known: bool) -> str:
+def _no_time(raw: RawTable, known: bool) -> DriveError:
     if known:
-        return (
+        return DriveError(
             f"{raw.path} has no time column; name it {TIME_COLUMN} (seconds on one clock), "
             f"or name it in [time] of a mapping file; it has {column_list(raw.names)}"
         )
-    return (
+    return UnnamedError(
         f"{raw.path} has no canonical columns ({TIME_COLUMN}, vehicle_speed_kmh …); "
-        f"it has {column_list(raw.names)}: {how_to_name(raw.path)}"
+        f"it has {column_list(raw.names)}",
+        raw.path,
     )
 
 

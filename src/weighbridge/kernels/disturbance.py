@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from weighbridge.kernels._jit import kernel
+from weighbridge.kernels._jit import inlined_kernel, kernel
 
 
 class DisturbanceParams(NamedTuple):
@@ -51,7 +51,7 @@ def initial_state(x, cov, time):
     )
 
 
-@kernel
+@inlined_kernel
 def _faded(state, time, params):
     """Estimate and covariance at ``time``, and the part of each state that is left (n,)."""
     n = state.x.size
@@ -67,7 +67,7 @@ def _faded(state, time, params):
     return x, cov, left
 
 
-@kernel
+@inlined_kernel
 def _predicted(x, cov, row, noise_var, cov_row):
     """Mean and variance of a measurement; ``cov_row`` (n,) becomes ``cov @ row``."""
     mean = 0.0
@@ -82,7 +82,7 @@ def _predicted(x, cov, row, noise_var, cov_row):
     return mean, var
 
 
-@kernel
+@inlined_kernel
 def step(state, time, row, y, noise_var, params):
     """Let the states fade until ``time`` and fold in ``y = row @ x + noise``.
 
@@ -162,6 +162,43 @@ def run(state, time, rows, y, noise_var, added, params):
 
 
 @kernel
+def weighed(state, time, rows, columns, noise_var, added, params):
+    """Return what each of several measurements makes of the first state, none left out.
+
+    Parameters
+    ----------
+    state, time, rows, noise_var, added, params
+        As of ``run``; the states of ``state`` are taken for 0.
+    columns : (m, k) float64
+        Measurements, one column each.
+
+    Returns
+    -------
+    (k,) float64
+        After the last row.
+    """
+    count = columns.shape[1]
+    x = np.zeros((count, state.x.size))
+    cov_row = np.empty(state.x.size)
+    for k in range(time.size):
+        state = inflated(state, added[k])
+        none, cov, left = _faded(state, time[k], params)
+        _, innovation_var = _predicted(none, cov, rows[k], noise_var[k], cov_row)
+        for j in range(count):
+            mean = 0.0
+            for i in range(left.size):
+                x[j, i] *= left[i]
+                mean += rows[k, i] * x[j, i]
+            for i in range(left.size):
+                x[j, i] += cov_row[i] / innovation_var * (columns[k, j] - mean)
+        for i in range(left.size):
+            for j in range(left.size):
+                cov[i, j] -= cov_row[i] / innovation_var * cov_row[j]
+        state = DisturbanceState(none, cov, time[k], state.rows + 1, 0.0)
+    return x[:, 0].copy()
+
+
+@inlined_kernel
 def inflated(state, variance):
     """Return the state with ``variance`` (n,) added to those of the estimates."""
     cov = state.cov.copy()

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weighbridge.kernels import disturbance
-from weighbridge.kernels._jit import kernel
+from weighbridge.kernels._jit import inlined_kernel, kernel
 
 
 class LoadParams(NamedTuple):
@@ -53,14 +53,14 @@ def initial_state(same):
     return LoadState(same, same, False, 0.0, 0, 0)
 
 
-@kernel
+@inlined_kernel
 def log_odds(state, params):
     """Logarithm of the odds of a jump at the last stop against none."""
     gain = state.changed.log_likelihood - state.same.log_likelihood
     return state.prior + params.temper * gain
 
 
-@kernel
+@inlined_kernel
 def decided(state, params):
     """Drop the less probable hypothesis.
 
@@ -77,7 +77,7 @@ def decided(state, params):
     return LoadState(state.same, state.same, False, 0.0, state.trial_row, state.rows), -1
 
 
-@kernel
+@inlined_kernel
 def step(state, time, row, y, noise_var, odds, params):
     """Fold in one row; see `disturbance.step`.
 

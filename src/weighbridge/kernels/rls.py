@@ -129,14 +129,14 @@ def step(state, time, phi, y, params):
         predicted += phi[i] * state.theta[i]
     innovation = y - predicted
     std = np.sqrt(state.noise_var)
-    settled = state.rows >= params.settle_rows
-    taken = not settled or abs(innovation) <= params.gate * std
+    limit = np.inf
+    if state.rows >= params.settle_rows and params.gate < np.inf:
+        limit = params.gate * std
+    taken = abs(innovation) <= limit
 
     # The running variance sees outliers clipped, never dropped: a filter whose
     # model stopped fitting widens its gate until rows pass again.
-    clipped = innovation
-    if settled:
-        clipped = min(max(innovation, -params.gate * std), params.gate * std)
+    clipped = min(max(innovation, -limit), limit)
     weight = 1.0 / min(state.rows + 1.0, params.scale_rows)
     if state.rows == 0:
         noise_var = innovation * innovation
@@ -153,7 +153,7 @@ def step(state, time, phi, y, params):
     block_end, score, expected = state.block_end, state.score, state.expected
     block_score, block_expected = state.block_score, state.block_expected
     if time >= block_end:
-        if settled:
+        if state.rows >= params.settle_rows:
             keep = params.forgetting**params.scale_rows
             score = keep * score + block_score * block_score
             expected = keep * expected + block_expected

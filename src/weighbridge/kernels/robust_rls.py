@@ -22,6 +22,7 @@ class RobustRlsParams(NamedTuple):
     kept_information : sum of squared regressors below which nothing is forgotten
         without being replaced: the guard against wind-up
     threshold : Huber's, in standard deviations of the innovation [-]
+    weight_information : Huber's weight counts in the information, too
     scale_windows : windows over which the innovation variance is averaged [-]
     settle_windows : windows before the threshold holds
     offset_std : standard deviation of the offset over the mass before the drive
@@ -38,6 +39,7 @@ class RobustRlsParams(NamedTuple):
     forgetting: float
     kept_information: float
     threshold: float
+    weight_information: bool
     scale_windows: float
     settle_windows: int
     offset_std: float
@@ -148,10 +150,11 @@ def fold(state, phi, y, params):
     keep = params.forgetting
     if keep * state.information < params.kept_information:
         keep = min(1.0, params.kept_information / state.information)
-    information = keep * state.information + weight * phi * phi
+    counted = weight if params.weight_information else 1.0
+    information = keep * state.information + counted * phi * phi
     stays = params.offset_forgetting
-    sum_weighted = np.sqrt(keep * stays) * state.sum_weighted + weight * phi
-    sum_weight = stays * state.sum_weight + weight
+    sum_weighted = np.sqrt(keep * stays) * state.sum_weighted + counted * phi
+    sum_weight = stays * state.sum_weight + counted
     mass, offset = state.mass, state.offset
     if params.offset_std <= 0.0:
         mass += weight * phi * innovation / information

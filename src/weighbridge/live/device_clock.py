@@ -11,6 +11,8 @@ _SPELL: Final = 10.0
 _LATE: Final = 1.0
 # Late for so long, and it was the clock [s].
 _PATIENCE: Final = 2.0
+# So many stamps in succession that fell behind the newest, and the clock has begun anew.
+_FALLEN: Final = 3
 
 
 class DeviceClock:
@@ -19,12 +21,20 @@ class DeviceClock:
     A message is never early: of the differences between arrival and stamp the smallest is nearest
     to the truth. The stamps keep their spacing, which arrivals over a serial line do not.
 
+    A device that was turned on anew, or whose clock was set back, sends stamps that fall. What it
+    sends is believed from its third message on.
+
     Parameters
     ----------
     period : after which the device counts from 0 again, such as a day [s]; infinite for never
+
+    Attributes
+    ----------
+    renewed : how often the device's clock has begun anew
     """
 
     def __init__(self, period: float = math.inf) -> None:
+        self.renewed = 0
         self._period = period
         self._told = -math.inf
         self._turns = 0
@@ -32,9 +42,14 @@ class DeviceClock:
         self._before = math.inf
         self._begun = -math.inf
         self._late_since = math.inf
+        self._newest = -math.inf
+        self._fallen = 0
+        self._fallen_to = math.nan
 
     def host(self, stamp: float, arrived: float) -> float:
         """Return when something was measured, by the host's clock [s].
+
+        NaN while it is not known whether the device's clock has begun anew.
 
         Parameters
         ----------
@@ -45,6 +60,8 @@ class DeviceClock:
         difference = arrived - stamp
         if not math.isfinite(difference):
             return arrived
+        if self._falls(stamp):
+            return math.nan
         if difference > min(self._best, self._before) + _LATE:
             self._late_since = min(self._late_since, arrived)
             if arrived - self._late_since > _PATIENCE:
@@ -55,6 +72,22 @@ class DeviceClock:
             self._before, self._best, self._begun = self._best, math.inf, arrived
         self._best = min(self._best, difference)
         return stamp + min(self._best, self._before)
+
+    def _falls(self, stamp: float) -> bool:
+        """Tell whether a stamp has fallen; take a clock that goes on from there as a new one."""
+        if not stamp < self._newest - _LATE:
+            self._newest, self._fallen = max(self._newest, stamp), 0
+            return False
+        # One that was overtaken on its way through a network falls alone.
+        goes_on = self._fallen > 0 and abs(stamp - self._fallen_to) < _PATIENCE
+        self._fallen = self._fallen + 1 if goes_on else 1
+        self._fallen_to = stamp
+        if self._fallen < _FALLEN:
+            return True
+        self._best = self._before = self._late_since = math.inf
+        self._newest, self._fallen = stamp, 0
+        self.renewed += 1
+        return False
 
     def _running(self, stamp: float) -> float:
         """Let a stamp go on where the device counts from 0 again [s]."""

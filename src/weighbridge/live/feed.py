@@ -50,12 +50,36 @@ class SourceState:
     ended: bool = False
 
 
+def trouble_text(name: str, error: str) -> str:
+    """Say in a sentence which source has a trouble, its place named once.
+
+    Parameters
+    ----------
+    name : of the source, as ``nmea:tcp:127.0.0.1:10110``
+    error : why no samples come from it
+    """
+    kind, place = _parted(name)
+    return f"{kind}: {error}" if place in error else f"{source_text(name)}: {error}"
+
+
+def source_text(name: str) -> str:
+    """Write a source as people call it: ``nmea 127.0.0.1:10110``."""
+    return " ".join(_parted(name)).rstrip()
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """Part the name of a source into its kind and its place."""
+    kind, _, place = name.partition(":")
+    return kind, place.removeprefix("tcp:")
+
+
 class Feed:
     """Samples of all sources, as they come.
 
-    A source may have two more attributes. ``trouble``: why it has no samples although its device
+    A source may have three more attributes. ``trouble``: why it has no samples although its device
     is there, such as a bus that is silent; empty where it has. ``patient``: true where it waits
-    for room instead of having its oldest samples dropped, as a recorded drive.
+    for room instead of having its oldest samples dropped, as a recorded drive. ``renewed``: how
+    often the clock of its device has begun anew.
 
     Parameters
     ----------
@@ -118,6 +142,11 @@ class Feed:
             runner.look()
         return blocks
 
+    @property
+    def renewed(self) -> int:
+        """How often the clock of any device has begun anew."""
+        return sum(int(getattr(runner.source, "renewed", 0)) for runner in self._runners)
+
     def states(self) -> list[SourceState]:
         """How each source does, in the order they were named."""
         return [runner.state() for runner in self._runners]
@@ -131,7 +160,9 @@ class Feed:
         for runner in self._runners:
             runner.thread.join(max(until - monotonic(), 0.0))
             if runner.thread.is_alive():
-                _logger.warning("%s does not end; it is left behind", runner.source.name)
+                _logger.warning(
+                    "%s does not end; it is left behind", source_text(runner.source.name)
+                )
 
     def __enter__(self) -> Feed:
         return self
@@ -197,10 +228,10 @@ class _Runner:
                 self._since = now()
             self._error = error
             if trouble and not self._told:
-                _logger.warning("%s: %s", self.source.name, trouble)
+                _logger.warning("%s", trouble_text(self.source.name, trouble))
                 self._told = True
             elif not error and self._told:
-                _logger.warning("%s is back", self.source.name)
+                _logger.warning("%s is back", source_text(self.source.name))
                 self._told = False
 
     def _run(self) -> None:

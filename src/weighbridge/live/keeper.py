@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from pathlib import Path
 from time import monotonic
 from typing import Final
@@ -10,6 +11,8 @@ from typing import Final
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.live.scale import LiveScale
 from weighbridge.signals import DriveInfo
+from weighbridge.signals.instants import instant
+from weighbridge.signals.recent import STEP
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.whole import write_whole
 
@@ -17,6 +20,11 @@ _LOG = logging.getLogger(__name__)
 
 PERIOD: Final = 60.0
 """A checkpoint is written so often [s]."""
+
+OLDEST: Final = 3600.0
+"""The load may well have changed since a checkpoint that is older [s]."""
+
+_AHEAD: Final = 1.0  # stamps of a device run ahead of the host's by less [s]
 
 
 class Keeper:
@@ -35,14 +43,24 @@ class Keeper:
         self._failed = False
 
     def restored(
-        self, vehicle: Vehicle, *, lateness: float, info: DriveInfo
-    ) -> tuple[LiveScale, str]:
+        self, vehicle: Vehicle, *, lateness: float, info: DriveInfo, start: float,
+        step: float = STEP,
+    ) -> tuple[LiveScale, str]:  # fmt: skip
         """Return the scale of the checkpoint, or a new one; and one sentence on it.
 
         A checkpoint that cannot be used is set aside beside it, under a name that ends in
-        ``.bad``.
+        ``.bad``. Of one that is later than the samples, or older by more than `OLDEST`, what was
+        set to nought is taken over, and nothing else.
+
+        Parameters
+        ----------
+        vehicle
+        lateness : of a new scale [s]
+        info : of a new scale
+        start : instant from which samples come [s]
+        step : of a new scale [s]
         """
-        new = LiveScale(vehicle, lateness=lateness, info=info)
+        new = LiveScale(vehicle, lateness=lateness, info=info, step=step)
         try:
             data = self.path.read_text(encoding="ascii", errors="replace")
         except FileNotFoundError:
@@ -53,10 +71,28 @@ class Keeper:
             scale = LiveScale.restore(vehicle, data)
         except ConfigError as error:
             return new, f"{self.path}: {error}{self._set_aside()}"
+        after = start - scale.newest
+        if not -_AHEAD <= after <= OLDEST and math.isfinite(after):
+            new.take_tare(scale)
+            return new, f"{self.path}: {self._of_another_time(scale.newest, start)}"
         told = scale.weighing()
         if told.mass != told.mass:
             return scale, ""
-        return scale, f"going on from {told.mass:.0f} kg ± {told.std:.0f} kg of the checkpoint"
+        return scale, (
+            f"going on from {told.mass:.0f} kg ± {told.std:.0f} kg of the checkpoint: press l "
+            "where the load has changed since"
+        )
+
+    def _of_another_time(self, newest: float, start: float) -> str:
+        """Say why a checkpoint is not gone on from."""
+        if newest < start:
+            hours = (start - newest) / 3600.0
+            return f"it is {hours:.0f} h old, and the load may have changed: weighed anew"
+        return (
+            f"it holds samples until {instant(newest)}, later than those that come from "
+            f"{instant(start)} on: an emulated drive or a clock that was set back"
+            f"{self._set_aside()}"
+        )
 
     def _set_aside(self) -> str:
         aside = self.path.with_name(self.path.name + ".bad")

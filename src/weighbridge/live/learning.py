@@ -63,7 +63,7 @@ class Learned:
         return replace(self, setup=None, state=None)
 
 
-def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:
+def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
     """Weigh what was recorded so far as a whole, and set up the stages to go on from it.
 
     Parameters
@@ -71,6 +71,7 @@ def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:
     drive : records from the beginning, or the last `LONGEST` seconds of them, up to ``until``
     vehicle
     until : instant up to which they are complete [s]
+    step : in which later records are taken [s]
     """
     try:
         weighing = weigh(drive, vehicle)
@@ -79,7 +80,7 @@ def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:
     inconsistent = weighing.status is Status.INCONSISTENT
     if weighing.result is None or not math.isfinite(weighing.mass):
         return _nothing(until, weighing.reason, inconsistent=inconsistent, notes=weighing.warnings)
-    setup, state, notes = _set_up(weighing, drive, until)
+    setup, state, notes = _set_up(weighing, drive, until, step)
     return Learned(
         until=until,
         since=weighing.segments[-1].start if weighing.load_changed else drive.start,
@@ -95,14 +96,14 @@ def learn(drive: Drive, vehicle: Vehicle, until: float) -> Learned:
 
 
 def _set_up(
-    weighing: Weighing, drive: Drive, until: float
+    weighing: Weighing, drive: Drive, until: float, step: float
 ) -> tuple[ForwardSetup | None, ForwardState | None, tuple[str, ...]]:
     """Set up the stages; all records so far are one step of theirs.
 
     The records are as they came: what the checks of the weighing left out or moved is in them.
     """
     try:
-        setup = forward.identify_forward(weighing)
+        setup = forward.identify_forward(weighing, step)
     except WeighbridgeError as error:
         return None, None, (*weighing.warnings, str(error))
     return setup, forward.resume(weighing, drive, until, setup), weighing.warnings

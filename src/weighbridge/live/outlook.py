@@ -45,6 +45,9 @@ def outlook(
     reason: str,
     silent: Sequence[str],
     first: float,
+    unproved: str = "",
+    since: float = 0.0,
+    wait: float = 0.0,
 ) -> Outlook:
     """Judge a mass by its interval, and tell how much more driving it takes.
 
@@ -54,15 +57,20 @@ def outlook(
     ----------
     mass, std : [kg]; NaN where there is none
     floor : part of ``std`` that no driving takes away, relative to the mass [-]
-    driven : time on the move that the mass was made from [s]
+    driven : time on the move that the mass was made from, or what was looked at [s]
     reason : why there is none
     silent : signals that are needed and do not come
     first : time on the move before which nothing is weighed [s]
+    unproved : why the mass is not yet one of what is driven now; empty where it is
+    since : time on the move since then, which no look has seen yet [s]
+    wait : time on the move until it will [s]
     """
     missing = f"{', '.join(silent)} {'does' if len(silent) == 1 else 'do'} not come"
     if math.isnan(mass):
         if not reason:
-            reason = f"driven {driven:.0f} s; the first mass takes {first:.0f} s on the move"
+            reason = (
+                f"driven {driven + since:.0f} s; the first mass takes {first:.0f} s on the move"
+            )
         return Outlook(
             status=LiveStatus.LEARNING,
             reason=f"{missing}; {reason}" if silent else reason,
@@ -70,23 +78,39 @@ def outlook(
         )
     half = _REACH * std / mass
     noise = max(std**2 - (floor * mass) ** 2, 0.0)
-    to_good = _minutes(GOOD, mass, noise, floor, driven)
-    to_better = _minutes(BETTER, mass, noise, floor, driven)
+    to_good, to_better = (
+        _later(_minutes(part, mass, noise, floor, driven), since, wait) for part in (GOOD, BETTER)
+    )
     good = half <= GOOD
     if not good:
         reason = f"within {100.0 * half:.1f} % so far"
         reason = f"{missing}; {reason}" if silent else reason
     elif silent:
         reason = missing
+    else:
+        reason = unproved
     return Outlook(
-        status=LiveStatus.WEIGHED if good and not silent else LiveStatus.LEARNING,
-        reason="" if good and not silent else reason,
+        status=LiveStatus.LEARNING if reason else LiveStatus.WEIGHED,
+        reason=reason,
         progress=min(1.0, (BETTER / half) ** 2),
         reach=_REACH * floor,
         minutes_to_5=to_good,
         minutes_to_2=to_better,
         advice="" if to_better == 0.0 else ADVICE,
     )
+
+
+def _later(minutes: float, since: float, wait: float) -> float:
+    """Take off what was driven meanwhile; the interval is no narrower before the next look [min].
+
+    Parameters
+    ----------
+    minutes : as of the last look
+    since, wait : time on the move since it, and until the next [s]
+    """
+    if not 0.0 < minutes < math.inf:
+        return minutes
+    return max(minutes - since / 60.0, wait / 60.0)
 
 
 def _allowed(half: float, mass: float, floor: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import time
 from collections.abc import Callable
@@ -68,6 +69,8 @@ class Recorder:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.folder = Path(folder)
+        self._made = not self.folder.exists()
+        self._closed = False
         _refuse_drive(self.folder)
         self.samples = 0
         self._info = info or DriveInfo()
@@ -111,10 +114,17 @@ class Recorder:
             self._flush()
 
     def close(self) -> None:
-        """Write what is left and join the parts."""
+        """Write what is left and join the parts; let a folder go that was made for nothing."""
+        if self._closed:
+            return
+        self._closed = True
         self._flush()
         self._writer.submit(self._join)
         self._writer.shutdown(wait=True)
+        if self._made:
+            # One that holds something stays.
+            with contextlib.suppress(OSError):
+                self.folder.rmdir()
 
     def __enter__(self) -> Recorder:
         return self
@@ -191,6 +201,15 @@ class Recorder:
         if name not in self._unknown and len(self._unknown) < len(QUANTITIES):
             self._unknown.add(name)
             _logger.warning("%s is no signal of the catalogue and is not recorded", name)
+
+
+def free_folder(folder: Path) -> Path:
+    """Return a folder to record into that holds nothing: this one, or one numbered beside it."""
+    found, number = folder, 1
+    while found.is_dir() and any(found.iterdir()):
+        number += 1
+        found = folder.with_name(f"{folder.name}-{number}")
+    return found
 
 
 def _refuse_drive(folder: Path) -> None:

@@ -23,7 +23,13 @@ BACK: Final = 60.0
 """So far behind the newest likewise [s]."""
 
 JUMPED: Final = 50
-"""Of so many such samples in succession the clock has jumped; fewer are false."""
+"""Of so many such samples in succession, and of no other, the clock has jumped; fewer are false."""
+
+JUMPED_FOR: Final = 2.0
+"""They go on for so long [s]: one of several sources whose clock begins anew is not all of them."""
+
+SILENCE: Final = 3.0
+"""Where no sample came for so long, all were silent [s]."""
 
 _FIRST: Final = 1e10
 """No clock tells such an instant [s]: it is the year 2286."""
@@ -112,6 +118,9 @@ class Records:
     oldest : instant of the first sample of all that were taken [s]; inf before the first
     offset : what jumps of the clock have added up to, which is taken off [s]
     jumps : jumps of the clock so far
+    resumed : instant of the first sample after all were silent for `SILENCE` the last time [s];
+        -inf before that
+    silence : length of that silence [s]; 0 before any
     late, unfit : samples dropped because they came too late, or were no finite number or
         impossible instant, by signal
     """
@@ -123,12 +132,15 @@ class Records:
         self.lateness = lateness
         self.newest = -math.inf
         self.oldest = math.inf
+        self.resumed = -math.inf
+        self.silence = 0.0
         self.offset = 0.0
         self.jumps = 0
         self.late: dict[str, int] = {}
         self.unfit: dict[str, int] = {}
         self._columns: dict[str, _Column] = {}
         self._strange = 0
+        self._strange_from = math.nan
         self._sealed_to = -math.inf
 
     @property
@@ -148,6 +160,7 @@ class Records:
         column.single_values.append(value)
         column.newest = max(column.newest, at)
         self._strange = 0
+        self._resume(at)
         self.newest, self.oldest = max(self.newest, at), min(self.oldest, at)
 
     def add_block(self, samples: Samples) -> None:
@@ -163,6 +176,8 @@ class Records:
             There is no such signal, or times and values differ in number.
         """
         newest = self.newest
+        strange: list[Floats] = []
+        ordinary = False
         first, in_time, last = self._bounds()
         for name, (time, values) in samples.items():
             if time.shape != values.shape or time.ndim != 1:
@@ -176,14 +191,17 @@ class Records:
             fresh = near & (at >= in_time)
             self._count(self.unfit, name, int(np.count_nonzero(~near)))
             self._count(self.late, name, int(np.count_nonzero(near & ~fresh)))
-            self._watch(at[finite & ~near], bool(near.any()))
+            strange.append(at[finite & ~near])
+            ordinary = ordinary or bool(near.any())
             if fresh.any():
                 at = at[fresh]
                 column.blocks.append((at, values[fresh]))
                 column.newest = max(column.newest, float(at.max()))
+                self._resume(float(at.min()))
                 newest = max(newest, float(at.max()))
                 self.oldest = min(self.oldest, float(at.min()))
         self.newest = newest
+        self._watch(np.concatenate([*strange, _NONE]), ordinary)
 
     def _bounds(self) -> tuple[float, float, float]:
         """Instants between which a stamp can be so: after, in time from, before [s].
@@ -196,6 +214,10 @@ class Records:
         open_from = newest - self.lateness
         in_time = open_from if open_from > sealed_to else sealed_to
         return in_time - BACK, in_time, newest + FARTHEST
+
+    def _resume(self, at: float) -> None:
+        if at - self.newest > SILENCE and math.isfinite(self.newest):
+            self.resumed, self.silence = at, at - self.newest
 
     def _column(self, name: str) -> _Column:
         if name not in QUANTITIES:
@@ -210,12 +232,19 @@ class Records:
             counts[name] = counts.get(name, 0) + more
 
     def _watch(self, strange: Floats, ordinary: bool) -> None:
-        """Look for a clock that has jumped: samples of it come one after another."""
-        self._strange = 0 if ordinary else self._strange + strange.size
-        if self._strange >= JUMPED and math.isfinite(self.newest):
-            self.offset += float(strange[-1]) - self.newest
-            self.jumps += 1
+        """Look for a clock that has jumped: samples of it come, and no others."""
+        if ordinary or not math.isfinite(self.newest):
             self._strange = 0
+        elif strange.size:
+            low, high = float(strange.min()), float(strange.max())
+            if not self._strange or not -BACK < low - self._strange_from < BACK:
+                self._strange, self._strange_from = 0, low
+            self._strange += strange.size
+            if self._strange >= JUMPED and high - self._strange_from >= JUMPED_FOR:
+                # What came of it so far is left out, and leaves a gap of its length.
+                self.offset += self._strange_from - self.newest
+                self.jumps += 1
+                self._strange = 0
 
     def seal(self, until: float) -> None:
         """Put all samples before ``until`` in order; none of them comes any more."""
@@ -242,6 +271,12 @@ class Records:
             time = column.sealed[0]
             keep = min(int(time.searchsorted(before)), time.size - fewest)
             column.first += max(keep, 0)
+
+    def cut(self, before: float) -> None:
+        """Let all samples before an instant [s] go, however few are left."""
+        self.seal(before)
+        self.forget(before, 0)
+        self.oldest = max(self.oldest, before)
 
     def last(self, span: float, fewest: int) -> dict[str, tuple[Floats, Floats]]:
         """Samples of the last ``span`` [s], ``fewest`` of each signal at least, open ones too."""

@@ -18,6 +18,9 @@ BLOCK: Final = 0.1
 FASTEST_BLOCK: Final = 1.0
 """or of so long as fast as it goes [s]."""
 
+FASTEST_STEP: Final = 1.0
+"""A scale takes steps of so long then [s]: nobody waits for what is shown on the way."""
+
 
 class Replay:
     """Hands the samples of a drive over at a rate.
@@ -52,8 +55,8 @@ class Replay:
         length = BLOCK if math.isfinite(self._rate) else FASTEST_BLOCK
         begun, block = monotonic(), 0
         while drive.start + block * length <= drive.end:
-            start = drive.start + block * length
-            part = drive.between(start, start + length)
+            # The end of a block is the very start of the next, or samples fall between them.
+            part = drive.between(*(drive.start + k * length for k in (block, block + 1)))
             block += 1
             if math.isfinite(self._rate):
                 due = begun + block * length / self._rate

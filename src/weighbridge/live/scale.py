@@ -10,11 +10,12 @@ from typing import Final
 import numpy as np
 
 from weighbridge.arguments import as_floats, check_text, check_type
-from weighbridge.balance.table import MOVING
 from weighbridge.errors import ConfigError
 from weighbridge.live.arrival import needed_signals
 from weighbridge.live.checkpoint import packed, unpacked
+from weighbridge.live.doubts import doubts, of_before
 from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, REST, Learned, learn
+from weighbridge.live.on_the_move import moves, time_on_the_move
 from weighbridge.live.outlook import Outlook, outlook
 from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.source import Samples
@@ -37,6 +38,9 @@ deviations [-],"""
 LEAST_FAR: Final = 0.03
 """and so much of the mass [-]."""
 
+RENEWED: Final = 60.0
+"""A clock that begins anew no later after a silence belongs to it [s]."""
+
 LIGHTEST, HEAVIEST = 50.0, 200e3
 """Masses that road vehicles have [kg]."""
 
@@ -45,7 +49,7 @@ class LiveScale:
     """Weighs a vehicle from samples as they come.
 
     The first minutes are weighed as a whole, again and again, until they tell mounting, delays and
-    noise; from then on each second is weighed by the forward stages
+    noise; from then on each step is weighed by the forward stages
     (`weighbridge.pipeline.forward`), and all that came is still looked at now and then, by the
     checks of a recorded drive. With a ``setup`` nothing is learnt, and the mass is to the last bit
     that of `weighbridge.pipeline.forward.forward_weigh` over the same samples. Samples are taken as
@@ -59,6 +63,8 @@ class LiveScale:
         dropped
     setup : of `weighbridge.pipeline.forward.identify_forward`
     info : what is known beside the samples, such as wind and temperature
+    step : in which samples are weighed [s], one of `weighbridge.signals.recent.STEPS`: shorter ones
+        tell sooner and cost more; that of ``setup`` where there is one
 
     Notes
     -----
@@ -72,26 +78,33 @@ class LiveScale:
         lateness: float = LATENESS,
         setup: ForwardSetup | None = None,
         info: DriveInfo | None = None,
+        step: float = STEP,
     ) -> None:
         if setup is not None:
             check_type("setup", setup, ForwardSetup, "a ForwardSetup")
         if info is not None:
             check_type("info", info, DriveInfo, "a weighbridge.DriveInfo")
+        forward.check_step(step)
         self.vehicle = as_vehicle(vehicle)
         self.info = info or DriveInfo()
         self._records = Records(lateness)
         self._learns = setup is None
         self._setup = setup
+        self._every = step if setup is None else setup.step
         self._state: ForwardState | None = None
         self._learned: Learned | None = None
         self._next: float | None = None
         self._driven = 0.0
         self._driven_this_load = 0.0
+        self._driven_before = 0.0
         self._learn_at = FIRST
         self._learned_at = 0.0
         self._stood = 0.0
         self._since = self._kept_from = -math.inf
         self._tared: float | None = None
+        self._anew = -math.inf
+        self._came: tuple[str, ...] = ()
+        self._needed = needed_signals(self.vehicle, ())
 
     def update(self, time: float | Floats, signal: str, value: float | Floats) -> None:
         """Take one sample of a signal, or several.
@@ -143,7 +156,7 @@ class LiveScale:
             return
         self._advance(self._records.newest)
         if self._learns and self._driven > max(self._learned_at, FIRST) and self._next is not None:
-            self._learn(self._records.drive("live", self.info), self._next - STEP)
+            self._learn(self._records.drive("live", self.info), self._next - self._every)
 
     def checkpoint(self) -> str:
         """Return all that the scale goes on from, for `restore`, as text."""
@@ -157,9 +170,10 @@ class LiveScale:
             "tared": self._tared,
             "learns": self._learns,
             "lateness": self._records.lateness,
+            "step": self._every,
             "info": self.info,
             "learned": None if self._learned is None else self._learned.answer(),
-            "samples": self._records.last(BEHIND + 2.0 * STEP, FEWEST_SAMPLES),
+            "samples": self._records.last(BEHIND + 2.0 * self._every, FEWEST_SAMPLES),
         }
         return packed(content, self.vehicle)
 
@@ -181,7 +195,12 @@ class LiveScale:
         vehicle = as_vehicle(vehicle)
         content = unpacked(checkpoint, vehicle)
         try:
-            scale = cls(vehicle, lateness=content["lateness"], info=content["info"])
+            scale = cls(
+                vehicle,
+                lateness=content["lateness"],
+                info=content["info"],
+                step=content["step"],
+            )
             scale._setup, scale._state = content["setup"], content["state"]
             scale._next, scale._learned = content["next"], content["learned"]
             scale._driven, scale._driven_this_load = content["driven"], content["driven_this_load"]
@@ -189,8 +208,8 @@ class LiveScale:
             scale._tared, scale._learns = content["tared"], content["learns"]
             scale._records.add_block(content["samples"])
             if scale._next is not None:
-                scale._records.seal(scale._next - STEP)
-                scale._kept_from = scale._next - STEP
+                scale._records.seal(scale._next - scale._every)
+                scale._kept_from = scale._next - scale._every
         except (KeyError, TypeError, AttributeError) as error:
             raise ConfigError(f"the checkpoint is not used: {error}") from None
         scale._learned_at = scale._driven
@@ -226,6 +245,10 @@ class LiveScale:
         self._tared = mass
         return mass
 
+    def take_tare(self, other: LiveScale) -> None:
+        """Set to nought what another scale of the vehicle has set to nought."""
+        self._tared = other._tared
+
     def load_changed(self) -> None:
         """Tell that the load has changed: what was weighed before says nothing of it any more.
 
@@ -239,6 +262,27 @@ class LiveScale:
         self._driven_this_load = 0.0
         self._since = self._records.newest
         self._learned_at, self._learn_at = self._driven, self._driven + FIRST
+
+    def renew(self) -> None:
+        """Tell that the clock of a device has begun anew, as of one that was turned on again.
+
+        Where all signals were silent before, the vehicle may have been driven and loaded
+        meanwhile: what comes is weighed as a new drive. Where others went on it is the same drive.
+        """
+        records = self._records
+        if not records.newest - records.resumed < RENEWED:
+            return
+        self._learned = None
+        self._driven = self._driven_this_load = self._learned_at = self._stood = 0.0
+        self._driven_before = 0.0
+        self._learn_at = FIRST
+        self._since = self._kept_from = self._anew = records.resumed
+        if self._learns:
+            self._setup = self._state = None
+        elif self._setup is not None:
+            self._state = forward.begin(self._setup, records.resumed)
+        records.cut(records.resumed)
+        self._next = first_instant(records.resumed, self._every)
 
     def weighing(self, silence: float = 0.0) -> LiveWeighing:
         """Return the mass as it is known now, and what would make it surer.
@@ -269,9 +313,28 @@ class LiveScale:
             minutes_to_5=found.minutes_to_5,
             minutes_to_2=found.minutes_to_2,
             advice=found.advice,
+            look=self._look(),
             signals=health,
-            notes=self._notes(learned.notes if learned is not None else ()),
+            notes=(*self._doubts(mass), *(learned.notes if learned is not None else ())),
         )
+
+    def _doubts(self, mass: float) -> tuple[str, ...]:
+        return doubts(
+            self._records,
+            driven=self._driven,
+            anew=self._anew,
+            driven_since=self._driven_since(),
+            goes_on=self._is_of_before(mass),
+        )
+
+    def _driven_since(self) -> float:
+        """Time on the move since all signals were silent the last time [s]."""
+        waits = self._next is not None and self._records.resumed >= self._next - self._every
+        return 0.0 if waits else self._driven - self._driven_before
+
+    def _is_of_before(self, mass: float) -> bool:
+        """Whether a mass is of a load that was there before all signals were silent."""
+        return math.isfinite(mass) and self._since < self._records.resumed
 
     def _mass(self) -> tuple[float, float, float, float]:
         """Mass, its standard deviation, what no driving takes away of it, and its instant."""
@@ -288,6 +351,19 @@ class LiveScale:
         if learned is not None and math.isfinite(learned.mass):
             return learned.mass, learned.std, learned.floor, learned.until
         return nothing
+
+    def _goes_on(self) -> bool:
+        """Whether the mass is that of the forward stages, which each second of driving makes."""
+        state = self._state
+        told = self._learned is None or not self._learned.inconsistent
+        return told and self._setup is not None and state is not None and state.joint.windows > 0
+
+    def _look(self) -> float:
+        """Part of the driving until the next look that is done [-]; NaN where nothing waits."""
+        if not self._learns or (self._goes_on() and self._leaves() == 0.0):
+            return math.nan
+        part = (self._driven - self._learned_at) / (self._learn_at - self._learned_at)
+        return min(max(part, 0.0), 1.0)
 
     def _leaves(self) -> float:
         """Standard deviation over the mass that is too wide to be told [-]; 0 where it is not.
@@ -310,19 +386,31 @@ class LiveScale:
             return Outlook(status=LiveStatus.INCONSISTENT, reason=learned.reason)
         silent = [s.name for s in health if s.needed and not s.fresh]
         reason = learned.reason if learned is not None else ""
+        if reason and self._learns:
+            left = max(self._learn_at - self._driven, 0.0)
+            reason += f"; looked at again after {left:.0f} s more on the move"
         if wide := self._leaves():
             reason = (
                 "what was driven since the load may have changed leaves "
                 f"{196.0 * wide:.0f} % to both sides"
             )
+        waits = self._learns and not self._goes_on()
+        since = self._driven - self._learned_at if waits else 0.0
         return outlook(
             mass,
             std,
             floor,
-            driven=self._driven_this_load,
+            driven=self._driven_this_load - since,
             reason=reason,
             silent=silent,
             first=FIRST,
+            unproved=of_before(
+                self._records,
+                driven_since=self._driven_since(),
+                goes_on=self._is_of_before(mass),
+            ),
+            since=since,
+            wait=max(self._learn_at - self._driven, 0.0) if waits else 0.0,
         )
 
     def _advance(self, until: float | None = None) -> None:
@@ -332,29 +420,31 @@ class LiveScale:
             oldest = self._records.oldest
             if not end >= oldest:
                 return
-            self._next = first_instant(oldest)
+            self._next = first_instant(oldest, self._every)
             self._since = max(self._since, oldest)
             if self._setup is not None and self._state is None:
                 self._state = forward.begin(self._setup, oldest)
         while self._next <= end:
             self._records.seal(self._next)
-            if self._records.newest_sealed >= self._next - STEP - BEHIND:
+            if self._records.newest_sealed >= self._next - self._every - BEHIND:
                 self._step(self._next)
-                self._next += STEP
+                self._next += self._every
             else:
                 # Nothing came for long: on to the next sample.
-                self._next = first_instant(self._records.waiting_from)
+                self._next = first_instant(self._records.waiting_from, self._every)
 
     def _step(self, until: float) -> None:
         drive = self._records.drive("live", self.info)
-        seen = recent(drive, until)
-        moved = _moved(seen, until)
+        seen = recent(drive, until, self._every)
+        moved = self._every if moves(seen, until) else 0.0
+        if until - self._every <= self._records.resumed < until:
+            self._driven_before = self._driven
         self._driven += moved
         self._driven_this_load += moved
-        self._stood = 0.0 if moved else self._stood + STEP
+        self._stood = 0.0 if moved else self._stood + self._every
         if self._setup is not None and self._state is not None:
             self._state, _ = forward.step(self._state, seen, until, self._setup)
-        keep = BEHIND + 2.0 * STEP
+        keep = BEHIND + 2.0 * self._every
         if self._learns:
             keep += LONGEST
             rests = self._stood == REST and self._driven >= self._learned_at + FIRST
@@ -370,7 +460,9 @@ class LiveScale:
         """Look at all that is kept, and go on from it where it tells more than is known."""
         self._learned_at = self._driven
         self._learn_at = min(self._driven * GROWTH, self._driven + PERIOD)
-        learned = learn(drive, self.vehicle, until)
+        # Slow signals are kept for longer; others would seem to begin late beside them.
+        kept = drive.between(self._kept_from, math.inf) if self._kept_from > -math.inf else drive
+        learned = learn(kept, self.vehicle, until, self._every)
         _LOG.info("looked at %.0f s: %.0f kg %s", drive.duration, learned.mass, learned.reason)
         mass, std, _, _ = self._mass()
         self._learned = learned
@@ -386,12 +478,15 @@ class LiveScale:
         if learned.since > max(drive.start, self._since):
             # The load has changed on the way.
             self._since = learned.since
-            self._driven_this_load = _time_on_the_move(drive, learned.since)
+            self._driven_this_load = time_on_the_move(drive, learned.since)
 
     def _health(self, silence: float) -> Iterable[SignalHealth]:
         records = self._records
-        needed = needed_signals(self.vehicle, records.names())
-        for name in dict.fromkeys((*needed, *records.names())):
+        came = records.names()
+        if came != self._came:
+            self._came, self._needed = came, needed_signals(self.vehicle, came)
+        needed = self._needed
+        for name in dict.fromkeys((*needed, *came)):
             yield SignalHealth(
                 name=name,
                 rate=records.rate(name, RATE_SPAN),
@@ -402,29 +497,3 @@ class LiveScale:
                 unfit=records.unfit.get(name, 0),
                 needed=name in needed,
             )
-
-    def _notes(self, learned: tuple[str, ...]) -> tuple[str, ...]:
-        jumps = self._records.jumps
-        if not jumps:
-            return learned
-        told = (
-            f"the clock of the samples jumped {jumps} times, by {self._records.offset:.0f} s in all"
-        )
-        return (told, *learned)
-
-
-def _time_on_the_move(drive: Drive, since: float) -> float:
-    """Time on the move since an instant, gaps left out [s]."""
-    speed = drive.speed
-    if speed is None:
-        return 0.0
-    moved = (speed.values[1:] > MOVING) & (speed.time[1:] > since)
-    return float(np.minimum(np.diff(speed.time), STEP)[moved].sum())
-
-
-def _moved(seen: Drive, until: float) -> float:
-    """Time on the move within the last step [s]."""
-    speed = seen.speed
-    if speed is None:
-        return 0.0
-    return STEP if float(speed.held(np.array([until]))[0]) > MOVING else 0.0

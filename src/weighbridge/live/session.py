@@ -12,7 +12,7 @@ from typing import Final
 from weighbridge.errors import WeighbridgeError
 from weighbridge.live.alerts import Alert
 from weighbridge.live.clock import now
-from weighbridge.live.feed import Feed
+from weighbridge.live.feed import Feed, trouble_text
 from weighbridge.live.keeper import Keeper
 from weighbridge.live.outputs import Outputs
 from weighbridge.live.recorder import Recorder
@@ -53,6 +53,7 @@ class Session:
     orders: Callable[[LiveScale], None] | None = None
     _shown: float = field(default=-float("inf"), init=False)
     _looked: float = field(default=-float("inf"), init=False)
+    _renewed: int = field(default=0, init=False)
     _heard: tuple[float, float] = field(default=(-float("inf"), 0.0), init=False)
 
     def run(self, stop: Event) -> LiveWeighing:
@@ -63,6 +64,7 @@ class Session:
                     if self.recorder is not None:
                         self.recorder.put(samples)
                     self.scale.update_block(samples)
+                    self._renew()
                     self._show()
                     if stop.is_set():
                         break
@@ -94,9 +96,17 @@ class Session:
             if event is not None:
                 _LOG.warning("%s", event.text)
         active = [alert.text for alert in self.alerts if alert.active]
-        lost = [f"{s.name}: {s.error}" for s in self.feed.states() if s.error and not s.ended]
+        lost = [
+            trouble_text(s.name, s.error) for s in self.feed.states() if s.error and not s.ended
+        ]
         told = (*active, *lost, *self._doubts())
         self.outputs.show(replace(weighing, notes=(*told, *weighing.notes)))
+
+    def _renew(self) -> None:
+        """Tell the scale of a device that was turned on again."""
+        if self.feed.renewed > self._renewed:
+            self._renewed = self.feed.renewed
+            self.scale.renew()
 
     def _silence(self) -> float:
         """Time since any sample came [s]; 0 while some come."""
@@ -116,7 +126,7 @@ def order(scale: LiveScale, key: str) -> str:
     """Do what a key asks for; return one sentence, empty for a key that asks for nothing."""
     try:
         if key == "t":
-            return f"tared at {scale.tare():.0f} kg"
+            return f"tare {scale.tare():.0f} kg: the payload counts from here"
         if key == "l":
             scale.load_changed()
             return "the load has changed: what was weighed before is forgotten"

@@ -70,6 +70,8 @@ class LiveWeighing:
     minutes_to_5, minutes_to_2 : of driving like until now until the interval of 95 % is as narrow
         as so many percent; 0 where it is, infinite where it will not be, NaN where unknown
     advice : which driving would help; empty where nothing more is needed
+    look : part of the driving between two looks at all records that is done [-], 0 to 1; NaN where
+        the mass does not wait for the next one
     signals : health of each
     notes : what was found or doubted, one sentence each
     """
@@ -90,6 +92,7 @@ class LiveWeighing:
     minutes_to_2: float
     advice: str
     reach: float = math.nan
+    look: float = math.nan
     signals: tuple[SignalHealth, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -139,10 +142,13 @@ class LiveWeighing:
             "std_kg": _known(self.std),
             "interval95_kg": None if math.isnan(low) else [low, high],
             "payload_kg": self.payload,
+            "tared_kg": self.tared,
+            "permitted_kg": self.gross,
             "share_of_permitted": self.share,
             "overload_probability": self.overload,
             "driven_s": self.driven,
             "progress": self.progress,
+            "look": _known(self.look),
             "reach_percent": _known(100.0 * self.reach),
             "minutes_to_5_percent": _known(self.minutes_to_5),
             "minutes_to_2_percent": _known(self.minutes_to_2),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,10 +90,10 @@ def read_imu(drive: Drive) -> Imu:
     end = min(float(s.time[-1]) if len(s) else -np.inf for s in signals)
     clock = signals[0].time
     keep = (clock >= start) & (clock <= end)
-    usual = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
     for s in signals:
         # An axis that has a gap of its own must not be invented across it.
         if s.time is not clock and not np.array_equal(s.time, clock):
+            usual = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
             keep &= s.age(clock) <= 2.0 * max(usual, s.period)
     if keep.sum() < _FEWEST:
         raise DriveError(
@@ -170,18 +171,24 @@ def read_fixes(
 
 
 def resample(
-    time: Floats, values: Floats | Axes, start: float, period: float, count: int
+    time: Floats, columns: Sequence[Floats], start: float, period: float, count: int
 ) -> Floats:
-    """Low-pass channels (n, c) without delay and take them to an even clock; NaN in gaps."""
-    out = np.empty((count, 3 if isinstance(values, Axes) else values.shape[1]))
+    """Low-pass channels (n,) without delay and take them to an even clock; NaN in gaps.
+
+    Returns
+    -------
+    (count, c)
+    """
+    out = np.empty((count, len(columns)))
     for first in range(0, count, _AT_ONCE):
         part = out[first : first + _AT_ONCE]
         # One period and one sample more than the low-pass reaches to.
         near = start + period * np.array([first - _REACH - 1.0, first + len(part) + _REACH])
         low, high = np.searchsorted(time, near)
         rows = slice(max(min(low - 1, time.size - 2), 0), max(high + 1, 2))
+        values = np.column_stack([column[rows] for column in columns])
         lowpass_resample(
-            time[rows], values[rows], start, period, first, _REACH, part, np.empty(len(part))
+            time[rows], values, start, period, first, _REACH, part, np.empty(len(part))
         )
     return out
 

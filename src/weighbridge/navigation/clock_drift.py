@@ -11,7 +11,9 @@ import numpy as np
 
 from weighbridge.navigation.aiding import read_fixes, speed_from_fixes
 from weighbridge.navigation.clock_lag import Lags, find_lags, find_offset, locate_step
+from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
+from weighbridge.signals.instants import instant, span
 from weighbridge.signals.runs import marked_runs
 
 _LOG = logging.getLogger(__name__)
@@ -51,6 +53,13 @@ _OWN: Final = (-1.0, 2.0)
 _BEGUN: Final = (-0.3, 0.8)
 # Two tables that drift alike against the third: it is the third whose clock is wrong [s].
 _ALIKE: Final = 0.15
+# Vehicle speed and speed over ground agree to within so much [m/s] and [-], at so many instants
+# [-], while they range over so much [m/s]: then it is the accelerometer that fits neither.
+_SPEEDS_APART: Final = (1.0, 0.1)
+_SPEEDS_AGREE: Final = 0.8
+_SPEEDS_RANGE: Final = 3.0
+# Part of such times in which both must be known [-].
+_SEEN: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +118,9 @@ def mend_clocks(drive: Drive) -> Drive:
 
 def _round(drive: Drive) -> Drive:
     """Move what is seen to be off; the drive itself where nothing is."""
-    accel = [s for a in "xyz" if (s := drive.get(f"accel_{a}")) is not None and len(s) > 50]
+    axes = [f"accel_{a}" for a in "xyz"]
+    thaw = thawed(drive, axes)
+    accel = [s for name in axes if (s := thaw.get(name)) is not None and len(s) > 50]
     if len(accel) < 3:
         return drive
     found = {}
@@ -119,7 +130,7 @@ def _round(drive: Drive) -> Drive:
         lags = _lags(accel, speed)
         lost = _lost(lags) if table == "obd" else ()
         if lost:
-            return _left_out(drive, table, lost)
+            return _left_out(drive, lost)
         path = _judged(lags, table)
         if isinstance(path, Problem):
             return drive.with_problems(path)
@@ -186,8 +197,8 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     bends = float(np.median(np.abs(np.diff(lag, 2))))
     scatter = max(1.4826 * bends / np.sqrt(6.0), float(np.median(lags.std)))
     slope, slope_std, fit = _line(time, lag, scatter)
-    span = float(time[-1] - time[0])
-    drifts = abs(slope) * span > _DRIFT and abs(slope) > _SURE * slope_std
+    length = float(time[-1] - time[0])
+    drifts = abs(slope) * length > _DRIFT and abs(slope) > _SURE * slope_std
     allowed = _WANDER + 4.0 * scatter
     wanders = float(np.ptp(_median_of_three(lag))) > allowed
     apart = not _OWN[0] < float(np.median(lag)) < _OWN[1]
@@ -268,17 +279,46 @@ def _hopeless(table: str, why: str) -> Problem:
     )
 
 
-def _left_out(drive: Drive, table: str, lost: tuple[tuple[float, float], ...]) -> Drive:
-    """Leave the rows of a table out where its speed does not fit the accelerometer at all."""
+def _left_out(drive: Drive, lost: tuple[tuple[float, float], ...]) -> Drive:
+    """Leave out what is false where vehicle speed and accelerometer do not fit at all.
+
+    It is the accelerometer where GNSS agrees with the vehicle speed, and the rows of the bus where
+    it does not. Without GNSS it may be either.
+    """
     first, last = drive.start, drive.end
-    text = " and ".join(f"{max(a, first):.0f} to {min(b, last):.0f} s" for a, b in lost)
-    return _moved(drive, table, lambda t: t, lost).with_problems(
-        Problem(
-            "",
-            f"from {text} vehicle speed does not fit the accelerometer at any lag of its clock; "
-            f"the rows of {table} were left out there",
+    text = " and ".join(span(round(max(a, first)), round(min(b, last))) for a, b in lost)
+    agree = _speeds_agree(drive, lost)
+    said = f"from {text} vehicle speed does not fit the accelerometer at any lag of its clock; "
+    if agree is not None:
+        said += (
+            "the samples of imu were left out there, for GNSS agrees with the vehicle speed"
+            if agree
+            else "the rows of obd were left out there"
         )
+        return _moved(drive, "imu" if agree else "obd", lambda t: t, lost).with_problems(
+            Problem("", said)
+        )
+    for table in ("obd", "imu"):
+        drive = _moved(drive, table, lambda t: t, lost)
+    return drive.with_problems(
+        Problem("", said + "without GNSS either may be wrong, and both were left out there")
     )
+
+
+def _speeds_agree(drive: Drive, when: tuple[tuple[float, float], ...]) -> bool | None:
+    """Tell whether vehicle speed and speed over ground are one in some times; None if unknown."""
+    speed, ground = drive.get("vehicle_speed"), _gnss_speed(drive)
+    if speed is None or ground is None or not len(speed) or not len(ground):
+        return None
+    every = np.arange(drive.start, drive.end, 1.0)
+    inside = np.logical_or.reduce([(every > a) & (every < b) for a, b in when])
+    time = every[inside & (speed.age(every) < _OWN[1]) & (ground.age(every) < _OWN[1])]
+    if time.size < _SEEN * np.count_nonzero(inside):
+        return None
+    own, other = speed.at(time), ground.at(time)
+    least, part = _SPEEDS_APART
+    near = np.abs(own - other) < least + part * np.abs(other)
+    return bool(np.ptp(other) > _SPEEDS_RANGE and np.mean(near) > _SPEEDS_AGREE)
 
 
 def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floats]:
@@ -384,7 +424,7 @@ def _note(table: str, other: str, path: _Path, level: float) -> Problem:
     what = path.text or f"is {far:+.2f} s off"
     left_out = ""
     if path.cuts:
-        at = ", ".join(f"{0.5 * (a + b):.0f} s" for a, b in path.cuts)
+        at = ", ".join(instant(round(0.5 * (a + b))) for a, b in path.cuts)
         left_out = f"; rows about the step at {at} were left out"
     return Problem(
         "",

@@ -12,6 +12,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.signals import Bools, Floats, Signal
+from weighbridge.signals.interpolation import interpolate
 
 STEP: Final = 0.2
 """Grid on which force and speed are compared [s]."""
@@ -36,6 +37,8 @@ _SPEED_GAP: Final = 3.0
 # Part of a piece that must be seen, and spread of the changes of speed in it [m/s].
 _SEEN: Final = 0.5
 _LIVELY: Final = 0.25
+# Where less of a piece is seen, means are those of what was seen and felt together [-].
+_WHOLE: Final = 0.9
 # Part of the variance that the three axes explain, at least; by chance they explain 0.2 at most.
 _EXPLAINED: Final = 0.5
 # The same over a whole drive, whose clocks may overlap in part only.
@@ -87,8 +90,8 @@ def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) ->
     if count < size or min(len(s) for s in accel) < 50:
         return Lags(*(np.empty(0) for _ in range(4)))
     grid: Floats = np.asarray(start + STEP * np.arange(count), dtype=np.float64)
-    x, seen = _speed_changes(speed, grid)
-    x = _high_passed(x, seen)
+    shown, seen = _speed_changes(speed, grid)
+    x = _high_passed(shown, seen)
     lively = [
         first
         for first in range(0, count - size + 1, hop)
@@ -105,8 +108,15 @@ def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) ->
     for reach in (round(r / STEP) for r in REACH):
         for first in lively:
             there = slice(first + most - reach, first + most + size + reach)
+            part = slice(first, first + size)
             if first not in found:
-                peak = _peak(x[first : first + size], force[there], felt[there])
+                if np.mean(seen[part]) < _WHOLE:
+                    told = _explained_in_gaps(
+                        shown[part], seen[part], [c[there] for c in changes], felt[there]
+                    )
+                else:
+                    told = _explained(x[part], force[there], felt[there])
+                peak = _peak(*told, size)
                 if peak is not None:
                     found[first] = peak
     at = sorted(found)
@@ -219,7 +229,7 @@ def _integral(s: Signal) -> Floats:
 
 def _change(time: Floats, y: Floats, grid: Floats) -> Floats:
     half = 0.5 * _SPAN
-    return np.asarray(np.interp(grid + half, time, y) - np.interp(grid - half, time, y))
+    return np.asarray(interpolate(grid + half, time, y) - interpolate(grid - half, time, y))
 
 
 def _high_passed(y: Floats, seen: Bools) -> Floats:
@@ -230,17 +240,16 @@ def _high_passed(y: Floats, seen: Bools) -> Floats:
     return np.where(seen, y - mean / weight, 0.0)
 
 
-def _peak(x: Floats, force: Floats, felt: Bools) -> tuple[float, float] | None:
+def _peak(explained: Floats, enough: Bools, size: int) -> tuple[float, float] | None:
     """Shift of the force, from the middle, that explains the speed best [s], and its std.
 
     Parameters
     ----------
-    x : (n,) changes of speed
-    force : (n + 2 r, 3) changes of the integrated force
-    felt : (n + 2 r,) where there are any
+    explained : (k,) part of the variance by shift [-]
+    enough : (k,) shifts at which enough was felt
+    size : instants of the piece
     """
-    explained, enough = _explained(x, force, felt)
-    explained[~enough] = 0.0
+    explained = np.where(enough, explained, 0.0)
     best = int(np.argmax(explained))
     if not 0 < best < explained.size - 1 or explained[best] < _EXPLAINED:
         return None
@@ -254,14 +263,21 @@ def _peak(x: Floats, force: Floats, felt: Bools) -> tuple[float, float] | None:
     if curvature <= 0.0:
         return None
     shift = 0.5 * (low - high) / curvature
-    independent = x.size * STEP / _SPAN
+    independent = size * STEP / _SPAN
     std = STEP * float(np.sqrt(2.0 * max(mid, 1e-3) / (independent * curvature)))
     middle = (explained.size - 1) // 2
     return (best - middle + float(shift)) * STEP, std
 
 
 def _explained(x: Floats, force: Floats, felt: Bools) -> tuple[Floats, Bools]:
-    """Part of the variance of ``x`` that the axes explain at each shift, and where it is told."""
+    """Part of the variance that the axes explain at each shift, and where it is told.
+
+    Parameters
+    ----------
+    x : (n,) changes of speed
+    force : (n + 2 r, 3) changes of the integrated force
+    felt : (n + 2 r,) where there are any
+    """
     cross = np.einsum("kjn,n->kj", sliding_window_view(force, x.size, axis=0), x)
     products = force[:, :, None] * force[:, None, :]
     total = np.concatenate((np.zeros((1, 3, 3)), np.cumsum(products, axis=0)))
@@ -271,3 +287,31 @@ def _explained(x: Floats, force: Floats, felt: Bools) -> tuple[Floats, Bools]:
     seen = np.concatenate(([0], np.cumsum(felt)))
     enough = (seen[x.size :] - seen[: -x.size]) >= _SEEN * x.size
     return np.einsum("ij,ij->i", cross, fit) / max(float(x @ x), 1e-12), enough
+
+
+def _explained_in_gaps(
+    shown: Floats, seen: Bools, changes: Sequence[Floats], felt: Bools
+) -> tuple[Floats, Bools]:
+    """As `_explained`, of a speed with gaps: what is felt in them counts nothing.
+
+    Parameters
+    ----------
+    shown, seen : (n,) changes of speed with their means, and where there are any
+    changes, felt : (n + 2 r,) each, the same of the integrated force
+    """
+    shifts = felt.size - shown.size + 1
+    explained, enough = np.zeros(shifts), np.zeros(shifts, dtype=bool)
+    for k in range(shifts):
+        both = seen & felt[k : k + shown.size]
+        enough[k] = np.count_nonzero(both) >= _SEEN * np.count_nonzero(seen)
+        if not enough[k]:
+            continue
+        x = _high_passed(np.where(both, shown, 0.0), both)
+        rows = np.column_stack(
+            [_high_passed(np.where(both, c[k : k + shown.size], 0.0), both) for c in changes]
+        )
+        gram = rows.T @ rows
+        gram += 1e-6 * np.trace(gram) * np.eye(3) / 3.0 + 1e-12 * np.eye(3)
+        cross = rows.T @ x
+        explained[k] = float(cross @ np.linalg.solve(gram, cross)) / max(float(x @ x), 1e-12)
+    return explained, enough

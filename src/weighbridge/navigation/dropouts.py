@@ -122,7 +122,8 @@ def _zeros(x: Floats, moving: Bools) -> Bools:
     levels = np.unique(some)
     place = int(np.searchsorted(levels, 0.0))
     low, high = levels[max(place - 5, 0)], levels[min(place + 5, levels.size - 1)]
-    if high - low > np.percentile(some, 84.0) - np.percentile(some, 16.0):
+    below, above = np.percentile(some, [16.0, 84.0])
+    if high - low > above - below:
         # Rounding is so coarse that the middle may well be zero.
         return np.zeros(x.size, dtype=bool)
     near = int(np.count_nonzero((x >= low) & (x <= high) & moving)) - here

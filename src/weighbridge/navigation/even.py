@@ -10,6 +10,7 @@ import numpy as np
 
 from weighbridge.navigation.aiding import Imu, resample
 from weighbridge.signals import Floats
+from weighbridge.signals.interpolation import interpolate
 
 _SPARSE: Final = 1.2
 """Samples further apart than so many periods of the clock are interpolated [-]."""
@@ -41,8 +42,9 @@ def evenly(imu: Imu, rate: float, first: int | None = None) -> Even:
     count = max(4, math.floor((imu.time[-1] - start) * rate) + 1)
     if imu.period * rate > _SPARSE:
         return _interpolated(imu, start + np.arange(count) / rate)
-    both = [resample(imu.time, y, start, 1.0 / rate, count) for y in (imu.accel, imu.gyro)]
-    return Even(start + np.arange(count) / rate, np.hstack(both))
+    columns = (*imu.accel.columns, *imu.gyro.columns)
+    values = resample(imu.time, columns, start, 1.0 / rate, count)
+    return Even(start + np.arange(count) / rate, values)
 
 
 def _interpolated(imu: Imu, time: Floats) -> Even:
@@ -50,7 +52,7 @@ def _interpolated(imu: Imu, time: Floats) -> Even:
     right = np.clip(np.searchsorted(imu.time, time), 1, imu.time.size - 1)
     near = imu.time[right] - imu.time[right - 1] < _LONGEST * imu.period
     columns = [
-        np.where(near, np.interp(time, imu.time, y), np.nan)
+        np.where(near, interpolate(time, imu.time, y), np.nan)
         for y in (*imu.accel.columns, *imu.gyro.columns)
     ]
     return Even(time, np.column_stack(columns))
@@ -61,5 +63,5 @@ def coarsely(fine: Even, period: float) -> Even:
     start = float(fine.time[0])
     count = max(4, math.floor((fine.time[-1] - start) / period) + 1)
     whole = np.isfinite(fine.values).all(axis=1)
-    values = resample(fine.time[whole], fine.values[whole], start, period, count)
+    values = resample(fine.time[whole], list(fine.values[whole].T), start, period, count)
     return Even(start + np.arange(count) * period, values)

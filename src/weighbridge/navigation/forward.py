@@ -1,4 +1,4 @@
-"""Motion without smoother, second by second: each row from what is known soon after it."""
+"""Motion without smoother, step by step: each row from what is known soon after it."""
 
 from __future__ import annotations
 
@@ -252,7 +252,7 @@ def joined(parts: list[Motion], last: int | None = None) -> Motion:
 
 
 def forward_motion(drive: Drive, setup: Setup) -> Motion:
-    """Fold a drive second by second, without smoother.
+    """Fold a drive step by step, without smoother.
 
     The single numbers of the result are those at the end of the pass.
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.kernels.interpolation import longest_repeat
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.runs import marked_runs
 
@@ -49,9 +50,9 @@ def frozen_stretches(signal: Signal, speed: Signal | None) -> Floats:
     (k, 2) first and last instant of each stretch [s]
     """
     nothing = np.empty((0, 2))
-    same = signal.values[1:] == signal.values[:-1]
-    if not same.any():
+    if longest_repeat(signal.time, signal.values) < min(SHORTEST, _COARSE_RUN):
         return nothing
+    same = signal.values[1:] == signal.values[:-1]
     first, last = marked_runs(same)
     length = signal.time[last] - signal.time[first]
     repeats = last - first

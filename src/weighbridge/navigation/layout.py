@@ -32,6 +32,7 @@ from weighbridge.navigation.filter import Block, Nodes, run, run_smoothed
 from weighbridge.navigation.identify.setup import Setup
 from weighbridge.navigation.motion import Motion, bridged, noise_level
 from weighbridge.signals import Bools, Floats, Signal
+from weighbridge.signals.interpolation import interpolate
 
 _LOG = logging.getLogger(__name__)
 
@@ -204,7 +205,7 @@ def pose_at(time: Floats, nodes: Nodes, *, longest: float = math.inf) -> Pose:
         quaternions_to_euler(np.ascontiguousarray(states[part, Q : Q + 4]), angles[part])
 
     def on_grid(y: Floats) -> Floats:
-        return np.interp(time, nodes.time, y)
+        return interpolate(time, nodes.time, y)
 
     def three(first: int) -> Floats:
         out = np.empty((time.size, 3))

@@ -19,7 +19,7 @@ heights, or none; both are conditional means."""
 
 SLOW: Final = 0.4
 """Values of a speed further apart are too slow to be the only source of acceleration [s]: starts
-last few seconds, and masses by speed alone get worse from there on (README, What to expect)."""
+last few seconds, and masses by speed alone get worse from there on (docs/accuracy.md)."""
 
 
 SLOPE: Final = 5.0
@@ -100,11 +100,14 @@ class Motion:
     squat : pitch of the body per acceleration k found and removed
         [rad per m/s^2]; None where the drive does not show it
     squat_std : its standard deviation
+    own_squat : it is the drive's, and the one of the calibration does not hold
     mounting : (roll, pitch, yaw) of the sensor found or used [rad]
     mounting_std : their standard deviations [rad]
     speed_std : of ``speed`` where ``accel`` is its slope, as a smoother knows it; 0 where an
         accelerometer gave ``accel`` [m/s]
     specific_force_scale_std : relative, of the accelerometer's scale where it was corrected [-]
+    doubted_gain : specific force along the vehicle per change of its speed, where it is not 1 and
+        was left as it is, for it may be the accelerometer's scale or an error of the squat [-]
     measured_speed : samples of the speed that all of this was made from, true scale; None where an
         accelerometer was there as well
     notes : sentences on what was found and what was doubtful
@@ -131,10 +134,12 @@ class Motion:
     speed_delay: float = 0.0
     squat: float | None = None
     squat_std: float | None = None
+    own_squat: bool = False
     mounting: tuple[float, float, float] | None = None
     mounting_std: tuple[float, float, float] | None = None
     speed_std: float = 0.0
     specific_force_scale_std: float = 0.0
+    doubted_gain: float | None = None
     measured_speed: Signal | None = None
     notes: tuple[str, ...] = ()
 

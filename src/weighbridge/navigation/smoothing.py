@@ -47,6 +47,9 @@ THINNED: Final = 0.1
 LEVEL_STD: Final = 1.0
 """Standard deviation of the logarithms of these values before the drive has told [-]."""
 
+_FARTHEST: Final = 8.0 * LEVEL_STD
+"""Logarithms are sought up to here [-]."""
+
 
 def resolution(values: Floats) -> float:
     """Step in which values come, 0 where they are one value."""
@@ -127,7 +130,10 @@ def _smooth_likeliest(
         likelihood = rts.log_likelihood(transition, cov, row, values[::stride], var, start, spread)
         return float(-likelihood + 0.5 * np.sum((level / LEVEL_STD) ** 2))
 
-    found = minimize(misfit, np.zeros(levels), method="Nelder-Mead", options=options).x
+    # Of values that never change the likeliest noise is none, and a filter divides by it.
+    bounds = [(-_FARTHEST, _FARTHEST)] * levels
+    begin = np.zeros(levels)
+    found = minimize(misfit, begin, method="Nelder-Mead", bounds=bounds, options=options).x
     clock, z, at = _merged(stamps, values, time)
     transition, cov, noise, start, spread = model(clock, found)
     x, var = rts.smooth(transition, cov, row, z, np.full(clock.size, noise), start, spread)
@@ -232,9 +238,12 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
     Returns
     -------
     grade : (n,) [rad]
-    grade_std : (n,) its standard deviation [rad]
+    grade_std : (n,) its standard deviation [rad]; of a grade that never changes, whose noise
+        cannot be told, that of any grade
     """
     quantum = resolution(measured.values)
+    if not quantum:
+        return np.full(time.size, measured.values[0]), np.full(time.size, GRADE_NOISE)
     usual = np.log([GRADE_STD, GRADE_LENGTH, np.hypot(GRADE_NOISE, quantum / np.sqrt(12.0))])
     row = np.array([0.0, 1.0])
 

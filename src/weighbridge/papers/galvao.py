@@ -7,13 +7,11 @@ implementation for estimating the mass of passengers vehicles.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.stats import spearmanr
 
-from weighbridge.balance import ForceBalance
 from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.calibration.speed import (
     SAMPLE_TIME,
@@ -21,7 +19,7 @@ from weighbridge.calibration.speed import (
     calibrate_by_speed,
     speed_rows,
 )
-from weighbridge.calibration.speed_fit import SpeedRows, model_speed
+from weighbridge.calibration.speed_fit import model_speed
 from weighbridge.estimators.speed_ekf import (
     PRINTED,
     FilterRun,
@@ -36,6 +34,14 @@ from weighbridge.papers.galvao_drives import (
     mass_of,
     scenario,
     with_grade,
+)
+from weighbridge.papers.galvao_figures import item_figures
+from weighbridge.papers.galvao_items import ITEMS as ITEMS
+from weighbridge.papers.galvao_results import LAST, Reproduction, Test, Trial
+from weighbridge.papers.galvao_statistics import rank_correlation, slope
+from weighbridge.papers.galvao_torque import (
+    torque_table,
+    torque_trial,
 )
 from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
 from weighbridge.report.study import write_study
@@ -68,9 +74,6 @@ if TYPE_CHECKING:
 
     from weighbridge.simulation import SimulatedDrive
 
-LAST: Final = 200
-"""Samples over which Table 2 tells the band."""
-
 PAPER_MASSES: Final = (1092.07, 1095.58, 1092.02)
 PAPER_ERRORS: Final = ("0.0069", "0.33", "0.0025")
 PAPER_BANDS: Final = (100.0, 200.0, 200.0)
@@ -87,78 +90,6 @@ STATED: Final = (900.0, 1092.0, 1400.0)
 
 PAYLOADS: Final = (0.0, 100.0, 200.0, 300.0, 400.0)
 """Loads that the paper did not try [kg]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Test:
-    """One of the three drives.
-
-    Attributes
-    ----------
-    number : 1 to 3
-    mass : true mean [kg]
-    balance : windows of the drive
-    rows : the same with the true grade
-    predicted : (n,) speed of the model one window ahead, with the true grade [m/s]
-    ours, printed : runs of the filter started at the calibration's mass with a
-        constant mass, and with start and noise as printed
-    """
-
-    number: int
-    mass: float
-    balance: ForceBalance
-    rows: SpeedRows
-    predicted: Floats
-    ours: FilterRun
-    printed: FilterRun
-
-    def error(self, run: FilterRun) -> float:
-        """Relative error of the mean mass of a run [-]."""
-        return mean_mass(run.mass, run.used) / self.mass - 1.0
-
-    def band(self, run: FilterRun) -> float:
-        """Widest half of the 95 % band over the last samples used [kg]."""
-        return float(np.max(1.96 * run.std[run.used][-LAST:]))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
-    """Drives that the paper did not try, of one kind.
-
-    Attributes
-    ----------
-    kind : what is different
-    masses : true masses [kg]
-    answers : of our settings [kg]
-    pinned : of the filter that starts from nothing and knows the road to be level [kg]
-    """
-
-    kind: str
-    masses: Floats
-    answers: Floats
-    pinned: Floats
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reproduction:
-    """All the figures of the study.
-
-    Attributes
-    ----------
-    vehicle : with the speed model fitted to the first drive
-    r_squared : of the fit
-    tests : the three drives
-    starts : `STARTS` against where the second drive ends, ours and noise as printed [kg]
-    stated : `STATED` against what the second drive then weighs [kg], and R² of the fit
-    trials : drives the paper did not try
-    """
-
-    vehicle: Vehicle
-    r_squared: float
-    tests: tuple[Test, ...]
-    starts: tuple[tuple[float, float, float], ...]
-    stated: tuple[tuple[float, float, float], ...]
-    trials: tuple[Trial, ...]
 
 
 def weigh_three(
@@ -182,7 +113,7 @@ def reproduce(*, seed: int = 777, progress: Progress | None = None) -> Reproduct
     seed : of the road and the first drive; the other drives count on from it
     progress : called with steps done and steps in all
     """
-    total = 7
+    total = 8
     base = Vehicle(name=CAR.name)
     fitted, drives, tests = weigh_three(seed)
     vehicle, known = fitted.vehicle, with_grade(drives[0])
@@ -231,6 +162,8 @@ def reproduce(*, seed: int = 777, progress: Progress | None = None) -> Reproduct
         ]
         trials.append(_trial(kind, made, vehicle))
         _tell(progress, 3 + step, total)
+    torque = torque_trial(seed, easy_route(seed))
+    _tell(progress, total, total)
     return Reproduction(
         vehicle=vehicle,
         r_squared=fitted.fit.r_squared,
@@ -238,6 +171,7 @@ def reproduce(*, seed: int = 777, progress: Progress | None = None) -> Reproduct
         starts=tuple(starts),
         stated=tuple(stated),
         trials=tuple(trials),
+        torque=torque,
     )
 
 
@@ -277,29 +211,6 @@ def _trial(kind: str, scenarios: Sequence[Scenario], vehicle: Vehicle) -> Trial:
     )
 
 
-def slope(masses: Floats, answers: Floats) -> tuple[float, float]:
-    """Regress answers on true masses.
-
-    Parameters
-    ----------
-    masses, answers : (n,) [kg]
-
-    Returns
-    -------
-    slope, std : kg answered per kg loaded, and its standard error [-]
-    """
-    away = masses - masses.mean()
-    power = float(np.sum(away**2))
-    found = float(away @ answers) / power
-    residual = answers - answers.mean() - found * away
-    return found, float(np.sqrt(residual @ residual / (masses.size - 2) / power))
-
-
-def rank_correlation(masses: Floats, answers: Floats) -> float:
-    """Spearman's: 1 where heavier drives always get heavier answers; wild answers do no harm."""
-    return float(spearmanr(masses, answers).statistic)
-
-
 def reproduced(seed: int, progress: Progress | None) -> Reproduced:
     """Reproduce the paper and put it beside its own figures; see `reproduce`."""
     done = reproduce(seed=seed, progress=progress)
@@ -313,10 +224,16 @@ def reproduced(seed: int, progress: Progress | None) -> Reproduced:
         )
 
     return Reproduced(
-        title="Galvão et al.: speed alone gives back the mass it was calibrated with",
-        tables=(tests_table(done), starts_table(done), trials_table(done)),
+        title=f"Galvão et al., seeds from {seed}: speed alone gives back the mass it starts from",
+        tables=(
+            tests_table(done),
+            starts_table(done),
+            trials_table(done),
+            torque_table(done.torque),
+        ),
         comparisons=comparisons(done),
         write_page=write,
+        figures=item_figures(done),
     )
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from weighbridge.report.table import Table
@@ -39,12 +39,14 @@ class Reproduced:
     tables : of single drives or parameters
     comparisons : figures beside the paper's
     write_page : write a page of the given tables and the paper's figures from our data
+    figures : values by name, that `weighbridge.papers.claims.Item.ours` may ask for
     """
 
     title: str
     tables: tuple[Table, ...]
     comparisons: tuple[Comparison, ...]
     write_page: Callable[[Sequence[Table], Path], None]
+    figures: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def comparison(self) -> Table:

@@ -1,4 +1,4 @@
-"""What to expect of a mass by each way to weigh, as `inspect` and the README tell it."""
+"""What to expect of a mass by each way to weigh, as `inspect` and docs/accuracy.md tell it."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ EXPECTED: Final[dict[tuple[MotionSource, bool], tuple[float, float, str]]] = {
     ("speed", False): (4.0, 8.0, "no grade is measured, and speed is slowly polled"),
 }
 """Standard deviation of a mass, best to worst [%], and what sets it, by motion and whether the
-torque is read at `FAST` or more: it holds what the README says was measured. Of fast speed alone,
-of speed alone below 2 Hz and of a slow longitudinal accelerometer nothing was measured; theirs are
-graded from the others."""
+torque is read at `FAST` or more: it holds what docs/accuracy.md has as measured. Of fast speed
+alone, of speed alone below 2 Hz and of a slow longitudinal accelerometer nothing was measured;
+theirs are graded from the others."""
 
 
 def expected(

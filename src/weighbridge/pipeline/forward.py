@@ -1,7 +1,7 @@
 """The mass while a drive goes on: stages that look a second ahead, set up from outside.
 
 A whole drive tells mounting, delays, levels of noise and floors once (`identify_forward`). Then
-the drive is taken in steps of a second (`step`): navigation by the filter alone, force balance,
+the drive is taken in short steps (`step`): navigation by the filter alone, force balance,
 windows, and the joint filter, each from its state and the last seconds of the records. A recorded
 drive is folded with the same steps (`forward_weigh`), so that a vehicle which is weighed on the
 way gets the same numbers to the last bit.
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from weighbridge.arguments import check_number
 from weighbridge.balance import force_balance
 from weighbridge.balance.averaging import WINDOW, window_params
 from weighbridge.balance.table import ForceTable
@@ -34,7 +35,7 @@ from weighbridge.kernels.ins_model import E_SQUAT, SQUAT
 from weighbridge.navigation import forward
 from weighbridge.navigation.select import scaled_for_navigation
 from weighbridge.signals import Drive, Floats
-from weighbridge.signals.recent import instants, recent
+from weighbridge.signals.recent import STEP, STEPS, instants, recent
 from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
@@ -57,6 +58,12 @@ class ForwardSetup:
     navigation, force, joint : of the stages
     delay : lateness of the torque [s]
     period : between its readings [s]
+    step : in which the records are taken [s], one of `weighbridge.signals.recent.STEPS`
+
+    Raises
+    ------
+    ConfigError
+        The step is none of them.
     """
 
     vehicle: Vehicle
@@ -65,6 +72,24 @@ class ForwardSetup:
     joint: JointSetup
     delay: float
     period: float
+    step: float = STEP
+
+    def __post_init__(self) -> None:
+        check_step(self.step)
+
+
+def check_step(step: float) -> None:
+    """Refuse a step that is none of `weighbridge.signals.recent.STEPS`.
+
+    Raises
+    ------
+    ConfigError
+        The sentence names those there are.
+    """
+    check_number("step", step)
+    if step not in STEPS:
+        known = ", ".join(f"{s:g}" for s in STEPS)
+        raise ConfigError(f"a step of {step:g} s is none that sums without rounding: take {known}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +109,13 @@ class ForwardTrack:
     state: JointState
 
 
-def identify_forward(weighing: Weighing) -> ForwardSetup:
+def identify_forward(weighing: Weighing, step: float = STEP) -> ForwardSetup:
     """Take from a weighing by ``joint`` what a forward pass of the same vehicle needs.
 
     Parameters
     ----------
     weighing : with a mass, of a drive with an inertial sensor
+    step : in which records will be taken [s]
 
     Raises
     ------
@@ -120,6 +146,7 @@ def identify_forward(weighing: Weighing) -> ForwardSetup:
         joint=identify_joint(result.filter_input, result.sizes),
         delay=result.balance.delay,
         period=float(np.median(np.diff(time))),
+        step=step,
     )
 
 
@@ -302,8 +329,8 @@ def forward_weigh(drive: Drive, setup: ForwardSetup) -> ForwardTrack:
     setup : of `identify_forward`
     """
     state, parts = begin(setup, drive.start), [NO_WINDOWS]
-    for until in instants(drive):
-        state, running = step(state, recent(drive, until), until, setup)
+    for until in instants(drive, setup.step):
+        state, running = step(state, recent(drive, until, setup.step), until, setup)
         parts.append(running)
     time, mass, std = (np.concatenate(rows) for rows in zip(*parts, strict=True))
     return ForwardTrack(time, mass, std, state.joint)

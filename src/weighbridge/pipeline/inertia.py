@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,17 +15,17 @@ from weighbridge.arguments import check_path, check_text, check_type
 from weighbridge.checks import mend_drive, refuse_serious
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
+from weighbridge.estimators.settings import changed, differences
 from weighbridge.estimators.track import Status
 from weighbridge.inertia.filter import (
     AXES,
     METHODS,
-    InertiaSettings,
     InertiaTrack,
     Method,
     RideSamples,
     estimate,
-    integration_std,
 )
+from weighbridge.inertia.integration import integration_std
 from weighbridge.inertia.load_changes import believed_otherwise, jumps, load_changes
 from weighbridge.inertia.ride_checks import (
     LEAST,
@@ -36,6 +37,7 @@ from weighbridge.inertia.ride_checks import (
     ride_of,
     ride_samples,
 )
+from weighbridge.inertia.settings import UNKNOWN_FORCE_STD, InertiaSettings
 from weighbridge.inertia.suspension import (
     PARTS,
     SHORTEST,
@@ -59,11 +61,6 @@ from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Ride, Vehicle
 
 DEFAULT_METHOD: Final[Method] = "kalman-bucy"
-
-UNKNOWN_FORCE_STD: Final = 0.05
-"""Relative standard deviation of what all springs and dampers have in common where the vehicle
-file does not say [-]: chosen, for data-sheet values of springs (some 3 %) and dampers
-(some 10 %), of which springs carry most of the force."""
 
 WRONG_PART: Final = 0.5
 """A spring or damper off by more than this part is broken or not the file's [-]."""
@@ -105,7 +102,7 @@ def estimate_inertia(
     vehicle: GivenVehicle,
     method: str = DEFAULT_METHOD,
     *,
-    settings: InertiaSettings | None = None,
+    settings: InertiaSettings | Mapping[str, Any] | None = None,
 ) -> Inertia:
     """Estimate sprung mass, roll inertia and pitch inertia from the ride of a drive.
 
@@ -115,7 +112,7 @@ def estimate_inertia(
         and pitch rate; or the path or data frame that it is to be read from
     vehicle : with its suspension, ``[ride]`` of the vehicle file; or the path of that file
     method : name of the filter
-    settings : of the filter
+    settings : of the filter, or what differs from its defaults by name
 
     Returns
     -------
@@ -125,18 +122,19 @@ def estimate_inertia(
     Raises
     ------
     ConfigError
-        The method is not known, or the vehicle file has no suspension.
+        The method or a setting is not known, or the vehicle file has no suspension.
     DriveError
         What the drive says cannot be so, such as a wrong unit or sign.
     """
     check_text("method", method)
-    if settings is not None:
-        check_type("settings", settings, InertiaSettings, "an InertiaSettings")
+    kinds = (InertiaSettings, Mapping, type(None))
+    check_type("settings", settings, kinds, "an InertiaSettings, or a dictionary of values")
+    own = changed(InertiaSettings(), settings) if isinstance(settings, Mapping) else settings
     chosen: Method | None = next((m for m in METHODS if m == method), None)
     if chosen is None:
         raise ConfigError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
     home, vehicle = home_of(vehicle), as_vehicle(vehicle)
-    return _estimate(as_drive(drive, mapping_of(vehicle, home)), vehicle, chosen, settings)
+    return _estimate(as_drive(drive, mapping_of(vehicle, home)), vehicle, chosen, own)
 
 
 def _estimate(
@@ -175,6 +173,8 @@ def _estimate(
     problems += check_response(seen) if seen is not None else ()
     refuse_serious(drive.name, problems)
     warnings = tuple(dict.fromkeys(p.text for p in problems))
+    if settings is not None and (own := differences(settings)):
+        warnings += (f"{chosen} was run with {own}, not with its defaults",)
     if not samples.period <= LONGEST_PERIOD:
         return nothing(
             Status.NOT_EXCITED,
@@ -223,7 +223,7 @@ def _judged(
         )
     common = UNKNOWN_FORCE_STD if ride.force_std is None else ride.force_std
     noisy = attenuation(samples, ride, track.noise_factor, np.asarray(track.alpha[-1]))
-    std = np.hypot(np.hypot(common, noisy), integration_std(samples.period))
+    std = np.hypot(np.hypot(common, noisy), integration_std(samples, ride))
     # Each with what it does to the interval, which is said where there is one.
     doubts: list[tuple[str, str]] = []
     if check is not None and check.off.any():

@@ -30,6 +30,9 @@ from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 GAP_PERIODS: Final = 5.0
 """A gap is a step of the clock longer than this many median periods."""
 
+REFERENCE_NEEDED: Final = "reference_torque (or reference_torque_nm in the vehicle file)"
+"""What a torque in percent needs that its drive does not tell."""
+
 # Values enough to see a quantisation step; more would only take time.
 _STEP_SAMPLES: Final = 20_000
 
@@ -225,9 +228,11 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
                 best, worst, reason = best + torque.expected, worst + torque.expected, torque.limit
             # Nobody records torque at the wheels for want of another signal.
             rare = bool(needs) and torque.gearing is not None
+            # What a vehicle file can state need not be recorded.
+            recorded = len(set(needs) - {REFERENCE_NEEDED})
             ways.append(
                 (
-                    (bool(needs), rare, len(set(needs)), worst),
+                    (bool(needs), rare, recorded, len(set(needs)), worst),
                     Way(
                         motion=motion,
                         torque=torque.name,
@@ -301,7 +306,7 @@ def _torque_needs(drive: Drive, torque: TorqueSource, vehicle: Vehicle | None) -
     if torque.needs_reference and not drive.has("reference_torque"):
         known = vehicle is not None and vehicle.torque.reference_torque is not None
         if not known:
-            needs.append("reference_torque (or reference_torque_nm in the vehicle file)")
+            needs.append(REFERENCE_NEEDED)
     line = vehicle.driveline if vehicle is not None else None
     if not needs and torque.refusal(drive, line.driven if line is not None else None):
         needs.append("the torque of every driven axle (or driven in the vehicle file)")

@@ -5,6 +5,7 @@ Neither is a weighing: a bound is no estimate, and a coast-down tells no mass.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,8 +23,10 @@ from weighbridge.estimators.track import Status
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
+from weighbridge.signals.instants import instant
 from weighbridge.vehicle.air import air_density
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.visible import visible_json
 
 WINDOW: Final = 10.0
 """Over which power is averaged [s]: what a driver holds at full load on a climb."""
@@ -62,6 +65,25 @@ class MassBound:
     windows: int
     status: Status
     reason: str
+
+    def to_json(self, name: str) -> str:
+        """Return what ``weighbridge bound --json`` prints of the drive with this name."""
+        return _json(
+            drive=name,
+            status=str(self.status),
+            reason=self.reason,
+            bound_kg=self.mass,
+            nearest_kg=self.nearest,
+            nearest_std_kg=self.nearest_std,
+            start_s=self.start,
+            windows=self.windows,
+        )
+
+
+def _json(**values: object) -> str:
+    """Write an object; numbers that are none are null."""
+    known = {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in values.items()}
+    return visible_json(json.dumps(known, ensure_ascii=False))
 
 
 def _check_given(drive: Drive, vehicle: Vehicle) -> None:
@@ -207,9 +229,26 @@ class CoastDown:
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Interval of ``drag_over_mass`` that holds with a probability [m^2/kg]."""
-        reach = float(student.ppf(0.5 + 0.5 * level, self.degrees_of_freedom))
-        half = reach * self.drag_over_mass_std
-        return self.drag_over_mass - half, self.drag_over_mass + half
+        return self._between(self.drag_over_mass, self.drag_over_mass_std, level)
+
+    def rolling_interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Interval of ``rolling`` that holds with a probability [-]."""
+        return self._between(self.rolling, self.rolling_std, level)
+
+    def _between(self, value: float, std: float, level: float) -> tuple[float, float]:
+        half = float(student.ppf(0.5 + 0.5 * level, self.degrees_of_freedom)) * std
+        return value - half, value + half
+
+    def to_json(self, name: str) -> str:
+        """Return what ``weighbridge coast --json`` prints of the drive with this name."""
+        return _json(
+            drive=name,
+            status=str(self.status),
+            drag_over_mass_m2_per_kg=self.drag_over_mass,
+            drag_over_mass_interval95_m2_per_kg=self.interval(),
+            rolling_coefficient=self.rolling,
+            rolling_coefficient_interval95=self.rolling_interval(),
+        )
 
 
 def coast_down(
@@ -277,7 +316,7 @@ def _line(drive: Drive, motion: Motion, density: Floats, span: Span, rolls: floa
     inside = np.flatnonzero((motion.time >= span[0]) & (motion.time <= span[1]) & motion.valid)
     if inside.size < 3 * size:
         raise ConfigError(
-            f"{drive.name}: from {span[0]:g} to {span[1]:g} s there are "
+            f"{drive.name}: from {instant(span[0])} to {instant(span[1])} there are "
             f"{inside.size / motion.rate:.0f} s of speed; a coast-down needs "
             f"{3.0 * COAST_WINDOW:.0f} s"
         )

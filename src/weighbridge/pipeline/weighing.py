@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,14 +16,15 @@ from weighbridge.balance.circumference import on_its_tyres
 from weighbridge.balance.delay import clock_shift, estimate_torque_delay, far_shift
 from weighbridge.balance.gear_fit import ENOUGH, foreign_part, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
-from weighbridge.balance.speed_balance import SPEEDS, speed_balance
+from weighbridge.balance.shaking import shaken
+from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.balance.torque_drift import steadied
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
+from weighbridge.estimators.joint.bend import bent
 from weighbridge.estimators.joint.changing import largest
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
-from weighbridge.estimators.judging import lacks_accelerometer
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
@@ -35,17 +37,27 @@ from weighbridge.pipeline.given import (
     home_of,
     mapping_of,
 )
+from weighbridge.pipeline.notes import (
+    below_tare,
+    beside_speed,
+    fitted_for_another,
+    no_speed,
+    other_equipment,
+    overload,
+    uncalibrated,
+    what_is_missing,
+)
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
 from weighbridge.vehicle.as_read import as_read
-from weighbridge.vehicle.data_sheet import wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
 from weighbridge.vehicle.torque import source_of
-from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 if TYPE_CHECKING:
     from weighbridge.io.mapping import MappingSource
+
+_LOG = logging.getLogger(__name__)
 
 DEFAULT_METHOD = "joint"
 """Estimator used unless one is named."""
@@ -68,19 +80,21 @@ class Weighing(MassResult):
         """Weigh the same drive by every method, this one included, see `compare`."""
         return compare(self)
 
-    def report(self, path: str | Path, *, compare: bool = False) -> None:
+    def report(self, path: str | Path, *, compare: bool = False, tiles: str | None = None) -> None:
         """Write a self-contained HTML report that opens offline.
 
         Parameters
         ----------
         path : file to write
         compare : weigh by every other method too, and show them side by side
+        tiles : address of map tiles to draw maps over, see `weighbridge.report.write_report`
         """
         from weighbridge.report import write_report
 
         check_path("path", path)
         check_flag("compare", compare)
-        write_report([self], path, comparisons=[self.compare()] if compare else None)
+        compared = [self.compare()] if compare else None
+        write_report([self], path, comparisons=compared, tiles=tiles)
 
     def plot(self) -> Any:
         """Return a plotly figure of the mass over time."""
@@ -133,7 +147,10 @@ def weigh(
     home, vehicle = home_of(vehicle), as_vehicle(vehicle)
     drive = mend_drive(as_drive(drive, mapping_of(vehicle, home), mapping), vehicle)
     refuse_serious(drive.name, drive.problems)
-    return weigh_checked(drive, vehicle, method, chosen)
+    found = weigh_checked(drive, vehicle, method, chosen)
+    kg = (found.mass, found.std)
+    _LOG.info("%s: %.0f kg, std %.1f kg, %s by %s", drive.name, *kg, found.status, method)
+    return found
 
 
 def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = None) -> Weighing:
@@ -151,7 +168,7 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
         return without_mass(drive, vehicle, method, lacking, warnings)
     if alone:
         balance = speed_balance(drive, vehicle)
-        warnings += balance.motion.notes
+        warnings += balance.motion.notes + beside_speed(drive)
     else:
         vehicle, found = by_power(seen, vehicle)
         balance, notes = torque_balance(seen, vehicle)
@@ -201,6 +218,7 @@ def weigh_balance(
     elif not estimator.speed_alone and (
         why := scale_contradiction(balance, vehicle)
         or foreign_part(balance, vehicle)
+        or shaken(drive, balance.motion)
         or _smoothed(drive, vehicle, balance)
     ):
         status, reason = Status.INCONSISTENT, why
@@ -214,7 +232,7 @@ def weigh_balance(
             status, reason = Status.INCONSISTENT, change.text
         elif refused:
             status, reason = Status.INCONSISTENT, doubt
-        elif why := contradicted(result, joined):
+        elif why := bent(joined.bend, drive, vehicle) or contradicted(result, joined):
             status, reason = Status.INCONSISTENT, why
         else:
             possible = result.possible_change
@@ -320,24 +338,26 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     found, navigation = identify_motion(drive, vehicle)
     motion = of_vehicle(found, vehicle)
     delay = vehicle.timing.torque_delay
-    drive, drifted = steadied(drive, vehicle, motion, delay or 0.0)
+    drive, drifted, begun = steadied(drive, vehicle, motion, delay or 0.0)
     notes = motion.notes + drifted
     if delay is None:
-        delay = estimate_torque_delay(drive, vehicle, motion)
+        delay = estimate_torque_delay(drive, vehicle, motion, begun)
         if math.isfinite(delay):
             notes += (f"torque delay {delay:+.2f} s found from this drive",)
         else:
             delay = 0.0
             notes += ("the drive does not show how late its torque is; taken as 0 s",)
     elif vehicle.provenance.torque_fitted:
-        later = _other_clock(drive, vehicle, motion, delay)
+        later = _other_clock(drive, vehicle, motion, delay, begun)
         if later:
             delay += later
             notes += (
                 f"torque is {_later(later)} against the motion than in the calibration; "
                 "its clock was moved by that",
             )
-    balance = replace(force_balance(drive, vehicle, motion, delay=delay), navigation=navigation)
+    if begun is None or begun.delay != delay:
+        begun = force_balance(drive, vehicle, motion, delay=delay)
+    balance = replace(begun, navigation=navigation)
     if behind := far_shift(balance, vehicle):
         raise DriveError(
             f"{drive.name}: its torque lies {_later(-behind)} than the motion it makes, though "
@@ -347,36 +367,9 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     return balance, notes + other_equipment(vehicle, motion) + balance.notes
 
 
-def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
-    """Say what a file that no calibration made leaves open in the interval; nothing if one did."""
-    if vehicle.provenance.mass_scale_std is not None:
-        return ()
-    fit = vehicle.provenance.fit
-    made = "not made by a calibration"
-    if fit is not None and not fit.torque:
-        made = f"calibrated for {fit.name} alone"
-    text = f"the vehicle file of {vehicle.name} was {made}"
-    if not (math.isfinite(result.systematic_std) and result.mass > 0.0):
-        return (text,)
-    return (
-        f"{text}: for errors of its torque, rolling radius, efficiency (taken as "
-        f"{wheel_efficiency(vehicle):.2f}) and inertias, and of the equipment, such as the lean of "
-        f"the body, {100.0 * result.systematic_std / result.mass:.1f} % of the mass, as standard "
-        "deviation, are in the interval",
-    )
-
-
-def other_equipment(vehicle: Vehicle, motion: Motion) -> tuple[str, ...]:
-    """Say where the calibration had an accelerometer and the drive has none; nothing if not."""
-    if not lacks_accelerometer(vehicle, motion):
-        return ()
-    return (
-        f"the vehicle file of {vehicle.name} was made with an accelerometer, and this drive has "
-        "none that can be used: masses come out 3 to 14 % light; calibrate on drives without it",
-    )
-
-
-def _other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, delay: float) -> float:
+def _other_clock(
+    drive: Drive, vehicle: Vehicle, motion: Motion, delay: float, begun: ForceBalance | None
+) -> float:
     """By how much the torque of a drive is later than in the calibration [s]; 0 where it is not.
 
     Raises
@@ -385,7 +378,7 @@ def _other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, delay: float) -
         The clocks of torque and motion are `CLOCKS_APART` or more off, and not those of speed
         and motion by as much.
     """
-    later = clock_shift(drive, vehicle, motion, delay)
+    later = clock_shift(drive, vehicle, motion, delay, begun)
     # As late as the speed beside it: the whole table is, and the shift brings all of it back.
     of_table = motion.speed_delay > CLOCKS_APART and abs(motion.speed_delay - later) < ONE_TABLE
     if abs(later) > CLOCKS_APART and not of_table:
@@ -399,80 +392,3 @@ def _other_clock(drive: Drive, vehicle: Vehicle, motion: Motion, delay: float) -
 
 def _later(by: float) -> str:
     return f"{abs(by):.1f} s {'later' if by > 0.0 else 'earlier'}"
-
-
-def fitted_for_another(vehicle: Vehicle, method: str) -> tuple[str, ...]:
-    """Say where the torque was fitted for an estimator that needs another; nothing if not."""
-    fit, fits = vehicle.provenance.fit, ESTIMATORS[method].fits
-    if fit is None or not fit.torque or fit.name in fits:
-        return ()
-    return (
-        f"the vehicle file of {vehicle.name} was calibrated for {fit.name}, with which {method} "
-        f"masses come out several percent light; calibrate again for {fits[0]}, or weigh with "
-        f"--method {fit.name}",
-    )
-
-
-def overload(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
-    """Say in a sentence whether a mass is above the permitted one; nothing if not."""
-    gross = vehicle.gross
-    if gross is None or result.status is not Status.CONVERGED or result.mass <= gross:
-        return ()
-    sure = "surely" if result.mass - 2.0 * result.std > gross else "perhaps"
-    return (f"{sure} above the permitted mass of {gross:.0f} kg",)
-
-
-def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
-    """Say in a sentence whether a mass is below the empty one; nothing if not."""
-    tare = vehicle.tare
-    if tare is None or result.status is not Status.CONVERGED or result.mass >= tare:
-        return ()
-    if result.mass + 2 * result.std > tare:
-        return (
-            f"the payload of {result.mass - tare:.0f} kg is below nothing, within the uncertainty",
-        )
-    return (
-        f"the payload is {result.mass - tare:.0f} kg, which is below nothing: tank and driver's "
-        f"seat are empty, or the tare of {tare:.0f} kg, the vehicle file or the torque is wrong",
-    )
-
-
-def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
-    """Say which signals a drive lacks for this vehicle; empty if none."""
-    source = source_of(vehicle)
-    missing = source.lacking(drive)
-    if not (drive.has("vehicle_speed") or drive.has("gnss_speed")) and not drive.has("latitude"):
-        missing.append("vehicle_speed")
-    if not vehicle.driveline.single_speed and not drive.has("engine_speed"):
-        missing.append("engine_speed")
-    if not missing:
-        return source.refusal(drive, vehicle.driveline.driven)
-    fit = vehicle.provenance.fit
-    if fit is not None and not fit.torque and not vehicle.driveline.gearings:
-        return (
-            f"the vehicle file of {vehicle.name} was calibrated for {fit.name} alone and knows "
-            f"neither gears nor torque: calibrate without --method {fit.name} to weigh by torque"
-        )
-    names = " and ".join(dict.fromkeys(missing))
-    sentence = f"the drive has no {names}, which torque source {source.name!r} needs"
-    others = [s for s in TORQUE_SOURCES.values() if s != source and not s.lacking(drive)]
-    if others and drive.has("vehicle_speed"):
-        if not others[0].signed and not vehicle.provenance.masses:
-            return (
-                f"the vehicle file of {vehicle.name} was never calibrated, and only a drive of "
-                f"known mass tells what {others[0].title} is worth: weighbridge calibrate DRIVE "
-                f"--torque {others[0].name} --mass KG --vehicle FILE -o CALIBRATED"
-            )
-        return (
-            f"{sentence}; it has {' and '.join(others[0].found(drive))}: weigh it with a vehicle "
-            f"file of torque source {others[0].name!r} "
-            f"(weighbridge calibrate --torque {others[0].name})"
-        )
-    return f"{sentence}; nothing can be weighed"
-
-
-def no_speed(drive: Drive) -> str:
-    """Say that a drive has no speed, which is all some methods need; empty if it has."""
-    if any(drive.has(name) for name in SPEEDS):
-        return ""
-    return f"the drive has no {' and no '.join(SPEEDS)}, of which this method needs one"

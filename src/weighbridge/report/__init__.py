@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
+    from weighbridge.report.style import Panel
     from weighbridge.report.table import Table
     from weighbridge.results.calibration import Calibration
     from weighbridge.results.weighing import MassResult
@@ -25,6 +26,8 @@ def write_report(
     title: str | None = None,
     comparisons: Sequence[Sequence[MassResult]] | None = None,
     tables: Sequence[Table] = (),
+    panels: Sequence[Panel] = (),
+    tiles: str | None = None,
 ) -> None:
     """Write one self-contained HTML page for one or many drives.
 
@@ -39,15 +42,22 @@ def write_report(
     comparisons : for each of ``weighings`` the same drive by every method, as of
         `weighbridge.compare`, to show side by side; none when None
     tables : to begin the page with
+    panels : figures to follow the tables
+    tiles : address of map tiles with ``{z}``, ``{x}`` and ``{y}``, to draw maps over; whoever opens
+        the page then asks that server, which learns where the drive was. None: no request
 
     Raises
     ------
     ConfigError
-        There is nothing to report, there are not as many comparisons as weighings, or
-        the file cannot be written.
+        There is nothing to report, there are not as many comparisons as weighings, the tiles are no
+        such address, or the file cannot be written.
     """
+    from weighbridge.arguments import check_text
     from weighbridge.report.page import write_page
+    from weighbridge.report.tiles import Tiles
 
+    if tiles is not None:
+        check_text("tiles", tiles)
     write_page(
         weighings,
         Path(path),
@@ -56,6 +66,8 @@ def write_report(
         title=title,
         comparisons=comparisons or (),
         tables=tables,
+        panels=panels,
+        tiles=Tiles(tiles) if tiles is not None else None,
     )
 
 

@@ -15,7 +15,7 @@ from weighbridge.signals.units import from_si, scalar_from_si
 if TYPE_CHECKING:
     from weighbridge.results.calibration import Calibration
 
-GEAR_COLOURS = (BLUE, ORANGE, "#009e73", "#b0679b", VERMILLION, "#56b4e9", "#b3a24d", "#6b7a99")
+GEAR_COLOURS = (BLUE, ORANGE, "#009e73", "#b0679b", VERMILLION, "#2f95cf", "#9a8a2e", "#6b7a99")
 
 RATIO_TICKS = (3, 4, 5, 6, 8, 10, 14, 20, 30, 40, 60, 80, 100, 140)
 

@@ -19,6 +19,7 @@ from weighbridge.report.style import (
     GREY,
     ORANGE,
     PURPLE,
+    REACH,
     TIME_AXIS,
     VERMILLION,
     Panel,
@@ -248,7 +249,7 @@ def gain_panel(weighing: MassResult, result: MassTrack, gained: Gained) -> Panel
     width = next((w for w in (0.25, 0.5, 1.0, 2.0, 5.0) if span / w <= BARS), 10.0)
     bar = (time // width).astype(np.int64)
     count = int(bar[-1]) + 1
-    figure = blank(TIME_AXIS, "1 sd [kg]", height=480, barmode="stack", bargap=0.08)
+    figure = blank(TIME_AXIS, "± [kg]", height=480, barmode="stack", bargap=0.08)
     figure.update_layout(
         xaxis_anchor="y2",
         yaxis_domain=[0.58, 1.0],
@@ -262,9 +263,10 @@ def gain_panel(weighing: MassResult, result: MassTrack, gained: Gained) -> Panel
         },
     )
     assert result.slow_errors is not None
-    x, bound = thin_line(time, result.slow_errors.mass_bound)
-    line(figure, x, bound, "standard deviation (sd) of the mass", BLUE)
-    figure.update_layout(yaxis_range=_decades(result.slow_errors.mass_bound))
+    half = REACH * result.slow_errors.mass_bound
+    x, bound = thin_line(time, half)
+    line(figure, x, bound, "95 % interval of the mass, half", BLUE, meta={"short": "± mass"})
+    figure.update_layout(yaxis_range=_decades(half))
     for m in Manoeuvre:
         rows = gained.manoeuvre == m
         if rows.any():

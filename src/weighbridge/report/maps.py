@@ -1,4 +1,4 @@
-"""Maps of a drive in local kilometres: no tiles, no network."""
+"""Maps of a drive in local kilometres: no network unless tiles are asked for."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 import plotly.graph_objects as go
 import pymap3d
 
-from weighbridge.report.style import GREEN, GREY, VERMILLION, blank
+from weighbridge.report.style import GREEN, GREY, VERMILLION, blank, line
 from weighbridge.report.thinning import single, spread
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.units import from_si
 
 if TYPE_CHECKING:
+    from weighbridge.report.tiles import Tiles
     from weighbridge.results.weighing import MassResult
 
 
@@ -26,21 +27,25 @@ class Positions:
     Attributes
     ----------
     time : (n,) rising [s]
+    latitude, longitude : (n,) [rad]
     east, north : (n,) of the middle of the drive [km]
     speed : (n,) [m/s]; NaN where unknown
+    middle : latitude and longitude of it [rad]
     """
 
     time: Floats
+    latitude: Floats
+    longitude: Floats
     east: Floats
     north: Floats
     speed: Floats
+    middle: tuple[float, float]
 
     def at(self, time: Floats) -> Positions:
         """Interpolate to the instants ``time`` [s]."""
-        east, north, speed = (
-            np.interp(time, self.time, values) for values in (self.east, self.north, self.speed)
-        )
-        return Positions(time, east, north, speed)
+        rows = (self.latitude, self.longitude, self.east, self.north, self.speed)
+        latitude, longitude, east, north, speed = (np.interp(time, self.time, row) for row in rows)
+        return Positions(time, latitude, longitude, east, north, speed, self.middle)
 
 
 def positions(weighing: MassResult) -> Positions | None:
@@ -62,8 +67,8 @@ def positions(weighing: MassResult) -> Positions | None:
     return _local(latitude.time, latitude.values, east, pace, known)
 
 
-def track_map(track: Positions) -> go.Figure:
-    """Draw the track with its start and end."""
+def track_map(track: Positions, tiles: Tiles | None = None) -> go.Figure:
+    """Draw the track with its start and end, over tiles where a server is named."""
     index = spread(np.ones(track.time.size, dtype=bool))
     figure = blank("East [km]", "North [km]", height=460)
     figure.add_scatter(
@@ -76,7 +81,25 @@ def track_map(track: Positions) -> go.Figure:
             marker={"size": 12, "color": colour, "symbol": symbol},
         )  # fmt: skip
     figure.update_layout(yaxis_scaleanchor="x")
+    if tiles is not None:
+        figure.update_layout(images=tiles.images(track.latitude, track.longitude, track.middle))
+    _add_scale(figure, track)
     return figure
+
+
+def _add_scale(figure: go.Figure, track: Positions) -> None:
+    """Draw a bar of a round length below the track."""
+    east, north = np.ptp(track.east), np.ptp(track.north)
+    widest = 0.35 * max(float(east), float(north), 0.05)
+    length = max(n * 10.0**k for k in range(-3, 4) for n in (1, 2, 5) if n * 10.0**k <= widest)
+    west = float(np.mean((np.min(track.east), np.max(track.east)))) - 0.5 * length
+    south = float(np.min(track.north)) - 0.12 * max(float(east), float(north), 0.05)
+    said = f"{length:g} km" if length >= 1.0 else f"{1e3 * length:.0f} m"
+    line(
+        figure, [west, west + length], [south, south], "scale", GREY, showlegend=False,
+        hoverinfo="skip", line_width=4,
+    )  # fmt: skip
+    figure.add_annotation(x=west + 0.5 * length, y=south, yanchor="top", showarrow=False, text=said)
 
 
 def mark(
@@ -124,4 +147,7 @@ def _local(
     latitude, longitude = latitude[known], longitude[known]
     middle = float(np.median(latitude)), float(np.median(longitude))
     east, north, _ = pymap3d.geodetic2enu(latitude, longitude, 0.0, *middle, 0.0, deg=False)
-    return Positions(time[known], from_si(east, "km"), from_si(north, "km"), speed[known])
+    return Positions(
+        time[known], latitude, longitude, from_si(east, "km"), from_si(north, "km"), speed[known],
+        middle,
+    )  # fmt: skip

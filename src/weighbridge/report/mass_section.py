@@ -14,6 +14,7 @@ from weighbridge.report.style import (
     GREEN,
     GREY,
     PURPLE,
+    REACH,
     REASON_STYLE,
     TIME_AXIS,
     VERMILLION,
@@ -65,35 +66,39 @@ def mass_panel(weighing: MassResult, truth: float | None) -> Panel:
         )
     first = int(np.argmax(result.used))
     mass = np.where(np.arange(result.time.size) >= first, result.running_mass, np.nan)
-    half = 1.96 * result.running_std
+    half = REACH * result.running_std
     time = minutes(weighing.drive, result.time)
     x, running, low, high = thin_line(time, mass, mass - half, mass + half)
     figure = blank(TIME_AXIS, "Mass [kg]", height=420)
-    band(figure, x, low, high, "95 % band of the running mass")
-    line(figure, x, running, "running mass", BLUE)
+    band(figure, x, low, high, "95 % band of the running mass", meta={"short": "95 % band"})
+    line(figure, x, running, "running mass", BLUE, meta={"short": "running"})
     legs = [s for s in result.segments if np.isfinite(s.mass)]
     if len(legs) > 1:
         edges = np.array([[s.start, s.end, np.nan] for s in legs]).ravel()
         levels = np.array([[s.mass, s.mass, np.nan] for s in legs]).ravel()
-        line(figure, minutes(weighing.drive, edges), levels, "mass between stops", PURPLE)
-    ends = np.array([time[0], time[-1]], dtype=np.float32)
+        line(figure, minutes(weighing.drive, edges), levels, "mass between stops", PURPLE,
+             meta={"short": "between stops"})  # fmt: skip
+    begun = max(_load_since(weighing), float(result.time[0]))
+    ends = minutes(weighing.drive, np.array([begun, result.time[-1]])).astype(np.float32)
     converged = weighing.status is Status.CONVERGED
     marks = [truth] if truth is not None else []
+    marks += [x * s.mass for s in legs for x in (0.95, 1.05) if weighing.load_changed]
     if converged:
         for factor, name in ((0.95, "±5 % of the final mass"), (1.05, "")):
             line(
                 figure, ends, np.full(2, factor * weighing.mass), name, GREY,
-                dash="dot", showlegend=bool(name),
+                dash="dot", showlegend=bool(name), meta={"short": "±5 %"},
             )  # fmt: skip
         line(
             figure, ends, np.full(2, weighing.mass), f"final mass {weighing.mass:.0f} kg",
-            VERMILLION, dash="dash",
+            VERMILLION, dash="dash", meta={"short": "final"},
         )  # fmt: skip
         marks += [0.9 * weighing.mass, 1.1 * weighing.mass]
     if truth is not None:
         line(
-            figure, ends, np.full(2, truth), f"true mass {truth:.0f} kg", GREEN, dash="longdashdot"
-        )
+            figure, ends, np.full(2, truth), f"true mass {truth:.0f} kg", GREEN,
+            dash="longdashdot", meta={"short": "true"},
+        )  # fmt: skip
     figure.update_layout(yaxis_range=_mass_range(mass, half, result.used, marks))
     if converged:
         title = f"The final mass, {weighing.mass:.0f} kg, and what was known on the way"
@@ -143,7 +148,7 @@ def speed_panel(weighing: MassResult) -> Panel:
         colour, symbol = REASON_STYLE[reason]
         dots(
             figure, single(time[index]), single(rows[index]), f"{reason_name(reason)} ({count})",
-            colour, symbol=symbol, size=5, opacity=0.85,
+            colour, symbol=symbol, size=5, opacity=0.85, meta={"short": reason_name(reason)},
         )  # fmt: skip
     used = int(np.count_nonzero(result.used))
     return Panel(
@@ -153,6 +158,11 @@ def speed_panel(weighing: MassResult) -> Panel:
         figure=figure,
         wide=True,
     )
+
+
+def _load_since(weighing: MassResult) -> float:
+    """Instant since which the load is the last one; minus infinity where it never changed [s]."""
+    return weighing.segments[-1].start if weighing.load_changed else -np.inf
 
 
 def _sample(weighing: MassResult) -> str:
@@ -167,6 +177,7 @@ def fit_panel(weighing: MassResult) -> Panel:
         return Panel(title=title, absent="no force over specific force: not one sample was used.")
     phi, y = regression(result.balance.table, weighing.vehicle)
     known = result.used & np.isfinite(phi) & np.isfinite(y)
+    known &= result.time >= _load_since(weighing)
     if not known.any():
         return Panel(title=title, absent="no force over specific force: the grade is not known.")
     index = spread(known)
@@ -182,7 +193,8 @@ def fit_panel(weighing: MassResult) -> Panel:
     return Panel(
         title=title,
         caption="Traction less air drag and what the rotating parts take; the closer the marks "
-        "lie to the line and the further it reaches, the surer the mass.",
+        "lie to the line and the further it reaches, the surer the mass."
+        + (" Only samples since the load changed last." if weighing.load_changed else ""),
         figure=figure,
     )
 

@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from weighbridge.balance.law import wind_columns
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators import MassTrack
-from weighbridge.report.methods_section import method_style
-from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots
+from weighbridge.report.methods_section import apart, method_style
+from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, Section, blank, dots, line
 from weighbridge.report.thinning import single, spread
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.units import from_si
 
 if TYPE_CHECKING:
     from weighbridge.results.weighing import MassResult
+    from weighbridge.vehicle.model import Vehicle
 
-POINTS: Final = 900
+POINTS: Final = 600
 """Points of each cloud."""
 
 FEWEST_SAMPLES: Final = 10
@@ -27,6 +29,9 @@ FEWEST_SAMPLES: Final = 10
 
 SMALLEST: Final = 0.002
 """Part of all samples below which a bin has no mean [-]: a few seconds, all of one moment."""
+
+WITH_SLOW: Final = "with slow forces"
+"""Name of the means from which nothing is taken off."""
 
 BINS: Final = 14
 """Bins of an axis that has no widths of its own, at most."""
@@ -44,6 +49,8 @@ class _Against:
     widths : of a bin, of which the first that gives at most `BINS` is taken
     says : what a mean that leaves zero points to
     absent : why it may be missing
+    centred : bins lie around the multiples of their width
+    around : where the axis comes back to its start; 0 where it does not
     """
 
     name: str
@@ -52,6 +59,8 @@ class _Against:
     widths: tuple[float, ...]
     says: str
     absent: str
+    centred: bool = False
+    around: float = 0.0
 
 
 def _compass(table: ForceTable) -> Floats:
@@ -84,15 +93,18 @@ _AXES: Final = (
         (1.0,),
         "One gear that stands apart has a wrong ratio, inertia or efficiency.",
         "there is only one gear",
+        centred=True,
     ),
     _Against(
         "heading",
         "Heading [deg]",
         _compass,
         (30.0,),
-        "A wave with one crest in the round is wind, from where the residual is highest; 0 is "
-        "north, 90 east.",
+        "A wave of the dashed line with one crest in the round is wind, from where it is highest; "
+        "0 is north, 90 east.",
         "the heading is not known",
+        centred=True,
+        around=360.0,
     ),
 )
 
@@ -106,25 +118,67 @@ def residual_section(weighing: MassResult, comparison: Sequence[MassResult]) -> 
     comparison : of which the means are drawn beside; may be empty
     """
     key, title = "residuals", "Residuals"
-    if weighing.result is None:
+    result = weighing.result
+    if result is None:
         return Section(key=key, title=title)
     what = "the measured force less the model's at the final mass"
     if weighing.estimator.speed_alone:
         what = "the change of speed that the filter did not expect, as a force"
-    elif weighing.estimator.slow_errors:
-        what += ", with disturbance and wind still in it"
+    beside = [w for w in comparison if w not in apart(weighing, comparison)]
     return Section(
         key=key,
         title=title,
-        lead=f"A residual is {what}; its mean should stay near zero all along each axis.",
-        panels=tuple(residual_panel(weighing, comparison, against) for against in _AXES),
+        lead=f"A residual is {what}; its mean should stay near zero all along each axis."
+        + _slow_part(result, weighing.vehicle),
+        panels=tuple(residual_panel(weighing, beside, against) for against in _AXES),
     )
 
 
-def residual_panel(
-    weighing: MassResult, comparison: Sequence[MassResult], against: _Against
-) -> Panel:
-    """Draw the cloud of one method with its mean and spread, and the means of the others."""
+def slow_force(result: MassTrack, vehicle: Vehicle) -> Floats:
+    """Force that was found beside the mass at each row: disturbance, resistance, wind (n,) [N].
+
+    Zero where the method finds none.
+    """
+    table, slow = result.balance.table, result.slow_errors
+    if slow is None or not slow.time.size:
+        return np.zeros(table.time.size)
+
+    def at(values: Floats) -> Floats:
+        return np.interp(table.time, slow.time, values)
+
+    north, east = wind_columns(table)
+    wind = np.nan_to_num(north * at(slow.wind_north) + east * at(slow.wind_east))
+    area = vehicle.road.drag_area.value
+    return np.asarray(at(slow.disturbance) + at(slow.resistance) + area * wind)
+
+
+def _slow_part(result: MassTrack, vehicle: Vehicle) -> str:
+    """Say how much of the mean residual was found to be slow forces; empty where none is kept."""
+    known = result.used & np.isfinite(result.residual)
+    if result.slow_errors is None or not known.any():
+        return ""
+    slow = slow_force(result, vehicle)
+    mean, part = float(np.mean(result.residual[known])), float(np.mean(slow[known]))
+    return (
+        f" Of a mean of {_newton(mean)}, {_newton(part)} are slow resistance, disturbance and wind "
+        f"that were found beside the mass: they are taken off, which leaves {_newton(mean - part)}."
+        " The dashed line still has them."
+    )
+
+
+def _newton(force: float) -> str:
+    return f"{round(force) + 0:+d} N".replace("-", "−").replace("+0 ", "0 ")
+
+
+def residual_panel(weighing: MassResult, beside: Sequence[MassResult], against: _Against) -> Panel:
+    """Draw the cloud of one method with its mean and spread, and the means of the others.
+
+    Parameters
+    ----------
+    weighing : of the cloud
+    beside : the same drive by methods whose masses fit; may be empty
+    against : what to draw over
+    """
     title = f"Residual over {against.name}"
     result = weighing.result
     nothing = f"no residual over {against.name}"
@@ -134,39 +188,47 @@ def residual_panel(
     if not rows.any() or (against.name == "gear" and np.unique(x[rows]).size < 2):
         return Panel(title=title, absent=f"{nothing}: {against.absent}.")
     width = bin_width(x[rows], against.widths)
+    left = result.residual - slow_force(result, weighing.vehicle)
     index = spread(rows, POINTS)
     figure = blank(
         against.axis,
         "Innovation times mass [N]" if weighing.estimator.speed_alone else "Residual [N]",
     )
-    dots(figure, single(x[index]), single(result.residual[index]), f"samples, {weighing.method}",
-         BLUE, opacity=0.45)  # fmt: skip
-    colour, _ = method_style(weighing.method) if comparison else (VERMILLION, "")
-    centres, mean, std = binned(x[rows], result.residual[rows], width, against.name == "gear")
+    dots(figure, single(x[index]), single(left[index]), f"samples, {weighing.method}",
+         BLUE, opacity=0.45, meta={"short": "samples"})  # fmt: skip
+    colour, _ = method_style(weighing.method) if beside else (VERMILLION, "")
+    centres, mean, std = _means(x[rows], left[rows], width, against)
     figure.add_scatter(
         x=single(centres), y=single(mean), mode="lines+markers",
-        name=f"mean, {weighing.method}" if comparison else "mean and spread",
-        line={"color": colour, "width": 2.5}, marker={"size": 7},
+        name=f"mean, {weighing.method}" if beside else "mean and spread",
+        line={"color": colour, "width": 2.5}, marker={"size": 7}, meta={"short": "mean"},
         error_y={"type": "data", "array": single(std), "color": colour, "thickness": 1.2},
     )  # fmt: skip
-    for other in comparison:
-        if other is weighing or other.result is None:
+    reach = [*np.percentile(left[rows], [0.5, 99.5]), *mean]
+    if result.slow_errors is not None:
+        centres, mean, _ = _means(x[rows], result.residual[rows], width, against)
+        line(figure, single(centres), single(mean), WITH_SLOW, colour, dash="dash")
+        reach += [*mean]
+    for other in beside:
+        if other.method == weighing.method or other.result is None:
             continue
         ox, there = _rows(other.result, against)
-        oc, om, _ = binned(ox[there], other.result.residual[there], width, against.name == "gear")
+        oc, om, _ = _means(ox[there], other.result.residual[there], width, against)
         if oc.size:
             colour, dash = method_style(other.method)
             figure.add_scatter(
                 x=single(oc), y=single(om), mode="lines+markers", name=other.method,
                 line={"color": colour, "width": 1.6, "dash": dash}, marker={"size": 5},
             )  # fmt: skip
+            reach += [*om]
     figure.add_hline(y=0.0, line={"color": GREY, "width": 1})
-    low, high = np.percentile(result.residual[rows], [0.5, 99.5])
-    figure.update_layout(yaxis_range=[float(1.15 * low), float(1.15 * high)])
+    figure.update_layout(
+        yaxis_range=[1.15 * float(np.nanmin(reach)), 1.15 * float(np.nanmax(reach))]
+    )
     if against.name == "gear":
         figure.update_layout(xaxis_dtick=1)
-    if against.name == "heading":
-        figure.update_layout(xaxis_range=[0, 360], xaxis_dtick=90)
+    if against.around:
+        figure.update_layout(xaxis_range=[0, against.around], xaxis_dtick=90)
     says = against.says
     if weighing.estimator.speed_alone:
         says = "It says how well the speed model tells the next sample; no force was measured."
@@ -174,6 +236,28 @@ def residual_panel(
         title=f"The residual should not depend on {against.name}",
         caption=f"{says} Bars are one standard deviation of the samples of a bin.",
         figure=figure,
+    )
+
+
+def _means(x: Floats, y: Floats, width: float, against: _Against) -> tuple[Floats, Floats, Floats]:
+    """Bins as of `binned`, with a gap where bins are missing, and closed where the axis is round.
+
+    Returns
+    -------
+    centres, mean, std : (k,) NaN in gaps
+    """
+    if against.around:
+        x = np.mod(x + 0.5 * width, against.around) - 0.5 * width
+    found = binned(x, y, width, against.centred)
+    centres, mean, std = found
+    if against.around and centres.size and centres[0] == 0.0:
+        centres = np.append(centres, against.around)
+        mean, std = np.append(mean, mean[0]), np.append(std, std[0])
+    gaps = np.flatnonzero(np.diff(centres) > 1.5 * width) + 1
+    return (
+        np.insert(centres, gaps, centres[gaps] - 0.5 * width),
+        np.insert(mean, gaps, np.nan),
+        np.insert(std, gaps, np.nan),
     )
 
 

@@ -14,6 +14,7 @@ from weighbridge.report.style import (
     GREEN,
     GREY,
     ORANGE,
+    REACH,
     Panel,
     Section,
     band,
@@ -25,15 +26,16 @@ from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si
 
 if TYPE_CHECKING:
+    from weighbridge.report.tiles import Tiles
     from weighbridge.results.weighing import MassResult
 
 SLOPE_BASE = 200.0
 """Length over which the slope of the recorded altitude is taken [m]."""
 
 
-def road_section(weighing: MassResult) -> Section:
-    """Return map, grade and altitude."""
-    panels = [map_panel(weighing)]
+def road_section(weighing: MassResult, tiles: Tiles | None = None) -> Section:
+    """Return map, grade and altitude; the map over tiles where a server is named."""
+    panels = [map_panel(weighing, tiles)]
     if weighing.result is not None:
         panels += [grade_panel(weighing.result), pitch_panel(weighing, weighing.result)]
     return Section(
@@ -45,19 +47,20 @@ def road_section(weighing: MassResult) -> Section:
     )
 
 
-def map_panel(weighing: MassResult) -> Panel:
+def map_panel(weighing: MassResult, tiles: Tiles | None = None) -> Panel:
     """Track of the drive in local kilometres, coloured by speed."""
     title = "Map of the drive"
     found = positions(weighing)
     if found is None:
         return Panel(title=title, absent="no map: no position is known for this drive.")
-    figure = track_map(found)
+    figure = track_map(found, tiles)
     index = spread(np.ones(found.time.size, dtype=bool))
     places = found.at(found.time[index])
     mark(figure, places, from_si(places.speed, "kmh"), "Speed [km/h]", "Cividis")
     return Panel(
         title="Where the drive went, and how fast",
-        caption="Kilometres east and north of the middle of the drive, to one scale.",
+        caption="East and north of the middle of the drive, to one scale; the bar tells lengths."
+        + (f" {tiles.credit}" if tiles is not None else ""),
         figure=figure,
     )
 
@@ -72,7 +75,7 @@ def grade_panel(result: MassTrack) -> Panel:
             absent="no road grade: it is not known for this drive.",
         )
     distance = from_si(motion.distance, "km")
-    half = 1.96 * motion.grade_std
+    half = REACH * motion.grade_std
     moving = _advancing(motion.distance)
     x, middle, low, high = (
         part
@@ -81,13 +84,14 @@ def grade_panel(result: MassTrack) -> Panel:
             *(_percent(g[moving]) for g in (grade, grade - half, grade + half)),
         )
     )
-    figure = blank("Distance [km]", "Road grade [%]")
+    figure = blank("Distance [km]", "Road grade [%]", height=460)
     if np.isfinite(low).any():
         band(figure, x, low, high, "95 % band")
     line(figure, x, middle, "road grade", BLUE, line_width=1.4)
     lowest, highest = np.nanpercentile(_percent(grade), [1.0, 99.0])
+    between = f"{lowest:+.1f} and {highest:+.1f} %".replace("-", "−")
     return Panel(
-        title=f"The road rises and falls between {lowest:+.1f} and {highest:+.1f} %",
+        title=f"The road rises and falls between {between}",
         caption="Positive uphill; 98 % of the time lies between the two numbers."
         + (
             " The pitching of the body under acceleration is taken out."
@@ -95,7 +99,6 @@ def grade_panel(result: MassTrack) -> Panel:
             else ""
         ),
         figure=figure,
-        wide=True,
     )
 
 
@@ -135,7 +138,8 @@ def pitch_panel(weighing: MassResult, result: MassTrack) -> Panel:
     if along.size:
         x, slope_deg = thin_line(from_si(along, "km"), from_si(slope, "deg"))
         name = f"slope of the altitude over {SLOPE_BASE:.0f} m"
-        line(figure, x, slope_deg, name, GREEN, yaxis="y2", line_width=1.4)
+        line(figure, x, slope_deg, name, GREEN, yaxis="y2", line_width=1.4,
+             meta={"short": "slope of it"})  # fmt: skip
     return Panel(
         title="Pitch and grade should follow the hills",
         caption="Where the altitude climbs, pitch and grade should be positive and near the "

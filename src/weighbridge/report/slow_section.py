@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -15,12 +16,14 @@ from weighbridge.report.maps import mark, positions, track_map
 from weighbridge.report.style import (
     BLUE,
     GREY,
+    REACH,
     TIME_AXIS,
     VERMILLION,
     Panel,
     Section,
     band,
     blank,
+    dots,
     line,
     minutes,
 )
@@ -30,10 +33,14 @@ from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.signals.units import from_si, scalar_from_si
 
 if TYPE_CHECKING:
+    from weighbridge.report.tiles import Tiles
     from weighbridge.results.weighing import MassResult
 
-ARROWS: Final = 26
+ARROWS: Final = 12
 """Arrows of wind along a drive."""
+
+LONGEST_ARROW: Final = 46.0
+"""Length of the arrow of the strongest wind [pixel]."""
 
 SEEN: Final = 0.75
 """A component of the wind is seen where its standard deviation has fallen below this part of
@@ -100,7 +107,7 @@ def wind_at_vehicle(slow: SlowErrors, drive: Drive) -> Wind:
     )
 
 
-def slow_section(weighing: MassResult) -> Section:
+def slow_section(weighing: MassResult, tiles: Tiles | None = None) -> Section:
     """Return disturbance, slow resistance and wind, over time and on the map."""
     key, title = "slow", "Disturbance and wind"
     result = weighing.result
@@ -132,8 +139,8 @@ def slow_section(weighing: MassResult) -> Section:
                 slow.resistance_std,
             ),
             wind_panel(weighing, wind, blind),
-            disturbance_map(weighing, slow),
-            wind_map(weighing, wind, blind),
+            wind_map(weighing, wind, blind, tiles),
+            disturbance_map(weighing, slow, tiles),
         ),
     )
 
@@ -152,7 +159,7 @@ CONSTANTS: Final = {
 def constants_table(slow: SlowErrors) -> Table | None:
     """List what was found beside the mass that does not change over the drive."""
     rows = tuple(
-        (text, f"{value:+.3g}", f"{std:.2g}", unit)
+        (text, *_with_digits(value, REACH * std), unit)
         for name, (text, unit) in CONSTANTS.items()
         if name in slow.constants
         for value, std in [slow.constants[name]]
@@ -160,7 +167,13 @@ def constants_table(slow: SlowErrors) -> Table | None:
     )
     if not rows:
         return None
-    return Table("", ("The same all along", "found", "± standard deviation", "unit"), rows)
+    return Table("", ("The same all along", "found", "±", "unit"), rows)
+
+
+def _with_digits(value: float, half: float) -> tuple[str, str]:
+    """Print a value and half its interval to the two leading digits of the latter."""
+    places = max(1 - math.floor(math.log10(half)), 0)
+    return f"{value:+.{places}f}".replace("-", "−"), f"{half:.{places}f}"
 
 
 def force_panel(weighing: MassResult, what: str, causes: str, force: Floats, std: Floats) -> Panel:
@@ -169,7 +182,7 @@ def force_panel(weighing: MassResult, what: str, causes: str, force: Floats, std
     assert weighing.result.slow_errors is not None
     time = minutes(weighing.drive, weighing.result.slow_errors.time)
     figure = blank(TIME_AXIS, "Force against the motion [N]")
-    half = 1.96 * std
+    half = REACH * std
     x, middle, low, high = thin_line(time, force, force - half, force + half, points=POINTS)
     band(figure, x, low, high, "95 % band")
     line(figure, x, middle, "estimated", BLUE, line_width=1.6)
@@ -177,8 +190,11 @@ def force_panel(weighing: MassResult, what: str, causes: str, force: Floats, std
     size = float(np.sqrt(np.mean(force**2)))
     slope = 100.0 * size / (weighing.result.mass * GRAVITY)
     return Panel(
-        title=f"{what}: {size:.0f} N, as a slope of {slope:.2g} %",
-        caption=f"Root mean square over the drive; causes are {causes}. Positive holds back.",
+        title=f"{what}: {size:.0f} N, as a slope of {slope:.2f} %"
+        if stands_out(force, std)
+        else f"{what}: none stands out",
+        caption=f"{size:.0f} N root mean square over the drive; causes are {causes}. Positive "
+        "holds back.",
         figure=figure,
     )
 
@@ -189,42 +205,46 @@ def wind_panel(weighing: MassResult, wind: Wind, blind: bool) -> Panel:
         return Panel(
             title="Wind over time", absent="no wind: the heading of this drive is not known."
         )
-    figure = blank(TIME_AXIS, "Wind at the vehicle [m/s]")
+    figure = blank(TIME_AXIS, "Wind at the vehicle [m/s]", height=460)
     time = minutes(weighing.drive, wind.time)
     ends = [float(time[0]), float(time[-1])]
     for k, (values, name, colour) in enumerate(
         ((wind.north, "from north", BLUE), (wind.east, "from east", VERMILLION))
     ):
-        half = 1.96 * wind.std[:, k]
+        half = REACH * wind.std[:, k]
         x, middle, low, high = thin_line(time, values, values - half, values + half, points=POINTS)
-        band(figure, x, low, high, f"95 % band, {name}", colour)
+        band(figure, x, low, high, f"95 % band, {name}", colour, showlegend=False)
         line(figure, x, middle, name, colour)
         if any(wind.reported):
             line(
                 figure, ends, [wind.reported[k]] * 2, f"reported, {name}", colour, dash="dash",
-                line_width=1,
+                line_width=1, meta={"short": f"reported {name[5:]}"},
             )  # fmt: skip
     figure.add_hline(y=0.0, line={"color": GREY, "width": 1})
     return Panel(
         title=_wind_title(wind),
         caption="At the height of the vehicle, about half of what a weather report says for 10 m"
         + (", which is taken in and dashed" if any(wind.reported) else "")
-        + "; a negative line is wind from south or west. Where the vehicle drives slowly or "
-        "always one way, the band stays as wide as it was before the drive, "
-        f"± {1.96 * WIND_STD:.1f} m/s.",
+        + "; bands are of 95 %; a negative line is wind from south or west. Where the vehicle "
+        "drives slowly or always one way, the band stays as wide as it was before the drive, "
+        f"± {REACH * WIND_STD:.1f} m/s.",
         figure=figure,
-        wide=True,
     )
 
 
-def disturbance_map(weighing: MassResult, slow: SlowErrors) -> Panel:
+def disturbance_map(weighing: MassResult, slow: SlowErrors, tiles: Tiles | None) -> Panel:
     """Draw where the disturbance was."""
     track = positions(weighing)
     if track is None:
         # The map of the road says so.
         return Panel(title="Disturbance on the map")
+    if not stands_out(slow.disturbance, slow.disturbance_std):
+        return Panel(
+            title="Disturbance on the map",
+            absent="no map of the half-minute force: none stands out.",
+        )
     rows = np.unique(np.linspace(0, slow.time.size - 1, SCATTER_POINTS).astype(np.int64))
-    figure = track_map(track)
+    figure = track_map(track, tiles)
     reach = float(np.percentile(np.abs(slow.disturbance), 98.0))
     mark(
         figure, track.at(slow.time[rows]), slow.disturbance[rows], "Force [N]", "RdBu",
@@ -233,12 +253,18 @@ def disturbance_map(weighing: MassResult, slow: SlowErrors) -> Panel:
     return Panel(
         title="Where the half-minute force was",
         caption="Red holds back, blue pushes. The same colour on every pass of a place is the "
-        "road, or its grade; another each time is traffic or gusts.",
+        "road, or its grade; another each time is traffic or gusts."
+        + (f" {tiles.credit}" if tiles is not None else ""),
         figure=figure,
     )
 
 
-def wind_map(weighing: MassResult, wind: Wind, blind: bool) -> Panel:
+def stands_out(force: Floats, std: Floats) -> bool:
+    """Whether a force is larger on the whole than what is not known of it."""
+    return bool(np.mean(force**2) > np.mean(std**2))
+
+
+def wind_map(weighing: MassResult, wind: Wind, blind: bool, tiles: Tiles | None) -> Panel:
     """Draw the wind where the drive told it."""
     title = "Wind on the map"
     track = positions(weighing)
@@ -253,19 +279,31 @@ def wind_map(weighing: MassResult, wind: Wind, blind: bool) -> Panel:
         )
     places = track.at(wind.time[rows])
     rows = rows[_evenly(places.east, places.north)]
-    figure = track_map(track)
+    figure = track_map(track, tiles)
     strength = wind.strength[rows]
     top = max(float(np.max(strength)), 1.0)
-    mark(
-        figure, track.at(wind.time[rows]), strength, "Wind [m/s]",
-        ((0.0, GREY), (1.0, VERMILLION)), (0.0, top),
-        symbol="arrow", angle=single(from_si(wind.blows_to[rows], "deg")),
-        size=single(9.0 + 9.0 * strength / top), line={"color": GREY, "width": 0.5},
+    there = track.at(wind.time[rows])
+    origin = np.mod(from_si(wind.blows_to[rows], "deg") + 180.0, 360.0)
+    dots(
+        figure, single(there.east), single(there.north), "wind", BLUE, size=6.0, opacity=1.0,
+        hovertext=[f"{s:.1f} m/s from {o:.0f}°" for s, o in zip(strength, origin, strict=True)],
+        hoverinfo="text",
     )  # fmt: skip
+    for east, north, speed, to in zip(
+        there.east, there.north, strength, wind.blows_to[rows], strict=True
+    ):
+        # Pixels: an arrow is read at any zoom. Its head is at the place.
+        length = LONGEST_ARROW * speed / top
+        figure.add_annotation(
+            x=float(east), y=float(north), axref="pixel", ayref="pixel", text="",
+            ax=float(-length * np.sin(to)), ay=float(length * np.cos(to)),
+            showarrow=True, arrowhead=2, arrowsize=1.2, arrowwidth=2, arrowcolor=BLUE,
+        )  # fmt: skip
     return Panel(
-        title="How the wind blew",
-        caption="Arrows point where the wind goes; they stand where the drive told both "
-        "components.",
+        title=f"How the wind blew: up to {float(np.max(strength)):.1f} m/s",
+        caption="Arrows point where the wind goes and end at the place; the longest is the "
+        "strongest. They stand where the drive told both components."
+        + (f" {tiles.credit}" if tiles is not None else ""),
         figure=figure,
     )
 
@@ -277,11 +315,11 @@ def _wind_title(wind: Wind) -> str:
     north, east = float(np.mean(wind.north[wind.seen])), float(np.mean(wind.east[wind.seen]))
     std = float(np.mean(np.hypot(*wind.std[wind.seen].T))) / np.sqrt(2.0)
     strength = float(np.hypot(north, east))
-    if strength < std:
-        return f"No wind stands out: {strength:.1f} ± {std:.1f} m/s on the whole"
+    if strength < REACH * std:
+        return f"No wind stands out: {strength:.1f} ± {REACH * std:.1f} m/s on the whole"
     origin = scalar_from_si(float(np.arctan2(east, north)), "deg")
     name = COMPASS[round(origin / 45.0) % 8]
-    return f"Wind from the {name}, {strength:.1f} ± {std:.1f} m/s on the whole (1 sd)"
+    return f"Wind from the {name}, {strength:.1f} ± {REACH * std:.1f} m/s on the whole"
 
 
 def _evenly(east: Floats, north: Floats) -> Sequence[int]:

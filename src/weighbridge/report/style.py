@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 import plotly.graph_objects as go
+from scipy.stats import norm
 
 from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.report.table import Table
@@ -18,9 +19,13 @@ VERMILLION: Final = "#d55e00"
 GREEN: Final = "#009e73"
 GREY: Final = "#8a8a8a"
 PURPLE: Final = "#b0679b"
-ORANGE: Final = "#e69f00"
-"""Mid tones told apart with any colour vision, on white and on dark grey; after Okabe and
-Ito, Color Universal Design, 2008."""
+ORANGE: Final = "#c08300"
+BROWN: Final = "#a67c52"
+"""Mid tones told apart with any colour vision; after Okabe and Ito, Color Universal Design, 2008.
+Each has a contrast of 3 or more on light and dark paper (WCAG 2.2, 1.4.11)."""
+
+REACH: Final = float(norm.ppf(0.975))
+"""Half of a 95 % interval over the standard deviation, where that is known [-]."""
 
 TIME_AXIS: Final = "Time since start [min]"
 
@@ -37,18 +42,18 @@ AXIS: Final = {
 
 REASON_STYLE: Final[dict[Reason, tuple[str, str]]] = {
     Reason.USED: (BLUE, "circle"),
-    Reason.STANDING: ("#9a9a9a", "square"),
+    Reason.STANDING: ("#858585", "square"),
     Reason.NO_MOTION: ("#6b7a99", "x"),
-    Reason.NO_TORQUE: ("#56b4e9", "cross"),
+    Reason.NO_TORQUE: ("#2f95cf", "cross"),
     Reason.BRAKING: (VERMILLION, "triangle-down"),
     Reason.SHIFTING: (PURPLE, "diamond"),
-    Reason.CLUTCH_SLIPPING: ("#aa3377", "star"),
+    Reason.CLUTCH_SLIPPING: ("#b8508f", "star"),
     Reason.OVERRUN: (ORANGE, "triangle-left"),
     Reason.EXTRAPOLATED: (GREEN, "triangle-up"),
-    Reason.NOT_ACCELERATING: ("#b3a24d", "circle-open"),
-    Reason.BAD_FIT: ("#c0392b", "x-thin-open"),
-    Reason.TOO_SHORT: ("#c8c8c8", "diamond-open"),
-    Reason.CORNERING: ("#7a5c3e", "triangle-right"),
+    Reason.NOT_ACCELERATING: ("#9a8a2e", "circle-open"),
+    Reason.BAD_FIT: ("#d1483a", "x-thin-open"),
+    Reason.TOO_SHORT: ("#8f8f8f", "diamond-open"),
+    Reason.CORNERING: (BROWN, "triangle-right"),
 }
 """Colour and marker of used and excluded samples."""
 

@@ -14,8 +14,10 @@ class Table:
     title : above it
     columns : heads; the first column is aligned left, the others right
     rows : one text per column each
+    marked : indices of rows that contradict the rest
     """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    marked: tuple[int, ...] = ()

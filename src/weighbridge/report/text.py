@@ -16,7 +16,9 @@ NOTHING: Final = "–"
 
 def kg(mass: float | None) -> str:
     """Print a mass."""
-    return f"{mass:.0f} kg" if mass is not None and math.isfinite(mass) else NOTHING
+    if mass is None or not math.isfinite(mass):
+        return NOTHING
+    return f"{round(mass)} kg".replace("-", "−")
 
 
 def signed_kg(mass: float) -> str:

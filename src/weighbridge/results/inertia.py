@@ -141,12 +141,44 @@ class InertiaResult:
     @property
     def axle_loads(self) -> tuple[float, float]:
         """What scales under front and rear axle would show on the level [kg]."""
-        ride, sprung = self.ride, float(self.values[0])
+        return self._axles(float(self.values[0]))
+
+    def _axles(self, sprung: float) -> tuple[float, float]:
+        """Axle loads of a sprung mass whose centre of gravity is the vehicle file's [kg]."""
+        ride = self.ride
         base = ride.front_axle + ride.rear_axle
         return (
             sprung * ride.rear_axle / base + ride.front_unsprung,
             sprung * ride.front_axle / base + ride.rear_unsprung,
         )
+
+    def axle_load_intervals(
+        self, level: float = 0.95
+    ) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Bounds that hold the front and the rear axle load with the probability ``level`` [kg].
+
+        The centre of gravity is taken to be where the vehicle file has it.
+
+        Raises
+        ------
+        ConfigError
+            The level is not between 0 and 1.
+        """
+        low, high = (float(bound[0]) for bound in self.intervals(level))
+        (front_low, rear_low), (front_high, rear_high) = self._axles(low), self._axles(high)
+        return (front_low, front_high), (rear_low, rear_high)
+
+    def payload_interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Bounds that hold the payload with the probability ``level`` [kg]; NaN where unknown.
+
+        Raises
+        ------
+        ConfigError
+            The level is not between 0 and 1.
+        """
+        low, high = self.mass_interval(level)
+        tare = math.nan if self.vehicle.tare is None else self.vehicle.tare
+        return low - tare, high - tare
 
     @property
     def payload(self) -> float:
@@ -168,6 +200,7 @@ class InertiaResult:
         low, high = self.intervals()
         lightest, heaviest = self.mass_interval()
         front, rear = self.axle_loads
+        of_front, of_rear = self.axle_load_intervals()
         parts: dict[str, Any] = {}
         for k, name in enumerate(("sprung_mass_kg", "roll_inertia_kgm2", "pitch_inertia_kgm2")):
             stem, unit = name.rsplit("_", 1)
@@ -185,8 +218,11 @@ class InertiaResult:
             "std_kg": number(self.std),
             "interval95_kg": [number(lightest), number(heaviest)],
             "axle_load_front_kg": number(front),
+            "axle_load_front_interval95_kg": [number(bound) for bound in of_front],
             "axle_load_rear_kg": number(rear),
+            "axle_load_rear_interval95_kg": [number(bound) for bound in of_rear],
             "payload_kg": number(self.payload),
+            "payload_interval95_kg": [number(bound) for bound in self.payload_interval()],
             "duration_s": number(self.drive.duration),
             "converged_at_s": number(self.converged_at),
             "segments": [

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.signals.drive import Problem
+from weighbridge.signals.instants import instant
 from weighbridge.signals.signal import Bools, Floats, Signal
 
 Rows = NDArray[np.intp]
@@ -179,7 +180,7 @@ def clean_clock(time: Floats, source: str) -> Clock:
         problems.append(
             Problem(
                 "",
-                f"{source}: the clock runs backwards (by up to {back}, at {present[at]:.6g} s); "
+                f"{source}: the clock runs backwards (by up to {back}, at {instant(present[at])}); "
                 f"{lost - repeated} of {time.size} rows were left out; "
                 "split the file there if it holds two recordings",
             )

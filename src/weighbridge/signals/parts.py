@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from weighbridge.constants import EARTH_RADIUS
 from weighbridge.signals.drive import Drive, Problem
+from weighbridge.signals.instants import span
 from weighbridge.signals.signal import Floats, Signal
 
 PAUSE: Final = 300.0
@@ -38,6 +39,7 @@ _FASTER: Final = 7.0  # tyres drive a road vehicle no harder [m/s^2]
 _SLOWER: Final = 11.0  # nor brake it harder [m/s^2]
 _STEP: Final = 2.0  # of speed, beside that [m/s]
 _ALONE: Final = 0.35  # steps around a splice over its own [-]
+_FALLS: Final = 2.0 / 3.0  # engine or ground speed after a splice over that before it [-]
 _FASTEST: Final = 100.0  # between two positions [m/s]
 _FAR: Final = 300.0  # beside that [m]
 _COOLED: Final = 10.0  # of the coolant: the engine was parked [K]
@@ -111,7 +113,7 @@ def numbered(name: str, parts: Sequence[Drive], why: str, idle: int = 0) -> tupl
             Problem(
                 "",
                 f"{name} holds {len(parts)} drives, parted by {why}; this is drive {k}, from "
-                f"{part.start:.0f} to {part.end:.0f} s{left}",
+                f"{span(round(part.start), round(part.end))}{left}",
             )
         )
         for k, part in enumerate(parts, start=1)
@@ -127,6 +129,7 @@ def find_splices(drive: Drive) -> list[Cut]:
     speed = drive.speed
     if speed is not None and len(speed) > 2 * _AROUND:
         found += _speed_jumps(speed)
+        found += _starts_anew(speed, _witnesses(drive, speed))
     lat, lon = drive.get("latitude"), drive.get("longitude")
     if lat is not None and lon is not None and len(lat) > 2 * _AROUND:
         found += _position_jumps(lat, lon.at(lat.time))
@@ -148,13 +151,7 @@ def _speed_jumps(speed: Signal) -> list[Cut]:
     """
     time, values = speed.time, speed.values
     change = np.abs(np.diff(values))
-    # A value that is held is as old as its first sample.
-    new = np.concatenate(([True], change > 0.0))
-    since = time[np.maximum.accumulate(np.where(new, np.arange(new.size), 0))]
-    size = np.abs(values)
-    hardest = np.where(size[1:] > size[:-1], _FASTER, _SLOWER)
-    possible = _STEP + hardest * (time[1:] - since[:-1])
-    places = np.flatnonzero((np.diff(time) < _NEAR) & (change > possible))
+    places = np.flatnonzero((np.diff(time) < _NEAR) & (change > _possible(speed)))
     if not places.size:
         return []
     before, after = (np.abs(w) for w in _windows(values, places))
@@ -165,6 +162,57 @@ def _speed_jumps(speed: Signal) -> list[Cut]:
     for side in (before, after):
         stays &= np.nanmin(side, axis=1) > _STILL
     return _told(time, places[stays], "jumps of the speed")
+
+
+def _possible(speed: Signal) -> Floats:
+    """Largest step to each sample from the one before that tyres can make (n - 1,) [m/s]."""
+    time, size = speed.time, np.abs(speed.values)
+    # A value that is held is as old as its first sample.
+    new = np.concatenate(([True], np.diff(speed.values) != 0.0))
+    since = time[np.maximum.accumulate(np.where(new, np.arange(new.size), 0))]
+    hardest = np.where(size[1:] > size[:-1], _FASTER, _SLOWER)
+    return np.asarray(_STEP + hardest * (time[1:] - since[:-1]))
+
+
+def _witnesses(drive: Drive, speed: Signal) -> list[Signal]:
+    """Other signals that step at a splice, and go on where a speed drops out."""
+    others = (drive.get(name) for name in ("engine_speed", "gnss_speed", "vehicle_speed"))
+    return [s for s in others if s is not None and s is not speed and len(s) > 2 * _AROUND]
+
+
+def _starts_anew(speed: Signal, witnesses: Sequence[Signal]) -> list[Cut]:
+    """Find steps from driving to standstill that no brake could make, after which it drives off.
+
+    So look recordings that each begin at standstill. A speed that drops out looks so as well, but
+    comes back with a step, and engine and satellites go on: each of them has to step too.
+    """
+    time, values = speed.time, np.abs(speed.values)
+    possible = _possible(speed)
+    hard = (np.diff(time) < _NEAR) & (values[:-1] - values[1:] > possible)
+    places = np.flatnonzero(hard & (values[1:] < _STILL))
+    kept = []
+    for k in places:
+        ahead = np.flatnonzero(values[k + 1 :] > _STILL)
+        if not ahead.size or ahead[0] < _AROUND:
+            continue
+        off = k + 1 + int(ahead[0])
+        gently = values[off] - values[off - 1] < possible[off - 1]
+        fall = [_falls(s, float(time[k]), float(time[k + 1])) for s in witnesses]
+        if gently and fall and all(fall):
+            kept.append(k)
+    return _told(time, np.array(kept, dtype=np.intp), "starts from standstill amid driving")
+
+
+def _falls(signal: Signal, before: float, after: float) -> bool:
+    """Whether a signal falls by a third or more from one instant to another, and stays there."""
+    a, b = np.searchsorted(signal.time, before, side="right"), np.searchsorted(signal.time, after)
+    earlier, later = signal.values[max(a - _AROUND, 0) : a], signal.values[b : b + _AROUND]
+    if earlier.size < _AROUND or later.size < _AROUND:
+        return False
+    near = signal.time[b] - signal.time[a - 1] < _NEAR
+    # From one sample to the next, and for good.
+    pairs = ((earlier[-1], later[0]), (np.median(earlier), np.median(later)))
+    return bool(near and all(after < _FALLS * before for before, after in pairs))
 
 
 def _position_jumps(lat: Signal, longitude: Floats) -> list[Cut]:

@@ -11,8 +11,12 @@ import numpy as np
 from weighbridge.signals.drive import Drive
 from weighbridge.signals.signal import Floats, Signal
 
-STEP: Final = 1.0
-"""The stages take a drive in steps between whole multiples of this [s]."""
+STEPS: Final = (0.25, 0.5, 1.0)
+"""The stages take a drive in steps between whole multiples of one of these [s]: powers of two, so
+that no sum of them is rounded."""
+
+STEP: Final = 0.5
+"""The one of them that they take unless another is asked for [s]."""
 
 BEHIND: Final = 15.0
 """They look back so far [s]: a reading that runs straight for 10 s was filled in, and filters
@@ -22,31 +26,31 @@ FEWEST_SAMPLES: Final = 16
 """They see so many samples of a slow signal at least, however old."""
 
 
-def recent(drive: Drive, until: float) -> Drive:
-    """Return the part of a drive that a step up to ``until`` [s] reads; no signal is copied."""
+def recent(drive: Drive, until: float, step: float = STEP) -> Drive:
+    """Return the part of a drive that a ``step`` up to ``until`` [s] reads; no signal is copied."""
     cut = {}
     for name, s in drive.signals.items():
-        first, last = s.time.searchsorted([until - STEP - BEHIND, until])
+        first, last = s.time.searchsorted([until - step - BEHIND, until])
         first = max(min(first, last - FEWEST_SAMPLES), 0)
         if last > first:
             cut[name] = Signal(name, s.time[first:last], s.values[first:last])
     return replace(drive, signals=cut)
 
 
-def first_instant(time: float) -> float:
-    """Return the end of the step that an instant lies in [s]."""
-    return (math.floor(time / STEP) + 1) * STEP
+def first_instant(time: float, step: float = STEP) -> float:
+    """Return the end of the ``step`` that an instant lies in [s]."""
+    return (math.floor(time / step) + 1) * step
 
 
-def instants(drive: Drive) -> Floats:
-    """Ends of the steps (n,) that a drive is taken in [s].
+def instants(drive: Drive, step: float = STEP) -> Floats:
+    """Ends of the steps (n,) of so long that a drive is taken in [s].
 
     There are none where all signals have been silent for longer than `BEHIND`.
     """
     stamps = [s.time for s in drive.signals.values() if len(s)]
     if not stamps:
         return np.empty(0)
-    steps = np.unique(np.concatenate([np.floor(t / STEP) for t in stamps]))
-    after = 1.0 + np.arange(round(BEHIND / STEP) + 1)
-    ends = np.unique(steps[:, None] + after) * STEP
+    steps = np.unique(np.concatenate([np.floor(t / step) for t in stamps]))
+    after = 1.0 + np.arange(round(BEHIND / step) + 1)
+    ends = np.unique(steps[:, None] + after) * step
     return np.asarray(ends[ends <= drive.end])

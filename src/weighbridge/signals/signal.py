@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from weighbridge.arguments import as_floats, check_text
 from weighbridge.errors import ConfigError
+from weighbridge.signals.interpolation import interpolate
 
 Floats: TypeAlias = NDArray[np.float64]
 Bools: TypeAlias = NDArray[np.bool_]
@@ -80,7 +81,7 @@ class Signal:
         time = as_floats("time", time)
         if self.time.size == 0:
             return np.full(np.shape(time), np.nan)
-        return np.interp(time, self.time, self.values, left=np.nan, right=np.nan)
+        return interpolate(time, self.time, self.values, left=np.nan, right=np.nan)
 
     def held(self, time: Floats) -> Floats:
         """Hold the last value seen; NaN before the first sample [SI]."""
@@ -92,9 +93,12 @@ class Signal:
 
     def age(self, time: Floats) -> Floats:
         """Distance to the nearest sample [s]; infinite without samples."""
+        from weighbridge.kernels.interpolation import distance_to_nearest
+
         time = as_floats("time", time)
         if self.time.size == 0:
             return np.full(np.shape(time), np.inf)
-        right = np.clip(np.searchsorted(self.time, time), 0, self.time.size - 1)
-        left = np.maximum(right - 1, 0)
-        return np.minimum(np.abs(self.time[right] - time), np.abs(time - self.time[left]))
+        found: Floats = distance_to_nearest(
+            np.ascontiguousarray(time).ravel(), np.ascontiguousarray(self.time)
+        )
+        return found.reshape(np.shape(time))[()]

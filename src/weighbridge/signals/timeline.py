@@ -11,6 +11,7 @@ import numpy as np
 from weighbridge.signals.catalogue import QUANTITIES
 from weighbridge.signals.cleaning import NO_DRIVE, clean_columns
 from weighbridge.signals.drive import Drive, Problem
+from weighbridge.signals.instants import instant
 from weighbridge.signals.signal import Floats, Signal
 
 # Shorter times without samples that part a recording, where long ones leave too little in it [s].
@@ -231,8 +232,8 @@ def _told(
         problems.append(
             Problem(
                 "",
-                f"the clock jumps by {_start(parts[k + 1]) - at:.6g} s after {at:.6g} s while the "
-                "vehicle moves on; the parts were joined there",
+                f"the clock jumps by {_start(parts[k + 1]) - at:.6g} s after {instant(at)} while "
+                "the vehicle moves on; the parts were joined there",
             )
         )
     lost: dict[str, int] = {}
@@ -248,7 +249,7 @@ def _told(
         problems.append(
             Problem(
                 "",
-                f"the clock jumps by {beyond - at:.6g} s after {at:.6g} s; the part of "
+                f"the clock jumps by {beyond - at:.6g} s after {instant(at)}; the part of "
                 f"{end - start:.0f} s {side} that was taken and the other rows ({rows}) were "
                 "left out: correct their time stamps, or cut the recording there",
             )

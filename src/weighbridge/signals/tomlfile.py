@@ -124,7 +124,8 @@ class Section:
         return self.name
 
     def fail(self, key: str, text: str) -> NoReturn:
-        """Raise the file's error for a key."""
+        """Raise the file's error for a key, of which `done` says no more."""
+        self._known.append(key)
         label = ".".join((*self.path, key)) if key else ".".join(self.path)
         raise self.error(f"{self.where(key)}: {label} {text}")
 

@@ -1,6 +1,7 @@
 """Simulated vehicles on simulated roads, seen through simulated sensors."""
 
 from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar, random_car
+from weighbridge.simulation.fleet import FleetSettings, plan_fleet
 from weighbridge.simulation.named import ABOUT, SCENARIOS, make_scenario, usual_polling
 from weighbridge.simulation.route import (
     Route,
@@ -46,6 +47,7 @@ __all__ = [
     "VAN",
     "Braking",
     "Effects",
+    "FleetSettings",
     "Habits",
     "Loading",
     "Polling",
@@ -63,6 +65,7 @@ __all__ = [
     "jensen_route",
     "make_scenario",
     "mixed_route",
+    "plan_fleet",
     "random_car",
     "random_habits",
     "random_vehicle",

@@ -33,17 +33,23 @@ def _car(payload: float, seed: int) -> Scenario:
     return Scenario(name="car", car=MIDSIZE, route=jensen_route(), payload=payload, seed=seed)
 
 
-def _calibration(payload: float, seed: int) -> Scenario:
-    return Scenario(
-        name="car-calibration",
-        car=MIDSIZE,
-        route=hilly_route(),
-        payload=payload,
-        seed=seed,
-        calibration=True,
-        aggressiveness=1.2,
-        wind_speed=2.0,
-    )
+def _calibrating(name: str, car: SimulatedCar, route_seed: int = 4) -> Maker:
+    """Return what drives a vehicle through all gears, loads and engine speeds."""
+
+    def make(payload: float, seed: int) -> Scenario:
+        return Scenario(
+            name=name,
+            car=car,
+            route=hilly_route(route_seed),
+            payload=payload,
+            seed=seed,
+            calibration=True,
+            aggressiveness=1.2,
+            wind_speed=2.0,
+            polling=usual_polling(car),
+        )
+
+    return make
 
 
 def _short(payload: float, seed: int) -> Scenario:
@@ -61,12 +67,6 @@ def _highway(payload: float, seed: int) -> Scenario:
 
 def _compact(payload: float, seed: int) -> Scenario:
     return Scenario(name="compact", car=COMPACT, route=jensen_route(6), payload=payload, seed=seed)
-
-
-def _compact_calibration(payload: float, seed: int) -> Scenario:
-    return replace(
-        _calibration(payload, seed), name="compact-calibration", car=COMPACT, route=hilly_route(7)
-    )
 
 
 def _electric(payload: float, seed: int) -> Scenario:
@@ -155,20 +155,6 @@ def _on_the_road(name: str, car: SimulatedCar, seed: int) -> Maker:
     return make
 
 
-def _calibrating(name: str, car: SimulatedCar, seed: int) -> Maker:
-    def make(payload: float, drive_seed: int) -> Scenario:
-        return replace(
-            _calibration(payload, drive_seed),
-            name=name,
-            car=car,
-            route=hilly_route(seed),
-            payload=payload,
-            polling=usual_polling(car),
-        )
-
-    return make
-
-
 def _bus(payload: float, seed: int) -> Scenario:
     return Scenario(
         name="bus",
@@ -224,12 +210,12 @@ def _passengers(places: Iterable[float], payload: float, seed: int) -> tuple[Loa
 
 SCENARIOS: Final[dict[str, Maker]] = {
     "car": _car,
-    "car-calibration": _calibration,
+    "car-calibration": _calibrating("car-calibration", MIDSIZE),
     "car-short": _short,
     "car-loading": _loading,
     "highway": _highway,
     "compact": _compact,
-    "compact-calibration": _compact_calibration,
+    "compact-calibration": _calibrating("compact-calibration", COMPACT, 7),
     "electric": _electric,
     "bus": _bus,
     "bus-urban": _bus_urban,

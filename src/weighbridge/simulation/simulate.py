@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -14,8 +15,8 @@ from weighbridge.errors import ConfigError
 from weighbridge.io.write import TableFormat, write_drive
 from weighbridge.signals import Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.units import from_si
-from weighbridge.simulation.body import simulate_pose
-from weighbridge.simulation.longitudinal import DT, simulate_trajectory
+from weighbridge.simulation.body import Pose, simulate_pose
+from weighbridge.simulation.longitudinal import DT, Trajectory, simulate_trajectory
 from weighbridge.simulation.scenario import Scenario, streams
 from weighbridge.simulation.sensing import (
     POLLABLE,
@@ -148,12 +149,15 @@ class SimulatedDrive:
         write_drive(self.drive, folder, format, truth=columns)
 
 
-def simulate_car(scenario: Scenario) -> SimulatedDrive:
+def simulate_car(
+    scenario: Scenario, progress: Callable[[int, int], None] | None = None
+) -> SimulatedDrive:
     """Simulate one drive.
 
     Parameters
     ----------
     scenario : Scenario
+    progress : told of parts done of all
 
     Returns
     -------
@@ -168,21 +172,44 @@ def simulate_car(scenario: Scenario) -> SimulatedDrive:
     for name in (*scenario.polling.fast, *scenario.polling.slow):
         if name not in POLLABLE:
             raise ConfigError(f"cannot poll {name!r}; known are {', '.join(POLLABLE)}")
+    tell = progress or (lambda done, total: None)
     random = streams(scenario.seed, "plan", "drive", "road", "imu", "gnss", "obd", "habits")
     trajectory = simulate_trajectory(scenario, random["plan"], random["drive"], random["habits"])
+    tell(4, 8)
     pose = simulate_pose(scenario, trajectory, random["road"])
+    tell(5, 8)
     signals: list[Signal] = []
     if scenario.sensors.imu_rate > 0.0:
         signals += simulate_imu(scenario, trajectory, pose, random["imu"])
+    tell(7, 8)
     signals += simulate_polling(scenario, trajectory, pose, random["obd"])
     if scenario.sensors.gnss_rate > 0.0:
         signals += simulate_gnss(scenario, trajectory, pose, random["gnss"])
+
+    info = DriveInfo(
+        start_time=scenario.start_time,
+        vehicle=scenario.car.name,
+        mass=scenario.mass,
+        ambient_temperature=scenario.ambient_temperature,
+        barometric_pressure=scenario.pressure,
+        wind_speed=scenario.wind_speed,
+        wind_from=scenario.wind_from,
+        notes=f"simulated, scenario {scenario.name}, seed {scenario.seed}",
+    )
+    drive = Drive(scenario.name, {s.name: s for s in signals}, info)
+    log.info("simulated %s: %.0f s, %.1f km", scenario.name, drive.duration,
+             trajectory.distance[-1] / 1e3)  # fmt: skip
+    return SimulatedDrive(scenario=scenario, drive=drive, truth=_truth(scenario, trajectory, pose))
+
+
+def _truth(scenario: Scenario, trajectory: Trajectory, pose: Pose) -> Truth:
+    """Thin what was true to 20 Hz."""
 
     def cut(values: Floats) -> Floats:
         return np.ascontiguousarray(values[::_STRIDE])
 
     accel = np.gradient(trajectory.speed, DT)
-    truth = Truth(
+    return Truth(
         time=cut(trajectory.time),
         distance=cut(trajectory.distance),
         speed=cut(trajectory.speed),
@@ -210,17 +237,3 @@ def simulate_car(scenario: Scenario) -> SimulatedDrive:
         pedal=cut(trajectory.pedal),
         brake_pedal=cut(trajectory.brake_pedal),
     )
-    info = DriveInfo(
-        start_time=scenario.start_time,
-        vehicle=scenario.car.name,
-        mass=scenario.mass,
-        ambient_temperature=scenario.ambient_temperature,
-        barometric_pressure=scenario.pressure,
-        wind_speed=scenario.wind_speed,
-        wind_from=scenario.wind_from,
-        notes=f"simulated, scenario {scenario.name}, seed {scenario.seed}",
-    )
-    drive = Drive(scenario.name, {s.name: s for s in signals}, info)
-    log.info("simulated %s: %.0f s, %.1f km", scenario.name, drive.duration,
-             trajectory.distance[-1] / 1e3)  # fmt: skip
-    return SimulatedDrive(scenario=scenario, drive=drive, truth=truth)

@@ -56,6 +56,7 @@ class VehicleClass:
         stiff, 1
     fastest : speed that it hardly reaches [m/s]
     strongest : acceleration times speed that it hardly reaches [W/kg]
+    boarding_std : change of the mass at a short stop, standard deviation relative to it [-]
     retarded : a retarder or an engine brake may slow it without the brake pedal
     jensen_grid : whether the grid of Jensen 2022, Table 5, is for it
     """
@@ -81,6 +82,7 @@ class VehicleClass:
     squat_growth: float = 1.0
     fastest: float
     strongest: float
+    boarding_std: float = 0.0
     retarded: bool = False
     jensen_grid: bool = False
 
@@ -187,6 +189,7 @@ VEHICLE_CLASSES: Final = Registry(
             tyre="275/70 R22.5",
             fastest=45.0,
             strongest=60.0,
+            boarding_std=0.025,
             retarded=True,
         ),
         VehicleClass(
@@ -225,4 +228,5 @@ truck's 100 kg and 0.4 m, 16 kg m^2 each. Their ranges: cars from Jensen 2022, T
 spanning the usual values of Gillespie. ``efficiency``: cars and vans stand between both layouts;
 trucks: 0.99 in a direct and 0.96 in other gears (Regulation (EU) 2017/2400, Annex VI, App. 8),
 times 0.98 in a single reduction axle without its drag (Annex VII); buses have automatic gearboxes.
-``tyre``: those of cars lie within 6 % of its radius, of trucks within 8 %."""
+``boarding_std``: nine passengers of 71 kg get on and as many off, each by chance, a
+bus of 12 t. ``tyre``: those of cars lie within 6 % of its radius, of trucks within 8 %."""

@@ -7,7 +7,7 @@ it fills; loading, saving and the comments all follow it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from itertools import islice, pairwise
 from pathlib import Path
@@ -18,7 +18,7 @@ from tomlkit.items import Table
 
 from weighbridge.arguments import check_path
 from weighbridge.errors import ConfigError
-from weighbridge.signals.tomlfile import Section, read_toml
+from weighbridge.signals.tomlfile import Faults, Section, read_toml
 from weighbridge.vehicle.file_keys import SECTIONS, VEHICLE_KEYS, WITNESS_KEYS, Key
 from weighbridge.vehicle.rounding import covariance_texts, rounded_texts
 from weighbridge.vehicle.torque_model import WITNESS_TERMS, WitnessRelation
@@ -55,37 +55,56 @@ def load_vehicle(path: str | Path, build: type[Made]) -> Made:
     ------
     ConfigError
         A key is unknown, a value impossible, a unit missing, or the file's
-        version another one; the message names file, line, value and remedy.
+        version another one; the message names file, line, value and remedy of
+        each fault.
     """
     check_path("path", path)
     path = Path(path)
     root = read_toml(path)
     _check_version(root)
     _refuse_lost_mapping(root)
+    faults = Faults()
     sections: dict[str, Any] = {}
     for name, (part, keys) in SECTIONS.items():
         section = root.section(name)
         if section is None:
             continue
-        values = {key.field: value for key in keys if (value := _value(section, key)) is not None}
-        if name == "driveline":
-            _alternative_gearings(section, values)
-        elif name == "road_load":
-            _alternative_drag(section, values)
-        elif name == "provenance":
-            section.count("format_version")
-        section.done()
-        _refuse_gaps(section, part, keys, values)
-        sections[name] = _built(part, section, values)
-    sections["witnesses"] = _witnesses(root)
+        told = len(faults.said)
+        values = _values(section, keys, faults)
+        with faults.gathered():
+            if name == "driveline":
+                _alternative_gearings(section, values)
+            elif name == "road_load":
+                _alternative_drag(section, values)
+            elif name == "provenance":
+                section.count("format_version")
+        with faults.gathered():
+            section.done()
+        if len(faults.said) > told:
+            continue
+        with faults.gathered():
+            _refuse_gaps(section, part, keys, values)
+            sections[name] = _built(part, section, values)
+    with faults.gathered():
+        sections["witnesses"] = _witnesses(root)
     section = root.section("vehicle") or Section({}, root.name, root.lines, ("vehicle",))
-    values = {
-        key.field: value for key in VEHICLE_KEYS if (value := _value(section, key)) is not None
-    }
-    section.done()
-    root.done()
+    values = _values(section, VEHICLE_KEYS, faults)
+    for read in (section, root):
+        with faults.gathered():
+            read.done()
+    faults.refuse()
     made: Made = _built(build, section, {**values, **sections})
     return made
+
+
+def _values(section: Section, keys: Sequence[Key], faults: Faults) -> dict[str, Any]:
+    """Values of the keys that a section has, by their fields; faults are gathered."""
+    values = {}
+    for key in keys:
+        with faults.gathered():
+            if (value := _value(section, key)) is not None:
+                values[key.field] = value
+    return values
 
 
 def _refuse_lost_mapping(root: Section) -> None:
@@ -239,6 +258,8 @@ def _alternative_gearings(section: Section, values: dict[str, Any]) -> None:
     if "gearings" in values:
         section.fail("gear_ratios", "says the same as gearings_per_m; keep one of them")
     if "wheel_radius" not in values:
+        if any(key.startswith("wheel_radius") for key in section.data):
+            return
         section.fail("gear_ratios", "needs wheel_radius_m, such as 0.31")
     factor = (1.0 if final_drive is None else final_drive) / (values["wheel_radius"] or math.nan)
     if not (factor > 0.0 and all(r > 0.0 for r in ratios)):

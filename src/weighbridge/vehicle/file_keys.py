@@ -138,6 +138,12 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "100 % torque, where the drive does not say it",
                 suffix="nm",
             ),
+            Key(
+                "told_reference_torque",
+                "told_reference_torque",
+                "100 % torque, as the drives of the calibration said it",
+                suffix="nm",
+            ),
             Key("engine_efficiency", "engine_efficiency", "shaft over fuel power, for air_flow"),
             Key("noise", "noise", "standard deviation of the torque", suffix="nm"),
             Key("scale_std", "scale_std", "of a torque never calibrated: how sure its scale is"),
@@ -295,6 +301,12 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
             Key("samples", "samples", "used by the fit", "count"),
             Key("method", "method", "what was fitted: joint, rls or speed-ekf", "text"),
             Key("motion", "motion", "how the motion of the drives was found", "text"),
+            Key(
+                "unmeasured_grade",
+                "unmeasured_grade",
+                "what of the grade nothing had measured in them, as standard deviation",
+                suffix="rad",
+            ),
             Key(
                 "mass_scale_std",
                 "mass_scale_std",

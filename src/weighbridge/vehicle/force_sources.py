@@ -229,6 +229,7 @@ POWER_BY_SPEED: Final = REPORTED(
     motor_scale_std=0.03,
     # Of simulated cars: studies/electric_power.md.
     transfer_std=0.009,
+    between_std=0.005,
 )
 
 BATTERY: Final = REPORTED(
@@ -249,6 +250,7 @@ BATTERY: Final = REPORTED(
     scale_std=0.02,
     # Of simulated cars, whose heating and cooling differ: studies/electric_power.md.
     transfer_std=0.020,
+    between_std=0.012,
     cold_std=0.03,
     cold_torque_std=0.02,
     # Graded, not measured.

@@ -25,6 +25,8 @@ class Provenance:
     method : what the drives were fitted for: the torque of "joint" or "rls", or the speed
         model of "speed-ekf" alone; None where nothing was
     motion : how the motion of the drives was found, as `weighbridge.navigation.Motion.source`
+    unmeasured_grade : what of the grade nothing had measured in the drives, as standard deviation
+        [rad]; None where it is not known
     mass_scale_std : relative standard deviation that the calibration leaves in
         every mass weighed with it [-]
     fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
@@ -42,12 +44,15 @@ class Provenance:
     samples: int | None = None
     method: str | None = None
     motion: str | None = None
+    unmeasured_grade: float | None = None
     mass_scale_std: float | None = None
     fit_cov: tuple[float, ...] = ()
     notes: str | None = None
     doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        not_negative("unmeasured_grade", self.unmeasured_grade)
+        within("unmeasured_grade", self.unmeasured_grade, 0.0, 1.0, "rad")
         not_negative("mass_scale_std", self.mass_scale_std)
         within("mass_scale_std", self.mass_scale_std, 0.0, 1e3)
         for mass in self.masses:

@@ -30,7 +30,7 @@ _CRUISE: Final = 100.0 / 3.6
 """Speed at which gears and road load are told [m/s]."""
 
 _FEWEST_RELIABLE: Final = 2
-"""Calibration drives from which a file is told as good as the README's table."""
+"""Calibration drives from which a file is told as good as in the table of docs/accuracy.md."""
 
 
 def tell(vehicle: Vehicle) -> list[tuple[str, str]]:
@@ -42,6 +42,8 @@ def tell(vehicle: Vehicle) -> list[tuple[str, str]]:
         said.append(("sensor", _mounting(vehicle)))
     if vehicle.timing.torque_delay is not None:
         said.append(("timing", _timing(vehicle)))
+    if vehicle.mapping is not None:
+        said.append(("mapping", f"drives are read by {vehicle.mapping}, unless --mapping is given"))
     said.append(("made", _made(vehicle)))
     said.append(("worth", worth(vehicle)))
     if vehicle.provenance.notes:

@@ -37,6 +37,7 @@ class TorqueModel:
         read is interpolated; empty for none [rad/s]
     knot_slopes : that correction at the knots, in the unit of w1
     reference_torque : for "percent" where the drive does not carry it [N m]
+    told_reference_torque : what the drives of the calibration said that 100 % are [N m]
     engine_efficiency : for "air_flow", shaft over fuel power [-]
     noise : standard deviation of the torque from this source [N m]
     scale_std : relative standard deviation of the scale of a torque that was never calibrated
@@ -53,6 +54,7 @@ class TorqueModel:
     knots: tuple[float, ...] = ()
     knot_slopes: tuple[float, ...] = ()
     reference_torque: float | None = None
+    told_reference_torque: float | None = None
     engine_efficiency: float = 0.33
     noise: float | None = None
     scale_std: float | None = None
@@ -87,6 +89,8 @@ class TorqueModel:
             within("one of knots and knot_slopes", w, -1e9, 1e9)
         positive("reference_torque", self.reference_torque)
         within("reference_torque", self.reference_torque, 1.0, 1e6, "N m")
+        positive("told_reference_torque", self.told_reference_torque)
+        within("told_reference_torque", self.told_reference_torque, 1.0, 1e6, "N m")
         positive("noise", self.noise)
         within("noise", self.noise, 1e-15, 1e6, "N m")
         not_negative("scale_std", self.scale_std)

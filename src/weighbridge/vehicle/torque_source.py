@@ -94,6 +94,8 @@ class TorqueSource:
     scale_std, motor_scale_std : of the scale of a reading that was never calibrated, and that of
         an electric motor with one gear where it is another [-]
     transfer_std : what a calibration by eq. 48 loses on other drives, relative to the mass [-]
+    between_std : how far masses of one vehicle scatter from drive to drive by what the reading
+        does not tell, relative [-]; a fit by likelihood adds it to what all sources leave
     cold_std : of a mass made from a cold start alone, relative [-]
     cold_torque_std : of the friction torque of the cold in the reading, over the highest torque [-]
     expected : what the source adds to the expected error of a mass [%]
@@ -123,6 +125,7 @@ class TorqueSource:
     scale_std: float
     motor_scale_std: float | None = None
     transfer_std: float
+    between_std: float = 0.0
     cold_std: float
     cold_torque_std: float
     expected: float = 0.0

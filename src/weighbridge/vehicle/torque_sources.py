@@ -36,6 +36,7 @@ __all__ = [
     "REPORTED_TERMS",
     "ROUGH",
     "ROUGH_TERMS",
+    "SAME_REFERENCE",
     "TORQUE_SOURCES",
     "TorqueSource",
     "TorqueTerms",
@@ -66,6 +67,10 @@ def air_flow_torque(
     return np.asarray(power / np.maximum(engine_speed, 30.0))
 
 
+SAME_REFERENCE: Final = 0.02
+"""Reference torques that differ by less are one [-]."""
+
+
 def reference_torques(reference: Signal) -> list[tuple[float, float]]:
     """Reference torques that a drive tells, each in a tenth of the samples or more.
 
@@ -79,7 +84,7 @@ def reference_torques(reference: Signal) -> list[tuple[float, float]]:
     """
     order = np.argsort(reference.values)
     ascending = reference.values[order]
-    cuts = np.flatnonzero(np.diff(ascending) > 0.02 * np.abs(ascending[:-1])) + 1
+    cuts = np.flatnonzero(np.diff(ascending) > SAME_REFERENCE * np.abs(ascending[:-1])) + 1
     groups = [g for g in np.split(order, cuts) if g.size >= 0.1 * order.size]
     found = [
         (float(np.median(reference.values[g])), float(reference.time[g].min())) for g in groups

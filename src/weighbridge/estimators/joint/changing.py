@@ -11,6 +11,7 @@ from weighbridge.estimators.joint.load_stops import loadable
 from weighbridge.estimators.joint.problem import FilterInput
 from weighbridge.kernels import disturbance
 from weighbridge.signals import Floats
+from weighbridge.signals.instants import instant, span
 
 STEPS: Final = 20
 """Instants at which a step is tried; ramps begin at every fourth of them."""
@@ -83,9 +84,9 @@ class ScaleChange:
     def text(self) -> str:
         """What is wrong, in a sentence."""
         when = (
-            f"at {self.start:.6g} s"
+            f"at {instant(self.start)}"
             if self.end == self.start
-            else f"from {self.start:.6g} to {self.end:.6g} s"
+            else f"from {span(self.start, self.end)}"
         )
         return (
             f"the mass changes by {100.0 * self.change:+.0f} % about {when} while the vehicle "

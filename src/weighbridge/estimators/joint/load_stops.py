@@ -83,6 +83,22 @@ def change_odds(stood: Floats, *, by_speed: bool = False) -> Floats:
     return odds
 
 
+def unseen_std(stood: Floats, boarding_std: float) -> float:
+    """Relative standard deviation by loads that change where no change is looked for [-].
+
+    Without an accelerometer, stops shorter than `SHORTEST_BY_SPEED` are not looked at. A load that
+    wanders from stop to stop differs at the end from that of the whole drive by a third of its
+    variance.
+
+    Parameters
+    ----------
+    stood : (m,) how long the vehicle stood before each window [s]
+    boarding_std : of the change at one stop [-]
+    """
+    stops = np.count_nonzero((stood >= SHORTEST) & (stood < SHORTEST_BY_SPEED))
+    return boarding_std * float(np.sqrt(stops / 3.0))
+
+
 def loadable(stood: Floats, haste: float = 1.0) -> Floats:
     """Part of the mass that a stop loads or unloads (m,) [-].
 

@@ -11,6 +11,7 @@ from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput, load_p
 from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.kernels import disturbance
 from weighbridge.signals import Floats
+from weighbridge.signals.instants import instant
 
 FEWEST: Final = 3
 """Fewer windows after a stop, over those without which no change is believed, cannot tell what was
@@ -43,7 +44,7 @@ class PossibleChange:
             return ""
         return (
             f"with a probability of {100.0 * self.probability:.0f} % the load changed at a stop, "
-            f"most likely before {self.time:.0f} s; mass and interval allow for it"
+            f"most likely before {instant(float(round(self.time)))}; mass and interval allow for it"
         )
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
+import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TextIO
 
 from weighbridge.live.outputs.words import (
     age_text,
@@ -37,6 +39,9 @@ _LIKELY: Final = 0.5
 # The view is drawn anew at most so often [s].
 _PERIOD: Final = 0.2
 
+# Lines that the newest view leaves free at the end: the mass, what was written, the prompt.
+_AFTER: Final = 5
+
 # From this width on, two signals stand in one line.
 _WIDE: Final = 78
 _LONGEST_NAME: Final = 26
@@ -67,6 +72,7 @@ class TerminalView:
             console=console, auto_refresh=False, redirect_stdout=False, redirect_stderr=True
         )
         self._live.start()
+        self._moved = _through(sys.stderr)
 
     def show(self, weighing: LiveWeighing) -> None:
         """Draw a weighing, unless the last one was drawn a moment ago."""
@@ -79,8 +85,10 @@ class TerminalView:
     def close(self) -> None:
         """Leave the newest view on the terminal."""
         if self._newest is not None:
-            self._live.update(View(self._newest), refresh=True)
+            self._live.update(View(self._newest, spare=_AFTER), refresh=True)
         self._live.stop()
+        for handler, stream in self._moved:
+            handler.setStream(stream)
 
 
 class PlainLines:
@@ -115,6 +123,19 @@ class PlainLines:
         """Nothing was begun."""
 
 
+def _through(stream: TextIO) -> list[tuple[logging.StreamHandler[TextIO], TextIO]]:
+    """Let log lines to standard error go above the view, not into it; return what was where.
+
+    The handlers were made before the view, with the stream that it draws on.
+    """
+    moved = []
+    for handler in logging.getLogger().handlers:
+        if type(handler) is logging.StreamHandler:
+            moved.append((handler, handler.stream))
+            handler.setStream(stream)
+    return moved
+
+
 def terminal(console: Console) -> TerminalView | PlainLines:
     """Choose how a weighing is shown: in place on a terminal, else in lines."""
     return TerminalView(console) if console.is_terminal else PlainLines(console)
@@ -140,16 +161,16 @@ class View:
     Parameters
     ----------
     weighing : what is shown
+    spare : lines of the terminal that stay free; one for the cursor at least
     """
 
-    def __init__(self, weighing: LiveWeighing) -> None:
+    def __init__(self, weighing: LiveWeighing, spare: int = 1) -> None:
         self.weighing = weighing
+        self._spare = spare
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
-        # The last line stays free for the cursor.
-        yield from lines(
-            self.weighing, options.max_width, console.size.height - 1, ascii_only=options.ascii_only
-        )
+        height = console.size.height - self._spare
+        yield from lines(self.weighing, options.max_width, height, ascii_only=options.ascii_only)
 
 
 def lines(w: LiveWeighing, width: int, height: int, *, ascii_only: bool = False) -> list[Text]:
@@ -210,7 +231,11 @@ def _bars(w: LiveWeighing, width: int, *, ascii_only: bool) -> list[Text]:
     if w.share is not None:
         text = f"{100.0 * w.share:4.0f} % of {kg(w.gross)}"
         found.append(("permitted", w.share, _load_style(w), text))
-    found.append(("learnt", w.progress, "cyan", f"{100.0 * w.progress:4.0f} %"))
+    waits = w.look == w.look
+    if w.mass == w.mass or not waits:
+        found.append(("learnt", w.progress, "cyan", f"{100.0 * w.progress:4.0f} %"))
+    if waits:
+        found.append(("next look", w.look, "cyan", f"{100.0 * w.look:4.0f} %"))
     room = max(len(text) for *_, text in found)
     length = max(min(width - 11 - room, 50), 5)
     return [_bar(*f, length, width, ascii_only=ascii_only) for f in found]

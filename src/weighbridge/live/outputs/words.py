@@ -24,12 +24,17 @@ def mass_text(weighing: LiveWeighing) -> str:
 
 def payload_text(weighing: LiveWeighing) -> str:
     """Write the payload."""
-    name = "payload" if weighing.tared is None else "since set to nought"
+    name = "payload" if weighing.tared is None else "payload since the tare"
     return f"{name} {kg(weighing.payload)}"
 
 
 def overload_text(weighing: LiveWeighing) -> str:
-    """Write the probability that the permitted mass is exceeded; empty where it is not known."""
+    """Write the probability that the permitted mass is exceeded, or why there is none.
+
+    Empty where there is no mass yet.
+    """
+    if weighing.gross is None and math.isfinite(weighing.mass):
+        return "no permitted mass in the vehicle file"
     p = weighing.overload
     return "" if p is None else f"overload probability {_percent(p)}"
 

@@ -66,6 +66,7 @@ class LinesSource:
 
     def __init__(self, name: str, open_reader: Callable[[], Any]) -> None:
         self.name = name
+        self.renewed = 0
         self._open = open_reader
 
     def run(self, put: Callable[[Samples], None], stop: Event) -> None:
@@ -80,6 +81,7 @@ class LinesSource:
                 for time, values in reader.read(data, now()):
                     gathered.add(time, values)
                 gathered.flush(BLOCK)
+                self.renewed = reader.renewed
         gathered.flush()
 
 
@@ -142,6 +144,11 @@ class LineReader:
         self._clock = DeviceClock()
         self._columns: dict[str, tuple[str, str] | None] = {}
         self._told: set[str] = set()
+
+    @property
+    def renewed(self) -> int:
+        """How often the sender's clock has begun anew."""
+        return self._clock.renewed
 
     def read(self, data: bytes, arrived: float) -> list[tuple[float, dict[str, float]]]:
         """Return instants [s] and values [SI] of the lines that are whole now.

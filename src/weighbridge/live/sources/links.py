@@ -103,6 +103,11 @@ class SerialLink:
         return SourceError(f"serial port {self._path} is gone ({error}); plug the device in again")
 
 
+def _why(error: OSError) -> str:
+    """What the system says, without its number."""
+    return error.strerror or str(error)
+
+
 class TcpLink:
     """A TCP connection.
 
@@ -122,8 +127,8 @@ class TcpLink:
             self._socket = socket.create_connection((host, port), _CONNECTING)
         except OSError as error:
             raise SourceError(
-                f"{self._place} cannot be reached ({error}); is the device on, and this host in "
-                "its network?"
+                f"{self._place} cannot be reached ({_why(error)}); is the device on, and this "
+                "host in its network?"
             ) from error
 
     def read(self, timeout: float) -> bytes:
@@ -134,7 +139,7 @@ class TcpLink:
         except TimeoutError:
             return b""
         except OSError as error:
-            raise SourceError(f"{self._place} is gone ({error})") from error
+            raise SourceError(f"{self._place} is gone ({_why(error)})") from error
         if not data:
             raise SourceError(f"{self._place} closed the connection")
         return data
@@ -145,7 +150,7 @@ class TcpLink:
             self._socket.settimeout(1.0)
             self._socket.sendall(data)
         except OSError as error:
-            raise SourceError(f"{self._place} is gone ({error})") from error
+            raise SourceError(f"{self._place} is gone ({_why(error)})") from error
 
     def close(self) -> None:
         """End it; never raises."""

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
+from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.navigation.aiding import Fixes, interpolated, resample, speed_from_fixes
@@ -33,6 +35,15 @@ MOST_MOVED: Final = 0.2
 
 _MOVED_SURE: Final = 4.0
 """if it is by so many standard deviations: a steady drive hardly shows where ahead is [-]."""
+
+_NOD_BAND: Final = (2.0, 20.0)
+"""A nod is looked for between means over so long [s]: slower turns are grade."""
+
+_ROLLS: Final = 1.0
+"""Slower, a speed in steps changes by leaps [m/s]."""
+
+_NODS: Final = (0.6, 1.6)
+"""Part of a difference of speed and accelerometer that a nod explains where it is the cause [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +101,8 @@ def align(
         delay, std = estimate_speed_delay(fine.time, forward, reference)
         found = replace(found, speed_delay=delay if std < 0.1 else 0.0)
     if coarse is not None and reference.name == "vehicle_speed":
-        _check_speed_unit(coarse, reference)
+        nod = _nod(coarse_imu, coarse, undelayed(reference, found.speed_delay))
+        _check_speed_unit(coarse, reference, nod)
     if found.speed_delay == 0.0:
         notes.append("the drive does not show how late its vehicle speed is; taken as 0 s")
     return found, tuple(notes)
@@ -129,15 +141,45 @@ def _merged(found: Alignment, coarse: CoarseMounting) -> tuple[Alignment, str]:
     )
 
 
-def _check_speed_unit(coarse: CoarseMounting, reference: Signal) -> None:
-    """Refuse a speed whose changes are not those of the accelerometer."""
+def _nod(imu: Even, coarse: CoarseMounting, speed: Signal) -> float:
+    """Turn of the sensor per acceleration, nose up, by its gyro [rad per m/s^2]."""
+    at = _coarse_speed(speed, imu.time)
+    known = np.isfinite(at) & (at > _ROLLS)
+    accel = np.gradient(np.where(known, at, 0.0), imu.time)
+    turned = np.cumsum(imu.values[:, 3:] @ coarse.rot_bs[1]) * COARSE_PERIOD
+    short, long = (max(3, round(x / COARSE_PERIOD)) for x in _NOD_BAND)
+    x, y = (
+        uniform_filter1d(v, short, mode="nearest") - uniform_filter1d(v, long, mode="nearest")
+        for v in (accel, turned)
+    )
+    inner = uniform_filter1d(known.astype(np.float64), long, mode="constant") > 1.0 - 1e-9
+    spread = float(x[inner] @ x[inner])
+    return float(x[inner] @ y[inner]) / spread if spread > 0.0 else 0.0
+
+
+def _check_speed_unit(coarse: CoarseMounting, reference: Signal, nod: float) -> None:
+    """Refuse a speed whose changes are not those of the accelerometer.
+
+    Parameters
+    ----------
+    coarse, reference
+    nod : of `_nod`; where gravity felt by it is most of the difference, the speed is not at fault
+    """
     margin = 4.0 * coarse.forward_gain_std
     low = max(coarse.forward_gain + margin, coarse.forward_gain_most) < 0.75
-    if coarse.forward_gain - margin > 1.3 or low:
+    if not (coarse.forward_gain - margin > 1.3 or low):
+        return
+    felt = GRAVITY * nod / (coarse.forward_gain - 1.0)
+    if _NODS[0] < felt < _NODS[1]:
         raise DriveError(
-            f"{reference.name} changes by {1.0 / coarse.forward_gain:.2f} of what the "
-            "accelerometer shows: set its unit (kmh, mph or mps) in the mapping"
+            f"the inertial sensor turns by {math.degrees(abs(nod)):.1f} deg per m/s^2 as the "
+            f"vehicle accelerates, and reads {coarse.forward_gain:.2f} of what {reference.name} "
+            "changes by: its holder gives way; fix the sensor to the body and record again"
         )
+    raise DriveError(
+        f"{reference.name} changes by {1.0 / coarse.forward_gain:.2f} of what the "
+        "accelerometer shows: set its unit (kmh, mph or mps) in the mapping"
+    )
 
 
 def gnss_delay(drive: Drive, fine: Even, fixes: Fixes | None, rot_bs: Floats) -> float:
@@ -156,7 +198,7 @@ def _coarse_speed(speed: Signal, grid: Floats) -> Floats:
     at = interpolated(speed, grid, longest)
     if speed.period < 0.3 * COARSE_PERIOD:
         smooth_speed = resample(
-            speed.time, speed.values[:, None], float(grid[0]), COARSE_PERIOD, grid.size
+            speed.time, [speed.values], float(grid[0]), COARSE_PERIOD, grid.size
         )[:, 0]
         return np.where(np.isfinite(at) & (at > 0.05), smooth_speed, at)
     return at

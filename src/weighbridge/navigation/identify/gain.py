@@ -160,7 +160,7 @@ def find_gain(
     -------
     None where the scale is right, or where the drive does not tell.
     """
-    pairs = _changes(motion, speed, _SPAN)
+    pairs = changes_of_speed(motion, speed, _SPAN)
     if pairs is None:
         return None
     time, force, shown = pairs
@@ -225,7 +225,7 @@ def _smoothed(motion: Motion, speed: Signal) -> bool:
     """Tell whether the speed lacks what is fast in it: then the scale is not off."""
     off = []
     for span in (_SHORT, _LONG):
-        pairs = _changes(motion, speed, span)
+        pairs = changes_of_speed(motion, speed, span)
         if pairs is None:
             return False
         _, force, shown = pairs
@@ -244,8 +244,23 @@ def _rougher(time: Floats, error: Floats, ends: Floats) -> bool:
     return not 1.0 / _ALIKE < ratio < _ALIKE
 
 
-def _changes(motion: Motion, speed: Signal, span: float) -> tuple[Floats, Floats, Floats] | None:
-    """Change of the speed by force and as shown, less their means around; None if too few."""
+def changes_of_speed(
+    motion: Motion, speed: Signal, span: float
+) -> tuple[Floats, Floats, Floats] | None:
+    """Compare changes of the speed by the accelerometer with those that are shown.
+
+    Parameters
+    ----------
+    motion : whose acceleration is summed
+    speed : of the wheels, as recorded
+    span : over which the speed changes [s]
+
+    Returns
+    -------
+    time : (n,) middles of the spans, which overlap [s]
+    force, shown : (n,) changes by the one and by the other, less their means around [m/s]
+    None where too few spans are whole.
+    """
     stride = max(1, round(_STEP / speed.period))
     stamps = speed.time[::stride] - motion.speed_delay
     values = speed.values[::stride] / (motion.speed_scale or 1.0)

@@ -19,6 +19,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.navigation.even import Even
 from weighbridge.navigation.identify.steps import SIDE, Step, fitted
 from weighbridge.signals import Bools, Floats, Signal
+from weighbridge.signals.instants import instant, span
 
 _SPAN: Final = 4
 """Coarse periods over which the speed's change is compared [-]: shorter has its steps."""
@@ -195,9 +196,9 @@ def remounting_notes(changes: Sequence[Change], start: float, end: float) -> lis
         size = f"{math.degrees(abs(change.angle)):.1f} deg"
         if change.slow:
             first, last = max(change.start, start), min(change.end, end)
-            when = f"slowly from {first:.0f} to {last:.0f} s"
+            when = f"slowly from {span(round(first), round(last))}"
         else:
-            when = f"at {0.5 * (change.start + change.end):.0f} s"
+            when = f"at {instant(round(0.5 * (change.start + change.end)))}"
         texts.append(
             f"the sensor was moved by {size} {when}: its mounting is found anew from there"
         )

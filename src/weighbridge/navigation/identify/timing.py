@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from weighbridge.kernels.interpolation import moved_changes
 from weighbridge.signals import Floats, Signal
 
 _SPAN = 1.5
@@ -78,8 +79,7 @@ def estimate_speed_delay(
     target = high_passed(np.where(whole, change, 0.0))[whole]
 
     def residual(delay: float) -> float:
-        model = np.interp(b - delay, time, integral) - np.interp(a - delay, time, integral)
-        model = high_passed(np.where(whole, model, 0.0))[whole]
+        model = moved_changes(a, b, delay, time, integral, whole, width)
         gain = float(model @ target) / max(float(model @ model), 1e-12)
         if gain <= 0.0:
             return float(target @ target)

@@ -9,7 +9,9 @@ const at = (id) => document.getElementById(id);
 const put = (id, text) => {
   if (at(id).textContent !== text) at(id).textContent = text;
 };
-const kg = (value) => (value === null ? "–" : `${Math.round(value)} kg`);
+// With the sign that is as wide as a plus; never minus nought.
+const whole = (value) => `${Math.round(value) + 0}`.replace("-", "−");
+const kg = (value) => (value === null ? "–" : `${whole(value)} kg`);
 const percent = (p) => {
   if (p === null) return "–";
   if (p > 0 && p < 0.01) return "< 1 %";
@@ -53,7 +55,6 @@ function columns() {
 // The intervals at first are as wide as the plot is high: what is known later counts.
 function range() {
   const known = points.mass.filter((m) => m !== null);
-  if (!known.length) return [0, 1];
   let low = Math.min(...known);
   let high = Math.max(...known);
   const last = names.slice(2).map((n) => points[n][points[n].length - 1]);
@@ -66,6 +67,16 @@ function range() {
   at("limit-key").hidden = !near;
   const pad = Math.max(0.15 * (high - low), 0.02 * high);
   return [Math.max(low - pad, 0), high + pad];
+}
+
+// Without a mass there is nothing to draw, and no axis that means anything.
+function redraw() {
+  const empty = !points.mass.some((m) => m !== null);
+  for (const id of ["plot", "key"]) at(id).hidden = empty;
+  at("no-points").hidden = !empty;
+  if (empty) return;
+  if (plot) plot.setData(columns());
+  else draw();
 }
 
 function draw() {
@@ -86,7 +97,7 @@ function draw() {
       cursor: { show: false },
       scales: { x: { time: false, range: [-WINDOW / 60, 0] }, y: { range } },
       axes: [
-        { ...axis, incrs: [5, 10], size: 34, values: (u, v) => v.map((m) => (m ? `${m} min` : "now")) },
+        { ...axis, incrs: [5, 10], size: 34, values: (u, v) => v.map((m) => (m ? `${whole(m)} min` : "now")) },
         { ...axis, size: 48, values: (u, v) => v.map((m) => `${m}`) },
       ],
       series: [
@@ -128,7 +139,8 @@ function showSignals(signals) {
   body.replaceChildren();
   for (const s of rows) {
     const row = body.insertRow();
-    cell(row, s.name);
+    // A long name is broken after an underscore.
+    cell(row, s.name.replaceAll("_", "_\u200b"));
     cell(row, `${s.rate_hz.toFixed(1)} Hz`, "n");
     cell(row, s.age_s === null ? "–" : s.age_s < 100 ? `${Math.max(s.age_s, 0).toFixed(1)} s` : duration(s.age_s), "n");
     cell(row, s.late + s.unfit ? `${s.late + s.unfit}` : "", "n");
@@ -152,7 +164,10 @@ function show(w) {
   const [low, high] = w.interval95_kg || [null, null];
   put("interval", low === null ? "no mass yet" : `± ${kg((high - low) / 2)}: ${Math.round(low)} to ${kg(high)} with 95 %`);
   put("reason", w.reason);
+  put("payload-name", w.tared_kg === null ? "Payload" : "Payload since the tare");
   put("payload", kg(w.payload_kg));
+  at("overload-box").hidden = w.permitted_kg === null;
+  at("no-limit").hidden = w.permitted_kg !== null;
   put("overload", percent(w.overload_probability));
   put("driven", duration(w.driven_s));
   at("load").hidden = w.share_of_permitted === null;
@@ -161,7 +176,12 @@ function show(w) {
     put("share", `${Math.round(100 * w.share_of_permitted)} %`);
     at("share-bar").value = Math.min(w.share_of_permitted, 1);
     at("share-bar").className = p >= 0.5 ? "bad" : p >= 0.05 ? "fair" : "";
-    limit = w.mass_kg / w.share_of_permitted;
+  }
+  limit = w.permitted_kg;
+  at("look").hidden = w.look === null;
+  if (w.look !== null) {
+    put("look-share", `${Math.round(100 * w.look)} %`);
+    at("look-bar").value = w.look;
   }
   put("learnt", `${Math.round(100 * w.progress)} %`);
   at("learnt-bar").value = w.progress;
@@ -191,8 +211,7 @@ function take(event) {
     const weighing = waiting.weighing;
     waiting = null;
     show(weighing);
-    if (plot) plot.setData(columns());
-    else draw();
+    redraw();
     look();
   });
 }
@@ -219,7 +238,7 @@ at("signals-box").open = matchMedia("(min-width: 60rem)").matches;
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => plot && draw());
 new ResizeObserver(() => {
   const box = at("plot");
-  if (plot) plot.setSize({ width: box.clientWidth, height: box.clientHeight });
+  if (plot && box.clientWidth) plot.setSize({ width: box.clientWidth, height: box.clientHeight });
 }).observe(at("plot"));
 setInterval(look, 1000);
 listen();

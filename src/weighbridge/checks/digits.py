@@ -1,0 +1,93 @@
+"""Digits of the accelerometer: too few of them, or cut off towards zero."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from weighbridge.navigation.aiding import resolution
+from weighbridge.signals import Drive, Floats, Problem, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
+
+COARSEST: Final = 0.22
+"""Larger steps of the accelerometer do not show whether digits are cut off [m/s^2], which at
+0.5 m/s^2 made a mass 81 % heavy; 8 bits of 2 g are 0.15 m/s^2."""
+
+COARSEST_CUT: Final = 0.12
+"""Steps up to which half a digit mends what was cut off [m/s^2]: it leaves 0.3 to 0.6 % of the mass
+at 0.1 m/s^2, 2 to 4 % at 0.2 m/s^2. Unmended, 0.1 m/s^2 made masses 11 to 15 % heavy."""
+
+TWICE: Final = 1.6
+"""Samples at zero over the mean of both neighbours from which its step is twice as wide [-]: 1.8 to
+2.7 where digits are cut, 1.1 at most where they are rounded."""
+
+FLAT: Final = 1.8
+"""Samples at the first steps over those at the second ones: more are a peak of their own [-]."""
+
+FEWEST: Final = 200
+"""Samples at each of the first steps that tell [-]."""
+
+MOVES: Final = 1.0
+"""Slower, an axis may rest at zero [m/s]."""
+
+
+def with_half_digits(drive: Drive) -> Drive:
+    """Add half a digit to an accelerometer whose digits are cut off towards zero.
+
+    Such digits make every push smaller by half a digit, whichever way it goes: the sensor is dead
+    about zero. It shows in a step at zero that is twice as wide as the others.
+    """
+    axes = [s for name in IMU_SIGNALS[:3] if (s := drive.get(name)) is not None and len(s) > FEWEST]
+    steps = {s.name: _step(s.values) for s in axes}
+    step = float(np.median(list(steps.values()))) if steps else 0.0
+    if step <= 0.0:
+        return drive
+    if step > COARSEST:
+        return drive.with_problems(
+            _told(step, "too coarse to weigh by: record it with more digits, 0.1 m/s^2 or finer")
+        )
+    alike = [s for s in axes if abs(steps[s.name] / step - 1.0) < 0.01]
+    if not any(_cut(s, step, drive.speed) for s in alike):
+        return drive
+    if step > COARSEST_CUT:
+        return drive.with_problems(
+            _told(
+                step,
+                "cut off towards zero, so that it is dead about zero: record it with more digits, "
+                "or round them",
+            )
+        )
+    more = (Signal(s.name, s.time, s.values + 0.5 * step * np.sign(s.values)) for s in alike)
+    return drive.with_signals(*more).with_problems(
+        Problem(
+            "accel_x",
+            f"the accelerometer is recorded in steps of {step:.2g} m/s^2, cut off towards zero: "
+            "half a step was added; round the digits, or record more of them",
+        )
+    )
+
+
+def _told(step: float, why: str) -> Problem:
+    text = f"the accelerometer is recorded in steps of {step:.2g} m/s^2, {why}"
+    return Problem("accel_x", text, serious=True)
+
+
+def _step(values: Floats) -> float:
+    """Step that values are quantised to, 0 where none shows."""
+    return resolution(np.round(values, 9))
+
+
+def _cut(axis: Signal, step: float, speed: Signal | None) -> bool:
+    """Tell whether the step of an axis at zero is twice as wide as those beside it."""
+    values = axis.values
+    if speed is not None and len(speed) > 1:
+        values = values[np.interp(axis.time, speed.time, np.abs(speed.values)) > MOVES]
+    place = np.rint(values / step)
+    second, first, zero, next_first, next_second = (
+        np.count_nonzero(place == k) for k in (-2, -1, 0, 1, 2)
+    )
+    if min(first, next_first) < FEWEST:
+        return False
+    beside = first + next_first
+    return bool(2.0 * zero > TWICE * beside and beside < FLAT * (second + next_second))

@@ -1,0 +1,65 @@
+"""``weighbridge bound``: at most so heavy, by speed, grade and the engine's full power."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from weighbridge.cli.options import DbcPaths, JsonPath, MappingPath, OneDrive, chosen_mapping, load
+from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
+from weighbridge.cli.terminal import say
+
+
+def bound(
+    drive: OneDrive,
+    vehicle: Annotated[
+        Path,
+        typer.Option("--vehicle", help="Vehicle file with its road load.", show_default=False),
+    ],
+    power: Annotated[
+        float,
+        typer.Option(
+            "--power",
+            help="Full power at the wheels in kW; that of the engine makes a wider bound, which "
+            "holds too.",
+            show_default=False,
+        ),
+    ],
+    power_std: Annotated[
+        float, typer.Option("--power-std", help="Its standard deviation in percent.")
+    ] = 5.0,
+    json_path: JsonPath = None,
+    mapping: MappingPath = None,
+    dbc: DbcPaths = None,
+) -> None:
+    """Bound the mass of a drive from above by its speed, the grade and the engine's full power.
+
+    Needs no torque: a speed, and a grade (of a map) or heights. A bound is no weighing, for
+    nothing shows that the engine gave all its power. Exits with 0 where there is a bound, with 1
+    where no climb or start is hard enough.
+
+    Example: weighbridge bound climb/ --vehicle car.toml --power 60
+    """
+    from weighbridge.pipeline.speed_bounds import mass_bound
+    from weighbridge.vehicle.model import Vehicle
+
+    car = Vehicle.load(vehicle)
+    chosen = chosen_mapping(car, vehicle, mapping)
+    refuse_results(
+        inputs([drive], vehicle, chosen, dbc), asked_for(track=None, report=None, json=json_path)
+    )
+    read = load(drive, chosen, dbc)
+    found = mass_bound(read, car, 1e3 * power, power_std=0.01 * power_std)
+    if not write_json(json_path, found.to_json(read.name)):
+        say(f"{read.name}: {found.reason}")
+        if found.windows:
+            say(
+                f"at full power from {found.start:.0f} s on it would be {found.nearest:.0f} kg, "
+                f"95 % between {found.nearest - 1.96 * found.nearest_std:.0f} and "
+                f"{found.nearest + 1.96 * found.nearest_std:.0f} kg; "
+                f"{found.windows} windows of the drive bound the mass"
+            )
+    if not found.windows:
+        raise typer.Exit(1)

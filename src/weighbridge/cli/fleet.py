@@ -1,0 +1,275 @@
+"""``weighbridge fleet``: thousands of drives, weighed in parallel."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Optional
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from weighbridge.cli import fleet_report
+from weighbridge.cli.options import DbcPaths, MappingPath, Whole
+from weighbridge.cli.progress import time_text
+from weighbridge.cli.terminal import complain, console, say, shown
+from weighbridge.cli.verbosity import say_written, watched
+
+if TYPE_CHECKING:
+    from weighbridge.fleet.engine import Count
+
+_RUN: Final = "run"
+
+
+class RunsDrives(TyperGroup):
+    """A group whose first word may be a drive: what is no command of it is run."""
+
+    @property
+    def fallback(self) -> Any:
+        """The command that is meant where none is named."""
+        return self.commands[_RUN]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Put the name of the command in front where none is."""
+        if not args or args[0] not in self.commands:
+            args = [_RUN, *args]
+        return super().parse_args(ctx, args)
+
+
+class Unnamed(TyperCommand):
+    """The command of a group that is run without its name, which no usage line shows."""
+
+    def format_usage(self, ctx: Any, formatter: Any) -> None:
+        """Write the usage line under the name of the group."""
+        group = ctx if ctx.parent is None else ctx.parent
+        formatter.write_usage(group.command_path, " ".join(self.collect_usage_pieces(ctx)))
+
+
+app = typer.Typer(cls=RunsDrives, help="Weigh the drives of a fleet, in parallel.")
+app.command()(fleet_report.report)
+
+
+_Drives = Annotated[
+    list[str],
+    typer.Argument(
+        help="Folders, logs, patterns such as 'DRIVES/**' (quoted), URLs such as "
+        "s3://bucket/drives, or a table of drives (CSV or Parquet with a column files).",
+        show_default=False,
+    ),
+]
+_Vehicles = Annotated[
+    Path,
+    typer.Option(
+        "--vehicles",
+        help="Folder of vehicle files, ID.toml each; a drive's folder or file is named ID.",
+        show_default=False,
+    ),
+]
+_Output = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        help="Folder of the results; what is there already is not weighed again.",
+        show_default=False,
+    ),
+]
+_Scheduler = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--scheduler", help="Dask cluster, such as tcp://10.0.0.5:8786."),
+]
+_Workers = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option("--workers", help="Processes of this machine; one per core unless given."),
+]
+_Memory = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--memory", help="Limit of each process, such as '1 GB'."),
+]
+_Kind = Annotated[
+    str, typer.Option("--class", help="Class of vehicles without a file: car, van, bus, truck.")
+]
+_Learn = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--learn", help="Folder for vehicle files refined by drives of known mass."),
+]
+_Tickets = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--tickets", help="Known masses: CSV or Parquet with vehicle, time, mass_kg."),
+]
+_Changes = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--set",
+        help="Change a setting of the estimator; repeat it for more.",
+        metavar="NAME=VALUE",
+    ),
+]
+
+
+@app.command(_RUN, cls=Unnamed, hidden=True)
+def run(
+    drives: _Drives,
+    vehicles: _Vehicles,
+    results: _Output,
+    scheduler: _Scheduler = None,
+    workers: _Workers = None,
+    memory: _Memory = None,
+    kind: _Kind = "car",
+    method: Annotated[str, typer.Option("--method", help="Estimator.")] = "joint",
+    changes: _Changes = None,
+    learn: _Learn = None,
+    tickets: _Tickets = None,
+    whole: Whole = False,
+    mapping: MappingPath = None,
+    dbc: DbcPaths = None,
+) -> None:
+    """Weigh the drives of a fleet in parallel, and go on where an earlier run ended.
+
+    Exits with 0 where every drive has a mass, with 1 where one has none, with 2 where one could
+    not be read. `weighbridge fleet status RESULTS` tells how far a run is, and
+    `weighbridge fleet report RESULTS` who was overloaded.
+
+    Example: weighbridge fleet 'drives/**' --vehicles vehicles/ -o results/
+    """
+    from weighbridge.estimators.settings import parsed
+    from weighbridge.fleet.run import FleetSettings, run_fleet
+
+    how = FleetSettings(
+        method=method,
+        settings=parsed(changes or []),
+        kind=kind,
+        mapping=mapping,
+        dbc=tuple(dbc or ()),
+        whole=whole,
+        scheduler=scheduler,
+        workers=workers,
+        memory=memory,
+        learn=learn,
+        tickets=tickets,
+    )
+    began = time.monotonic()
+    with _progress() as tell:
+        count = run_fleet(drives, vehicles, results, how, tell)
+    found = _summary(results)
+    _say_run(count, time.monotonic() - began)
+    _say_summary(found)
+    if learn is not None:
+        _say_learnt(results, learn)
+    say_written(results)
+    if found["unread"] or found["failed"]:
+        raise typer.Exit(2)
+    if found["masses"] < found["drives"]:
+        raise typer.Exit(1)
+
+
+@app.command()
+def status(
+    results: Annotated[Path, typer.Argument(help="Folder of the results.", show_default=False)],
+) -> None:
+    """Tell how far a fleet is: drives weighed, without a mass and why, and how long it takes.
+
+    Example: weighbridge fleet status results/
+    """
+    from weighbridge.fleet.store import Results
+
+    opened = Results.opened(results)
+    told = opened.told()
+    if opened.running:
+        left = told.get("left_s")
+        of = f" of {told.get('found', '?')}" + ("" if told.get("complete") else " found so far")
+        rest = "" if left is None else f", {time_text(left)} left"
+        rate = told.get("rate_per_s", 0)
+        say(f"running: {told.get('done', 0)}{of} recordings, {rate:.1f}/s{rest}")
+    elif told and not (told.get("complete") and told.get("done") == told.get("found")):
+        say(
+            f"stopped after {told.get('done', 0)} of {told.get('found', '?')} recordings: give the "
+            "same command again to go on"
+        )
+    else:
+        say("no run is under way")
+    _say_summary(_summary(results))
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    """Count the rows of the results by what came of them."""
+    import polars as pl
+
+    from weighbridge.fleet.reading import read_drives
+
+    rows = read_drives(folder).select("outcome", "status", "reason", "mass_kg", "vehicle_id")
+    frame = rows.collect()
+    without = frame.filter((pl.col("outcome") == "weighed") & pl.col("mass_kg").is_null())
+    reasons = frame.filter(pl.col("reason") != "")["reason"].value_counts(sort=True)
+    return {
+        "drives": frame.height,
+        "vehicles": frame["vehicle_id"].n_unique(),
+        "masses": int(frame["mass_kg"].is_not_null().sum()),
+        "unread": frame.filter(pl.col("outcome") == "unread").height,
+        "failed": frame.filter(pl.col("outcome") == "failed").height,
+        "status": dict(without["status"].value_counts(sort=True).iter_rows()),
+        "reasons": list(reasons.head(3).iter_rows()),
+    }
+
+
+def _say_run(count: Count, seconds: float) -> None:
+    new = count.done - count.there
+    rate = f", {new / seconds:.2f}/s" if new else ""
+    there = f", {count.there} were there already" if count.there else ""
+    say(f"{new} recordings weighed in {time_text(seconds)}{rate}{there}")
+
+
+def _say_summary(found: dict[str, Any]) -> None:
+    say(
+        f"{found['drives']} drives of {found['vehicles']} vehicles: {found['masses']} with a mass"
+        + "".join(f", {count} {name}" for name, count in found["status"].items())
+        + "".join(f", {found[name]} {name}" for name in ("unread", "failed") if found[name])
+    )
+    for reason, count in found["reasons"]:
+        say(f"  {count} x {reason}")
+
+
+def _say_learnt(results: Path, learn: Path) -> None:
+    import polars as pl
+
+    from weighbridge.fleet.learning import LEARNT
+
+    rows = pl.read_parquet((results / LEARNT).read_bytes())
+    for row in rows.iter_rows(named=True):
+        refined = f"refined: {learn / row['refined']}" if row["refined"] else "not refined"
+        say(f"{row['vehicle_id']}: {row['drives']} drives with a ticket, {refined}")
+        if row["told"]:
+            say(f"  {row['told']}")
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[Count], None] | None]:
+    """Show a bar with rate and time left on a terminal, and nothing in a pipe."""
+    if not watched():
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns = (TextColumn("weighing"), BarColumn(), TextColumn("{task.fields[told]}"))
+    with Progress(*columns, console=console(stderr=True), transient=True) as bar:
+        task = bar.add_task("weighing", total=None, told="")
+
+        def tell(count: Count) -> None:
+            left = "" if count.left is None else f", {time_text(count.left)} left"
+            of = f"{count.found}" + ("" if count.complete else "+")
+            bad = f", {count.failed + count.unread} bad" if count.failed + count.unread else ""
+            bar.update(
+                task,
+                total=count.found if count.complete else None,
+                completed=count.done,
+                told=shown(f"{count.done}/{of}, {count.rate:.1f}/s{left}{bad}"),
+            )
+
+        try:
+            yield tell
+        except KeyboardInterrupt:
+            bar.stop()
+            complain("stopping; what was weighed is kept: give the same command again to go on")
+            raise

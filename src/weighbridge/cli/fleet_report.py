@@ -1,0 +1,82 @@
+"""``weighbridge fleet report``: who was overloaded, what was carried, and how good the data are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from weighbridge.cli.results import Inputs, asked_for, refuse_results
+from weighbridge.cli.terminal import say
+from weighbridge.cli.verbosity import say_written
+
+
+def report(
+    results: Annotated[Path, typer.Argument(help="Folder of the results.", show_default=False)],
+    page: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("-o", "--output", help="Page to write, an HTML file that opens offline."),
+    ] = None,
+    json: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--json", help="File for the same figures as JSON."),
+    ] = None,
+    tickets: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--tickets", help="Known masses: CSV or Parquet with vehicle, time, mass_kg."),
+    ] = None,
+    couplings: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--couplings",
+            help="Trailers: CSV or Parquet with vehicle, start, end, permitted_kg of both.",
+        ),
+    ] = None,
+    warn: Annotated[float, typer.Option("--warn", help="Overload told from here on.")] = 0.5,
+    alarm: Annotated[float, typer.Option("--alarm", help="Overload told as sure.")] = 0.95,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", help="Error that passes the tests of known mass.")
+    ] = 0.05,
+) -> None:
+    """Tell who was overloaded, what was carried, where loads changed, and how good the data are.
+
+    Example: weighbridge fleet report results/ -o fleet.html --tickets tickets.csv
+    """
+    from weighbridge.errors import ConfigError
+    from weighbridge.fleet.legs import Limits
+    from weighbridge.fleet.page import how_sure, write_page
+    from weighbridge.fleet.reporting import report as figures
+
+    if json == "-":
+        raise ConfigError("--json -: name a file; standard output has the summary")
+    read = Inputs(files=tuple(path for path in (tickets, couplings) if path is not None))
+    refuse_results(read, asked_for(track=None, report=page, json=json))
+    for path in (page, None if json is None else Path(json)):
+        if path is not None and path.resolve().is_relative_to(results.resolve()):
+            raise ConfigError(f"{path}: is within the results; name a file elsewhere")
+    found = figures(
+        results,
+        limits=Limits(warn=warn, alarm=alarm),
+        tickets=tickets,
+        couplings=couplings,
+        tolerance=tolerance,
+    )
+    if page is not None:
+        write_page(found, page)
+    if json is not None:
+        found.to_json(json)
+    t = found.totals
+    say(f"{t['drives']} drives of {t['vehicles']} vehicles, {t['distance_km']:.0f} km")
+    legs = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
+    say(f"overloaded: {legs} at least {100 * alarm:g} % sure, {t['warnings']} likely")
+    for row in found.overloads.head(10).iter_rows(named=True):
+        when = "no time" if row["start"] is None else f"{row['start']:%Y-%m-%d %H:%M} UTC"
+        say(
+            f"  {row['vehicle_id']} {when}: {row['mass_kg']:.0f} ± "
+            f"{row['high95_kg'] - row['mass_kg']:.0f} kg of {row['permitted_kg']:.0f} kg, "
+            f"{how_sure(row['overload'])}"
+        )
+    for written in (page, json):
+        if written is not None:
+            say_written(written)

@@ -1,0 +1,124 @@
+"""How much a command tells beside its results: ``--quiet`` and ``--verbose`` of every command."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Final
+
+import typer
+from typer.core import TyperGroup, TyperOption
+
+from weighbridge.cli.terminal import complain, say
+
+_SHARED: Final = ("quiet", "verbose")
+"""Options that stand behind every command as well as before it."""
+
+
+@dataclass(slots=True)
+class _Asked:
+    """What the user asked for in this run."""
+
+    quiet: bool = False
+    verbose: int = 0
+    ends: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
+
+
+_asked: Final = _Asked()
+
+
+def _take_quiet(wanted: bool) -> None:
+    _take(quiet=wanted)
+
+
+def _take_verbose(times: int) -> None:
+    _take(verbose=times)
+
+
+def _take(*, quiet: bool = False, verbose: int = 0) -> None:
+    """Add what one option asks for; it may stand before the command and behind it."""
+    _asked.quiet |= quiet
+    _asked.verbose += verbose
+    if _asked.quiet and _asked.verbose:
+        raise typer.BadParameter("--quiet and --verbose exclude each other; give one")
+    if _asked.quiet or _asked.verbose:
+        from weighbridge.cli.logs import logged
+
+        _asked.ends.enter_context(logged(_asked.quiet, _asked.verbose))
+
+
+Quiet = Annotated[
+    bool,
+    typer.Option(
+        "--quiet", "-q", callback=_take_quiet, help="Print results and errors only, no progress."
+    ),
+]
+Verbose = Annotated[
+    int,
+    typer.Option(
+        "--verbose",
+        "-v",
+        count=True,
+        callback=_take_verbose,
+        metavar="",
+        show_default=False,
+        help="Log to standard error what is done; -vv logs more.",
+    ),
+]
+
+
+class EveryCommand(TyperGroup):
+    """The root of all commands; its ``--quiet`` and ``--verbose`` are options of each of them."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        shared = [option for option in self.params if option.name in _SHARED]
+        for command in _leaves(self.commands.values()):
+            for option in shared:
+                own = copy.copy(option)
+                assert isinstance(own, TyperOption)
+                own.expose_value = False
+                command.params.append(own)
+
+
+def _leaves(commands: Iterable[Any]) -> Iterator[Any]:
+    """Yield the commands themselves, those of groups included."""
+    for command in commands:
+        inside = getattr(command, "commands", None)
+        if inside is None:
+            yield command
+        else:
+            yield from _leaves(inside.values())
+
+
+def watched() -> bool:
+    """Tell whether a person at a terminal wants to see how far the work is."""
+    return not _asked.quiet and sys.stderr.isatty()
+
+
+def quiet() -> bool:
+    """Tell whether results and errors alone are wanted."""
+    return _asked.quiet
+
+
+def notice(text: str) -> None:
+    """Print one line about the work, which is no result, to standard error."""
+    if not _asked.quiet:
+        complain(text)
+
+
+def say_written(path: object, *, aside: bool = False) -> None:
+    """Name a file that was written; ``aside`` from JSON that is on standard output."""
+    if not _asked.quiet:
+        (complain if aside else say)(f"written: {path}")
+
+
+@contextlib.contextmanager
+def asked_anew() -> Iterator[None]:
+    """Let one run of the command line ask for itself, and leave logging as it was."""
+    with contextlib.ExitStack() as ends:
+        _asked.quiet, _asked.verbose, _asked.ends = False, 0, ends
+        yield

@@ -1,0 +1,130 @@
+"""Does the torque read otherwise at high torque than at low, beside what the calibration found?
+
+A motor that is not in the reading, an assist, a new map of the engine and values that are held all
+make one drive weigh differently by its high torques and by its low ones. Only an accelerometer
+shows it: noise of a speed's rate and of heights looks alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from weighbridge.balance.law import traction_gain
+from weighbridge.balance.table import ForceTable
+from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput
+from weighbridge.kernels import disturbance
+from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque import source_of
+
+KNEE: Final = 0.55
+"""Part of the highest torque above which it may read otherwise [-]: from lower ones on, a driver's
+answer to hills and wind passes for a bend too."""
+
+PRIOR_STD: Final = 0.5
+"""Standard deviation of the part that is missing or too much, before the drive has told [-]."""
+
+BENT: Final = 0.14
+"""A larger part that is missing contradicts the calibration [-]: undamaged drives of three
+simulators, in cars, vans, trucks and buses, had 0.07 at most."""
+
+TOO_MUCH: Final = 0.35
+"""The same of a part that is too much [-]: gusts and hills that a gentle driver answers look alike,
+and undamaged drives had 0.23, or 0.33 hardly known."""
+
+SURE: Final = 4.0
+"""Standard deviations by which either has to be known as well [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueBend:
+    """What is missing of the torque above a knee.
+
+    Attributes
+    ----------
+    part : of the torque above it that the reading does not tell [-]; negative where it tells more
+    std : its standard deviation [-]
+    knee : [N m] at the engine or motor
+    """
+
+    part: float
+    std: float
+    knee: float
+
+
+def above_knee(table: ForceTable, vehicle: Vehicle, knee: float) -> Floats:
+    """Force at the wheels of the torque above a knee (n,) [N].
+
+    Parameters
+    ----------
+    table, vehicle
+    knee : [N m]
+    """
+    torque = np.nan_to_num(table.torque)
+    gain = np.nan_to_num(traction_gain(vehicle, torque, np.nan_to_num(table.gearing)))
+    return np.asarray(gain * np.maximum(0.0, torque - knee))
+
+
+def torque_bend(given: FilterInput, force: Floats, knee: float) -> TorqueBend:
+    """Estimate the bend as one more state of the filter, beside mass and slow errors.
+
+    Parameters
+    ----------
+    given : what the filter was given
+    force : (m,) means of `above_knee` over the windows [N]
+    knee : [N m]
+
+    References
+    ----------
+    A bias of known shape as a further state: Friedland, IEEE Trans. Automatic Control 14, 1969.
+    """
+    start, params = given.start, given.params
+    count = start.x.size
+    cov = np.zeros((count + 1, count + 1))
+    cov[:count, :count], cov[count, count] = start.cov, PRIOR_STD**2
+    state, *_ = disturbance.run(
+        disturbance.initial_state(  # type: ignore[no-untyped-call]
+            np.append(start.x, 0.0), cov, start.time
+        ),
+        given.time,
+        np.ascontiguousarray(np.column_stack([given.rows, -force])),
+        given.y,
+        given.noise,
+        np.ascontiguousarray(np.column_stack([given.added, np.zeros(force.size)])),
+        params._replace(
+            time_constant=np.append(params.time_constant, np.inf), std=np.append(params.std, 0.0)
+        ),
+    )
+    std = UNMODELLED * float(np.sqrt(state.cov[count, count]))
+    return TorqueBend(float(state.x[count]), std, knee)
+
+
+def bent(bend: TorqueBend | None, drive: Drive, vehicle: Vehicle) -> str:
+    """Say that the torque bends otherwise than in the calibration, in a sentence; empty if not.
+
+    Only a refined fit has found the bends that the reading always has. A torque that a person
+    vouches for is not doubted.
+
+    Parameters
+    ----------
+    bend : None where a method does not say
+    drive, vehicle
+    """
+    fit, source = vehicle.provenance.fit, source_of(vehicle)
+    if bend is None or fit is None or not fit.refined:
+        return ""
+    if set(source.found(drive)) & set(drive.info.trusted):
+        return ""
+    least = BENT if bend.part > 0.0 else TOO_MUCH
+    if abs(bend.part) <= max(least, SURE * bend.std):
+        return ""
+    less = "less" if bend.part > 0.0 else "more"
+    return (
+        f"above {bend.knee:.0f} N m {source.title} tells {100.0 * abs(bend.part):.0f} % {less} of "
+        "the torque than below, otherwise than in the calibration: another motor or an assist, a "
+        "new map of the engine, or values that are held; record what was calibrated, or calibrate "
+        "again"
+    )

@@ -1,0 +1,172 @@
+"""Rows of the results from weighings, and weighings from rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any, Final
+
+import numpy as np
+
+from weighbridge.estimators import Segment, Status
+from weighbridge.fleet.schema import CHECKS
+from weighbridge.fleet.spans import Span, spans_of
+from weighbridge.fleet.travel import Travel
+from weighbridge.pipeline.weighing import Weighing
+from weighbridge.results.row import WeighingRow
+from weighbridge.vehicle.model import Vehicle
+
+_FIRST: Final = 0.1  # a running mass counts from this standard deviation on [-]
+
+_NUMBERS: Final = {
+    "mass_kg": "mass",
+    "std_kg": "std",
+    "payload_kg": "payload",
+    "duration_s": "duration",
+    "used_s": "used_time",
+    "converged_at_s": "converged_at",
+    "bound_std_kg": "bound_std",
+}
+"""Columns that hold a number of `WeighingRow`, and its field there."""
+
+
+def answer(row: WeighingRow) -> dict[str, Any]:
+    """Return the columns that hold what `weigh` says, to the last bit."""
+    return {
+        "drive": row.drive,
+        "vehicle": row.vehicle,
+        "start": row.start,
+        "date": _date(row.start),
+        "method": row.method,
+        "status": str(row.status),
+        "reason": row.reason,
+        "low95_kg": _number(row.interval[0]),
+        "high95_kg": _number(row.interval[1]),
+        "warnings": list(row.warnings),
+        **{column: _number(getattr(row, field)) for column, field in _NUMBERS.items()},
+        "segments": [
+            {
+                "segment": number,
+                "start_s": s.start,
+                "end_s": s.end,
+                "mass_kg": _number(s.mass),
+                "std_kg": _number(s.std),
+            }
+            for number, s in enumerate(row.segments)
+        ],
+    }
+
+
+def weighing_row(drive: Mapping[str, Any], segments: Sequence[Mapping[str, Any]]) -> WeighingRow:
+    """Return what `weigh` says from a row of a drive and its segments, in their order.
+
+    Spans without a segment of `weigh` are left out.
+    """
+    return WeighingRow(
+        drive=drive["drive"],
+        vehicle=drive["vehicle"],
+        start=drive["start"],
+        method=drive["method"],
+        status=Status(drive["status"]),
+        reason=drive["reason"],
+        interval=(_float(drive["low95_kg"]), _float(drive["high95_kg"])),
+        warnings=tuple(drive["warnings"]),
+        segments=tuple(
+            Segment(
+                start=s["start_s"],
+                end=s["end_s"],
+                mass=_float(s["mass_kg"]),
+                std=_float(s["std_kg"]),
+            )
+            for s in segments
+            if s["start_s"] is not None
+        ),
+        **{field: _float(drive[column]) for column, field in _NUMBERS.items()},
+    )
+
+
+def row_of(weighed: Weighing) -> dict[str, Any]:
+    """Return a row with its segments: what `weigh` says, and where and how far was driven."""
+    drive = weighed.drive
+    found = answer(weighed.row)
+    travel = Travel(drive)
+    spans = spans_of(weighed, travel)
+    bare = [span for span in spans if span.segment is None]
+    result = weighed.result
+    return {
+        **found,
+        "segments": _segments(found["segments"], spans, travel),
+        "unweighed_s": sum(span.end - span.start for span in bare),
+        **of_vehicle(weighed.vehicle),
+        **travel.between(drive.start, drive.end),
+        **_running(weighed, travel.begin, bare),
+        "load_changed": weighed.load_changed,
+        "freedom": None if result is None else float(result.degrees_of_freedom),
+        "systematic_std_kg": None if result is None else _number(float(result.systematic_std)),
+        "known_mass_kg": drive.info.mass,
+        "signals": sorted(drive.signals),
+    }
+
+
+def of_vehicle(vehicle: Vehicle) -> dict[str, Any]:
+    """Return the columns that a vehicle file says."""
+    return {
+        "vehicle_class": vehicle.kind,
+        "tare_kg": vehicle.tare,
+        "gross_kg": vehicle.gross,
+    }
+
+
+def _segments(
+    told: Sequence[dict[str, Any]], spans: Sequence[Span], travel: Travel
+) -> list[dict[str, Any]]:
+    """Return a row per span: the segment of `weigh`, and how far its mass reaches."""
+    rows = []
+    for number, span in enumerate(spans):
+        found = {} if span.segment is None else told[span.segment]
+        edges = span.start, span.end
+        row = {"from_s": span.start, "to_s": span.end, "weighed_s": span.weighed}
+        row |= travel.between(*edges) | {"period_km": travel.periods(*edges)}
+        empty = dict.fromkeys(("start_s", "end_s", "mass_kg", "std_kg"))
+        rows.append(empty | found | row | {"segment": number})
+    return rows
+
+
+def _running(weighed: Weighing, begin: float | None, bare: Sequence[Span]) -> dict[str, Any]:
+    """Return when the running mass came, and what it was at the instants of `CHECKS`.
+
+    Parameters
+    ----------
+    weighed
+    begin : instant of the first motion [s]; None where there is none
+    bare : spans that were not weighed; none of their instants has a mass
+    """
+    result = weighed.result
+    if result is None or begin is None:
+        return {"first_mass_s": None, "checked_kg": [], "checked_std_kg": []}
+    came = result.time[result.running_std <= _FIRST * result.running_mass]
+    marks = np.arange(begin + CHECKS[0], weighed.drive.end, CHECKS[1])
+    at = np.searchsorted(result.time, marks, side="right") - 1
+    for span in bare:
+        at[(marks >= span.start) & (marks <= span.end)] = -1
+    found = {
+        name: [_number(float(values[k])) if k >= 0 else None for k in at]
+        for name, values in (
+            ("checked_kg", result.running_mass),
+            ("checked_std_kg", result.running_std),
+        )
+    }
+    return {"first_mass_s": max(float(came[0]) - begin, 0.0) if came.size else None, **found}
+
+
+def _date(start: str | None) -> Any:
+    return None if start is None else datetime.fromisoformat(start).astimezone(UTC).date()
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else float(value)
+
+
+def _float(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -1,0 +1,280 @@
+"""The one function that weighs a recording of a fleet: on this machine, on Dask, Ray or Spark."""
+
+from __future__ import annotations
+
+import bisect
+import contextlib
+import socket
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.fleet import remote
+from weighbridge.fleet.inputs import Recording
+from weighbridge.fleet.keys import content_digest, text_digest
+from weighbridge.fleet.schema import FAILED, FORMAT_VERSION, UNREAD, WEIGHED
+from weighbridge.fleet.store import part_path, write_part
+from weighbridge.fleet.vehicles import Assigned
+from weighbridge.version import VERSION
+
+TRIES: Final = 3
+"""How often a drive is tried where the machine fails, and not the data."""
+
+_PAUSE: Final = 0.2  # before the second try; twice as long before the third [s]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """All that a worker has to know of one recording.
+
+    Attributes
+    ----------
+    recording, assigned : what is weighed, and as which vehicle
+    results : folder of the results, seen by all workers
+    method, settings : as of `weigh`
+    dbc : databases of raw CAN logs, seen by all workers
+    dbc_digest : of their content
+    whole : take the recording as one drive
+    known : file of the keys that are there already; None where none is
+    version, format_version : of weighbridge and of the tables, where the job was made
+    """
+
+    recording: Recording
+    assigned: Assigned
+    results: str
+    method: str = "joint"
+    settings: Mapping[str, object] = field(default_factory=dict)
+    dbc: tuple[str, ...] = ()
+    dbc_digest: str = ""
+    whole: bool = False
+    known: str | None = None
+    version: str = VERSION
+    format_version: int = FORMAT_VERSION
+
+
+class Receipt(NamedTuple):
+    """What a worker tells of a recording; its rows are in the part file.
+
+    Attributes
+    ----------
+    key : of the part
+    outcome : weighed, unread or failed; ``there`` where the results have it already
+    drives, masses : drives of the recording, and those with a mass
+    seconds : that it took
+    """
+
+    key: str
+    outcome: str
+    drives: int
+    masses: int
+    seconds: float
+
+
+THERE: Final = "there"
+"""Outcome of a recording that the results have already."""
+
+
+def weigh_job(job: Job) -> Receipt:
+    """Weigh one recording and write its part file.
+
+    The same job writes the same rows, wherever and however often it runs. Nothing is raised for a
+    drive: what goes wrong is a row with the reason.
+
+    Parameters
+    ----------
+    job
+
+    Raises
+    ------
+    ConfigError
+        The folder of the results cannot be written to, or the job was made by another version.
+    """
+    _refuse_other_version(job)
+    begin = time.perf_counter()
+    rows: list[dict[str, Any]] = []
+    key, tries = "", 1
+    for tries in range(1, TRIES + 1):
+        try:
+            with local_paths(job.recording) as paths:
+                key = _key(job, content_digest(paths))
+                if _is_there(job, key):
+                    return Receipt(key, THERE, 0, 0, time.perf_counter() - begin)
+                rows = _weighed(job, paths)
+            break
+        except Exception as error:
+            if isinstance(error, WeighbridgeError) and not _of_the_machine(error):
+                key = key or failed_key(job)
+                rows = [_row(job, UNREAD, str(error))]
+                break
+            key = failed_key(job)
+            rows = [_row(job, FAILED, f"failed {tries} times: {_named(error)}")]
+            if tries < TRIES:
+                time.sleep(_PAUSE * tries)
+    return _written(job, key, rows, tries, begin)
+
+
+def fail_job(job: Job, reason: str) -> Receipt:
+    """Write the row of a recording that no worker could finish.
+
+    Parameters
+    ----------
+    job
+    reason : why, one sentence
+    """
+    begin = time.perf_counter()
+    return _written(job, failed_key(job), [_row(job, FAILED, reason)], TRIES, begin)
+
+
+def _refuse_other_version(job: Job) -> None:
+    """Raise where this worker would write rows that the command does not expect."""
+    if (job.version, job.format_version) != (VERSION, FORMAT_VERSION):
+        raise ConfigError(
+            f"the worker on {socket.gethostname()} has weighbridge {VERSION} (tables of format "
+            f"{FORMAT_VERSION}), the command {job.version} (format {job.format_version}): install "
+            "the same version on both"
+        )
+
+
+def failed_key(job: Job) -> str:
+    """Key of a recording whose content nobody could read: of its name."""
+    return _key(job, text_digest(["no content", *job.recording.paths]))
+
+
+def _key(job: Job, content: str) -> str:
+    settings = sorted((name, repr(value)) for name, value in job.settings.items())
+    return text_digest(
+        [
+            content,
+            job.assigned.digest,
+            VERSION,
+            str(FORMAT_VERSION),
+            job.method,
+            repr(settings),
+            repr(job.whole),
+            repr(job.recording.start),
+            job.dbc_digest,
+        ]
+    )
+
+
+def _is_there(job: Job, key: str) -> bool:
+    if part_path(Path(job.results), key).exists():
+        return True
+    if job.known is None:
+        return False
+    keys = _known(job.known)
+    at = bisect.bisect_left(keys, key)
+    return at < len(keys) and keys[at] == key
+
+
+@lru_cache(maxsize=1)
+def _known(path: str) -> list[str]:
+    """Read the sorted keys once per run and worker."""
+    return Path(path).read_text(encoding="ascii").split()
+
+
+@contextlib.contextmanager
+def local_paths(recording: Recording) -> Iterator[list[Path]]:
+    """Give the paths of a recording on this machine; what was brought there goes again."""
+    if not any(remote.is_url(path) for path in recording.paths):
+        yield [Path(path) for path in recording.paths]
+        return
+    with tempfile.TemporaryDirectory(prefix="weighbridge-") as home:
+        yield remote.fetch(recording.paths, Path(home))
+
+
+def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
+    """Weigh each drive of a recording, as the command ``weigh`` does."""
+    from dataclasses import replace
+
+    from weighbridge.fleet.facts import row_of
+    from weighbridge.io import read_drive, read_drives
+    from weighbridge.pipeline.weighing import weigh
+
+    given: Path | list[Path] = paths[0] if len(paths) == 1 else paths
+    read = (lambda *a: [read_drive(*a)]) if job.whole else read_drives
+    drives = read(given, job.assigned.mapping, job.dbc)
+    if job.recording.start is not None:
+        begun = job.recording.start
+        drives = [
+            d if d.info.start_time else replace(d, info=replace(d.info, start_time=begun))
+            for d in drives
+        ]
+    rows = []
+    for drive in drives:
+        try:
+            vehicle = job.assigned.as_vehicle(drive)
+            weighed = weigh(drive, vehicle, job.method, settings=job.settings or None)
+            row = _row(job, WEIGHED, "") | row_of(weighed)
+        except WeighbridgeError as error:
+            row = _row(job, UNREAD, str(error)) | {"drive": drive.name, **_begin(drive.began)}
+        if job.assigned.note:
+            row["warnings"] = [job.assigned.note, *row["warnings"]]
+        rows.append(row)
+    return rows
+
+
+def _begin(began: str | None) -> dict[str, Any]:
+    if began is None:
+        return {}
+    return {"start": began, "date": datetime.fromisoformat(began).astimezone(UTC).date()}
+
+
+def _row(job: Job, outcome: str, reason: str) -> dict[str, Any]:
+    """Return the row of a drive that has no answer (yet)."""
+    from weighbridge.fleet.facts import answer, of_vehicle
+    from weighbridge.results.row import unread_row
+    from weighbridge.visible import visible
+
+    assigned = job.assigned
+    path = Path(job.recording.paths[0])
+    name = path.name if len(job.recording.paths) == 1 else path.stem
+    vehicle = assigned.vehicle
+    called = vehicle.name if vehicle is not None else assigned.id or assigned.kind
+    row = answer(unread_row(visible(name), called, job.method, visible(reason)))
+    return {
+        **row,
+        **_begin(job.recording.start),
+        **(of_vehicle(vehicle) if vehicle is not None else {"vehicle_class": assigned.kind}),
+        "source": visible(job.recording.source),
+        "outcome": outcome,
+        "vehicle_id": assigned.id,
+        "vehicle_file": assigned.file,
+    }
+
+
+def _written(job: Job, key: str, rows: list[dict[str, Any]], tries: int, begin: float) -> Receipt:
+    now = datetime.now(UTC)
+    for number, row in enumerate(rows):
+        row |= {
+            "key": key,
+            "part": number,
+            "parts": len(rows),
+            "tries": tries,
+            "weighed_at": now,
+            "version": VERSION,
+        }
+    write_part(Path(job.results), key, rows)
+    outcomes = {row["outcome"] for row in rows}
+    outcome = next(o for o in (FAILED, UNREAD, WEIGHED) if o in outcomes)
+    masses = sum(row["mass_kg"] is not None for row in rows)
+    return Receipt(key, outcome, len(rows), masses, time.perf_counter() - begin)
+
+
+def _of_the_machine(error: BaseException | None) -> bool:
+    """Tell whether an error of the system, such as a network that is gone, is behind another."""
+    while error is not None:
+        if isinstance(error, OSError):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _named(error: Exception) -> str:
+    return str(error) if isinstance(error, WeighbridgeError) else f"{type(error).__name__}: {error}"

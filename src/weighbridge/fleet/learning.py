@@ -1,0 +1,302 @@
+"""Vehicle files refined by the drives of known mass that a fleet has, and what drifts in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import polars as pl
+
+from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.fleet.inputs import Recording
+from weighbridge.fleet.job import local_paths
+from weighbridge.fleet.tickets import read_tickets, ticketed
+from weighbridge.fleet.vehicles import Assigned, Vehicles
+from weighbridge.pipeline.given import mapping_beside
+from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.whole import whole_file
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+MOST: Final = 12
+"""Drives that refine one vehicle file, at most: those over all masses, and over all of the time."""
+
+SURE: Final = 3.0
+"""A drift is told where it is so many standard deviations [-]."""
+
+FEW: Final = 4
+"""Drives that show a drift, at least."""
+
+APART: Final = 2.0
+"""Masses contradict a vehicle file where they are off by so many standard deviations [-]."""
+
+LEARNT: Final = "learnt.parquet"
+
+
+class Known(NamedTuple):
+    """A drive of known mass: where it is, when it began, masses weighed and known [kg]."""
+
+    paths: tuple[str, ...]
+    part: int
+    begin: datetime
+    weighed: float
+    std: float
+    known: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lesson:
+    """What a worker needs to refine one vehicle: its file, its drives, and where the file goes."""
+
+    assigned: Assigned
+    drives: tuple[Known, ...]
+    output: str
+    whole: bool = False
+
+
+class Drift(NamedTuple):
+    """Change per 30 days and its standard deviation; NaN where too few drives show it."""
+
+    slope: float
+    std: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is more than the scatter."""
+        return abs(self.slope) > SURE * self.std
+
+
+def learn_fleet(
+    client: Client, results: Path, shelf: Vehicles, tickets: Path, output: Path, *, whole: bool
+) -> pl.DataFrame:
+    """Refine the vehicle files of a fleet by its tickets.
+
+    Parameters
+    ----------
+    client : of a Dask cluster
+    results : folder of weighed drives
+    shelf : the vehicle files
+    tickets : table of them
+    output : folder of the refined files, none of the old ones
+    whole : as the drives were weighed
+
+    Returns
+    -------
+    One row per vehicle, see `learn_vehicle`; it is also in the results as ``learnt.parquet``
+
+    Raises
+    ------
+    ConfigError
+        Tickets cannot be read, or the folder not be written to.
+    """
+    from weighbridge.fleet.reading import read_drives
+
+    refuse_output(output, shelf)
+    found = ticketed(read_tickets(tickets), read_drives(results))
+    output.mkdir(parents=True, exist_ok=True)
+    lessons = []
+    for (vehicle,), own in found.partition_by("vehicle_id", as_dict=True).items():
+        assigned = shelf.of((str(vehicle),), str(vehicle))
+        if assigned.vehicle is not None:
+            known = tuple(_known(row) for row in own.iter_rows(named=True))
+            lessons.append(
+                Lesson(assigned=assigned, drives=known, output=str(output.resolve()), whole=whole)
+            )
+    rows = client.gather(client.map(learn_vehicle, lessons, pure=False))
+    frame = pl.DataFrame(rows, schema=COLUMNS, orient="row").sort("vehicle_id")
+    with whole_file(results / LEARNT) as part:
+        frame.write_parquet(part)
+    return frame
+
+
+COLUMNS: Final[dict[str, Any]] = {
+    "vehicle_id": pl.String,
+    "drives": pl.Int32,
+    "weighed": pl.Int32,
+    "error_pct": pl.Float64,
+    "error_std_pct": pl.Float64,
+    "contradicted": pl.Boolean,
+    "torque_drift_pct": pl.Float64,
+    "torque_drift_std_pct": pl.Float64,
+    "rolling_drift": pl.Float64,
+    "rolling_drift_std": pl.Float64,
+    "pitch_drift_deg": pl.Float64,
+    "pitch_drift_std_deg": pl.Float64,
+    "refined": pl.String,
+    "told": pl.String,
+}
+"""Columns of what was learnt of a vehicle: drives with a ticket, those with a mass, how far these
+are from their tickets in the mean (positive: too heavy) and how far they may be; drifts per 30
+days; name of the refined file, and sentences."""
+
+
+def refuse_output(output: Path, shelf: Vehicles) -> None:
+    """Raise where refined files would take the place of those that are read.
+
+    Raises
+    ------
+    ConfigError
+        The folder is that of the vehicle files, or holds a file of another kind by such a name.
+    """
+    for path in shelf.files:
+        target = output / path.name
+        if not target.exists():
+            continue
+        if target.samefile(path):
+            raise ConfigError(
+                f"{output}: holds the vehicle files that are read; name another folder for --learn"
+            )
+        # An earlier one gives way; anything else is told by this.
+        Vehicle.load(target)
+
+
+def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
+    """Refine one vehicle file, and tell whether its drives contradict it, and what drifts.
+
+    Parameters
+    ----------
+    lesson
+
+    Returns
+    -------
+    A row of `COLUMNS`; nothing is raised for drives that cannot be used
+    """
+    from weighbridge.calibration.run import calibrate
+
+    car, told = lesson.assigned.vehicle, []
+    weighed = [k for k in lesson.drives if math.isfinite(k.weighed)]
+    row: dict[str, Any] = {
+        "vehicle_id": lesson.assigned.id,
+        "drives": len(lesson.drives),
+        "weighed": len(weighed),
+    }
+    error, std = _mean_error(weighed)
+    row |= {"error_pct": 100.0 * error, "error_std_pct": 100.0 * std}
+    row["contradicted"] = len(weighed) > 1 and abs(error) > APART * std
+    if row["contradicted"]:
+        told.append(
+            f"{len(weighed)} drives of known mass contradict the vehicle file: in the mean they "
+            f"come out {abs(100.0 * error):.1f} % too {'heavy' if error > 0 else 'light'}, and "
+            f"their standard deviation is {100.0 * std:.1f} %"
+        )
+    drives, masses, alone, times = [], [], [], []
+    for known in chosen(lesson.drives):
+        try:
+            drive = _read(lesson, known)
+            one = calibrate([drive], [known.known], vehicle=car)
+        except (WeighbridgeError, OSError) as problem:
+            told.append(f"{Path(known.paths[0]).name} cannot be learnt from: {problem}")
+            continue
+        drives.append(drive)
+        masses.append(known.known)
+        times.append(known.begin)
+        mounting = one.mounting.pitch if one.mounting is not None else math.nan
+        alone.append((one.road.rolling_coefficient.value, math.degrees(mounting)))
+    row |= _drifts(weighed, times, np.array(alone, dtype=float).reshape(-1, 2), told)
+    if drives:
+        try:
+            refined = calibrate(drives, masses, vehicle=car)
+            name = f"{lesson.assigned.id}.toml"
+            target = Path(lesson.output) / name
+            if refined.mapping is not None and lesson.assigned.mapping_file is not None:
+                named = mapping_beside(Path(lesson.assigned.mapping_file), target)
+                refined = replace(refined, mapping=named)
+            refined.save(target)
+            row["refined"] = name
+        except WeighbridgeError as problem:
+            told.append(f"the file cannot be refined: {problem}")
+    return row | {"told": "; ".join(told)}
+
+
+def chosen(drives: Sequence[Known]) -> list[Known]:
+    """Return at most `MOST` drives, in order of time: evenly over the order of their masses."""
+    if len(drives) <= MOST:
+        return list(drives)
+    by_mass = sorted(drives, key=lambda k: (k.known, k.begin))
+    places = np.linspace(0, len(by_mass) - 1, MOST).round().astype(int)
+    return sorted((by_mass[k] for k in places), key=lambda k: k.begin)
+
+
+def _mean_error(weighed: Sequence[Known]) -> tuple[float, float]:
+    """Mean of the relative errors, and how far they may be off together.
+
+    What a vehicle file leaves open is the same in all its drives: the mean is no surer than one.
+    """
+    if not weighed:
+        return math.nan, math.nan
+    errors = np.array([k.weighed / k.known - 1.0 for k in weighed])
+    stds = np.array([k.std / k.known for k in weighed])
+    return float(errors.mean()), float(np.sqrt(np.mean(np.square(stds))))
+
+
+def _drifts(
+    weighed: Sequence[Known], times: Sequence[datetime], alone: Floats, told: list[str]
+) -> dict[str, float]:
+    scales = np.array([100.0 * (k.weighed / k.known - 1.0) for k in weighed])
+    found = {
+        "torque_drift{}_pct": (drift([k.begin for k in weighed], scales), "torque scale", "%"),
+        "rolling_drift{}": (drift(times, alone[:, 0]), "rolling resistance", ""),
+        "pitch_drift{}_deg": (drift(times, alone[:, 1]), "pitch of the sensor", "deg"),
+    }
+    row = {}
+    for column, (change, what, unit) in found.items():
+        row[column.format("")], row[column.format("_std")] = change
+        if change.sure:
+            told.append(
+                f"the {what} drifts by {change.slope:+.2g} ± {change.std:.1g} {unit} in 30 days"
+            )
+    return row
+
+
+def drift(times: Sequence[datetime], values: Floats) -> Drift:
+    """Fit a line over time.
+
+    Parameters
+    ----------
+    times : of the values
+    values : (n,); NaN where there is none
+
+    Returns
+    -------
+    Slope per 30 days, with a standard deviation from the scatter around the line
+    """
+    good = np.isfinite(values)
+    if np.count_nonzero(good) < FEW:
+        return Drift(math.nan, math.nan)
+    day = np.array([t.timestamp() for t, g in zip(times, good, strict=True) if g]) / (30 * 86_400.0)
+    day -= day.mean()
+    spread = float(day @ day)
+    if spread <= 0.0:
+        return Drift(math.nan, math.nan)
+    own = values[good] - values[good].mean()
+    slope = float(day @ own) / spread
+    left = own - slope * day
+    return Drift(slope, float(np.sqrt(left @ left / (left.size - 2) / spread)))
+
+
+def _known(row: Mapping[str, Any]) -> Known:
+    return Known(
+        paths=tuple(row["source"].split(";")),
+        part=row["part"],
+        begin=row["begin"],
+        weighed=math.nan if row["mass_kg"] is None else row["mass_kg"],
+        std=math.nan if row["std_kg"] is None else row["std_kg"],
+        known=row["ticket_kg"],
+    )
+
+
+def _read(lesson: Lesson, known: Known) -> Drive:
+    from weighbridge.io import read_drive, read_drives
+
+    with local_paths(Recording(known.paths)) as paths:
+        given = paths[0] if len(paths) == 1 else paths
+        if lesson.whole:
+            return read_drive(given, lesson.assigned.mapping)
+        return read_drives(given, lesson.assigned.mapping)[known.part]

@@ -1,0 +1,254 @@
+"""Legs: the spans of drives with one load each, and what was loaded between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Final, NamedTuple
+
+import numpy as np
+import polars as pl
+from scipy.stats import t as student
+
+from weighbridge.errors import ConfigError
+from weighbridge.fleet.couplings import Coupling, with_couplings
+from weighbridge.signals import Floats
+
+SURE: Final = 1.959964
+"""Standard deviations of a change of load that is told: 95 % of a normal distribution."""
+
+_TIME: Final = pl.Datetime("us", "UTC")
+_POSITION: Final = tuple(
+    f"{edge}_{axis}_deg" for edge in ("start", "end") for axis in ("latitude", "longitude")
+)
+_OF_DRIVE: Final = (
+    "key", "part", "source", "drive", "outcome", "vehicle_id", "vehicle_file", "vehicle_class",
+    "tare_kg", "gross_kg", "status", "reason", "freedom",
+)  # fmt: skip
+_OF_LEG: Final = ("mass_kg", "std_kg", "distance_km", "moving_s", *_POSITION)
+
+NOT_WEIGHED: Final = "no force was usable from a stop on, and the load may have changed there"
+"""Why a leg of a drive with a mass has none."""
+
+
+class Limits(NamedTuple):
+    """What is told as overload, as a trailer and as empty.
+
+    Attributes
+    ----------
+    warn, alarm : probabilities that the mass is above the permitted one, from which on it is told
+    empty : payload below this part of the permitted payload is none [-]
+    trailer : mass above this multiple of the permitted one is taken for one with a trailer, where
+        no coupling is told [-]
+    """
+
+    warn: float = 0.5
+    alarm: float = 0.95
+    empty: float = 0.1
+    trailer: float = 1.25
+
+
+def check_limits(limits: Limits) -> None:
+    """Raise where limits cannot be.
+
+    Raises
+    ------
+    ConfigError
+        A probability is not in (0, 1), warn is above alarm, or another is out of range.
+    """
+    if not 0.0 < limits.warn <= limits.alarm < 1.0:
+        raise ConfigError(
+            f"warn and alarm are probabilities, warn the lower, such as 0.5 and 0.95; "
+            f"got {limits.warn:g} and {limits.alarm:g}"
+        )
+    if not 0.0 <= limits.empty < 1.0:
+        raise ConfigError(f"empty must be in [0, 1) of the permitted payload, got {limits.empty:g}")
+    if not limits.trailer > 1.0:
+        raise ConfigError(f"trailer must be above 1, got {limits.trailer:g}")
+
+
+def legs(
+    drives: pl.DataFrame,
+    segments: pl.DataFrame,
+    limits: Limits | None = None,
+    couplings: Sequence[Coupling] = (),
+) -> pl.DataFrame:
+    """Return one row per leg, in order of vehicle and time.
+
+    A drive whose load changed has a leg for each load, any other is one leg. A drive without a mass
+    is a leg without one. So is the part of a drive that was not weighed, from a stop on.
+
+    Parameters
+    ----------
+    drives, segments : as of `read_drives` and `read_segments`, collected
+    limits : as of `Limits`
+    couplings : of trailers, where the fleet knows them
+
+    Returns
+    -------
+    polars.DataFrame
+        Beside columns of the drive: ``leg``, ``start``, ``end`` [UTC], ``duration_s``,
+        ``mass_kg``, ``std_kg``, ``shared_kg`` (part of it that all legs of the vehicle share),
+        ``low95_kg``, ``high95_kg``, ``payload_kg``, ``permitted_kg`` (with the trailer that is
+        known to be coupled), ``coupled``, ``overload`` (probability), ``level`` (ok, warn, alarm),
+        ``trailer``, ``empty``, ``tkm``.
+
+    Raises
+    ------
+    ConfigError
+        The limits cannot be.
+    """
+    limits = limits or Limits()
+    check_limits(limits)
+    begun = drives.with_columns(instants(drives["start"]).alias("start"))
+    drive_scale = pl.col("systematic_std_kg") / pl.col("mass_kg")
+    kept: list[str | pl.Expr] = [*_OF_DRIVE, "start", drive_scale.alias("scale")]
+    changed = pl.col("load_changed").fill_null(value=False)
+    several = changed | (pl.col("unweighed_s") > 0.0).fill_null(value=False)
+    whole = begun.filter(~several).select(
+        *kept, *_OF_LEG, "duration_s", pl.lit(0, pl.Int32).alias("leg")
+    )
+    of = begun.filter(several).select(
+        *kept, changed.alias("changed"),
+        pl.col("mass_kg").alias("drive_mass"), pl.col("std_kg").alias("drive_std"),
+    )  # fmt: skip
+    split = of.join(segments, on=["key", "part"]).pipe(_parted).select(whole.columns)
+    found = pl.concat([whole, split]).with_columns(
+        end=pl.col("start") + _seconds(pl.col("duration_s")),
+        shared_kg=(pl.col("scale") * pl.col("mass_kg")).clip(upper_bound=pl.col("std_kg")),
+        payload_kg=pl.col("mass_kg") - pl.col("tare_kg"),
+    )
+    found = _judged(with_couplings(found.drop("scale"), couplings), limits)
+    return found.sort("vehicle_id", "start", "source", "leg", nulls_last=True)
+
+
+def _parted(rows: pl.DataFrame) -> pl.DataFrame:
+    """Make legs of the segments of drives: one per load, and one per span that was not weighed."""
+    bare = pl.col("start_s").is_null()
+    drive = ["key", "part"]
+    rows = rows.sort(*drive, "segment").with_columns(
+        leg=pl.when(pl.col("changed")).then("segment").otherwise(bare.rle_id().over(drive)),
+        offset=pl.col("from_s") - pl.col("from_s").min().over(drive),
+        duration_s=pl.col("to_s") - pl.col("from_s"),
+        reason=pl.when(bare).then(pl.lit(NOT_WEIGHED)).otherwise("reason"),
+        # One load has the mass of its drive, whatever its segments have.
+        mass_kg=pl.when(pl.col("changed") | bare).then("mass_kg").otherwise("drive_mass"),
+        std_kg=pl.when(pl.col("changed") | bare).then("std_kg").otherwise("drive_std"),
+    )
+    summed, last = ("distance_km", "moving_s", "duration_s"), _POSITION[2:]
+    first = [n for n in rows.columns if n not in (*drive, "leg", *summed, *last)]
+    return (
+        rows.group_by(*drive, "leg", maintain_order=True)
+        .agg(pl.col(first).first(), pl.col(summed).sum(), pl.col(last).last())
+        .with_columns(
+            pl.col("leg").cast(pl.Int32), start=pl.col("start") + _seconds(pl.col("offset"))
+        )
+    )
+
+
+def _judged(rows: pl.DataFrame, limits: Limits) -> pl.DataFrame:
+    """Add interval, probability of overload and what follows from the limits."""
+    mass, std, permitted, freedom = (
+        rows[name].fill_null(float("nan")).to_numpy()
+        for name in ("mass_kg", "std_kg", "permitted_kg", "freedom")
+    )
+    reach = std * student.ppf(0.975, freedom)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        overload = student.sf((permitted - mass) / std, freedom)
+    room = pl.col("gross_kg") - pl.col("tare_kg")
+    level = (
+        pl.when(pl.col("overload") >= limits.alarm)
+        .then(pl.lit("alarm"))
+        .when(pl.col("overload") >= limits.warn)
+        .then(pl.lit("warn"))
+        .when(pl.col("overload").is_not_null())
+        .then(pl.lit("ok"))
+    )
+    return rows.with_columns(
+        low95_kg=_column(mass - reach),
+        high95_kg=_column(mass + reach),
+        overload=_column(overload),
+    ).with_columns(
+        level=level,
+        trailer=pl.col("coupled") | (pl.col("mass_kg") > limits.trailer * pl.col("gross_kg")),
+        empty=pl.col("payload_kg") < limits.empty * room,
+        tkm=1e-3 * pl.col("payload_kg").clip(lower_bound=0.0) * pl.col("distance_km"),
+    )
+
+
+def load_changes(rows: pl.DataFrame) -> pl.DataFrame:
+    """Return where and when the load of a vehicle changed between two of its legs.
+
+    What both masses share, an error of the vehicle file, moves their difference by as much of it
+    as the difference is of the mass. Within a drive the estimator told both loads apart; between
+    drives a change is told from `SURE` standard deviations on.
+
+    Parameters
+    ----------
+    rows : as of `legs`
+
+    Returns
+    -------
+    polars.DataFrame
+        ``vehicle_id``, ``time`` [UTC], ``stop_s``, ``latitude_deg``, ``longitude_deg``,
+        ``before_kg``, ``after_kg``, ``change_kg``, ``std_kg``, ``within_drive``, ``kind``
+        (loaded, unloaded, trailer on, trailer off).
+    """
+    known = rows.filter(pl.col("mass_kg").is_not_null() & pl.col("start").is_not_null())
+    own = (pl.col("std_kg").pow(2) - pl.col("shared_kg").fill_null(0.0).pow(2)).clip(0.0)
+    known = known.sort("vehicle_id", "start").with_columns(own=own)
+    before = {
+        f"old_{name}": pl.col(name).shift(1).over("vehicle_id")
+        for name in ("mass_kg", "own", "end", "key", "part", "trailer",
+                     "end_latitude_deg", "end_longitude_deg")
+    }  # fmt: skip
+    change = pl.col("mass_kg") - pl.col("old_mass_kg")
+    scale = pl.col("shared_kg").fill_null(0.0) / pl.col("mass_kg")
+    pairs = known.with_columns(**before).filter(pl.col("old_mass_kg").is_not_null())
+    pairs = pairs.with_columns(
+        change_kg=change,
+        change_std=(pl.col("own") + pl.col("old_own") + (scale * change).pow(2)).sqrt(),
+        within_drive=(pl.col("key") == pl.col("old_key")) & (pl.col("part") == pl.col("old_part")),
+    )
+    found = pairs.filter(
+        pl.col("within_drive") | (pl.col("change_kg").abs() > SURE * pl.col("change_std"))
+    )
+    towed = (pl.col("trailer") != pl.col("old_trailer")).fill_null(value=False)
+    more = pl.col("change_kg") > 0.0
+    kind = (
+        pl.when(towed & more).then(pl.lit("trailer on"))
+        .when(towed).then(pl.lit("trailer off"))
+        .when(more).then(pl.lit("loaded"))
+        .otherwise(pl.lit("unloaded"))
+    )  # fmt: skip
+    return found.select(
+        "vehicle_id",
+        pl.col("start").alias("time"),
+        (pl.col("start") - pl.col("old_end")).dt.total_seconds().alias("stop_s"),
+        pl.coalesce("start_latitude_deg", "old_end_latitude_deg").alias("latitude_deg"),
+        pl.coalesce("start_longitude_deg", "old_end_longitude_deg").alias("longitude_deg"),
+        pl.col("old_mass_kg").alias("before_kg"),
+        pl.col("mass_kg").alias("after_kg"),
+        "change_kg",
+        pl.col("change_std").alias("std_kg"),
+        "within_drive",
+        kind.alias("kind"),
+    )
+
+
+def instants(texts: pl.Series) -> pl.Series:
+    """Read ISO 8601 as instants, UTC where it names no zone; null stays null."""
+    found = [None if text is None else datetime.fromisoformat(text) for text in texts]
+    instants = [
+        None if t is None else (t if t.tzinfo else t.replace(tzinfo=UTC)).astimezone(UTC)
+        for t in found
+    ]
+    return pl.Series("start", instants, dtype=_TIME)
+
+
+def _seconds(value: pl.Expr) -> pl.Expr:
+    return (1e6 * value).cast(pl.Int64).cast(pl.Duration("us"))
+
+
+def _column(values: Floats) -> pl.Series:
+    return pl.Series(values).fill_nan(None)

@@ -1,0 +1,25 @@
+"""Names of files: which make a folder a drive, and which are drives of their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from weighbridge.io.formats import is_log
+from weighbridge.io.info import FILE_NAME as INFO_NAME
+from weighbridge.io.parts import SUFFIX as PARTS
+from weighbridge.io.read import TRUTH_NAME
+from weighbridge.signals.catalogue import TABLES
+
+
+def is_table_name(name: str) -> bool:
+    """Tell whether a file of such a name makes its folder a drive."""
+    if name == INFO_NAME:
+        return True
+    path = Path(name)
+    return path.stem.lower() in TABLES and (path.suffix == PARTS or is_log(path))
+
+
+def is_drive_name(name: str) -> bool:
+    """Tell whether a file of such a name may be a drive of its own."""
+    path = Path(name)
+    return path.stem.lower() != TRUTH_NAME and not name.startswith(".") and is_log(path)

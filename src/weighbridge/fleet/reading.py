@@ -1,0 +1,64 @@
+"""Results as lazy frames: the tables, and what is not gathered into them yet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import polars as pl
+
+from weighbridge.arguments import check_path
+from weighbridge.fleet.schema import DRIVES, SEGMENTS
+from weighbridge.fleet.store import TABLES, Results, read_parts
+
+
+def read_drives(results: str | Path) -> pl.LazyFrame:
+    """Return one row per drive, as `weighbridge.fleet.schema.DRIVES` lists the columns.
+
+    Each drive is there once, also while a run writes, and after a kill. Where a recording or its
+    vehicle file was changed and weighed again, the last answer is there.
+
+    Parameters
+    ----------
+    results : folder that ``weighbridge fleet`` wrote
+
+    Raises
+    ------
+    ConfigError
+        The folder holds no results.
+    """
+    check_path("results", results)
+    rows = _rows(Results.opened(Path(results)), "drives").select(list(DRIVES))
+    last = pl.col("weighed_at") == pl.col("weighed_at").max().over("source", "vehicle_id")
+    return rows.filter(last)
+
+
+def read_segments(results: str | Path) -> pl.LazyFrame:
+    """Return one row per segment of these drives, see `weighbridge.fleet.schema.SEGMENTS`.
+
+    Parameters
+    ----------
+    results : folder that ``weighbridge fleet`` wrote
+
+    Raises
+    ------
+    ConfigError
+        The folder holds no results.
+    """
+    check_path("results", results)
+    rows = _rows(Results.opened(Path(results)), "segments").select(list(SEGMENTS))
+    return rows.join(read_drives(results).select("key", "part"), on=["key", "part"], how="semi")
+
+
+def _rows(results: Results, table: str) -> pl.LazyFrame:
+    """Rows of a table and of the parts, each once."""
+    # Parts first: what is gathered in between is in both then, and never in none.
+    loose = TABLES[table](read_parts(results.part_files()))
+    files = results.table_files(table)
+    by: list[str] = [n for n in ("key", "part", "segment") if n in loose.columns]
+    frames = [loose.lazy()]
+    if files:
+        gathered = pl.scan_parquet(files, glob=False, hive_partitioning=False)
+        if loose.height:
+            gathered = gathered.join(loose.lazy().select(by), on=by, how="anti")
+        frames.append(gathered)
+    return pl.concat(frames)

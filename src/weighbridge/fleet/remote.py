@@ -1,0 +1,124 @@
+"""Recordings behind a URL, by fsspec: found, and brought to a folder of this machine."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from weighbridge.errors import DriveError, MissingExtraError
+from weighbridge.fleet.names import is_drive_name, is_table_name
+from weighbridge.visible import visible
+
+_URL: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
+
+
+def is_url(text: str) -> bool:
+    """Tell whether a text is a URL and no path."""
+    return _URL.match(text) is not None
+
+
+def was_url(path: Path) -> bool:
+    """Tell whether a path was made of a URL, of which it keeps one slash."""
+    return re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", path.as_posix()) is not None
+
+
+def drives(url: str, *, as_drive: bool) -> Iterator[str]:
+    """Find recordings behind a URL, which may be a pattern; the rules are those of paths.
+
+    Parameters
+    ----------
+    url : such as ``s3://bucket/drives/**``
+    as_drive : the folder is one drive, whatever is in it
+
+    Raises
+    ------
+    DriveError
+        The store cannot be asked.
+    MissingExtraError
+        fsspec, or what it needs for this kind of URL, is not installed.
+    """
+    files, root = _store(url)
+    try:
+        if as_drive and not _is_pattern(url):
+            yield url.rstrip("/")
+            return
+        if _is_pattern(root) and not files.exists(root):
+            found = sorted(files.glob(root))
+            below = sorted({f for path in found for f in files.find(path)})
+        else:
+            below = sorted(files.find(root))
+    except Exception as error:  # each store has errors of its own
+        raise DriveError(f"{url} cannot be listed: {error}") from None
+    yield from (files.unstrip_protocol(path) for path in _grouped(below))
+
+
+def fetch(urls: Sequence[str], folder: Path) -> list[Path]:
+    """Bring a recording to a folder; return its paths there.
+
+    Raises
+    ------
+    OSError
+        It is not there, or the store fails.
+    """
+    brought = []
+    for url in urls:
+        files, path = _store(url)
+        name = path.rstrip("/").rpartition("/")[2]
+        target = folder / name
+        if files.isdir(path):
+            target.mkdir()
+            inside = [f for f in files.find(path) if f != path]
+            for file in inside:
+                local = target / file[len(path.rstrip("/")) + 1 :]
+                local.parent.mkdir(parents=True, exist_ok=True)
+                files.get_file(file, str(local))
+        else:
+            files.get_file(path, str(target))
+        brought.append(target)
+    return brought
+
+
+def _store(url: str) -> tuple[Any, str]:
+    """File system of a URL and the path in it."""
+    try:
+        from fsspec.core import url_to_fs
+    except ImportError:
+        raise MissingExtraError("fsspec", "fleet", f"reading {visible(url)}") from None
+    try:
+        files, path = url_to_fs(url)
+    except ImportError as error:
+        raise MissingExtraError(
+            error.name or "s3fs", "s3", f"reading {visible(url)} ({error})"
+        ) from None
+    except ValueError as error:
+        raise DriveError(f"{url}: {error}") from None
+    return files, path
+
+
+def _is_pattern(text: str) -> bool:
+    return any(letter in text for letter in "*?[")
+
+
+def _grouped(files: Sequence[str]) -> Iterator[str]:
+    """Folders that hold tables, and other logs, in order."""
+    folders = {_parent(f) for f in files if is_table_name(_name(f)) and _name(f)}
+    told: set[str] = set()
+    for file in files:
+        home = _parent(file)
+        part_of = home if home in folders else _parent(home)
+        if home in folders or (home.endswith(".parts") and part_of in folders):
+            if part_of not in told:
+                told.add(part_of)
+                yield part_of
+        elif is_drive_name(_name(file)):
+            yield file
+
+
+def _parent(path: str) -> str:
+    return path.rpartition("/")[0]
+
+
+def _name(path: str) -> str:
+    return path.rpartition("/")[2]

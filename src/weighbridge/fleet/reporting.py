@@ -1,0 +1,135 @@
+"""All figures of a fleet at once: as frames, as JSON and as a page."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from weighbridge.fleet import figures, protocol
+from weighbridge.fleet.couplings import read_couplings
+from weighbridge.fleet.legs import Limits, legs, load_changes
+from weighbridge.fleet.reading import read_drives, read_segments
+from weighbridge.fleet.tickets import read_tickets
+from weighbridge.fleet.track import track
+from weighbridge.visible import visible_json
+from weighbridge.whole import write_whole
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetReport:
+    """What fleets ask.
+
+    Attributes
+    ----------
+    limits : by which overload, trailer and empty are told
+    tolerance : of the verdicts [-]
+    legs : one row per leg, see `weighbridge.fleet.legs.legs`
+    changes : of the load, see `weighbridge.fleet.legs.load_changes`
+    track : spans with one load, see `weighbridge.fleet.track.track`
+    vehicles : one row each, see `weighbridge.fleet.figures.per_vehicle`
+    totals : sums, see `weighbridge.fleet.figures.totals`
+    quality : what is wrong with the data, see `weighbridge.fleet.figures.quality`
+    speed_mass : distance by speed and mass, see `weighbridge.fleet.figures.speed_mass`
+    verdicts : of the protocol, see `weighbridge.fleet.protocol.verdicts`
+    rfms : last masses, see `weighbridge.fleet.figures.rfms`
+    """
+
+    limits: Limits
+    tolerance: float
+    legs: pl.DataFrame
+    changes: pl.DataFrame
+    track: pl.DataFrame
+    vehicles: pl.DataFrame
+    totals: dict[str, Any]
+    quality: pl.DataFrame
+    speed_mass: pl.DataFrame
+    verdicts: pl.DataFrame
+    rfms: pl.DataFrame
+
+    @property
+    def overloads(self) -> pl.DataFrame:
+        """Legs that are told as overloaded, the surest first."""
+        told = self.legs.filter(pl.col("level").is_in(["warn", "alarm"]))
+        return told.sort("overload", "mass_kg", descending=True, nulls_last=True)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything but the legs as plain values; instants as ISO 8601."""
+        return {
+            "limits": {**self.limits._asdict(), "tolerance": self.tolerance},
+            "totals": self.totals,
+            "vehicles": _rows(self.vehicles),
+            "overloads": _rows(self.overloads),
+            "load_changes": _rows(self.changes),
+            "track": _rows(self.track),
+            "quality": _rows(self.quality),
+            "speed_mass": _rows(self.speed_mass),
+            "verdicts": _rows(self.verdicts),
+            "rfms": _rows(self.rfms),
+        }
+
+    def to_json(self, path: str | Path) -> None:
+        """Write `to_dict` as JSON.
+
+        Raises
+        ------
+        ConfigError
+            The file cannot be written.
+        """
+        text = json.dumps(self.to_dict(), ensure_ascii=False, indent=1)
+        write_whole(path, visible_json(text) + "\n")
+
+
+def report(
+    results: str | Path,
+    *,
+    limits: Limits | None = None,
+    tickets: str | Path | None = None,
+    couplings: str | Path | None = None,
+    tolerance: float = protocol.TOLERANCE,
+) -> FleetReport:
+    """Work out the figures of a fleet.
+
+    Parameters
+    ----------
+    results : folder that ``weighbridge fleet`` wrote
+    limits : by which overload, trailer and empty are told
+    tickets : table of known masses, see `weighbridge.fleet.tickets.read_tickets`
+    couplings : table of trailers, see `weighbridge.fleet.couplings.read_couplings`
+    tolerance : largest error that passes the protocol [-]
+
+    Raises
+    ------
+    ConfigError
+        The folder holds no results, a limit cannot be, or a table cannot be read.
+    """
+    limits = limits or Limits()
+    told = [] if tickets is None else read_tickets(Path(tickets))
+    drives, segments = read_drives(results).collect(), read_segments(results).collect()
+    coupled = [] if couplings is None else read_couplings(Path(couplings))
+    rows = legs(drives, segments, limits, coupled)
+    changes = load_changes(rows)
+    vehicles = figures.per_vehicle(rows, changes)
+    known = protocol.known_masses(rows, drives, told)
+    return FleetReport(
+        limits=limits,
+        tolerance=tolerance,
+        legs=rows,
+        changes=changes,
+        track=track(rows, limits),
+        vehicles=vehicles,
+        totals=figures.totals(vehicles),
+        quality=figures.quality(drives),
+        speed_mass=figures.speed_mass(drives, segments),
+        verdicts=protocol.verdicts(known, tolerance),
+        rfms=figures.rfms(rows),
+    )
+
+
+def _rows(frame: pl.DataFrame) -> list[dict[str, Any]]:
+    instants = pl.selectors.datetime()
+    texts = frame.with_columns(instants.dt.strftime("%Y-%m-%dT%H:%M:%SZ"))
+    return texts.with_columns(pl.selectors.float().fill_nan(None)).to_dicts()

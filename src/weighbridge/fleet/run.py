@@ -1,0 +1,298 @@
+"""A fleet from recordings to rows: `weigh_drives`."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from weighbridge.errors import ConfigError
+from weighbridge.fleet.engine import Count, plain, run_jobs
+from weighbridge.fleet.inputs import Recording, recordings, refuse_missing
+from weighbridge.fleet.job import Job
+from weighbridge.fleet.keys import file_digest, text_digest
+from weighbridge.fleet.learning import learn_fleet, refuse_output
+from weighbridge.fleet.remote import is_url, was_url
+from weighbridge.fleet.store import KEYS, Results
+from weighbridge.fleet.tickets import read_tickets
+from weighbridge.fleet.vehicles import Vehicles
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_TOLD: Final = 2.0  # between writings of how far the run is [s]
+_GATHER: Final = 5_000  # receipts between gatherings of their parts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetSettings:
+    """How a fleet is weighed.
+
+    Attributes
+    ----------
+    method, settings : as of `weighbridge.weigh`
+    kind : class of vehicles without a file
+    mapping : for all logs; None for the one that each vehicle file names
+    dbc : databases of raw CAN logs
+    whole : take each recording as one drive
+    scheduler : address of a Dask cluster; None for workers of this machine
+    workers : their number; None for one per core
+    memory : limit of each, such as ``"1 GB"``
+    learn : folder for refined vehicle files; None to learn nothing
+    tickets : table of known masses to learn from, see `weighbridge.fleet.tickets`
+    """
+
+    method: str = "joint"
+    settings: Mapping[str, object] = field(default_factory=dict)
+    kind: str = "car"
+    mapping: Path | None = None
+    dbc: tuple[str, ...] = ()
+    whole: bool = False
+    scheduler: str | None = None
+    workers: int | None = None
+    memory: str | None = None
+    learn: Path | None = None
+    tickets: Path | None = None
+
+    def __post_init__(self) -> None:
+        from weighbridge.estimators import ESTIMATORS
+
+        if self.method not in ESTIMATORS:
+            raise ConfigError(f"unknown method {self.method!r}; known are {ESTIMATORS.names}")
+        if (self.learn is None) != (self.tickets is None):
+            raise ConfigError(
+                "learning needs a folder for the refined vehicle files and a table of tickets: "
+                "give both, --learn DIR and --tickets FILE"
+            )
+        if self.settings:
+            ESTIMATORS[self.method].settings_of(self.settings)
+
+
+def weigh_drives(
+    drives: str | Path | Iterable[str | Path],
+    vehicles: str | Path,
+    results: str | Path,
+    *,
+    method: str = "joint",
+    settings: Mapping[str, object] | None = None,
+    kind: str = "car",
+    mapping: str | Path | None = None,
+    dbc: Sequence[str] = (),
+    whole: bool = False,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    memory: str | None = None,
+    learn: str | Path | None = None,
+    tickets: str | Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> pl.LazyFrame:
+    """Weigh many drives in parallel; go on where an earlier run ended.
+
+    Parameters
+    ----------
+    drives : paths, patterns such as ``"drives/**"``, URLs, or tables of drives
+    vehicles : folder of vehicle files, each named after its vehicle
+    results : folder that is written to; seen by all workers
+    method, settings : as of `weighbridge.weigh`
+    kind : class of vehicles without a file, whose data sheet stands in
+    mapping : for all logs; None for the one that each vehicle file names
+    dbc : databases of raw CAN logs
+    whole : take each recording as one drive
+    scheduler : address of a Dask cluster; None for workers of this machine
+    workers, memory : number and limit of the workers of this machine
+    learn, tickets : folder for vehicle files refined by the drives of known mass, and the table of
+        these; what was learnt is in ``learnt.parquet`` of the results
+    progress : called with recordings done and found
+
+    Returns
+    -------
+    One row per drive, see `weighbridge.fleet.schema.DRIVES`; a drive that cannot be weighed has
+    its reason there
+
+    Raises
+    ------
+    ConfigError
+        An argument, a vehicle file or the folder of the results cannot be used.
+    DriveError
+        Nothing is there of a name.
+    """
+    from weighbridge.fleet.reading import read_drives
+
+    given = [drives] if isinstance(drives, str | Path) else list(drives)
+    how = FleetSettings(
+        method=method,
+        settings=dict(settings or {}),
+        kind=kind,
+        mapping=None if mapping is None else Path(mapping),
+        dbc=tuple(dbc),
+        whole=whole,
+        scheduler=scheduler,
+        workers=workers,
+        memory=memory,
+        learn=None if learn is None else Path(learn),
+        tickets=None if tickets is None else Path(tickets),
+    )
+    told = None if progress is None else lambda count: progress(count.done, count.found)
+    run_fleet([str(one) for one in given], Path(vehicles), Path(results), how, told)
+    return read_drives(results)
+
+
+def run_fleet(
+    given: Sequence[str],
+    vehicles: Path,
+    folder: Path,
+    how: FleetSettings,
+    tell: Callable[[Count], None] | None = None,
+) -> Count:
+    """Weigh recordings into a folder of results; see `weigh_drives`.
+
+    However it ends, what was weighed is in the results.
+    """
+    from weighbridge.fleet.cluster import connected
+
+    with prepared(given, vehicles, folder, how) as jobs:
+        teller = _Teller(Results(folder), tell)
+        try:
+            with connected(how.scheduler, how.workers, how.memory) as client:
+                count = run_jobs(client, jobs, teller)
+                if how.learn is not None and how.tickets is not None:
+                    shelf = Vehicles(vehicles, how.kind, how.mapping)
+                    learn_fleet(client, folder, shelf, how.tickets, how.learn, whole=how.whole)
+                return count
+        finally:
+            teller.ended()
+
+
+@contextlib.contextmanager
+def prepared(
+    given: Sequence[str], vehicles: Path, folder: Path, how: FleetSettings
+) -> Iterator[Iterator[Job]]:
+    """Give the jobs of recordings; gather what was weighed when the block ends, however it does.
+
+    Parameters
+    ----------
+    given, vehicles, folder, how : as of `run_fleet`
+
+    Raises
+    ------
+    ConfigError, DriveError
+        As of `weigh_drives`.
+    """
+    shelf = Vehicles(vehicles, how.kind, how.mapping)
+    if how.learn is not None and how.tickets is not None:
+        refuse_output(how.learn, shelf)
+        read_tickets(how.tickets)
+    refuse_missing(given)
+    found = recordings(given)
+    first = next(found)
+    if was_url(folder):
+        raise ConfigError(f"{folder}: results go to a folder; mount the store, or copy them there")
+    databases = _dbc_digest(how.dbc)
+    results = Results.begun(folder)
+    with results.locked():
+        results.clean()
+        known = _known_file(results)
+        try:
+            yield _jobs_of(chain([first], found), shelf, results, how, known, databases)
+        finally:
+            results.gather()
+            if known is not None:
+                known.unlink(missing_ok=True)
+
+
+def _jobs_of(
+    found: Iterable[Recording],
+    shelf: Vehicles,
+    results: Results,
+    how: FleetSettings,
+    known: Path | None,
+    databases: str,
+) -> Iterator[Job]:
+    folder = str(results.folder.resolve())
+    for recording in found:
+        yield Job(
+            recording=_whole_path(recording),
+            assigned=shelf.of(recording.paths, recording.vehicle, recording.kind),
+            results=folder,
+            method=how.method,
+            settings=how.settings,
+            dbc=how.dbc,
+            dbc_digest=databases,
+            whole=how.whole,
+            known=None if known is None else str(known.resolve()),
+        )
+
+
+def _dbc_digest(paths: Sequence[str]) -> str:
+    try:
+        return text_digest(file_digest(Path(path)) for path in paths)
+    except OSError as error:
+        raise ConfigError(f"{error.filename}: cannot be read ({error.strerror})") from None
+
+
+def _whole_path(recording: Recording) -> Recording:
+    """Return a recording by paths that hold in any working folder."""
+    import os
+
+    paths = (p if is_url(p) else os.path.abspath(p) for p in recording.paths)  # noqa: PTH100
+    return recording._replace(paths=tuple(paths))
+
+
+def _known_file(results: Results) -> Path | None:
+    """Write the keys that are there already for the workers; None where none is."""
+    results.gather()
+    keys = results.known_keys()
+    if not keys:
+        return None
+    from weighbridge.whole import write_whole
+
+    path = results.folder / f".{time.time_ns()}{KEYS}"
+    write_whole(path, "\n".join(sorted(keys)))
+    return path
+
+
+class _Teller:
+    """Writes how far a run is, gathers parts now and then, and tells whoever asked."""
+
+    def __init__(self, results: Results, tell: Callable[[Count], None] | None) -> None:
+        self._results = results
+        self._tell = tell
+        self._last = -_TOLD
+        self._count = Count()
+        self._gathered = 0
+        self._gathering: Future[None] | None = None
+        self._beside = ThreadPoolExecutor(1)
+
+    def __call__(self, count: Count) -> None:
+        self._count = count
+        if self._tell is not None:
+            self._tell(count)
+        if time.monotonic() - self._last >= _TOLD:
+            self._last = time.monotonic()
+            self._write(ended=False)
+            if count.done - self._gathered >= _GATHER:
+                self._gather()
+
+    def ended(self) -> None:
+        """Wait for the gathering, and say that the run is over."""
+        self._beside.shutdown()
+        self._write(ended=True)
+
+    def _gather(self) -> None:
+        """Gather beside the run; a failure is raised by the next."""
+        if self._gathering is not None:
+            if not self._gathering.done():
+                return
+            self._gathering.result()
+        self._gathered = self._count.done
+        self._gathering = self._beside.submit(self._results.gather)
+
+    def _write(self, *, ended: bool) -> None:
+        told: dict[str, Any] = plain(self._count) | {"ended": ended, "at": time.time()}
+        with contextlib.suppress(ConfigError):
+            self._results.tell(told)

@@ -1,0 +1,139 @@
+"""The tables of a fleet's results: every column, its type and what it is. The only place that
+lists them.
+
+A row of `DRIVES` is one drive, a row of `SEGMENTS` one segment of it. They belong together by
+``key`` and ``part``. Numbers are null where there is none.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import polars as pl
+
+FORMAT_VERSION: Final = 2
+"""Version of the tables; part of every key, so that another one weighs anew."""
+
+UNKNOWN_DATE: Final = "__HIVE_DEFAULT_PARTITION__"
+"""Partition of drives without a date, as Hive names it: readers take it for null."""
+
+
+PERIOD: Final = 300.0
+"""Length of the periods of a segment whose distances are kept [s]."""
+
+CHECKS: Final = (900.0, 600.0)
+"""The running mass is kept this long after the vehicle first moves, and again every so long [s]
+(Regulation (EU) 2019/1213, Annex I, point 4.1)."""
+
+
+class Column(NamedTuple):
+    """One column: its type and what it is."""
+
+    type: pl.DataType
+    about: str
+
+
+_TEXT: Final = pl.String()
+_NUMBER: Final = pl.Float64()
+_NUMBERS: Final = pl.List(pl.Float64())
+_COUNT: Final = pl.Int32()
+_TIME: Final = pl.Datetime("us", "UTC")
+
+DRIVES: Final[dict[str, Column]] = {
+    "key": Column(_TEXT, "digest of the recording's content, vehicle, method and version"),
+    "part": Column(_COUNT, "which drive of its recording, from 0"),
+    "parts": Column(_COUNT, "drives that its recording holds"),
+    "date": Column(pl.Date(), "day of the start in UTC; the partition"),
+    "source": Column(_TEXT, "path or URL of the recording, as it was found"),
+    "outcome": Column(_TEXT, "weighed, unread (bad data) or failed (three tries; tried again)"),
+    "vehicle_id": Column(_TEXT, "id by which its vehicle file was found"),
+    "vehicle_file": Column(_TEXT, "name of that file; null where the class's data sheet stood in"),
+    "vehicle_class": Column(_TEXT, "car, van, bus or truck"),
+    "tare_kg": Column(_NUMBER, "mass of the empty vehicle, of its file"),
+    "gross_kg": Column(_NUMBER, "permitted mass, of its file"),
+    "drive": Column(_TEXT, "name; from here to warnings as `weighbridge weigh` has it"),
+    "vehicle": Column(_TEXT, "name in the vehicle file"),
+    "start": Column(_TEXT, "ISO 8601 in UTC"),
+    "method": Column(_TEXT, "estimator"),
+    "status": Column(_TEXT, "converged, not_excited, inconsistent or missing_signals"),
+    "reason": Column(_TEXT, "why there is no mass; empty where there is"),
+    "mass_kg": Column(_NUMBER, "mass"),
+    "std_kg": Column(_NUMBER, "its standard deviation"),
+    "low95_kg": Column(_NUMBER, "lower end of the 95 % interval"),
+    "high95_kg": Column(_NUMBER, "upper end of it"),
+    "payload_kg": Column(_NUMBER, "mass minus tare"),
+    "duration_s": Column(_NUMBER, "first to last stamp"),
+    "used_s": Column(_NUMBER, "time of the rows that the mass is made of"),
+    "converged_at_s": Column(_NUMBER, "from the start until the mass stays at the result"),
+    "bound_std_kg": Column(_NUMBER, "Cramér-Rao bound of the drive"),
+    "warnings": Column(pl.List(pl.String()), "what was mended or doubted, one sentence each"),
+    "load_changed": Column(pl.Boolean(), "segments are loads told apart"),
+    "unweighed_s": Column(_NUMBER, "time of its segments without a usable force"),
+    "freedom": Column(_NUMBER, "degrees of freedom of the mass (Student's t); infinite is normal"),
+    "distance_km": Column(_NUMBER, "driven, from the speed"),
+    "moving_s": Column(_NUMBER, "time in which the vehicle moved"),
+    "systematic_std_kg": Column(_NUMBER, "part of std_kg that all drives of the vehicle share"),
+    "first_mass_s": Column(_NUMBER, "from the first motion to a running mass within 10 %, 1 std"),
+    "checked_kg": Column(_NUMBERS, "running mass 15 min after the first motion, then every 10 min"),
+    "checked_std_kg": Column(_NUMBERS, "its standard deviations; null where there was none yet"),
+    "known_mass_kg": Column(_NUMBER, "mass that the drive itself tells (drive.toml)"),
+    "start_latitude_deg": Column(_NUMBER, "first position"),
+    "start_longitude_deg": Column(_NUMBER, ""),
+    "end_latitude_deg": Column(_NUMBER, "last position"),
+    "end_longitude_deg": Column(_NUMBER, ""),
+    "signals": Column(pl.List(pl.String()), "signals that the drive has"),
+    "tries": Column(_COUNT, "how often it was tried"),
+    "weighed_at": Column(_TIME, "when this row was made"),
+    "version": Column(_TEXT, "of weighbridge"),
+}
+"""One row per drive."""
+
+SEGMENTS: Final[dict[str, Column]] = {
+    "key": Column(_TEXT, "as of the drive"),
+    "part": Column(_COUNT, "as of the drive"),
+    "segment": Column(_COUNT, "which segment, in order of time, from 0"),
+    "date": Column(pl.Date(), "as of the drive; the partition"),
+    "start_s": Column(
+        _NUMBER,
+        "begin as `weigh` tells it, on the drive's clock; null where no force was usable from a "
+        "stop on at which the load could change",
+    ),
+    "end_s": Column(_NUMBER, "end as `weigh` tells it"),
+    "mass_kg": Column(_NUMBER, "mass; null where none was weighed"),
+    "std_kg": Column(_NUMBER, "its standard deviation"),
+    "from_s": Column(_NUMBER, "from here on the mass stands; all segments fill the drive"),
+    "to_s": Column(_NUMBER, "until here it stands: the next segment, or the end of the drive"),
+    "weighed_s": Column(_NUMBER, "time of the rows in it that the mass is made of"),
+    "distance_km": Column(_NUMBER, "driven from from_s to to_s"),
+    "moving_s": Column(_NUMBER, "time in which the vehicle moved"),
+    "period_km": Column(_NUMBERS, "driven in each 5 min of it, the last one cut short"),
+    "start_latitude_deg": Column(_NUMBER, "position at from_s, where the load was changed"),
+    "start_longitude_deg": Column(_NUMBER, ""),
+    "end_latitude_deg": Column(_NUMBER, "position at to_s"),
+    "end_longitude_deg": Column(_NUMBER, ""),
+}
+"""One row per segment: the mass between stops at which load can change."""
+
+WEIGHED: Final = "weighed"
+UNREAD: Final = "unread"
+FAILED: Final = "failed"
+"""Outcomes: of a drive that `weigh` answers, of one that it refuses, of one tried in vain."""
+
+_INNER: Final = tuple(name for name in SEGMENTS if name not in ("key", "part", "date"))
+
+PART: Final[dict[str, pl.DataType]] = {
+    **{name: column.type for name, column in DRIVES.items()},
+    "segments": pl.List(pl.Struct({name: SEGMENTS[name].type for name in _INNER})),
+}
+"""Columns of a part file, as workers write it: the drives of one recording, segments within."""
+
+
+def drives_of(parts: pl.DataFrame) -> pl.DataFrame:
+    """Return the rows of `DRIVES` that part files hold."""
+    return parts.select(list(DRIVES))
+
+
+def segments_of(parts: pl.DataFrame) -> pl.DataFrame:
+    """Return the rows of `SEGMENTS` that part files hold."""
+    rows = parts.select("key", "part", "date", "segments").explode("segments")
+    return rows.filter(pl.col("segments").is_not_null()).unnest("segments").select(list(SEGMENTS))

@@ -1,0 +1,281 @@
+"""A folder of results: part files as workers write them, and the tables they are gathered into.
+
+::
+
+    RESULTS/fleet.json                              marks the folder; format version
+    RESULTS/parts/ab/abcd….arrow                    one recording each, named after its key
+    RESULTS/drives/date=2026-05-01/drives-0000.parquet
+    RESULTS/segments/date=2026-05-01/segments-0000.parquet
+    RESULTS/progress.json                           how far the last run is, for `fleet status`
+
+Every file comes by one rename, so that a kill at any instant leaves whole files. A part is removed
+after its rows are in the tables; a row that is in both is the same row, by ``key`` and ``part``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import secrets
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import polars as pl
+
+from weighbridge.errors import ConfigError
+from weighbridge.fleet.schema import (
+    FAILED,
+    FORMAT_VERSION,
+    PART,
+    UNKNOWN_DATE,
+    drives_of,
+    segments_of,
+)
+from weighbridge.whole import PART as UNFINISHED
+from weighbridge.whole import whole_file, write_whole
+
+MARK: Final = "fleet.json"
+PROGRESS: Final = "progress.json"
+PARTS: Final = "parts"
+KEYS: Final = "-known.keys"
+_LOCK: Final = ".lock"
+_SUFFIX: Final = ".arrow"
+
+TABLES: Final = MappingProxyType({"drives": drives_of, "segments": segments_of})
+"""Tables of the results, and how they are made of parts."""
+
+FULL: Final = 100_000
+"""Rows of one file of a table, about: later rows of the date begin another."""
+
+_GATHERED: Final = 5_000
+"""Parts that are read at once; some 50 MB."""
+
+
+def is_results(folder: Path) -> bool:
+    """Tell whether a folder holds results of a fleet."""
+    return (folder / MARK).is_file()
+
+
+def part_path(folder: Path, key: str) -> Path:
+    """Where the part of a key goes."""
+    return folder / PARTS / key[:2] / f"{key}{_SUFFIX}"
+
+
+def write_part(folder: Path, key: str, rows: Sequence[dict[str, Any]]) -> None:
+    """Write the rows of one recording, whole or not at all.
+
+    Raises
+    ------
+    ConfigError
+        The folder cannot be written to.
+    """
+    path = part_path(folder, key)
+    part = path.with_name(f".{key}-{secrets.token_hex(4)}{UNFINISHED}")
+    frame = pl.DataFrame(rows, schema=PART, orient="row")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Not as `whole_file`: a rename that a power cut takes back costs one drive, weighed again.
+        with part.open("wb") as file:
+            frame.write_ipc(file)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as e:
+        raise ConfigError(f"{path} cannot be written: {e.strerror or e}") from None
+
+
+def read_parts(paths: Sequence[Path]) -> pl.DataFrame:
+    """Read part files; those that were gathered meanwhile are left out."""
+    frames = []
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError):
+            frames.append(pl.read_ipc(io.BytesIO(path.read_bytes())))
+    return pl.concat(frames) if frames else pl.DataFrame(schema=PART)
+
+
+class Results:
+    """A folder of results.
+
+    Parameters
+    ----------
+    folder : as of `opened` or `begun`
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    @classmethod
+    def opened(cls, folder: Path) -> Results:
+        """Return the results that a folder holds.
+
+        Raises
+        ------
+        ConfigError
+            It holds none, or those of another version.
+        """
+        if not is_results(folder):
+            raise ConfigError(
+                f"{folder}: holds no results of weighbridge fleet; name such a folder"
+            )
+        try:
+            version = json.loads((folder / MARK).read_text(encoding="utf-8")).get("format_version")
+        except (OSError, ValueError, AttributeError) as error:
+            raise ConfigError(f"{folder / MARK} cannot be read: {error}") from None
+        if version != FORMAT_VERSION:
+            raise ConfigError(
+                f"{folder}: results of format {version}, and this program writes {FORMAT_VERSION}; "
+                "name another folder"
+            )
+        return cls(folder)
+
+    @classmethod
+    def begun(cls, folder: Path) -> Results:
+        """Return the results in a folder, which is made where it is not there.
+
+        Raises
+        ------
+        ConfigError
+            The folder holds something else, or cannot be written to.
+        """
+        if is_results(folder):
+            return cls.opened(folder)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            there = [f.name for f in folder.iterdir() if not f.name.endswith(UNFINISHED)]
+        except OSError as e:
+            raise ConfigError(f"{folder} cannot be written: {e.strerror or e}") from None
+        if there:
+            raise ConfigError(
+                f"{folder}: is there and holds no results of weighbridge fleet; name an empty or "
+                "new folder"
+            )
+        write_whole(folder / MARK, json.dumps({"format_version": FORMAT_VERSION}) + "\n")
+        return cls(folder)
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs out; the lock goes with the process, however it ends.
+
+        Raises
+        ------
+        ConfigError
+            Another run writes here.
+        """
+        with (self.folder / _LOCK).open("ab") as file:
+            if not _lock(file.fileno()):
+                raise ConfigError(
+                    f"{self.folder}: another run of weighbridge fleet writes here; wait for it, or "
+                    "name another folder"
+                )
+            yield
+
+    @property
+    def running(self) -> bool:
+        """Whether a run holds the lock."""
+        try:
+            with (self.folder / _LOCK).open("rb") as file:
+                return not _lock(file.fileno())
+        except OSError:
+            return False
+
+    def part_files(self) -> list[Path]:
+        """List the parts that are not gathered, or not removed, yet."""
+        return sorted((self.folder / PARTS).glob(f"*/*{_SUFFIX}"))
+
+    def table_files(self, table: str) -> list[Path]:
+        """List the files of a table."""
+        return sorted((self.folder / table).glob("date=*/*.parquet"))
+
+    def clean(self) -> None:
+        """Remove what killed writers left."""
+        import shutil
+
+        for left in self.folder.glob(f"**/.*{UNFINISHED}"):
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
+        for left in self.folder.glob(f".*{KEYS}"):
+            left.unlink(missing_ok=True)
+
+    def known_keys(self) -> set[str]:
+        """Keys that need not be weighed again: all but those of drives that failed."""
+        parts = self.part_files()
+        frames = [_columns(path, ["key", "outcome"]) for path in self.table_files("drives")]
+        found = {k for f in frames for k in f.filter(pl.col("outcome") != FAILED)["key"]}
+        for k in range(0, len(parts), _GATHERED):
+            some = read_parts(parts[k : k + _GATHERED])
+            found |= set(some.filter(pl.col("outcome") != FAILED)["key"])
+        return found
+
+    def gather(self) -> None:
+        """Bring the rows of all parts into the tables, and remove the parts.
+
+        Raises
+        ------
+        ConfigError
+            The folder cannot be written to. Nothing is lost.
+        """
+        parts = self.part_files()
+        for k in range(0, len(parts), _GATHERED):
+            some = parts[k : k + _GATHERED]
+            rows = read_parts(some).unique(["key", "part"], keep="first", maintain_order=True)
+            for table, made in TABLES.items():
+                for (day,), own in made(rows).partition_by("date", as_dict=True).items():
+                    self._add(table, day, own)
+            for path in some:
+                path.unlink(missing_ok=True)
+
+    def _add(self, table: str, day: Any, rows: pl.DataFrame) -> None:
+        """Add to the last file of a date what none of its files has."""
+        home = self.folder / table / f"date={UNKNOWN_DATE if day is None else day.isoformat()}"
+        files = sorted(home.glob("*.parquet"))
+        by: list[str] = [n for n in ("key", "part", "segment") if n in rows.columns]
+        last = _columns(files[-1], None) if files else None
+        if last is not None and last.height >= FULL:
+            last = None
+        number = len(files) if last is None else len(files) - 1
+        for path in files[:number]:
+            rows = rows.join(_columns(path, by), on=by, how="anti")
+        if rows.is_empty():
+            return
+        if last is not None:
+            # A drive that failed, and fails again, has a new row.
+            rows = pl.concat([last.join(rows, on=by, how="anti"), rows])
+        home.mkdir(parents=True, exist_ok=True)
+        with whole_file(home / f"{table}-{number:04d}.parquet") as part:
+            rows.sort(by).write_parquet(part, compression="zstd")
+
+    def tell(self, progress: dict[str, Any]) -> None:
+        """Write how far a run is."""
+        write_whole(self.folder / PROGRESS, json.dumps(progress) + "\n")
+
+    def told(self) -> dict[str, Any]:
+        """Return how far the last run came; empty where that is not known."""
+        try:
+            found = json.loads((self.folder / PROGRESS).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}
+
+
+def _columns(path: Path, names: list[str] | None) -> pl.DataFrame:
+    with path.open("rb") as file:
+        return pl.read_parquet(file, columns=names, hive_partitioning=False)
+
+
+def _lock(number: int) -> bool:
+    """Lock an open file; False where another process has it."""
+    if os.name == "nt":
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

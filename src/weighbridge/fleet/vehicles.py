@@ -1,0 +1,191 @@
+"""Which vehicle a drive is of: by a column, a folder's name or a file's, else its class's."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+from weighbridge.errors import ConfigError
+from weighbridge.fleet.keys import file_digest, text_digest
+from weighbridge.pipeline.given import mapping_of
+from weighbridge.signals import Drive
+from weighbridge.vehicle.classes import VEHICLE_CLASSES
+from weighbridge.vehicle.known import Known, describe
+from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+# After its id a file's name goes on with anything but a letter or a digit: truck17_2025-06-11.
+_BEHIND: Final = re.compile(r"[^A-Za-z0-9]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assigned:
+    """The vehicle that a drive is weighed as.
+
+    Attributes
+    ----------
+    id : by which it was found; None where nothing tells it
+    file : name of its file; None where its class's data sheet stands in
+    vehicle : of the file; None for the data sheet, which asks the drive for its torque
+    kind : name of its class
+    mapping : what its logs are read with; None for canonical ones
+    digest : of file and mapping
+    mapping_file : its path; None where there is none
+    """
+
+    id: str | None
+    file: str | None
+    vehicle: Vehicle | None
+    kind: str
+    mapping: Mapping[str, Any] | None
+    digest: str
+    mapping_file: str | None = None
+
+    def as_vehicle(self, drive: Drive) -> Vehicle:
+        """Return the vehicle; that of a data sheet with the best torque that the drive tells."""
+        if self.vehicle is not None:
+            return self.vehicle
+        reported = (s for s in TORQUE_SOURCES.values() if s.signed and not s.lacking(drive))
+        source = next(reported, None)
+        known = Known(
+            name=self.id or self.kind,
+            kind=self.kind,
+            torque=source.name if source is not None else None,
+        )
+        return describe(known).vehicle
+
+    @property
+    def note(self) -> str:
+        """Say that no file was found; empty where one was."""
+        if self.vehicle is not None:
+            return ""
+        whose = f"vehicle {self.id}" if self.id is not None else "this drive"
+        return (
+            f"there is no vehicle file for {whose}: the data sheet of a {self.kind} stands in, and "
+            "the mass is rough"
+        )
+
+
+class Vehicles:
+    """The vehicle files of a folder, each read once, by the name of the file.
+
+    Parameters
+    ----------
+    folder : of vehicle files; ``ID.toml`` is that of the vehicle ID
+    kind : class of a vehicle without a file
+    mapping : for all logs; None for the one that each vehicle file names
+
+    Raises
+    ------
+    ConfigError
+        No folder, no file in it, or a file that cannot be used.
+    """
+
+    def __init__(self, folder: Path, kind: str = "car", mapping: Path | None = None) -> None:
+        if not folder.is_dir():
+            raise ConfigError(f"{folder}: no such folder of vehicle files")
+        if kind not in VEHICLE_CLASSES:
+            raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {kind!r}")
+        self._kind = kind
+        self._mapping = mapping
+        self.files = tuple(
+            f for f in sorted(folder.glob("*.toml")) if f.is_file() and _is_vehicle(f)
+        )
+        self._known = {path.stem: self._read(path) for path in self.files}
+        self._sheets: dict[tuple[str | None, str], Assigned] = {}
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    def of(
+        self, paths: tuple[str, ...], given: str | None = None, kind: str | None = None
+    ) -> Assigned:
+        """Return the vehicle of a recording.
+
+        The id is the one given, else the name of the nearest folder that a vehicle file is named
+        after, else what the file's name begins with.
+
+        Parameters
+        ----------
+        paths : of the recording, paths or URLs
+        given : id of the vehicle, from a table of drives
+        kind : class, where no file is found
+
+        Raises
+        ------
+        ConfigError
+            No such class.
+        """
+        if given is not None:
+            found = self._known.get(given)
+            return found if found is not None else self._sheet(given, kind)
+        path = PurePosixPath(paths[0].replace("\\", "/"))
+        for name in (path.name, path.stem, *(p.name for p in path.parents)):
+            if name in self._known:
+                return self._known[name]
+        for name in (path.name, path.parent.name):
+            begun = [i for i in self._known if name.startswith(i) and _BEHIND.match(name, len(i))]
+            if begun:
+                return self._known[max(begun, key=len)]
+        return self._sheet(path.parent.name or None, kind)
+
+    def _read(self, path: Path) -> Assigned:
+        vehicle = Vehicle.load(path)
+        named = mapping_of(vehicle, path, self._mapping)
+        return Assigned(
+            id=path.stem,
+            file=path.name,
+            vehicle=vehicle,
+            kind=vehicle.kind,
+            mapping=_mapping(named),
+            digest=text_digest([file_digest(path), "" if named is None else file_digest(named)]),
+            mapping_file=None if named is None else str(named.resolve()),
+        )
+
+    def _sheet(self, name: str | None, kind: str | None) -> Assigned:
+        kind = kind or self._kind
+        if kind not in VEHICLE_CLASSES:
+            raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {kind!r}")
+        if (name, kind) not in self._sheets:
+            named = self._mapping
+            self._sheets[name, kind] = Assigned(
+                id=name,
+                file=None,
+                vehicle=None,
+                kind=kind,
+                mapping=_mapping(named),
+                digest=text_digest([kind, "" if named is None else file_digest(named)]),
+            )
+        return self._sheets[name, kind]
+
+
+def _mapping(path: Path | None) -> Mapping[str, Any] | None:
+    """Return what a mapping file says, to be sent to a worker that may not see the file.
+
+    Raises
+    ------
+    ConfigError
+        It cannot be used.
+    """
+    if path is None:
+        return None
+    import tomllib
+
+    from weighbridge.io.mapping import load_mapping
+
+    load_mapping(path)
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def _is_vehicle(path: Path) -> bool:
+    """Tell a vehicle file from a mapping beside it."""
+    import tomllib
+
+    try:
+        with path.open("rb") as file:
+            return not ({"csv", "time", "signals", "tables"} & set(tomllib.load(file)))
+    except (OSError, ValueError):
+        return True

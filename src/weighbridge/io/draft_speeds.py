@@ -1,0 +1,77 @@
+"""Whether the speeds of the wheels and of satellites agree, as drafts of a log have them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from weighbridge.io.draft import Draft
+from weighbridge.io.draft_column import DraftColumn
+from weighbridge.signals.units import UNITS
+
+SPEEDS: Final = ("kmh", "mph", "mps", "kn")
+"""Units in which loggers write speeds."""
+
+NEAR: Final = 0.08
+"""A ratio of two speeds is that of two units within this part [-]: indicated speeds read up to a
+tenth too much, satellites miss the peaks."""
+
+SLOWEST: Final = 3.0
+"""Slower in the median, or in the highest, nothing is compared [m/s]."""
+
+
+def with_compared_speeds(drafts: Sequence[Draft]) -> list[Draft]:
+    """Doubt the unit of a vehicle speed that is another unit's multiple of the satellites' speed.
+
+    Parameters
+    ----------
+    drafts : of the files of one drive or logger
+    """
+    ground = _only(drafts, "gnss_speed")
+    speed = _only(drafts, "vehicle_speed")
+    if ground is None or speed is None:
+        return list(drafts)
+    meant = _meant(speed, ground)
+    if meant is None:
+        return list(drafts)
+    ratio = _si(speed.high, speed) / _si(ground.high, ground)
+    doubt = (
+        f"reads {ratio:.2f} times the speed of {ground.name!r}, as {meant} under {speed.unit} "
+        f'would: write unit = "{meant}" for it, if {ground.name!r} is in {ground.unit}'
+    )
+    told = replace(speed, doubt=f"{speed.doubt}; {doubt}" if speed.doubt else doubt, unsure=True)
+    return [
+        replace(one, columns=tuple(told if c is speed else c for c in one.columns))
+        for one in drafts
+    ]
+
+
+def _only(drafts: Sequence[Draft], quantity: str) -> DraftColumn | None:
+    """Return the column of a quantity; None where there is none, or several differ."""
+    found = [c for one in drafts for c in one.columns if c.quantity == quantity]
+    return found[0] if len(found) == 1 else None
+
+
+def _si(value: float, column: DraftColumn) -> float:
+    return value * UNITS[column.unit].factor
+
+
+def _meant(speed: DraftColumn, ground: DraftColumn) -> str | None:
+    """Unit that a speed seems to be in; None where the one it is taken for fits.
+
+    Highest and median have to tell the same, so that neither a spike nor a stop decides.
+    """
+    pairs = [
+        (_si(a, speed), _si(b, ground))
+        for a, b in ((speed.high, ground.high), (speed.usual, ground.usual))
+    ]
+    if min(b for _, b in pairs) < SLOWEST or min(a for a, _ in pairs) <= 0.0:
+        return None
+    for unit in SPEEDS:
+        if unit == speed.unit:
+            continue
+        factor = UNITS[speed.unit].factor / UNITS[unit].factor
+        if all(abs(a / b / factor - 1.0) < NEAR for a, b in pairs):
+            return unit
+    return None

@@ -1,0 +1,37 @@
+"""Paths that a user gives."""
+
+from __future__ import annotations
+
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+
+from weighbridge.arguments import check_path, check_type
+from weighbridge.errors import DriveError
+
+
+def is_folder(path: Path) -> bool:
+    """Tell whether a path is a folder.
+
+    Raises
+    ------
+    DriveError
+        The path can be none: its name is too long, or its links lead round.
+    """
+    try:
+        # Raises where `Path.is_dir` would answer no, or in some versions raise.
+        return stat.S_ISDIR(path.stat().st_mode)
+    except FileNotFoundError:
+        raise DriveError(f"{path}: no such file or folder") from None
+    except (OSError, ValueError) as e:
+        reason = e.strerror if isinstance(e, OSError) else e
+        raise DriveError(f"{path} cannot be read: {reason}") from None
+
+
+def given_paths(name: str, given: Iterable[str | Path]) -> list[str | Path]:
+    """Several paths, each checked."""
+    check_type(name, given, Iterable, "a path, as text or pathlib.Path, or a list of them")
+    paths = list(given)
+    for one in paths:
+        check_path(f"each {name}", one)
+    return paths

@@ -1,0 +1,67 @@
+"""What a reproduction of Du et al. 2025 finds: of one drive, and of all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from weighbridge.estimators import MassTrack
+from weighbridge.vehicle.model import Vehicle
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveResult:
+    """How one drive went, by method.
+
+    Attributes
+    ----------
+    load : of `LOADS`
+    seed : of the drive
+    true_mass : mean over the drive [kg]
+    tracks : of each method
+    rmse : of the running mass from the first one told [kg]
+    late_rmse : the same from `CONVERGED` [kg]
+    worst : largest relative error of the running mass from `CONVERGED` [-]
+    held : part of the instants from `CONVERGED` whose 95 % interval holds the truth [-]
+    seconds : computing time of each method, forces and motion given [s]
+    steady_at : time since the start from when on the running mass stays within `BAND` [s]
+    twice_rmse : of robust-rls with the grade counted twice, from the first mass told [kg]
+    blends : ``late_rmse`` of the hybrid by its blend
+    printed : ``late_rmse`` of each method as printed, by `PRINTED_ROLLING`; empty where the bus
+        is not known
+    printed_mean : mean error of the running mass of the same [kg]
+    printed_steady_at : ``steady_at`` of each method as printed, told the tyres' rolling resistance
+    """
+
+    load: str
+    seed: int
+    true_mass: float
+    tracks: dict[str, MassTrack]
+    rmse: dict[str, float]
+    late_rmse: dict[str, float]
+    worst: dict[str, float]
+    held: dict[str, float]
+    seconds: dict[str, float]
+    steady_at: dict[str, float]
+    twice_rmse: float
+    blends: dict[str, float]
+    printed: dict[str, dict[str, float]] = field(default_factory=dict)
+    printed_mean: dict[str, dict[str, float]] = field(default_factory=dict)
+    printed_steady_at: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reproduction:
+    """All the figures.
+
+    Attributes
+    ----------
+    drives : as in the paper, the bus known
+    road : with all effects, the bus calibrated on other drives
+    sheet : of the latter the first at each load, with the data sheet alone
+    vehicle : as calibrated
+    """
+
+    drives: tuple[DriveResult, ...]
+    road: tuple[DriveResult, ...]
+    sheet: tuple[DriveResult, ...]
+    vehicle: Vehicle

@@ -1,0 +1,6 @@
+"""The version of the program, where every room can read it."""
+
+from typing import Final
+
+VERSION: Final = "0.2.0"
+"""As packages count it."""

@@ -1,0 +1,90 @@
+"""The command ``weighbridge fleet``."""
+
+import pytest
+from tests.fleet.fleets import tiny_fleet
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    """Folders of six tiny drives and of their vehicle files."""
+    return tiny_fleet(tmp_path_factory.mktemp("fleet"), 6)
+
+
+@pytest.fixture(scope="module")
+def address():
+    """Address of a scheduler with one worker, a thread of this process."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp",
+        dashboard_address="127.0.0.1:0",
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+def test_help_has_an_example(weighbridge):
+    ran = weighbridge("fleet", "--help")
+    assert ran.code == 0
+    assert "Example: weighbridge fleet 'drives/**'" in " ".join(ran.out.split())
+    assert "Example: weighbridge fleet status" in " ".join(
+        weighbridge("fleet", "status", "--help").out.split()
+    )
+
+
+@pytest.mark.parametrize("group", ["fleet", "simulate"])
+def test_the_usage_line_is_what_is_typed(weighbridge, group):
+    told = weighbridge(group, "--help").out
+    assert f"Usage: weighbridge {group} [OPTIONS]" in told
+
+
+def test_a_run_its_status_and_a_second_run(weighbridge, fleet, address, tmp_path):
+    drives, cars = fleet
+    results = tmp_path / "results"
+    words = (f"{drives}/**", "--vehicles", cars, "-o", results, "--scheduler", address)
+    ran = weighbridge("fleet", *words)
+    assert (ran.code, ran.err) == (1, "")
+    assert "6 recordings weighed" in ran.out
+    summary = "6 drives of 3 vehicles: 0 with a mass, 6 missing_signals"
+    assert summary in ran.out
+    told = weighbridge("fleet", "status", results)
+    assert (told.code, told.err) == (0, "")
+    assert "no run is under way" in told.out
+    assert summary in told.out
+    again = weighbridge("fleet", "--vehicles", cars, "-o", results, "--scheduler", address, drives)
+    assert "0 recordings weighed" in again.out
+    assert "6 were there already" in again.out
+
+
+def test_a_drive_that_cannot_be_read_is_exit_status_2(weighbridge, fleet, address, tmp_path):
+    _, cars = fleet
+    (tmp_path / "van0").mkdir()
+    (tmp_path / "van0" / "obd.csv").write_text("time_s,vehicle_speed_kmh\n")
+    words = (tmp_path / "van0", "--vehicles", cars, "-o", tmp_path / "r", "--scheduler", address)
+    ran = weighbridge("fleet", *words)
+    assert (ran.code, ran.err) == (2, "")
+    assert "1 unread" in ran.out
+    assert "holds no samples" in ran.out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("{drives}", "--vehicles", "{cars}", "-o", "{drives}"), "holds no results"),
+        (("{drives}/none", "--vehicles", "{cars}", "-o", "{new}"), "no such file"),
+        (("{drives}", "--vehicles", "{new}", "-o", "{new}"), "no such folder"),
+        (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--class", "boat"), "class must be"),
+        (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--workers", "0"), "1 or more"),
+        (("{drives}", "--vehicles", "{cars}"), "--output"),
+        (("status", "{drives}"), "holds no results"),
+        (("status",), "results"),
+    ],
+)
+def test_a_mistake_is_one_line(weighbridge, fleet, tmp_path, words, told):
+    drives, cars = fleet
+    given = {"drives": drives, "cars": cars, "new": tmp_path / "new"}
+    ran = weighbridge("fleet", *(word.format(**given) for word in words))
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert told in ran.err

@@ -1,0 +1,89 @@
+"""The page of a fleet: its answer, its data, and texts that would be more than text."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from tests.fleet.made_rows import drive, segment
+
+from weighbridge.fleet.schema import PART
+from weighbridge.fleet.store import Results, write_part
+
+HOSTILE = '</script><img src=x onerror="alert(1)">\u202e'
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Results of three vehicles, one with a name that would be more than a name."""
+    rows = [
+        drive("a" * 32, mass=20000.0, std=500.0),
+        drive("b" * 32, HOSTILE, mass=18200.0, std=500.0, warnings=[HOSTILE]),
+        drive("c" * 32, "truck3", start="2026-05-04T09:00:00+00:00", mass=9000.0, std=400.0),
+        drive("d" * 32, "truck3", start=None),
+    ]
+    folder = Results.begun(tmp_path / "results").folder
+    inner = [f.name for f in PART["segments"].inner.fields]
+    for row in rows:
+        told = segment(
+            row["key"], 0, 0.0, 1200.0, row["mass_kg"], row["std_kg"], period_km=[5.0] * 4
+        )
+        write_part(folder, row["key"], [row | {"segments": [{n: told[n] for n in inner}]}])
+    return folder
+
+
+def data_of(page):
+    text = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    return json.loads(text.group(1))
+
+
+def test_the_page_answers_who_when_and_how_sure(weighbridge, results, tmp_path):
+    ran = weighbridge("fleet", "report", results, "-o", tmp_path / "fleet.html",
+                      "--json", tmp_path / "fleet.json")  # fmt: skip
+    assert ran.code == 0
+    assert "1 leg at least 95 % sure, 1 likely" in ran.out
+    assert "truck1 2026-05-04 06:00 UTC: 20000 ± 980 kg of 18000 kg, above 99.9 %" in ran.out
+    page = (tmp_path / "fleet.html").read_text()
+    first = page[: page.index("<nav")]
+    assert "1 vehicle overloaded" in first
+    assert '<span class="day">2026-05-04</span> 06:00' in first
+    assert "20000 ±&nbsp;980" in first
+    assert "of 3 legs that could be judged. 1 could not" in first
+    data = data_of(page)
+    assert data["legs"]["overload"][data["legs"]["mass_kg"].index(18200)] == pytest.approx(0.6554)
+    told = json.loads((tmp_path / "fleet.json").read_text())
+    assert [r["vehicle_id"] for r in told["overloads"]] == ["truck1", HOSTILE]
+    assert told["totals"]["distance_km"] == 80.0
+
+
+def test_texts_are_shown_and_never_obeyed(weighbridge, results, tmp_path):
+    weighbridge("fleet", "report", results, "-o", tmp_path / "fleet.html")
+    page = (tmp_path / "fleet.html").read_text()
+    assert "<img" not in page
+    assert "\u202e" not in page
+    assert page.count("</script>") == 2
+    assert "\\u202e" in data_of(page)["names"][data_of(page)["vehicles"]["warnings"].index(1)]
+    assert not re.search(r"""(?:src|href)\s*=\s*["']?(?:https?:)?//""", page)
+    assert "default-src 'none'" in page
+
+
+def test_results_and_inputs_are_not_overwritten(weighbridge, results, tmp_path):
+    ran = weighbridge("fleet", "report", results, "-o", results / "fleet.html")
+    assert (ran.code, "within the results" in ran.err) == (2, True)
+    other = tmp_path / "tickets.csv"
+    other.write_text("vehicle,time,mass_kg\n")
+    ran = weighbridge("fleet", "report", results, "-o", other, "--tickets", other)
+    assert (ran.code, other.read_text()) == (2, "vehicle,time,mass_kg\n")
+    ran = weighbridge("fleet", "report", tmp_path)
+    assert (ran.code, "holds no results" in ran.err) == (2, True)
+
+
+def test_the_python_of_the_document_runs(results, tmp_path, monkeypatch):
+    (tmp_path / "tickets.csv").write_text("vehicle,time,mass_kg\n")
+    document = Path(__file__).parents[2] / "docs" / "fleet_figures.md"
+    (code,) = re.findall(r"```python\n(.*?)```", document.read_text("utf-8"), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(code, names)
+    assert names["found"].overloads.height == 2
+    assert (tmp_path / "fleet.html").read_bytes().startswith(b"<!DOCTYPE html>")

@@ -1,0 +1,97 @@
+"""What the site is made of: links, reference, settings that keep it on the reader's machine."""
+
+import re
+import tomllib
+from importlib import import_module
+from pathlib import Path
+
+import latex2mathml.converter
+import pytest
+from website import docstrings, links, reference
+
+HOME = Path(__file__).parents[2]
+
+
+def test_every_public_name_is_in_the_reference():
+    page = reference.python_pages()["reference/python.md"]
+    for name in set(import_module("weighbridge").__all__) - {"fleet"}:
+        assert f"::: weighbridge.{name}\n" in page
+    assert "Others" not in reference.groups()
+
+
+def test_every_command_is_in_the_reference():
+    page = reference.commands_page()
+    for words in ("weigh", "calibrate", "vehicle new", "fleet report", "live", "record"):
+        assert f"## weighbridge {words}\n" in page
+    assert "| `--vehicle` | path |" in page
+
+
+@pytest.mark.parametrize(
+    ("place", "given", "expected"),
+    [
+        ("index.md", "[a](../studies/x.md)", "`a`"),
+        ("files.md", "[a](../studies/accuracy.md#b)", "[a](studies/accuracy.md#b)"),
+        ("methods/joint.md", "[a](../files.md)", "[a](../files.md)"),
+        ("studies/accuracy.md", "[a](../docs/files.md)", "[a](../files.md)"),
+        ("contributing.md", "[a](docs/glossary.md)", "[a](glossary.md)"),
+        ("files.md", "[a](../CONTRIBUTING.md)", "[a](contributing.md)"),
+        ("files.md", "[a](../src/weighbridge/io/read.py)", "`a`"),
+        ("files.md", "[a](https://example.org/b)", "[a](https://example.org/b)"),
+        ("files.md", "`[a](../LICENSE)`", "`[a](../LICENSE)`"),
+    ],
+)
+def test_a_link_of_the_repository_becomes_one_of_the_site(place, given, expected):
+    assert links.relinked(given, place) == expected
+
+
+def test_words_behind_a_name_are_no_type():
+    text = (
+        "Do it.\n\nParameters\n----------\nmass : that rolls [kg]\n\n"
+        "Returns\n-------\nx : (n,) [m]\n"
+    )
+    told = docstrings.reworded(text)
+    assert "mass\n    that rolls [kg]\n" in told
+    assert "x :\n    (n,) [m]" in told
+
+
+def test_a_sentence_that_is_returned_is_no_type():
+    text = (
+        "Do it.\n\nReturns\n-------\nOne of each, in\ntheir order.\n\nRaises\n------\nE\n    Why.\n"
+    )
+    told = docstrings.reworded(text)
+    assert "-------\n:\n    One of each, in their order.\n\nRaises\n------\nE\n    Why." in told
+
+
+def test_a_toml_of_the_pages_is_one():
+    found = 0
+    for page in (HOME / "docs").rglob("*.md"):
+        for block in re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+            tomllib.loads(block)
+            found += 1
+    assert found >= 3
+
+
+METHODS = sorted((HOME / "docs" / "methods").glob("*.md"))
+
+
+@pytest.mark.parametrize("page", METHODS, ids=lambda p: p.stem)
+def test_formulas_are_written_so_that_site_and_repository_show_them(page):
+    """A fence of ``math``, or dollars: between them a backslash before a mark is lost elsewhere."""
+    text = page.read_text(encoding="utf-8")
+    shown = re.findall(r"^```math\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    prose = re.sub(r"^ *```.*?^ *```$|`[^`\n]+`", "", text, flags=re.MULTILINE | re.DOTALL)
+    inline = re.findall(r"\$([^$]+)\$", prose)
+    assert len(shown) >= 1
+    assert not re.search(r"\$\$|\\[(\[]|½", prose)
+    for formula in inline:
+        assert not re.search(r"\\[^A-Za-z]", formula), formula
+        assert formula == formula.strip()
+    for formula in (*shown, *inline):
+        assert "<math" in latex2mathml.converter.convert(formula)
+        assert formula.isascii(), formula
+
+
+def test_the_theme_asks_no_host():
+    text = (HOME / "mkdocs.yml").read_text(encoding="utf-8")
+    assert "font: false" in text
+    assert "http" not in text

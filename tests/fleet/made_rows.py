@@ -1,0 +1,64 @@
+"""Rows of results as the engine writes them, with the values that a test is about."""
+
+from datetime import UTC, datetime
+
+import polars as pl
+
+from weighbridge.fleet.schema import DRIVES, SEGMENTS
+
+
+def drive(key, vehicle="truck1", *, start="2026-05-04T06:00:00+00:00", mass=None, std=None, **more):
+    row = dict.fromkeys(DRIVES) | {
+        "key": key,
+        "part": 0,
+        "source": f"drives/{key}",
+        "drive": key,
+        "outcome": "weighed",
+        "status": "converged" if mass is not None else "not_excited",
+        "reason": "" if mass is not None else "only 12 s could be used",
+        "vehicle_id": vehicle,
+        "vehicle_file": f"{vehicle}.toml",
+        "vehicle_class": "truck",
+        "tare_kg": 8000.0,
+        "gross_kg": 18000.0,
+        "start": start,
+        "mass_kg": mass,
+        "std_kg": std,
+        "systematic_std_kg": None if std is None else 0.8 * std,
+        "freedom": float("inf"),
+        "duration_s": 1200.0,
+        "distance_km": 20.0,
+        "moving_s": 1100.0,
+        "warnings": [],
+        "load_changed": False,
+        "unweighed_s": 0.0,
+        "first_mass_s": 60.0,
+        "checked_kg": [],
+        "checked_std_kg": [],
+        "weighed_at": datetime(2026, 5, 6, tzinfo=UTC),
+    }
+    return row | more
+
+
+def segment(key, number, start, end, mass, std, *, km=10.0, weighed=True, **more):
+    row = dict.fromkeys(SEGMENTS) | {
+        "key": key,
+        "part": 0,
+        "segment": number,
+        "start_s": start if weighed else None,
+        "end_s": end if weighed else None,
+        "from_s": start,
+        "to_s": end,
+        "weighed_s": end - start if weighed else 0.0,
+        "mass_kg": mass,
+        "std_kg": std,
+        "distance_km": km,
+    }
+    return row | more
+
+
+def frames(drives, segments=()):
+    return (
+        pl.DataFrame(list(drives), schema={n: c.type for n, c in DRIVES.items()}, orient="row"),
+        pl.DataFrame(list(segments), schema={n: c.type for n, c in SEGMENTS.items()}, orient="row"),
+    )

@@ -1,0 +1,150 @@
+"""Drives in an S3 store, results as Delta tables, the same function on Ray and Spark."""
+
+import shutil
+
+import polars as pl
+import pytest
+
+import weighbridge as wb
+from tests.fleet.fleets import compared, tiny_fleet
+from weighbridge.errors import DriveError
+from weighbridge.fleet import remote
+from weighbridge.fleet.inputs import recordings
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    """A local S3 store, by moto's server, with nine tiny drives; their folder and vehicle files."""
+    server = pytest.importorskip("moto.server")
+    fsspec = pytest.importorskip("fsspec")
+    pytest.importorskip("s3fs")
+    drives, cars = tiny_fleet(tmp_path_factory.mktemp("store"), 9)
+    lone = drives / "van1-lone.csv"
+    lone.write_text("time_s,vehicle_speed_kmh\n0,10\n1,11\n2,12\n")
+    running = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    running.start()
+    host, port = running.get_host_and_port()
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (
+            ("AWS_ACCESS_KEY_ID", "test"),
+            ("AWS_SECRET_ACCESS_KEY", "test"),
+            ("AWS_DEFAULT_REGION", "us-east-1"),
+            ("AWS_ENDPOINT_URL", f"http://{host}:{port}"),
+        ):
+            patch.setenv(name, value)
+        files = fsspec.filesystem("s3", skip_instance_cache=True)
+        files.mkdir("fleet")
+        files.put(str(drives), "fleet/drives", recursive=True)
+        yield drives, cars
+    running.stop()
+
+
+def test_drives_are_listed_as_in_a_folder(store):
+    drives, _ = store
+    here = [r.source.removeprefix(str(drives)) for r in recordings([str(drives)])]
+    for url in ("s3://fleet/drives", "s3://fleet/drives/**", "s3://fleet/dri*"):
+        found = [r.source for r in recordings([url])]
+        assert sorted(found) == sorted(f"s3://fleet/drives{name}" for name in here)
+    assert len(list(recordings(["s3://fleet/drives/van1/**"]))) == 3
+
+
+def test_a_store_without_drives_is_told(store):
+    with pytest.raises(DriveError, match="holds no drive"):
+        list(recordings(["s3://fleet/nothing/**"]))
+    with pytest.raises(DriveError, match="cannot be listed"):
+        list(recordings(["s3://no-such-bucket/**"]))
+
+
+def test_rows_of_a_store_are_those_of_a_folder(store, scheduler, tmp_path):
+    drives, cars = store
+    here = wb.fleet.weigh_drives(drives, cars, tmp_path / "here", scheduler=scheduler)
+    there = wb.fleet.weigh_drives("s3://fleet/**", cars, tmp_path / "there", scheduler=scheduler)
+    here, there = compared(here.collect()), compared(there.collect())
+    assert there["source"].str.starts_with("s3://fleet/drives/").all()
+    assert there.drop("source").equals(here.drop("source"))
+    assert there.height == 10
+
+
+def test_a_drive_that_left_the_store_is_tried_again(store, tmp_path):
+    _, cars = store
+    import fsspec
+
+    from weighbridge.fleet.inputs import Recording
+    from weighbridge.fleet.job import Job, weigh_job
+    from weighbridge.fleet.store import Results, part_path, read_parts
+    from weighbridge.fleet.vehicles import Vehicles
+
+    files = fsspec.filesystem("s3")
+    url = "s3://fleet/drives/van0/trip-9999"
+    recording = Recording((url,))
+    job = Job(
+        recording=recording,
+        assigned=Vehicles(cars).of(recording.paths),
+        results=str(Results.begun(tmp_path / "results").folder),
+    )
+    (row,) = read_parts([part_path(tmp_path / "results", weigh_job(job).key)]).to_dicts()
+    assert (row["outcome"], row["tries"]) == ("failed", 3)
+    files.copy("fleet/drives/van0/trip-0000/obd.csv", f"{url}/obd.csv")
+    files.invalidate_cache()
+    assert weigh_job(job).outcome == "weighed"
+
+
+def test_what_is_brought_is_what_lies_there(store, tmp_path):
+    drives, _ = store
+    (found,) = remote.fetch(["s3://fleet/drives/van0/trip-0000"], tmp_path)
+    names = sorted(f.name for f in found.iterdir())
+    assert names == ["drive.toml", "obd.csv"]
+    for name in names:
+        own = drives / "van0" / "trip-0000" / name
+        assert (found / name).read_bytes() == own.read_bytes()
+
+
+def test_delta_tables_hold_each_row_once(tiny, scheduler, tmp_path):
+    deltalake = pytest.importorskip("deltalake")
+    drives, cars = tiny
+    cars = shutil.copytree(cars, tmp_path / "cars")
+    results, place = tmp_path / "results", tmp_path / "delta"
+
+    def rows():
+        return pl.from_arrow(deltalake.DeltaTable(str(place / "drives")).to_pyarrow_table())
+
+    for part in ("van0", "van1", "van1"):
+        wb.fleet.weigh_drives(drives / part, cars, results, scheduler=scheduler)
+        wb.fleet.write_delta(results, place)
+    assert rows().height == 27
+    car = cars / "van0.toml"
+    car.write_text(car.read_text().replace("2000", "2100"))
+    wb.fleet.weigh_drives(drives / "van0", cars, results, scheduler=scheduler)
+    wb.fleet.write_delta(results, place)
+    assert rows().height == 27
+    assert rows().filter(vehicle_id="van0")["tare_kg"].unique().to_list() == [2100.0]
+
+
+@pytest.mark.filterwarnings("ignore::FutureWarning:ray")
+def test_ray_gives_the_same_rows(tiny, scheduler, tmp_path):
+    ray = pytest.importorskip("ray", reason="ray is not installed")
+    drives, cars = tiny
+    some = str(drives / "van0")
+    here = wb.fleet.weigh_drives(some, cars, tmp_path / "here", scheduler=scheduler)
+    ray.init(num_cpus=2, include_dashboard=False)
+    try:
+        there = wb.fleet.weigh_on_ray(some, cars, tmp_path / "there")
+    finally:
+        ray.shutdown()
+    assert compared(there.collect()).equals(compared(here.collect()))
+
+
+@pytest.mark.filterwarnings("ignore:.*PySpark does not yet fully support pandas")
+def test_spark_gives_the_same_rows(tiny, scheduler, tmp_path):
+    sql = pytest.importorskip("pyspark.sql", reason="pyspark is not installed")
+    if shutil.which("java") is None:
+        pytest.skip("Spark needs Java, and there is none")
+    drives, cars = tiny
+    some = str(drives / "van0")
+    here = wb.fleet.weigh_drives(some, cars, tmp_path / "here", scheduler=scheduler)
+    spark = sql.SparkSession.builder.master("local[2]").getOrCreate()
+    try:
+        there = wb.fleet.weigh_on_spark(spark, some, cars, tmp_path / "there")
+    finally:
+        spark.stop()
+    assert compared(there.collect()).equals(compared(here.collect()))

@@ -1,0 +1,286 @@
+"""Figures of a fleet against numbers worked out by hand."""
+
+import json
+import math
+from datetime import UTC, datetime
+
+import pytest
+from scipy.stats import t as student
+
+from tests.fleet.made_rows import drive, frames, segment
+from weighbridge.errors import ConfigError
+from weighbridge.fleet.couplings import Coupling, read_couplings
+from weighbridge.fleet.figures import per_vehicle, quality, rfms, speed_mass, totals
+from weighbridge.fleet.legs import Limits, legs, load_changes
+from weighbridge.fleet.protocol import known_masses, verdicts
+from weighbridge.fleet.tickets import Ticket
+from weighbridge.fleet.track import track
+
+
+def at(hour, minute=0):
+    return f"2026-05-04T{hour:02d}:{minute:02d}:00+00:00"
+
+
+def test_a_leg_has_payload_interval_and_probability_of_overload():
+    rows = legs(*frames([drive("a", mass=18500.0, std=500.0, freedom=6.0)]))
+    (leg,) = rows.to_dicts()
+    assert leg["payload_kg"] == 10500.0
+    assert leg["overload"] == pytest.approx(student.cdf(1.0, 6.0))
+    assert leg["high95_kg"] - leg["mass_kg"] == pytest.approx(2.447 * 500.0, abs=1.0)
+    assert (leg["level"], leg["trailer"], leg["empty"]) == ("warn", False, False)
+    assert leg["tkm"] == pytest.approx(10.5 * 20.0)
+    assert leg["start"] == datetime(2026, 5, 4, 6, tzinfo=UTC)
+
+
+@pytest.mark.parametrize(
+    ("mass", "level"), [(17990.0, "ok"), (18010.0, "warn"), (18817.0, "warn"), (18828.0, "alarm")]
+)
+def test_two_thresholds_part_the_levels(mass, level):
+    assert legs(*frames([drive("a", mass=mass, std=500.0)]))["level"].to_list() == [level]
+
+
+def test_what_cannot_be_judged_is_not_called_well():
+    rows = legs(
+        *frames([drive("a"), drive("b", mass=9000.0, std=400.0, gross_kg=None, tare_kg=None)])
+    )
+    assert rows["level"].to_list() == [None, None]
+    assert rows["overload"].null_count() == 2
+    assert rows["payload_kg"].null_count() == 2
+
+
+def test_legs_of_a_drive_that_was_not_weighed_to_its_end():
+    drives = [
+        drive("a", mass=17000.0, std=500.0, unweighed_s=400.0),
+        drive("b", start=at(9), mass=16000.0, std=500.0, load_changed=True, unweighed_s=300.0),
+    ]
+    segments = [
+        segment("a", 0, 5.0, 605.0, None, None, km=4.0),
+        segment("a", 1, 605.0, 805.0, 17500.0, 600.0, km=6.0),
+        segment("a", 2, 805.0, 1205.0, None, None, km=9.0, weighed=False),
+        segment("b", 0, 5.0, 605.0, 12000.0, 400.0),
+        segment("b", 1, 605.0, 905.0, None, None, weighed=False),
+        segment("b", 2, 905.0, 1205.0, 16000.0, 500.0),
+    ]
+    rows = legs(*frames(drives, segments))
+    assert rows["leg"].to_list() == [0, 1, 0, 1, 2]
+    assert rows["mass_kg"].to_list() == [17000.0, None, 12000.0, None, 16000.0]
+    assert rows["std_kg"].to_list() == [500.0, None, 400.0, None, 500.0]
+    assert rows["distance_km"].to_list() == [10.0, 9.0, 10.0, 10.0, 10.0]
+    assert rows["duration_s"].to_list() == [800.0, 400.0, 600.0, 300.0, 300.0]
+    assert rows["start"].dt.minute().to_list() == [0, 13, 0, 10, 15]
+    (change,) = load_changes(rows).filter(within_drive=True).to_dicts()
+    assert (change["before_kg"], change["after_kg"], change["stop_s"]) == (12000.0, 16000.0, 300)
+
+
+def test_a_known_trailer_has_the_permitted_mass_of_both():
+    drives = [
+        drive(f"{hour}", start=at(hour), mass=20000.0, std=500.0, gross_kg=18000.0)
+        for hour in (6, 8, 10)
+    ]
+    other = drive("other", "truck2", start=at(8), mass=20000.0, std=500.0, gross_kg=18000.0)
+    begun, ended = datetime(2026, 5, 4, 7, tzinfo=UTC), datetime(2026, 5, 4, 9, tzinfo=UTC)
+    rows = legs(*frames([*drives, other]), None, [Coupling("truck1", begun, ended, 28000.0)])
+    assert rows["permitted_kg"].to_list() == [18000.0, 28000.0, 18000.0, 18000.0]
+    assert rows["coupled"].to_list() == rows["trailer"].to_list() == [False, True, False, False]
+    assert rows["level"].to_list() == ["alarm", "ok", "alarm", "alarm"]
+    assert rows["gross_kg"].unique().to_list() == [18000.0]
+    assert track(rows)["state"].to_list() == ["loaded", "trailer", "loaded", "loaded"]
+
+
+def test_a_table_of_couplings_is_read_and_its_mistakes_are_told(tmp_path):
+    path = tmp_path / "couplings.csv"
+    head = "vehicle,start,end,permitted_kg\n"
+    path.write_text(head + "truck1,2026-05-04T07:00:00,,28000\n")
+    (found,) = read_couplings(path)
+    assert found.start == datetime(2026, 5, 4, 7, tzinfo=UTC)
+    assert found.end.year == 9999
+    for row, told in (
+        ("truck1,noon,,28000", "must be dates and times"),
+        ("truck1,2026-05-04T07:00:00,2026-05-04T06:00:00,28000", "is not after"),
+        ("truck1,2026-05-04T07:00:00,,28", "no permitted mass"),
+    ):
+        path.write_text(head + row + "\n")
+        with pytest.raises(ConfigError, match=f"row 2: .*{told}"):
+            read_couplings(path)
+    path.write_text("vehicle,start\n")
+    with pytest.raises(ConfigError, match="lacks the column end"):
+        read_couplings(path)
+
+
+def test_a_load_that_changed_is_two_legs_and_others_one():
+    told = [
+        segment("a", 0, 5.0, 605.0, 12000.0, 400.0),
+        segment("a", 1, 605.0, 1205.0, 9000.0, 300.0),
+    ]
+    changed = legs(*frames([drive("a", mass=9000.0, std=300.0, load_changed=True)], told))
+    assert changed["mass_kg"].to_list() == [12000.0, 9000.0]
+    assert changed["start"].to_list()[1] == datetime(2026, 5, 4, 6, 10, tzinfo=UTC)
+    # Both share the error of the vehicle file, a part of the mass.
+    assert changed["shared_kg"].to_list() == pytest.approx([320.0, 240.0])
+    same = legs(*frames([drive("a", mass=9000.0, std=300.0)], told))
+    assert same["mass_kg"].to_list() == [9000.0]
+
+
+def test_a_change_between_drives_needs_more_than_its_own_error():
+    # Own parts: 0.6 of the standard deviations, 240 kg each; together 339 kg.
+    def changes(second):
+        first = drive("a", mass=12000.0, std=400.0)
+        then = drive("b", start=at(7), mass=second, std=400.0, start_latitude_deg=51.0)
+        return load_changes(legs(*frames([first, then])))
+
+    assert changes(12600.0).height == 0
+    (found,) = changes(12700.0).to_dicts()
+    assert found["std_kg"] == pytest.approx(math.hypot(240.0, 240.0, 320.0 / 12700.0 * 700.0))
+    assert (found["kind"], found["stop_s"], found["latitude_deg"]) == ("loaded", 2400, 51.0)
+    assert changes(9000.0)["kind"].to_list() == ["unloaded"]
+    assert changes(23000.0)["kind"].to_list() == ["trailer on"]
+
+
+def test_legs_between_changes_are_one_span_of_the_track():
+    rows = [
+        drive("a", mass=8200.0, std=400.0),
+        drive("b", start=at(7), mass=8500.0, std=500.0),
+        drive("c", start=at(8)),
+        drive("d", start=at(9), mass=14000.0, std=400.0),
+        drive("e", "truck2", mass=24000.0, std=400.0),
+        drive("f", "truck3", mass=9000.0, std=400.0, gross_kg=None),
+    ]
+    first, second, third, fourth = track(legs(*frames(rows))).to_dicts()
+    # Own parts 240 and 300 kg: weights 1 and 0.64.
+    assert first["mass_kg"] == pytest.approx((8200.0 + 0.64 * 8500.0) / 1.64)
+    shared = (320.0 / 8200.0 + 0.64 * 400.0 / 8500.0) / 1.64 * first["mass_kg"]
+    assert first["std_kg"] == pytest.approx(math.hypot(240.0 / math.sqrt(1.64), shared))
+    assert (first["legs"], first["distance_km"], first["state"]) == (2, 40.0, "empty")
+    assert (first["start"], first["end"]) == (
+        datetime(2026, 5, 4, 6, tzinfo=UTC),
+        datetime(2026, 5, 4, 7, 20, tzinfo=UTC),
+    )
+    assert (second["legs"], second["state"], second["payload_kg"]) == (1, "loaded", 6000.0)
+    assert (third["vehicle_id"], third["state"]) == ("truck2", "trailer")
+    assert fourth["state"] is None
+
+
+@pytest.mark.parametrize(("kind", "shared"), [("truck", [20.0]), ("bus", [12.0, 8.0])])
+def test_sums_of_a_vehicle_and_of_all(kind, shared):
+    rows = [
+        drive("a", mass=13000.0, std=500.0),
+        drive("b", start=at(8), mass=8200.0, std=500.0, distance_km=10.0),
+        drive("c", start=at(9)),
+        drive("d", "truck2", mass=20000.0, std=500.0, vehicle_class=kind),
+    ]
+    found = legs(*frames(rows))
+    vehicles = per_vehicle(found, load_changes(found))
+    first, second = vehicles.to_dicts()
+    assert (first["distance_km"], first["known_km"]) == (50.0, 30.0)
+    assert first["known_share"] == pytest.approx(0.6)
+    assert first["tkm"] == pytest.approx(5.0 * 20.0 + 0.2 * 10.0)
+    # 400 kg on all of 30 km, 300 kg on each part by itself.
+    assert first["tkm_std"] == pytest.approx(math.hypot(0.4 * 30.0, 0.3 * 20.0, 0.3 * 10.0))
+    assert first["empty_share"] == pytest.approx(10.0 / 30.0)
+    assert (first["last_kg"], first["changes"], first["drives"]) == (8200.0, 1, 3)
+    assert (second["alarms"], second["worst_overload"]) == (1, pytest.approx(0.99997, abs=1e-5))
+    sums = totals(vehicles)
+    # Files of one class err alike, those of two do not.
+    assert sums["tkm_std"] == pytest.approx(math.hypot(*shared, 6.0, 3.0, 6.0))
+    assert (sums["vehicles"], sums["alarms"], sums["distance_km"]) == (2, 1, 70.0)
+
+
+def test_without_an_empty_mass_nothing_is_said_of_what_was_carried():
+    unknown = drive("a", mass=9000.0, std=300.0, tare_kg=None)
+    rows = [unknown, drive("b", "truck2", mass=9000.0, std=1.0)]
+    found = legs(*frames(rows))
+    vehicles = per_vehicle(found, load_changes(found))
+    assert vehicles["tkm"].to_list() == [None, pytest.approx(20.0)]
+    assert vehicles["tkm_std"].to_list()[0] is None
+    assert totals(vehicles)["tkm"] == pytest.approx(20.0)
+
+
+def test_sentences_that_differ_in_numbers_are_one_problem():
+    rows = [drive(k, warnings=[f"delay +0.0{n} s found"]) for n, k in enumerate("abc")]
+    rows.append(drive("d", mass=9000.0, std=300.0, warnings=["the tank leaks"]))
+    found = quality(frames(rows)[0])
+    assert found.select("kind", "drives", "share").rows() == [
+        ("no mass", 3, 0.75),
+        ("warning", 3, 0.75),
+        ("warning", 1, 0.25),
+    ]
+
+
+def test_rfms_has_the_last_mass_in_whole_kilograms():
+    rows = [drive("b", start=at(8), mass=9000.4, std=300.0), drive("a", mass=12000.0, std=300.0)]
+    assert rfms(legs(*frames(rows))).rows() == [("truck1", "2026-05-04T08:20:00Z", 9000)]
+
+
+def test_distance_by_speed_and_mass():
+    told = [
+        segment("a", 0, 0.0, 450.0, 11000.0, 300.0, km=7.0, period_km=[2.0, 5.0]),
+        segment("b", 0, 0.0, 300.0, None, None, km=4.0, period_km=[4.0]),
+    ]
+    rows = [drive("a", mass=12500.0, std=300.0), drive("b", "truck2")]
+    found = speed_mass(*frames(rows, told))
+    # 2 km in 5 min are 24 km/h, 5 km in 2.5 min 120 km/h; the drive's mass, not the segment's.
+    assert found.rows() == [
+        (20.0, 12.0, 2.0, pytest.approx(1 / 12)),
+        (90.0, 12.0, 5.0, pytest.approx(1 / 24)),
+        (40.0, None, 4.0, pytest.approx(1 / 12)),
+    ]
+    assert speed_mass(*frames(rows, told), by_vehicle=True)["vehicle_id"].n_unique() == 2
+    with pytest.raises(ConfigError, match="rise from 0"):
+        speed_mass(*frames(rows, told), speeds=(10.0, 20.0))
+
+
+def tickets(*rows):
+    return [Ticket(vehicle, datetime.fromisoformat(time), mass) for vehicle, time, mass in rows]
+
+
+def test_a_ticket_belongs_to_the_leg_under_way_or_the_nearest_within_an_hour():
+    rows = frames(
+        [drive("a", mass=12000.0, std=300.0), drive("b", start=at(7), mass=9000.0, std=300.0)]
+    )
+    found = legs(*rows)
+
+    def known(time):
+        return known_masses(found, rows[0], tickets(("truck1", time, 10000.0)))["key"].to_list()
+
+    assert known(at(6, 10)) == ["a"]
+    assert known(at(6, 25)) == ["a"]
+    assert known(at(6, 45)) == ["b"]
+    assert known(at(5, 5)) == ["a"]
+    assert known(at(4, 55)) == []
+    assert known(at(9)) == []
+    assert known_masses(found, rows[0], tickets(("van9", at(6, 10), 1.0))).height == 0
+
+
+def test_verdicts_need_all_three_loads_within_the_tolerance():
+    def verdict(errors, **more):
+        loads = (9000.0, 12600.0, 17100.0)
+        rows = frames(
+            drive(str(k), start=at(6 + k), mass=m * (1.0 + e), std=300.0, known_mass_kg=m, **more)
+            for k, (m, e) in enumerate(zip(loads, errors, strict=False))
+        )
+        return verdicts(known_masses(legs(*rows), rows[0])).to_dicts()[0]
+
+    assert verdict((0.04, -0.04, 0.01))["verdict"] == "passed"
+    failed = verdict((0.04, -0.06, 0.01))
+    assert (failed["verdict"], failed["worst_70"]) == ("failed", pytest.approx(-0.06))
+    assert "65 to 75 %" in failed["why"]
+    assert verdict((0.04, -0.04))["verdict"] == "incomplete"
+    # A first mass after 15 minutes, a check without one, a running mass far off.
+    assert verdict((0.0, 0.0, 0.0), first_mass_s=901.0)["late"] == 3
+    assert verdict((0.0, 0.0, 0.0), checked_kg=[None])["verdict"] == "failed"
+    assert verdict((0.0, 0.0, 0.0), checked_kg=[9450.0])["worst_50"] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    "limits", [Limits(warn=0.99), Limits(alarm=1.0), Limits(empty=-0.1), Limits(trailer=1.0)]
+)
+def test_impossible_limits_are_refused(limits):
+    with pytest.raises(ConfigError, match="got"):
+        legs(*frames([drive("a")]), limits)
+
+
+def test_no_drives_give_empty_figures():
+    found = legs(*frames([]))
+    vehicles = per_vehicle(found, load_changes(found))
+    assert json.dumps(totals(vehicles))
+    assert totals(vehicles)["known_share"] is None

@@ -1,0 +1,97 @@
+"""A torque that freezes: what was driven after the next stop has no mass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.fleet import read_drives, read_segments
+from weighbridge.fleet.facts import weighing_row
+from weighbridge.fleet.figures import per_vehicle, speed_mass
+from weighbridge.fleet.inputs import recordings
+from weighbridge.fleet.job import Job, weigh_job
+from weighbridge.fleet.legs import NOT_WEIGHED, legs
+from weighbridge.fleet.protocol import known_masses
+from weighbridge.fleet.store import Results
+from weighbridge.fleet.tickets import Ticket, ticketed
+from weighbridge.fleet.vehicles import Vehicles
+from weighbridge.io.write import write_drive
+from weighbridge.simulation import make_scenario, simulate_car
+
+START = "2026-05-04T06:00:00+00:00"
+
+
+@pytest.fixture(scope="module")
+def loading():
+    """Fifteen minutes of a car that takes up load in its last stop, and when it drives off."""
+    made = make_scenario("car-loading", payload=0.0, seed=3)
+    sensors = replace(made.sensors, imu_rate=50.0)
+    drive = simulate_car(replace(made, duration=900.0, sensors=sensors)).drive
+    stands = drive.speed.time[drive.speed.values < 0.5]
+    # It stands at the lights at 374 s, and for its load at 761 s.
+    return drive, [float(stands[stands < end].max()) for end in (500.0, 870.0)]
+
+
+@pytest.fixture
+def frozen(tmp_path, loading, short_car):
+    """Results of the drive with its torque held from an instant on, and what `weigh` says."""
+
+    def made(instant):
+        drive = loading[0]
+        load = drive.signals["engine_load"]
+        held = np.minimum(np.arange(len(load)), np.searchsorted(load.time, instant))
+        drive = drive.with_signals(replace(load, values=load.values[held]))
+        drive = replace(drive, info=replace(drive.info, start_time=START, mass=None))
+        cars, drives = tmp_path / "vehicles", tmp_path / "drives"
+        cars.mkdir()
+        replace(short_car, tare=1400.0, gross=2000.0).save(cars / "car.toml")
+        write_drive(drive, drives / "car" / "trip", "parquet")
+        results, shelf = Results.begun(tmp_path / "results"), Vehicles(cars)
+        for found in recordings([str(drives)]):
+            assigned = shelf.of(found.paths, found.vehicle, found.kind)
+            weigh_job(Job(recording=found, assigned=assigned, results=str(results.folder)))
+        told = wb.weigh(drives / "car" / "trip", cars / "car.toml")
+        assert told.mass > 0.0
+        assert not told.load_changed
+        return read_drives(results.folder), read_segments(results.folder).collect(), told
+
+    return made
+
+
+@pytest.mark.parametrize(("instant", "stop"), [(300.0, 0), (450.0, 1)])
+def test_from_the_stop_after_the_freeze_on_there_is_no_mass(frozen, loading, instant, stop):
+    lazy, segments, told = frozen(instant)
+    drives = lazy.collect()
+    first, rest = legs(drives, segments).to_dicts()
+    off = loading[1][stop] - told.drive.start
+    assert first["duration_s"] == pytest.approx(off, abs=1.0)
+    assert (first["mass_kg"], first["std_kg"]) == (told.mass, told.std)
+    assert rest["duration_s"] == pytest.approx(told.drive.duration - off, abs=1.0)
+    for name in ("mass_kg", "payload_kg", "overload", "level", "trailer", "empty", "tkm"):
+        assert rest[name] is None, name
+    assert rest["reason"] == NOT_WEIGHED
+    (row,) = drives.to_dicts()
+    assert first["distance_km"] + rest["distance_km"] == pytest.approx(row["distance_km"])
+    assert rest["distance_km"] > 0.3
+    assert row["unweighed_s"] == pytest.approx(rest["duration_s"])
+    assert segments["weighed_s"].to_list() == pytest.approx([row["used_s"], 0.0], abs=1.0)
+    assert repr(weighing_row(row, segments.to_dicts())) == repr(told.row)
+
+
+def test_what_was_not_weighed_is_in_no_sum_and_is_known_by_no_ticket(frozen):
+    lazy, segments, told = frozen(300.0)
+    drives = lazy.collect()
+    rows = legs(drives, segments)
+    (vehicle,) = per_vehicle(rows, rows.clear().select("vehicle_id")).to_dicts()
+    weighed, rest = rows["distance_km"]
+    assert (vehicle["drives"], vehicle["legs"]) == (1, 2)
+    assert vehicle["known_km"] == vehicle["payload_km"] == pytest.approx(weighed)
+    assert vehicle["tkm"] == pytest.approx(1e-3 * (told.mass - 1400.0) * weighed)
+    table = speed_mass(drives, segments).drop_nulls("speed_kmh")
+    assert table.filter(table["mass_t"].is_null())["distance_km"].sum() == pytest.approx(rest)
+    end = rows["end"][1]
+    ticket = Ticket("car", end, 1786.0)
+    assert ticketed([ticket], lazy).is_empty()
+    (known,) = known_masses(rows, drives, [ticket]).to_dicts()
+    assert (known["known_kg"], known["error"]) == (1786.0, None)

@@ -1,0 +1,218 @@
+"""A fleet through a cluster: all rows, once, in whatever order and after whatever went wrong."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import dask
+import polars as pl
+import pytest
+
+import weighbridge as wb
+from tests.fleet.fleets import compared, copy_of
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.fleet.engine import Count
+from weighbridge.fleet.job import Receipt
+from weighbridge.fleet.store import Results
+
+
+def weigh(tiny, results, scheduler, **how):
+    drives, cars = tiny
+    found = wb.fleet.weigh_drives(f"{drives}/**", cars, results, scheduler=scheduler, **how)
+    return compared(found.collect())
+
+
+@pytest.fixture(scope="module")
+def whole(tiny, scheduler, tmp_path_factory):
+    """Rows of the tiny fleet, weighed in one go."""
+    return weigh(tiny, tmp_path_factory.mktemp("whole") / "results", scheduler)
+
+
+def test_every_drive_has_its_row_and_a_second_run_weighs_none(tiny, scheduler, tmp_path, whole):
+    assert whole.height == 40
+    assert whole["vehicle_id"].value_counts().sort("vehicle_id").rows() == [
+        ("van0", 14),
+        ("van1", 13),
+        ("van2", 13),
+    ]
+    results = tmp_path / "results"
+    told = []
+    first = weigh(tiny, results, scheduler, progress=lambda *counts: told.append(counts))
+    assert first.equals(whole)
+    assert told[-1] == (40, 40)
+    files = {f: f.stat().st_mtime_ns for f in Results(results).table_files("drives")}
+    assert weigh(tiny, results, scheduler).equals(whole)
+    assert {f: f.stat().st_mtime_ns for f in Results(results).table_files("drives")} == files
+
+
+def test_new_drives_are_added(tiny, scheduler, tmp_path, whole):
+    drives, cars = tiny
+    some = [str(drives / "van0"), str(drives / "van1")]
+    results = tmp_path / "results"
+    part = wb.fleet.weigh_drives(some, cars, results, scheduler=scheduler).collect()
+    assert part.height == 27
+    assert weigh(tiny, results, scheduler).equals(whole)
+
+
+def test_a_drive_there_twice_has_one_row(tiny, scheduler, tmp_path):
+    drives, cars = tiny
+    home = copy_of(drives / "van0", tmp_path / "drives" / "van0")
+    copy_of(home / "trip-0000", home / "trip-0000 (copy)")
+    rows = weigh((tmp_path / "drives", cars), tmp_path / "results", scheduler)
+    assert rows.height == 14
+
+
+def test_a_changed_vehicle_file_weighs_its_drives_again(tiny, scheduler, tmp_path, whole):
+    drives, cars = tiny
+    own = copy_of(cars, tmp_path / "cars")
+    weigh((drives, own), tmp_path / "results", scheduler)
+    path = own / "van0.toml"
+    path.write_text(path.read_text().replace("2000", "2100"))
+    rows = weigh((drives, own), tmp_path / "results", scheduler)
+    assert rows.select("source").equals(whole.select("source"))
+    assert set(rows.filter(vehicle_id="van0")["tare_kg"]) == {2100.0}
+    assert set(rows.filter(vehicle_id="van1")["tare_kg"]) == {2000.0}
+
+
+def test_parts_are_gathered_while_a_run_goes_on(tiny, scheduler, tmp_path, whole, monkeypatch):
+    from weighbridge.fleet import run
+
+    monkeypatch.setattr(run, "_GATHER", 3)
+    monkeypatch.setattr(run, "_TOLD", 0.0)
+    gathered = []
+    real = Results.gather
+    monkeypatch.setattr(Results, "gather", lambda self: gathered.append(real(self)))
+    assert weigh(tiny, tmp_path / "results", scheduler).equals(whole)
+    assert len(gathered) > 3
+
+
+def test_mistakes_are_told_before_the_work(tiny, tmp_path, scheduler):
+    drives, cars = tiny
+    with pytest.raises(ConfigError, match="unknown method"):
+        weigh(tiny, tmp_path / "r", scheduler, method="magic")
+    with pytest.raises(ConfigError, match="no Dask scheduler answers"):
+        weigh(tiny, tmp_path / "r", "tcp://127.0.0.1:1")
+    with pytest.raises(ConfigError, match="leave them out"):
+        weigh(tiny, tmp_path / "r", scheduler, workers=2)
+    with pytest.raises(DriveError, match="no such file"):
+        wb.fleet.weigh_drives([drives, drives / "nowhere"], cars, tmp_path / "s")
+    with pytest.raises(ConfigError, match="no such folder"):
+        wb.fleet.weigh_drives(drives, drives / "nowhere", tmp_path / "s")
+    with pytest.raises(ConfigError, match=r"nowhere\.dbc: cannot be read"):
+        wb.fleet.weigh_drives(drives, cars, tmp_path / "s", dbc=[f"{tmp_path}/nowhere.dbc"])
+    with pytest.raises(ConfigError, match="results go to a folder"):
+        wb.fleet.weigh_drives(drives, cars, "s3://bucket/results")
+    assert not (tmp_path / "s").exists()
+
+
+def test_time_left_follows_the_rate(monkeypatch):
+    now = [105.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    count = Count(found=30, began=100.0)
+    assert count.left is None
+    for _ in range(10):
+        count.add(Receipt("k", "weighed", 1, 1, 0.1))
+    assert count.left is None
+    count.complete = True
+    assert (count.rate, count.left) == (2.0, 10.0)
+
+
+COMMAND = [sys.executable, "-m", "weighbridge", "fleet"]
+
+
+def started(tiny, results, *more):
+    drives, cars = tiny
+    words = [f"{drives}/**", "--vehicles", str(cars), "-o", str(results), *more]
+    return subprocess.Popen(
+        [*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def wait_for_rows(results: Path, count: int, process) -> None:
+    """Wait until so many drives have a part file."""
+    until = time.monotonic() + 120.0
+    while process.poll() is None and time.monotonic() < until:
+        if len(Results(results).part_files()) >= count:
+            return
+        time.sleep(0.002)
+
+
+def test_a_killed_command_goes_on_where_it_was(tiny, tmp_path, whole, scheduler):
+    results = tmp_path / "results"
+    process = started(tiny, results, "--workers", "2")
+    wait_for_rows(results, 9, process)
+    process.kill()
+    process.communicate()
+    there = wb.fleet.read_drives(results).collect()
+    assert 0 < there.height < 40
+    assert there.height == there.unique(["key", "part"]).height
+    rows = weigh(tiny, results, scheduler)
+    assert rows.equals(whole)
+    kept = wb.fleet.read_drives(results).collect()
+    assert there.join(kept, on=["key", "part", "weighed_at"], how="anti").is_empty()
+
+
+def test_an_interruption_ends_cleanly(tiny, tmp_path, whole, scheduler):
+    results = tmp_path / "results"
+    process = started(tiny, results, "--workers", "1")
+    wait_for_rows(results, 5, process)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (130, "")
+    assert Results(results).part_files() == []
+    assert 0 < wb.fleet.read_drives(results).collect().height < 40
+    assert out == ""
+    assert weigh(tiny, results, scheduler).equals(whole)
+
+
+def test_a_drive_that_kills_its_worker_has_a_row(tiny, tmp_path):
+    drives, cars = tiny
+    home = copy_of(drives / "van0", tmp_path / "drives" / "van0")
+    (home / "trip-0003").rename(home / "deadly")
+    fault = tmp_path / "fault.py"
+    fault.write_text(
+        "import os, signal\n"
+        "from weighbridge.fleet import job\n"
+        "read = getattr(job.content_digest, 'read', job.content_digest)\n"
+        "def digest(paths):\n"
+        "    if paths[0].name == 'deadly':\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    return read(paths)\n"
+        "digest.read = read\n"
+        "job.content_digest = digest\n"
+    )
+    with dask.config.set({"distributed.worker.preload": [str(fault)]}):
+        rows = wb.fleet.weigh_drives(home, cars, tmp_path / "results", workers=2).collect()
+    assert rows.height == 14
+    (row,) = rows.filter(pl.col("outcome") != "weighed").to_dicts()
+    assert (Path(row["source"]).name, row["outcome"]) == ("deadly", "failed")
+    assert "worker died 3 times" in row["reason"]
+
+
+def test_the_python_of_the_document_runs(tiny, tmp_path, monkeypatch):
+    drives, cars = tiny
+    copy_of(drives / "van0", tmp_path / "drives" / "van0")
+    copy_of(cars, tmp_path / "vehicles")
+    document = Path(__file__).parents[2] / "docs" / "fleet.md"
+    (code,) = re.findall(r"```python\n(.*?)```", document.read_text(encoding="utf-8"), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(code, names)
+    assert names["rows"].collect().height == 14
+    assert (tmp_path / "lake" / "drives" / "_delta_log").is_dir()
+
+
+def test_workers_keep_the_memory_of_their_arrays():
+    """Dask's own setting doubles the time of a drive: each array comes from the system anew."""
+    from weighbridge.fleet.cluster import connected
+
+    names = ("MALLOC_TRIM_THRESHOLD_", "MALLOC_MMAP_THRESHOLD_")
+    with connected(None, 1, None) as client:
+        (kept,) = client.run(lambda: [os.environ.get(name) for name in names]).values()
+    assert kept == ["67108864"] * 2
+    document = (Path(__file__).parents[2] / "docs" / "fleet.md").read_text(encoding="utf-8")
+    assert f"export {names[0]}={kept[0]} {names[1]}={kept[1]}" in document

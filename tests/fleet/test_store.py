@@ -1,0 +1,166 @@
+"""Results on the disk: each row once, whatever was cut off."""
+
+import os
+from datetime import UTC, date, datetime
+
+import polars as pl
+import pytest
+
+from weighbridge.errors import ConfigError
+from weighbridge.fleet import read_drives, read_segments
+from weighbridge.fleet import store as store_module
+from weighbridge.fleet.schema import FAILED, PART, UNREAD, WEIGHED
+from weighbridge.fleet.store import Results, part_path, read_parts, write_part
+
+NOW = datetime(2026, 5, 1, tzinfo=UTC)
+
+
+def row(key, part=0, *, day=1, outcome=WEIGHED, source=None, at=NOW, segments=2):
+    found = dict.fromkeys(PART)
+    return found | {
+        "key": key,
+        "part": part,
+        "date": date(2026, 5, day) if day else None,
+        "source": source or key,
+        "outcome": outcome,
+        "weighed_at": at,
+        "segments": [{"segment": k, "mass_kg": 1000.0 + k} for k in range(segments)],
+    }
+
+
+def keys(results):
+    drives = read_drives(results.folder).collect()
+    segments = read_segments(results.folder).collect()
+    of_segments = segments.select("key", "part", "segment").rows()
+    assert len(set(of_segments)) == len(of_segments) == 2 * drives.height
+    return sorted(drives.select("key", "part").rows())
+
+
+@pytest.fixture
+def results(tmp_path):
+    return Results.begun(tmp_path / "results")
+
+
+def test_rows_are_the_same_before_and_after_gathering(results):
+    write_part(results.folder, "aa", [row("aa"), row("aa", 1, day=2)])
+    write_part(results.folder, "bb", [row("bb", day=None)])
+    before = keys(results)
+    results.gather()
+    assert keys(results) == before == [("aa", 0), ("aa", 1), ("bb", 0)]
+    assert results.part_files() == []
+    write_part(results.folder, "cc", [row("cc")])
+    results.gather()
+    assert keys(results) == [*before, ("cc", 0)]
+    assert [f.parent.name for f in results.table_files("drives")] == [
+        "date=2026-05-01",
+        "date=2026-05-02",
+        "date=__HIVE_DEFAULT_PARTITION__",
+    ]
+    assert results.known_keys() == {"aa", "bb", "cc"}
+
+
+def test_the_tables_are_hive_tables(results):
+    write_part(results.folder, "aa", [row("aa"), row("aa", 1, day=None)])
+    results.gather()
+    frame = pl.scan_parquet(results.folder / "drives", hive_partitioning=True).collect()
+    assert sorted(frame["date"].to_list(), key=str) == [date(2026, 5, 1), None]
+
+
+@pytest.mark.parametrize("step", range(5))
+def test_a_kill_while_gathering_loses_and_doubles_nothing(results, monkeypatch, step):
+    for key in ("aa", "bb", "cc"):
+        write_part(results.folder, key, [row(key), row(key, 1, day=2)])
+    left = [step]
+
+    class Killed(BaseException):
+        pass
+
+    def dies(real):
+        def run(*given, **named):
+            if left[0] == 0:
+                raise Killed
+            left[0] -= 1
+            return real(*given, **named)
+
+        return run
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Results, "_add", dies(Results._add))
+        patch.setattr(store_module.Path, "unlink", dies(store_module.Path.unlink))
+        with pytest.raises(Killed):
+            results.gather()
+    expected = [(key, part) for key in ("aa", "bb", "cc") for part in (0, 1)]
+    assert keys(results) == expected
+    results.gather()
+    assert keys(results) == expected
+    gathered = pl.concat(pl.read_parquet(f) for f in results.table_files("drives"))
+    assert gathered.height == 6
+
+
+def test_a_full_file_is_left_alone_and_another_begun(results, monkeypatch):
+    monkeypatch.setattr(store_module, "FULL", 2)
+    for number in range(5):
+        write_part(results.folder, f"{number:02}", [row(f"{number:02}")])
+        results.gather()
+        write_part(results.folder, f"{number:02}", [row(f"{number:02}")])
+        results.gather()
+    assert len(results.table_files("drives")) == 3
+    assert len(keys(results)) == 5
+
+
+def test_what_killed_writers_left_is_removed_and_never_read(results):
+    write_part(results.folder, "aa", [row("aa")])
+    home = part_path(results.folder, "aa").parent
+    (home / ".aa-1234.weighbridge-part").write_bytes(b"half")
+    (results.folder / ".x-1.weighbridge-part").mkdir()
+    assert keys(results) == [("aa", 0)]
+    results.clean()
+    assert os.listdir(home) == ["aa.arrow"]  # noqa: PTH208
+    assert not (results.folder / ".x-1.weighbridge-part").exists()
+
+
+def test_a_failed_drive_is_tried_again_and_its_row_gives_way(results):
+    write_part(results.folder, "f1", [row("f1", outcome=FAILED, source="trip")])
+    write_part(results.folder, "u1", [row("u1", outcome=UNREAD)])
+    assert results.known_keys() == {"u1"}
+    results.gather()
+    assert results.known_keys() == {"u1"}
+    write_part(results.folder, "f1", [row("f1", outcome=FAILED, source="trip")])
+    results.gather()
+    assert keys(results) == [("f1", 0), ("u1", 0)]
+    later = datetime(2026, 5, 2, tzinfo=UTC)
+    write_part(results.folder, "aa", [row("aa", source="trip", at=later)])
+    assert keys(results) == [("aa", 0), ("u1", 0)]
+    results.gather()
+    assert keys(results) == [("aa", 0), ("u1", 0)]
+
+
+def test_a_part_gathered_meanwhile_is_left_out(results):
+    write_part(results.folder, "aa", [row("aa")])
+    gone = part_path(results.folder, "bb")
+    assert read_parts([part_path(results.folder, "aa"), gone])["key"].to_list() == ["aa"]
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path):
+    (tmp_path / "letter.txt").write_text("dear")
+    with pytest.raises(ConfigError, match="holds no results"):
+        Results.begun(tmp_path)
+    with pytest.raises(ConfigError, match="holds no results"):
+        read_drives(tmp_path)
+    assert [f.name for f in tmp_path.iterdir()] == ["letter.txt"]
+
+
+def test_results_of_another_version_are_refused(results):
+    (results.folder / "fleet.json").write_text('{"format_version": 99}')
+    with pytest.raises(ConfigError, match="format 99"):
+        Results.begun(results.folder)
+
+
+def test_one_run_at_a_time(results):
+    other = Results(results.folder)
+    assert not other.running
+    with results.locked():
+        assert other.running
+        with pytest.raises(ConfigError, match="another run"), other.locked():
+            pass
+    assert not other.running

@@ -1,0 +1,107 @@
+"""Digits of the inertial sensor that are cut off or too few: mended, told or refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weighbridge.checks import mend_drive
+from weighbridge.checks.digits import with_half_digits
+from weighbridge.signals import Signal
+from weighbridge.simulation import make_scenario, simulate_car
+
+ACCEL = ("accel_x", "accel_y", "accel_z")
+GYRO = ("gyro_x", "gyro_y", "gyro_z")
+
+
+@pytest.fixture(scope="module", params=[("car", 88), ("truck", 89)])
+def drive(request):
+    name, seed = request.param
+    return simulate_car(replace(make_scenario(name, seed=seed), duration=600.0)).drive
+
+
+def to_digits(drive, names, step, how):
+    signals = [drive.signals[n] for n in names]
+    return drive.with_signals(
+        *(Signal(s.name, s.time, how(s.values / step) * step) for s in signals)
+    )
+
+
+def mean_slope(drive, other):
+    """Slope of one drive's force along on another's, as means over a second."""
+    a, b = (d.signals["accel_x"].values for d in (drive, other))
+    each = round(1.0 / other.signals["accel_x"].period)
+    a, b = (x[: x.size // each * each].reshape(-1, each).mean(axis=1) for x in (a, b))
+    return np.polyfit(b, a, 1)[0]
+
+
+def test_digits_as_they_come_are_left_to_the_last_bit(drive):
+    assert with_half_digits(drive) is drive
+
+
+@pytest.mark.parametrize("step", [0.01, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("how", [np.round, np.floor, np.ceil])
+@pytest.mark.parametrize("centred", [False, True])
+def test_rounded_digits_are_left_alone(drive, step, how, centred):
+    if centred:
+        signals = [drive.signals[n] for n in ACCEL[:2]]
+        drive = drive.with_signals(
+            *(Signal(s.name, s.time, s.values - np.median(s.values)) for s in signals)
+        )
+    coarse = to_digits(drive, ACCEL, step, how)
+    assert with_half_digits(coarse) is coarse
+
+
+@pytest.mark.parametrize("step", [0.02, 0.05, 0.1])
+def test_digits_that_are_cut_off_get_half_a_step(drive, step):
+    cut = to_digits(drive, ACCEL, step, np.trunc)
+    mended = with_half_digits(cut)
+    (problem,) = mended.problems
+    assert f"steps of {step:.2g} m/s^2, cut off towards zero: half a step" in problem.text
+    assert not problem.serious
+    was, now = mean_slope(cut, drive), mean_slope(mended, drive)
+    assert abs(now - 1.0) < 0.4 * abs(was - 1.0)
+    assert now == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("step", "how", "text"),
+    [
+        (0.15, np.trunc, "dead about zero"),
+        (0.2, np.trunc, "dead about zero"),
+        (0.5, np.trunc, "too coarse"),
+        (0.5, np.round, "too coarse"),
+    ],
+)
+def test_digits_that_nothing_mends_are_refused(drive, step, how, text):
+    found = mend_drive(to_digits(drive, ACCEL, step, how)).problems[0]
+    assert found.serious
+    assert text in found.text
+
+
+@pytest.mark.parametrize("how", [np.trunc, np.round])
+def test_a_gyro_with_few_digits_has_no_wrong_sign(drive, how):
+    settled = mend_drive(to_digits(drive, GYRO, 0.02, how))
+    assert not any(p.serious for p in settled.problems)
+
+
+def test_a_mirrored_gyro_with_all_digits_is_still_refused():
+    made = simulate_car(replace(make_scenario("car", seed=88), duration=900.0)).drive
+    nod = made.signals["gyro_y"]
+    mirrored = made.with_signals(Signal(nod.name, nod.time, -nod.values))
+    assert any("has the wrong sign" in p.text for p in mend_drive(mirrored).problems if p.serious)
+
+
+def test_an_inertial_sensor_averaged_to_a_second_is_slow_and_not_in_milliseconds(drive):
+    each = round(1.0 / drive.signals["accel_x"].period)
+    slow = drive
+    for name in ACCEL + GYRO:
+        s = drive.signals[name]
+        count = len(s) // each * each
+        mean = s.values[:count].reshape(-1, each).mean(axis=1)
+        slow = slow.with_signals(Signal(name, s.time[:count:each], mean))
+    (problem,) = [p for p in mend_drive(slow).problems if p.serious]
+    assert "over the same time as the speed; navigation needs" in problem.text
+    late = [slow.signals[n] for n in ACCEL + GYRO]
+    late = slow.with_signals(*(Signal(s.name, s.time * 1e3, s.values) for s in late))
+    assert "if its time is in milliseconds" in mend_drive(late).problems[0].text

@@ -1,0 +1,44 @@
+"""An accelerometer that was wrong in the calibration is told at each weighing, and widens it."""
+
+from dataclasses import replace
+
+import pytest
+from numba import config
+
+import weighbridge as wb
+from weighbridge.signals import Signal
+from weighbridge.simulation import make_scenario, simulate_car
+
+pytestmark = pytest.mark.skipif(
+    bool(config.DISABLE_JIT), reason="whole drives take minutes without the compiler"
+)
+
+
+@pytest.fixture(scope="module", params=[("van-calibration", 71), ("compact-calibration", 72)])
+def made(request):
+    name, seed = request.param
+    return simulate_car(replace(make_scenario(name, seed=seed), duration=1500.0))
+
+
+def scaled(drive, gain):
+    ahead = drive.signals["accel_x"]
+    return drive.with_signals(Signal(ahead.name, ahead.time, gain * ahead.values))
+
+
+@pytest.mark.parametrize("gain", [1.06, 0.94])
+def test_a_scale_of_the_calibration_alone_is_told_and_in_the_interval(made, gain):
+    mass = made.scenario.mass
+    car = wb.calibrate(scaled(made.drive, gain), mass)
+    (doubt,) = car.provenance.doubts
+    assert "the accelerometer reads" in doubt
+    weighed = wb.weigh(made.drive, car)
+    assert doubt in weighed.warnings
+    assert abs(weighed.mass / mass - 1.0) > 0.02
+    low, high = weighed.interval(0.95)
+    assert low < mass < high
+
+
+def test_a_sound_calibration_is_not_doubted(made):
+    car = wb.calibrate(made.drive, made.scenario.mass)
+    assert car.provenance.doubts == ()
+    assert car.provenance.mass_scale_std < 0.02

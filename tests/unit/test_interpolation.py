@@ -1,0 +1,99 @@
+"""Interpolation and means of windows against NumPy."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from weighbridge.kernels.interpolation import (
+    distance_to_nearest,
+    longest_repeat,
+    moved_changes,
+    seen_windows,
+    trapezoid_means,
+)
+from weighbridge.signals import Signal
+from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.runs import runs_of
+
+
+@np.errstate(invalid="ignore")  # NumPy says nothing of infinite values, its scalars do.
+@pytest.mark.parametrize("seed", range(5))
+def test_interpolation_is_that_of_numpy_to_the_last_bit(seed):
+    rng = np.random.default_rng(seed)
+    time = np.sort(rng.uniform(0.0, 50.0, 300))
+    time[40:43] = time[40]
+    values = rng.normal(size=time.size)
+    values[100:103], values[200] = np.inf, np.nan
+    rising = np.sort(rng.uniform(-3.0, 53.0, 500))
+    for at in (
+        rising,
+        rising[::-1],
+        rng.permutation(np.concatenate([rising, time, [np.nan, np.inf, -np.inf]])),
+        (rising - np.array([[0.0], [1.0]]))[:, ::2],
+        np.array(7.5),
+        np.empty(0),
+    ):
+        expected = np.interp(at, time, values)
+        assert_array_equal(interpolate(at, time, values), expected)
+        assert interpolate(at, time, values).shape == np.shape(expected)
+        assert_array_equal(
+            interpolate(at, time, values, left=np.nan, right=1.0),
+            np.interp(at, time, values, left=np.nan, right=1.0),
+        )
+    assert_array_equal(interpolate(rising, time[:1], values[:1]), np.full(500, values[0]))
+
+
+def test_the_nearest_point_is_that_of_all():
+    rng = np.random.default_rng(5)
+    time = np.cumsum(rng.uniform(0.1, 3.0, 200))
+    at = np.concatenate([rng.uniform(-5.0, time[-1] + 5.0, 400), time, [np.inf]])
+    expected = np.abs(at[:, None] - time).min(axis=1)
+    for order in (np.arange(at.size), np.argsort(at)):
+        assert_array_equal(distance_to_nearest(at[order], time), expected[order])
+    assert np.isnan(distance_to_nearest(np.array([np.nan]), time)).all()
+    assert_array_equal(distance_to_nearest(at, time[:1]), np.abs(at - time[0]))
+
+
+def test_changes_moved_by_a_delay_are_those_of_two_interpolations():
+    rng = np.random.default_rng(6)
+    time = 0.1 * np.arange(600)
+    integral = np.cumsum(rng.normal(size=600))
+    begins = np.sort(rng.uniform(1.0, 55.0, 400))
+    ends, whole, width = begins + 1.5, rng.uniform(size=400) < 0.9, 31
+    moved = np.interp(ends - 0.3, time, integral) - np.interp(begins - 0.3, time, integral)
+    moved = np.where(whole, moved, 0.0)
+    padded = np.pad(moved, width // 2, mode="edge")
+    total = np.concatenate([[0.0], np.cumsum(padded)])
+    expected = moved - (total[width:] - total[:-width]) / width
+    found = moved_changes(begins, ends, 0.3, time, integral, whole, width)
+    assert_array_equal(found, expected[whole])
+
+
+def test_windows_are_those_of_whole_integrals_and_of_the_gaps_they_touch():
+    rng = np.random.default_rng(7)
+    time = np.sort(rng.uniform(10.0, 90.0, 900))
+    time = np.delete(time, slice(300, 340))
+    values, edges, limit = rng.normal(size=time.size), np.arange(0.0, 101.0, 2.0), 0.5
+    area = np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) * 0.5 * np.diff(time))])
+    expected = np.diff(np.interp(edges, time, area)) / np.diff(edges)
+    assert_array_equal(trapezoid_means(edges, time, values), expected)
+    gaps = [(a, b) for a, b in pairwise(time) if b - a > limit]
+    seen = [
+        a >= time[0] - limit
+        and b <= time[-1] + limit
+        and not any(start < b and end > a for start, end in gaps)
+        for a, b in pairwise(edges)
+    ]
+    assert 0 < sum(seen) < len(seen) - len(gaps)
+    assert_array_equal(seen_windows(edges, time, limit), seen)
+
+
+def test_the_longest_repeat_is_that_of_the_runs_of_a_signal():
+    rng = np.random.default_rng(9)
+    time = np.cumsum(rng.uniform(0.01, 0.02, 2000))
+    for levels in (1, 2, 5, 10**9):
+        signal = Signal("accel_x", time, rng.integers(levels, size=2000).astype(float))
+        assert longest_repeat(time, signal.values) == runs_of(signal).duration.max()
+    assert longest_repeat(np.empty(0), np.empty(0)) == 0.0

@@ -1,0 +1,154 @@
+"""The reproduction of Jensen et al. 2022: drives, judging, items, report."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from weighbridge.errors import ConfigError
+from weighbridge.estimators.rls import RlsSettings, estimate, run_in_turn
+from weighbridge.papers import PAPERS, items_of, jensen2022, section_of, seed_of, settings_of
+from weighbridge.papers.claims import NOT_REPRODUCED, document
+from weighbridge.papers.jensen2022_drives import (
+    HIGHWAY_LIMIT,
+    HIGHWAY_TRIPS,
+    TABLE_B1,
+    Conditions,
+    highway_scenario,
+    scenario,
+)
+from weighbridge.papers.jensen2022_judged import joined, torques
+from weighbridge.papers.jensen2022_printed import calibrate_as_printed, pulling
+from weighbridge.simulation import make_scenario, simulate_car
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+@pytest.fixture(scope="module")
+def made():
+    return simulate_car(make_scenario("car-short", seed=172001))
+
+
+@pytest.fixture(scope="module")
+def car(made):
+    return calibrate_as_printed(made.drive, float(made.truth.mass[0]))
+
+
+def test_the_conditions_of_a_drive_are_settings():
+    tyres, windows = TABLE_B1[10], TABLE_B1[16]
+    usual = scenario(tyres, seed=1)
+    assert usual.tyre_factor == 1.13
+    assert usual.wind_speed == 9.0
+    assert usual.effects.warm_up > 0.3
+    changed = Conditions(tyre_under=1.4, two_windows=0.1, wind=0.0, cold=0.0)
+    other = scenario(tyres, seed=1, conditions=changed)
+    assert (other.tyre_factor, other.wind_speed, other.effects.warm_up) == (1.4, 0.0, 0.0)
+    assert scenario(windows, seed=1, conditions=changed).drag_area_addition == 0.1
+    assert scenario(TABLE_B1[0], seed=1, conditions=changed).tyre_factor == 1.0
+
+
+def test_highway_trips_lead_north_first_at_the_speeds_of_the_paper():
+    for trip in HIGHWAY_TRIPS:
+        route = highway_scenario(trip, seed=1).route
+        highway = route.limit > HIGHWAY_LIMIT
+        out = highway & (np.arange(highway.size) < highway.size // 2)
+        assert np.mean(np.cos(route.heading[out])) > 0.85
+        assert np.mean(np.cos(route.heading[highway & ~out])) < -0.85
+        assert_allclose(np.max(route.limit), trip.fastest, rtol=1e-3)
+        assert_allclose(np.min(route.limit[highway]), trip.slowest, rtol=1e-3)
+    high, low = (highway_scenario(HIGHWAY_TRIPS[k], seed=1) for k in (0, 3))
+    assert high.wind_speed > 5.0 * low.wind_speed
+    assert [t.speeds for t in HIGHWAY_TRIPS[:3]] == ["110", "120", "100-120"]
+
+
+def test_drives_in_turn_are_one_long_drive(car):
+    balance = car.balance
+    alone = estimate(balance, car.vehicle).running_mass
+    first, second = run_in_turn([balance, balance], car.vehicle)
+    known = np.isfinite(alone)
+    assert_allclose(first[known], alone[known], rtol=1e-12)
+    # What was learnt is kept: the second begins where the first ended, not at the start value.
+    assert second[0] == pytest.approx(first[-1], rel=0.01)
+    quick = run_in_turn([balance, balance], car.vehicle, RlsSettings(forgetting=0.99))[1]
+    assert np.std(quick) > 2.0 * np.std(second)
+
+
+def test_torques_are_those_of_the_simulated_engine(made, car):
+    mass = float(np.mean(made.truth.mass))
+    balance = car.balance
+    steady = balance.table.usable & pulling(balance)
+    found = torques(made.drive, balance, car.vehicle, mass, steady)
+    true = np.interp(found.time, made.truth.time, made.truth.engine_torque)
+    # Less the losses of the driveline, with the engine's inertia still in it.
+    assert np.corrcoef(found.motion, true)[0, 1] > 0.93
+    assert 0.8 < np.sum(found.motion * true) / np.sum(true**2) < 1.05
+    assert 0.85 < found.r_squared < 1.0
+    assert 1.0 < found.air_over_source < 1.6
+    twice = joined([found, found])
+    assert twice.load.size == 2 * found.load.size
+    assert twice.r_squared == pytest.approx(found.r_squared)
+
+
+def test_seeds_are_those_that_no_tuning_saw():
+    assert seed_of("jensen2022") == 172_000
+    assert seed_of("galvao") == 777
+
+
+def test_what_the_paper_varies_is_a_setting():
+    from weighbridge.estimators.settings import changed
+
+    made = changed(
+        settings_of("jensen2022")(),
+        {
+            "rls.forgetting": 0.998,
+            "printed.initial_mass": 1200.0,
+            "printed.filter.speed_std": 0.3,
+            "printed.order": 1,
+            "conditions.two_windows": 0.1,
+            "forgettings": [0.99, 0.999, 1.0],
+        },
+    )
+    assert made.rls.forgetting == 0.998
+    assert made.printed.rls.initial_mass == 1200.0
+    assert made.printed.filter.noise.speed_std == 0.3
+    assert made.printed.order == 1
+    assert made.conditions.two_windows == 0.1
+    with pytest.raises(ConfigError, match="forgettings must be in"):
+        replace(made, forgettings=(0.5, 0.9995, 0.9999))
+
+
+@pytest.mark.parametrize("page", [DOCS / "papers.md", DOCS / "methods" / "jensen2022.md"])
+def test_pages_have_every_item_with_a_figure_of_a_run(page):
+    text = page.read_text(encoding="utf-8")
+    cells = [line.removesuffix(" |").split(" | ") for line in text.splitlines() if "| " in line]
+    rows = {(row[0].removeprefix("| "), row[1]): row for row in cells if len(row) == 6}
+    names = set(PAPERS) if page.name == "papers.md" else {"jensen2022"}
+    for item in (item for name in names for item in items_of(name)):
+        row = rows[(item.paper_item, item.where)]
+        assert row[4] == item.printed
+        assert NOT_REPRODUCED not in row[5]
+        assert bool(row[5].strip()) is bool(item.ours), item.paper_item
+
+
+@pytest.mark.slow
+def test_a_reproduction_has_every_figure_and_its_page(tmp_path):
+    rows = tuple(r for r in TABLE_B1 if r.number in (4, 7))
+    done = jensen2022.reproduce(drives=rows, trips=HIGHWAY_TRIPS[::3])
+    made = jensen2022.as_reproduced(done)
+    assert {name for item in jensen2022.ITEMS for name in item.names} <= set(made.figures)
+    assert "172000 to 172004" in made.title
+    assert "no choice of the weighing was made on" in made.title
+    by_print, ours = done.printed[1], done.drives[1]
+    assert 0.003 < by_print.pitch_largest < math.radians(3.0)
+    assert ours.pitch_largest < by_print.pitch_largest
+    text = document([section_of("jensen2022", made)])
+    assert text.index(": conditions of the paper") < text.index(": other conditions")
+    page = tmp_path / "page.html"
+    made.write_report(page)
+    html = page.read_text(encoding="utf-8")
+    for number in ("4:", "8b", "9,", "10,", "12,", "13,", "16,", "17,", "18,", "19,"):
+        assert f"Fig. {number}" in html
+    assert "fig. 11: these drives were not asked for" in html.lower()

@@ -1,0 +1,64 @@
+"""What the shape of the torque reading leaves open of a mass."""
+
+import numpy as np
+import pytest
+
+from weighbridge.estimators.torque_shape import (
+    KNOTS,
+    ORDINARY,
+    SHAPE_STD,
+    shape_columns,
+    shape_std,
+)
+from weighbridge.pipeline.weighing import weigh
+
+MASS = 1600.0
+
+
+@pytest.fixture(scope="module")
+def weighed(short_drive, short_car):
+    return weigh(short_drive.drive, short_car).result
+
+
+def moved(torque, accel):
+    """Mass that a unit of the error at each knot adds, by least squares of force on motion [kg]."""
+    near = np.maximum(0.0, 1.0 - np.abs(torque[:, None] - KNOTS) / (KNOTS[1] - KNOTS[0]))
+    accel = accel - accel.mean()
+    full = 2.0 * MASS * np.ptp(accel) / np.ptp(torque)
+    return full * accel @ near / (accel @ accel)
+
+
+def driven(low, high):
+    """A drive whose torque goes to and fro between two parts of the highest."""
+    torque = np.linspace(low, high, 400)
+    return moved(torque, MASS * (torque - torque.mean()))
+
+
+def test_ordinary_torques_weigh_as_the_calibration_did():
+    mean, spread = ORDINARY
+    often = np.exp(-0.5 * ((KNOTS - mean) / spread) ** 2)
+    assert shape_std(MASS * (KNOTS - mean) * often, MASS) < 1e-6
+    assert shape_std(MASS * often, MASS) < 1e-6
+
+
+def test_few_torques_leave_more_open_than_many():
+    many, few = shape_std(driven(-0.1, 0.8), MASS), shape_std(driven(0.5, 0.7), MASS)
+    assert few > 2.0 * many
+    assert few > SHAPE_STD
+
+
+def test_no_mass_and_no_torque_leave_nothing(weighed, short_car):
+    assert shape_std(np.ones(KNOTS.size), 0.0) == 0.0
+    assert not shape_columns(weighed.balance.table, short_car, 0.0).any()
+
+
+def test_an_equal_error_at_all_torques_is_a_force_of_the_engine(weighed, short_car):
+    table, highest = weighed.balance.table, 150.0
+    columns = shape_columns(table, short_car, highest)
+    torque, gearing = np.nan_to_num(table.torque), np.nan_to_num(table.gearing)
+    pulling = (torque > 0.0) & (torque < highest)
+    np.testing.assert_allclose(
+        columns[pulling].sum(axis=1),
+        highest * gearing[pulling] * short_car.driveline.efficiency,
+        rtol=1e-9,
+    )
