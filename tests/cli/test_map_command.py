@@ -101,6 +101,7 @@ def answers(monkeypatch, told):
     def prompt(question, *, default, err):
         assert err
         asked.append(question)
+        assert asked.count(question) < 5, f"the answers to {question!r} are not taken"
         found = next((a for words, a in told.items() if words in question), default)
         return found.pop(0) if isinstance(found, list) else found
 
@@ -244,7 +245,7 @@ def test_a_log_of_which_no_column_is_a_torque_says_what_to_do(
     mapping = tmp_path / "m.toml"
     told = " ".join(weighbridge("map", torqueless, "-o", mapping).err.split())
     assert "no column taken is a torque, a load or a power" in told
-    asked = answers(monkeypatch, {"kx7, 0 to 97.5": "engine_torque_fraction", "unit": "pct"})
+    asked = answers(monkeypatch, {"kx7, 0 to 97.5": "engine_torque_fraction", "kx7 is": "pct"})
     ran = weighbridge("map", torqueless, "-o", mapping, "--ask", "--force")
     assert ran.code == 0
     assert any(question.startswith("kx7, 0 to 97.5") for question in asked)

@@ -11,7 +11,8 @@ import pytest
 from weighbridge.version import VERSION
 
 ROOT = Path(__file__).parents[2]
-COMPILED = {".pyc", ".nbi", ".nbc"}
+COMPILED = "__pycache__"
+"""Folder of what Python and the kernels compiled at a first run."""
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def files(below: Path) -> set[str]:
     return {
         path.relative_to(ROOT / "src").as_posix()
         for path in below.rglob("*")
-        if path.is_file() and path.suffix not in COMPILED
+        if path.is_file() and COMPILED not in path.parts
     }
 
 

@@ -25,10 +25,15 @@ def scaled(drive, gain):
     return drive.with_signals(Signal(ahead.name, ahead.time, gain * ahead.values))
 
 
+def calibrated(made, drive):
+    mass = made.scenario.mass
+    return wb.calibrate(drive, mass, vehicle=wb.Vehicle(kind=made.scenario.car.kind))
+
+
 @pytest.mark.parametrize("gain", [1.06, 0.94])
 def test_a_scale_of_the_calibration_alone_is_told_and_in_the_interval(made, gain):
     mass = made.scenario.mass
-    car = wb.calibrate(scaled(made.drive, gain), mass)
+    car = calibrated(made, scaled(made.drive, gain))
     (doubt,) = car.provenance.doubts
     assert "the accelerometer reads" in doubt
     weighed = wb.weigh(made.drive, car)
@@ -39,6 +44,6 @@ def test_a_scale_of_the_calibration_alone_is_told_and_in_the_interval(made, gain
 
 
 def test_a_sound_calibration_is_not_doubted(made):
-    car = wb.calibrate(made.drive, made.scenario.mass)
+    car = calibrated(made, made.drive)
     assert car.provenance.doubts == ()
     assert car.provenance.mass_scale_std < 0.02

@@ -16,7 +16,9 @@ from weighbridge.io.dbc import Database, Found, is_readable, message_frames, phy
 from weighbridge.io.draft import Draft
 from weighbridge.io.formats import format_of
 from weighbridge.io.frames import Frames
+from weighbridge.io.j1939 import decode_j1939, is_j1939
 from weighbridge.io.naming import recognise_all
+from weighbridge.io.obd import decode_obd
 
 
 def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
@@ -53,7 +55,17 @@ def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
     drafted = draft_of(path, found)
     flags = _flags(databases)
     columns = (replace(c, valid=flags.get(c.name.partition(".")[0], "")) for c in drafted.columns)
-    return replace(drafted, columns=tuple(columns))
+    return replace(
+        drafted, columns=tuple(columns), read_anyway=drafted.read_anyway | _read_anyway(frames)
+    )
+
+
+def _read_anyway(frames: Frames) -> frozenset[str]:
+    """Name what OBD-II answers and J1939 in the traffic tell without a database."""
+    signals = decode_obd(frames).signals
+    if is_j1939(rest := frames.select(frames.extended)):
+        signals = [*signals, *decode_j1939(rest).signals]
+    return frozenset(signal.name for signal in signals)
 
 
 def _flags(databases: Sequence[Database]) -> dict[str, str]:

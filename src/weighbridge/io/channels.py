@@ -309,6 +309,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
         duration=max(b for _, b in ends) - min(a for a, _ in ends),
         columns=columns,
         doubts=tuple(doubts),
+        read_anyway=frozenset(known),
     )
 
 

@@ -72,6 +72,7 @@ class Draft:
         a clock
     rows : of a table
     times : columns of a table that can be its time, the one taken first
+    read_anyway : quantities that the log is known to tell without a mapping
     """
 
     path: Path
@@ -88,6 +89,7 @@ class Draft:
     row_rate: float | None = None
     rows: int = 0
     times: tuple[DraftTime, ...] = ()
+    read_anyway: frozenset[str] = frozenset()
 
     @property
     def files(self) -> int:
@@ -183,8 +185,9 @@ def draft(path: Path) -> Draft:
 
 
 def tells_torque(*drafts: Draft) -> bool:
-    """Whether the columns that are known hold a torque, a load or what does instead."""
+    """Whether what is known of the logs holds a torque, a load or what does instead."""
     known = {c.quantity for one in drafts for c in one.known}
+    known |= frozenset().union(*(one.read_anyway for one in drafts))
     sets = (s for source in TORQUE_SOURCES.values() for s in (source.signals, *source.others))
     return any(set(signals) - _BESIDE <= known for signals in sets)
 
