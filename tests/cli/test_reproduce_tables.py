@@ -104,7 +104,9 @@ def test_settings_reach_the_reproduction_by_name(weighbridge, monkeypatch):
 
     monkeypatch.setattr("weighbridge.papers.paper", paper)
     words = ("--set", "printed.forgetting=0.998", "--set", "conditions.wind=0")
-    assert weighbridge("reproduce", "jensen2022", *words).code == 0
+    ran = weighbridge("reproduce", "jensen2022", *words)
+    assert ran.code == 0
+    assert "printed.forgetting = 0.998, conditions.wind = 0" in " ".join(ran.out.split())
     ((name, seed, _, settings),) = asked
     assert (name, seed) == ("jensen2022", jensen2022.SEED)
     assert settings.printed.forgetting == 0.998
@@ -115,7 +117,7 @@ def test_settings_reach_the_reproduction_by_name(weighbridge, monkeypatch):
     ("words", "said"),
     [
         (("all", "--set", "rls.forgetting=0.99"), "all has no settings to change"),
-        (("nguyen2024", "--set", "noise=1"), "nguyen2024 has no settings to change"),
+        (("nguyen2024", "--set", "noise=1"), "there is no setting 'noise'"),
         (("jensen2022", "--set", "windows=1"), "there is no setting 'windows'"),
         (("jensen2022", "--set", "rls.forgetting=2"), "forgetting must be in"),
     ],

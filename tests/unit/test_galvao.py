@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from weighbridge.estimators.settings import changed
 from weighbridge.papers import PAPERS, galvao
 from weighbridge.papers.galvao_figures import item_figures
 from weighbridge.papers.galvao_statistics import rank_correlation, slope
@@ -60,6 +61,14 @@ def test_same_mass_is_met_from_its_own_start_and_not_from_the_printed_one(three)
         assert abs(test.error(test.ours)) <= galvao.PAPER_WORST
         assert test.band(test.ours) <= 100.0
         assert abs(test.error(test.printed)) > 0.1
+
+
+def test_a_setting_of_the_printed_filter_moves_it_alone(three):
+    settings = changed(galvao.Settings(), {"printed.process_var": [0.1, 1e-8, 0.005]})
+    _, _, others = galvao.weigh_three(1234, settings)
+    for usual, other in zip(three[2], others, strict=True):
+        np.testing.assert_array_equal(usual.ours.mass, other.ours.mass)
+        assert abs(usual.printed.mass[-1] - other.printed.mass[-1]) > 10.0
 
 
 def test_what_falls_behind_is_told(done):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from weighbridge.estimators.settings import changed
 from weighbridge.papers import nguyen2024 as paper
 
 
@@ -51,3 +52,17 @@ def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
     paper.reproduced(5, None).write_report(page)
     text = page.read_text(encoding="utf-8")
     assert text.index("MAPE of the sprung mass, worst road") < text.index("Table 2 of the paper")
+
+
+def test_settings_reach_the_cases_that_have_the_papers():
+    with_offsets = next(c for c in paper.CASES if c.settings.offset_std > 0.0)
+    settings = changed(paper.Settings(), {"filter.jump_rate": 0.01, "body_noise": [1e-4] * 3})
+    assert settings.of(paper.PAPERS_CASE).settings.jump_rate == 0.01
+    assert settings.of(with_offsets).settings == with_offsets.settings
+    assert settings.of(paper.INVERSE).sensors.body_noise == (1e-4,) * 3
+    assert settings.of(paper.AS_VARIANCE).sensors == paper.AS_VARIANCE.sensors
+    run = {"seed": 5, "roads": 1, "cases": (paper.PAPERS_CASE,)}
+    (usual,), (other,) = (
+        paper.reproduce(**run, settings=s)[0][paper.PAPERS_CASE.name] for s in (None, settings)
+    )
+    assert np.all(usual.mape != other.mape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
@@ -39,7 +40,7 @@ def reproduce(
         typer.Option(
             "--set",
             help="Change what a paper varies, such as printed.forgetting=0.998; repeat it for "
-            "more. For jensen2022.",
+            "more. Of one paper.",
             metavar="NAME=VALUE",
         ),
     ] = None,
@@ -50,6 +51,7 @@ def reproduce(
     """
     from weighbridge import papers
     from weighbridge.errors import ConfigError
+    from weighbridge.estimators.settings import differences
 
     if paper != "all" and paper not in papers.PAPERS:
         raise ConfigError(f"{paper}: known papers are {', '.join(papers.PAPERS)} and all")
@@ -65,6 +67,8 @@ def reproduce(
         asked = (settings,) if settings is not None else ()
         with progress(f"reproducing {name}") as bar:
             done = papers.paper(name)(first, bar.tell, *asked)
+        if changed := differences(settings) if settings is not None else "":
+            done = replace(done, title=f"{done.title}; {changed}")
         show(done)
         behind += [f"{name}: {figure}" for figure in done.behind]
         if papers.items_of(name):
@@ -96,8 +100,8 @@ def _settings(paper: str, changes: list[str]) -> Any:
     kind = papers.settings_of(paper) if paper != "all" else None
     if kind is None:
         raise ConfigError(
-            f"--set {changes[0]}: {paper} has no settings to change; name one paper that has, such "
-            "as jensen2022"
+            f"--set {changes[0]}: {paper} has no settings to change; name one paper, such as "
+            "jensen2022"
         )
     return changed(kind(), parsed(changes))
 
