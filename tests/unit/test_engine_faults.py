@@ -136,6 +136,26 @@ def test_a_dragged_engine_in_whole_percent_is_not_frozen(fleet):
     assert held_at(0.08) > 100
 
 
+def test_a_level_the_reading_comes_back_to_is_not_frozen(fleet):
+    # Overrun through the gears: the control unit tells one value above its lowest each time.
+    drive = fleet.drive("truck")
+    reading = drive.signals["engine_torque_fraction"]
+    time = reading.time - drive.start
+    coast = np.where((time > 300.0) & (time % 100.0 < 12.0), time // 100.0, 0.0).astype(int)
+    swaying = np.where(
+        coast > 0, 15.0 + 3.0 * np.sin(time), drive.signals["vehicle_speed"].at(reading.time)
+    )
+    moving = Signal("vehicle_speed", reading.time, swaying)
+
+    def marked(value):
+        held = Signal(reading.name, reading.time, np.where(coast > 0, value, reading.values))
+        return np.count_nonzero(frozen(drive.with_signals(held, moving), reading.name))
+
+    span = np.ptp(reading.values)
+    assert marked(reading.values.min() + 0.08 * span) == 0
+    assert marked(reading.values.min() + (0.08 + 0.01 * coast) * span) > 100
+
+
 def without_quick_changes(span):
     def change(t, x):
         return uniform_filter1d(x, round(span / np.median(np.diff(t))))

@@ -41,6 +41,10 @@ DRAGGED: Final = 0.05
 """Part of its range above its lowest up to which a reading may be a dragged engine's [-]: drag goes
 with speed and warmth, by up to 0.035 in four undamaged vehicles of the second model."""
 
+LEVEL_RUNS: Final = 3
+"""Runs at one value from which on it is a level of the reading, such as that of a dragged engine,
+and no value that was held by chance."""
+
 REVS: Final = 1.3
 """Highest over lowest engine speed that one torque does not outlast [-]."""
 
@@ -80,7 +84,9 @@ def frozen(drive: Drive, name: str) -> Bools:
     shortest = SHORTEST.get(name, SHORTEST_TORQUE)
     least = min(shortest, SHORTEST.get(name, HELD))
     candidates = np.flatnonzero((runs.duration >= least) & (runs.length >= 8)).tolist()
-    impossible = [k for k in candidates if _impossible(drive, signal, _part(runs, k), runs)]
+    values, counts = np.unique(signal.values[runs.first[candidates]], return_counts=True)
+    levels = frozenset(values[counts >= LEVEL_RUNS].tolist())
+    impossible = [k for k in candidates if _impossible(drive, signal, _part(runs, k), levels)]
     if len(impossible) >= FEWEST_HELD:
         # What is known to hold its value has held the others too.
         impossible = candidates
@@ -96,7 +102,8 @@ def _part(runs: Runs, k: int) -> slice:
     return slice(int(runs.first[k]), int(runs.first[k] + runs.length[k]))
 
 
-def _impossible(drive: Drive, signal: Signal, part: slice, runs: Runs) -> bool:
+def _impossible(drive: Drive, signal: Signal, part: slice, levels: frozenset[float]) -> bool:
+    """Whether a value cannot have lasted; coasting and full load come back to their ``levels``."""
     time, value = signal.time[part], float(signal.values[part.start])
     grid = np.linspace(time[0], time[-1], max(int((time[-1] - time[0]) / 1.0), 8))
     if signal.name == "vehicle_speed":
@@ -117,7 +124,7 @@ def _impossible(drive: Drive, signal: Signal, part: slice, runs: Runs) -> bool:
     if not accel.size:
         return False
     lowest, highest = float(signal.values.min()), float(signal.values.max())
-    if value in (0.0, highest) or value <= lowest + DRAGGED * (highest - lowest):
+    if value in (0.0, highest, *levels) or value <= lowest + DRAGGED * (highest - lowest):
         low, high, reach = EXTREME
         return bool(accel.min() < low and accel.max() > high and np.ptp(speed[known]) > reach)
     engine = _of(drive, "engine_speed", grid)
