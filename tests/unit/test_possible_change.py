@@ -1,5 +1,6 @@
 """The load may have changed at a stop after which too little was driven to find it."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from weighbridge.estimators.joint.load_stops import change_odds
-from weighbridge.estimators.joint.possible import FEWEST, averaged
+from weighbridge.estimators.joint.possible import FEWEST, PossibleChange, averaged
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput, filter_params
 from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.kernels import disturbance
@@ -89,6 +90,30 @@ def test_where_nothing_can_be_told_nothing_is_changed():
         state, _, possible = averaged(none, STD, SETTINGS)
         assert possible is None
         assert_array_equal(state.x, unaveraged(given).x)
+
+
+def test_a_change_found_that_the_rest_denies_is_averaged_away():
+    shares, errors = [], []
+    for seed in range(12):
+        true = van(0.0, seed=seed, every=40, stood=60.0)
+        found = true.added.copy()
+        found[120, [0, 2]] = (SETTINGS.change_std * MASS) ** 2, 1.0
+        state, same, possible = averaged(replace(true, added=found), STD, SETTINGS)
+        errors.append((abs(state.x[0] - MASS), abs(same.x[0] - MASS)))
+        assert errors[-1][0] < 2.0 * std(state)
+        assert possible.doubtful_time == true.time[120]
+        shares.append(possible.none)
+    averaged_error, found_error = np.mean(errors, axis=0)
+    assert averaged_error < 0.8 * found_error
+    assert np.median(shares) > 0.4
+    sure = van(-600.0, seed=1, every=40, stood=60.0)
+    *_, possible = averaged(replace(sure, added=found), STD, SETTINGS)
+    assert possible.none < 1e-3
+
+
+def test_a_change_found_that_may_be_none_is_told():
+    note = PossibleChange(math.nan, 0.0, 1492.0, 0.38).note
+    assert note.startswith("with a probability of 38 % the load did not change before 1492 s")
 
 
 def test_a_stop_at_which_a_change_was_found_is_not_tried_again():
