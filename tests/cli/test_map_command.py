@@ -228,6 +228,16 @@ def test_the_command_named_next_reads_one_of_several_drives(weighbridge, tmp_pat
     assert f"next: {command}" in " ".join(ran.out.split())
     for folder in folders:
         assert weighbridge("inspect", folder, "--mapping", mapping).code == 0
+    assert "folder of its own" not in ran.out
+
+
+def test_drives_beside_each_other_are_to_have_folders_of_their_own(weighbridge, tmp_path):
+    for day in (11, 12):
+        for name, column in (("obd", "Vehicle speed (km/h)"), ("gps", "Latitude (deg)")):
+            rows = "".join(f"{k / 4},{40 + k % 9}\n" for k in range(300))
+            (tmp_path / f"{name}_202403{day}.csv").write_text(f"Time (s),{column}\n{rows}")
+    told = " ".join(weighbridge("map", tmp_path, "-o", tmp_path / "m.toml").out.split())
+    assert "put the files of each into a folder of its own" in told
 
 
 @pytest.fixture

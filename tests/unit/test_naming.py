@@ -56,6 +56,32 @@ def test_most_columns_of_buses_are_named_right_that_nothing_was_made_for():
     assert not [p for p in pairs if p[1] and p[0] != p[1]]
 
 
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("altitude_gps", "altitude", None),
+        ("vitesse_gps_ms", "gnss_speed", "mps"),
+        ("maf_gps", "mass_air_flow", "gps"),
+        ("engine_run_time_ms", "run_time", "ms"),
+        ("delay_ms", "", "ms"),
+    ],
+)
+def test_a_last_word_is_a_unit_where_the_quantity_has_it(name, quantity, unit):
+    found = recognise_all([name])[0]
+    assert (found.quantity, found.unit) == (quantity, unit)
+
+
+def test_axes_are_named_by_the_directions_of_the_vehicle():
+    names = ["AccLong", "AccLat", "AccVert", "RollRate", "PitchRate", "YawRate"]
+    units = ["mps2"] * 3 + ["degps"] * 3
+    axes = ["accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z"]
+    assert [n.quantity for n in recognise_all(names, units)] == axes
+    # A sensor of the brakes has no vertical axis; a log of the ride measures the suspension.
+    assert "accel_x" not in {n.quantity for n in recognise_all(names[:2], units[:2])}
+    ride = recognise_all([*names, "suspension_travel_fl"], [*units, "mm"])
+    assert {"roll_rate", "pitch_rate"} <= {n.quantity for n in ride}
+
+
 def test_apps_that_nothing_was_made_for():
     """0.89 of their columns were named right, and one wrong, before a word was added for them."""
     right = total = 0

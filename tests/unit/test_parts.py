@@ -57,6 +57,25 @@ def test_pauses_part_a_day(trips):
     assert not find_cuts(behind(trips, PAUSE - 60.0))
 
 
+def test_a_position_held_through_a_tunnel_is_no_splice(trips):
+    drive = trips[0]
+    latitude, longitude = drive.signals["latitude"], drive.signals["longitude"]
+    speed = drive.signals["vehicle_speed"]
+    starts = np.arange(latitude.time[0], drive.end - 90.0, 5.0)
+    begin = max(starts, key=lambda t: np.mean(speed.at(t + np.arange(60.0))))
+    tick = np.arange(latitude.time[0], drive.end, 0.02)
+    known = np.where((tick > begin) & (tick < begin + 60.0), begin, tick)
+    second = np.maximum(np.floor(known), tick[0])
+    held = [Signal(s.name, tick, s.at(second)) for s in (latitude, longitude)]
+    moved = np.hypot(*(np.abs(np.diff(s.values)).max() for s in held)) * 6.37e6
+    assert moved > 600.0
+    assert not find_splices(drive.with_signals(*held))
+    elsewhere = [Signal(s.name, tick, s.values + 0.01 * (tick > begin + 60.0)) for s in held]
+    assert [c.why for c in find_splices(drive.with_signals(*elsewhere))] == [
+        "jumps of the position"
+    ]
+
+
 def test_a_long_stop_parts_a_day_and_a_short_one_does_not(trips):
     trip = trips[0]
     speed = trip.signals["vehicle_speed"]

@@ -106,6 +106,8 @@ def map_log(
         say(f"next: weighbridge map {shlex.join(map(str, logs))} --rate HZ -o {output} --force")
         return
     drive = logs[0] if len(drafts) == 1 else _drive(logs)
+    if _drives_beside_each_other(drafts):
+        say(f"if {drive} holds several drives, put the files of each into a folder of its own")
     words = ["weighbridge", "inspect", drive, "--mapping", output]
     words += [word for d in dbc or () for word in ("--dbc", d)]
     say(f"next: {shlex.join(map(str, words))}")
@@ -217,6 +219,12 @@ def _rated(found: Draft, rate: float) -> Draft:
 def _drive(logs: list[Path]) -> Path:
     """Path of one drive: a folder named, else that of the files."""
     return next((path for path in logs if path.is_dir()), logs[0].parent)
+
+
+def _drives_beside_each_other(drafts: list[Draft]) -> bool:
+    """Whether one folder has several files of each kind, which may be those of several drives."""
+    places = {path.parent for found in drafts for path in (found.path, *found.alike)}
+    return len(places) == 1 and len(drafts) > 1 and all(found.files > 1 for found in drafts)
 
 
 def _show(found: Draft, screen: Console) -> None:

@@ -293,8 +293,10 @@ def draft_of(path: Path, found: Recording) -> Draft:
             f"{path}: none of its channels is known by its name; it has {column_list(counted)}: "
             "write [signals] of a mapping by hand"
         )
-    ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in channels]
-    rates = [(c.time.size - 1) / (b - a) for c, (a, b) in zip(channels, ends, strict=True) if b > a]
+    # Channels that stand for a name alone have no instants of their own.
+    told = [c for c in channels if c.quantity or np.isfinite(c.values).any()] or channels
+    ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in told]
+    rates = [(c.time.size - 1) / (b - a) for c, (a, b) in zip(told, ends, strict=True) if b > a]
     doubts = [*found.notes]
     doubts += [
         f"{n!r} is there {k} times; the longest is taken" for n, k in counted.items() if k > 1

@@ -11,7 +11,8 @@ import numpy as np
 import polars as pl
 
 from weighbridge.errors import DriveError
-from weighbridge.io.naming import TIME_WORDS, is_time, unit_of, words_of
+from weighbridge.io.naming import is_time, unit_of, words_of
+from weighbridge.io.phrases import TIME_WORDS
 from weighbridge.io.table import RawTable, column_list, since_1970, time_seconds
 from weighbridge.signals import Floats
 from weighbridge.signals.units import UNITS
@@ -26,7 +27,9 @@ DATE_FORMATS: Final = (
     "%m/%d/%Y %I:%M:%S%.f %p",
     "%d-%b-%Y %H:%M:%S%.f",
     "%Y/%m/%d %H:%M:%S%.f",
+    "%Y-%m-%d %H:%M:%S:%3f",
     "%Y-%m-%d %H-%M-%S%.f",
+    "%Y-%m-%d %H-%M-%S_%3f",
     "%Y%m%d %H%M%S%.f",
 )
 """Dates that loggers write beside ISO 8601; day before month where both would fit."""

@@ -42,6 +42,7 @@ _ALONE: Final = 0.35  # steps around a splice over its own [-]
 _FALLS: Final = 2.0 / 3.0  # engine or ground speed after a splice over that before it [-]
 _FASTEST: Final = 100.0  # between two positions [m/s]
 _FAR: Final = 300.0  # beside that [m]
+_BEYOND: Final = 1.2  # of the way that a speed tells, which may be off [-]
 _COOLED: Final = 10.0  # of the coolant: the engine was parked [K]
 _RARELY: Final = 10.0  # period of signals that are sent now and then [s]
 
@@ -132,7 +133,7 @@ def find_splices(drive: Drive) -> list[Cut]:
         found += _starts_anew(speed, _witnesses(drive, speed))
     lat, lon = drive.get("latitude"), drive.get("longitude")
     if lat is not None and lon is not None and len(lat) > 2 * _AROUND:
-        found += _position_jumps(lat, lon.at(lat.time))
+        found += _position_jumps(lat, lon.at(lat.time), speed)
     coolant = drive.get("coolant_temperature")
     if coolant is not None and len(coolant) > 2 * _AROUND:
         found += _coolant_jumps(coolant)
@@ -215,12 +216,23 @@ def _falls(signal: Signal, before: float, after: float) -> bool:
     return bool(near and all(after < _FALLS * before for before, after in pairs))
 
 
-def _position_jumps(lat: Signal, longitude: Floats) -> list[Cut]:
+def _position_jumps(lat: Signal, longitude: Floats, speed: Signal | None) -> list[Cut]:
+    """Find steps of the position that no vehicle makes, nor one that drove on while it was held.
+
+    A receiver without sight, or its logger, may repeat the last fix for as long as a tunnel takes.
+    """
     step = np.diff(lat.time)
+    driven = np.zeros(step.size)
+    if speed is not None and len(speed) > 1:
+        length = np.concatenate(([0.0], np.cumsum(np.diff(speed.time) * np.abs(speed.values[1:]))))
+        moved = (np.diff(lat.values) != 0.0) | (np.diff(longitude) != 0.0)
+        new = np.concatenate(([True], moved))
+        since = lat.time[np.maximum.accumulate(np.where(new, np.arange(new.size), 0))]
+        driven = np.diff(np.interp([since[:-1], lat.time[1:]], speed.time, length), axis=0)[0]
     east_per_angle = np.cos(lat.values[:-1])
     way = EARTH_RADIUS * np.hypot(np.diff(lat.values), np.diff(longitude) * east_per_angle)
     with np.errstate(invalid="ignore"):
-        places = np.flatnonzero((step < _NEAR) & (way > _FAR + _FASTEST * step))
+        places = np.flatnonzero((step < _NEAR) & (way > _FAR + _FASTEST * step + _BEYOND * driven))
     north = _rise(*_windows(lat.values, places))
     east = _rise(*_windows(longitude, places)) * east_per_angle[places]
     stays = EARTH_RADIUS * np.hypot(north, east) > 0.6 * way[places]
