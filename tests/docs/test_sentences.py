@@ -9,12 +9,16 @@ HOME = Path(__file__).parents[2]
 STUDIES = [
     HOME / "studies" / f"{name}.md"
     for name in (
+        "du2025",
+        "du2025.template",
         "electric_power",
         "jensen2022",
         "jensen2022.template",
         "jensen2022_band.template",
         "live",
         "live.template",
+        "nguyen2024",
+        "nguyen2024.template",
     )
 ]
 """Studies whose sentences are short; the others follow."""
