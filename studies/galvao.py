@@ -108,8 +108,8 @@ def chance_of_print() -> str:
     errors = ", ".join(f"{abs(m - true):.2f}" for m in paper.PAPER_MASSES)
     bands = ", ".join(f"{b:.0f}" for b in paper.PAPER_BANDS)
     return (
-        f"errors of {errors} kg under 95 % bands of ± {bands} kg have, if the bands hold, a chance "
-        f"of {np.prod(chances):.0e}."
+        f"errors of {errors} kg under 95 % bands of ± {bands} kg. If the bands hold, their chance is "
+        f"{np.prod(chances):.0e}."
     )
 
 
@@ -287,7 +287,7 @@ def sampling() -> str:
     fast = speed.values > 5.0
     lines = [
         f"A mean over 7 s of readings in whole km/h at 4 Hz is off by {np.nanstd(off):.3f} m/s, a "
-        f"single reading by {np.std((speed.values - late)[fast]):.3f} m/s; the paper's R is that "
+        f"single reading by {np.std((speed.values - late)[fast]):.3f} m/s. The paper's R is that "
         "of 0.010 m/s.",
         "",
         "| sample time s | samples used | R² of the fit | largest error % |",
@@ -348,9 +348,9 @@ def transfer_text(seed: int) -> str:
         f"{errors.size} drives of {CARS} cars with loads to {100 * LARGEST_LOAD:.0f} % of the "
         f"car: RMS error {100 * np.sqrt(np.mean(errors**2)):.1f} %, mean "
         f"{100 * errors.mean():+.1f} %, from {100 * errors.min():+.1f} to "
-        f"{100 * errors.max():+.1f} %; the intervals, which are not given out, would hold in "
-        f"{held}; the start makes {100 * shares.min():.0f} to {100 * shares.max():.0f} % of the "
-        f"answers; none is called a mass."
+        f"{100 * errors.max():+.1f} %. The intervals, which are not given out, would hold in "
+        f"{held}. The start makes {100 * shares.min():.0f} to {100 * shares.max():.0f} % of the "
+        f"answers. None is called a mass."
     )
 
 

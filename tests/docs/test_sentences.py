@@ -12,6 +12,8 @@ STUDIES = [
         "du2025",
         "du2025.template",
         "electric_power",
+        "galvao",
+        "galvao.template",
         "jensen2022",
         "jensen2022.template",
         "jensen2022_band.template",
