@@ -108,8 +108,8 @@ def chance_of_print() -> str:
     errors = ", ".join(f"{abs(m - true):.2f}" for m in paper.PAPER_MASSES)
     bands = ", ".join(f"{b:.0f}" for b in paper.PAPER_BANDS)
     return (
-        f"errors of {errors} kg under 95 % bands of ± {bands} kg. If the bands hold, their chance is "
-        f"{np.prod(chances):.0e}."
+        f"errors of {errors} kg under 95 % bands of ± {bands} kg. If the bands hold, their chance "
+        f"is {np.prod(chances):.0e}."
     )
 
 
