@@ -254,7 +254,9 @@ def differences(rows: Sequence[Row]) -> str:
             f"{words} {gap.mean():+.2f} ± {std:.2f} % (curved is better in "
             f"{np.count_nonzero(gap < 0)} of {gap.size} calibrations)"
         )
-    return "Curved less straight, absolute errors, one standard error: " + "; ".join(said) + "."
+    return "Curved less straight, absolute errors, one standard error:\n\n" + "\n".join(
+        f"- {each}" for each in said
+    )
 
 
 def main() -> None:

@@ -375,10 +375,10 @@ def j1939_truck() -> str:
     lines += [
         "",
         f"Reference torque {signals['reference_torque'].values[0]:.0f} N m in all "
-        f"{len(signals['reference_torque'])} broadcasts (SPN 544, transport protocol); net torque "
+        f"{len(signals['reference_torque'])} broadcasts (SPN 544, transport protocol). Net torque "
         f"{100 * torque.min():.0f} to {100 * torque.max():.0f} % of it, friction "
         f"{100 * extras['friction_torque'].values.min():.0f} to "
-        f"{100 * extras['friction_torque'].values.max():.0f} %; speed {speed.min():.0f} to "
+        f"{100 * extras['friction_torque'].values.max():.0f} %. Speed {speed.min():.0f} to "
         f"{speed.max():.0f} km/h; {sum(found.summary.decoded.values())} frames of "
         f"{len(found.summary.decoded)} groups read, {len(found.summary.ignored)} groups not used.",
         "",

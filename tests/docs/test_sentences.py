@@ -6,31 +6,13 @@ import pytest
 from website.sentences import MOST, length, long_ones, sentences
 
 HOME = Path(__file__).parents[2]
-STUDIES = [
-    HOME / "studies" / f"{name}.md"
-    for name in (
-        "du2025",
-        "du2025.template",
-        "electric_power",
-        "galvao",
-        "galvao.template",
-        "jensen2022",
-        "jensen2022.template",
-        "jensen2022_band.template",
-        "live",
-        "live.template",
-        "nguyen2024",
-        "nguyen2024.template",
-    )
-]
-"""Studies whose sentences are short; the others follow."""
 PAGES = sorted(
     page.relative_to(HOME).as_posix()
     for page in (
         HOME / "README.md",
         HOME / "CONTRIBUTING.md",
         *(HOME / "docs").rglob("*.md"),
-        *STUDIES,
+        *(HOME / "studies").glob("*.md"),
     )
 )
 
