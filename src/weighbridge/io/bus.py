@@ -164,6 +164,11 @@ def _nothing(
     if not databases:
         if diagnosis:
             return f"{seen}; {diagnosis[0]}: let the logger ask for current data (service 01)"
+        if mapping is not None:
+            return (
+                f"{seen}; they are neither OBD-II answers nor J1939, and the mapping names "
+                "signals of a DBC: give it with --dbc"
+            )
         return (
             f"{seen}; they are neither OBD-II answers nor J1939: "
             "give the vehicle's DBC with --dbc and name its signals in a mapping, which "

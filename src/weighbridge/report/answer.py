@@ -215,6 +215,8 @@ def _left_by_file(weighing: MassResult) -> float:
 def _calibrate(vehicle: Vehicle) -> str:
     made = vehicle.provenance
     drives = max(len(made.drives), len(made.masses))
+    if made.doubts:
+        return "Calibrate again: the notes tell what is doubtful of the calibration."
     if not drives:
         return "Calibrate the vehicle on a drive with a mass from a scale (weighbridge calibrate)."
     if drives <= FEW_DRIVES:

@@ -36,12 +36,14 @@ class PossibleChange:
     probability : that the load changed at one of the stops without one found [-]
     doubtful_time : of the change found that is least sure; NaN where none was found [s]
     none : probability that one of the changes found is none [-]
+    difference : mass at the end with the change at ``time`` less that without it [kg]
     """
 
     time: float
     probability: float
     doubtful_time: float = math.nan
     none: float = 0.0
+    difference: float = math.nan
 
     @property
     def note(self) -> str:
@@ -50,7 +52,9 @@ class PossibleChange:
         if self.probability >= WORTH_TELLING:
             told.append(
                 f"with a probability of {100.0 * self.probability:.0f} % the load changed at a "
-                f"stop, most likely before {instant(float(round(self.time)))}"
+                f"stop, most likely before {instant(float(round(self.time)))}: the mass would be "
+                f"{abs(self.difference):.0f} kg {'more' if self.difference > 0.0 else 'less'} than "
+                "without"
             )
         if self.none >= WORTH_TELLING:
             told.append(
@@ -127,11 +131,13 @@ def averaged(given: FilterInput, std: Floats, settings: JointSettings) -> Averag
     spread = np.einsum("k,ki,kj->ij", share, off, off) / UNMODELLED**2
     cov = np.einsum("k,kij->ij", share, np.array([s.cov for s in states])) + spread
     more, less = share[1 : 1 + stops.size], share[1 + stops.size :]
+    likeliest = states[1 + int(np.argmax(more))] if stops.size else same
     possible = PossibleChange(
         time=_at(given.time, stops, more),
         probability=float(more.sum()),
         doubtful_time=_at(given.time, found, less),
         none=float(less.sum()),
+        difference=float(likeliest.x[0] - same.x[0]),
     )
     return Averaged(same._replace(x=mean, cov=cov), same, possible)
 
