@@ -1,9 +1,14 @@
 """Gear ratios from speeds, and the gear of the moment."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+import weighbridge as wb
+from weighbridge.calibration.problem import find_gears
 from weighbridge.errors import DriveError
+from weighbridge.signals import Signal
 from weighbridge.vehicle.gear import (
     detect_gearings,
     idling,
@@ -30,6 +35,20 @@ def drive(rng, *, minutes=20, step=0.0, rate=4.0):
     if step:
         speed = np.floor(speed / step) * step + 0.5 * step
     return time, engine, speed
+
+
+def test_no_more_gears_are_found_than_the_gear_signal_tells():
+    time, engine, speed = drive(np.random.default_rng(3))
+    # Twice as the clutch closes the ratio stays at one between two gears for some seconds.
+    for begin in (300, 2100):
+        engine[begin : begin + 40] = 12.4 * speed[begin : begin + 40]
+    motion = SimpleNamespace(time=time, speed=speed, speed_delay=0.0)
+    logged = wb.Drive("d", {"engine_speed": Signal("engine_speed", time, engine)})
+    assert find_gears([logged], [motion]).gearings.size == 6
+    gear = 1.0 + np.searchsorted([4.0, 8.0, 13.0, 18.0], speed)
+    gear[:3] = 9.0
+    told = logged.with_signals(Signal("gear", time, gear))
+    assert find_gears([told], [motion]).gearings == pytest.approx(GEARINGS, rel=0.01)
 
 
 def test_gearings_are_found_within_a_percent():

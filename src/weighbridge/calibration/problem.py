@@ -27,6 +27,9 @@ from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling
 from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
+FEWEST_TOLD: Final = 10
+"""Samples of a gear below which a gear signal may be in error there."""
+
 FEW_READINGS: Final = 200
 """Fewer readings of engine speed show no curve of the torque over it."""
 
@@ -252,7 +255,7 @@ def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
 def find_gears(
     drives: Sequence[Drive], motions: Sequence[Motion], *, idle_speed: float | None = None
 ) -> GearDetection:
-    """Find the gearings from all the drives together.
+    """Find the gearings from all the drives together, as many as their gear signals tell at most.
 
     Raises
     ------
@@ -266,7 +269,30 @@ def find_gears(
                 f"{drive.name}: no engine_speed, so no gear can be found; give gearings in the "
                 "vehicle file"
             )
-    return detect_gearings(*_engine_and_speed(drives, motions), idle_speed=idle_speed)
+    found = detect_gearings(*_engine_and_speed(drives, motions), idle_speed=idle_speed)
+    told = _told_gears(drives)
+    if not told or found.gearings.size <= told:
+        return found
+    # Ratios that were passed on the way from gear to gear have few samples.
+    kept = np.sort(np.argsort(-found.counts, kind="stable")[:told])
+    return replace(
+        found,
+        gearings=found.gearings[kept],
+        stds=found.stds[kept],
+        counts=found.counts[kept],
+    )
+
+
+def _told_gears(drives: Sequence[Drive]) -> int:
+    """Forward gears that the gear signals of the drives tell together; 0 where one has none."""
+    gears: set[float] = set()
+    for drive in drives:
+        signal = drive.get("gear")
+        if signal is None:
+            return 0
+        value, count = np.unique(signal.values[signal.values > 0.0], return_counts=True)
+        gears |= set(value[count >= FEWEST_TOLD].tolist())
+    return len(gears)
 
 
 def _warm_idle(drives: Sequence[Drive], motions: Sequence[Motion]) -> float:
