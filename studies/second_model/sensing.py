@@ -100,6 +100,28 @@ def specific_force(out: np.ndarray, arm: tuple[float, float] = (0.0, 0.0)) -> np
     return np.column_stack([forward, left, upward])
 
 
+def angular_rate(out: np.ndarray) -> np.ndarray:
+    """Angular rate of the body about forward, left, up [rad/s].
+
+    A turn on a grade is a roll rate as well, and a turn of a leaning body a pitch rate: the body's
+    axes are not the vertical (Euler angles yaw, pitch, roll; Diebel 2006, eq. 75).
+
+    Parameters
+    ----------
+    out : (n, columns) motion
+    """
+    roll, nose_up = out[:, AT["roll"]], out[:, AT["grade"]] + out[:, AT["pitch"]]
+    roll_rate = np.gradient(roll) * RATE
+    nose_rate, yaw_rate = out[:, AT["pitch_rate"]], out[:, AT["yaw_rate"]]
+    return np.column_stack(
+        [
+            roll_rate + yaw_rate * np.sin(nose_up),
+            yaw_rate * np.cos(nose_up) * np.sin(roll) - nose_rate * np.cos(roll),
+            yaw_rate * np.cos(nose_up) * np.cos(roll) + nose_rate * np.sin(roll),
+        ]
+    )
+
+
 def imu(out: np.ndarray, vehicle: Vehicle, logger: Logger, day_rng) -> Columns:
     """Accelerometer and gyroscope as mounted: x forward, y left, z up, if aligned."""
     rng, quality = day_rng, logger.imu_quality
@@ -107,8 +129,7 @@ def imu(out: np.ndarray, vehicle: Vehicle, logger: Logger, day_rng) -> Columns:
     u = rng.uniform
     arm = (u(-0.3, 1.2) * quality, u(-0.2, 0.4) * quality)
     force = specific_force(out, arm)
-    roll_rate = np.gradient(out[:, AT["roll"]]) * RATE
-    rate = np.column_stack([roll_rate, -out[:, AT["pitch_rate"]], out[:, AT["yaw_rate"]]])
+    rate = angular_rate(out)
     time = np.arange(n) / RATE
     speed = out[:, AT["speed"]]
     if quality > 0.0:

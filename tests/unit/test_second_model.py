@@ -71,10 +71,25 @@ def test_a_perfect_accelerometer_reads_acceleration_and_gravity(kind):
     moving = speed > 0.5
     accel = np.diff(speed, prepend=0.0) * RATE
     assert_allclose((along - accel - G * climb)[moving], 0.0, atol=0.02)
-    # The gyroscope follows the slope of road and body, and y points left.
-    turned = -np.cumsum(table["gyro_y_radps"]) / RATE
-    tilt = motion.out[:, AT["grade"]] + pitch
-    assert_allclose(turned - turned[0], tilt - tilt[0], atol=0.003)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_perfect_gyroscope_turns_the_vertical_as_a_rigid_body_does(kind):
+    vehicle, motion = driven(kind)
+    table = imu(motion.out, vehicle, Logger(imu_quality=0.0), np.random.default_rng(1))
+    rate = np.column_stack([table[f"gyro_{axis}_radps"] for axis in "xyz"])
+    grade, pitch, roll, yaw_rate = columns(motion, "grade", "pitch", "roll", "yaw_rate")
+    tilt = grade + pitch
+    # Forward, left, up: what an accelerometer at rest reads, over gravity.
+    vertical = np.column_stack(
+        [np.sin(tilt), np.sin(roll) * np.cos(tilt), np.cos(roll) * np.cos(tilt)]
+    )
+    turned = np.cumsum(np.cross(vertical, rate), axis=0) / RATE
+    assert_allclose(turned - turned[0], vertical - vertical[0], atol=0.003)
+    # Without turns on grades the vertical would be lost.
+    assert np.abs(np.cumsum(yaw_rate * np.sin(tilt)) / RATE).max() > 0.008
+    rolled = np.gradient(roll) * RATE * np.sin(tilt)
+    assert_allclose(np.sum(rate * vertical, axis=1), yaw_rate + rolled, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
