@@ -27,7 +27,7 @@ from weighbridge.live.replay import FASTEST_BLOCK, FASTEST_STEP
 from weighbridge.live.weighing import LiveStatus
 
 HERE = Path(__file__).parent
-JUDGED = 9860
+JUDGED = 9910
 LOADS = {"calibration-1": 0.0, "calibration-2": 0.45, "calibration-3": 0.9}
 WEIGHED = {
     "drive-1": (0.95, "ordinary", 0.0),

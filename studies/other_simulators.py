@@ -32,7 +32,7 @@ CALIBRATIONS = {
 }
 DRIVES = ("drive-1", "drive-2", "drive-3", "drive-4")
 
-JUDGED = 9830
+JUDGED = 9890
 KINDS = (
     "small_petrol", "petrol", "petrol_dct", "petrol_automatic", "diesel", "van", "truck", "semi",
     "electric_car", "electric_bus",
