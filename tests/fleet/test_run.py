@@ -193,6 +193,24 @@ def test_a_drive_that_kills_its_worker_has_a_row(tiny, tmp_path):
     assert "worker died 3 times" in row["reason"]
 
 
+def test_workers_that_do_not_end_in_time_lose_nothing(tiny, tmp_path, monkeypatch):
+    from distributed import LocalCluster
+
+    drives, cars = tiny
+    home = copy_of(drives / "van0" / "trip-0003", tmp_path / "drives" / "van0" / "trip-0003")
+    close, late = LocalCluster.close, ["timed out after 10 s."]
+
+    def slow(cluster, timeout=None):
+        close(cluster, timeout=timeout)
+        if late:
+            raise TimeoutError(late.pop())
+
+    monkeypatch.setattr(LocalCluster, "close", slow)
+    found = wb.fleet.weigh_drives(home.parent, cars, tmp_path / "results", workers=1).collect()
+    assert found["outcome"].to_list() == ["weighed"]
+    assert not late
+
+
 def test_the_python_of_the_document_runs(tiny, tmp_path, monkeypatch):
     drives, cars = tiny
     copy_of(drives / "van0", tmp_path / "drives" / "van0")

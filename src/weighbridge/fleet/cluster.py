@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 _CONNECT: Final = 5.0  # wait for a scheduler [s]
 
+_CLOSE: Final = 30.0  # wait for workers to end [s]
+
 _KEPT: Final = 64 * 1024 * 1024  # memory that a worker keeps for its next arrays [B]
 
 SETTINGS: Final[dict[str, Any]] = {
@@ -95,7 +97,9 @@ def _client(scheduler: str | None, workers: int | None, memory: str | None) -> I
             with contextlib.closing(Client(cluster, set_as_default=False)) as client:
                 yield client
         finally:
-            cluster.close(timeout=10)
+            # What was weighed is on the disk; a worker that does not end in time ends with us.
+            with contextlib.suppress(TimeoutError):
+                cluster.close(timeout=_CLOSE)
 
 
 @contextlib.contextmanager
