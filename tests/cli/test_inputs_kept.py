@@ -123,11 +123,12 @@ def test_simulate_onto_a_file(weighbridge, car):
 
 
 @pytest.mark.parametrize("how", ["same", "hard", "soft"])
-@pytest.mark.parametrize("what", ["vehicle", "mapping", "dbc", "bus dbc", "table"])
+@pytest.mark.parametrize("what", ["vehicle", "mapping", "dbc", "bus dbc", "mapped dbc", "table"])
 @pytest.mark.parametrize("option", ["--json", "--report", "--track"])
 def test_results_over_inputs_by_any_name(weighbridge, drive, car, tmp_path, how, what, option):
     mapping = tmp_path / "map.toml"
-    mapping.write_text("[time]\noffset_s = 0\n[signals.accel_x]\ncolumn = 'x'\n")
+    names = "dbc = '1:bus.dbc'\n" if what == "mapped dbc" else ""
+    mapping.write_text(names + "[time]\noffset_s = 0\n[signals.accel_x]\ncolumn = 'x'\n")
     dbc = Path(shutil.copy(GOLDEN / "golden.dbc", tmp_path / "bus.dbc"))
     read = {"vehicle": car, "mapping": mapping, "table": drive / "imu.csv"}.get(what, dbc)
     out = read
@@ -136,7 +137,8 @@ def test_results_over_inputs_by_any_name(weighbridge, drive, car, tmp_path, how,
         os.link(read, out) if how == "hard" else out.symlink_to(read)
     before = contents(drive, car, mapping, dbc)
     named = f"1:{dbc}" if what == "bus dbc" else dbc
-    words = ("--vehicle", car, "--mapping", mapping, "--dbc", named, option, out)
+    given = () if what == "mapped dbc" else ("--dbc", named)
+    words = ("--vehicle", car, "--mapping", mapping, *given, option, out)
     for command in ("weigh", "inertia"):
         ran = weighbridge(command, drive, *words)
         if option == "--track" and out.suffix != ".csv":

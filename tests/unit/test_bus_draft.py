@@ -5,7 +5,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from weighbridge.errors import DriveError
+from weighbridge.errors import ConfigError, DriveError
+from weighbridge.fleet.vehicles import Vehicles
 from weighbridge.io import read_drive
 from weighbridge.io.bus_draft import draft_bus
 from weighbridge.io.dbc import load_dbcs
@@ -98,3 +99,63 @@ def test_channels_of_an_mdf_are_drafted(tmp_path):
     mapping.write_text(mapping_text([draft]), encoding="utf-8")
     speed = read_drive(path, mapping).signals["vehicle_speed"]
     np.testing.assert_allclose(speed.values, (20.0 + time) / 3.6)
+
+
+@pytest.fixture
+def named(logged, tmp_path):
+    """A mapping in a folder of its own that names the DBC beside the log."""
+    log, dbc = logged
+    home = tmp_path / "maps"
+    home.mkdir()
+    text = mapping_text([draft_bus(log, load_dbcs([str(dbc)]))], dbc=["../car.dbc"])
+    mapping = home / "map.toml"
+    mapping.write_text(text, encoding="utf-8")
+    return mapping
+
+
+def test_a_mapping_names_its_dbc_from_its_own_folder(logged, named):
+    log, dbc = logged
+    asked = read_drive(log, named, str(dbc))
+    found = read_drive(log, named)
+    assert set(found.signals) == set(asked.signals) >= {"vehicle_speed", "engine_torque"}
+    for name, signal in asked.signals.items():
+        np.testing.assert_array_equal(found.signals[name].values, signal.values)
+
+
+def test_a_dbc_that_is_given_goes_before_that_of_the_mapping(logged, named, tmp_path):
+    log, _ = logged
+    half = tmp_path / "half.dbc"
+    half.write_text(DBC.replace("(0.01,0)", "(0.005,0)"))
+    whole = read_drive(log, named).signals["vehicle_speed"].values
+    halved = read_drive(log, named, half).signals["vehicle_speed"].values
+    np.testing.assert_allclose(halved, 0.5 * whole)
+
+
+def test_a_dbc_of_the_mapping_is_for_one_bus_where_it_says_so(logged, named):
+    log, _ = logged
+    text = named.read_text()
+    named.write_text(text.replace("../car.dbc", "0:../car.dbc"))
+    assert read_drive(log, named).has("vehicle_speed")
+    named.write_text(text.replace("../car.dbc", "5:../car.dbc"))
+    with pytest.raises(DriveError, match="on bus 5; they are on another"):
+        read_drive(log, named)
+
+
+def test_a_dbc_of_the_mapping_that_is_not_there_is_told_with_its_line(logged, named):
+    log, dbc = logged
+    dbc.unlink()
+    with pytest.raises(ConfigError, match=r"map\.toml, line 2: dbc names .*car\.dbc, which is no"):
+        read_drive(log, named)
+
+
+def test_a_fleet_weighs_anew_where_the_dbc_of_a_mapping_changed(logged, named, tmp_path):
+    _, dbc = logged
+    cars = tmp_path / "cars"
+    cars.mkdir()
+    (cars / "van.toml").write_text('[vehicle]\nname = "van"\nmapping = "../maps/map.toml"\n')
+    before = Vehicles(cars).of(("van/trip.log",))
+    assert Vehicles(cars).of(("van/trip.log",)).digest == before.digest
+    # A worker in another folder finds it.
+    assert before.mapping["dbc"] == [dbc.resolve().as_posix()]
+    dbc.write_text(DBC.replace("(0.01,0)", "(0.02,0)"))
+    assert Vehicles(cars).of(("van/trip.log",)).digest != before.digest

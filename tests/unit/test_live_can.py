@@ -1,3 +1,4 @@
+import shutil
 import time
 from pathlib import Path
 from threading import Event, Thread
@@ -56,6 +57,17 @@ def test_signals_of_a_database_and_foreign_answers(bus, request):
     assert samples["vehicle_speed"][0] == pytest.approx(50.0 / 3.6)
     # Nothing but what this test sent was on the bus.
     assert bus.recv(0.0) is None
+
+
+def test_a_mapping_names_the_database_of_a_bus(bus, request, tmp_path):
+    shutil.copy(GOLDEN / "golden.dbc", tmp_path)
+    mapping = tmp_path / "map.toml"
+    mapping.write_text('dbc = "golden.dbc"\n' + '[signals.accel_x]\ncolumn = "Sensor.Forward"\n')
+    source = parse_source(f"can:virtual:{request.node.name}", mapping=mapping)
+    acceleration = frame(2566853172 & 0x1FFFFFFF, "01 E8 03 00 00 00 00 00")
+    with Feed([source]) as feed:
+        samples = read_until(feed, lambda s: "accel_x" in s, lambda: bus.send(acceleration))
+    assert samples["accel_x"][0] == pytest.approx(1.0)
 
 
 def test_truck_is_heard_and_nothing_is_sent(bus, request):

@@ -93,7 +93,7 @@ def map_log(
         notice(f"  left out: {sentence}")
     if not tells_torque(*drafts):
         notice(_NO_TORQUE)
-    text = mapping_text(drafts, tuple(refused))
+    text = mapping_text(drafts, tuple(refused), _named_dbcs(dbc or [], output))
     if output is None:
         sys.stdout.write(text)
         return
@@ -109,8 +109,16 @@ def map_log(
     if _drives_beside_each_other(drafts):
         say(f"if {drive} holds several drives, put the files of each into a folder of its own")
     words = ["weighbridge", "inspect", drive, "--mapping", output]
-    words += [word for d in dbc or () for word in ("--dbc", d)]
     say(f"next: {shlex.join(map(str, words))}")
+
+
+def _named_dbcs(dbc: list[str], output: Path | None) -> list[str]:
+    """DBC files as the mapping names them: seen from its folder, or from here where it is shown."""
+    from weighbridge.io.dbc import dbc_path, with_path
+    from weighbridge.pipeline.given import mapping_beside
+
+    home = output if output is not None else Path("map.toml")
+    return [with_path(d, Path(mapping_beside(dbc_path(d), home))) for d in dbc]
 
 
 def _drafts(

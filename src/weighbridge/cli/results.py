@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from weighbridge.cli.terminal import say_json
-from weighbridge.errors import ConfigError
+from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.whole import is_stream, write_whole
 
 Kind = Literal[
@@ -86,10 +86,23 @@ def inputs(
     mapping: Path | None = None,
     dbc: Sequence[str] | None = None,
 ) -> Inputs:
-    """Gather what a command reads; a DBC may be written ``1:FILE``."""
-    named = [Path(re.sub(r"^\d{1,3}:", "", name)) for name in dbc or ()]
-    files = [p for p in (vehicle, mapping) if p is not None] + named
+    """Gather what a command reads; a DBC may be written ``1:FILE``, or be named by the mapping."""
+    files = [p for p in (vehicle, mapping) if p is not None]
+    if dbc or mapping is not None:
+        from weighbridge.io.dbc import dbc_path
+
+        files += [dbc_path(name) for name in dbc or _dbcs_of(mapping)]
     return Inputs(tuple(drives), tuple(files))
+
+
+def _dbcs_of(mapping: Path | None) -> tuple[str, ...]:
+    """DBC files that a mapping names; none where it cannot be used, which its reader says."""
+    from weighbridge.io.mapping import load_mapping, named_dbcs
+
+    try:
+        return named_dbcs(load_mapping(mapping)) if mapping is not None else ()
+    except WeighbridgeError:
+        return ()
 
 
 def asked_for(*, track: Path | None, report: Path | None, json: str | None) -> list[Result]:

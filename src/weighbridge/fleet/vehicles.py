@@ -10,6 +10,8 @@ from typing import Any, Final
 
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.keys import file_digest, text_digest
+from weighbridge.io.dbc import dbc_path, with_path
+from weighbridge.io.mapping import load_mapping, named_dbcs
 from weighbridge.pipeline.given import mapping_of
 from weighbridge.signals import Drive
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
@@ -32,7 +34,7 @@ class Assigned:
     vehicle : of the file; None for the data sheet, which asks the drive for its torque
     kind : name of its class
     mapping : what its logs are read with; None for canonical ones
-    digest : of file and mapping
+    digest : of file and mapping, and of the DBC files that the mapping names
     mapping_file : its path; None where there is none
     """
 
@@ -141,7 +143,7 @@ class Vehicles:
             vehicle=vehicle,
             kind=vehicle.kind,
             mapping=_mapping(named),
-            digest=text_digest([file_digest(path), "" if named is None else file_digest(named)]),
+            digest=text_digest([file_digest(path), *_digests(named)]),
             mapping_file=None if named is None else str(named.resolve()),
         )
 
@@ -157,13 +159,15 @@ class Vehicles:
                 vehicle=None,
                 kind=kind,
                 mapping=_mapping(named),
-                digest=text_digest([kind, "" if named is None else file_digest(named)]),
+                digest=text_digest([kind, *_digests(named)]),
             )
         return self._sheets[name, kind]
 
 
 def _mapping(path: Path | None) -> Mapping[str, Any] | None:
     """Return what a mapping file says, to be sent to a worker that may not see the file.
+
+    The DBC files that it names are sent by their whole paths, and are seen by all workers.
 
     Raises
     ------
@@ -174,10 +178,19 @@ def _mapping(path: Path | None) -> Mapping[str, Any] | None:
         return None
     import tomllib
 
-    from weighbridge.io.mapping import load_mapping
+    dbc = named_dbcs(load_mapping(path))
+    said = tomllib.loads(path.read_text(encoding="utf-8"))
+    if dbc:
+        said["dbc"] = [with_path(name, dbc_path(name).resolve()) for name in dbc]
+    return said
 
-    load_mapping(path)
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+def _digests(mapping: Path | None) -> list[str]:
+    """Digests of a mapping file and of the DBC files that it names."""
+    if mapping is None:
+        return [""]
+    named = map(dbc_path, named_dbcs(load_mapping(mapping)))
+    return [file_digest(path) for path in (mapping, *named)]
 
 
 def _is_vehicle(path: Path) -> bool:

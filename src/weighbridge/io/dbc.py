@@ -67,6 +67,34 @@ class Found:
     frames: NDArray[np.intp]
 
 
+def dbc_path(source: DbcSource) -> Path:
+    """Return the path of a DBC that may be written ``1:file.dbc``."""
+    return _parted(source)[1]
+
+
+def seen_from(source: DbcSource, home: Path) -> str:
+    """Return a DBC that stands in a file of a folder, by a path that holds without it.
+
+    Parameters
+    ----------
+    source : ``file.dbc`` or ``1:file.dbc``
+    home : the folder
+    """
+    return with_path(source, home / dbc_path(source))
+
+
+def with_path(source: DbcSource, path: Path) -> str:
+    """Return a DBC of the same bus by another path."""
+    channel = _parted(source)[0]
+    return path.as_posix() if channel is None else f"{channel}:{path.as_posix()}"
+
+
+def _parted(source: DbcSource) -> tuple[int | None, Path]:
+    """Bus of a DBC, None for every bus, and its path."""
+    found = _CHANNEL.match(str(source))
+    return (int(found.group(1)), Path(found.group(2))) if found else (None, Path(source))
+
+
 def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
     """Read DBC files.
 
@@ -87,9 +115,7 @@ def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
     logging.getLogger("cantools").setLevel(logging.ERROR)
     databases = []
     for source in sources:
-        found = _CHANNEL.match(str(source))
-        channel = int(found.group(1)) if found else None
-        path = Path(found.group(2) if found else source)
+        channel, path = _parted(source)
         try:
             if not path.is_file() and path.exists():
                 kind = "folder" if path.is_dir() else "device or a pipe"

@@ -3,6 +3,7 @@
 ::
 
     format_version = 1               # may be left out
+    dbc = ["car.dbc", "2:imu.dbc"]   # of raw CAN logs, seen from this file's folder; 2: of bus 2
 
     [csv]                            # text tables only; may be left out
     separator = ";"                  # found in the header if not given
@@ -39,7 +40,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, Final
@@ -47,6 +48,7 @@ from typing import Any, Final
 from weighbridge.arguments import check_texts, check_type
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
+from weighbridge.io.dbc import dbc_path, seen_from
 from weighbridge.io.table import MOST_COLUMNS, TextFormat, column_list
 from weighbridge.signals import QUANTITIES, Problem, Quantity
 from weighbridge.signals.tomlfile import Faults, Section, read_toml, suggestion
@@ -131,6 +133,7 @@ class TableMapping:
     time : the time column
     signals : the columns; none where the file has names of its own or canonical ones
     source : the mapping's file, for messages
+    dbc : DBC files that the mapping names for all its tables, as of `weighbridge.io.dbc.load_dbcs`
     """
 
     files: str
@@ -138,6 +141,7 @@ class TableMapping:
     time: TimeColumn
     signals: tuple[MappedSignal, ...]
     source: str
+    dbc: tuple[str, ...] = ()
 
 
 def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
@@ -154,12 +158,12 @@ def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
     """
     if isinstance(source, Mapping):
         check_texts("keys of mapping", source)
-        root = Section(source, "mapping", {})
+        root, home = Section(source, "mapping", {}), Path()
     else:
         check_type(
             "mapping", source, (str, Path), "the path of a mapping file, or a dictionary like one"
         )
-        root = read_toml(Path(source))
+        root, home = read_toml(Path(source)), Path(source).parent
     faults = Faults()
     version = root.count("format_version")
     if version not in (None, FORMAT_VERSION):
@@ -168,6 +172,9 @@ def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
             f"is {version}, and this program reads {FORMAT_VERSION}: "
             "use the program's version that goes with the file",
         )
+    dbc: tuple[str, ...] = ()
+    with faults.gathered():
+        dbc = _dbc(root, home)
     found: list[TableMapping] = []
     tables = root.section("tables")
     if tables is not None:
@@ -188,7 +195,12 @@ def load_mapping(source: MappingSource) -> tuple[TableMapping, ...]:
     with faults.gathered():
         root.done()
     faults.refuse()
-    return tuple(found)
+    return tuple(replace(table, dbc=dbc) for table in found)
+
+
+def named_dbcs(mappings: Sequence[TableMapping]) -> tuple[str, ...]:
+    """Return the DBC files that a mapping names; none where there is no mapping."""
+    return mappings[0].dbc if mappings else ()
 
 
 def mapping_for(path: Path, mappings: tuple[TableMapping, ...]) -> TableMapping | None:
@@ -212,6 +224,15 @@ def none_fits(folder: Path, files: Sequence[Path], mappings: Sequence[TableMappi
         f"({column_list(f.name for f in files)}); correct the patterns, or draft another mapping: "
         f"weighbridge map {shlex.quote(str(folder))}"
     )
+
+
+def _dbc(root: Section, home: Path) -> tuple[str, ...]:
+    """DBC files of the mapping, by paths that hold in the working folder."""
+    named = tuple(seen_from(name, home) for name in root.texts("dbc") or ())
+    for path in map(dbc_path, named):
+        if not path.is_file():
+            root.fail("dbc", f"names {path}, which is no file: put it there, or correct its name")
+    return named
 
 
 def _table(root: Section, files: str) -> TableMapping:

@@ -18,16 +18,21 @@ from weighbridge.signals import QUANTITIES
 from weighbridge.visible import visible
 
 
-def mapping_text(drafts: Sequence[Draft], others: Sequence[Path] = ()) -> str:
+def mapping_text(
+    drafts: Sequence[Draft], others: Sequence[Path] = (), dbc: Sequence[str] = ()
+) -> str:
     """Write a mapping: at the top level for one kind of file, else one table for each.
 
     Parameters
     ----------
     drafts : of the files, one for each kind
     others : files beside them that the mapping is not for
+    dbc : DBC files of raw CAN logs, seen from the mapping's folder
     """
     document = tomlkit.document()
     document.add(tomlkit.comment("How to read this log: a mapping for weighbridge."))
+    if dbc:
+        document.add("dbc", list(dbc))
     if len(drafts) == 1 and not others:
         for name, part in _sections(drafts[0]).items():
             document.add(name, part)

@@ -31,6 +31,7 @@ from weighbridge.io.mapping import (
     how_to_name,
     load_mapping,
     mapping_for,
+    named_dbcs,
     none_fits,
 )
 from weighbridge.io.parquet import read_parquet
@@ -73,7 +74,8 @@ def read_drive(
     mapping : mapping TOML, or a dictionary of the same form, for files whose
         columns have other names or units than the canonical ones, and for the
         signals of a DBC
-    dbc : one or several DBC files for raw bus logs; ``1:file.dbc`` is for bus 1 alone
+    dbc : one or several DBC files for raw bus logs; ``1:file.dbc`` is for bus 1 alone; those that
+        the mapping names when none is given
 
     Returns
     -------
@@ -134,7 +136,8 @@ def _opened(
     if not isinstance(path, str | Path):
         path = given_paths("path", path)
     mappings = load_mapping(mapping) if mapping is not None else ()
-    databases = load_dbcs(given_paths("dbc", [dbc] if isinstance(dbc, str | Path) else dbc))
+    asked = given_paths("dbc", [dbc] if isinstance(dbc, str | Path) else dbc)
+    databases = load_dbcs(asked or named_dbcs(mappings))
     info = DriveInfo()
     if not isinstance(path, str | Path):
         paths = [Path(p) for p in path]

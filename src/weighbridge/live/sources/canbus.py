@@ -13,7 +13,7 @@ import numpy as np
 from weighbridge.errors import ConfigError, MissingExtraError, SourceError
 from weighbridge.io.dbc import load_dbcs
 from weighbridge.io.frames import Frames
-from weighbridge.io.mapping import TableMapping, load_mapping
+from weighbridge.io.mapping import TableMapping, load_mapping, named_dbcs
 from weighbridge.io.stream import DbcStream, J1939Stream, ObdStream, Stream
 from weighbridge.live.clock import now
 from weighbridge.live.device_clock import DeviceClock
@@ -39,10 +39,11 @@ def make_can(text: str, options: SourceOptions) -> CanSource:
         The place, a DBC or the mapping cannot be used.
     """
     bus = BusPlace.of(f"can:{text}", listen_only=options.listen_only)
-    databases = load_dbcs(options.dbc)
+    named = load_mapping(options.mapping) if options.mapping is not None else ()
+    databases = load_dbcs(options.dbc or named_dbcs(named))
     streams: list[Stream] = [ObdStream()]
     if databases:
-        mapping = _mapping(bus.source, options)
+        mapping = _of_frames(bus.source, named)
         streams.insert(0, DbcStream(databases, mapping, bus.source))
     return CanSource(bus, streams)
 
@@ -59,11 +60,11 @@ def make_j1939(text: str, options: SourceOptions) -> CanSource:
     return CanSource(bus, [J1939Stream()])
 
 
-def _mapping(source: str, options: SourceOptions) -> TableMapping | None:
+def _of_frames(source: str, mappings: tuple[TableMapping, ...]) -> TableMapping | None:
     """Mapping for frames: of several tables the one that names signals."""
-    if options.mapping is None:
+    if not mappings:
         return None
-    found = [m for m in load_mapping(options.mapping) if m.signals]
+    found = [m for m in mappings if m.signals]
     if len(found) != 1:
         raise ConfigError(
             f"source {source}: the mapping names the signals of {len(found)} tables; give one "

@@ -17,7 +17,7 @@ class SourceOptions:
 
     Attributes
     ----------
-    dbc : files that name the signals of CAN frames
+    dbc : files that name the signals of CAN frames; those of the mapping when none is given
     mapping : names of those signals that are wanted; None for canonical names
     listen_only : nothing is sent to the vehicle
     """
