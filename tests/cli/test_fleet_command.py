@@ -1,7 +1,11 @@
 """The command ``weighbridge fleet``."""
 
+import threading
+
 import pytest
 from tests.fleet.fleets import tiny_fleet
+
+from weighbridge.fleet.store import Results
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +71,30 @@ def test_a_drive_that_cannot_be_read_is_exit_status_2(weighbridge, fleet, addres
     assert (ran.code, ran.err) == (2, "")
     assert "1 unread" in ran.out
     assert "holds no samples" in ran.out
+
+
+def test_a_scheduler_without_a_worker_is_told(weighbridge, fleet, tmp_path, monkeypatch):
+    from distributed import LocalCluster
+
+    from weighbridge.cli import fleet as command
+
+    drives, cars = fleet
+    results = tmp_path / "results"
+    monkeypatch.setattr(command, "_PATIENCE", 1.0)
+    with LocalCluster(
+        n_workers=0, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
+    ) as cluster:
+        helper = threading.Timer(4.0, cluster.scale, [1])
+        helper.start()
+        ran = weighbridge("fleet", drives, "--vehicles", cars, "-o", results,
+                          "--scheduler", cluster.scheduler_address)  # fmt: skip
+        helper.join()
+    assert ran.err.count("no worker is connected to the scheduler") == 1
+    assert "6 recordings weighed" in ran.out
+    opened = Results.opened(results)
+    with opened.locked():
+        opened.tell(opened.told() | {"workers": 0, "done": 0})
+        assert "no worker is connected" in weighbridge("fleet", "status", results).out
 
 
 @pytest.mark.parametrize(

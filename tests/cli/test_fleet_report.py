@@ -47,13 +47,24 @@ def test_the_page_answers_who_when_and_how_sure(weighbridge, results, tmp_path):
     first = page[: page.index("<nav")]
     assert "1 vehicle overloaded" in first
     assert '<span class="day">2026-05-04</span> 06:00' in first
-    assert "20000 ±&nbsp;980" in first
+    assert "20\u202f000 ±&nbsp;980" in first
+    assert "1 sure, 0 likely" in first
+    assert "0 sure, 1 likely" in first
     assert "of 3 legs that could be judged. 1 could not" in first
     data = data_of(page)
     assert data["legs"]["overload"][data["legs"]["mass_kg"].index(18200)] == pytest.approx(0.6554)
     told = json.loads((tmp_path / "fleet.json").read_text())
     assert [r["vehicle_id"] for r in told["overloads"]] == ["truck1", HOSTILE]
     assert told["totals"]["distance_km"] == 80.0
+
+
+def test_the_answer_tells_how_many_it_leaves_out(weighbridge, tmp_path):
+    folder = Results.begun(tmp_path / "results").folder
+    for k in range(13):
+        row = drive(f"{k:032d}", f"truck{k:02d}", mass=21000.0, std=500.0)
+        write_part(folder, row["key"], [row | {"segments": []}])
+    told = weighbridge("fleet", "report", folder).out
+    assert (told.count("\n  truck"), "and 3 more" in told) == (10, True)
 
 
 def test_texts_are_shown_and_never_obeyed(weighbridge, results, tmp_path):

@@ -124,7 +124,7 @@ def test_delta_tables_hold_each_row_once(tiny, scheduler, tmp_path):
 def test_ray_gives_the_same_rows(tiny, scheduler, tmp_path):
     ray = pytest.importorskip("ray", reason="ray is not installed")
     drives, cars = tiny
-    some = str(drives / "van0")
+    some = drives / "van0"
     here = wb.fleet.weigh_drives(some, cars, tmp_path / "here", scheduler=scheduler)
     ray.init(num_cpus=2, include_dashboard=False)
     try:
@@ -140,7 +140,7 @@ def test_spark_gives_the_same_rows(tiny, scheduler, tmp_path):
     if shutil.which("java") is None:
         pytest.skip("Spark needs Java, and there is none")
     drives, cars = tiny
-    some = str(drives / "van0")
+    some = drives / "van0"
     here = wb.fleet.weigh_drives(some, cars, tmp_path / "here", scheduler=scheduler)
     spark = sql.SparkSession.builder.master("local[2]").getOrCreate()
     try:

@@ -112,13 +112,22 @@ def test_mistakes_are_told_before_the_work(tiny, tmp_path, scheduler):
 def test_time_left_follows_the_rate(monkeypatch):
     now = [105.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    count = Count(found=30, began=100.0)
+    count = Count(found=130, began=100.0)
     assert count.left is None
+    for _ in range(100):
+        count.add(Receipt("k", "there", 1, 1, 0.1))
+    count.complete = True
+    # What was there already came at once, and tells nothing of the rest.
+    assert (count.rate, count.left) == (0.0, None)
+    count.complete = False
     for _ in range(10):
         count.add(Receipt("k", "weighed", 1, 1, 0.1))
     assert count.left is None
     count.complete = True
     assert (count.rate, count.left) == (2.0, 10.0)
+    for _ in range(20):
+        count.add(Receipt("k", "there", 1, 1, 0.1))
+    assert count.left == 0.0
 
 
 COMMAND = [sys.executable, "-m", "weighbridge", "fleet"]

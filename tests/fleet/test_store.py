@@ -1,7 +1,10 @@
 """Results on the disk: each row once, whatever was cut off."""
 
 import os
+import re
+import shutil
 from datetime import UTC, date, datetime
+from pathlib import Path
 
 import polars as pl
 import pytest
@@ -9,6 +12,7 @@ import pytest
 from weighbridge.errors import ConfigError
 from weighbridge.fleet import read_drives, read_segments
 from weighbridge.fleet import store as store_module
+from weighbridge.fleet.reading import collected
 from weighbridge.fleet.schema import FAILED, PART, UNREAD, WEIGHED
 from weighbridge.fleet.store import Results, part_path, read_parts, write_part
 
@@ -139,6 +143,47 @@ def test_a_part_gathered_meanwhile_is_left_out(results):
     write_part(results.folder, "aa", [row("aa")])
     gone = part_path(results.folder, "bb")
     assert read_parts([part_path(results.folder, "aa"), gone])["key"].to_list() == ["aa"]
+
+
+def _damage(path, how):
+    data = path.read_bytes()
+    middle = len(data) // 2
+    path.write_bytes({"cut": data[:middle], "empty": b"", "spoilt": b"\xff" * middle}[how]
+                     + (data[middle:] if how == "spoilt" else b""))  # fmt: skip
+
+
+@pytest.mark.parametrize("how", ["cut", "empty", "spoilt"])
+@pytest.mark.parametrize("table", ["drives", "segments"])
+def test_a_damaged_table_is_told_and_its_date_is_weighed_again(results, table, how):
+    for key, day in (("aa", 1), ("bb", 1), ("cc", 2)):
+        write_part(results.folder, key, [row(key, day=day)])
+    results.gather()
+    hurt = results.table_files(table)[0]
+    _damage(hurt, how)
+    read = {"drives": read_drives, "segments": read_segments}[table]
+    with pytest.raises(ConfigError, match="is damaged") as told:
+        collected(read(results.folder), results.folder)
+    assert str(hurt) in str(told.value)
+    removed = re.findall(r"\S+/date=\S+?(?=,| and )", str(told.value).partition("remove")[2])
+    assert [Path(p).parent.name for p in removed] == ["drives", "segments"]
+    for folder in removed:
+        shutil.rmtree(folder)
+    assert results.known_keys() == {"cc"}
+    for key in ("aa", "bb"):
+        write_part(results.folder, key, [row(key)])
+    results.gather()
+    assert keys(results) == [("aa", 0), ("bb", 0), ("cc", 0)]
+
+
+@pytest.mark.parametrize("how", ["cut", "empty"])
+def test_a_damaged_part_is_told(results, how):
+    write_part(results.folder, "aa", [row("aa")])
+    _damage(part_path(results.folder, "aa"), how)
+    for use in (results.known_keys, results.gather, lambda: read_drives(results.folder)):
+        with pytest.raises(ConfigError, match=r"aa\.arrow: is damaged .*; remove .*aa\.arrow, and"):
+            use()
+    part_path(results.folder, "aa").unlink()
+    assert results.known_keys() == set()
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path):

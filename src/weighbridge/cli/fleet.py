@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 _RUN: Final = "run"
 
+_NO_WORKER: Final = "no worker is connected to the scheduler: start one there, dask worker ADDRESS"
+_PATIENCE: Final = 10.0  # without a worker until that is told [s]
+
 
 class RunsDrives(TyperGroup):
     """A group whose first word may be a drive: what is no command of it is run."""
@@ -183,6 +186,8 @@ def status(
         rest = "" if left is None else f", {time_text(left)} left"
         rate = told.get("rate_per_s", 0)
         say(f"running: {told.get('done', 0)}{of} recordings, {rate:.1f}/s{rest}")
+        if told.get("workers") == 0:
+            say(f"  {_NO_WORKER}")
     elif told and not (told.get("complete") and told.get("done") == told.get("found")):
         say(
             f"stopped after {told.get('done', 0)} of {told.get('found', '?')} recordings: give the "
@@ -197,10 +202,10 @@ def _summary(folder: Path) -> dict[str, Any]:
     """Count the rows of the results by what came of them."""
     import polars as pl
 
-    from weighbridge.fleet.reading import read_drives
+    from weighbridge.fleet.reading import collected, read_drives
 
     rows = read_drives(folder).select("outcome", "status", "reason", "mass_kg", "vehicle_id")
-    frame = rows.collect()
+    frame = collected(rows, folder)
     without = frame.filter((pl.col("outcome") == "weighed") & pl.col("mass_kg").is_null())
     reasons = frame.filter(pl.col("reason") != "")["reason"].value_counts(sort=True)
     return {
@@ -244,11 +249,27 @@ def _say_learnt(results: Path, learn: Path) -> None:
             say(f"  {row['told']}")
 
 
+def _lonely() -> Callable[[Count], None]:
+    """Return what tells once that no worker is there to do the work."""
+    told, since = False, time.monotonic()
+
+    def tell(count: Count) -> None:
+        nonlocal told, since
+        if count.workers != 0:
+            since = time.monotonic()
+        elif not told and time.monotonic() - since > _PATIENCE:
+            told = True
+            complain(f"weighbridge: {_NO_WORKER}")
+
+    return tell
+
+
 @contextmanager
-def _progress() -> Iterator[Callable[[Count], None] | None]:
-    """Show a bar with rate and time left on a terminal, and nothing in a pipe."""
+def _progress() -> Iterator[Callable[[Count], None]]:
+    """Show a bar with rate and time left on a terminal; in a pipe, what must be told alone."""
+    lonely = _lonely()
     if not watched():
-        yield None
+        yield lonely
         return
     from rich.progress import BarColumn, Progress, TextColumn
 
@@ -257,6 +278,7 @@ def _progress() -> Iterator[Callable[[Count], None] | None]:
         task = bar.add_task("weighing", total=None, told="")
 
         def tell(count: Count) -> None:
+            lonely(count)
             left = "" if count.left is None else f", {time_text(count.left)} left"
             of = f"{count.found}" + ("" if count.complete else "+")
             bad = f", {count.failed + count.unread} bad" if count.failed + count.unread else ""

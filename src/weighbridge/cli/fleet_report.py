@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Final, Optional
 
 import typer
 
 from weighbridge.cli.results import Inputs, asked_for, refuse_results
 from weighbridge.cli.terminal import say
 from weighbridge.cli.verbosity import say_written
+
+_TOLD: Final = 10  # legs in the answer
 
 
 def report(
@@ -70,13 +72,16 @@ def report(
     say(f"{t['drives']} drives of {t['vehicles']} vehicles, {t['distance_km']:.0f} km")
     legs = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
     say(f"overloaded: {legs} at least {100 * alarm:g} % sure, {t['warnings']} likely")
-    for row in found.overloads.head(10).iter_rows(named=True):
+    for row in found.overloads.head(_TOLD).iter_rows(named=True):
         when = "no time" if row["start"] is None else f"{row['start']:%Y-%m-%d %H:%M} UTC"
         say(
             f"  {row['vehicle_id']} {when}: {row['mass_kg']:.0f} ± "
             f"{row['high95_kg'] - row['mass_kg']:.0f} kg of {row['permitted_kg']:.0f} kg, "
             f"{how_sure(row['overload'])}"
         )
+    more = found.overloads.height - _TOLD
+    if more > 0:
+        say(f"  and {more} more, surest first: -o fleet.html has all")
     for written in (page, json):
         if written is not None:
             say_written(written)

@@ -27,7 +27,10 @@ RECEIPT_SCHEMA: Final = "key string, outcome string, drives int, masses int, sec
 
 
 def weigh_on_ray(
-    drives: str | Iterable[str], vehicles: str | Path, results: str | Path, **how: Any
+    drives: str | Path | Iterable[str | Path],
+    vehicles: str | Path,
+    results: str | Path,
+    **how: Any,
 ) -> pl.LazyFrame:
     """Weigh drives on the Ray cluster that ``ray.init`` is connected to.
 
@@ -66,7 +69,11 @@ def weigh_on_ray(
 
 
 def weigh_on_spark(
-    spark: Any, drives: str | Iterable[str], vehicles: str | Path, results: str | Path, **how: Any
+    spark: Any,
+    drives: str | Path | Iterable[str | Path],
+    vehicles: str | Path,
+    results: str | Path,
+    **how: Any,
 ) -> pl.LazyFrame:
     """Weigh drives on a Spark cluster, by ``applyInPandas``.
 
@@ -111,5 +118,6 @@ def weigh_rows(frame: Any) -> Any:
     return pd.DataFrame(receipts, columns=Receipt._fields)
 
 
-def _texts(drives: str | Iterable[str]) -> list[str]:
-    return [drives] if isinstance(drives, str) else [str(one) for one in drives]
+def _texts(drives: str | Path | Iterable[str | Path]) -> list[str]:
+    given = [drives] if isinstance(drives, str | Path) else drives
+    return [str(one) for one in given]

@@ -7,7 +7,7 @@ from pathlib import Path
 import polars as pl
 
 from weighbridge.errors import ConfigError, MissingExtraError
-from weighbridge.fleet.reading import read_drives, read_segments
+from weighbridge.fleet.reading import collected, read_drives, read_segments
 
 
 def write_delta(results: str | Path, place: str | Path) -> None:
@@ -42,7 +42,7 @@ def write_delta(results: str | Path, place: str | Path) -> None:
         ),
     )
     for name, lazy, same in tables:
-        frame = lazy.with_columns(pl.col("date").cast(pl.String)).collect()
+        frame = collected(lazy.with_columns(pl.col("date").cast(pl.String)), results)
         uri = f"{str(place).rstrip('/')}/{name}"
         try:
             if not deltalake.DeltaTable.is_deltatable(uri):

@@ -46,6 +46,7 @@ class Count:
     found : jobs known so far; ``complete`` when there are no more
     done : receipts; of them ``there`` already, ``failed``, ``unread``
     drives, masses : weighed in this run, and those with a mass
+    workers : connected to the scheduler; None while not known
     began : when, as of `time.monotonic` [s]
     """
 
@@ -57,6 +58,7 @@ class Count:
     unread: int = 0
     drives: int = 0
     masses: int = 0
+    workers: int | None = None
     began: float = field(default_factory=time.monotonic)
 
     def add(self, receipt: Receipt) -> None:
@@ -70,15 +72,16 @@ class Count:
 
     @property
     def rate(self) -> float:
-        """Recordings per second since the begin."""
-        return self.done / max(time.monotonic() - self.began, 1e-9)
+        """Recordings weighed per second since the begin: what was there already costs no time."""
+        return (self.done - self.there) / max(time.monotonic() - self.began, 1e-9)
 
     @property
     def left(self) -> float | None:
-        """Time left [s]; None while not known."""
-        if not self.complete or not self.done:
+        """Time left [s], as if none of the rest were there already; None while not known."""
+        rest = self.found - self.done
+        if not self.complete or (rest and not self.rate):
             return None
-        return (self.found - self.done) / self.rate
+        return rest / self.rate if rest else 0.0
 
 
 def first_alone(job: Job) -> Receipt:
@@ -193,6 +196,7 @@ class _Run:
             raise SchedulerLost
         workers = self._client.scheduler_info(n_workers=-1).get("workers", {})
         threads = sum(w.get("nthreads", 1) for w in workers.values())
+        self.count.workers = len(workers)
         self._window = max(_LEAST, PER_THREAD * threads)
 
     def _submit(self, job: Job) -> Future[Receipt]:
@@ -279,5 +283,15 @@ def plain(count: Count) -> dict[str, Any]:
     """Return a count for `progress.json`."""
     return {
         name: getattr(count, name)
-        for name in ("found", "complete", "done", "there", "failed", "unread", "drives", "masses")
+        for name in (
+            "found",
+            "complete",
+            "done",
+            "there",
+            "failed",
+            "unread",
+            "drives",
+            "masses",
+            "workers",
+        )
     } | {"rate_per_s": round(count.rate, 3), "left_s": count.left}

@@ -10,7 +10,9 @@ function make(tag, text, kind) {
   return element;
 }
 const place = (key) => document.querySelector(`#${key} .body`);
-const number = (x, unit = "") => (x === null ? "–" : x.toLocaleString("en").replaceAll(",", " ") + unit);
+// A number is never broken at its thousands, nor before its ±.
+const number = (x, unit = "") => (x === null ? "–" : x.toLocaleString("en").replaceAll(",", "\u202f") + unit);
+const pair = (x, half) => (x === null ? "–" : `${number(x)} ±\u00a0${number(Math.round(half))}`);
 const percent = (x) => (x === null ? "–" : `${(100 * x).toFixed(1)} %`);
 const sure = (x) => (x !== null && x > 0.999 ? "> 99.9 %" : percent(x));
 const time = (x) => (x === null ? "–" : new Date(1000 * x).toISOString().slice(0, 16).replace("T", " "));
@@ -31,7 +33,7 @@ function table(key, count, columns, order) {
   let shown = PAGE, by = order[0], down = order[1], found = [];
   const texts = Array.from({ length: count }, (_, k) =>
     columns.map((c) => String(c.show ? c.show(c.value(k), k) : c.value(k) ?? "–")));
-  const words = texts.map((cells) => cells.join("\n").toLowerCase());
+  const words = texts.map((cells) => cells.join("\n").replace(/[\u00a0\u202f]/g, " ").toLowerCase());
   function draw() {
     const parts = document.createDocumentFragment();
     for (const k of found.slice(0, shown)) {
@@ -89,7 +91,7 @@ function overloads() {
     { head: "vehicle", value: (k) => names[L.v[at[k]]], press: (k) => choose(L.v[at[k]], true) },
     { head: "when, UTC", value: col(L.start), show: time, kind: "n" },
     { head: "mass, kg", value: col(L.mass_kg), kind: "n",
-      show: (x, k) => `${number(x)} ± ${number(L.high95_kg[at[k]] - x)}` },
+      show: (x, k) => pair(x, L.high95_kg[at[k]] - x) },
     { head: "permitted, kg", value: col(L.permitted_kg), show: (x) => number(x), kind: "n" },
     { head: "over by", value: (k) => L.mass_kg[at[k]] / L.permitted_kg[at[k]] - 1, show: percent, kind: "n" },
     { head: "how sure", value: col(L.overload), kind: "n", mark: (k) => [`${L.level[at[k]]}-text`],
@@ -105,14 +107,14 @@ function vehicles() {
     { head: "km", value: of(V.distance_km), show: (x) => number(x), kind: "n" },
     { head: "mass known", value: of(V.known_share), show: percent, kind: "n" },
     { head: "t·km", value: of(V.tkm), kind: "n",
-      show: (x, k) => (x === null ? "–" : `${number(x)} ± ${number(Math.round(1.96 * V.tkm_std[k]))}`) },
+      show: (x, k) => pair(x, 1.96 * V.tkm_std[k]) },
     { head: "mean payload, kg", value: of(V.mean_payload_kg), show: (x) => number(x), kind: "n" },
     { head: "empty", value: of(V.empty_share), show: percent, kind: "n" },
     { head: "overloads", value: (k) => 1e6 * V.alarms[k] + V.warnings[k], kind: "n",
       show: (x, k) => (V.worst_overload[k] === null ? "not judged" : `${V.alarms[k]} sure, ${V.warnings[k]} likely`), mark: (k) => (V.alarms[k] ? ["alarm-text"] : []) },
     { head: "load changes", value: of(V.changes), kind: "n" },
     { head: "last mass, kg", value: of(V.last_kg), kind: "n",
-      show: (x, k) => (x === null ? "–" : `${number(x)} ± ${number(Math.round(1.96 * V.last_std_kg[k]))}`) },
+      show: (x, k) => pair(x, 1.96 * V.last_std_kg[k]) },
     { head: "file", value: of(V.has_file), show: (x) => (x ? "yes" : "none") },
   ], [8, true]);
 }
@@ -313,7 +315,7 @@ function map() {
     const k = nearest(spots, event.offsetX, event.offsetY, 16);
     if (k === null) return;
     told.textContent = `${names[C.v[k]]}, ${time(C.time[k])}: ${C.kind[k]}, ${number(C.before_kg[k])} to ` +
-      `${number(C.after_kg[k])} kg (${C.change_kg[k] > 0 ? "+" : ""}${number(C.change_kg[k])} ± ${number(Math.round(1.96 * C.std_kg[k]))} kg)`;
+      `${number(C.after_kg[k])} kg (${C.change_kg[k] > 0 ? "+" : ""}${pair(C.change_kg[k], 1.96 * C.std_kg[k])} kg)`;
   }
   body.append(key, told);
   painted.push(() => { if (only) paint(); });

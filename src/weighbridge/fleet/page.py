@@ -109,9 +109,10 @@ def _answer(report: FleetReport) -> str:
         head = f'<p class="answer good">No overload that is {sure}</p>'
         rest = "no leg"
     # One row per vehicle, its surest leg: one that is always overloaded shall hide no other.
-    first = told.with_columns(legs=pl.len().over("vehicle_id")).unique(
-        "vehicle_id", keep="first", maintain_order=True
-    )
+    alarm = pl.col("level") == "alarm"
+    first = told.with_columns(
+        sure=alarm.sum().over("vehicle_id"), likely=(~alarm).sum().over("vehicle_id")
+    ).unique("vehicle_id", keep="first", maintain_order=True)
     judged = report.legs["level"].is_not_null().sum()
     why = (
         f"{rest}, {unsure} more likely than {100 * limits.warn:g} %, of {judged} legs that could "
@@ -120,10 +121,10 @@ def _answer(report: FleetReport) -> str:
     rows = "".join(
         f'<tr class="{row["level"]}"><td>{_text(row["vehicle_id"])}</td>'
         f"<td class=n>{_when(row['start'])}</td>"
-        f"<td class=n>{row['mass_kg']:.0f} ±&nbsp;{row['high95_kg'] - row['mass_kg']:.0f}</td>"
-        f"<td class=n>{row['permitted_kg']:.0f}</td>"
+        f"<td class=n>{_number(row['mass_kg'])} ±&nbsp;{_number(row['high95_kg'] - row['mass_kg'])}"
+        f"</td><td class=n>{_number(row['permitted_kg'])}</td>"
         f"<td class=n>{how_sure(row['overload'])}{_towing(row)}</td>"
-        f"<td class=n>{row['legs']}</td></tr>"
+        f"<td class=n>{row['sure']} sure, {row['likely']} likely</td></tr>"
         for row in first.head(_FIRST).iter_rows(named=True)
     )
     table = (
@@ -143,9 +144,9 @@ def _facts(report: FleetReport) -> str:
     facts = (
         ("vehicles", f"{t['vehicles']} ({t['without_file']} without a file)"),
         ("drives, legs", f"{t['drives']}, {t['legs']}"),
-        ("driven", f"{t['distance_km']:.0f} km"),
+        ("driven", f"{_number(t['distance_km'])} km"),
         ("with a known mass", _share(t["known_share"])),
-        ("transported", f"{t['tkm']:.0f} ± {1.96 * t['tkm_std']:.0f} t·km"),
+        ("transported", f"{_number(t['tkm'])} ± {_number(1.96 * t['tkm_std'])} t·km"),
         ("driven empty", _share(t["empty_share"])),
         ("load changes", f"{t['changes']}"),
         ("legs with a trailer?", f"{t['trailer_legs']}"),
@@ -247,6 +248,11 @@ def _when(time: Any) -> str:
     if time is None:
         return NOTHING
     return f'<span class="day">{time:%Y-%m-%d}</span> {time:%H:%M}'
+
+
+def _number(value: float) -> str:
+    """Write a number with its thousands apart, where no line may break it."""
+    return f"{value:,.0f}".replace(",", "\u202f")
 
 
 def how_sure(probability: float) -> str:

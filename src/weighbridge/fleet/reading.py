@@ -8,7 +8,7 @@ import polars as pl
 
 from weighbridge.arguments import check_path
 from weighbridge.fleet.schema import DRIVES, SEGMENTS
-from weighbridge.fleet.store import TABLES, Results, read_parts
+from weighbridge.fleet.store import TABLES, Results, check_end, read_parts
 
 
 def read_drives(results: str | Path) -> pl.LazyFrame:
@@ -24,7 +24,7 @@ def read_drives(results: str | Path) -> pl.LazyFrame:
     Raises
     ------
     ConfigError
-        The folder holds no results.
+        The folder holds no results, or a file of it was cut off.
     """
     check_path("results", results)
     rows = _rows(Results.opened(Path(results)), "drives").select(list(DRIVES))
@@ -42,11 +42,31 @@ def read_segments(results: str | Path) -> pl.LazyFrame:
     Raises
     ------
     ConfigError
-        The folder holds no results.
+        The folder holds no results, or a file of it was cut off.
     """
     check_path("results", results)
     rows = _rows(Results.opened(Path(results)), "segments").select(list(SEGMENTS))
     return rows.join(read_drives(results).select("key", "part"), on=["key", "part"], how="semi")
+
+
+def collected(rows: pl.LazyFrame, results: str | Path) -> pl.DataFrame:
+    """Collect rows of the results.
+
+    Parameters
+    ----------
+    rows : made of `read_drives` or `read_segments`
+    results : their folder
+
+    Raises
+    ------
+    ConfigError
+        A file of the results is damaged.
+    """
+    try:
+        return rows.collect()
+    except (pl.exceptions.PolarsError, OSError):
+        Results.opened(Path(results)).check()
+        raise
 
 
 def _rows(results: Results, table: str) -> pl.LazyFrame:
@@ -54,6 +74,8 @@ def _rows(results: Results, table: str) -> pl.LazyFrame:
     # Parts first: what is gathered in between is in both then, and never in none.
     loose = TABLES[table](read_parts(results.part_files()))
     files = results.table_files(table)
+    for path in files:
+        check_end(path)
     by: list[str] = [n for n in ("key", "part", "segment") if n in loose.columns]
     frames = [loose.lazy()]
     if files:

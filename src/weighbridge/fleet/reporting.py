@@ -12,7 +12,7 @@ import polars as pl
 from weighbridge.fleet import figures, protocol
 from weighbridge.fleet.couplings import read_couplings
 from weighbridge.fleet.legs import Limits, legs, load_changes
-from weighbridge.fleet.reading import read_drives, read_segments
+from weighbridge.fleet.reading import collected, read_drives, read_segments
 from weighbridge.fleet.tickets import read_tickets
 from weighbridge.fleet.track import track
 from weighbridge.visible import visible_json
@@ -108,7 +108,7 @@ def report(
     """
     limits = limits or Limits()
     told = [] if tickets is None else read_tickets(Path(tickets))
-    drives, segments = read_drives(results).collect(), read_segments(results).collect()
+    drives, segments = (collected(read(results), results) for read in (read_drives, read_segments))
     coupled = [] if couplings is None else read_couplings(Path(couplings))
     rows = legs(drives, segments, limits, coupled)
     changes = load_changes(rows)

@@ -89,11 +89,21 @@ def write_part(folder: Path, key: str, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def read_parts(paths: Sequence[Path]) -> pl.DataFrame:
-    """Read part files; those that were gathered meanwhile are left out."""
+    """Read part files; those that were gathered meanwhile are left out.
+
+    Raises
+    ------
+    ConfigError
+        A file is damaged.
+    """
     frames = []
     for path in paths:
-        with contextlib.suppress(FileNotFoundError):
-            frames.append(pl.read_ipc(io.BytesIO(path.read_bytes())))
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            continue
+        with _whole(path):
+            frames.append(pl.read_ipc(io.BytesIO(data)))
     return pl.concat(frames) if frames else pl.DataFrame(schema=PART)
 
 
@@ -190,6 +200,20 @@ class Results:
         """List the files of a table."""
         return sorted((self.folder / table).glob("date=*/*.parquet"))
 
+    def check(self) -> None:
+        """Read all tables and parts.
+
+        Raises
+        ------
+        ConfigError
+            A file is damaged.
+        """
+        for table in TABLES:
+            for path in self.table_files(table):
+                _columns(path, None)
+        for path in self.part_files():
+            read_parts([path])
+
     def clean(self) -> None:
         """Remove what killed writers left."""
         import shutil
@@ -263,9 +287,36 @@ class Results:
         return found if isinstance(found, dict) else {}
 
 
+def check_end(path: Path) -> None:
+    """Raise where a file of a table was cut off, which its end tells.
+
+    Raises
+    ------
+    ConfigError
+        It was cut off.
+    """
+    with path.open("rb") as file, _whole(path):
+        pl.read_parquet_schema(file)
+
+
 def _columns(path: Path, names: list[str] | None) -> pl.DataFrame:
-    with path.open("rb") as file:
+    with path.open("rb") as file, _whole(path):
         return pl.read_parquet(file, columns=names, hive_partitioning=False)
+
+
+@contextlib.contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    """Tell a damaged file, and what to remove so that its drives are weighed again."""
+    try:
+        yield
+    except (pl.exceptions.PolarsError, OSError) as error:
+        why = str(error).partition("\n")[0]
+        date = [path.parents[2] / table / path.parent.name for table in TABLES]
+        gone = [path] if path.suffix == _SUFFIX else date
+        raise ConfigError(
+            f"{path}: is damaged ({why}); remove {' and '.join(map(str, gone))}, and give the "
+            "command of the run again, which weighs what is missing"
+        ) from None
 
 
 def _lock(number: int) -> bool:
