@@ -195,6 +195,20 @@ def test_a_silence_of_hours_costs_no_steps(short, weighing, setup, forward):
     assert direct.std[-1] > forward.std[-1]
 
 
+def test_a_silence_after_the_state_was_kept_is_survived(short, weighing, setup, forward):
+    """An adapter is unplugged for half a minute; a slow signal had nothing open just before."""
+    gone = short.start + 120.0
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    scale.update(short.start, "ambient_temperature", 20.0)
+    for block in blocks(short, even(short.between(short.start, gone), 0.5)):
+        scale.update_block(block)
+        scale.checkpoint()
+    for block in blocks(short, even(short.between(gone + 30.0, short.end), 0.5)):
+        scale.update_block(block)
+    scale.finish()
+    assert abs(scale.weighing().mass - forward.mass[-1]) < forward.std[-1]
+
+
 def test_a_clock_that_jumps_is_brought_back(short, weighing, setup, forward):
     """From 1970 to the date in mid-drive: time goes on, and it is said once."""
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)

@@ -73,6 +73,15 @@ def test_what_is_sealed_takes_no_earlier_sample():
     assert records.newest == NEWEST + 5.0
 
 
+def test_a_look_at_what_waits_leaves_nothing_behind():
+    """A slow signal has no open sample when the state is kept, and then all fall silent."""
+    records = Records(LATENESS)
+    records.add("ambient_temperature", NEWEST, 20.0)
+    records.seal(NEWEST + 1.0)
+    assert records.last(10.0, 1)["ambient_temperature"][0].size == 1
+    assert records.waiting_from == math.inf
+
+
 def test_a_value_that_is_asked_for_seldom_has_its_rate():
     records = Records(lateness=200.0)
     records.add_block({"vehicle_speed": (np.arange(0.0, 100.0, 0.2), np.ones(500))})

@@ -60,9 +60,11 @@ class _Column:
         if self.single_times:
             self.blocks.append((np.array(self.single_times), np.array(self.single_values)))
             self.single_times, self.single_values = [], []
-        if len(self.blocks) != 1:
-            times, values = zip(*self.blocks, strict=True) if self.blocks else ((), ())
-            self.blocks = [(np.concatenate([*times, _NONE]), np.concatenate([*values, _NONE]))]
+        if not self.blocks:
+            return _NONE, _NONE
+        if len(self.blocks) > 1:
+            times, values = zip(*self.blocks, strict=True)
+            self.blocks = [(np.concatenate(times), np.concatenate(values))]
         return self.blocks[0]
 
     def seal(self, until: float) -> None:
