@@ -313,8 +313,15 @@ def test_silent_vehicle_loses_no_parameter():
 
 def test_vigil():
     vigil = Vigil(0.0)
+    for k in range(3):
+        assert vigil.why_asleep(4.0) == vigil.why_asleep(6.0) == ""
+        vigil.note(1.0 + k, {}, answered=False)
     assert vigil.why_asleep(4.0) == ""
     assert "answer" in vigil.why_asleep(6.0)
+    vigil.rested(40.0)
+    vigil.note(46.0, {}, answered=False)
+    # One answer was waited for, and the host stood still meanwhile.
+    assert vigil.why_asleep(46.0) == ""
     running = {"engine_speed": 90.0, "vehicle_speed": 0.0}
     vigil.note(100.0, running, answered=True)
     stopped = {"engine_speed": 0.0, "vehicle_speed": 0.0}

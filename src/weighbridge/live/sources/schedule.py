@@ -32,7 +32,10 @@ PROBE: Final = 30.0
 """A vehicle at rest is asked one request in so long at most [s]."""
 
 NO_ANSWER: Final = 5.0
-"""A vehicle that answers nothing for so long has its ignition off [s]."""
+"""A vehicle that answers nothing for so long has its ignition off [s],"""
+
+_UNANSWERED: Final = 3
+"""and so many requests in a row: a host that stood still itself has asked fewer."""
 
 STANDING: Final = 180.0
 """A vehicle that stands with its engine off for so long may have its ignition off [s]."""
@@ -201,10 +204,12 @@ class Vigil:
         self.silent = False
         self.low = False
         self._answered = time
+        self._unanswered = 0
         self._alive = time
 
     def note(self, time: float, values: Mapping[str, float], *, answered: bool) -> None:
         """Take what one answer said [SI]; nothing where none came."""
+        self._unanswered = 0 if answered else self._unanswered + 1
         if answered:
             self._answered = time
         if values.get("engine_speed", 0.0) > _RUNS or values.get("vehicle_speed", 0.0) > _MOVES:
@@ -221,10 +226,11 @@ class Vigil:
     def rested(self, time: float) -> None:
         """Begin to count the vehicle's silence anew: it was not asked meanwhile."""
         self._answered = time
+        self._unanswered = 0
 
     def why_asleep(self, time: float) -> str:
         """Why the vehicle is not to be asked now; empty where it may be."""
-        self.silent = time - self._answered > NO_ANSWER
+        self.silent = time - self._answered > NO_ANSWER and self._unanswered >= _UNANSWERED
         if self.low:
             return LOW_BATTERY
         if self.silent:
