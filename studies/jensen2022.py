@@ -1,6 +1,7 @@
 """Figures of studies/jensen2022.md: the 18 drives, other cars, recorded navigation, sensitivity.
 
-Run from the checkout: ``python studies/jensen2022.py``. Recorded drives lie in
+Run from the checkout: ``python studies/jensen2022.py``, or with the names of some parts
+(``drives``, ``cars``, ``recorded``), which alone are made anew. Recorded drives lie in
 ``../shared/data`` and are not part of the project; without them their tables say so.
 """
 
@@ -8,6 +9,8 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import re
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -274,27 +277,54 @@ def write_items(reproduced: Reproduced) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def main() -> None:
-    done = paper.reproduce()
+def drives() -> dict[str, str]:
+    """Reproduce the paper: tables and figures of the study, and the items of the method's page."""
+    return reproduction(paper.reproduce())
+
+
+def reproduction(done: Reproduction) -> dict[str, str]:
+    """Make of a reproduction what is shown of it; returns the tables of this page."""
     reproduced = paper.as_reproduced(done)
     reproduced.write_report(Path(tempfile.gettempdir()) / "jensen2022.html")
     write_items(reproduced)
     sensitivity_figure(done)
     masses_figure(done)
-    template = (HERE / "jensen2022.template.md").read_text(encoding="utf-8")
-    page = template
-    for name, text in (
-        ("targets", targets_table(done)),
-        ("drives", drives_table(done)),
-        ("parameters", parameters_table(done)),
-        ("cars", other_cars(curved=True)),
-        ("straight cars", other_cars(curved=False)),
-        ("recorded", recorded_tables()),
-        ("pyins", beside_pyins()),
-    ):
-        page = page.replace(f"<!-- {name} -->", text)
-    (HERE / "jensen2022.md").write_text(page, encoding="utf-8")
+    return {
+        "targets": targets_table(done),
+        "drives": drives_table(done),
+        "parameters": parameters_table(done),
+    }
+
+
+def cars() -> dict[str, str]:
+    """Weigh other cars with the curved torque map and with the straight one."""
+    return {"cars": other_cars(curved=True), "straight cars": other_cars(curved=False)}
+
+
+def recordings() -> dict[str, str]:
+    """Navigate by recorded sensors."""
+    return {"recorded": recorded_tables(), "pyins": beside_pyins()}
+
+
+PARTS = {"drives": drives, "cars": cars, "recorded": recordings}
+
+
+def write_page(tables: dict[str, str]) -> None:
+    """Put tables at their places in the template; those not made anew stay as the page has them."""
+    page = HERE / "jensen2022.md"
+    before = page.read_text(encoding="utf-8")
+    text = (HERE / "jensen2022.template.md").read_text(encoding="utf-8")
+    for name in re.findall(r"<!-- (.+) -->", text):
+        begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+        table = tables.get(name) or before.split(f"{begin}\n")[1].split(f"\n{end}")[0]
+        text = text.replace(begin, f"{begin}\n{table}\n{end}")
+    page.write_text(text, encoding="utf-8")
+
+
+def main(names: list[str]) -> None:
+    for name in names or list(PARTS):
+        write_page(PARTS[name]())
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
