@@ -113,6 +113,19 @@ def test_torque_from_air_flow(empty, loaded):
     assert abs(weighing.mass - loaded.truth.mass[-1]) < 2.0 * weighing.std
 
 
+def test_a_source_without_a_floor_has_the_range_of_its_readings(empty, monkeypatch, tmp_path):
+    every = replace(TORQUE_SOURCES["air_flow"], floor=TORQUE_SOURCES["measured"].floor)
+    monkeypatch.setitem(TORQUE_SOURCES._own, "air_flow", every)
+    car = calibrate(empty.drive, settings=CalibrationSettings(source="air_flow"))
+    car.save(tmp_path / "car.toml")
+    kept = Vehicle.load(tmp_path / "car.toml").torque
+    flow = empty.drive.signals["mass_air_flow"]
+    reading = every.reading(empty.drive, flow.time, kept)
+    low, high = kept.load_range
+    assert np.nanmin(reading) <= low < 0.5 * np.nanmax(reading)
+    assert high < 1.05 * np.nanmax(reading)
+
+
 def test_grid_of_table_5_ends_near(empty):
     car = calibrate(empty.drive, settings=CalibrationSettings(method="rls"))
     grid = calibrate(empty.drive, settings=CalibrationSettings(grid=True, method="rls"))

@@ -100,7 +100,8 @@ def ranges(
         [r.reading[use] for r, use in zip(problem.recordings, pulling, strict=True)]
     )
     slow, fast = np.percentile(speed, [0.1, 99.9])
-    lowest = min(r.floor for r in problem.recordings)
+    floor = min(r.floor for r in problem.recordings)
+    lowest = floor if np.isfinite(floor) else float(np.min(load))
     return (float(0.95 * slow), float(1.05 * fast)), (lowest, 1.02 * float(np.max(load)))
 
 

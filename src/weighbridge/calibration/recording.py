@@ -49,6 +49,7 @@ class Recording:
     mass : known, as the drive begins [kg]
     draft : vehicle with gears and source, without a torque model
     reading : (n,) of the torque source at its stamps
+    floor : reading below which the engine may be dragged; minus infinity where none is
     driven : (n,) where the reading is above that of a dragged engine
     source : of the torque
     anchors : balances made so far, by delay and lag
@@ -60,6 +61,7 @@ class Recording:
     draft: Vehicle
     source: TorqueSource
     reading: Floats
+    floor: float
     driven: Bools
     anchors: dict[tuple[float, float], ForceBalance] = field(default_factory=dict)
 
@@ -68,10 +70,9 @@ class Recording:
         cls, drive: Drive, motion: Motion, mass: float, draft: Vehicle, source: TorqueSource
     ) -> Recording:
         """See a drive by its torque source."""
-        carrier = source.carrier(drive)
-        stamps = carrier.time
+        stamps = source.carrier(drive).time
         reading = source.reading(drive, stamps, draft.torque)
-        floor = source.floor(carrier.values)
+        floor = source.floor(reading)
         period = float(np.median(np.diff(stamps)))
         return cls(
             drive=drive,
@@ -80,13 +81,9 @@ class Recording:
             draft=draft,
             source=source,
             reading=reading,
+            floor=floor,
             driven=averaged(reading, period, DRAGGED_TIME) >= floor,
         )
-
-    @property
-    def floor(self) -> float:
-        """Reading below which the engine may be dragged."""
-        return self.source.floor(self.source.carrier(self.drive).values)
 
     def with_draft(self, draft: Vehicle) -> Recording:
         """Return the same drive with another draft of the vehicle."""

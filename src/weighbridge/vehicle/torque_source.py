@@ -86,7 +86,8 @@ class TorqueSource:
     needs_map : the reading is no torque, and means nothing without the coefficients of a
         calibration
     needs_reference : the reading is a part of a reference torque
-    floor : least reading that says something, from the readings of a drive (n,)
+    floor : least reading that says something, from the readings of a drive (n,); where it is not
+        given, each says something
     title : in a few words, of the ways to weigh a drive
     words : what a vehicle file that uses it says of it
     axis, axis_suffix : title of an axis of readings, and the suffix of its unit; empty for SI
