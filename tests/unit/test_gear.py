@@ -9,6 +9,7 @@ import weighbridge as wb
 from weighbridge.calibration.problem import find_gears
 from weighbridge.errors import DriveError
 from weighbridge.signals import Signal
+from weighbridge.vehicle.engine_delay import find_engine_delay
 from weighbridge.vehicle.gear import (
     detect_gearings,
     idling,
@@ -49,6 +50,27 @@ def test_no_more_gears_are_found_than_the_gear_signal_tells():
     gear[:3] = 9.0
     told = logged.with_signals(Signal("gear", time, gear))
     assert find_gears([told], [motion]).gearings == pytest.approx(GEARINGS, rel=0.01)
+
+
+@pytest.mark.parametrize("engine_late", [0.1, 0.35, 0.5])
+def test_an_engine_speed_that_is_not_as_late_as_the_vehicle_speed_moves_no_gear(engine_late):
+    time, engine, speed = drive(np.random.default_rng(7), rate=20.0)
+    motion = SimpleNamespace(time=time, speed=speed, speed_delay=0.35)
+    stamps = time + engine_late
+    gearings = GEARINGS * np.array([1.05, 1.02, 1.0, 1.0, 1.0])
+    found = find_engine_delay(stamps, engine, (time, speed), gearings, motion.speed_delay)
+    assert found == pytest.approx(engine_late, abs=0.03)
+    logged = wb.Drive("d", {"engine_speed": Signal("engine_speed", stamps, engine)})
+    assert find_gears([logged], [motion]).gearings == pytest.approx(GEARINGS, rel=0.005)
+
+
+def test_gears_that_never_pull_leave_the_engine_speed_as_late_as_the_vehicle_speed():
+    time = np.arange(4000) * 0.1
+    speed = np.full(time.size, 20.0)
+    engine = 8.4 * speed * (1.0 + np.random.default_rng(8).normal(0.0, 0.002, time.size))
+    late = find_engine_delay(time, engine, (time, speed), GEARINGS, 0.2)
+    assert late == pytest.approx(0.2, abs=1e-3)
+    assert find_engine_delay(time[:5], engine[:5], (time, speed), GEARINGS, 0.2) == 0.2
 
 
 def test_gearings_are_found_within_a_percent():

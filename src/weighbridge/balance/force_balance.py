@@ -82,6 +82,7 @@ def force_balance(
             foot=brakes.foot,
             switch_dead=brakes.switch_dead,
             gears=read.instants.numbers,
+            engine_delay=read.instants.engine_delay,
             air=read.air,
             full_torque=read.full_torque,
             torque_noise=_torque_noise(vehicle, table),
@@ -143,8 +144,8 @@ def _read(
 ) -> _Read:
     """Read motion and torque at the stamps of the source, less its delay."""
     recorded = source.time
-    gears = setup.gears if setup is not None else None
-    at = read_instants(drive, vehicle, lagged_motion(motion, lag), recorded, delay, gears)
+    known = (setup.gears, setup.engine_delay) if setup is not None else (None, None)
+    at = read_instants(drive, vehicle, lagged_motion(motion, lag), recorded, delay, *known)
     engine_speed, gearing, altitude = at.columns["engine_speed"], at.columns["gearing"], at.altitude
     torque = engine_torque(drive, vehicle, engine_speed, recorded)
     full = setup.full_torque if setup is not None else full_load_torque(torque.torque)

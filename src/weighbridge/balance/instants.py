@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
+from weighbridge.vehicle.engine_delay import find_engine_delay
 from weighbridge.vehicle.gear import (
     effective_gearing,
     number_reported_gears,
@@ -87,8 +88,19 @@ def interpolate_motion(motion: Motion, time: Floats) -> dict[str, Floats]:
     return rows
 
 
+def identify_engine_delay(drive: Drive, vehicle: Vehicle, motion: Motion) -> float:
+    """Find how late the engine speed of a drive is, as late as vehicle speed if unseen [s]."""
+    signal = drive.get("engine_speed")
+    gearings = np.array(vehicle.driveline.gearings)
+    unseen = signal is None or not len(signal) or gearings.size < 2
+    if signal is None or unseen or source_of(vehicle).gearing is not None:
+        return motion.speed_delay
+    seen = (motion.time, motion.speed)
+    return find_engine_delay(signal.time, signal.values, seen, gearings, motion.speed_delay)
+
+
 def engine_speed_at(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Floats) -> Floats:
-    """Engine speed at the stamps it was recorded with: it is as late as vehicle speed."""
+    """Engine speed at the stamps it was recorded with."""
     if source_of(vehicle).gearing is not None:
         return speed * vehicle.driveline.gearings[0]
     signal = drive.get("engine_speed")
@@ -163,6 +175,7 @@ class Instants:
     slipping : (n,) the clutch slips
     changing : (n,) the gear changes soon or has just changed
     numbers : of `identify_told_gears`
+    engine_delay : of `identify_engine_delay` [s]
     """
 
     columns: dict[str, Any]
@@ -171,6 +184,7 @@ class Instants:
     slipping: Bools
     changing: Bools
     numbers: Mapping[int, int]
+    engine_delay: float
 
 
 def read_instants(
@@ -180,6 +194,7 @@ def read_instants(
     recorded: Floats,
     delay: float,
     numbers: Mapping[int, int] | None = None,
+    engine_delay: float | None = None,
 ) -> Instants:
     """Read a motion, smoothed as the torque is, where a delay puts the force samples.
 
@@ -189,11 +204,14 @@ def read_instants(
     recorded : (n,) stamps of the torque [s]
     delay : by which they are late [s]
     numbers : of `identify_told_gears`; found from this drive when None
+    engine_delay : of `identify_engine_delay`; found from this drive when None [s]
     """
     time = recorded - delay
     rows = interpolate_motion(motion, time)
     speed = rows["speed"]
-    engine_speed = engine_speed_at(drive, vehicle, time + motion.speed_delay, speed)
+    if engine_delay is None:
+        engine_delay = identify_engine_delay(drive, vehicle, motion)
+    engine_speed = engine_speed_at(drive, vehicle, time + engine_delay, speed)
     if numbers is None:
         numbers = identify_told_gears(drive, vehicle, recorded, engine_speed, speed)
     gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, speed, numbers)
@@ -215,6 +233,7 @@ def read_instants(
         slipping=slipping,
         changing=changing,
         numbers=numbers,
+        engine_delay=engine_delay,
     )
 
 

@@ -161,6 +161,7 @@ class ForceSetup:
     foot : accelerator and floor of the reading
     switch_dead : the brake switch contradicts the motion and is not used
     gears : number of the vehicle file's gear by what the gearbox tells
+    engine_delay : lateness of the engine speed [s]
     air : temperature and pressure
     full_torque : torque of the engine that the drive hardly exceeds [N m]
     torque_noise : of one torque [N m]
@@ -170,6 +171,7 @@ class ForceSetup:
     foot: FootSetup
     switch_dead: bool
     gears: Mapping[int, int]
+    engine_delay: float
     air: Air
     full_torque: float
     torque_noise: float

@@ -23,6 +23,7 @@ from weighbridge.navigation.select import find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.classes import VehicleClass
+from weighbridge.vehicle.engine_delay import find_engine_delay
 from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling
 from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
@@ -269,7 +270,19 @@ def find_gears(
                 f"{drive.name}: no engine_speed, so no gear can be found; give gearings in the "
                 "vehicle file"
             )
-    found = detect_gearings(*_engine_and_speed(drives, motions), idle_speed=idle_speed)
+    usual = [motion.speed_delay for motion in motions]
+    found = detect_gearings(*_engine_and_speed(drives, motions, usual), idle_speed=idle_speed)
+    late = [
+        find_engine_delay(
+            drive.signals["engine_speed"].time,
+            drive.signals["engine_speed"].values,
+            (motion.time, motion.speed),
+            found.gearings,
+            motion.speed_delay,
+        )
+        for drive, motion in zip(drives, motions, strict=True)
+    ]
+    found = detect_gearings(*_engine_and_speed(drives, motions, late), idle_speed=idle_speed)
     told = _told_gears(drives)
     if not told or found.gearings.size <= told:
         return found
@@ -299,20 +312,23 @@ def _warm_idle(drives: Sequence[Drive], motions: Sequence[Motion]) -> float:
     """Lowest of the idle speeds of the drives, as a cold engine idles faster [rad/s]; 0 if none."""
     found = []
     for drive, motion in zip(drives, motions, strict=True):
-        _, engine_speed, speed = _engine_and_speed([drive], [motion])
+        _, engine_speed, speed = _engine_and_speed([drive], [motion], [motion.speed_delay])
         found.append(idling(engine_speed, speed))
     return min((idle for idle in found if idle > 0.0), default=0.0)
 
 
 def _engine_and_speed(
-    drives: Sequence[Drive], motions: Sequence[Motion]
+    drives: Sequence[Drive], motions: Sequence[Motion], late: Sequence[float]
 ) -> tuple[Floats, Floats, Floats]:
-    """Instants of all drives [s], engine speed [rad/s] and speed of the vehicle there [m/s]."""
+    """Instants of all drives [s], engine speed [rad/s] and speed of the vehicle there [m/s].
+
+    ``late`` is by how much the engine speed of each drive is [s].
+    """
     times, engine, speeds = [], [], []
     offset = 0.0
-    for drive, motion in zip(drives, motions, strict=True):
+    for drive, motion, delay in zip(drives, motions, late, strict=True):
         signal = drive.signals["engine_speed"]
-        instants = signal.time - motion.speed_delay
+        instants = signal.time - delay
         inside = (instants >= motion.time[0]) & (instants <= motion.time[-1])
         times.append(instants[inside] + offset)
         engine.append(signal.values[inside])

@@ -9,7 +9,12 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance import ForceBalance, force_balance
-from weighbridge.balance.instants import SLOWEST_GEARED, lagged_motion, read_instants
+from weighbridge.balance.instants import (
+    SLOWEST_GEARED,
+    identify_engine_delay,
+    lagged_motion,
+    read_instants,
+)
 from weighbridge.balance.table import ForceTable
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
@@ -52,6 +57,7 @@ class Recording:
     floor : reading below which the engine may be dragged; minus infinity where none is
     driven : (n,) where the reading is above that of a dragged engine
     source : of the torque
+    engine_delay : lateness of the engine speed [s]
     anchors : balances made so far, by delay and lag
     """
 
@@ -63,6 +69,7 @@ class Recording:
     reading: Floats
     floor: float
     driven: Bools
+    engine_delay: float
     anchors: dict[tuple[float, float], ForceBalance] = field(default_factory=dict)
 
     @classmethod
@@ -83,6 +90,7 @@ class Recording:
             reading=reading,
             floor=floor,
             driven=averaged(reading, period, DRAGGED_TIME) >= floor,
+            engine_delay=identify_engine_delay(drive, draft, motion),
         )
 
     def with_draft(self, draft: Vehicle) -> Recording:
@@ -134,7 +142,7 @@ class Recording:
         """Read motion, engine speed and gear where a delay puts the force samples."""
         drive, draft = self.drive, self.draft
         recorded = self.source.carrier(drive).time
-        at = read_instants(drive, draft, motion, recorded, delay)
+        at = read_instants(drive, draft, motion, recorded, delay, engine_delay=self.engine_delay)
         nothing = np.full(recorded.size, np.nan)
         table = replace(
             anchor.table,
