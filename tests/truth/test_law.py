@@ -71,6 +71,11 @@ NORTH, EAST = law.wind_columns(VIEW)
         (law.gust_column(VIEW), np.sqrt([0.5 + 200.0 / 225.0, 0.5 + 50.0 / 225.0])),
         # An open grade of 0.04 / 9.81 is as large as the disturbance.
         (law.gust_column(rows(speed=np.array([15.0, 0.0])), 0.04 / 9.81), [1.0, np.sqrt(0.75)]),
+        # In a gear twice as short as the usual one errors of the torque are twice as large.
+        (
+            law.gust_column(rows(speed=np.array([0.0, 15.0])), usual_gearing=5.0),
+            np.sqrt([0.5 + 4.0, 1.0 + 1.0]),
+        ),
         # One time constant after the start.
         (law.cold_torque_column(VIEW), [10.0, 5.0 * 0.36787944]),
         (law.torque_offset_column(VIEW), [10.0, 5.0]),

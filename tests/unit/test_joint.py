@@ -18,7 +18,7 @@ from weighbridge.estimators.joint.slow_errors import DATA_SHEET_NAMES, design, u
 from weighbridge.report.slow_section import constants_table
 from weighbridge.signals import Signal
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
-from weighbridge.vehicle.model import TorqueModel
+from weighbridge.vehicle.model import Driveline, TorqueModel
 
 LOADED = 400.0
 
@@ -86,6 +86,30 @@ def test_a_body_that_leans_with_its_load_costs_little(balance, car):
         return abs(joint.estimate(leaning, car, settings).mass / upright - 1.0)
 
     assert off(None) < 0.7 * off(joint.JointSettings(load_pitch_std=0.0))
+
+
+def test_torque_errors_that_act_through_the_gear_weigh_less_in_short_gears(
+    balance, car, monkeypatch
+):
+    """Errors of 20 N m that last half a minute, drawn anew eight times."""
+    table = balance.table
+    gearing = np.nan_to_num(table.gearing)
+    known = joint.estimate(balance, car).mass
+    keep = np.exp(-np.gradient(table.time) / 30.0)
+
+    def error(seed):
+        white = np.random.default_rng(seed).normal(0.0, 20.0, table.time.size)
+        wrong = np.zeros(table.time.size)
+        for k in range(1, wrong.size):
+            wrong[k] = keep[k] * wrong[k - 1] + np.sqrt(1.0 - keep[k] ** 2) * white[k]
+        force = table.traction_force + gearing * wrong
+        off = replace(balance, table=replace(table, traction_force=force))
+        return joint.estimate(off, car, load_changes=False).mass / known - 1.0
+
+    by_gear = np.array([error(seed) for seed in range(8)])
+    monkeypatch.setattr(Driveline, "usual_gearing", 0.0)
+    alike = np.array([error(seed) for seed in range(8)])
+    assert np.sqrt(np.mean(by_gear**2)) < 0.85 * np.sqrt(np.mean(alike**2))
 
 
 def test_each_segment_has_burnt_its_own_fuel(balance, car):

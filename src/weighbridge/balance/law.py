@@ -128,20 +128,26 @@ def resistance_column(table: ForceTable) -> Floats:
     return np.ones_like(table.time)
 
 
-def gust_column(table: ForceTable, unmeasured_grade: float = 0.0) -> Floats:
+def gust_column(
+    table: ForceTable, unmeasured_grade: float = 0.0, *, usual_gearing: float = 0.0
+) -> Floats:
     """How large the fast disturbance is at each row over its usual size (n,) [-].
 
-    Half of it are errors of grade and torque, the other half gusts, whose force grows with the
-    speed. A grade that nothing has measured comes beside them.
+    Half of it are errors of the grade, the other half gusts, whose force grows with the speed.
+    Errors of the torque come beside them: at an engine they act through the gear. So does a grade
+    that nothing has measured.
 
     Parameters
     ----------
     table
     unmeasured_grade : what of the grade nothing has measured [rad]
+    usual_gearing : at which errors of the torque are as large as the usual size [1/m]; 0 for a
+        single gear, where they are a part of it
     """
     gusts = 0.5 * (1.0 + (np.nan_to_num(table.speed) / GUST_SPEED) ** 2)
+    through = np.nan_to_num(table.gearing) / usual_gearing if usual_gearing > 0.0 else 0.0
     grade = (GRAVITY * unmeasured_grade / DISTURBANCE_STD) ** 2
-    return np.asarray(np.sqrt((gusts + grade) / (1.0 + grade)))
+    return np.asarray(np.sqrt((gusts + through**2 + grade) / (1.0 + grade)))
 
 
 def coldness(table: ForceTable) -> Floats:

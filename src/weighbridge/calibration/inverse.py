@@ -114,6 +114,7 @@ class FitSettings:
     torque_noise : of one reading, as torque [N m]
     wheel_radius : [m]
     prior : mean and standard deviation (4,) of C_d A, C_r, I_e, I_w
+    usual_gearing : of `weighbridge.vehicle.driveline.Driveline` [1/m]
     lasting_drag : learn the drag area from the lasting part of the pressure alone; what comes and
         goes within `AROUND` is taken with that of the class
     window : length of the windows [s]
@@ -128,6 +129,7 @@ class FitSettings:
     torque_noise: float
     wheel_radius: float
     prior: tuple[Floats, Floats]
+    usual_gearing: float = 0.0
     lasting_drag: bool = False
     window: float = WINDOW
     rounds: int = 3
@@ -305,7 +307,7 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
         *road.T,
         # The reading itself stands on the left; the other torque terms stand here.
         *-np.delete(terms, 1, axis=1).T,
-        law.gust_column(table, d.motion.unmeasured_grade),
+        law.gust_column(table, d.motion.unmeasured_grade, usual_gearing=settings.usual_gearing),
         law.resistance_column(table),
         north,
         east,

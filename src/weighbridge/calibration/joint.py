@@ -196,6 +196,7 @@ def _settings(problem: Problem, noise: float) -> FitSettings:
         torque_noise=noise,
         wheel_radius=problem.draft.driveline.wheel_radius,
         prior=_prior(problem.draft, problem.base.driveline),
+        usual_gearing=problem.draft.driveline.usual_gearing,
     )
 
 

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
+import numpy as np
+
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.possible import not_negative, positive, within
 
@@ -84,6 +86,13 @@ class Driveline:
     def single_speed(self) -> bool:
         """Whether there is one fixed gear."""
         return len(self.gearings) == 1
+
+    @property
+    def usual_gearing(self) -> float:
+        """Geometric mean of the gearings [1/m]; 0 where there are not several."""
+        if len(self.gearings) < 2:
+            return 0.0
+        return float(np.exp(np.mean(np.log(self.gearings))))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -160,7 +160,7 @@ def design(
     north, east = law.wind_columns(table)
     columns = [
         phi,
-        law.gust_column(table, unmeasured_grade),
+        law.gust_column(table, unmeasured_grade, usual_gearing=vehicle.driveline.usual_gearing),
         law.resistance_column(table),
         area * north,
         area * east,
