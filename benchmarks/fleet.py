@@ -192,12 +192,15 @@ def lines(home: Path, most: int) -> None:
         if count > most:
             break
         drives, cars = tiny(home / f"line-{count}", count)
+        before = processor_time()
         ran = run(drives, cars, home / f"line-results-{count}", 2)
+        spent = processor_time() - before
         whole = wb.fleet.read_drives(home / f"line-results-{count}")
         rows = whole.select(pl.len()).collect().item()
         say(
             f"{rows} tiny drives, 2 workers",
-            f"{ran.seconds:.1f} s, {ran.memory:.0f} MB, {rate_text(home, count)}",
+            f"{ran.seconds:.1f} s, processors {spent:.1f} s, {ran.memory:.0f} MB, "
+            f"{rate_text(home, count)}",
         )
 
 
