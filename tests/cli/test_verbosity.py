@@ -57,6 +57,12 @@ def test_every_command_takes_them():
         assert {"quiet", "verbose"} <= {option.name for option in command.params}, command.name
 
 
+def test_the_terminal_breaks_the_lines_of_help():
+    for command in leaves():
+        assert command.help, command.name
+        assert all("\n" not in part for part in command.help.split("\n\n")), command.name
+
+
 @pytest.mark.parametrize("before", [True, False])
 def test_quiet_leaves_the_results(weighbridge, loaded, car, tmp_path, before):
     track = tmp_path / "track.csv"

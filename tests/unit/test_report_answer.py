@@ -11,7 +11,7 @@ from tests.unit.test_report import MASS, VEHICLE, Elements, make_weighing, writt
 from weighbridge.estimators import Status
 from weighbridge.report.answer import Answer, advice, answer_block, file_worth, grade
 from weighbridge.report.style import REACH
-from weighbridge.vehicle.model import Provenance, TorqueModel
+from weighbridge.vehicle.model import Provenance, TorqueModel, Vehicle
 
 
 def weighed(std, systematic=math.nan, vehicle=VEHICLE, method="joint", **changed):
@@ -121,6 +121,21 @@ def test_a_drive_without_a_mass_says_what_would_help(tmp_path):
     assert "The road was too flat." in page.text
     assert "more starts" in page.text
     assert " ± " not in page.text
+
+
+def test_a_vehicle_that_was_never_calibrated_is_to_be_calibrated(tmp_path):
+    raw = Vehicle(name="raw")
+    why = "run weighbridge calibrate --method joint"
+    w = replace(
+        make_weighing(status=Status.MISSING_SIGNALS, why=why), vehicle=raw, result=None
+    )  # fmt: skip
+    html = block(tmp_path, w)
+    page = Elements(html)
+    assert "Calibrate the vehicle on a drive with a mass from a scale" in page.text
+    assert "Record the missing signals" not in page.text
+    assert '<span class="option">--method</span> joint' in html
+    calibrated = replace(w, vehicle=VEHICLE)
+    assert "Record the missing signals" in Elements(block(tmp_path, calibrated)).text
 
 
 def test_the_true_mass_is_explained_by_the_fuel(tmp_path):

@@ -123,8 +123,8 @@ def unbacked_scale(vehicle: Vehicle) -> list[str]:
     if source_of(vehicle).signed or vehicle.tare is not None or vehicle.gross is not None:
         return []
     return [
-        f"what {source_of(vehicle).title} is worth, the masses given say alone, and one that is "
-        f"wrong makes every mass wrong by as much: {_BOTH_MISSING}"
+        f"the masses given alone say what {source_of(vehicle).title} is worth, and a wrong one "
+        f"makes every mass wrong by as much: {_BOTH_MISSING}"
     ]
 
 

@@ -31,6 +31,8 @@ _WIDTH = 140
 _STRONG = 900.0
 # Narrower, the rarer columns of the signals are left out.
 _WHOLE = 116
+# Narrower still, counts are left out too, so that numbers stay whole.
+_NARROW = 76
 
 
 def inspect(
@@ -215,12 +217,13 @@ def _signal_table(found: Inspection, width: int) -> Table:
     """List the signals; a narrow terminal gets the columns that matter most."""
     from rich.table import Table
 
-    whole = width >= _WHOLE
     table = Table()
     columns = ["samples", "Hz", "period s", "jitter ms", "gaps", "longest s", "lowest", "highest"]
     columns += ["step"]
-    rare = {"period s", "jitter ms", "longest s", "step"}
-    kept = [c for c in columns if whole or c not in rare]
+    rare = {"period s", "jitter ms", "longest s", "step"} if width < _WHOLE else set()
+    if width < _NARROW:
+        rare |= {"samples", "gaps"}
+    kept = [c for c in columns if c not in rare]
     table.add_column("signal", no_wrap=True)
     for name in kept:
         table.add_column(name, justify="right", no_wrap=True)
@@ -254,16 +257,14 @@ def _way_table(found: Inspection, every_way: bool) -> Table:
     if not any(w.torque != "speed" for w in ways):
         ways = [found.ways[0], *ways]
     table = Table()
-    for name in ("way to weigh by", "expect (one std)", "limited by", "lacks"):
+    lacking = any(w.needs for w in ways)
+    names = ["way to weigh by", "expect (one std)", "limited by"] + ["lacks"] * lacking
+    for name in names:
         table.add_column(name)
     for w in ways:
         mark = " (weigh goes this way)" if w.chosen else ""
-        table.add_row(
-            w.name + mark,
-            _expected(w),
-            w.because if w.possible else "",
-            ", ".join(w.needs),
-        )
+        cells = (w.name + mark, _expected(w), w.because if w.possible else "", ", ".join(w.needs))
+        table.add_row(*cells[: len(names)])
     return table
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import inspect
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -77,11 +78,17 @@ class EveryCommand(TyperGroup):
         super().__init__(**settings)
         shared = [option for option in self.params if option.name in _SHARED]
         for command in _leaves(self.commands.values()):
+            command.help = _unbroken(command.help or "")
             for option in shared:
                 own = copy.copy(option)
                 assert isinstance(own, TyperOption)
                 own.expose_value = False
                 command.params.append(own)
+
+
+def _unbroken(text: str) -> str:
+    """Join the lines of each paragraph of a docstring, for the terminal breaks them anew."""
+    return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
 
 
 def _leaves(commands: Iterable[Any]) -> Iterator[Any]:

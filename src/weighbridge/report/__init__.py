@@ -36,8 +36,8 @@ def write_report(
     weighings : in the order to show them
     path : file to write; its folder must be there
     calibration : shows how the vehicle file came about
-    truth : true mass by drive name [kg]; where a drive is not named, the known
-        mass of its ``drive.toml`` serves
+    truth : true mass at the end of each drive, by its name [kg]; where a drive is not named, the
+        known mass of its ``drive.toml`` serves
     title : heading of the page; made from the drives when None
     comparisons : for each of ``weighings`` the same drive by every method, as of
         `weighbridge.compare`, to show side by side; none when None

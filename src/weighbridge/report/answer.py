@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from weighbridge.estimators import Status
 from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.report.style import REACH
-from weighbridge.report.text import capital, kg, sentence, signed_kg
+from weighbridge.report.text import capital, kg, prose, sentence, signed_kg
 from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std
 from weighbridge.vehicle.telling import can_weigh
 
@@ -55,6 +55,15 @@ SPEED_REMEDY_TEXT: Final[dict[Status, str]] = {
     "what is there and what it allows.",
 }
 """The same where speed alone was weighed by."""
+
+
+CALIBRATE_TEXT: Final = (
+    "Calibrate the vehicle on a drive with a mass from a scale (weighbridge calibrate)."
+)
+SPEED_CALIBRATE_TEXT: Final = (
+    "Calibrate the vehicle for this method on a drive with a mass from a scale "
+    "(weighbridge calibrate --method speed-ekf)."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +116,7 @@ def answer_block(answer: Answer) -> str:
     half = f" ± {answer.half:.0f}" if sure else ""
     told = f"{named}: ± {_percent(answer.half / answer.mass)}" if sure else "rough: no upper bound"
     holds = f"95 % interval {low:.0f} to {high:.0f} kg" if sure else "no interval"
-    judged = "".join(f'<p class="why">{escape(text)}</p>' for text in answer.judged)
+    judged = "".join(f'<p class="why">{prose(text)}</p>' for text in answer.judged)
     return (
         f'<div class="verdict {named}"><p class="answer {named}">{answer.mass:.0f}{half} kg '
         f'<span class="grade">{told}</span></p><p class="holds">{holds}</p>{judged}'
@@ -119,7 +128,7 @@ def answer_block(answer: Answer) -> str:
 
 def no_answer_block(status: Status, reason: str, remedy: str) -> str:
     """Return the block of a drive that carries no mass, as HTML."""
-    told = f'<p class="why">{escape(sentence(reason))}</p>' if reason else ""
+    told = f'<p class="why">{prose(sentence(reason))}</p>' if reason else ""
     helps = (
         f'<dl class="key">{_item("what would help", remedy)}</dl>' if remedy else ""
     )  # fmt: skip
@@ -153,7 +162,13 @@ def weighing_answer(weighing: MassResult, judged: tuple[str, ...]) -> str:
 
 def remedy(weighing: MassResult) -> str:
     """Say what would let a drive without a mass carry one."""
-    texts = SPEED_REMEDY_TEXT if weighing.estimator.speed_alone else REMEDY_TEXT
+    speed_alone = weighing.estimator.speed_alone
+    if weighing.status is Status.MISSING_SIGNALS:
+        if speed_alone and weighing.vehicle.speed_model is None:
+            return SPEED_CALIBRATE_TEXT
+        if not speed_alone and not can_weigh(weighing.vehicle):
+            return CALIBRATE_TEXT
+    texts = SPEED_REMEDY_TEXT if speed_alone else REMEDY_TEXT
     return texts[weighing.status]
 
 
@@ -218,7 +233,7 @@ def _calibrate(vehicle: Vehicle) -> str:
     if made.doubts:
         return "Calibrate again: the notes tell what is doubtful of the calibration."
     if not drives:
-        return "Calibrate the vehicle on a drive with a mass from a scale (weighbridge calibrate)."
+        return CALIBRATE_TEXT
     if drives <= FEW_DRIVES:
         return "Calibrate on more drives, of other known masses."
     return "Calibrate on drives like this one: same place of the sensor, like roads and load."
@@ -263,7 +278,7 @@ def _share(answer: Answer) -> str:
 
 def _item(name: str, text: str, value: str = "", more: str = "") -> str:
     strong = f"<strong>{escape(value)}</strong> " if value else ""
-    return f"<div><dt>{name}</dt><dd>{strong}{escape(text)}{more}</dd></div>"
+    return f"<div><dt>{name}</dt><dd>{strong}{prose(text)}{more}</dd></div>"
 
 
 def _percent(share: float) -> str:

@@ -7,7 +7,7 @@ from html import escape
 from typing import Final
 
 from weighbridge.report.table import Table
-from weighbridge.report.text import sentence
+from weighbridge.report.text import prose, sentence
 
 STACKED: Final = 4
 """Columns from which a table becomes one block per row on a telephone."""
@@ -18,14 +18,14 @@ def left_out(reasons: Sequence[str]) -> str:
     if not reasons:
         return ""
     listed = " ".join(sentence(text) for text in reasons)
-    return f'<p class="absent">Left out: {escape(listed)}</p>'
+    return f'<p class="absent">Left out: {prose(listed)}</p>'
 
 
 def remarks(texts: Sequence[str]) -> str:
     """List what was found, mended or doubted; nothing where nothing was."""
     if not texts:
         return ""
-    noted = "".join(f"<li>{escape(sentence(text))}</li>" for text in dict.fromkeys(texts))
+    noted = "".join(f"<li>{prose(sentence(text))}</li>" for text in dict.fromkeys(texts))
     return f'<h3>What was found, mended or doubted</h3><ul class="warnings">{noted}</ul>'
 
 
@@ -65,7 +65,7 @@ def html_table(
 
     def cell(text: str, kind: str, label: str) -> str:
         named = f' data-label="{escape(label)}"' if label else ""
-        return f"<td{f' class={kind}' if kind else ''}{named}>{escape(text)}</td>"
+        return f"<td{f' class={kind}' if kind else ''}{named}>{prose(text)}</td>"
 
     head = "".join(
         f"<th scope=col{f' class={kind}' if kind else ''}>{escape(text)}</th>"

@@ -216,7 +216,7 @@ def share_panel(result: MassTrack) -> Panel:
         showlegend=False,
         hovertext=[f"{counts[r]} samples" for r in present],
     )
-    figure.update_layout(xaxis_range=[0, 1.18 * max(shares, default=1.0)])
+    figure.update_layout(xaxis_range=[0, 1.35 * max(shares, default=1.0)])
     excluded = [r for r in reversed(present) if r is not Reason.USED]
     title = "No sample was excluded"
     if excluded:

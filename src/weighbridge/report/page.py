@@ -101,7 +101,7 @@ def _known(weighing: MassResult, truth: Mapping[str, float]) -> Known | None:
     """
     name = weighing.drive.name
     if name in truth:
-        return Known(truth[name], "")
+        return Known(truth[name], "at the end of the drive, fuel burnt on the way taken off")
     mass, result = weighing.drive.info.mass, weighing.result
     if mass is None or weighing.load_changed:
         return None

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from html import escape
 from typing import TYPE_CHECKING, Final
 
 from weighbridge.signals.units import scalar_from_si
@@ -12,6 +14,8 @@ if TYPE_CHECKING:
 
 NOTHING: Final = "–"
 """Where there is no number."""
+
+_OPTION: Final = re.compile(r"(?<!\S)--[a-z][a-z-]*")
 
 
 def kg(mass: float | None) -> str:
@@ -59,6 +63,11 @@ def duration(seconds: float) -> str:
 def capital(text: str) -> str:
     """Give a text a capital."""
     return text[:1].upper() + text[1:]
+
+
+def prose(text: str) -> str:
+    """Return a text as HTML; options of commands, such as ``--mass``, are not broken."""
+    return _OPTION.sub(r'<span class="option">\g<0></span>', escape(text))
 
 
 def sentence(text: str) -> str:
