@@ -18,7 +18,8 @@ _DISPLAY = re.compile(r'<div class="arithmatex">\\\[(.*?)\\\]</div>', re.DOTALL)
 _INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
 
 _WEIGHTS = (
-    *((name, 3.0) for name in ("start", "record", "data", "accuracy", "troubleshooting")),
+    *((name, 3.0) for name in ("start", "record", "data", "files", "accuracy", "troubleshooting")),
+    ("questions", 2.0),
     *((f"{folder}/", 3.0) for folder in ("howto", "tutorials", "concepts")),
     *((name, 0.3) for name in ("changelog", "papers", "studies/", "reference/", "licence")),
 )
