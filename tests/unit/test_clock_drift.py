@@ -11,7 +11,7 @@ from weighbridge.balance.instants import lagged_motion
 from weighbridge.checks import mend_drive
 from weighbridge.errors import DriveError
 from weighbridge.navigation.clock_drift import mend_clocks
-from weighbridge.navigation.clock_lag import find_lags
+from weighbridge.navigation.clock_lag import Integrated, find_lags
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import MIDSIZE, Scenario, Sensors, jensen_route, simulate_car
@@ -57,7 +57,8 @@ def without_inertial(drive, gaps):
 
 
 def lags(drive, speed="vehicle_speed"):
-    return find_lags([drive.signals[f"accel_{a}"] for a in "xyz"], drive.signals[speed])
+    accel = Integrated.of([drive.signals[f"accel_{a}"] for a in "xyz"])
+    return find_lags(accel, drive.signals[speed])
 
 
 def counted(period, share, seed=1):

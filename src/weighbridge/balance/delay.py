@@ -12,6 +12,7 @@ from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
+from weighbridge.signals.correlation import correlation, correlations
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.vehicle.model import Vehicle
 
@@ -230,7 +231,7 @@ def far_shift(balance: ForceBalance, vehicle: Vehicle) -> float:
     time, specific = table.time[known], table.specific_force[known]
     shifts = np.arange(-_SOUGHT, _SOUGHT + 0.25, 0.5)
     moved = (interpolate(table.time[rows] + s, time, specific) for s in shifts)
-    misfit = 1.0 - np.array([_correlation(force[rows], m) for m in moved])
+    misfit = 1.0 - correlations(force[rows], moved)
     best = int(np.argmin(misfit))
     near = float(misfit[np.abs(shifts) < ELSEWHERE].min())
     far = abs(shifts[best]) >= ELSEWHERE and misfit[best] < _CLEARER * near
@@ -287,7 +288,7 @@ def _misfit(
         rows = common & np.isfinite(table.traction_force) & np.isfinite(table.specific_force)
         if np.count_nonzero(rows) < 100:
             return float("nan")
-        return 1.0 - _correlation(force_on_mass(table, vehicle)[rows], table.specific_force[rows])
+        return 1.0 - correlation(force_on_mass(table, vehicle)[rows], table.specific_force[rows])
 
     return misfit
 
@@ -299,9 +300,3 @@ def vertex(x: Floats, y: Floats) -> float:
         return float(x[1])
     shift = 0.5 * (y[0] - y[2]) / curvature
     return float(x[1] + np.clip(shift, -1.0, 1.0) * (x[1] - x[0]))
-
-
-def _correlation(a: Floats, b: Floats) -> float:
-    a, b = a - a.mean(), b - b.mean()
-    scale = float(np.sqrt(np.dot(a, a) * np.dot(b, b)))
-    return float(np.dot(a, b)) / scale if scale > 0.0 else 0.0

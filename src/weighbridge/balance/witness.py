@@ -19,6 +19,7 @@ from scipy.signal import lfilter
 from weighbridge.errors import DriveError
 from weighbridge.kernels.robust_line import lines_without_parts, robust_line
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.signals.correlation import correlations
 from weighbridge.signals.interpolation import interpolate
 from weighbridge.vehicle.air import standard_pressure
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
@@ -353,13 +354,13 @@ def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following
     )
     period = float(np.median(np.diff(rows.time)))
     reading = rows.reading[rows.driving]
+    driven = rows.time[rows.driving]
     left = np.empty((len(BLURS), len(DELAYS)))
     for i, blur in enumerate(BLURS):
         kept = np.exp(-period / blur) if blur > 0.0 else 0.0
         delayed, _ = lfilter([1.0 - kept], [1.0, -kept], predicted, zi=[kept * predicted[0]])
-        for j, delay in enumerate(DELAYS):
-            moved = interpolate(rows.time - delay, rows.time, delayed)[rows.driving]
-            left[i, j] = 1.0 - _correlation(moved, reading) ** 2
+        moved = (interpolate(driven - delay, rows.time, delayed) for delay in DELAYS)
+        left[i] = 1.0 - correlations(reading, moved) ** 2
     best = int(np.argmin(left.min(axis=1)))
     usual = int(np.argmin(np.abs(np.array(BLURS) - (relation.blur or 0.0))))
     return Following(
@@ -368,12 +369,6 @@ def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following
         usual_left=float(left[usual].min()),
         lag=DELAYS[int(np.argmin(left[usual]))],
     )
-
-
-def _correlation(a: Floats, b: Floats) -> float:
-    a, b = a - a.mean(), b - b.mean()
-    size = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / size if size > 0.0 else 0.0
 
 
 def air_of(drive: Drive, start: float, end: float) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.navigation.aiding import resolution
-from weighbridge.signals import Drive, Floats, Problem, Signal
+from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 
 COARSEST: Final = 0.22
@@ -48,7 +48,11 @@ def with_half_digits(drive: Drive) -> Drive:
             _told(step, "too coarse to weigh by: record it with more digits, 0.1 m/s^2 or finer")
         )
     alike = [s for s in axes if abs(steps[s.name] / step - 1.0) < 0.01]
-    if not any(_cut(s, step, drive.speed) for s in alike):
+    moving: dict[int, Bools] = {}
+    for s in alike:
+        if id(s.time) not in moving:
+            moving[id(s.time)] = _moving(s.time, drive.speed)
+    if not any(_cut(s.values[moving[id(s.time)]], step) for s in alike):
         return drive
     if step > COARSEST_CUT:
         return drive.with_problems(
@@ -75,14 +79,18 @@ def _told(step: float, why: str) -> Problem:
 
 def _step(values: Floats) -> float:
     """Step that values are quantised to, 0 where none shows."""
-    return resolution(np.round(values, 9))
+    return resolution(values, 9)
 
 
-def _cut(axis: Signal, step: float, speed: Signal | None) -> bool:
-    """Tell whether the step of an axis at zero is twice as wide as those beside it."""
-    values = axis.values
-    if speed is not None and len(speed) > 1:
-        values = values[np.interp(axis.time, speed.time, np.abs(speed.values)) > MOVES]
+def _moving(time: Floats, speed: Signal | None) -> Bools:
+    """Instants (n,) at which an axis may not rest at zero; all of them without a speed."""
+    if speed is None or len(speed) < 2:
+        return np.ones(time.size, dtype=bool)
+    return np.asarray(np.interp(time, speed.time, np.abs(speed.values)) > MOVES)
+
+
+def _cut(values: Floats, step: float) -> bool:
+    """Tell whether the step of an axis (n,) at zero is twice as wide as those beside it."""
     place = np.rint(values / step)
     second, first, zero, next_first, next_second = (
         np.count_nonzero(place == k) for k in (-2, -1, 0, 1, 2)

@@ -210,13 +210,14 @@ def _check_axes(
         found = _against_course(gyro, turns, bias, down)
     if found is None and speed is not None and len(speed) > 20:
         found = _against_speed(speed, at, force, rate, full, down)
-        step = max(resolution(np.round(s.values, 9)) for s in gyro)
-        if found is not None and found.text.endswith(_BY_TILT) and step > _COARSE_RATE:
-            text = (
-                f"the gyro is recorded in steps of {step:.2g} rad/s, too coarse to tell whether "
-                "the signs of its axes are right; record it with more digits"
-            )
-            found = Problem(found.signal, text)
+        if found is not None and found.text.endswith(_BY_TILT):
+            step = max(resolution(s.values, 9) for s in gyro)
+            if step > _COARSE_RATE:
+                text = (
+                    f"the gyro is recorded in steps of {step:.2g} rad/s, too coarse to tell "
+                    "whether the signs of its axes are right; record it with more digits"
+                )
+                found = Problem(found.signal, text)
     if found is not None:
         yield found
 

@@ -28,8 +28,11 @@ _MOVES = 1.0
 _REACH = 3.0
 """Periods of an even clock to both sides that its low-pass reaches to [-]."""
 
-_AT_ONCE = 1 << 15
-"""Outputs low-passed at a time: bounds the memory."""
+_AT_ONCE = 1 << 12
+"""Outputs low-passed at a time: their samples stay in the processor's cache."""
+
+_TELLING = 20_000
+"""So many values show the step of a signal."""
 
 _SLOWEST = 0.11
 """Inertial samples further apart lose what happens between them [s]."""
@@ -114,7 +117,8 @@ def read_imu(drive: Drive) -> Imu:
     moving = np.ones(time.size, dtype=bool)
     if speed is not None and len(speed):
         moving = np.interp(time, speed.time, speed.values) > _MOVES
-    imu = Imu(time, accel, gyro, float(np.median(np.diff(time))))
+    usual = signals[0].period if whole else float(np.median(np.diff(time)))
+    imu = Imu(time, accel, gyro, usual)
     repeated = repeated_rows(imu.accel, imu.gyro, moving)
     own = time[moving & ~repeated]
     if repeated.any() and own.size >= _FEWEST:
@@ -193,9 +197,13 @@ def resample(
     return out
 
 
-def resolution(values: Floats) -> float:
-    """Return the step a signal is quantised to, 0 where none shows."""
-    levels = np.unique(values[:20_000])
+def resolution(values: Floats, digits: int | None = None) -> float:
+    """Return the step a signal (n,) is quantised to, 0 where none shows.
+
+    Values are rounded to so many ``digits`` first where that is not None.
+    """
+    some = values[:_TELLING]
+    levels = np.unique(some if digits is None else np.round(some, digits))
     if levels.size < 3:
         return 0.0
     gaps = np.diff(levels)

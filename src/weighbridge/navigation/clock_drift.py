@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from weighbridge.navigation.aiding import read_fixes, speed_from_fixes
-from weighbridge.navigation.clock_lag import Lags, find_lags, find_offset, locate_step
+from weighbridge.navigation.clock_lag import (
+    Integrated,
+    Lags,
+    find_lags,
+    find_offset,
+    locate_step,
+)
 from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant, span
@@ -123,11 +129,12 @@ def _round(drive: Drive) -> Drive:
     accel = [s for name in axes if (s := thaw.get(name)) is not None and len(s) > 50]
     if len(accel) < 3:
         return drive
+    force = Integrated.of(accel)
     found = {}
     for table, speed in (("obd", drive.get("vehicle_speed")), ("gnss", _gnss_speed(drive))):
         if speed is None or len(speed) < 50:
             continue
-        lags = _lags(accel, speed)
+        lags = _lags(force, speed)
         lost = _lost(lags) if table == "obd" else ()
         if lost:
             return _left_out(drive, lost)
@@ -135,7 +142,7 @@ def _round(drive: Drive) -> Drive:
         if isinstance(path, Problem):
             return drive.with_problems(path)
         if path is not None:
-            path = _narrowed(path, accel, speed)
+            path = _narrowed(path, force, speed)
             found[table] = path
     if len(found) == 2 and _alike(found["obd"], found["gnss"]):
         return _imu_moved(drive, found["obd"])
@@ -144,12 +151,12 @@ def _round(drive: Drive) -> Drive:
     return drive
 
 
-def _narrowed(path: _Path, accel: Sequence[Signal], speed: Signal) -> _Path:
+def _narrowed(path: _Path, force: Integrated, speed: Signal) -> _Path:
     """Cut out no more about each step than is in doubt, and keep both its sides to the edge."""
     time, lag, cuts = path.time, path.lag, []
     for cut in path.cuts:
         sides = (float(lag[time <= cut[0]][-1]), float(lag[time >= cut[1]][0]))
-        near = locate_step(accel, speed, cut, sides)
+        near = locate_step(force, speed, cut, sides)
         cuts.append(near)
         time, lag = np.append(time, near), np.append(lag, sides)
     time, first = np.unique(time, return_index=True)
@@ -165,13 +172,13 @@ def _gnss_speed(drive: Drive) -> Signal | None:
     return speed_from_fixes(fixes) if fixes is not None and fixes.time.size > 50 else None
 
 
-def _lags(accel: Sequence[Signal], speed: Signal) -> Lags:
+def _lags(force: Integrated, speed: Signal) -> Lags:
     """Lags about zero, or about where else the drive fits."""
-    lags = find_lags(accel, speed)
+    lags = find_lags(force, speed)
     if lags.pieces >= _FEWEST and lags.lag.size < 0.3 * lags.pieces:
-        offset = find_offset(accel, speed)
+        offset = find_offset(force, speed)
         if offset is not None:
-            other = find_lags(accel, speed, centre=offset)
+            other = find_lags(force, speed, centre=offset)
             if other.lag.size >= _SHOWN * other.pieces:
                 return other
     return lags
@@ -333,11 +340,10 @@ def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floa
         left = lag - middle - slope * t
         scale = max(1.4826 * float(np.median(np.abs(left))), 0.01)
         weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(left), 1e-9))
-        mean = np.average(t, weights=weight)
-        slope = float(
-            np.sum(weight * (t - mean) * lag) / max(np.sum(weight * (t - mean) ** 2), 1e-9)
-        )
-        middle = float(np.average(lag - slope * t, weights=weight))
+        total = np.sum(weight)
+        off = t - np.sum(t * weight) / total
+        slope = float(np.sum(weight * off * lag) / max(np.sum(weight * off**2), 1e-9))
+        middle = float(np.sum((lag - slope * t) * weight) / total)
     std = scatter * float(np.sqrt(_OVERLAP / max(np.sum(weight * t**2), 1e-9)))
     return slope, std, middle + slope * t
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
@@ -72,7 +71,38 @@ class Lags:
         return self.lag.size + self.missed.size
 
 
-def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) -> Lags:
+@dataclass(frozen=True, slots=True)
+class Integrated:
+    """Specific force of the three sensor axes, integrated over time.
+
+    Attributes
+    ----------
+    times : (n,) stamps of each axis [s]
+    integrals : (n,) of each axis, less its median [m/s]
+    start, end : first and last stamp of all [s]
+    samples : of the axis that has fewest
+    """
+
+    times: tuple[Floats, ...]
+    integrals: tuple[Floats, ...]
+    start: float
+    end: float
+    samples: int
+
+    @classmethod
+    def of(cls, accel: Sequence[Signal]) -> Integrated:
+        """Integrate the axes of an accelerometer of any mounting."""
+        times = tuple(s.time for s in accel)
+        return cls(
+            times=times,
+            integrals=tuple(_integral(s) for s in accel),
+            start=min(float(t[0]) for t in times),
+            end=max(float(t[-1]) for t in times),
+            samples=min(t.size for t in times),
+        )
+
+
+def find_lags(force: Integrated, speed: Signal, *, centre: float = 0.0) -> Lags:
     """Find the lag of a speed against an accelerometer of any mounting, piece by piece.
 
     In each piece the changes of speed are regressed on those of the integrated specific force
@@ -80,14 +110,14 @@ def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) ->
 
     Parameters
     ----------
-    accel : specific force of the three sensor axes
+    force : of the accelerometer
     speed : by the clock that is examined
     centre : lag around which is looked [s]
     """
     start, end = float(speed.time[0]), float(speed.time[-1])
     count = int((end - start) / STEP)
     hop, size = (round(x / STEP) for x in (_HOP, _PIECE))
-    if count < size or min(len(s) for s in accel) < 50:
+    if count < size or force.samples < 50:
         return Lags(*(np.empty(0) for _ in range(4)))
     grid: Floats = np.asarray(start + STEP * np.arange(count), dtype=np.float64)
     shown, seen = _speed_changes(speed, grid)
@@ -101,8 +131,8 @@ def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) ->
     # The force reaches beyond the speed on both sides by the lags looked at.
     most = round(REACH[-1] / STEP)
     wide: Floats = np.asarray(start - centre + STEP * np.arange(-most, count + most))
-    changes, felt = _force_changes(accel, wide)
-    force = np.column_stack([_high_passed(c, felt) for c in changes])
+    changes, felt = _force_changes(force, wide)
+    axes = np.column_stack([_high_passed(c, felt) for c in changes])
     lively = [k for k in lively if np.mean(felt[k + most : k + most + size]) > _SEEN]
     found: dict[int, tuple[float, float]] = {}
     for reach in (round(r / STEP) for r in REACH):
@@ -115,7 +145,7 @@ def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) ->
                         shown[part], seen[part], [c[there] for c in changes], felt[there]
                     )
                 else:
-                    told = _explained(x[part], force[there], felt[there])
+                    told = _explained(x[part], axes[there], felt[there])
                 peak = _peak(*told, size)
                 if peak is not None:
                     found[first] = peak
@@ -129,21 +159,20 @@ def find_lags(accel: Sequence[Signal], speed: Signal, *, centre: float = 0.0) ->
     )
 
 
-def find_offset(accel: Sequence[Signal], speed: Signal) -> float | None:
+def find_offset(force: Integrated, speed: Signal) -> float | None:
     """Find one lag for a whole drive among all that leave the records together [s].
 
     Returns
     -------
     Coarse, to be refined by `find_lags`; None where no lag explains much.
     """
-    first = min(float(s.time[0]) for s in accel)
-    last = max(float(s.time[-1]) for s in accel)
+    first, last = force.start, force.end
     start, end = float(speed.time[0]), float(speed.time[-1])
     if min(last - first, end - start) < _PIECE:
         return None
     x, seen = _speed_changes(speed, np.arange(start, end, STEP))
     x = _high_passed(x, seen)
-    changes, felt = _force_changes(accel, np.arange(first, last, STEP))
+    changes, felt = _force_changes(force, np.arange(first, last, STEP))
     axes = np.column_stack([_high_passed(c, felt) for c in changes])
     gram = axes.T @ axes
     gram += 1e-6 * np.trace(gram) * np.eye(3) + 1e-12 * np.eye(3)
@@ -159,13 +188,13 @@ def find_offset(accel: Sequence[Signal], speed: Signal) -> float | None:
 
 
 def locate_step(
-    accel: Sequence[Signal], speed: Signal, cut: tuple[float, float], lags: tuple[float, float]
+    force: Integrated, speed: Signal, cut: tuple[float, float], lags: tuple[float, float]
 ) -> tuple[float, float]:
     """Narrow the time in which the lag of a speed steps from one value to another [s].
 
     Parameters
     ----------
-    accel : specific force of the three sensor axes
+    force : of the accelerometer
     speed : by the clock that steps
     cut : in which the step lies, by that clock [s]
     lags : before and after it [s]
@@ -182,7 +211,7 @@ def locate_step(
     x = _high_passed(x, seen)
     sides = []
     for lag in lags:
-        changes, felt = _force_changes(accel, grid - lag)
+        changes, felt = _force_changes(force, grid - lag)
         sides.append(np.column_stack([_high_passed(c, felt) for c in changes]))
         seen &= felt
     sure = seen & ((grid < cut[0]) | (grid > cut[1]))
@@ -207,11 +236,11 @@ def _speed_changes(speed: Signal, grid: Floats) -> tuple[Floats, Bools]:
     return np.where(seen, change, 0.0), seen
 
 
-def _force_changes(accel: Sequence[Signal], grid: Floats) -> tuple[list[Floats], Bools]:
+def _force_changes(force: Integrated, grid: Floats) -> tuple[list[Floats], Bools]:
     """Integral of each axis over `_SPAN` about each instant, (n,) each, and where it was felt."""
     felt = np.ones(grid.size, dtype=bool)
-    changes = [_change(s.time, _integral(s), grid) for s in accel]
-    for time in {id(s.time): s.time for s in accel}.values():
+    changes = [_change(*axis, grid) for axis in zip(force.times, force.integrals, strict=True)]
+    for time in {id(time): time for time in force.times}.values():
         step = np.diff(time)
         holes = np.concatenate(([0.0], np.cumsum(np.where(step > _FORCE_GAP, step, 0.0))))
         felt &= (grid - _SPAN > time[0]) & (grid + _SPAN < time[-1])
@@ -278,7 +307,7 @@ def _explained(x: Floats, force: Floats, felt: Bools) -> tuple[Floats, Bools]:
     force : (n + 2 r, 3) changes of the integrated force
     felt : (n + 2 r,) where there are any
     """
-    cross = np.einsum("kjn,n->kj", sliding_window_view(force, x.size, axis=0), x)
+    cross = np.column_stack([np.correlate(axis, x, "valid") for axis in force.T])
     products = force[:, :, None] * force[:, None, :]
     total = np.concatenate((np.zeros((1, 3, 3)), np.cumsum(products, axis=0)))
     gram = total[x.size :] - total[: -x.size]

@@ -50,12 +50,17 @@ class Block(NamedTuple):
     def part(self, first: int, last: int) -> Block:
         """Return the samples from ``first`` up to ``last`` (excluded) with their nodes."""
         low, high = np.searchsorted(self.nodes, (first, last))
+        return self.stretch((first, last), (int(low), int(high)))
+
+    def stretch(self, samples: tuple[int, int], nodes: tuple[int, int]) -> Block:
+        """Return a run of samples with its nodes, both from the first up to the last (excluded)."""
+        there, own = slice(*samples), slice(*nodes)
         return Block(
-            self.time[first:last],
-            self.accel[first:last],
-            self.gyro[first:last],
-            self.nodes[low:high] - first,
-            self.z[low:high],
+            self.time[there],
+            self.accel[there],
+            self.gyro[there],
+            self.nodes[own] - samples[0],
+            self.z[own],
         )
 
 
@@ -118,11 +123,11 @@ def run_smoothed(state: State, block: Block, setup: Setup) -> tuple[State, Nodes
     begins = []
     for cut, (first, last) in stretches:
         begins.append(state)
-        part = block.part(*cut)
+        part = block.stretch(cut, (first, last))
         state = _fold(state, part, setup, new_rows(), states[first:last], grade_std[first:last])
     log, adjoint = new_rows(_STRETCH), np.zeros(ERRORS)
     for begin, (cut, (first, last)) in zip(reversed(begins), reversed(stretches), strict=True):
-        part = block.part(*cut)
+        part = block.stretch(cut, (first, last))
         _fold(begin, part, setup, log, states[first:last], again)
         smooth(log, last - first, adjoint, states, first)
     return state, Nodes(block.time[block.nodes], states, grade_std)

@@ -100,8 +100,12 @@ def place_nodes(
     nearest = np.where(fixes - time[right - 1] < time[right] - fixes, right - 1, right)
     nearest = nearest[np.abs(time[nearest] - fixes) < _NEAREST]
     after = np.flatnonzero(np.diff(time) > max_gap)
-    ends = [] if causal else [after, np.array([0, time.size - 1])]
-    return np.unique(np.concatenate([even, nearest, after + 1, *ends]))
+    chosen = np.zeros(time.size, dtype=bool)
+    for places in (even, nearest, after + 1):
+        chosen[places] = True
+    if not causal:
+        chosen[after] = chosen[0] = chosen[-1] = True
+    return np.flatnonzero(chosen)
 
 
 def rests(grid: Even, rot_bs: Floats, limits: tuple[float, float], *, causal: bool) -> Bools:

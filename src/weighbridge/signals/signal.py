@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -40,14 +40,15 @@ class Signal:
     name: str
     time: Floats
     values: Floats
+    _period: float | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         check_text("name of a signal", self.name)
-        for field in ("time", "values"):
-            given = getattr(self, field)
-            floats = as_floats(f"{field} of signal {self.name!r}", given)
+        for name in ("time", "values"):
+            given = getattr(self, name)
+            floats = as_floats(f"{name} of signal {self.name!r}", given)
             if floats is not given:
-                object.__setattr__(self, field, floats)
+                object.__setattr__(self, name, floats)
         if self.time.shape != self.values.shape or self.time.ndim != 1:
             raise ConfigError(
                 f"signal {self.name!r} has times of shape {self.time.shape} and values of shape "
@@ -74,7 +75,12 @@ class Signal:
     @property
     def period(self) -> float:
         """Median time between samples [s]; NaN below two samples."""
-        return float(np.median(np.diff(self.time))) if self.time.size > 1 else float("nan")
+        if self._period is None:
+            steps = np.diff(self.time)
+            usual = float(np.median(steps)) if steps.size else float("nan")
+            object.__setattr__(self, "_period", usual)
+            return usual
+        return self._period
 
     def at(self, time: Floats) -> Floats:
         """Interpolate linearly; NaN outside the samples [SI]."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.kernels.interpolation import moved_changes
 from weighbridge.signals import Floats, Signal
+from weighbridge.signals.correlation import inner
 
 _SPAN = 1.5
 """Speed changes are compared over this time [s]: longer lets grade in, shorter noise."""
@@ -80,13 +81,12 @@ def estimate_speed_delay(
 
     def residual(delay: float) -> float:
         model = moved_changes(a, b, delay, time, integral, whole, width)
-        gain = float(model @ target) / max(float(model @ model), 1e-12)
-        if gain <= 0.0:
-            return float(target @ target)
-        return float(np.sum((target - gain * model) ** 2))
+        gain = inner(model, target) / max(inner(model, model), 1e-12)
+        left = target - gain * model if gain > 0.0 else target
+        return inner(left, left)
 
     delay, least, curvature = _minimum(residual, low, high)
-    if curvature <= 0.0 or least > 0.7 * float(target @ target):
+    if curvature <= 0.0 or least > 0.7 * inner(target, target):
         return 0.0, np.inf
     # overlapping spans repeat the same noise `ahead` times
     noise_var = least / target.size
