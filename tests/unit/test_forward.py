@@ -1,17 +1,27 @@
 """The forward pass: near the smoothed answer, and causal to the last bit."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 import weighbridge as wb
-from weighbridge.balance.averaging import WINDOW
+from weighbridge.balance import ForceTable, Reason, force_balance
+from weighbridge.balance import forward as rows
+from weighbridge.balance.averaging import WINDOW, window_params
 from weighbridge.errors import ConfigError, DriveError
+from weighbridge.estimators.judging import STOP
+from weighbridge.kernels import window_means
+from weighbridge.navigation import forward as navigation
+from weighbridge.navigation.select import scaled_for_navigation
 from weighbridge.pipeline.forward import forward_weigh, identify_forward, lateness
-from weighbridge.signals.recent import STEP
+from weighbridge.signals import Signal
+from weighbridge.signals.recent import STEP, instants, recent
 from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+from weighbridge.vehicle.model import TorqueModel
+
+COLUMNS = tuple(f.name for f in fields(ForceTable) if f.name != "set_off")
 
 
 @pytest.fixture(scope="module")
@@ -20,12 +30,15 @@ def made():
 
 
 @pytest.fixture(scope="module")
-def weighing(made):
-    car = wb.calibrate(made.drive, mass=made.scenario.mass)
-    other = simulate_car(
+def loaded():
+    return simulate_car(
         Scenario(name="loaded", car=MIDSIZE, route=short_route(), payload=250.0, seed=42_002)
     )
-    return wb.weigh(other.drive, car)
+
+
+@pytest.fixture(scope="module")
+def weighing(made, loaded):
+    return wb.weigh(loaded.drive, wb.calibrate(made.drive, mass=made.scenario.mass))
 
 
 @pytest.fixture(scope="module")
@@ -65,14 +78,8 @@ def test_what_comes_later_changes_no_bit(weighing, setup, whole, part):
 def test_a_drive_that_pauses_goes_on(weighing, setup):
     """Bus and sensor are silent for a while; what comes after is weighed as before."""
     drive = weighing.drive
-    middle = drive.start + 0.5 * drive.duration
-    gap = drive.with_signals(
-        *(
-            replace(s, time=s.time[keep], values=s.values[keep])
-            for s in drive.signals.values()
-            for keep in [(s.time < middle) | (s.time > middle + 60.0)]
-        )
-    )
+    middle = drive.start + 0.3 * drive.duration
+    gap = paused(drive)
     track = forward_weigh(gap, setup)
     assert track.mass[-1] == pytest.approx(weighing.mass, rel=0.02)
     assert not ((track.time > middle + 1.0) & (track.time < middle + 60.0)).any()
@@ -104,3 +111,116 @@ def test_a_setup_needs_a_mass_by_joint_and_an_inertial_sensor(weighing):
     blind = weighing.drive.without(*(f"{k}_{a}" for k in ("accel", "gyro") for a in "xyz"))
     with pytest.raises(DriveError, match="needs accel_x"):
         identify_forward(wb.weigh(blind, weighing.vehicle))
+
+
+def with_torque(loaded, period):
+    """The loaded drive with a torque that is told every ``period``, and what tells of the brake."""
+    truth, rng = loaded.truth, np.random.default_rng(42_003)
+    every = round(period / np.median(np.diff(truth.time)))
+    time, torque = truth.time[::every].copy(), truth.engine_torque[::every].copy()
+    torque = np.round(torque + rng.normal(0.0, 2.0, torque.size), 2)
+    return time, torque, truth
+
+
+def by_torque(weighing, drive, lag):
+    """Weigh by a measured torque that is smoothed with a ``lag``, and by nothing beside it."""
+    drive = drive.without("engine_load", "mass_air_flow")
+    vehicle = weighing.vehicle
+    vehicle = replace(
+        vehicle,
+        torque=TorqueModel(source="measured"),
+        timing=replace(vehicle.timing, torque_delay=None, torque_lag=lag),
+    )
+    return wb.weigh(drive, vehicle)
+
+
+def switched(weighing, loaded):
+    """10 Hz with a brake switch; for half a minute of driving the logger filled its readings in."""
+    time, torque, truth = with_torque(loaded, 0.1)
+    fast = time[(np.interp(time, truth.time, truth.speed) > 8.0) & (time > time[0] + 150.0)]
+    hole = (time > fast[0]) & (time < fast[0] + 30.0)
+    torque[hole] = np.round(np.linspace(40.0, 70.0, np.count_nonzero(hole)), 2)
+    pressed = (truth.brake_pedal[::20] > 0.0).astype(float)
+    switch = Signal("brake_switch", truth.time[::20].copy(), pressed)
+    drive = weighing.drive.with_signals(Signal("engine_torque", time, torque), switch)
+    return by_torque(weighing, drive, 0.25)
+
+
+def slow(weighing, loaded):
+    """1 Hz with the position of the accelerator, and a silence of a minute in all signals."""
+    time, torque, truth = with_torque(loaded, 1.0)
+    pedal = Signal("accelerator_pedal", truth.time[::50].copy(), truth.pedal[::50].copy())
+    drive = weighing.drive.with_signals(Signal("engine_torque", time, torque), pedal)
+    return by_torque(weighing, paused(drive), 0.4)
+
+
+def paused(drive):
+    middle = drive.start + 0.3 * drive.duration
+    return drive.with_signals(
+        *(
+            replace(s, time=s.time[keep], values=s.values[keep])
+            for s in drive.signals.values()
+            for keep in [(s.time < middle) | (s.time > middle + 60.0)]
+        )
+    )
+
+
+def rows_by_steps(drive, setup):
+    """All rows of a drive, as the stages find them step by step; and the whole motion."""
+    motion, force = navigation.begin(setup.navigation, drive.start), rows.begin()
+    parts, moved = [], []
+    for until in instants(drive, setup.step):
+        records = recent(drive, until, setup.step)
+        seen = scaled_for_navigation(records, setup.vehicle, positions=True)
+        motion, found = navigation.step(motion, seen, until, setup.navigation)
+        if found is not None:
+            moved.append(found)
+        if motion.motion is None or motion.motion.time.size < 2:
+            continue
+        force, table, new = rows.step(
+            force, records, motion.motion, until, setup.vehicle, setup.delay, setup.force
+        )
+        if new.stop > new.start:
+            parts.append({name: getattr(table, name)[new] for name in COLUMNS})
+    stepped = {name: np.concatenate([part[name] for part in parts]) for name in COLUMNS}
+    return stepped, navigation.joined(moved)
+
+
+@pytest.mark.parametrize("kind", [None, switched, slow], ids=["load", "switched", "slow"])
+def test_rows_of_a_whole_drive_are_those_of_the_stages(weighing, loaded, kind):
+    """Given the setup, nothing but what came before a row and soon after it changes it."""
+    weighed = weighing if kind is None else kind(weighing, loaded)
+    setup, start = identify_forward(weighed), weighed.drive.start
+    drive = weighed.drive.between(start, start + 400.0)
+    stepped, motion = rows_by_steps(drive, setup)
+    table = force_balance(drive, setup.vehicle, motion, delay=setup.delay, setup=setup.force).table
+    count = stepped["time"].size
+    assert 0 <= table.time.size - count <= 3.0 / setup.period
+    for name in COLUMNS:
+        assert_array_equal(getattr(table, name)[:count], stepped[name], err_msg=name)
+    told = set(np.unique(table.reason).tolist())
+    assert {Reason.USED, Reason.STANDING, Reason.SHIFTING} < told
+    if kind is switched:
+        assert {Reason.BRAKING, Reason.NO_TORQUE} < told
+    if kind is not switched:
+        assert Reason.OVERRUN in told
+
+
+def test_windows_of_all_rows_at_once_are_those_of_the_stages(weighing, setup):
+    """One call of the kernel over all rows, or one for every few: the same windows."""
+    table = weighing.result.balance.table
+    values = np.column_stack([table.time, table.traction_force])
+    usable = table.usable & np.isfinite(values).all(axis=1)
+    params = window_params(setup.period, long_gap=STOP)
+    columns = (table.time, usable, table.moving, values)
+    state, *whole = window_means.run(window_means.initial_state(2), *columns, params)
+    parts, stepped = [], window_means.initial_state(2)
+    for first in range(0, table.time.size, 7):
+        part = (np.ascontiguousarray(c[first : first + 7]) for c in columns)
+        stepped, *found = window_means.run(stepped, *part, params)
+        parts.append(found)
+    for at_once, bit_by_bit in zip(whole, zip(*parts, strict=True), strict=True):
+        assert_array_equal(at_once, np.concatenate(bit_by_bit))
+    assert whole[0].shape[0] > 50
+    for a, b in zip(state, stepped, strict=True):
+        assert_array_equal(a, b)

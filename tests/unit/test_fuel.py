@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import weighbridge as wb
 from weighbridge.estimators import joint
 from weighbridge.estimators.regression import regression
 from weighbridge.signals import Drive, Signal
 from weighbridge.simulation import MIDSIZE, Polling, Scenario, short_route, simulate_car
-from weighbridge.vehicle.fuel import DENSITY, SEEN, fuel_burnt
+from weighbridge.vehicle.fuel import DENSITY, SEEN, Burnt, fuel_burnt, fuel_flow
 from weighbridge.vehicle.model import Driveline, Vehicle
 
 GEARED = Vehicle(kind="car", driveline=Driveline(gearings=(12.0, 7.0, 4.0)))
@@ -28,7 +28,7 @@ def drive(**signals):
 
 def burnt(made, vehicle=GEARED, *, time=HOUR, torque=40.0, speed=200.0):
     full = np.full(time.size, 1.0)
-    return fuel_burnt(made, vehicle, time, torque * full, speed * full)
+    return fuel_burnt(time, fuel_flow(made, vehicle, time, torque * full, speed * full))
 
 
 def test_a_fuel_rate_is_integrated():
@@ -52,7 +52,7 @@ def test_work_tells_the_fuel_where_nothing_else_does():
     # Engines burn 200 to 400 g for each kWh on the shaft, and 0.3 to 1.2 L in an hour at idle.
     assert 8.0 * 0.2 < burnt(drive())[-1] < 8.0 * 0.4
     torque = np.where(HOUR < 300.0, 200.0, 0.0)
-    found = fuel_burnt(drive(), GEARED, HOUR, torque, np.full(HOUR.size, 80.0))
+    found = burnt(drive(), torque=torque, speed=80.0)
     idle = (found[-1] - found[HOUR < 300.0][-1]) / (3300.0 / 3600.0)
     assert 0.3e-3 * DENSITY < idle < 1.2e-3 * DENSITY
 
@@ -67,9 +67,20 @@ def test_gaps_and_unknown_values_count_little_and_never_backwards():
     rate = 8e-3 / 3600.0
     found = burnt(drive(fuel_rate=rate), time=time)
     assert_allclose(found[-1], rate * DENSITY * (600.0 + 600.0 + SEEN), rtol=0.01)
-    unknown = np.full(HOUR.size, np.nan)
-    assert_allclose(fuel_burnt(drive(), GEARED, HOUR, unknown, unknown), 0.0)
-    assert fuel_burnt(drive(), GEARED, HOUR[:1], HOUR[:1], HOUR[:1]).tolist() == [0.0]
+    assert_allclose(burnt(drive(), torque=np.nan, speed=np.nan), 0.0)
+    assert burnt(drive(), time=HOUR[:1]).tolist() == [0.0]
+
+
+def test_it_goes_on_from_where_it_was_to_the_last_bit():
+    rng = np.random.default_rng(7)
+    time, flow = np.cumsum(rng.uniform(0.1, 0.5, 500)), rng.uniform(0.0, 3e-3, 500)
+    whole = fuel_burnt(time, flow)
+    since = Burnt(float(time[299]), float(flow[299]), float(whole[299]))
+    # The rows of earlier on may be seen again, or not.
+    for first in (0, 250, 300):
+        again = fuel_burnt(time[first:], flow[first:], since)
+        assert_array_equal(again[300 - first :], whole[300:])
+        assert_allclose(again[: 300 - first], whole[first:300], rtol=1e-12)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from weighbridge.balance.foot_setup import FootSetup, identify_foot, near
 from weighbridge.balance.instants import SLOWEST_GEARED, behind
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
 from weighbridge.balance.table import ForceSetup, ForceTable
-from weighbridge.navigation.motion import BY_SPEED, Motion
+from weighbridge.navigation.motion import BY_SPEED, Motion, row_before
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import dynamic_pressure
 from weighbridge.vehicle.model import Vehicle
@@ -133,7 +133,8 @@ def find_brakes(
     released = signed and pressed is not None and not retarder_untold(drive, vehicle)
     overrun = np.zeros_like(foot.off) if released else foot.off
     slowed = foot.off if pressed is None else pressed
-    held = _trailing(vehicle, motion, table.time, slowed, traction if signed else None, lag)
+    told = traction if signed else None
+    held = _trailing(vehicle, motion, table.time, slowed, told, lag, forward=by.forward)
     slows = (needed < -SLOWED * weight)[slowing.moving]
     hidden = pressed is None and not foot.observable and slows.size and slows.mean() > SLOWS
     return Brakes(
@@ -189,6 +190,8 @@ def _trailing(
     slowed: Bools,
     traction: Floats | None,
     lag: float,
+    *,
+    forward: bool,
 ) -> Bools:
     """Where the smoothed motion still holds the force of a brake that was let go (n,).
 
@@ -199,6 +202,7 @@ def _trailing(
     slowed : (n,) where the brake may work
     traction : (n,) of a torque that tells what a dragged engine takes [N]; None for none
     lag : time constant of the smoothing [s]
+    forward : take the last motion before a row, for which no later row counts, not between two
     """
     if lag <= 0.0 or not slowed.any():
         return np.zeros(time.size, dtype=bool)
@@ -207,5 +211,7 @@ def _trailing(
     needed, weight = needed_force(vehicle, motion.specific_force, pressure)
     dragged = np.minimum(np.nan_to_num(traction), 0.0)[nearest] if traction is not None else 0.0
     brake = np.where(slowed[nearest], np.maximum(dragged - np.nan_to_num(needed), 0.0), 0.0)
-    held = np.interp(time, motion.time, behind(brake, motion.rate, lag))
+    smoothed = behind(brake, motion.rate, lag)
+    last = row_before(motion, time)
+    held = smoothed[last] if forward else np.interp(time, motion.time, smoothed)
     return np.asarray(held > TRAIL * weight)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
 
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.motion import Motion, nearest_row
 from weighbridge.signals import Bools, Floats
 
 HARD_CORNERING: Final = 3.0
@@ -21,7 +22,7 @@ TURN_TIME: Final = 1.0
 """Time over which the yaw rate is taken, as the difference of headings [s]."""
 
 
-def yaw_rate(time: Floats, heading: Floats, rate: float) -> Floats:
+def yaw_rate(time: Floats, heading: Floats, rate: float, ahead: float = math.inf) -> Floats:
     """Return the yaw rate (n,) [rad/s]; NaN where the heading is unknown.
 
     Parameters
@@ -29,33 +30,42 @@ def yaw_rate(time: Floats, heading: Floats, rate: float) -> Floats:
     time : (n,) [s]
     heading : (n,) [rad]
     rate : of the rows [Hz]
+    ahead : how far past a row others may tell of it [s]
     """
     half = max(1, round(0.5 * TURN_TIME * rate))
+    seen = min(half, math.floor(min(ahead, TURN_TIME) * rate))
     index = np.arange(time.size)
-    before, after = np.maximum(index - half, 0), np.minimum(index + half, index.size - 1)
+    before, after = np.maximum(index - half, 0), np.minimum(index + seen, index.size - 1)
     turn = heading[after] - heading[before]
     turn = np.mod(turn + np.pi, 2.0 * np.pi) - np.pi
     span = time[after] - time[before]
     return np.asarray(turn / np.where(span > 0.0, span, np.inf))
 
 
-def lateral_acceleration(motion: Motion) -> Floats:
-    """Return yaw rate times speed (n,) [m/s^2]; NaN where the heading is unknown."""
-    return np.asarray(motion.speed * yaw_rate(motion.time, motion.heading, motion.rate))
+def lateral_acceleration(motion: Motion, ahead: float = math.inf) -> Floats:
+    """Return yaw rate times speed (n,) [m/s^2]; NaN where the heading is unknown.
+
+    ``ahead`` is how far past a row others may tell of it [s].
+    """
+    turning = yaw_rate(motion.time, motion.heading, motion.rate, ahead)
+    return np.asarray(motion.speed * turning)
 
 
-def cornering(motion: Motion, time: Floats) -> Bools:
+def cornering(motion: Motion, time: Floats, ahead: float = math.inf) -> Bools:
     """Where the lateral acceleration exceeds `HARD_CORNERING`; nowhere if headings are unknown.
 
     Parameters
     ----------
     motion
     time : (n,) instants asked about [s]
+    ahead : how far past an instant the motion may tell of it [s]
 
     Returns
     -------
     (n,)
     """
-    hard = np.abs(np.nan_to_num(lateral_acceleration(motion))) > HARD_CORNERING
-    nearest = np.rint((time - motion.time[0]) * motion.rate)
-    return np.asarray(hard[np.clip(nearest, 0, hard.size - 1).astype(np.int64)])
+    hard = (
+        np.abs(np.nan_to_num(lateral_acceleration(motion, ahead - 0.5 / motion.rate)))
+        > HARD_CORNERING
+    )
+    return np.asarray(hard[nearest_row(motion, time)])

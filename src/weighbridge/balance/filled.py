@@ -55,7 +55,7 @@ def identify_fill(signal: Signal) -> Fill | None:
     return Fill(least, 1.01 * step, (0.0, float(np.nanmin(values))))
 
 
-def filled(signal: Signal, fill: Fill | None) -> Bools:
+def filled(signal: Signal, fill: Fill | None, *, forward: bool = False) -> Bools:
     """Where a signal holds one value or runs straight for longer than a real one does.
 
     Loggers and makers of data sets fill gaps so, and the fill looks like data.
@@ -64,6 +64,7 @@ def filled(signal: Signal, fill: Fill | None) -> Bools:
     ----------
     signal : of n samples
     fill : of `identify_fill`
+    forward : tell a run only from where it has lasted so long, not from its begin
 
     Returns
     -------
@@ -77,5 +78,5 @@ def filled(signal: Signal, fill: Fill | None) -> Bools:
     runs = np.zeros(values.size, dtype=bool)
     for begin, end in zip(*marked_runs(straight), strict=True):
         if end - begin >= fill.least:
-            runs[begin:end] = True
+            runs[begin + (fill.least - 1 if forward else 0) : end] = True
     return runs

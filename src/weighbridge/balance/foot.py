@@ -7,6 +7,7 @@ the floor are left out, and those just beside them, where a foot is on its way.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +15,6 @@ import numpy as np
 
 from weighbridge.balance.foot_setup import (
     PUSHED,
-    PUSHED_TIME,
     SETTLED,
     FootSetup,
     identify_foot,
@@ -24,7 +24,6 @@ from weighbridge.balance.foot_setup import (
 from weighbridge.kernels import two_states
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import averaged
 
 USUAL_LAG: Final = 0.3
 """Time constant of the smoothing by which control units report torque and load [s]."""
@@ -105,7 +104,7 @@ def find_foot(
         if pedal is None:
             return Foot(np.zeros(len(source), dtype=bool), observable=False)
         # A pedal may be up because cruise control pushes.
-        pushed = averaged(need, setup.period, PUSHED_TIME) > 0.0
+        pushed = setup.mean(need, source.time) > 0.0
         return Foot(~_pressed(pedal, source.time, setup) & ~pushed, observable=True)
     pressed = np.zeros(len(source), bool) if pedal is None else _pressed(pedal, source.time, setup)
     # The foot leaves the accelerator before a vehicle stops: a floor that shows it nowhere is none.
@@ -130,7 +129,8 @@ def _pressed(pedal: Signal, recorded: Floats, setup: FootSetup) -> Bools:
     """
     margin = max(MARGIN, setup.pedal_period)
     known = pedal.age(recorded) <= margin
-    return np.asarray(known & ~near(pedal.time, pedal.values <= setup.pedal_up, recorded, margin))
+    up = near(pedal.time, pedal.values <= setup.pedal_up, recorded, margin, setup.ahead)
+    return np.asarray(known & ~up)
 
 
 def _dragged(
@@ -147,7 +147,7 @@ def _dragged(
     """
     if setup.by_motion:
         # A motor that recuperates may be helped by the brake, and no floor tells where it ends.
-        return np.asarray(~(averaged(need, setup.period, PUSHED_TIME) > 0.0))
+        return np.asarray(~(setup.mean(need, source.time) > 0.0))
     floor = setup.floor
     if floor is None:
         return None
@@ -158,18 +158,18 @@ def _dragged(
         _log_odds(source.values - level, floor.scatter, floor.span),
         _log_odds(sharp - level, gain * floor.scatter, floor.span),
     )
-    taken = averaged(torque, setup.period, PUSHED_TIME)
-    odds = np.where(_noisy(source, level, taken, setup), ODDS[0], odds)
+    odds = np.where(_noisy(source, level, torque, setup), ODDS[0], odds)
     off = two_states.posterior(odds, recorded, STAY, setup.ahead) > PROBABLE
     margin = float(np.clip(MARGIN_POLLS * setup.period, MARGIN, MOST_MARGIN))
-    off = near(recorded, off, recorded, margin)
+    off = near(recorded, off, recorded, margin, setup.ahead)
     # An engine without fuel cut burns its idle charge in overrun, and so reads above its floor
     # what it also reads when it pushes a little. The motion tells these rows, not the reading.
-    untold = taken < setup.least if setup.least is not None else np.zeros_like(off)
-    return np.asarray(off | untold)
+    if setup.least is None:
+        return off
+    return np.asarray(off | (setup.mean(torque, recorded) < setup.least))
 
 
-def _noisy(source: Signal, level: Floats, taken: Floats, setup: FootSetup) -> Bools:
+def _noisy(source: Signal, level: Floats, torque: Floats, setup: FootSetup) -> Bools:
     """Where a reading may be as low as it is by noise alone, for the motion shows a push (n,).
 
     Without this the noise of a reading chooses rows: low ones pass for a dragged engine, high
@@ -178,13 +178,16 @@ def _noisy(source: Signal, level: Floats, taken: Floats, setup: FootSetup) -> Bo
     Parameters
     ----------
     source, level : reading and its floor (n,)
-    taken : (n,) mean torque that the motion takes [N m]
+    torque : (n,) that the motion takes [N m]
     setup
     """
     if setup.asked is None or setup.floor is None:
         return np.zeros(len(source), dtype=bool)
-    asked = setup.asked.at(taken)
-    pushes = ~near(source.time, ~(asked > level + PUSHED * setup.floor.span), source.time, SETTLED)
+    # Rows judge by the readings beside them: where the look ahead is limited, those have it all.
+    until = -setup.ahead if setup.forward else math.inf
+    asked = setup.asked.at(setup.mean(torque, source.time, until))
+    clear = asked > level + PUSHED * setup.floor.span
+    pushes = ~near(source.time, ~clear, source.time, SETTLED, 0.0 if setup.forward else math.inf)
     return np.asarray(pushes & (asked - source.values < NOISE_REACH * setup.asked.noise))
 
 

@@ -75,7 +75,7 @@ class FootSetup:
     pedal : name of the signal of the accelerator; None where nothing tells it
     pedal_up : its position below which no foot is on it
     pedal_period : its period [s]
-    ahead : time after a reading that may tell of it [s]
+    ahead : time after a reading that may tell of it, as far as the motion is known [s]
     """
 
     period: float
@@ -87,6 +87,23 @@ class FootSetup:
     pedal_up: float
     pedal_period: float
     ahead: float = math.inf
+
+    @property
+    def forward(self) -> bool:
+        """Whether the rows are judged as the drive goes on, not of a whole drive."""
+        return math.isfinite(self.ahead)
+
+    def mean(self, values: Floats, time: Floats, ahead: float | None = None) -> Floats:
+        """Mean over `PUSHED_TIME` at the stamps of the reading (n,), no further ``ahead``.
+
+        Parameters
+        ----------
+        values : (n,) NaN where nothing is known
+        time : (n,) [s]
+        ahead : `FootSetup.ahead` when None [s]
+        """
+        ahead = self.ahead if ahead is None else ahead
+        return averaged(values, self.period, PUSHED_TIME, time=time, ahead=ahead)
 
 
 def identify_foot(
@@ -172,7 +189,7 @@ def turning_at(drive: Drive, source: Signal) -> Floats:
     return engine.at(source.time) if engine is not None else np.full(len(source), np.nan)
 
 
-def near(time: Floats, flag: Bools, asked: Floats, margin: float) -> Bools:
+def near(time: Floats, flag: Bools, asked: Floats, margin: float, ahead: float = math.inf) -> Bools:
     """Whether a flagged sample lies within ``margin`` of each instant (n,).
 
     Parameters
@@ -180,14 +197,12 @@ def near(time: Floats, flag: Bools, asked: Floats, margin: float) -> Bools:
     time, flag : (m,) samples, rising [s]
     asked : (n,) [s]
     margin : [s]
+    ahead : no later sample counts [s]
     """
-    flagged = time[flag]
-    if flagged.size == 0:
-        return np.zeros(asked.size, dtype=bool)
+    flagged = np.concatenate(([-np.inf], time[flag], [np.inf]))
     after = np.searchsorted(flagged, asked)
-    right = flagged[np.minimum(after, flagged.size - 1)]
-    left = flagged[np.maximum(after - 1, 0)]
-    return np.minimum(np.abs(right - asked), np.abs(asked - left)) <= margin
+    later = flagged[after] - asked <= min(margin, ahead)
+    return np.asarray(later | (asked - flagged[after - 1] <= margin))
 
 
 def _driven(drive: Drive, source: Signal) -> Floats:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from weighbridge.balance.braking import Brakes, find_brakes, retarder_untold
 from weighbridge.balance.coarse import coarse_std
 from weighbridge.balance.cornering import cornering
-from weighbridge.balance.filled import Fill, filled, identify_fill
+from weighbridge.balance.filled import filled, identify_fill
 from weighbridge.balance.foot_setup import learn_dragged
 from weighbridge.balance.instants import (
     SLOWEST_GEARED,
@@ -24,14 +25,38 @@ from weighbridge.balance.instants import (
 from weighbridge.balance.law import needed_force, traction_gain
 from weighbridge.balance.table import ForceBalance, ForceSetup, ForceTable, Reason
 from weighbridge.navigation.motion import BY_SPEED, Motion
-from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.recent import looking
 from weighbridge.vehicle.air import Air, air_density, dynamic_pressure, identify_air
-from weighbridge.vehicle.fuel import fuel_burnt, full_load_torque
+from weighbridge.vehicle.fuel import Burnt, fuel_burnt, fuel_flow, full_load_torque
 from weighbridge.vehicle.model import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import Torque, engine_torque, source_of, source_signal
 
 ROUGH_NOISE: Final = 0.03
 """Noise of a torque of which the vehicle file says none, over the highest of the drive [-]."""
+
+
+class ForceState(NamedTuple):
+    """What the rows so far leave to those that come.
+
+    Attributes
+    ----------
+    burnt : fuel until the last row; None before the first
+    lagged : motion, smoothed as the torque is; None before the first row
+    """
+
+    burnt: Burnt | None
+    lagged: Motion | None
+
+    @property
+    def time(self) -> float:
+        """Instant of the last row; minus infinity before the first [s]."""
+        return -math.inf if self.burnt is None else self.burnt.time
+
+    @property
+    def fuel(self) -> float:
+        """Burnt since the first row [kg]."""
+        return 0.0 if self.burnt is None else self.burnt.mass
 
 
 def force_balance(
@@ -43,11 +68,16 @@ def force_balance(
     lag: float | None = None,
     signed: bool = True,
     setup: ForceSetup | None = None,
+    since: ForceState | None = None,
 ) -> ForceBalance:
     """Bring the force and the motion of a drive together.
 
     A control unit smooths what it reports. The motion is smoothed alike, so
     that both sides have lost the same.
+
+    With a setup that looks no further than ``setup.ahead`` each row hangs on the setup, on what
+    came before and on what comes so soon after, and on nothing else: a drive whose rows are found
+    together has the same ones, to the last bit, as one that is read second by second.
 
     Parameters
     ----------
@@ -57,17 +87,22 @@ def force_balance(
     signed : whether the torque tells what a dragged engine takes; a load that stands for it
         does not
     setup : what a whole drive tells of its force side; found from this drive when None
+    since : what earlier rows left, where ``drive`` and ``motion`` hold the last seconds alone
 
     Raises
     ------
     DriveError
         The drive lacks what the vehicle's torque source needs.
     """
+    forward = setup is not None and setup.foot.forward
+    if setup is not None and forward:
+        drive = looking(drive, setup.readings_ahead, setup.periods)
     source = source_signal(drive, vehicle)
     if delay is None:
         delay = vehicle.timing.torque_delay or 0.0
     lag = vehicle.timing.torque_lag if lag is None else lag
-    read = _read(drive, vehicle, motion, source, delay, lag, setup)
+    lagged = lagged_motion(motion, lag, since.lagged if since is not None else None)
+    read = _read(drive, vehicle, lagged, source, delay, setup, since)
     table = read.table
     brakes = find_brakes(
         drive, vehicle, motion, source, table,
@@ -75,7 +110,9 @@ def force_balance(
         signed=signed and source_of(vehicle).signed, setup=setup,
     )  # fmt: skip
     fill = setup.fill if setup is not None else identify_fill(source)
-    reason = _reasons(vehicle, motion, source, read, brakes, fill)
+    without = filled(source, fill, forward=forward)
+    turning = cornering(motion, table.time, setup.ahead if setup is not None else math.inf)
+    reason = _reasons(read, brakes, without, turning)
     table = replace(table, reason=reason)
     if setup is None:
         setup = ForceSetup(
@@ -87,6 +124,7 @@ def force_balance(
             full_torque=read.full_torque,
             torque_noise=_torque_noise(vehicle, table),
             fill=fill,
+            periods={name: s.period for name, s in drive.signals.items() if len(s) > 1},
         )
     return ForceBalance(
         table=replace(table, force_std=setup.torque_noise * np.nan_to_num(table.gearing)),
@@ -97,6 +135,8 @@ def force_balance(
         coarse_std=coarse_std(source, reason == Reason.USED),
         setup=setup,
         delay=delay,
+        lagged=lagged if forward else None,
+        fuel_flow=read.fuel_flow if forward else None,
     )
 
 
@@ -110,8 +150,8 @@ def force_rows(
     drive, vehicle, motion, delay, setup : as of `force_balance`
     """
     source = source_signal(drive, vehicle)
-    lag = vehicle.timing.torque_lag
-    return _read(drive, vehicle, motion, source, delay, lag, setup).table
+    lagged = lagged_motion(motion, vehicle.timing.torque_lag)
+    return _read(drive, vehicle, lagged, source, delay, setup).table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,6 +164,7 @@ class _Read:
     torque : of the rows
     instants : motion, engine speed and gear
     air, full_torque : of `ForceSetup`
+    fuel_flow : of the rows (n,) [kg/s]
     """
 
     table: ForceTable
@@ -131,32 +172,37 @@ class _Read:
     instants: Instants
     air: Air
     full_torque: float
+    fuel_flow: Floats
 
 
 def _read(
     drive: Drive,
     vehicle: Vehicle,
-    motion: Motion,
+    lagged: Motion,
     source: Signal,
     delay: float,
-    lag: float,
     setup: ForceSetup | None,
+    since: ForceState | None = None,
 ) -> _Read:
-    """Read motion and torque at the stamps of the source, less its delay."""
+    """Read motion, lagged as the torque is, and torque at the source's stamps less its delay."""
     recorded = source.time
     known = (setup.gears, setup.engine_delay) if setup is not None else (None, None)
-    at = read_instants(drive, vehicle, lagged_motion(motion, lag), recorded, delay, *known)
+    ahead = setup.ahead if setup is not None else math.inf
+    at = read_instants(drive, vehicle, lagged, recorded, delay, *known, ahead=ahead)
     engine_speed, gearing, altitude = at.columns["engine_speed"], at.columns["gearing"], at.altitude
-    torque = engine_torque(drive, vehicle, engine_speed, recorded)
+    period = setup.foot.period if setup is not None else None
+    torque = engine_torque(drive, vehicle, engine_speed, recorded, period=period, ahead=ahead)
     full = setup.full_torque if setup is not None else full_load_torque(torque.torque)
     air = setup.air if setup is not None else identify_air(drive, altitude)
+    flow = fuel_flow(drive, vehicle, recorded, torque.torque, engine_speed, full)
+    burnt = since.burnt if since is not None else None
     table = ForceTable(
         **at.columns,
         traction_force=traction_gain(vehicle, torque.torque, gearing) * torque.torque,
         force_std=np.full(recorded.size, np.nan),
         torque=torque.torque,
         air_density=air.density(altitude),
-        fuel_burnt=fuel_burnt(drive, vehicle, recorded, torque.torque, engine_speed, full),
+        fuel_burnt=fuel_burnt(at.columns["time"], flow, burnt),
         reason=np.zeros(recorded.size, dtype=np.uint8),
     )
     return _Read(
@@ -165,29 +211,22 @@ def _read(
         instants=at,
         air=air,
         full_torque=full,
+        fuel_flow=flow,
     )
 
 
-def _reasons(
-    vehicle: Vehicle,
-    motion: Motion,
-    source: Signal,
-    read: _Read,
-    brakes: Brakes,
-    fill: Fill | None,
-) -> NDArray[np.uint8]:
+def _reasons(read: _Read, brakes: Brakes, without: Bools, turning: Bools) -> NDArray[np.uint8]:
     """Why a row is not usable (n,); the first reason that applies is told, so the order matters.
 
     Parameters
     ----------
-    vehicle, motion
-    source : what the torque is made from
     read, brakes : of the rows
-    fill : how readings that a logger filled in would look
+    without : (n,) readings that a logger filled in
+    turning : (n,) it corners hard
     """
     table = read.table
     reason = np.zeros(table.time.size, dtype=np.uint8)
-    has_torque = np.isfinite(table.traction_force) & ~filled(source, fill)
+    has_torque = np.isfinite(table.traction_force) & ~without
     for flag, why in (
         (~read.instants.known | ~np.isfinite(table.speed), Reason.NO_MOTION),
         (table.speed < SLOWEST_GEARED, Reason.STANDING),
@@ -197,7 +236,7 @@ def _reasons(
         (~has_torque, Reason.NO_TORQUE),
         (read.torque.overrun | brakes.overrun, Reason.OVERRUN),
         (read.torque.extrapolated, Reason.EXTRAPOLATED),
-        (cornering(motion, table.time), Reason.CORNERING),
+        (turning, Reason.CORNERING),
     ):
         reason[(reason == 0) & flag] = why
     return reason

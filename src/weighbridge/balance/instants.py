@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -9,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.signal import lfilter
 
-from weighbridge.navigation.motion import Motion
+from weighbridge.navigation.motion import Motion, nearest_row, row_before
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
 from weighbridge.vehicle.engine_delay import find_engine_delay
@@ -34,6 +36,9 @@ WIND_AT_VEHICLE: Final = 0.5
 over a roughness length of 0.1 m, ln(1 / 0.1) / ln(10 / 0.1) (Stull, An Introduction to
 Boundary Layer Meteorology, 1988, ch. 9)."""
 
+BREAK: Final = 1.5
+"""Rows of a motion further apart, over their period, have a silence between them [-]."""
+
 _FORGOTTEN: Final = 2.0
 """Time constants after which a first-order lag has forgotten a gap that a line bridges [-]."""
 
@@ -41,17 +46,40 @@ _LONG_GAP: Final = 0.5
 """Across less a line is near to what was not seen [s]."""
 
 
-def lagged_motion(motion: Motion, lag: float) -> Motion:
-    """Pass what the force side is compared with through a first-order lag [s]."""
+def lagged_motion(motion: Motion, lag: float, before: Motion | None = None) -> Motion:
+    """Pass what the force side is compared with through a first-order lag.
+
+    Parameters
+    ----------
+    motion
+    lag : [s]
+    before : what this made of earlier rows, some of which ``motion`` still has, to go on from;
+        None to begin anew
+    """
     if lag <= 0.0:
         return motion
     return replace(
         motion,
         valid=_valid_lagged(motion.valid, motion.rate, lag),
-        specific_force=behind(motion.specific_force, motion.rate, lag),
-        accel=behind(motion.accel, motion.rate, lag),
-        grade=behind(motion.grade, motion.rate, lag),
+        specific_force=_lagged(motion, "specific_force", lag, before),
+        accel=_lagged(motion, "accel", lag, before),
+        grade=_lagged(motion, "grade", lag, before),
     )
+
+
+def _lagged(motion: Motion, name: str, lag: float, before: Motion | None) -> Floats:
+    """One column (n,) of `lagged_motion`; it begins anew where the motion does."""
+    values, known = getattr(motion, name), 0
+    found = np.empty(values.size)
+    if before is not None and before.time[-1] >= motion.time[0]:
+        known = int(np.searchsorted(motion.time, before.time[-1], side="right"))
+        found[:known] = getattr(before, name)[before.time.size - known :]
+    silent = np.diff(motion.time) * motion.rate > BREAK
+    anew = np.flatnonzero(silent) + 1
+    for first, last in itertools.pairwise((known, *anew[anew > known], values.size)):
+        start = found[first - 1] if first > 0 and not silent[first - 1] else None
+        found[first:last] = behind(values[first:last], motion.rate, lag, start)
+    return found
 
 
 def _valid_lagged(valid: Bools, rate: float, lag: float) -> Bools:
@@ -64,27 +92,31 @@ def _valid_lagged(valid: Bools, rate: float, lag: float) -> Bools:
     return np.asarray(valid & (np.cumsum(change)[:-1] == 0))
 
 
-def behind(values: Floats, rate: float, lag: float) -> Floats:
-    """Pass even samples (n,) at ``rate`` [Hz] through a first-order lag [s]."""
+def behind(values: Floats, rate: float, lag: float, start: float | None = None) -> Floats:
+    """Pass even samples (n,) at ``rate`` [Hz] through a first-order lag [s].
+
+    ``start`` is what came out before the first; that sample itself when None.
+    """
+    if not values.size:
+        return values
     keep = float(np.exp(-1.0 / (rate * lag)))
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0])
+    start = values[0] if start is None else start
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * start])[0])
 
 
 def interpolate_motion(motion: Motion, time: Floats) -> dict[str, Floats]:
     """Interpolate the motion to the instants ``time``; NaN outside."""
-    rate = motion.rate
-    position = (time - motion.time[0]) * rate
-    inside = (position >= 0.0) & (position <= motion.time.size - 1)
-    index = np.clip(position.astype(np.int64), 0, motion.time.size - 2)
-    part = np.clip(position - index, 0.0, 1.0)
+    index = np.minimum(row_before(motion, time), motion.time.size - 2)
+    before, after = motion.time[index], motion.time[index + 1]
+    inside = (time >= before) & (time <= after) & ((after - before) * motion.rate < BREAK)
+    part = np.clip((time - before) / (after - before), 0.0, 1.0)
     rows: dict[str, Floats] = {}
     for name in ("speed", "accel", "specific_force", "grade", "pitch", "altitude", "valid"):
         values = np.asarray(getattr(motion, name), dtype=np.float64)
         mixed = values[index] + part * (values[index + 1] - values[index])
         rows[name] = np.where(inside, mixed, np.nan)
     rows["valid"] = np.where(inside, rows["valid"], 0.0)
-    nearest = np.clip(np.rint(position).astype(np.int64), 0, motion.time.size - 1)
-    rows["heading"] = np.where(inside, motion.heading[nearest], np.nan)
+    rows["heading"] = np.where(inside, motion.heading[nearest_row(motion, time)], np.nan)
     return rows
 
 
@@ -195,6 +227,8 @@ def read_instants(
     delay: float,
     numbers: Mapping[int, int] | None = None,
     engine_delay: float | None = None,
+    *,
+    ahead: float = math.inf,
 ) -> Instants:
     """Read a motion, smoothed as the torque is, where a delay puts the force samples.
 
@@ -205,6 +239,7 @@ def read_instants(
     delay : by which they are late [s]
     numbers : of `identify_told_gears`; found from this drive when None
     engine_delay : of `identify_engine_delay`; found from this drive when None [s]
+    ahead : how far past a row others may tell of it [s]
     """
     time = recorded - delay
     rows = interpolate_motion(motion, time)
@@ -215,7 +250,7 @@ def read_instants(
     if numbers is None:
         numbers = identify_told_gears(drive, vehicle, recorded, engine_speed, speed)
     gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, speed, numbers)
-    changing = shifting(time, gear, margin=SHIFT_MARGIN)
+    changing = shifting(time, gear, margin=SHIFT_MARGIN, ahead=ahead)
     if vehicle.driveline.single_speed:
         changing[:] = False
     moved = ("speed", "accel", "specific_force", "grade", "pitch", "heading")

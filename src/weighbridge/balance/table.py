@@ -166,6 +166,7 @@ class ForceSetup:
     full_torque : torque of the engine that the drive hardly exceeds [N m]
     torque_noise : of one torque [N m]
     fill : how readings that a logger filled in would look; None where they cannot be told
+    periods : median time between samples of each signal [s]
     """
 
     foot: FootSetup
@@ -176,6 +177,17 @@ class ForceSetup:
     full_torque: float
     torque_noise: float
     fill: Fill | None
+    periods: Mapping[str, float]
+
+    @property
+    def ahead(self) -> float:
+        """How far past a row the motion may tell of it [s]; infinite for a whole drive."""
+        return self.foot.ahead
+
+    @property
+    def readings_ahead(self) -> float:
+        """How far past a row the readings may tell of it [s]: rows beside it look on from there."""
+        return 2.0 * self.foot.ahead
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,9 +202,11 @@ class ForceBalance:
     switch_dead : the brake switch contradicts the motion and is not used
     retarder_untold : a retarder may slow the vehicle that the drive does not tell of
     coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
-    setup : what a whole drive tells of its force side; None where it was not looked for
+    setup : what a whole drive tells of its force side; None but for stages that go forward
     delay : lateness of the torque, which is off its instants [s]
     navigation : what the motion was found by; None where it was not from an inertial sensor
+    lagged, fuel_flow : the motion, smoothed as the torque is, and the fuel of each row (n,) [kg/s];
+        None but for stages that go forward
     """
 
     table: ForceTable
@@ -204,6 +218,8 @@ class ForceBalance:
     setup: ForceSetup | None = None
     delay: float = 0.0
     navigation: Setup | None = None
+    lagged: Motion | None = None
+    fuel_flow: Floats | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -346,8 +346,8 @@ class LiveScale:
             if self._leaves() > 0.0:
                 return nothing
             floor = setup.joint.systematic_std
-            mass = state.joint.mass - state.burnt
-            return mass, state.joint.std(setup.joint), floor, state.read
+            mass = state.joint.mass - state.force.fuel
+            return mass, state.joint.std(setup.joint), floor, state.force.time
         if learned is not None and math.isfinite(learned.mass):
             return learned.mass, learned.std, learned.floor, learned.until
         return nothing

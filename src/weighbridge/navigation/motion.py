@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.signals import Bools, Floats, Signal
+from weighbridge.signals import Bools, Floats, Ints, Signal
 
 MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
 
@@ -24,6 +24,12 @@ last few seconds, and masses by speed alone get worse from there on (docs/accura
 
 SLOPE: Final = 5.0
 """Time over which the slope of a slow speed is still that of the vehicle [s]."""
+
+RATE_ROWS: Final = 100
+"""First rows of a motion, which tell its rate."""
+
+RATE_DIGITS: Final = 6
+"""Decimals of that rate [Hz]: the clock is even, and its stamps are rounded."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,8 +157,8 @@ class Motion:
 
     @property
     def rate(self) -> float:
-        """Samples per second [Hz]."""
-        return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
+        """Samples per second [Hz], the same of any part of a motion."""
+        return round(1.0 / float(np.median(np.diff(self.time[:RATE_ROWS]))), RATE_DIGITS)
 
     @property
     def unmeasured_grade(self) -> float:
@@ -164,6 +170,16 @@ class Motion:
     def mean_accel_std(self, length: float) -> float:
         """Standard deviation of the mean acceleration over ``length`` [s] by its ends [m/s^2]."""
         return float(min(np.sqrt(2.0) * self.speed_std / length, self.specific_force_std or 0.0))
+
+
+def row_before(motion: Motion, time: Floats) -> Ints:
+    """Last row that is not after each instant (n,); the first where none is."""
+    return np.maximum(np.searchsorted(motion.time, time, side="right") - 1, 0)
+
+
+def nearest_row(motion: Motion, time: Floats) -> Ints:
+    """Row nearest to each instant (n,)."""
+    return np.minimum(row_before(motion, time + 0.5 / motion.rate), motion.time.size - 1)
 
 
 def noise_level(y: Floats) -> float:

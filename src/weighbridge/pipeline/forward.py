@@ -9,15 +9,15 @@ way gets the same numbers to the last bit.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from weighbridge.arguments import check_number
-from weighbridge.balance import force_balance
+from weighbridge.balance import forward as force_rows
 from weighbridge.balance.averaging import WINDOW, window_params
+from weighbridge.balance.force_balance import ForceState
 from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.joint import forward as joint_forward
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from weighbridge.pipeline.weighing import Weighing
 
 AHEAD: Final = 0.45
-"""The force side reads so much past the instant that it tells of [s], the motion
-`weighbridge.navigation.forward.lateness`."""
+"""The force side looks so far past a row at the motion, and twice as far at the readings [s]. What
+the motion itself looks at is `weighbridge.navigation.forward.lateness`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,18 +167,16 @@ class ForwardState(NamedTuple):
     Attributes
     ----------
     motion : of the navigation
+    force : of the rows
     windows : of the means of rows
     joint : of the filter of the mass
-    read : instant of the last row that was folded [s]
-    burnt : fuel since the first row, until then [kg]
     set_off : instant at which the vehicle first moved; None before [s]
     """
 
     motion: forward.NavigationState
+    force: ForceState
     windows: window_means.WindowState
     joint: JointState
-    read: float
-    burnt: float
     set_off: float | None
 
 
@@ -206,9 +204,8 @@ def begin(setup: ForwardSetup, start: float) -> ForwardState:
     return ForwardState(
         motion=forward.begin(setup.navigation, start),
         windows=window_means.initial_state(columns),  # type: ignore[no-untyped-call]
+        force=force_rows.begin(),
         joint=JointState(),
-        read=-math.inf,
-        burnt=0.0,
         set_off=None,
     )
 
@@ -241,7 +238,9 @@ def resume(weighing: Weighing, records: Drive, until: float, setup: ForwardSetup
 
 def lateness(setup: ForwardSetup) -> float:
     """Time that a row waits for what tells of it [s]: delays, and look-ahead of the stages."""
-    return forward.lateness(setup.navigation) + AHEAD + max(setup.delay, 0.0)
+    by_motion = forward.lateness(setup.navigation) + setup.force.ahead
+    late = max(setup.delay, setup.force.engine_delay)
+    return max(by_motion, late + setup.force.readings_ahead)
 
 
 def step(
@@ -268,19 +267,13 @@ def step(
     state = state._replace(motion=moved)
     if moved.motion is None or moved.motion.time.size < 2:
         return state, NO_WINDOWS
-    try:
-        balance = force_balance(
-            records, vehicle, moved.motion, delay=setup.delay, setup=setup.force
-        )
-    except DriveError:
-        # No torque came for long: the rows go on with the next one.
+    force, table, new = force_rows.step(
+        state.force, records, moved.motion, until, vehicle, setup.delay, setup.force
+    )
+    state = state._replace(force=force)
+    if table is None or new.stop <= new.start:
         return state, NO_WINDOWS
-    table = balance.table
-    horizon = float(moved.motion.time[-1]) - AHEAD
-    first, last = table.time.searchsorted([state.read, horizon], side="right")
-    if last <= first:
-        return state, NO_WINDOWS
-    return _folded(state, table, slice(int(first), int(last)), setup)
+    return _folded(state, table, new, setup)
 
 
 def _folded(
@@ -288,12 +281,11 @@ def _folded(
 ) -> tuple[ForwardState, Running]:
     """Fold new rows of the table into windows, and complete windows into the filter."""
     sizes = setup.joint
-    burnt = table.fuel_burnt + (state.burnt - table.fuel_burnt[max(new.start - 1, 0)])
-    moving = table.moving
+    burnt, moving = table.fuel_burnt, table.moving
     set_off = state.set_off
     if set_off is None and moving[new].any():
         set_off = float(table.time[new][np.argmax(moving[new])])
-    table = replace(table, fuel_burnt=burnt, set_off=set_off)
+    table = replace(table, set_off=set_off)
     rows, y = design(table, setup.vehicle, squat_accel=sizes.body.squat_accel(table.accel))
     values = np.column_stack([table.time, y, table.force_std**2, rows])
     windows, means, count, stood = window_means.run(
@@ -313,8 +305,6 @@ def _folded(
     after = state._replace(
         windows=windows,
         joint=joint,
-        read=float(table.time[new][-1]),
-        burnt=float(burnt[new][-1]),
         set_off=set_off,
     )
     return after, Running(means[:, 0], mass - light, std)

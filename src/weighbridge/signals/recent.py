@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -35,6 +36,23 @@ def recent(drive: Drive, until: float, step: float = STEP) -> Drive:
         if last > first:
             cut[name] = Signal(name, s.time[first:last], s.values[first:last])
     return replace(drive, signals=cut)
+
+
+def looking(drive: Drive, ahead: float, periods: Mapping[str, float]) -> Drive:
+    """Return a drive whose signals are read no further than ``ahead`` past an instant [s].
+
+    So each row is the same, whether the rest of the drive is there or still to come.
+
+    Parameters
+    ----------
+    drive : or the last seconds of one
+    ahead : [s]
+    periods : median time between samples of each signal of the whole drive [s]
+    """
+    seen = {
+        name: replace(s, ahead=ahead, usual=periods.get(name)) for name, s in drive.signals.items()
+    }
+    return replace(drive, signals=seen)
 
 
 def first_instant(time: float, step: float = STEP) -> float:

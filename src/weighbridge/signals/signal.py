@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ Floats: TypeAlias = NDArray[np.float64]
 Bools: TypeAlias = NDArray[np.bool_]
 Ints: TypeAlias = NDArray[np.int64]
 
+HELD: Final = 10.0
+"""A stage that goes forward holds a value for so long, where no next one is in sight [s]."""
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Signal:
@@ -26,6 +30,9 @@ class Signal:
     name : canonical name, see `weighbridge.signals.catalogue`
     time : (n,) strictly increasing, finite [s]
     values : (n,) finite, in SI
+    ahead : how far past an instant `at` and `age` look for a sample [s]; finite for stages that
+        go forward, see `weighbridge.signals.recent.looking`
+    usual : median time between samples, where more of them were seen than are here [s]
 
     Lists and arrays of whole numbers become arrays of doubles.
 
@@ -40,6 +47,8 @@ class Signal:
     name: str
     time: Floats
     values: Floats
+    ahead: float = math.inf
+    usual: float | None = None
     _period: float | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -75,6 +84,8 @@ class Signal:
     @property
     def period(self) -> float:
         """Median time between samples [s]; NaN below two samples."""
+        if self.usual is not None:
+            return self.usual
         if self._period is None:
             steps = np.diff(self.time)
             usual = float(np.median(steps)) if steps.size else float("nan")
@@ -87,7 +98,14 @@ class Signal:
         time = as_floats("time", time)
         if self.time.size == 0:
             return np.full(np.shape(time), np.nan)
-        return interpolate(time, self.time, self.values, left=np.nan, right=np.nan)
+        straight = interpolate(time, self.time, self.values, left=np.nan, right=np.nan)
+        if math.isinf(self.ahead):
+            return straight
+        place = np.searchsorted(self.time, time, side="right")
+        later = self.time[np.minimum(place, self.time.size - 1)]
+        between = (place < self.time.size) & (later - time <= self.ahead)
+        old = time - self.time[np.maximum(place - 1, 0)] > HELD
+        return np.where(between, straight, np.where(old, np.nan, self.held(time)))
 
     def held(self, time: Floats) -> Floats:
         """Hold the last value seen; NaN before the first sample [SI]."""
@@ -107,4 +125,9 @@ class Signal:
         found: Floats = distance_to_nearest(
             np.ascontiguousarray(time).ravel(), np.ascontiguousarray(self.time)
         )
-        return found.reshape(np.shape(time))[()]
+        found = found.reshape(np.shape(time))
+        if math.isfinite(self.ahead):
+            place = np.searchsorted(self.time, time, side="right")
+            before = np.where(place > 0, time - self.time[np.maximum(place - 1, 0)], np.inf)
+            found = np.where(found <= self.ahead, found, before)
+        return found[()]

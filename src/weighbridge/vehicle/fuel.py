@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ SEEN: Final = 10.0
 """Of a longer gap between two rows no more is counted [s]: the engine may have stood."""
 
 
-def fuel_burnt(
+def fuel_flow(
     drive: Drive,
     vehicle: Vehicle,
     time: Floats,
@@ -35,7 +35,7 @@ def fuel_burnt(
     engine_speed: Floats,
     full_torque: float | None = None,
 ) -> Floats:
-    """Mass of the fuel burnt since the first row (n,) [kg].
+    """Mass flow of the fuel (n,) [kg/s].
 
     From the fuel rate, else from air flow and air-fuel ratio, else from the
     work of the engine and its friction. A vehicle with one fixed gear is
@@ -49,7 +49,7 @@ def fuel_burnt(
     engine_speed : (n,) [rad/s]; NaN where unknown
     full_torque : of the engine, whose friction is a part of it; that of the rows when None [N m]
     """
-    if vehicle.driveline.single_speed or time.size < 2:
+    if vehicle.driveline.single_speed:
         return np.zeros(time.size)
     flow = np.full(time.size, np.nan)
     rate, air, ratio = drive.get("fuel_rate"), drive.get("mass_air_flow"), drive.get("lambda_1")
@@ -59,10 +59,48 @@ def fuel_burnt(
         equivalence_ratio = np.maximum(_near(ratio, time), 0.5)
         flow = _near(air, time) / (PETROL_STOICHIOMETRIC_RATIO * equivalence_ratio)
     full = full_load_torque(torque) if full_torque is None else full_torque
-    flow = np.where(np.isfinite(flow), flow, _by_work(torque, engine_speed, full))
+    return np.where(np.isfinite(flow), flow, _by_work(torque, engine_speed, full))
+
+
+class Burnt(NamedTuple):
+    """Fuel until an instant.
+
+    Attributes
+    ----------
+    time : the instant [s]
+    flow : then [kg/s]
+    mass : burnt by then [kg]
+    """
+
+    time: float
+    flow: float
+    mass: float
+
+
+def fuel_burnt(time: Floats, flow: Floats, since: Burnt | None = None) -> Floats:
+    """Mass of the fuel burnt since the first row (n,) [kg].
+
+    Parameters
+    ----------
+    time : (n,) not falling [s]
+    flow : (n,) [kg/s]
+    since : of an earlier row, to go on from; rows until then count backwards from it
+    """
+    burnt = np.concatenate(([0.0], np.cumsum(_parts(time, flow))))[: time.size]
+    if since is None:
+        return burnt
+    done = int(np.searchsorted(time, since.time, side="right"))
+    before = since.mass + (burnt[:done] - burnt[max(done - 1, 0)])
+    parts = _parts(
+        np.concatenate(([since.time], time[done:])), np.concatenate(([since.flow], flow[done:]))
+    )
+    return np.concatenate((before, np.cumsum(np.concatenate(([since.mass], parts)))[1:]))
+
+
+def _parts(time: Floats, flow: Floats) -> Floats:
+    """Fuel that is burnt from each row to the next (n - 1,) [kg]."""
     span = np.clip(np.diff(time), 0.0, SEEN)
-    middle = 0.5 * (flow[1:] + flow[:-1])
-    return np.concatenate(([0.0], np.cumsum(span * np.maximum(middle, 0.0))))
+    return np.asarray(span * np.maximum(0.5 * (flow[1:] + flow[:-1]), 0.0))
 
 
 def _near(signal: Signal, time: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -271,22 +272,21 @@ def steady(time: Floats, gearing: Floats, tolerance: Floats) -> Bools:
     return held
 
 
-def shifting(time: Floats, gear: Ints, *, margin: float) -> Bools:
+def shifting(time: Floats, gear: Ints, *, margin: float, ahead: float = math.inf) -> Bools:
     """Mark samples within ``margin`` [s] of a change of gear.
 
     Parameters
     ----------
     time : (n,) rising [s]
     gear : (n,) with 0 for none engaged
+    ahead : how far past a sample the next gear may be seen [s]
     """
     change = np.flatnonzero(np.diff(gear) != 0)
-    if change.size == 0:
-        return np.zeros(time.size, dtype=bool)
-    instants = 0.5 * (time[change] + time[change + 1])
-    right = np.clip(np.searchsorted(instants, time), 0, instants.size - 1)
-    left = np.maximum(right - 1, 0)
-    near = np.minimum(np.abs(instants[right] - time), np.abs(time - instants[left]))
-    return np.asarray(near <= margin)
+    instants = np.concatenate(([-np.inf], 0.5 * (time[change] + time[change + 1]), [np.inf]))
+    seen = np.concatenate(([-np.inf], time[change + 1], [np.inf]))
+    after = np.searchsorted(instants, time)
+    later = (instants[after] - time <= margin) & (seen[after] - time <= ahead)
+    return np.asarray(later | (time - instants[after - 1] <= margin))
 
 
 def idling(engine_speed: Floats, speed: Floats) -> float:

@@ -17,6 +17,9 @@ from weighbridge.vehicle.torque_sources import TorqueSource
 DRAGGED_TIME: Final = 0.5
 """Time over which a load tells whether the engine is dragged [s]."""
 
+JITTER: Final = 0.1
+"""By how much stamps may miss the ends of a window, over their period [-]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Torque:
@@ -143,7 +146,14 @@ def reading_of(torque: Floats, engine_speed: Floats, model: TorqueModel) -> Floa
     return np.asarray(-2.0 * rest / np.where(steep > 0.0, steep, np.nan))
 
 
-def averaged(values: Floats, period: float, span: float) -> Floats:
+def averaged(
+    values: Floats,
+    period: float,
+    span: float,
+    *,
+    time: Floats | None = None,
+    ahead: float = math.inf,
+) -> Floats:
     """Mean over ``span`` around each sample.
 
     Rows chosen by a noisy reading itself are chosen by its noise: of those near
@@ -154,9 +164,13 @@ def averaged(values: Floats, period: float, span: float) -> Floats:
     values : (n,) NaN where nothing is known
     period : between samples [s]
     span : [s]
+    time, ahead : stamps (n,), and how far past each of them samples count, for stages that go
+        forward [s]
     """
     if not period > 0.0:
         return values
+    if time is not None and math.isfinite(ahead):
+        return _averaged_until(values, time, period, span, ahead)
     size = 2 * round(0.5 * span / period) + 1
     known = np.isfinite(values)
     share = uniform_filter1d(known.astype(np.float64), size)
@@ -164,13 +178,48 @@ def averaged(values: Floats, period: float, span: float) -> Floats:
     return np.where(share > 0.5 / size, mean / np.maximum(share, 0.5 / size), np.nan)
 
 
-def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Floats) -> Torque:
+def _averaged_until(
+    values: Floats, time: Floats, period: float, span: float, ahead: float
+) -> Floats:
+    """Mean of what is known over ``span``, centred where no more than ``ahead`` is needed (n,).
+
+    Each window is summed for itself, so that it is the same wherever the samples begin.
+    """
+    known = np.isfinite(values)
+    values = np.where(known, values, 0.0)
+    end, jitter = min(ahead, 0.5 * span), JITTER * period
+    first, last = end - span - jitter, min(end + jitter, ahead)
+    total, count = np.zeros(values.size), np.zeros(values.size)
+    for k in range(math.floor(first / period) - 1, math.ceil(last / period) + 2):
+        if abs(k) >= values.size:
+            continue
+        # Samples that lie k after those they count for.
+        there = slice(max(k, 0), values.size + min(k, 0))
+        here = slice(max(-k, 0), values.size - max(k, 0))
+        apart = time[there] - time[here]
+        counts = known[there] & (first <= apart) & (apart <= last)
+        total[here] += np.where(counts, values[there], 0.0)
+        count[here] += counts
+    return np.where(count > 0.0, total / np.maximum(count, 1.0), np.nan)
+
+
+def engine_torque(
+    drive: Drive,
+    vehicle: Vehicle,
+    engine_speed: Floats,
+    time: Floats,
+    *,
+    period: float | None = None,
+    ahead: float = math.inf,
+) -> Torque:
     """Return the torque at the recorded stamps ``time``.
 
     Parameters
     ----------
     engine_speed : (n,) at the same stamps [rad/s]; may be NaN for measured torque
     time : (n,) [s]
+    period : between readings; that of the drive when None [s]
+    ahead : how far past a reading others may tell of it [s]
 
     Raises
     ------
@@ -178,14 +227,14 @@ def engine_torque(drive: Drive, vehicle: Vehicle, engine_speed: Floats, time: Fl
         The drive lacks what the torque source needs.
     """
     model = vehicle.torque
-    period = source_signal(drive, vehicle).period
+    period = source_signal(drive, vehicle).period if period is None else period
     source = source_of(vehicle)
     x = source.reading(drive, time, model)
     nowhere = np.zeros(time.size, dtype=bool)
     if source.signed:
         torque = _by_map(model, x, engine_speed)
         return Torque(time, torque, nowhere, nowhere)
-    dragged = averaged(x, period, DRAGGED_TIME)
+    dragged = averaged(x, period, DRAGGED_TIME, time=time, ahead=ahead)
     if not model.coefficients:
         return Torque(time, x, nowhere, dragged <= 0.0)
     torque = _by_map(model, x, engine_speed)
