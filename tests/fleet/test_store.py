@@ -145,6 +145,21 @@ def test_a_part_gathered_meanwhile_is_left_out(results):
     assert read_parts([part_path(results.folder, "aa"), gone])["key"].to_list() == ["aa"]
 
 
+def test_a_table_that_has_no_room_is_told_and_its_parts_stay(results):
+    resource = pytest.importorskip("resource")
+    write_part(results.folder, "aa", [row("aa")])
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(ConfigError, match=r"drives-0000\.parquet.* cannot be written"):
+            results.gather()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert len(results.part_files()) == 1
+    results.gather()
+    assert keys(results) == [("aa", 0)]
+
+
 def _damage(path, how):
     data = path.read_bytes()
     middle = len(data) // 2

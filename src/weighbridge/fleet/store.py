@@ -271,8 +271,11 @@ class Results:
             # A drive that failed, and fails again, has a new row.
             rows = pl.concat([last.join(rows, on=by, how="anti"), rows])
         home.mkdir(parents=True, exist_ok=True)
+        # By way of the memory: a full disk is told as one, which polars does not.
+        data = io.BytesIO()
+        rows.sort(by).write_parquet(data, compression="zstd")
         with whole_file(home / f"{table}-{number:04d}.parquet") as part:
-            rows.sort(by).write_parquet(part, compression="zstd")
+            part.write_bytes(data.getbuffer())
 
     def tell(self, progress: dict[str, Any]) -> None:
         """Write how far a run is."""
