@@ -52,24 +52,31 @@ def replayed(car: wb.Vehicle, drive: Drive) -> None:
     print(f"{'the same by processor time':<44}{drive.duration / spent:8.0f} x")
 
 
-def on_the_way(car: wb.Vehicle, drive: Drive) -> None:
-    """Feed a drive as sources do: processor time, and how old what is told is at each block."""
+def on_the_way(car: wb.Vehicle, drive: Drive, every: float = 1.0) -> None:
+    """Feed a drive as sources do, and show it: processor time, and the age of each mass shown."""
     scale = wb.LiveScale(car, info=drive.info)
-    parts, ages, shown = list(blocks(drive, BLOCK)), [], -np.inf
+    parts, shown_at, looked = list(blocks(drive, BLOCK)), -np.inf, 0.0
+    shown, settled = [], []
     begin = time.process_time()
     for samples in parts:
         scale.update_block(samples)
-        if scale.newest - shown >= 1.0:
-            shown = scale.newest
-            scale.weighing()
-        at = scale._mass()[-1]
-        ages.append(scale.newest - at)
+        if scale.newest - shown_at < every:
+            continue
+        shown_at = scale.newest
+        settled.append(scale.weighing().age)
+        before = time.process_time()
+        told = scale.weighing(ahead=True)
+        if told.provisional:
+            looked += time.process_time() - before
+            shown.append(told.age)
     core = 100.0 * (time.process_time() - begin) / drive.duration
-    known = np.array([a for a in ages if np.isfinite(a)][3000:])
     print(f"{'share of a core, all that it learns included':<44}{core:8.2f} %")
+    print(f"{'of it to look ahead once a second':<44}{100.0 * looked / drive.duration:8.2f} %")
     print(f"{'the same over the budgets of openpilot':<44}{core / OPENPILOT:8.3f} x")
-    print(f"{'age of what is told, least, median and 99 %':<44}{known.min():8.2f} s "
-          f"{np.median(known):.2f} s {np.percentile(known, 99.0):.2f} s")  # fmt: skip
+    for name, ages in (("of what is shown", shown), ("of the settled mass", settled)):
+        known = np.array(ages)[np.isfinite(ages)]
+        print(f"{f'age {name}, least, median and 99 %':<44}{known.min():8.2f} s "
+              f"{np.median(known):.2f} s {np.percentile(known, 99.0):.2f} s")  # fmt: skip
 
 
 def sample_by_sample(car: wb.Vehicle, drive: Drive, span: float = 300.0) -> None:

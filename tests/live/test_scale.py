@@ -10,12 +10,21 @@ from hypothesis import strategies as st
 
 import weighbridge as wb
 from tests.live.conftest import SHORT
+from weighbridge.balance.averaging import WINDOW
 from weighbridge.errors import ConfigError
+from weighbridge.estimators.judging import STOP
 from weighbridge.live.learning import REST, _nothing
 from weighbridge.live.records import LATENESS
 from weighbridge.live.weighing import LiveStatus
-from weighbridge.pipeline.forward import forward_weigh, identify_forward, lateness
-from weighbridge.signals.recent import STEP
+from weighbridge.pipeline.forward import (
+    begin,
+    forward_weigh,
+    identify_forward,
+    lateness,
+    step,
+    with_open,
+)
+from weighbridge.signals.recent import STEP, recent
 from weighbridge.simulation import MIDSIZE, Loading, Scenario, short_route, simulate_car
 
 
@@ -65,11 +74,13 @@ def test_live_is_the_forward_pass_to_the_last_bit(
             held[name] = time[order][hold[order]], values[order][hold[order]]
         scale.update_block(before)
         scale.update_block(now)
+        scale.weighing(ahead=True)
     scale.update_block(held)
     scale.finish()
     told = scale.weighing()
+    assert not told.provisional
     assert not any(s.late or s.unfit for s in told.signals)
-    assert told.mass == forward.state.mass - scale._state.burnt
+    assert told.mass == forward.state.mass - scale._state.force.fuel
     assert told.std == forward.std[-1]
 
 
@@ -94,7 +105,7 @@ def test_other_steps_are_those_of_the_setup(short, weighing, step):
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
     told = fed(scale, part, even(part, 3.0))
     assert told.std == forward.std[-1]
-    assert told.mass == forward.state.mass - scale._state.burnt
+    assert told.mass == forward.state.mass - scale._state.force.fuel
 
 
 def test_a_step_that_rounds_is_refused(car):
@@ -102,18 +113,102 @@ def test_a_step_that_rounds_is_refused(car):
         wb.LiveScale(car, step=0.3)
 
 
-def test_what_is_told_is_as_old_as_lateness_look_ahead_and_step(short, weighing, setup):
+def test_the_settled_mass_is_as_old_as_lateness_look_ahead_and_step(short, weighing, setup):
     """Samples come in blocks of 0.1 s, as from a source."""
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
     ages = []
     for block in blocks(short, even(short, 0.1)):
         scale.update_block(block)
-        ages.append(scale.newest - scale._mass()[-1])
+        ages.append(scale.weighing().age)
     ages = np.array([a for a in ages if np.isfinite(a)])[300:]
     # A torque reading, and so a row, comes a tenth of a second after the one before.
     row = 1.5 * setup.period
     assert np.percentile(ages, 99.0) < LATENESS + lateness(setup) + STEP + row
     assert np.percentile(ages, 1.0) > LATENESS
+
+
+def looked_at_each_second(scale, drive, late=0.0):
+    """Provisional weighings each second, and settled ones at each step, of a drive as it comes.
+
+    Of ``late`` [s], a third of the samples come so much later than the others.
+    """
+    rng, held, shown, settled, shown_at = np.random.default_rng(7), {}, [], [], -np.inf
+    for block in blocks(drive, even(drive, 0.1)):
+        before, held, now = held, {}, {}
+        for name, (time, values) in block.items():
+            hold = (rng.random(time.size) < 1.0 / 3.0) & (late > 0.0)
+            now[name], held[name] = (time[~hold], values[~hold]), (time[hold], values[hold])
+        scale.update_block(now)
+        scale.update_block(before)
+        if scale._state is None or not scale._state.joint.windows:
+            continue
+        if not settled or scale._state.force.time > settled[-1][0]:
+            joint = with_open(scale._state, scale._setup)
+            std = joint.std(scale._setup.joint)
+            settled.append((scale._state.force.time, joint.mass - scale._state.force.fuel, std))
+        if scale.newest - shown_at >= 1.0:
+            shown_at = scale.newest
+            shown.append(scale.weighing(ahead=True))
+    return shown, np.array(settled)
+
+
+def test_the_provisional_mass_is_young_and_near_the_settled_one(short, weighing, setup):
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    shown, settled = looked_at_each_second(scale, short)
+    told = [w for w in shown if np.isfinite(w.mass) and w.time <= settled[-1, 0]]
+    assert len(told) > 100
+    assert all(w.provisional for w in told)
+    assert np.percentile([w.age for w in told], 99.0) <= LATENESS + 0.2
+    known, std = (np.interp([w.time for w in told], settled[:, 0], settled[:, k]) for k in (1, 2))
+    assert np.array([w.std for w in told]) == pytest.approx(std, rel=0.1)
+    far = np.array([(w.mass - m) / w.std for w, m in zip(told, known, strict=True)])
+    assert np.sqrt(np.mean(far**2)) < 0.05
+    assert np.abs(far).max() < 0.5
+
+
+def test_the_provisional_mass_waits_for_no_late_sample(short, weighing, setup):
+    """A third of the samples come 0.1 s late: it is no older, and within a standard deviation."""
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    shown, settled = looked_at_each_second(scale, short, late=0.1)
+    told = [w for w in shown if np.isfinite(w.mass) and w.time <= settled[-1, 0]]
+    assert np.percentile([w.age for w in told], 99.0) <= LATENESS + 0.2
+    known = np.interp([w.time for w in told], settled[:, 0], settled[:, 1])
+    far = np.array([(w.mass - m) / w.std for w, m in zip(told, known, strict=True)])
+    assert np.abs(far).max() < 0.5
+
+
+def test_a_look_ahead_leaves_no_trace(short, weighing, setup):
+    """The states of two scales are the same to the last letter; one of them is looked at."""
+    part = short.between(short.start, short.start + 0.5 * SHORT)
+    kept = []
+    for looks in (False, True):
+        scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+        for block in blocks(part, even(part, 0.5)):
+            scale.update_block(block)
+            if looks:
+                scale.weighing(ahead=True)
+        assert scale.weighing(ahead=True).mass != scale.weighing().mass
+        kept.append(scale.checkpoint())
+    assert kept[0] == kept[1]
+
+
+def test_an_open_window_that_is_full_counts_as_the_whole_one(short, weighing, setup):
+    """Of one that has fewer rows the noise is larger, so that it moves the mass less."""
+    state, whole = begin(setup, short.start), 0
+    for until in np.arange(short.start, short.start + 0.5 * SHORT, 0.125):
+        after, _ = step(state, recent(short, until), until, setup)
+        if state.windows.stood >= STOP:
+            assert with_open(state, setup) == state.joint
+        elif after.joint.windows > state.joint.windows:
+            whole += 1
+            full = replace(setup, period=WINDOW / state.windows.rows)
+            told = with_open(state, full)
+            assert told.mass == pytest.approx(after.joint.mass, rel=1e-12)
+            assert told.var == pytest.approx(after.joint.var, rel=1e-12)
+            less = with_open(state, replace(setup, period=0.5 * full.period))
+            assert less.var > told.var
+        state = after
+    assert whole > 5
 
 
 def test_a_scale_learns_and_weighs(car, loaded, weighing):
@@ -149,7 +244,7 @@ def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
     assert again.weighing().mass == scale.weighing().mass
     told = fed(again, short, [np.nextafter(rest, np.inf), short.end + 1.0])
     assert told.std == forward.std[-1]
-    assert told.mass == forward.state.mass - again._state.burnt
+    assert told.mass == forward.state.mass - again._state.force.fuel
 
 
 @pytest.mark.parametrize(

@@ -193,6 +193,7 @@ def live(
             keeper=keeper,
             recorder=None if record is None else _recorder(record, info),
             alerts=_alerts(above, below, car),
+            ahead=not _unwatched(replay, speed),
         )
         last = _run(session, pressed)
     if ticket is not None and out is not None:
@@ -250,12 +251,17 @@ def _speed(rate: str, *, replayed: bool) -> float:
     return speed
 
 
+def _unwatched(replay: Path | None, speed: float) -> bool:
+    """Whether nobody waits for what is shown: a replay on its fastest way."""
+    return replay is not None and math.isinf(speed)
+
+
 def _step(replay: Path | None, speed: float) -> float:
-    """Choose the step of the scale [s]: nobody waits for what a replay shows on its fastest way."""
+    """Choose the step of the scale [s]."""
     from weighbridge.live.replay import FASTEST_STEP
     from weighbridge.signals.recent import STEP
 
-    return FASTEST_STEP if replay is not None and math.isinf(speed) else STEP
+    return FASTEST_STEP if _unwatched(replay, speed) else STEP
 
 
 def _state_file(state: str | None, replay: Path | None, vehicle: Path) -> Path | None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from weighbridge.live.records import Records
 from weighbridge.live.source import Samples
+from weighbridge.live.weighing import SignalHealth
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -20,6 +23,9 @@ _SPEEDS: Final = (("vehicle_speed",), ("gnss_speed",))
 
 _INERTIAL: Final = "inertial sensor"
 _POSITION: Final = "position"
+
+RATE_SPAN: Final = 10.0
+"""Time over which the rate of a signal is told [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +90,31 @@ def needed_signals(vehicle: Vehicle, came: Iterable[str]) -> tuple[str, ...]:
             continue
         found += whole or need.sets[0]
     return tuple(dict.fromkeys(found))
+
+
+def health_of(
+    records: Records, needed: tuple[str, ...], silence: float
+) -> tuple[SignalHealth, ...]:
+    """Tell how each signal comes, those that are needed first.
+
+    Parameters
+    ----------
+    records
+    needed : of `needed_signals`
+    silence : time since any sample came last [s]
+    """
+    now = records.newest + silence
+    return tuple(
+        SignalHealth(
+            name=name,
+            rate=records.rate(name, RATE_SPAN),
+            age=now - records.newest_of(name) if math.isfinite(now) else math.inf,
+            late=records.late.get(name, 0),
+            unfit=records.unfit.get(name, 0),
+            needed=name in needed,
+        )
+        for name in dict.fromkeys((*needed, *records.names()))
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -74,14 +74,7 @@ class _Column:
         if not old.any():
             return
         self.blocks = [] if old.all() else [(time[~old], values[~old])]
-        time, values = time[old], values[old]
-        if (np.diff(time) <= 0.0).any():
-            # Of two samples with one stamp the order they came in must not choose.
-            order = np.lexsort((values, time))
-            time, values = time[order], values[order]
-            keep = np.concatenate(([True], np.diff(time) > 0.0))
-            time, values = time[keep], values[keep]
-        self._append(time, values)
+        self._append(*_in_order(time[old], values[old]))
 
     def _append(self, time: Floats, values: Floats) -> None:
         count = self.last - self.first
@@ -101,6 +94,17 @@ class _Column:
     @property
     def sealed(self) -> tuple[Floats, Floats]:
         return self.time[self.first : self.last], self.values[self.first : self.last]
+
+
+def _in_order(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Put samples (n,) in rising order, one for each instant."""
+    if (np.diff(time) <= 0.0).any():
+        # Of two samples with one stamp the order they came in must not choose.
+        order = np.lexsort((values, time))
+        time, values = time[order], values[order]
+        keep = np.concatenate(([True], np.diff(time) > 0.0))
+        time, values = time[keep], values[keep]
+    return time, values
 
 
 class Records:
@@ -298,6 +302,18 @@ class Records:
         return Drive(
             name,
             {n: Signal(n, *c.sealed) for n, c in self._columns.items() if c.last > c.first},
+            info,
+        )
+
+    def so_far(self, name: str, info: DriveInfo, span: float, fewest: int) -> Drive:
+        """Samples of the last ``span`` [s] as a drive, `last`, late ones may still come."""
+        return Drive(
+            name,
+            {
+                n: Signal(n, *_in_order(*pair))
+                for n, pair in self.last(span, fewest).items()
+                if pair[0].size
+            },
             info,
         )
 

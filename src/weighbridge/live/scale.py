@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
 from weighbridge.arguments import as_floats, check_text, check_type
 from weighbridge.errors import ConfigError
-from weighbridge.live.arrival import needed_signals
+from weighbridge.live.arrival import health_of, needed_signals
 from weighbridge.live.checkpoint import packed, unpacked
 from weighbridge.live.doubts import doubts, of_before
 from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, REST, Learned, learn
@@ -27,9 +27,6 @@ from weighbridge.signals import Drive, DriveInfo, Floats
 from weighbridge.signals.recent import BEHIND, FEWEST_SAMPLES, STEP, first_instant, recent
 
 _LOG = logging.getLogger(__name__)
-
-RATE_SPAN: Final = 10.0
-"""Time over which the rate of a signal is told [s]."""
 
 FAR: Final = 3.0
 """The mass on the way and that of all records so far contradict each other beyond so many standard
@@ -284,16 +281,24 @@ class LiveScale:
         records.cut(records.resumed)
         self._next = first_instant(records.resumed, self._every)
 
-    def weighing(self, silence: float = 0.0) -> LiveWeighing:
+    def weighing(self, silence: float = 0.0, *, ahead: bool = False) -> LiveWeighing:
         """Return the mass as it is known now, and what would make it surer.
+
+        The mass is the settled one, of which nothing changes any more: that of the forward stages
+        over all samples that can no longer be late. With ``ahead`` it is provisional: what came
+        since is weighed on a copy of the state, with less to look ahead and the open window as it
+        is. The copy is thrown away. Nothing that is settled, kept or learnt hangs on it.
 
         Parameters
         ----------
         silence : time since any sample came last [s]; who feeds the scale knows it
+        ahead : for showing: a mass that is `weighbridge.pipeline.forward.HURRY` and the lateness
+            younger, and costs a step of the stages
         """
-        mass, std, floor, at = self._mass()
-        health = tuple(self._health(silence))
-        found = self._outlook(mass, std, floor, health)
+        state = self._ahead() if ahead else self._state
+        mass, std, floor, at = self._mass(state)
+        health = self._health(silence)
+        found = self._outlook(mass, std, floor, health, state)
         newest = self._records.newest
         learned = self._learned
         return LiveWeighing(
@@ -313,7 +318,8 @@ class LiveScale:
             minutes_to_5=found.minutes_to_5,
             minutes_to_2=found.minutes_to_2,
             advice=found.advice,
-            look=self._look(),
+            look=self._look(state),
+            provisional=state is not self._state,
             signals=health,
             notes=(*self._doubts(mass), *(learned.notes if learned is not None else ())),
         )
@@ -336,14 +342,22 @@ class LiveScale:
         """Whether a mass is of a load that was there before all signals were silent."""
         return math.isfinite(mass) and self._since < self._records.resumed
 
-    def _mass(self) -> tuple[float, float, float, float]:
+    def _ahead(self) -> ForwardState | None:
+        """State after all samples that came, to look at alone; see `forward.looked_ahead`."""
+        state, setup, records = self._state, self._setup, self._records
+        if state is None or setup is None or not state.joint.windows:
+            return state
+        seen = records.so_far("live", self.info, BEHIND + self._every, FEWEST_SAMPLES)
+        return forward.looked_ahead(state, seen, records.newest, setup)
+
+    def _mass(self, state: ForwardState | None) -> tuple[float, float, float, float]:
         """Mass, its standard deviation, what no driving takes away of it, and its instant."""
-        learned, state, setup = self._learned, self._state, self._setup
+        learned, setup = self._learned, self._setup
         nothing = math.nan, math.nan, 0.0, math.nan
         if learned is not None and learned.inconsistent:
             return nothing
         if state is not None and setup is not None and state.joint.windows:
-            if self._leaves() > 0.0:
+            if forward.too_wide(state, self._setup) > 0.0:
                 return nothing
             floor = setup.joint.systematic_std
             mass = state.joint.mass - state.force.fuel
@@ -358,28 +372,20 @@ class LiveScale:
         told = self._learned is None or not self._learned.inconsistent
         return told and self._setup is not None and state is not None and state.joint.windows > 0
 
-    def _look(self) -> float:
+    def _look(self, state: ForwardState | None) -> float:
         """Part of the driving until the next look that is done [-]; NaN where nothing waits."""
-        if not self._learns or (self._goes_on() and self._leaves() == 0.0):
+        if not self._learns or (self._goes_on() and forward.too_wide(state, self._setup) == 0.0):
             return math.nan
         part = (self._driven - self._learned_at) / (self._learn_at - self._learned_at)
         return min(max(part, 0.0), 1.0)
 
-    def _leaves(self) -> float:
-        """Standard deviation over the mass that is too wide to be told [-]; 0 where it is not.
-
-        A recorded drive that leaves as much has no mass either.
-        """
-        state, setup = self._state, self._setup
-        if state is None or setup is None or not state.joint.windows:
-            return 0.0
-        gate, floor = setup.joint.settings, setup.joint.systematic_std
-        std = state.joint.std(setup.joint) / abs(state.joint.mass)
-        of_drive = math.sqrt(max(std**2 - floor**2, 0.0))
-        return std if std > gate.widest or of_drive > gate.widest_of_drive else 0.0
-
     def _outlook(
-        self, mass: float, std: float, floor: float, health: tuple[SignalHealth, ...]
+        self,
+        mass: float,
+        std: float,
+        floor: float,
+        health: tuple[SignalHealth, ...],
+        state: ForwardState | None,
     ) -> Outlook:
         learned = self._learned
         if learned is not None and learned.inconsistent:
@@ -389,7 +395,7 @@ class LiveScale:
         if reason and self._learns:
             left = max(self._learn_at - self._driven, 0.0)
             reason += f"; looked at again after {left:.0f} s more on the move"
-        if wide := self._leaves():
+        if wide := forward.too_wide(state, self._setup):
             reason = (
                 "what was driven since the load may have changed leaves "
                 f"{196.0 * wide:.0f} % to both sides"
@@ -464,7 +470,7 @@ class LiveScale:
         kept = drive.between(self._kept_from, math.inf) if self._kept_from > -math.inf else drive
         learned = learn(kept, self.vehicle, until, self._every)
         _LOG.info("looked at %.0f s: %.0f kg %s", drive.duration, learned.mass, learned.reason)
-        mass, std, _, _ = self._mass()
+        mass, std, _, _ = self._mass(self._state)
         self._learned = learned
         if learned.inconsistent or math.isnan(learned.mass):
             return
@@ -480,20 +486,8 @@ class LiveScale:
             self._since = learned.since
             self._driven_this_load = time_on_the_move(drive, learned.since)
 
-    def _health(self, silence: float) -> Iterable[SignalHealth]:
-        records = self._records
-        came = records.names()
+    def _health(self, silence: float) -> tuple[SignalHealth, ...]:
+        came = self._records.names()
         if came != self._came:
             self._came, self._needed = came, needed_signals(self.vehicle, came)
-        needed = self._needed
-        for name in dict.fromkeys((*needed, *came)):
-            yield SignalHealth(
-                name=name,
-                rate=records.rate(name, RATE_SPAN),
-                age=records.newest + silence - records.newest_of(name)
-                if math.isfinite(records.newest)
-                else math.inf,
-                late=records.late.get(name, 0),
-                unfit=records.unfit.get(name, 0),
-                needed=name in needed,
-            )
+        return health_of(self._records, self._needed, silence)

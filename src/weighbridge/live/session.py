@@ -39,8 +39,9 @@ class Session:
         the host's [s]
     keeper : writes checkpoints; None for none
     recorder : records what comes; None for none
-    alerts : limits that are watched
+    alerts : limits that are watched, by the settled mass
     orders : looked at between samples: what a person at the terminal asks for
+    ahead : show the provisional mass, which is younger; see `LiveScale.weighing`
     """
 
     feed: Feed
@@ -51,6 +52,7 @@ class Session:
     recorder: Recorder | None = None
     alerts: Sequence[Alert] = ()
     orders: Callable[[LiveScale], None] | None = None
+    ahead: bool = True
     _shown: float = field(default=-float("inf"), init=False)
     _looked: float = field(default=-float("inf"), init=False)
     _renewed: int = field(default=0, init=False)
@@ -77,22 +79,23 @@ class Session:
                 if self.recorder is not None:
                     self.recorder.tick()
         finally:
-            self.scale.finish()
             if self.recorder is not None:
                 self.recorder.close()
+            self.scale.finish()
             if self.keeper is not None:
                 self.keeper.write(self.scale)
-        self._show(due=True)
+        self._show(due=True, ahead=False)
         return self.scale.weighing()
 
-    def _show(self, *, due: bool = False) -> None:
+    def _show(self, *, due: bool = False, ahead: bool = True) -> None:
         newest = self.scale.newest
         if not due and newest - self._shown < self.period:
             return
         self._shown, self._looked = newest, monotonic()
-        weighing = self.scale.weighing(self._silence())
+        silence = self._silence()
+        settled = self.scale.weighing(silence)
         for alert in self.alerts:
-            event = alert.look(weighing)
+            event = alert.look(settled)
             if event is not None:
                 _LOG.warning("%s", event.text)
         active = [alert.text for alert in self.alerts if alert.active]
@@ -100,6 +103,8 @@ class Session:
             trouble_text(s.name, s.error) for s in self.feed.states() if s.error and not s.ended
         ]
         told = (*active, *lost, *self._doubts())
+        ahead = ahead and self.ahead
+        weighing = self.scale.weighing(silence, ahead=True) if ahead else settled
         self.outputs.show(replace(weighing, notes=(*told, *weighing.notes)))
 
     def _renew(self) -> None:

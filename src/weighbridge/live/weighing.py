@@ -72,6 +72,8 @@ class LiveWeighing:
     advice : which driving would help; empty where nothing more is needed
     look : part of the driving between two looks at all records that is done [-], 0 to 1; NaN where
         the mass does not wait for the next one
+    provisional : the mass counts samples among which others may still come; the next one is made
+        anew from the settled state
     signals : health of each
     notes : what was found or doubted, one sentence each
     """
@@ -93,6 +95,7 @@ class LiveWeighing:
     advice: str
     reach: float = math.nan
     look: float = math.nan
+    provisional: bool = False
     signals: tuple[SignalHealth, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -149,6 +152,7 @@ class LiveWeighing:
             "driven_s": self.driven,
             "progress": self.progress,
             "look": _known(self.look),
+            "provisional": self.provisional,
             "reach_percent": _known(100.0 * self.reach),
             "minutes_to_5_percent": _known(self.minutes_to_5),
             "minutes_to_2_percent": _known(self.minutes_to_2),

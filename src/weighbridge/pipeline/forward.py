@@ -9,6 +9,7 @@ way gets the same numbers to the last bit.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -46,6 +47,10 @@ if TYPE_CHECKING:
 AHEAD: Final = 0.45
 """The force side looks so far past a row at the motion, and twice as far at the readings [s]. What
 the motion itself looks at is `weighbridge.navigation.forward.lateness`."""
+
+
+HURRY: Final = 0.5
+"""A look ahead waits so much less for what comes after a row [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -236,6 +241,20 @@ def resume(weighing: Weighing, records: Drive, until: float, setup: ForwardSetup
     return state._replace(joint=resumed(result.filter_input, setup.joint, last))
 
 
+def too_wide(state: ForwardState | None, setup: ForwardSetup | None) -> float:
+    """Standard deviation over the mass that is too wide to be told [-]; 0 where it is not.
+
+    A recorded drive that leaves as much has no mass either.
+    """
+    if state is None or setup is None or not state.joint.windows:
+        return 0.0
+    joint, sizes = state.joint, setup.joint
+    gate = sizes.settings
+    std = joint.std(sizes) / abs(joint.mass)
+    of_drive = math.sqrt(max(std**2 - sizes.systematic_std**2, 0.0))
+    return std if std > gate.widest or of_drive > gate.widest_of_drive else 0.0
+
+
 def lateness(setup: ForwardSetup) -> float:
     """Time that a row waits for what tells of it [s]: delays, and look-ahead of the stages."""
     by_motion = forward.lateness(setup.navigation) + setup.force.ahead
@@ -274,6 +293,43 @@ def step(
     if table is None or new.stop <= new.start:
         return state, NO_WINDOWS
     return _folded(state, table, new, setup)
+
+
+def looked_ahead(
+    state: ForwardState, records: Drive, newest: float, setup: ForwardSetup
+) -> ForwardState:
+    """Return a copy of a state with all that came since, as far as it can be told already.
+
+    It is to look at, never to go on from: samples may be missing that still come, rows have
+    `HURRY` less to look ahead, and the open window counts as `with_open` says.
+
+    Parameters
+    ----------
+    state : of the stages, which is left as it is
+    records : those of `step`, and those since
+    newest : instant of the last of them [s]
+    setup : of `identify_forward`
+    """
+    ahead, _ = step(state, records, newest + HURRY, setup)
+    return ahead._replace(joint=with_open(ahead, setup))
+
+
+def with_open(state: ForwardState, setup: ForwardSetup) -> JointState:
+    """Return the filter of the mass as if the open window were over.
+
+    The noise of its motion is that of a mean over its own, shorter time, between two ends. The
+    first window after a stop tries another load, of which a part of it tells nothing: it waits.
+    """
+    windows, sizes = state.windows, setup.joint
+    if not windows.rows or windows.stood >= STOP:
+        return state.joint
+    mean = windows.sums / windows.rows
+    part = min(windows.rows * setup.period / WINDOW, 1.0)
+    window = Window(
+        float(mean[0]), mean[3:], float(mean[1]), float(mean[2] / windows.rows), windows.stood
+    )
+    noisier = replace(sizes, motion_var=sizes.motion_var / part**2)
+    return joint_forward.step(state.joint, window, noisier)
 
 
 def _folded(
