@@ -242,6 +242,8 @@ def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
     assert len(saved) < 3e6
     again = wb.LiveScale.restore(weighing.vehicle, saved)
     assert again.weighing().mass == scale.weighing().mass
+    assert again.weighing().status is LiveStatus.LEARNING
+    assert "no sample has come since the state was kept" in again.weighing().reason
     told = fed(again, short, [np.nextafter(rest, np.inf), short.end + 1.0])
     assert told.std == forward.std[-1]
     assert told.mass == forward.state.mass - again._state.force.fuel

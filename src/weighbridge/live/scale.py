@@ -100,6 +100,7 @@ class LiveScale:
         self._since = self._kept_from = -math.inf
         self._tared: float | None = None
         self._anew = -math.inf
+        self._kept_to = math.nan
         self._came: tuple[str, ...] = ()
         self._needed = needed_signals(self.vehicle, ())
 
@@ -204,6 +205,7 @@ class LiveScale:
             scale._since = content["since"]
             scale._tared, scale._learns = content["tared"], content["learns"]
             scale._records.add_block(content["samples"])
+            scale._kept_to = scale.newest
             if scale._next is not None:
                 scale._records.seal(scale._next - scale._every)
                 scale._kept_from = scale._next - scale._every
@@ -410,13 +412,16 @@ class LiveScale:
             reason=reason,
             silent=silent,
             first=FIRST,
-            unproved=of_before(
-                self._records,
-                driven_since=self._driven_since(),
-                goes_on=self._is_of_before(mass),
-            ),
+            unproved=self._unproved(mass),
             since=since,
             wait=max(self._learn_at - self._driven, 0.0) if waits else 0.0,
+        )
+
+    def _unproved(self, mass: float) -> str:
+        if self.newest == self._kept_to:
+            return "no sample has come since the state was kept"
+        return of_before(
+            self._records, driven_since=self._driven_since(), goes_on=self._is_of_before(mass)
         )
 
     def _advance(self, until: float | None = None) -> None:
