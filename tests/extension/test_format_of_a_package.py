@@ -54,6 +54,12 @@ def test_an_installed_package_adds_a_format(install, log):
         sys.path.remove(str(log.parent))
 
 
+def test_a_signal_that_no_drive_can_hold_is_refused(install, log):
+    install(READER.replace('"vehicle_speed"', '"motor_iq"'))
+    with pytest.raises(DriveError, match="reader of Bang hands over 'motor_iq'"):
+        read_drive(log)
+
+
 @pytest.mark.parametrize(
     ("module", "name", "said"),
     [

@@ -39,7 +39,7 @@ from weighbridge.io.parts import part_folders, read_parts
 from weighbridge.io.paths import given_paths, is_folder
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
 from weighbridge.io.table import read_text, start_text
-from weighbridge.signals import Drive, DriveInfo, Floats, Problem, Signal
+from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
 from weighbridge.signals.instants import instant
@@ -308,6 +308,11 @@ def _read_file(
         raise DriveError(f"{path} cannot be read: {e.strerror or e}") from None
     except PARSE_ERRORS as e:
         raise DriveError(f"{path} cannot be read ({first_line(e)}); copy it again") from None
+    if unknown := next((s.name for s in log.signals if s.name not in QUANTITIES), ""):
+        raise DriveError(
+            f"{path}: the reader of {form.name} hands over {unknown!r}, which is no signal of "
+            "weighbridge.signals.QUANTITIES; correct its name in that package"
+        )
     if mapping is not None:
         log.align = mapping.time.align
         if not names:
