@@ -72,6 +72,29 @@ def test_settings_of_the_command_reach_every_method():
     assert settings.estimators["hybrid"].keywords["settings"].blend is Blend.SPEED
     smaller = changed(du2025.SETTINGS(), {"blend": "variance"})
     assert smaller.estimators["hybrid"].keywords["settings"].blend is Blend.VARIANCE
+    assert smaller.blended(Blend.INNOVATIONS).chosen.blend is Blend.INNOVATIONS
+
+
+def test_lambda_start_and_noise_of_the_paper_are_settings_of_the_command():
+    words = ["printed.ekf.start.forgetting=0.99", "printed.ekf.start_std=1e-4", "as_printed=true"]
+    settings = changed(du2025.SETTINGS(), parsed([*words, "ours.ekf.accel_walk=0.3"]))
+    assert settings.estimators["robust-rls"].keywords["settings"].forgetting == 0.99
+    assert settings.estimators["ekf"].keywords["settings"].start_std == 1e-4
+    ours = replace(settings, as_printed=False)
+    assert ours.estimators["ekf"].keywords["settings"].accel_walk == 0.3
+    assert ours.estimators["hybrid"].keywords["settings"].blend is Blend.INNOVATIONS
+
+
+def test_a_braking_moves_the_least_squares_and_not_the_kalman_filter(judged):
+    # By hand: farthest from the mass at each braking within 20 s.
+    track, start = judged.tracks["ekf"], judged.tracks["ekf"].time[0]
+    made = du2025.simulate(3000.0, SEED, as_paper=True)
+    expected = 0.0
+    for at in (115.0, 147.0):
+        mass = track.running_mass[(track.time >= start + at) & (track.time <= start + at + 20.0)]
+        expected = max(expected, np.ptp(np.append(mass, mass[0])) / mass[0])
+    assert 0.4 * expected < du2025.swing(track, made) <= expected
+    assert judged.printed_swing["robust-rls"] > 3.0 * judged.printed_swing["ekf"]
 
 
 def test_every_equation_table_and_figure_has_its_item():

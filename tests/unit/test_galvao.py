@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from weighbridge.errors import ConfigError
 from weighbridge.estimators.settings import changed
 from weighbridge.papers import PAPERS, galvao
 from weighbridge.papers.galvao_figures import item_figures
@@ -71,6 +72,21 @@ def test_a_setting_of_the_printed_filter_moves_it_alone(three):
         assert abs(usual.printed.mass[-1] - other.printed.mass[-1]) > 10.0
 
 
+def test_sample_time_model_and_mean_are_settings(three):
+    given = {"sample_time": 14.0, "model.drag": 0.5, "printed.groups": 1, "printed.tail": 1.0}
+    settings = changed(galvao.Settings(), given)
+    fitted = settings.fitted(three[1][0])
+    assert fitted.vehicle.speed_model.sample_time == 14.0
+    assert fitted.vehicle.speed_model.drag == 0.5
+    other = changed(galvao.Settings(), {"printed.groups": 1, "printed.tail": 1.0})
+    run = galvao.run_filter(three[2][1].balance, three[0].vehicle, other.printed)
+    # One group of all samples: nothing is left out.
+    assert run.answer == pytest.approx(np.mean(run.mass[run.used]))
+    assert run.answer != three[2][1].printed.answer
+    with pytest.raises(ConfigError, match="sample_time must be in"):
+        changed(galvao.Settings(), {"sample_time": 0.5})
+
+
 def test_what_falls_behind_is_told(done):
     by_start, band, printed, *_ = galvao.comparisons(done)
     assert "gives back the mass it is started from" in by_start.figure
@@ -120,6 +136,9 @@ def test_errors_of_recorded_torque_are_told(done):
     said = torque_figures(done.torque)
     assert said["torque errors"].startswith("errors 0.0 / 1.0 / 1.0 %")
     assert said["blind torque errors"].startswith("errors 0.0 / 10.0 / 10.0 %")
+    # 109 kg off with ± 78 told, twice.
+    assert said["blind torque errors"].endswith("3 of 5 within 95 % told")
+    assert said["torque errors"].endswith("4 of 4 within 95 % told")
     last = torque_table(done.torque).rows[-1]
     assert last[2] == "no mass"
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from weighbridge.calibration.grid import TABLE_5
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.rls import RlsSettings, estimate, run_in_turn
 from weighbridge.papers import PAPERS, items_of, jensen2022, section_of, seed_of, settings_of
@@ -20,6 +21,7 @@ from weighbridge.papers.jensen2022_drives import (
     highway_scenario,
     scenario,
 )
+from weighbridge.papers.jensen2022_gradient import gradient_road, gradient_scenario
 from weighbridge.papers.jensen2022_judged import joined, torques
 from weighbridge.papers.jensen2022_printed import calibrate_as_printed, pulling
 from weighbridge.simulation import make_scenario, simulate_car
@@ -64,6 +66,19 @@ def test_highway_trips_lead_north_first_at_the_speeds_of_the_paper():
     assert [t.speeds for t in HIGHWAY_TRIPS[:3]] == ["110", "120", "100-120"]
 
 
+def test_the_road_of_fig_5_is_600_m_with_two_inclines_and_two_right_angles():
+    road = gradient_road()
+    assert road.length == 600.0
+    steep = np.abs(road.grade) > 0.03
+    assert np.count_nonzero(np.diff(steep.astype(int)) == 1) == 2
+    turned = np.degrees(road.heading)
+    assert np.max(turned) - np.min(turned) == pytest.approx(90.0, abs=0.5)
+    assert turned[-1] == pytest.approx(0.0, abs=0.5)
+    calm, restless = (simulate_car(gradient_scenario(run, 1)).truth for run in (1, 2))
+    hardest = [np.max(np.abs(np.gradient(t.speed, t.time))) for t in (calm, restless)]
+    assert hardest[1] > 2.0 * hardest[0]
+
+
 def test_drives_in_turn_are_one_long_drive(car):
     balance = car.balance
     alone = estimate(balance, car.vehicle).running_mass
@@ -80,7 +95,9 @@ def test_torques_are_those_of_the_simulated_engine(made, car):
     mass = float(np.mean(made.truth.mass))
     balance = car.balance
     steady = balance.table.usable & pulling(balance)
-    found = torques(made.drive, balance, car.vehicle, mass, steady)
+    found = torques(made.drive, balance, car.vehicle, mass, steady, efficiency=0.33)
+    less = torques(made.drive, balance, car.vehicle, mass, steady, efficiency=0.22)
+    assert_allclose(less.air, found.air * 2.0 / 3.0)
     true = np.interp(found.time, made.truth.time, made.truth.engine_torque)
     # Less the losses of the driveline, with the engine's inertia still in it.
     assert np.corrcoef(found.motion, true)[0, 1] > 0.93
@@ -108,6 +125,8 @@ def test_what_the_paper_varies_is_a_setting():
             "printed.initial_mass": 1200.0,
             "printed.filter.speed_std": 0.3,
             "printed.order": 1,
+            "printed.engine_efficiency": 0.3,
+            "printed.grid_wheels": [1.0, 4.0, 1.5],
             "conditions.two_windows": 0.1,
             "forgettings": [0.99, 0.999, 1.0],
         },
@@ -116,6 +135,12 @@ def test_what_the_paper_varies_is_a_setting():
     assert made.printed.rls.initial_mass == 1200.0
     assert made.printed.filter.noise.speed_std == 0.3
     assert made.printed.order == 1
+    assert made.printed.engine_efficiency == 0.3
+    assert_allclose(made.printed.axes[3], [1.0, 2.5, 4.0])
+    for axis, printed in zip(settings_of("jensen2022")().printed.axes, TABLE_5, strict=True):
+        assert_allclose(axis, printed)
+    with pytest.raises(ConfigError, match="grid_wheels takes a lower limit"):
+        changed(made, {"printed.grid_wheels": [4.0, 1.0, 1.5]})
     assert made.conditions.two_windows == 0.1
     with pytest.raises(ConfigError, match="forgettings must be in"):
         replace(made, forgettings=(0.5, 0.9995, 0.9999))
@@ -140,7 +165,9 @@ def test_a_reproduction_has_every_figure_and_its_page(tmp_path):
     done = jensen2022.reproduce(drives=rows, trips=HIGHWAY_TRIPS[::3])
     made = jensen2022.as_reproduced(done)
     assert {name for item in jensen2022.ITEMS for name in item.names} <= set(made.figures)
-    assert "172000 to 172004" in made.title
+    assert "172000 to 172007" in made.title
+    assert len(done.gradient) == 3
+    assert all(0.0 < r.largest[1] < math.radians(1.5) for r in done.gradient)
     assert "no choice of the weighing was made on" in made.title
     by_print, ours = done.printed[1], done.drives[1]
     assert 0.003 < by_print.pitch_largest < math.radians(3.0)
@@ -150,6 +177,6 @@ def test_a_reproduction_has_every_figure_and_its_page(tmp_path):
     page = tmp_path / "page.html"
     made.write_report(page)
     html = page.read_text(encoding="utf-8")
-    for number in ("4:", "8b", "9,", "10,", "12,", "13,", "16,", "17,", "18,", "19,"):
+    for number in ("4:", "5,", "8b", "9,", "10,", "12,", "13,", "16,", "17,", "18,", "19,"):
         assert f"Fig. {number}" in html
     assert "fig. 11: these drives were not asked for" in html.lower()

@@ -3,13 +3,17 @@
 import numpy as np
 import pytest
 
+from weighbridge.errors import ConfigError
 from weighbridge.estimators.settings import changed
 from weighbridge.papers import nguyen2024 as paper
 
 
 @pytest.fixture(scope="module")
 def done():
-    cases = (paper.PAPERS_CASE, paper.PRINTED_NOISE, paper.AS_IN_PRINT)
+    cases = (
+        paper.PAPERS_CASE, paper.PRINTED_NOISE, paper.LOWER_NOISE, paper.HIGHER_NOISE,
+        paper.AS_IN_PRINT, paper.EXTENDED,
+    )  # fmt: skip
     return paper.reproduce(seed=5, roads=2, cases=cases)
 
 
@@ -38,6 +42,25 @@ def test_q_and_r_as_printed_cannot_follow_tonnes(done):
         assert np.all(r.settled[:2, [0, 2]] == 7.0)
 
 
+def test_less_noise_over_q_is_faster_as_in_sec_4_1(done):
+    results, _ = done
+    low, printed, high = (
+        np.mean([r.mape for r in results[case.name]], axis=0)
+        for case in (paper.LOWER_NOISE, paper.PRINTED_NOISE, paper.HIGHER_NOISE)
+    )
+    assert np.all(low < printed)
+    assert np.all(printed < high)
+
+
+def test_ten_percent_are_reached_before_five(done):
+    results, shown = done
+    r = results[paper.PAPERS_CASE.name][0]
+    assert np.all(r.near <= r.settled)
+    # Row by row from the end: the last sample outside 10 % of the first load.
+    relative = np.abs(shown.track.parameters / shown.made.inertias - 1.0)[: 7 * 1000, 0]
+    assert r.near[0, 0] == pytest.approx((np.flatnonzero(relative > 0.1)[-1] + 1) / 1000.0)
+
+
 def test_errors_are_those_of_eq_10(done):
     results, shown = done
     r = results[paper.CASES[0].name][0]
@@ -57,6 +80,12 @@ def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
 def test_settings_reach_the_cases_that_have_the_papers():
     with_offsets = next(c for c in paper.CASES if c.settings.offset_std > 0.0)
     settings = changed(paper.Settings(), {"filter.jump_rate": 0.01, "body_noise": [1e-4] * 3})
+    other = changed(paper.Settings(), {"printed_process": [2.0] * 6, "printed_noise": [1e-5] * 3})
+    lower = other.of(paper.LOWER_NOISE).settings
+    assert lower.process_densities == (2.0,) * 6
+    assert lower.noise_densities == pytest.approx((1e-7,) * 3)
+    with pytest.raises(ConfigError, match="change_times must rise"):
+        changed(paper.Settings(), {"change_times": [14, 7]})
     assert settings.of(paper.PAPERS_CASE).settings.jump_rate == 0.01
     assert settings.of(with_offsets).settings == with_offsets.settings
     assert settings.of(paper.INVERSE).sensors.body_noise == (1e-4,) * 3
@@ -66,3 +95,17 @@ def test_settings_reach_the_cases_that_have_the_papers():
         paper.reproduce(**run, settings=s)[0][paper.PAPERS_CASE.name] for s in (None, settings)
     )
     assert np.all(usual.mape != other.mape)
+
+
+def test_the_experiment_itself_is_a_setting():
+    given = {"speed": 25.0, "start": 1.5, "change_times": [3.0, 6.0], "change_factors": [1.2, 0.8]}
+    settings = changed(paper.Settings(), given)
+    made = paper.simulate(5, paper.PAPERS_SENSORS, settings)
+    times = made.time
+    mass = made.inertias[:, 0] / paper.suspension_of(paper.TRUCK, paper.PAPERS_SENSORS).sprung_mass
+    assert made.scenario.speed == 25.0
+    for t, factor in ((1.0, 1.0), (4.0, 1.2), (8.0, 0.8)):
+        assert mass[np.searchsorted(times, t)] == pytest.approx(factor)
+    # As printed the parameters never move from where they begin.
+    track = paper.run(paper.AS_IN_PRINT, made, settings.start)
+    assert track.parameters[-1, 0] / made.inertias[0, 0] == pytest.approx(1.5)

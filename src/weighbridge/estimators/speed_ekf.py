@@ -48,12 +48,16 @@ class SpeedEkfSettings:
     initial_slope : sin(theta + beta) at the start [-]
     process_var : diagonal of Q for speed, inverse mass and slope; P starts there
     speed_var : R [m^2/s^2]
+    tail : part of the samples, the last, whose masses are averaged [-]
+    groups : equal groups that these are cut into
     """
 
     initial_mass: float | None = None
     initial_slope: float = 0.01
     process_var: tuple[float, float, float] = (0.1, 1e-12, 0.005)
     speed_var: float = 1e-4
+    tail: float = TAIL
+    groups: int = GROUPS
 
     def __post_init__(self) -> None:
         if self.initial_mass is not None and not self.initial_mass > 0.0:
@@ -63,6 +67,10 @@ class SpeedEkfSettings:
                 "process_var must not be negative and speed_var must be positive, "
                 f"got {self.process_var} and {self.speed_var}"
             )
+        if not 0.0 < self.tail <= 1.0:
+            raise ConfigError(f"tail must be in (0, 1], got {self.tail}")
+        if not self.groups >= 1:
+            raise ConfigError(f"groups must be at least 1, got {self.groups}")
 
 
 PRINTED: Final = SpeedEkfSettings(initial_mass=1500.0, process_var=(0.1, 1e-10, 0.005))
@@ -79,6 +87,7 @@ class FilterRun:
     slope : sin(theta + beta) [-]
     innovation, innovation_var : of the speed [m/s], [m^2/s^2]; NaN where it was off
     used : where the estimation was on
+    answer : mean of the converged masses [kg]; NaN without a sample
     """
 
     mass: Floats
@@ -87,6 +96,7 @@ class FilterRun:
     innovation: Floats
     innovation_var: Floats
     used: Bools
+    answer: float
 
 
 def run_filter(
@@ -128,29 +138,32 @@ def run_filter(
         innovation=innovation,
         innovation_var=innovation_var,
         used=used,
+        answer=mean_mass(running, used, settings.tail, settings.groups),
     )
 
 
-def mean_mass(mass: Floats, used: Bools) -> float:
+def mean_mass(mass: Floats, used: Bools, tail: float = TAIL, groups: int = GROUPS) -> float:
     """Average the converged masses, groups that still move left out (sec. 4).
 
-    The last `TAIL` of the samples used is cut into `GROUPS` equal groups; those
+    The last ``tail`` of the samples used is cut into ``groups`` equal groups; those
     whose standard deviation is not above the average one count.
 
     Parameters
     ----------
     mass : (n,) running [kg]
     used : (n,)
+    tail : part of the samples used [-]
+    groups : how many
 
     Returns
     -------
     [kg]; NaN without a sample
     """
     rows = mass[used]
-    rows = rows[rows.size - int(np.ceil(TAIL * rows.size)) :]
+    rows = rows[rows.size - int(np.ceil(tail * rows.size)) :]
     if rows.size == 0:
         return float("nan")
-    parts = np.array_split(rows, min(GROUPS, rows.size))
+    parts = np.array_split(rows, min(groups, rows.size))
     spread = np.array([np.std(part) for part in parts])
     # Equal spreads differ from their mean by rounding.
     calm = spread <= spread.mean() * (1.0 + 1e-9)
@@ -167,7 +180,7 @@ def start_share(balance: ForceBalance, vehicle: Vehicle, settings: SpeedEkfSetti
     ends = []
     for start in starts:
         done = run_filter(balance, vehicle, replace(settings, initial_mass=start))
-        ends.append(mean_mass(done.mass, done.used))
+        ends.append(done.answer)
     return (ends[1] - ends[0]) / (starts[1] - starts[0])
 
 
@@ -190,7 +203,7 @@ def estimate(
     count = int(np.count_nonzero(used))
     mass, std, share, bound = float("nan"), float("inf"), float("nan"), float("nan")
     if count:
-        mass = mean_mass(done.mass, used)
+        mass = done.answer
         std = float(np.hypot(done.std[-1], model.scale_std * mass))
         share = start_share(balance, vehicle, settings)
         free = run_filter(balance, vehicle, settings, flat=True)

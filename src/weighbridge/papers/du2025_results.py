@@ -22,7 +22,7 @@ class DriveResult:
     late_rmse : the same from `CONVERGED` [kg]
     worst : largest relative error of the running mass from `CONVERGED` [-]
     held : part of the instants from `CONVERGED` whose 95 % interval holds the truth [-]
-    seconds : computing time of each method, forces and motion given [s]
+    seconds : processor time of each method, forces and motion given [s]
     steady_at : time since the start from when on the running mass stays within `BAND` [s]
     twice_rmse : of robust-rls with the grade counted twice, from the first mass told [kg]
     blends : ``late_rmse`` of the hybrid by its blend
@@ -30,6 +30,8 @@ class DriveResult:
         is not known
     printed_mean : mean error of the running mass of the same [kg]
     printed_steady_at : ``steady_at`` of each method as printed, told the tyres' rolling resistance
+    printed_swing : farthest that the running mass of the same moves after a braking in the cruise
+        [-]
     """
 
     load: str
@@ -47,6 +49,7 @@ class DriveResult:
     printed: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_mean: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_steady_at: dict[str, float] = field(default_factory=dict)
+    printed_swing: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,14 +19,15 @@ from weighbridge.calibration.speed import (
     calibrate_by_speed,
     speed_rows,
 )
-from weighbridge.calibration.speed_fit import model_speed
+from weighbridge.calibration.speed_fit import Nominal, model_speed
+from weighbridge.errors import ConfigError
 from weighbridge.estimators.speed_ekf import (
     PRINTED,
     FilterRun,
     SpeedEkfSettings,
-    mean_mass,
     run_filter,
 )
+from weighbridge.estimators.speed_torque_ekf import SpeedTorqueSettings
 from weighbridge.papers.galvao_drives import (
     CAR,
     NOMINAL,
@@ -40,6 +41,7 @@ from weighbridge.papers.galvao_items import ITEMS as ITEMS
 from weighbridge.papers.galvao_results import LAST, Reproduction, Test, Trial
 from weighbridge.papers.galvao_statistics import rank_correlation, slope
 from weighbridge.papers.galvao_torque import (
+    FROM_PRINTED_START,
     torque_table,
     torque_trial,
 )
@@ -89,12 +91,32 @@ class Settings:
 
     Attributes
     ----------
-    printed : start and noise as the paper prints them
+    printed : start, noise and mean as the paper prints them
     ours : those of ``speed-ekf``
+    torque : those of ``speed-torque-ekf``, which has the torque recorded
+    model : constants of the model of eq. 11
+    sample_time : between samples of the speed [s]
     """
 
     printed: SpeedEkfSettings = PRINTED
     ours: SpeedEkfSettings = field(default_factory=SpeedEkfSettings)
+    torque: SpeedTorqueSettings = FROM_PRINTED_START
+    model: Nominal = NOMINAL
+    sample_time: float = SAMPLE_TIME
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.sample_time <= 60.0:
+            raise ConfigError(f"sample_time must be in [1, 60] s, got {self.sample_time:g}")
+
+    def fitted(self, known: SimulatedDrive, mass: float | None = None) -> SpeedCalibration:
+        """Fit the model to a drive of known grade, told its mass or another [kg]."""
+        return calibrate_by_speed(
+            [with_grade(known)],
+            [mass_of(known) if mass is None else mass],
+            Vehicle(name=CAR.name),
+            nominal=self.model,
+            sample_time=self.sample_time,
+        )
 
 
 SEED: Final = 196_200
@@ -119,10 +141,8 @@ def weigh_three(
     """Drive one road three times, fit the model to the first drive and weigh all three."""
     route = easy_route(seed)
     drives = tuple(simulate_car(scenario(seed + k, route)) for k in range(3))
-    fitted = calibrate_by_speed(
-        [with_grade(drives[0])], [mass_of(drives[0])], Vehicle(name=CAR.name), nominal=NOMINAL
-    )
     settings = settings or Settings()
+    fitted = settings.fitted(drives[0])
     tests = tuple(_test(k, made, fitted.vehicle, settings) for k, made in enumerate(drives, 1))
     return fitted, drives, tests
 
@@ -140,9 +160,8 @@ def reproduce(
     """
     total = 8
     settings = settings or Settings()
-    base = Vehicle(name=CAR.name)
     fitted, drives, tests = weigh_three(seed, settings)
-    vehicle, known = fitted.vehicle, with_grade(drives[0])
+    vehicle = fitted.vehicle
     _tell(progress, 1, total)
 
     second = tests[1]
@@ -151,14 +170,14 @@ def reproduce(
         ends = []
         for one in (settings.ours, settings.printed):
             run = run_filter(second.balance, vehicle, replace(one, initial_mass=start))
-            ends.append(mean_mass(run.mass, run.used))
+            ends.append(run.answer)
         starts.append((start, ends[0], ends[1]))
     stated = []
     for mass in STATED:
-        other = calibrate_by_speed([known], [mass], base, nominal=NOMINAL)
+        other = settings.fitted(drives[0], mass)
         balance = speed_balance(drives[1].drive, other.vehicle)
         run = run_filter(balance, other.vehicle, settings.ours)
-        stated.append((mass, mean_mass(run.mass, run.used), other.fit.r_squared))
+        stated.append((mass, run.answer, other.fit.r_squared))
     _tell(progress, 2, total)
 
     trials = []
@@ -186,7 +205,7 @@ def reproduce(
         ]
         trials.append(_trial(kind, made, vehicle, settings))
         _tell(progress, 3 + step, total)
-    torque = torque_trial(seed, easy_route(seed))
+    torque = torque_trial(seed, easy_route(seed), settings.torque)
     _tell(progress, total, total)
     return Reproduction(
         vehicle=vehicle,
@@ -206,7 +225,7 @@ def _tell(progress: Progress | None, done: int, total: int) -> None:
 
 def _test(number: int, made: SimulatedDrive, vehicle: Vehicle, settings: Settings) -> Test:
     mass = mass_of(made)
-    rows = speed_rows(with_grade(made), vehicle, mass, SAMPLE_TIME)
+    rows = speed_rows(with_grade(made), vehicle, mass, settings.sample_time)
     balance = speed_balance(made.drive, vehicle)
     assert vehicle.speed_model is not None
     return Test(
@@ -228,7 +247,7 @@ def _trial(kind: str, scenarios: Sequence[Scenario], vehicle: Vehicle, settings:
         ours = run_filter(balance, vehicle, settings.ours)
         free = run_filter(balance, vehicle, PINNED, flat=True)
         masses.append(mass_of(made))
-        answers.append(mean_mass(ours.mass, ours.used))
+        answers.append(ours.answer)
         pinned.append(float(free.mass[-1]))
     return Trial(
         kind=kind, masses=np.array(masses), answers=np.array(answers), pinned=np.array(pinned)
@@ -278,10 +297,10 @@ def tests_table(done: Reproduction) -> Table:
                 error,
                 f"± {half:.0f}",
                 f"{test.mass:.1f}",
-                f"{mean_mass(test.ours.mass, test.ours.used):.2f}",
+                f"{test.ours.answer:.2f}",
                 f"{100.0 * abs(test.error(test.ours)):.4f}",
                 f"± {test.band(test.ours):.0f}",
-                f"{mean_mass(test.printed.mass, test.printed.used):.0f}",
+                f"{test.printed.answer:.0f}",
                 f"{100.0 * abs(test.error(test.printed)):.1f}",
                 f"± {test.band(test.printed):.0f}",
             )
@@ -370,7 +389,7 @@ def _panels(test: Test) -> list[Panel]:
     name = f"Test {test.number:02d}"
     used = test.ours.used
     speed = blank("Time [min]", "Speed [km/h]")
-    line(speed, minutes, from_si(test.rows.speed, "kmh"), "measured, means of 7 s", GREY)
+    line(speed, minutes, from_si(test.rows.speed, "kmh"), "measured, means", GREY)
     steps = np.isfinite(test.predicted)
     dots(speed, minutes[steps], from_si(test.predicted[steps], "kmh"), "model, one step ahead",
          VERMILLION, size=5)  # fmt: skip
@@ -389,7 +408,7 @@ def _panels(test: Test) -> list[Panel]:
     return [
         Panel(
             title=f"{name}: model speed against measured speed (fig. {6 + test.number})",
-            caption=f"One step of 7 s ahead, with the true grade; off by {off:.2f} m/s RMS. "
+            caption=f"One step ahead, with the true grade; off by {off:.2f} m/s RMS. "
             "The model was fitted to Test 01.",
             figure=speed,
         ),

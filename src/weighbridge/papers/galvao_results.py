@@ -9,7 +9,7 @@ import numpy as np
 
 from weighbridge.balance import ForceBalance
 from weighbridge.calibration.speed_fit import SpeedRows
-from weighbridge.estimators.speed_ekf import FilterRun, mean_mass
+from weighbridge.estimators.speed_ekf import FilterRun
 from weighbridge.papers.galvao_torque import TorqueTrial
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
@@ -43,7 +43,7 @@ class Test:
 
     def error(self, run: FilterRun) -> float:
         """Relative error of the mean mass of a run [-]."""
-        return mean_mass(run.mass, run.used) / self.mass - 1.0
+        return run.answer / self.mass - 1.0
 
     def band(self, run: FilterRun) -> float:
         """Widest half of the 95 % band over the last samples used [kg]."""

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 from scipy.stats import gaussian_kde
 
 from weighbridge.estimators.rls import run_in_turn
+from weighbridge.papers.jensen2022_gradient import gradient_panel
 from weighbridge.papers.jensen2022_judged import BAND, DriveResult, Torques, joined, kilometres
 from weighbridge.papers.jensen2022_reproduction import LOADED, Reproduction, Sample
 from weighbridge.papers.jensen2022_tables import (
@@ -51,7 +52,7 @@ _CELLS: Final = 500
 
 def panels(done: Reproduction) -> tuple[Panel, ...]:
     """Return every figure of the paper that shows data of a drive, in its order."""
-    found = [_scatter_matrix(done.sample)]
+    found = [_scatter_matrix(done.sample), gradient_panel(done.gradient)]
     for way, parts in (("printed", done.printed_loads), ("ours", done.loads)):
         if parts:
             found.append(_torque_panel(joined(parts), way))

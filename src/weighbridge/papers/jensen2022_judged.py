@@ -26,9 +26,6 @@ BAND: Final = 0.05
 ONE_DEGREE: Final = scalar_to_si(1.0, "deg")
 """The paper's largest error of the pitch [rad]."""
 
-ENGINE_EFFICIENCY: Final = 0.33
-"""Of eq. 51 [-]."""
-
 _MOVING: Final = 1.5
 """Slower, angles are not judged [m/s]."""
 
@@ -174,7 +171,13 @@ class Torques:
 
 
 def torques(
-    drive: Drive, balance: ForceBalance, vehicle: Vehicle, mass: float, rows: Bools
+    drive: Drive,
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    mass: float,
+    rows: Bools,
+    *,
+    efficiency: float,
 ) -> Torques:
     """Find the torque of a drive of known mass three ways.
 
@@ -184,6 +187,7 @@ def torques(
     balance, vehicle : it was weighed by
     mass : true [kg]
     rows : (n,) of the balance, to take
+    efficiency : of the engine in eq. 51 [-]
     """
     table = balance.table
     rest = table.traction_force - force_on_mass(table, vehicle)
@@ -194,7 +198,7 @@ def torques(
         drive.signals["mass_air_flow"].at(stamps),
         drive.signals["engine_speed"].at(stamps),
         np.ones(stamps.size) if equivalence is None else equivalence.at(stamps),
-        ENGINE_EFFICIENCY,
+        efficiency,
     )
     # Efficiency is one after a calibration: torque and force go by the gearing alone.
     motion = needed / table.gearing

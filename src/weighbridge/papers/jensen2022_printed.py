@@ -34,6 +34,9 @@ from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 TYRE_RADIUS: Final = 0.319
 """Outer tyre radius [m] (Table 1)."""
 
+GRID: Final = ("grid_drag_area", "grid_rolling", "grid_engine", "grid_wheels")
+"""Settings of the grid, in the order of the road parameters."""
+
 _NOT_THERE: Final = (Reason.STANDING, Reason.NO_MOTION, Reason.NO_TORQUE)
 """Reasons against rows that the paper has as well: they carry nothing."""
 
@@ -47,7 +50,10 @@ class PrintedSettings:
     forgetting, initial_mass, initial_gain : of eqs. 7-9 [-], [kg], [s^4/m^2]
     order : highest power of engine speed in eq. 49
     grid : solve on the grid of Table 5; the least squares with its limits else
+    grid_drag_area, grid_rolling, grid_engine, grid_wheels : lower limit, upper limit and step of
+        C_d A [m^2], C_r [-], I_e and I_w [kg m^2] in Table 5
     gear_width : half width of the intervals of eq. 50 over their centre [-]
+    engine_efficiency : of eq. 51, which the paper chose by the largest torque [-]
     filter : noise, start and windows of the navigation
     """
 
@@ -56,7 +62,12 @@ class PrintedSettings:
     initial_gain: float = 1000.0
     order: int = 2
     grid: bool = True
+    grid_drag_area: tuple[float, float, float] = (0.30, 1.00, 0.05)
+    grid_rolling: tuple[float, float, float] = (0.002, 0.030, 0.002)
+    grid_engine: tuple[float, float, float] = (0.02, 1.00, 0.02)
+    grid_wheels: tuple[float, float, float] = (2.0, 12.0, 1.0)
     gear_width: float = 0.02
+    engine_efficiency: float = 0.33
     filter: PrintedFilterSettings = field(default_factory=PrintedFilterSettings)
 
     def __post_init__(self) -> None:
@@ -64,6 +75,28 @@ class PrintedSettings:
             raise ConfigError(f"order must be between 1 and 4, got {self.order}")
         if not 0.001 <= self.gear_width <= 0.05:
             raise ConfigError(f"gear_width must be in [0.001, 0.05], got {self.gear_width:g}")
+        if not 0.05 <= self.engine_efficiency <= 0.6:
+            raise ConfigError(
+                f"engine_efficiency must be in [0.05, 0.6], got {self.engine_efficiency:g}"
+            )
+        for name, (low, high, step) in zip(GRID, self._limits, strict=True):
+            if not (0.0 <= low <= high and step > 0.0 and (high - low) / step < 1000.0):
+                raise ConfigError(
+                    f"{name} takes a lower limit, an upper one and a step, less than 1000 steps, "
+                    f"got {low:g}, {high:g}, {step:g}"
+                )
+
+    @property
+    def _limits(self) -> tuple[tuple[float, float, float], ...]:
+        return tuple(getattr(self, name) for name in GRID)
+
+    @property
+    def axes(self) -> tuple[Floats, ...]:
+        """Values of each road parameter on the grid."""
+        return tuple(
+            np.asarray(low + step * np.arange(round((high - low) / step) + 1), dtype=np.float64)
+            for low, high, step in self._limits
+        )
 
     @property
     def rls(self) -> RlsSettings:
@@ -145,7 +178,7 @@ def calibrate_as_printed(
         curved=False,
         rows=used,
     )
-    coefficients, road = _solved(rows, draft, grid=settings.grid)
+    coefficients, road = _solved(rows, draft, settings)
     vehicle = fitted_vehicle(draft, coefficients, road)
     return PrintedCar(
         vehicle=vehicle,
@@ -205,10 +238,10 @@ def fitted_vehicle(draft: Vehicle, coefficients: Floats, road: Floats) -> Vehicl
     )
 
 
-def _solved(rows: TorqueRows, draft: Vehicle, *, grid: bool) -> tuple[Floats, Floats]:
+def _solved(rows: TorqueRows, draft: Vehicle, settings: PrintedSettings) -> tuple[Floats, Floats]:
     """Regression weights and road parameters of eq. 48, plain squares."""
-    if grid:
-        coefficients, road, _ = grid_search(rows, np.ones(rows.target.size))
+    if settings.grid:
+        coefficients, road, _ = grid_search(rows, np.ones(rows.target.size), settings.axes)
         return coefficients, road
     # The first round weighs all rows alike.
     once = fit(rows, *draft.of_class.road_bounds, iterations=1)

@@ -23,6 +23,7 @@ from weighbridge.papers.jensen2022_drives import (
     scenario,
     without_weather,
 )
+from weighbridge.papers.jensen2022_gradient import GradientRun, gradient_runs
 from weighbridge.papers.jensen2022_judged import (
     DriveResult,
     Torques,
@@ -137,6 +138,7 @@ class Reproduction:
     sample : drive 1
     highways, printed_highways : trips of fig. 16
     outage_grade_rms : grade error within the outage with and without fixes [rad]
+    gradient : the runs of fig. 5
     """
 
     settings: Settings
@@ -155,11 +157,12 @@ class Reproduction:
     highways: tuple[HighwayResult, ...]
     printed_highways: tuple[HighwayResult, ...]
     outage_grade_rms: tuple[float, float]
+    gradient: tuple[GradientRun, ...] = ()
 
     @property
     def last_seed(self) -> int:
         """Of the last drive simulated."""
-        return self.seed + len(self.drives) + len(self.highways)
+        return self.seed + len(self.drives) + len(self.highways) + len(self.gradient)
 
 
 def reproduce(
@@ -175,13 +178,14 @@ def reproduce(
     Parameters
     ----------
     seed : of the calibration drive; the drives of the table count on from it, then the trips
+        and the runs of fig. 5
     drives : rows of the table; the first is looked at for figs. 4 and 9
     trips : of the highway
     settings : what the paper varies
     progress : called with drives done and drives in all
     """
     settings = settings or Settings()
-    total = len(drives) + len(trips) + 2
+    total = len(drives) + len(trips) + 3
     known = simulate_car(make_scenario("car-calibration", seed=seed))
     mass = float(np.mean(known.truth.mass))
     fit = CalibrationSettings(method="rls", curved=settings.curved)
@@ -206,6 +210,10 @@ def reproduce(
             progress(1 + k, total)
     outage = _outage(drives[0], car, seed + 1, settings)
     if progress:
+        progress(total - 1, total)
+    last = seed + len(drives) + len(trips)
+    gradient = gradient_runs(last + 1, car, cars.printed, settings.printed)
+    if progress:
         progress(total, total)
     return Reproduction(
         settings=settings,
@@ -224,6 +232,7 @@ def reproduce(
         highways=tuple(ours for ours, _ in ways),
         printed_highways=tuple(printed for _, printed in ways),
         outage_grade_rms=outage,
+        gradient=gradient,
     )
 
 
@@ -256,12 +265,16 @@ def _weighed(row: TestDrive, seed: int, cars: _Cars, settings: Settings) -> _Wei
     informed = judge(row, made, weigh(made.drive, cars.informed, method="rls", settings=own))
     printed = judge_track(row, made, weigh_as_printed(drive, cars.printed, settings.printed))
     mass, by_print = ours.true_mass, cars.printed.vehicle
-    three = torques(drive, printed.balance, by_print, mass, pulling(printed.balance))
+    efficiency = settings.printed.engine_efficiency
+    rows = pulling(printed.balance)
+    three = torques(drive, printed.balance, by_print, mass, rows, efficiency=efficiency)
     return _Weighed(
         ours=ours,
         informed=informed,
         printed=printed,
-        torques=torques(drive, ours.balance, cars.ours, mass, ours.track.used),
+        torques=torques(
+            drive, ours.balance, cars.ours, mass, ours.track.used, efficiency=efficiency
+        ),
         printed_torques=three,
         sample=Sample(drive=drive, torques=three),
     )

@@ -7,8 +7,11 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from scipy.signal import find_peaks
+from scipy.stats import gaussian_kde
 
 from weighbridge.estimators.rls import RlsSettings, run_in_turn
+from weighbridge.papers.jensen2022_gradient import gradient_figures
 from weighbridge.papers.jensen2022_judged import BAND, DriveResult, joined, rms, within
 from weighbridge.papers.jensen2022_reproduction import (
     HighwayResult,
@@ -19,7 +22,7 @@ from weighbridge.papers.reproduced import Comparison
 from weighbridge.report.table import Table
 from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Floats
-from weighbridge.signals.units import scalar_from_si, scalar_to_si
+from weighbridge.signals.units import from_si, scalar_from_si, scalar_to_si
 from weighbridge.vehicle.model import Vehicle
 
 PAPER_R_SQUARED: Final = 0.972
@@ -111,6 +114,10 @@ def figures(done: Reproduction) -> dict[str, str]:
         "seeds": f"{done.seed}-{done.last_seed}",
         "ratio_printed": percent(_largest(done.printed_ratio_errors)),
         "ratio_ours": percent(_largest(done.ratio_errors)),
+        "gears_printed": _gears(done.printed_car.vehicle),
+        "gears_ours": _gears(done.car),
+        "speed_peaks": _peaks(done),
+        "hills_printed": _hills(done.printed),
         "r2_printed": f"{done.printed_car.r_squared:.3f}",
         "r2_ours": f"{unweighted(done.calibration):.3f}",
         "r2_weighted": f"{done.calibration.rows.r_squared:.3f}",
@@ -145,10 +152,13 @@ def figures(done: Reproduction) -> dict[str, str]:
     ):
         for way, drives in (("printed", done.printed), ("ours", done.drives)):
             found[f"{name}_{way}"] = _day([d for d in drives if d.drive.number in numbers])
+    for way, drives in (("printed", done.printed), ("ours", done.drives)):
+        found[f"loads_{way}"] = _loads(drives)
     for way, drives, car, rls in ways(done):
         found |= {f"{k}_{way}": v for k, v in _memory(done, drives, car, rls).items()}
         found |= {f"{k}_{way}": v for k, v in _perturbed(done, drives, car, rls).items()}
         found |= {f"{k}_{way}": v for k, v in _highway(done, way, car, rls).items()}
+    found |= gradient_figures(done.gradient)
     for wind in ("high", "low"):
         errors = [h.joint / h.true_mass - 1.0 for h in done.highways if h.trip.wind == wind]
         found[f"{wind}_joint"] = ", ".join(f"{100.0 * e:+.1f}" for e in errors) + " %"
@@ -235,6 +245,10 @@ def _perturbed(
             if mass is not neutral
         ]
         found[kind] = ", ".join(moved)
+        if kind == "wind":
+            found["calm"] = ", ".join(
+                f"{value:g}: ± {np.std(mass[part]):.0f} kg" for value, mass in cases.items()
+            )
     return found
 
 
@@ -262,6 +276,38 @@ def _day(drives: Sequence[DriveResult]) -> str:
         f"{within(drives)} of {len(drives)} within; worst {percent(max(d.worst for d in drives))}; "
         f"means {means} %"
     )
+
+
+def _loads(drives: Sequence[DriveResult]) -> str:
+    """Mass found above the unloaded drive of the day, for both loads of fig. 12."""
+    found = {d.drive.number: (1.0 + d.typical) * d.true_mass for d in drives}
+    said = []
+    for numbers, load in (((5, 6), 125), ((7, 8), 240)):
+        if 4 in found and all(n in found for n in numbers):
+            more = np.mean([found[n] for n in numbers]) - found[4]
+            said.append(f"{more:+.0f} kg for {load}")
+    return ", ".join(said) or "not driven"
+
+
+def _peaks(done: Reproduction) -> str:
+    """Speeds at which the density of the vehicle speed of drive 1 has a peak (fig. 4)."""
+    speed = from_si(done.sample.drive.signals["vehicle_speed"].values, "kmh")
+    along = np.arange(-20.0, 160.0)
+    density = gaussian_kde(speed, bw_method=0.1)(along)
+    peaks, _ = find_peaks(density, prominence=0.02 * float(density.max()))
+    return ", ".join(f"{abs(along[k]):.0f}" for k in peaks) + " km/h"
+
+
+def _hills(drives: Sequence[DriveResult]) -> str:
+    """Steepest pitch down and up of drives 1-3, but for a thousandth of the time each (fig. 10)."""
+    pitch = np.concatenate([d.balance.motion.pitch for d in drives[:3]])
+    low, high = from_si(np.quantile(pitch, [0.001, 0.999]), "deg")
+    return f"{low:+.1f} to {high:+.1f}°"
+
+
+def _gears(car: Vehicle) -> str:
+    """Gearings in turns per minute over metres per second, as in table 4."""
+    return ", ".join(f"{scalar_from_si(g, 'rpm'):.1f}" for g in car.driveline.gearings)
 
 
 def _inside(drives: Sequence[DriveResult]) -> str:
