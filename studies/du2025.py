@@ -12,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import du2025_bus
+import du2025_imm
 import matplotlib
 import numpy as np
 
@@ -110,6 +111,7 @@ PARTS = {
     "bus": du2025_bus.bus,
     "opposite": du2025_bus.opposite,
     "city": du2025_bus.city,
+    "interacting": du2025_imm.interacting,
     "second": du2025_bus.second,
     "urban": du2025_bus.urban,
     "bends": du2025_bus.bends,
