@@ -211,6 +211,10 @@ def test_percent_of_a_reference_torque(empty):
     assert car.torque.told_reference_torque == 250.0
 
 
+def test_the_steps_of_the_reading_are_kept(car):
+    assert car.torque.reading_step == pytest.approx(1.0 / 255.0, rel=1e-4)
+
+
 def test_known_speed_scale_stays_where_the_drive_shows_none(empty):
     alone = empty.drive.without(
         *(n for n in empty.drive.signals if n.startswith(("gnss", "lat", "lon", "alt")))

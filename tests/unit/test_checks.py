@@ -158,6 +158,18 @@ def test_gyro_in_degrees(sane):
     assert "seems to be in deg/s: name its columns gyro_x_degps" in only(fast).text
 
 
+def test_a_gyro_that_stays_at_zero_is_stuck(sane):
+    still = scaled(sane, **dict.fromkeys(GYRO, 0.0))
+    assert "gyro_x is 0 radps all the time" in only(still).text
+
+
+def test_a_speed_that_runs_against_the_positions_is_of_another_drive(sane):
+    speed = sane.signals["vehicle_speed"]
+    other = Signal(speed.name, speed.time, -0.05 * speed.values)
+    texts = [p.text for p in serious(sane.with_signals(other).without("gnss_speed"))]
+    assert any("the two are of different drives" in text for text in texts)
+
+
 def test_slow_gyro_in_degrees_is_seen_against_the_course():
     # A road of wide bends: too slow to stand out by itself.
     gentle = make_drive(bends=0.4)

@@ -21,6 +21,7 @@ from weighbridge.calibration.problem import Problem, checked, problem_of
 from weighbridge.calibration.rls import fit_rls
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.calibration.speed import SpeedCalibration, calibrate_by_speed
+from weighbridge.checks.steps import SAME, reading_step
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.judging import HIDDEN_BRAKE_STD
@@ -130,7 +131,9 @@ def run_calibration(
     done = replace(
         fitted.vehicle,
         torque=replace(
-            fitted.vehicle.torque, told_reference_torque=_told_reference(recorded, problem)
+            fitted.vehicle.torque,
+            told_reference_torque=_told_reference(recorded, problem),
+            reading_step=_reading_step(recorded, problem),
         ),
         witnesses=witnesses or fitted.vehicle.witnesses,
         provenance=replace(
@@ -197,6 +200,15 @@ def _told_reference(drives: Sequence[Drive], problem: Problem) -> float | None:
     if len(said) != len(drives) or max(said) > (1.0 + SAME_REFERENCE) * min(said):
         return None
     return float(np.median(said))
+
+
+def _reading_step(drives: Sequence[Drive], problem: Problem) -> float | None:
+    """Return the step in which all drives tell the torque's reading [SI]; None if they differ."""
+    signals = [drive.get(problem.source.found(drive)[0]) for drive in drives]
+    steps = [reading_step(signal.values) if signal else 0.0 for signal in signals]
+    if not min(steps) > 0.0 or max(steps) > (1.0 + SAME) * min(steps):
+        return None
+    return float(f"{np.median(steps):.6g}")
 
 
 def _with_notes(

@@ -18,8 +18,10 @@ from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
 from weighbridge.checks.mending import mended
 from weighbridge.checks.ranges import check_range, within_ranges, without_strays
+from weighbridge.checks.smoothed_imu import check_smoothed
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
+from weighbridge.checks.steps import check_steps
 from weighbridge.checks.travel import check_sign, check_standstill
 from weighbridge.checks.values import check_load, check_pressure, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
@@ -39,6 +41,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_stuck,
     check_frozen,
     check_limit,
+    check_smoothed,
     check_load,
     check_pressure,
     check_retarder,
@@ -49,6 +52,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_scales,
     check_imu,
     check_vehicle,
+    check_steps,
     check_range,
     check_standstill,
 )

@@ -58,6 +58,8 @@ def check_imu(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     drive = thawed(drive, IMU_SIGNALS)
     accel = _axes(drive, "accel")
     gyro = _axes(drive, "gyro")
+    if gyro is not None and not any(np.ptp(s.values) > 0.0 for s in gyro):
+        gyro = None  # It is stuck, and told so.
     fine = True
     if accel is not None:
         for problem in _check_gravity(accel):

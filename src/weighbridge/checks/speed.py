@@ -170,6 +170,13 @@ def _scale_problem(
     """Judge a speed that reads ``ratio`` times another source of it."""
     if abs(ratio - 1.0) < _TOLERANCE:
         return None
+    if not ratio > 0.0:
+        return Problem(
+            name,
+            f"{name} falls where the speed from {source} rises: the two are of different drives, "
+            "or one of them is false; record them together",
+            serious=True,
+        )
     expected = min((c[2] for c in _CONFUSIONS), key=lambda e: abs(np.log(ratio / e)))
     stem = "speed" if name == "gnss_speed" else name
     if abs(np.log(ratio / expected)) < near:

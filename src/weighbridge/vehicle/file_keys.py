@@ -144,6 +144,11 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "100 % torque, as the drives of the calibration said it",
                 suffix="nm",
             ),
+            Key(
+                "reading_step",
+                "reading_step",
+                "steps in which the drives of the calibration told it, in SI",
+            ),
             Key("engine_efficiency", "engine_efficiency", "shaft over fuel power, for air_flow"),
             Key("noise", "noise", "standard deviation of the torque", suffix="nm"),
             Key("scale_std", "scale_std", "of a torque never calibrated: how sure its scale is"),

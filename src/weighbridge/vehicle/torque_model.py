@@ -38,6 +38,8 @@ class TorqueModel:
     knot_slopes : that correction at the knots, in the unit of w1
     reference_torque : for "percent" where the drive does not carry it [N m]
     told_reference_torque : what the drives of the calibration said that 100 % are [N m]
+    reading_step : step in which the drives of the calibration told the reading [SI]; None where
+        they showed none
     engine_efficiency : for "air_flow", shaft over fuel power [-]
     noise : standard deviation of the torque from this source [N m]
     scale_std : relative standard deviation of the scale of a torque that was never calibrated
@@ -55,6 +57,7 @@ class TorqueModel:
     knot_slopes: tuple[float, ...] = ()
     reference_torque: float | None = None
     told_reference_torque: float | None = None
+    reading_step: float | None = None
     engine_efficiency: float = 0.33
     noise: float | None = None
     scale_std: float | None = None
@@ -91,6 +94,8 @@ class TorqueModel:
         within("reference_torque", self.reference_torque, 1.0, 1e6, "N m")
         positive("told_reference_torque", self.told_reference_torque)
         within("told_reference_torque", self.told_reference_torque, 1.0, 1e6, "N m")
+        positive("reading_step", self.reading_step)
+        within("reading_step", self.reading_step, 1e-12, 1e9)
         positive("noise", self.noise)
         within("noise", self.noise, 1e-15, 1e6, "N m")
         not_negative("scale_std", self.scale_std)

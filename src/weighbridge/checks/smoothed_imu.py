@@ -1,0 +1,84 @@
+"""Was the accelerometer smoothed? A road shakes a vehicle, and a raw sensor shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from weighbridge.navigation.frozen import thawed
+from weighbridge.signals import Drive, Floats, Problem, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.instants import span
+from weighbridge.vehicle.model import Vehicle
+
+SECOND: Final = 1.0
+"""What an axis reads beside its mean over so long is the shaking [s]."""
+
+BLOCK: Final = 30.0
+"""Shaking is judged over so long [s]."""
+
+QUIET: Final = 0.025
+"""Root mean square of the shaking, of the axis that shakes most, below which it was smoothed
+[m/s^2]: 0.26 to 0.68 in raw sensors of cars, vans and trucks of two simulators, 0.08 to 0.23 in
+means over 0.3 s and 0.026 to 0.06 over 1 s, which do no harm; 0.017 to 0.024 over 2 s and 0.010 to
+0.020 over 3 s, of which masses came out up to 15 % heavy."""
+
+MADE: Final = 0.001
+"""Less is no sensor's, but a simulation's without noise, and tells nothing [m/s^2]."""
+
+FAST: Final = 5.0
+"""A slower vehicle need not shake [m/s]."""
+
+PART: Final = 0.2
+"""Part of the driving that has to be quiet [-]."""
+
+SLOWEST: Final = 0.2
+"""Samples further apart do not show the shaking [s]."""
+
+
+def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find an accelerometer whose shaking was filtered away, and quick changes with it."""
+    speed = drive.speed
+    drive = thawed(drive, IMU_SIGNALS[:3])
+    axes = [s for name in IMU_SIGNALS[:3] if (s := drive.get(name)) is not None and len(s) > 1]
+    if speed is None or len(speed) < 2 or len(axes) < len(IMU_SIGNALS[:3]):
+        return
+    if max(s.period for s in axes) > SLOWEST:
+        return
+    start, count = drive.start, int((drive.end - drive.start) / BLOCK) + 1
+    shaking = np.zeros(count)
+    for axis in axes:
+        shaking = np.fmax(shaking, _shaking(axis, speed, start, count))
+    driven = shaking > MADE
+    quiet = driven & (shaking < QUIET)
+    if not quiet.any() or np.count_nonzero(quiet) < max(2.0, PART * np.count_nonzero(driven)):
+        return
+    first, last = np.flatnonzero(quiet)[[0, -1]]
+    end = min(start + BLOCK * (last + 1), drive.end)
+    yield Problem(
+        axes[0].name,
+        f"the accelerometer shakes by {float(np.median(shaking[quiet])):.2g} m/s^2 only within "
+        f"{SECOND:g} s as the vehicle drives, from {span(round(start + BLOCK * first), round(end))}"
+        ", and a road shakes it by 0.1 and more: it was smoothed, and quick changes of the motion "
+        "are lost; record it unfiltered",
+        serious=True,
+    )
+
+
+def _shaking(axis: Signal, speed: Signal, start: float, count: int) -> Floats:
+    """Root mean square of an axis beside its mean, by blocks (count,); 0 where nothing drives."""
+    long = max(2, round(SECOND / axis.period))
+    if len(axis) <= 2 * long:
+        return np.zeros(count)
+    total = np.concatenate(([0.0], np.cumsum(axis.values - axis.values[0])))
+    mean = (total[long:] - total[:-long]) / long + axis.values[0]
+    middle = slice(long // 2, long // 2 + mean.size)
+    time, beside = axis.time[middle], axis.values[middle] - mean
+    moving = np.interp(time, speed.time, np.abs(speed.values)) > FAST
+    block = ((time[moving] - start) / BLOCK).astype(np.int64)
+    square = np.bincount(block, beside[moving] ** 2, minlength=count)
+    samples = np.bincount(block, minlength=count)
+    enough = samples * axis.period > 0.3 * BLOCK
+    return np.asarray(np.sqrt(np.where(enough, square / np.maximum(samples, 1), 0.0)))
