@@ -24,7 +24,7 @@ from weighbridge.estimators.joint.bend import BENT
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.navigation.select import find_motion, without_accelerometer
-from weighbridge.pipeline.notes import below_tare
+from weighbridge.pipeline.notes import below_tare, lighter_than_known
 from weighbridge.pipeline.weighing import weigh_balance
 from weighbridge.signals import QUANTITIES, Drive, Signal
 from weighbridge.simulation import simulate_car
@@ -184,6 +184,13 @@ def test_a_torque_through_a_filter_of_seconds_is_found(fleet):
     slow = with_signal(drive, SOURCE["car"], filtered)
     said = smoothed_torque(force_balance(slow, vehicle, motion, delay=late + 1.0), vehicle)
     assert "was smoothed" in said
+
+
+def test_a_torque_of_the_other_sign_is_blamed_on_nothing_else(fleet):
+    drive = fleet.drive("electric")
+    turned = with_signal(drive, SOURCE["electric"], lambda t, x: -x)
+    with pytest.raises(DriveError, match="runs against the motion it makes: its sign was turned"):
+        fleet.weigh_alone("electric", turned)
 
 
 def test_a_change_of_scale_that_is_likely_and_not_sure_is_told():
@@ -402,6 +409,21 @@ def test_a_speed_ten_percent_off_is_not_in_miles():
     assert told(even, 1.1) == []
     assert told(uneven, 1.1) == []
     assert any("it seems to be in mph" in text for text in told(uneven, 1.0 / 1.609344))
+
+
+def test_lighter_than_all_of_the_calibration_is_told_without_a_tare(fleet):
+    result = fleet.weigh("truck", fleet.drive("truck")).result
+    sure = replace(result, std=0.01 * result.mass)
+
+    def told(lightest, **known):
+        made = fleet.files["truck"]
+        masses = replace(made.provenance, masses=(lightest * result.mass,))
+        return lighter_than_known(replace(made, provenance=masses, **known), sure)
+
+    (note,) = told(1.25)
+    assert "the mass is 20 % below" in note
+    assert told(1.1) == ()
+    assert told(1.25, tare=0.9 * result.mass) == ()
 
 
 def test_a_payload_below_nothing_is_told_or_refused(fleet):

@@ -102,6 +102,29 @@ def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
     )
 
 
+LIGHTER: Final = 0.9
+"""Masses below so much of the lightest of the calibration are told, where no tare is stated [-]."""
+
+
+def lighter_than_known(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
+    """Say in a sentence whether a mass is far below all of the calibration; nothing if not.
+
+    Where the vehicle file states its tare, that tells more.
+    """
+    masses = vehicle.provenance.masses
+    if vehicle.tare is not None or not masses or result.status is not Status.CONVERGED:
+        return ()
+    lightest = min(masses)
+    if result.mass + 2.0 * result.std >= LIGHTER * lightest:
+        return ()
+    below = 100.0 * (1.0 - result.mass / lightest)
+    return (
+        f"the mass is {below:.0f} % below the {lightest:.0f} kg of the lightest drive of the "
+        "calibration: if no load was in that drive, the torque or load reads too low now; state "
+        "tare_kg under [vehicle] of the vehicle file, so that it can be checked",
+    )
+
+
 def what_is_missing(drive: Drive, vehicle: Vehicle) -> str:
     """Say which signals a drive lacks for this vehicle; empty if none."""
     source = source_of(vehicle)

@@ -13,7 +13,12 @@ from weighbridge.arguments import check_flag, check_path, check_text, check_type
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
 from weighbridge.balance.circumference import on_its_tyres
-from weighbridge.balance.delay import clock_shift, estimate_torque_delay, far_shift
+from weighbridge.balance.delay import (
+    clock_shift,
+    estimate_torque_delay,
+    far_shift,
+    turned_torque,
+)
 from weighbridge.balance.gear_fit import ENOUGH, foreign_part, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.shaking import shaken
@@ -22,7 +27,7 @@ from weighbridge.balance.torque_drift import steadied
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
 from weighbridge.estimators.joint.bend import bent
-from weighbridge.estimators.joint.changing import largest
+from weighbridge.estimators.joint.changing import in_place_of_loads, largest
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
 from weighbridge.estimators.settings import differences
@@ -41,6 +46,7 @@ from weighbridge.pipeline.notes import (
     below_tare,
     beside_speed,
     fitted_for_another,
+    lighter_than_known,
     no_speed,
     other_equipment,
     overload,
@@ -236,9 +242,12 @@ def weigh_balance(
             status, reason = Status.INCONSISTENT, why
         else:
             possible = result.possible_change
+            given = joined.filter_input
+            no_load = in_place_of_loads(given) if given is not None else None
             doubts = (
                 doubt,
                 change.doubt if change is not None else "",
+                no_load.doubt if no_load is not None else "",
                 possible.note if possible is not None else "",
             )
             warnings += tuple(d for d in doubts if d)
@@ -249,7 +258,12 @@ def weigh_balance(
         status=status,
         reason=reason,
         result=result,
-        warnings=warnings + overload(vehicle, result) + below_tare(vehicle, result),
+        warnings=(
+            *warnings,
+            *overload(vehicle, result),
+            *below_tare(vehicle, result),
+            *lighter_than_known(vehicle, result),
+        ),
         settings=settings,
     )
 
@@ -358,6 +372,11 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     if begun is None or begun.delay != delay:
         begun = force_balance(drive, vehicle, motion, delay=delay)
     balance = replace(begun, navigation=navigation)
+    if turned_torque(balance, vehicle):
+        raise DriveError(
+            f"{drive.name}: its torque runs against the motion it makes: its sign was turned; set "
+            "factor = -1 for it in the mapping"
+        )
     if behind := far_shift(balance, vehicle):
         raise DriveError(
             f"{drive.name}: its torque lies {_later(-behind)} than the motion it makes, though "

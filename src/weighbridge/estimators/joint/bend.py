@@ -125,6 +125,6 @@ def bent(bend: TorqueBend | None, drive: Drive, vehicle: Vehicle) -> str:
     return (
         f"above {bend.knee:.0f} N m {source.title} tells {100.0 * abs(bend.part):.0f} % {less} of "
         "the torque than below, otherwise than in the calibration: another motor or an assist, a "
-        "new map of the engine, or values that are held; record what was calibrated, or calibrate "
-        "again"
+        "new map of the engine, values that are held, or a speed or accelerometer that is filtered "
+        "or bent; record what was calibrated, or calibrate again"
     )

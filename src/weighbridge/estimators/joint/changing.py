@@ -46,6 +46,13 @@ LAUNCH: Final = 1e6
 SCALE_STD: Final = 0.3
 """Standard deviation of a change of scale before the drive has told [-]."""
 
+AS_WELL: Final = 0.0
+"""Gain of likelihood of a change of scale over the changes of load found, from which it may be the
+one as well as the other [-]."""
+
+QUICK: Final = 60.0
+"""Where every stop with a change of load was longer, somebody loaded [s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class ScaleChange:
@@ -90,9 +97,47 @@ class ScaleChange:
         )
         return (
             f"the mass changes by {100.0 * self.change:+.0f} % about {when} while the vehicle "
-            "drives, where no load can change: the torque or load that was recorded, or the "
-            "speed, is wrong before or after it; cut the recording there, and weigh the part "
-            "that is right"
+            "drives, where no load can change: the torque or load that was recorded, the speed or "
+            "the accelerometer is wrong before or after it; cut the recording there, and weigh the "
+            "part that is right"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoLoad:
+    """A change of the torque's scale in place of all the changes of load that were found.
+
+    Attributes
+    ----------
+    start, end : of the scale that is another; of a ramp, from 0 to all of it [s]
+    ramp : it changes evenly
+    change, std : of the scale, relative to before, and its standard deviation [-]
+    gain : logarithm of the likelihood over that of the changes of load [-]
+    stood : of the shortest stop with a change of load [s]
+    """
+
+    start: float
+    end: float
+    ramp: bool
+    change: float
+    std: float
+    gain: float
+    stood: float
+
+    @property
+    def doubt(self) -> str:
+        """What may be wrong, in a sentence; empty where it was loading."""
+        if self.gain < AS_WELL or self.stood > QUICK:
+            return ""
+        if abs(self.change) <= max(LEAST, SIGNIFICANT * self.std):
+            return ""
+        size = f"{100.0 * abs(self.change):.0f} % {'less' if self.change < 0.0 else 'more'}"
+        how = "goes evenly to" if self.ramp else "is"
+        return (
+            f"from {span(round(self.start), round(self.end))} the mass {how} {size}: by loads that "
+            f"changed in stops, of {self.stood:.0f} s the shortest, or because the torque or load "
+            "that was recorded tells as much of it; the drive fits either; if no load was changed, "
+            "the mass may be wrong by as much: cut the recording there"
         )
 
 
@@ -143,6 +188,51 @@ def largest(given: FilterInput) -> ScaleChange | None:
     if best is None or not best.sure:
         return best
     return replace(best, gain=best.gain + same - _with_stops(given, same))
+
+
+def in_place_of_loads(given: FilterInput) -> NoLoad | None:
+    """Find the change of scale that explains a drive best without any change of load.
+
+    A load is felt by all that goes with the mass, and the scale of the torque by air drag and
+    friction of the engine as well. A reading that is wrong between two stops needs one number where
+    two loads need two, and they have to be alike.
+
+    Parameters
+    ----------
+    given : of the joint estimator
+
+    Returns
+    -------
+    NoLoad
+        None where no load was found to change.
+    """
+    changed = np.flatnonzero(given.added.any(axis=1))
+    if not changed.size:
+        return None
+    given = _without_launches(given)
+    time = given.time
+    edges = [*changed, time.size]
+    parts = [(a, b) for i, a in enumerate(edges) for b in edges[i + 1 :]]
+    here = np.arange(time.size)
+    shapes = [(a, b, ((here >= a) & (here < b)).astype(np.float64)) for a, b in parts]
+    shapes.append((0, time.size, (time - time[0]) / (time[-1] - time[0])))
+    none = np.zeros_like(given.added)
+    same, *_ = _run(given, np.zeros_like(time), given.added)
+    found = []
+    for first, last, shape in shapes:
+        likelihood, change, std = _run(given, shape, none)
+        found.append(
+            NoLoad(
+                start=float(time[first]),
+                end=float(time[last - 1]),
+                ramp=bool(first == 0),
+                change=change,
+                std=std,
+                gain=likelihood - same,
+                stood=float(np.min(given.stood[changed])),
+            )
+        )
+    return max(found, key=lambda one: one.gain)
 
 
 def _without_launches(given: FilterInput) -> FilterInput:
