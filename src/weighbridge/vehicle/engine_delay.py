@@ -13,6 +13,9 @@ USUAL_STD: Final = 0.2
 """Standard deviation of how much sooner or later than the vehicle speed it is [s]: control units
 answer within 0.02 to 0.4 s, each in its own time."""
 
+ALIKE: Final = 0.01
+"""A lateness that is nearer to the usual one is the usual one [s]: no gear moves by 1 %."""
+
 ROUNDS: Final = 4
 """Of moving the engine speed and looking again: a wrong delay puts rows beside their gears."""
 
@@ -72,7 +75,7 @@ def find_engine_delay(
         # The slope is how much too early the rows are looked at; it counts from the usual one.
         trust = USUAL_STD**2 / (USUAL_STD**2 + variance)
         delay = usual + trust * (delay - slope - usual)
-    return float(delay)
+    return float(delay) if abs(delay - usual) > ALIKE else usual
 
 
 def _in_gear(
