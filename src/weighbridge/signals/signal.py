@@ -9,7 +9,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.arguments import as_floats, check_text
+from weighbridge.arguments import as_floats, check_number, check_text
 from weighbridge.errors import ConfigError
 from weighbridge.signals.interpolation import interpolate
 
@@ -53,6 +53,8 @@ class Signal:
 
     def __post_init__(self) -> None:
         check_text("name of a signal", self.name)
+        check_number("ahead of a signal", self.ahead)
+        check_number("usual of a signal", self.usual, optional=True)
         for name in ("time", "values"):
             given = getattr(self, name)
             floats = as_floats(f"{name} of signal {self.name!r}", given)
