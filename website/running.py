@@ -96,8 +96,9 @@ def agrees(shown: str, said: str, tolerance: float) -> bool:
     """Tell whether a page shows what was said: the same words, and numbers within a tolerance.
 
     Another processor rounds otherwise: numbers may differ by a part `tolerance` of
-    themselves or by as much in absolute terms, whichever is more. Lines of ``...`` stand
-    for any number of lines.
+    themselves or by as much in absolute terms, whichever is more. A number of kilograms may
+    differ by that part of the greatest one shown, since a payload is a difference of masses.
+    Lines of ``...`` stand for any number of lines.
     """
     return _found(shown, said, tolerance) is not None
 
@@ -136,15 +137,16 @@ def renew_all(chosen: list[Path]) -> None:
 def _found(shown: str, said: str, tolerance: float) -> list[str] | None:
     """Return the lines shown, as they were said now; none where one of them was not said."""
     rows = [row for row in said.splitlines() if row.strip()]
+    heaviest = max((abs(_number(kg)) for kg in _MASS.findall(shown)), default=0.0)
     found, at, skips = [], 0, False
     for line in (row for row in shown.splitlines() if row.strip()):
         if line.strip() == "...":
             found.append(line)
             skips = True
             continue
-        while skips and at < len(rows) and not _alike(line, rows[at], tolerance):
+        while skips and at < len(rows) and not _alike(line, rows[at], tolerance, heaviest):
             at += 1
-        if at >= len(rows) or not _alike(line, rows[at], tolerance):
+        if at >= len(rows) or not _alike(line, rows[at], tolerance, heaviest):
             return None
         found.append(rows[at])
         at, skips = at + 1, False
@@ -153,15 +155,21 @@ def _found(shown: str, said: str, tolerance: float) -> list[str] | None:
 
 _RULES = re.compile(r"[━─┏┓┳┡┩╇└┘┴]+")
 _NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_MASS = re.compile(rf"({_NUMBER.pattern}) kg\b")
 
 
-def _alike(a: str, b: str, tolerance: float) -> bool:
+def _number(text: str) -> float:
+    return float(text.replace("−", "-"))
+
+
+def _alike(a: str, b: str, tolerance: float, heaviest: float) -> bool:
     if _RULES.sub(" ", _NUMBER.sub("#", a)).split() != _RULES.sub(" ", _NUMBER.sub("#", b)).split():
         return False
-    pairs = zip(_NUMBER.findall(a), _NUMBER.findall(b), strict=True)
-    for left, right in pairs:
-        x, y = (float(n.replace("−", "-")) for n in (left, right))
-        if x != y and abs(x - y) > tolerance * max(1.0, abs(x), abs(y)):
+    masses = {match.start(1) for match in _MASS.finditer(a)}
+    for left, right in zip(_NUMBER.finditer(a), _NUMBER.findall(b), strict=True):
+        x, y = _number(left[0]), _number(right)
+        greatest = max(1.0, abs(x), abs(y), heaviest if left.start() in masses else 0.0)
+        if x != y and abs(x - y) > tolerance * greatest:
             return False
     return True
 
