@@ -104,11 +104,12 @@ def test_brackets_stay_in_tables_of_several_drives():
     from weighbridge.vehicle.model import Vehicle
 
     why = "state it under [torque] of the vehicle file"
-    none = without_mass(Drive("run[a]", {}), Vehicle(), "rls", why)
+    car = Vehicle()
+    none = without_mass(Drive("run[a]", {}), car, "rls", why)
     assert none.status is Status.MISSING_SIGNALS
     console = Console(width=160)
     with console.capture() as shown:
-        console.print(result_table([none], [("logs[b]", why)]))
+        console.print(result_table([none.row], [("logs[b]", why)], car))
         console.print(method_table((none,)))
     text = shown.get()
     assert text.count("under [torque] of") == 3
@@ -233,7 +234,8 @@ def test_warnings_of_several_drives_are_a_few_lines():
     def day(k, *warnings):
         parted = f"day holds 2 drives, parted by pauses; this is drive {k}"
         name = f"day part {k} of 2"
-        return without_mass(Drive(name, {}), truck, "joint", "why", (parted, "heights", *warnings))
+        told = (parted, "heights", *warnings)
+        return without_mass(Drive(name, {}), truck, "joint", "why", told).row
 
     truck = describe(Known(kind="truck", torque="percent")).vehicle
     drives = [day(1), day(2, "a", "b", "c", "d", "e")]
@@ -243,5 +245,5 @@ def test_warnings_of_several_drives_are_a_few_lines():
         "day part 2 of 2: 2 more, told by --json",
     ]
     assert warning_lines([]) == []
-    assert "never calibrated" in result_table(drives, []).title
-    assert result_table([], [("day", "why")]).title is None
+    assert "never calibrated" in result_table(drives, [], truck).title
+    assert result_table([], [("day", "why")], truck).title is None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Optional
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from weighbridge.pipeline.weighing import Weighing
+    from weighbridge.results.row import WeighingRow
     from weighbridge.signals import Drive
     from weighbridge.vehicle.model import Vehicle
 
@@ -126,9 +127,16 @@ def weigh(
     shares = 1.0 + _COMPARING * compare + _REPORTING * (report is not None)
     with progress("weighing", len(drives) * shares) as bar:
         given = partial(load_parts, mapping=chosen, dbc=dbc, whole=whole)
-        weighed, failed = _weighed(
-            drives, given, car, method, settings, bar, alone=track is not None
-        )
+        whole_wanted = compare or report is not None or track is not None
+        rows: list[WeighingRow] = []
+        failed: list[tuple[str, str]] = []
+        weighed: list[Weighing] = []
+        for found in _weighed(drives, given, car, method, settings, bar, alone=track is not None):
+            if isinstance(found, tuple):
+                failed.append(found)
+                continue
+            rows.append(found.row)
+            weighed += [found] if whole_wanted else []
         bar.total = len(drives) + len(weighed) * (shares - 1.0)
         compared = []
         for w in weighed if compare else []:
@@ -143,15 +151,15 @@ def weigh(
                 raise ConfigError(f"--report {report}: none of the drives could be read")
             bar.begin("writing the report", len(weighed) * _REPORTING)
             write_report(weighed, report, comparisons=compared, tiles=tiles)
-    lines = [w.to_json() for w in weighed] + [
+    lines = [row.to_json() for row in rows] + [
         _failure(name, why, car, method) for name, why in failed
     ]
     if not write_json(json_path, "\n".join(lines)):
-        _show(weighed, failed, compared)
+        _show(rows, failed, compared, car)
     _tell_written([json_path, track, report], beside_json=json_path == "-")
     if failed:
         raise typer.Exit(2)
-    if any(w.status != "converged" for w in weighed):
+    if any(row.status != "converged" for row in rows):
         raise typer.Exit(1)
 
 
@@ -164,16 +172,14 @@ def _weighed(
     bar: Bar,
     *,
     alone: bool,
-) -> tuple[list[Weighing], list[tuple[str, str]]]:
-    """Weigh every drive of the recordings; name those that could not be, and why.
+) -> Iterator[Weighing | tuple[str, str]]:
+    """Weigh every drive of the recordings, one by one; of one that cannot be, its name and why.
 
     ``given`` reads the drives of a recording, and ``alone`` refuses one of several.
     """
     from weighbridge.errors import ConfigError, WeighbridgeError
     from weighbridge.pipeline.weighing import weigh as weigh_drive
 
-    weighed: list[Weighing] = []
-    failed: list[tuple[str, str]] = []
     for path in drives:
         bar.begin(f"weighing {path.name}")
         try:
@@ -181,7 +187,7 @@ def _weighed(
         except WeighbridgeError as error:
             if len(drives) == 1:
                 raise
-            failed.append((path.name, str(error)))
+            yield path.name, str(error)
             continue
         if alone and len(parts) > 1:
             raise ConfigError(
@@ -191,12 +197,11 @@ def _weighed(
         for k, drive in enumerate(parts):
             bar.within(k, len(parts))
             try:
-                weighed.append(weigh_drive(drive, car, method, settings=settings))
+                yield weigh_drive(drive, car, method, settings=settings)
             except WeighbridgeError as error:
                 if len(drives) == len(parts) == 1:
                     raise
-                failed.append((drive.name if len(parts) > 1 else path.name, str(error)))
-    return weighed, failed
+                yield drive.name if len(parts) > 1 else path.name, str(error)
 
 
 def _tell_written(paths: list[str | Path | None], *, beside_json: bool) -> None:
@@ -215,22 +220,23 @@ def _failure(name: str, why: str, car: Vehicle, method: str) -> str:
 
 
 def _show(
-    weighed: list[Weighing],
+    rows: list[WeighingRow],
     failed: list[tuple[str, str]],
     compared: list[tuple[Weighing, ...]],
+    car: Vehicle,
 ) -> None:
     screen = console()
     if not screen.is_terminal:
         screen.width = _WIDTH
     narrow = screen.width < _ROOMY
-    if len(weighed) == 1 and not failed:
-        _show_one(weighed[0], screen)
+    if len(rows) == 1 and not failed:
+        _show_one(rows[0], car, screen)
     else:
-        screen.print(result_table(weighed, failed, narrow=narrow))
+        screen.print(result_table(rows, failed, car, narrow=narrow))
         if narrow:
-            for line in reason_lines(weighed, failed):
+            for line in reason_lines(rows, failed):
                 screen.print(shown(line), highlight=False)
-        say_notes(warning_lines(weighed), screen)
+        say_notes(warning_lines(rows), screen)
     for methods in compared:
         screen.print(method_table(methods, narrow=narrow))
         without = [w for w in methods if w.status != "converged"]
@@ -240,20 +246,20 @@ def _show(
             say_notes([note], screen)
 
 
-def _show_one(w: Weighing, screen: Console) -> None:
-    if w.status == "converged":
-        low, high = w.interval(0.95)
-        say(f"{w.drive.name}: {w.mass:.0f} kg, 95 % between {low:.0f} and {high:.0f} kg")
-        if w.vehicle.tare is not None:
-            say(f"payload {w.payload:.0f} kg over a tare of {w.vehicle.tare:.0f} kg")
-        if w.load_changed:
-            loads = ", then ".join(f"{s.mass:.0f} ± {1.96 * s.std:.0f} kg" for s in w.segments)
+def _show_one(row: WeighingRow, car: Vehicle, screen: Console) -> None:
+    if row.status == "converged":
+        low, high = row.interval
+        say(f"{row.drive}: {row.mass:.0f} kg, 95 % between {low:.0f} and {high:.0f} kg")
+        if car.tare is not None:
+            say(f"payload {row.payload:.0f} kg over a tare of {car.tare:.0f} kg")
+        if row.load_changed:
+            loads = ", then ".join(f"{s.mass:.0f} ± {1.96 * s.std:.0f} kg" for s in row.segments)
             say(f"the load changed: {loads}")
-        minutes = w.used_time / 60.0
-        say(f"from {minutes:.1f} min of {w.drive.duration / 60.0:.1f} min, method {w.method}")
+        minutes = row.used_time / 60.0
+        say(f"from {minutes:.1f} min of {row.duration / 60.0:.1f} min, method {row.method}")
     else:
-        say(f"{w.drive.name}: no mass ({w.status}): {w.reason}")
-    say_notes(w.warnings, screen)
+        say(f"{row.drive}: no mass ({row.status}): {row.reason}")
+    say_notes(row.warnings, screen)
 
 
 def method_table(methods: tuple[Weighing, ...], *, narrow: bool = False) -> Table:
@@ -267,7 +273,7 @@ def method_table(methods: tuple[Weighing, ...], *, narrow: bool = False) -> Tabl
     kept = 3 if narrow else 4
     _add_outcome_columns(table, kept, narrow=narrow)
     for w in methods:
-        table.add_row(w.method, *_numbers(w)[:kept], _outcome(w, narrow=narrow))
+        table.add_row(w.method, *_numbers(w.row)[:kept], _outcome(w.row, narrow=narrow))
     return table
 
 
@@ -290,9 +296,9 @@ def made_for(methods: tuple[Weighing, ...]) -> str:
     )
 
 
-def _numbers(w: Weighing) -> list[str]:
+def _numbers(row: WeighingRow) -> list[str]:
     """Mass, interval and payload; empty where there is none."""
-    return [f"{x:.0f}" if x == x else "" for x in (w.mass, *w.interval(0.95), w.payload)]
+    return [f"{x:.0f}" if x == x else "" for x in (row.mass, *row.interval, row.payload)]
 
 
 def _table(*, narrow: bool) -> Table:
@@ -313,42 +319,44 @@ def _add_outcome_columns(table: Table, kept: int, *, narrow: bool) -> None:
     table.add_column("status" if narrow else "status or reason", no_wrap=narrow)
 
 
-def _outcome(w: Weighing, *, narrow: bool) -> str:
-    if narrow or w.status == "converged":
-        return str(w.status)
-    return shown(f"{w.status}: {w.reason}")
+def _outcome(row: WeighingRow, *, narrow: bool) -> str:
+    if narrow or row.status == "converged":
+        return str(row.status)
+    return shown(f"{row.status}: {row.reason}")
 
 
-def warning_lines(weighed: list[Weighing]) -> list[str]:
+def warning_lines(rows: list[WeighingRow]) -> list[str]:
     """Warnings of several drives, one line each: what all share once, at most `_NOTED` of each.
 
     How a recording was parted is not repeated: the names of its drives say it.
     """
-    if not weighed:
+    if not rows:
         return []
-    shared = set.intersection(*(set(w.warnings) for w in weighed)) if len(weighed) > 1 else set()
-    lines = [
-        f"every drive: {text}" for text in dict.fromkeys(weighed[0].warnings) if text in shared
-    ]
-    for w in weighed:
-        parted = f"{w.drive.name.rsplit(' part ', 1)[0]} holds "
-        own = [t for t in w.warnings if t not in shared and not t.startswith(parted)]
-        lines += [f"{w.drive.name}: {text}" for text in own[:_NOTED]]
+    shared = set.intersection(*(set(r.warnings) for r in rows)) if len(rows) > 1 else set()
+    lines = [f"every drive: {text}" for text in dict.fromkeys(rows[0].warnings) if text in shared]
+    for row in rows:
+        parted = f"{row.drive.rsplit(' part ', 1)[0]} holds "
+        own = [t for t in row.warnings if t not in shared and not t.startswith(parted)]
+        lines += [f"{row.drive}: {text}" for text in own[:_NOTED]]
         if len(own) > _NOTED:
-            lines.append(f"{w.drive.name}: {len(own) - _NOTED} more, told by --json")
+            lines.append(f"{row.drive}: {len(own) - _NOTED} more, told by --json")
     return lines
 
 
-def reason_lines(weighed: list[Weighing], failed: list[tuple[str, str]]) -> list[str]:
+def reason_lines(rows: list[WeighingRow], failed: list[tuple[str, str]]) -> list[str]:
     """Say why drives have no mass, for a table that has no room for it."""
-    without = [w for w in weighed if w.status != "converged"]
-    return [f"{w.drive.name}: no mass ({w.status}): {w.reason}" for w in without] + [
+    without = [r for r in rows if r.status != "converged"]
+    return [f"{r.drive}: no mass ({r.status}): {r.reason}" for r in without] + [
         why if name in why else f"{name}: {why}" for name, why in failed
     ]
 
 
 def result_table(
-    weighed: list[Weighing], failed: list[tuple[str, str]], *, narrow: bool = False
+    rows: list[WeighingRow],
+    failed: list[tuple[str, str]],
+    car: Vehicle,
+    *,
+    narrow: bool = False,
 ) -> Table:
     """One row a drive: its mass, or why there is none.
 
@@ -358,18 +366,17 @@ def result_table(
     from weighbridge.vehicle.telling import worth
 
     table = _table(narrow=narrow)
-    if weighed and by_data_sheet(weighed[0].vehicle):
-        car = weighed[0].vehicle
+    if rows and by_data_sheet(car):
         table.title = shown(f"{car.name} {worth(car)}")
     times = () if narrow else ("min", "used")
     table.add_column("drive", overflow="fold")
     for name in times:
         table.add_column(name, justify="right", no_wrap=True)
     _add_outcome_columns(table, 4, narrow=narrow)
-    for w in weighed:
-        minutes = [f"{t / 60.0:.1f}" for t in (w.drive.duration, w.used_time)]
-        cells = (*minutes[: len(times)], *_numbers(w), _outcome(w, narrow=narrow))
-        table.add_row(shown(w.drive.name), *cells)
+    for row in rows:
+        minutes = [f"{t / 60.0:.1f}" for t in (row.duration, row.used_time)]
+        cells = (*minutes[: len(times)], *_numbers(row), _outcome(row, narrow=narrow))
+        table.add_row(shown(row.drive), *cells)
     for name, why in failed:
         outcome = "unreadable" if narrow else shown(f"unreadable: {why}")
         table.add_row(shown(name), *[""] * (len(times) + 4), outcome)

@@ -82,6 +82,7 @@ def weighing_row(drive: Mapping[str, Any], segments: Sequence[Mapping[str, Any]]
             for s in segments
             if s["start_s"] is not None
         ),
+        load_changed=bool(drive["load_changed"]),
         **{field: _float(drive[column]) for column, field in _NUMBERS.items()},
     )
 

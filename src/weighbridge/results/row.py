@@ -27,6 +27,7 @@ class WeighingRow:
     payload : mass minus the vehicle's tare [kg]; NaN where either is unknown
     duration, used_time, converged_at : of the drive, of the rows used, until the mass stays [s]
     bound_std : Cramer-Rao bound of the drive [kg]
+    load_changed : whether segments are loads told apart, not just legs of a drive
     """
 
     drive: str
@@ -45,6 +46,7 @@ class WeighingRow:
     bound_std: float = math.nan
     segments: tuple[Segment, ...] = ()
     warnings: tuple[str, ...] = ()
+    load_changed: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``weigh --json`` prints: numbers, None where there is no mass."""

@@ -187,6 +187,7 @@ class MassResult:
             bound_std=self.result.bound_std if self.result else math.nan,
             segments=self.segments,
             warnings=self.warnings,
+            load_changed=self.load_changed,
         )
 
     def to_dict(self) -> dict[str, Any]:
