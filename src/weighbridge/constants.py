@@ -1,4 +1,4 @@
-"""Physical constants, in SI."""
+"""Physical constants, in SI, and one of statistics."""
 
 from typing import Final
 
@@ -25,3 +25,6 @@ PETROL_STOICHIOMETRIC_RATIO: Final = 14.7
 
 PETROL_HEATING_VALUE: Final = 45.0e6
 """Heating value of petrol [J/kg] (Jensen 2022, sec. 7.1)."""
+
+HUBER: Final = 1.345
+"""Residual over noise beyond which a row counts less [-] (Huber 1964, 95 % efficiency)."""

@@ -10,11 +10,9 @@ from scipy.optimize import lsq_linear
 
 from weighbridge.balance.law import ROAD_PARAMETERS, reading_columns, road_columns
 from weighbridge.balance.table import ForceTable
+from weighbridge.constants import HUBER
 from weighbridge.errors import DriveError
 from weighbridge.signals import Bools, Floats
-
-HUBER: Final = 1.345
-"""Residual over noise beyond which a row counts less [-] (Huber 1964, 95 % efficiency)."""
 
 BLOCK: Final = 60.0
 """Rows nearer than this share their errors [s]."""

@@ -22,6 +22,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.estimators.considered import fit_consider_std, force_columns
 from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.joint.confounded import inertia_relative_std
+from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
     Evidence,
@@ -68,9 +69,6 @@ ROUNDS: Final = 3
 
 CLOSE: Final = 0.003
 """Masses of two passes nearer than this are the same [-]."""
-
-UNMODELLED: Final = 1.6
-"""True errors over those that the filter reckons with [-], as of the joint estimator."""
 
 MOTION_STD: Final = 0.025
 """Relative standard deviation that speeds leave in a mass without an accelerometer [-]."""

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from weighbridge.balance import ForceBalance
+from weighbridge.constants import HUBER
 from weighbridge.signals import Floats, Ints
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.gear import GearDetection
 from weighbridge.vehicle.model import Vehicle
-
-HUBER: Final = 1.345
-"""Residual over noise beyond which a row counts less [-] (Huber 1964, 95 % efficiency)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
