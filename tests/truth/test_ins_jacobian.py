@@ -7,10 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from weighbridge.kernels.ins import propagate, propagate_covariance
 from weighbridge.kernels.ins_model import (
-    ACCEL,
     BA,
     BG,
     ERRORS,
+    FORCE,
     LEVER,
     MEASUREMENTS,
     PITCH0,
@@ -52,7 +52,7 @@ def _state():
     x[BA : BA + 3] = [0.05, -0.03, 0.1]
     x[BG : BG + 3] = [0.002, -0.001, 0.003]
     x[PITCH0], x[YAW0], x[SQUAT], x[SCALE], x[LEVER] = 0.01, -0.02, 0.004, 1.02, 1.3
-    x[ACCEL] = 0.8
+    x[FORCE] = 0.8
     return x
 
 
@@ -114,11 +114,13 @@ def test_covariance_follows_the_nonlinear_propagation(correlated):
 def _predicted(x, rate):
     """Speed, lateral and vertical row as functions of the nominal state."""
     body = Rotation.from_quat(np.roll(x[Q : Q + 4], -1)).inv().apply(x[V : V + 3])
+    # What the body reads less what its mounting and its squat add is the force along the road.
+    along = (x[FORCE] - QUIET.gravity * x[PITCH0]) / (1.0 + QUIET.gravity * x[SQUAT])
     return np.array(
         [
             x[SCALE] * body[0],
             body[1] - x[YAW0] * body[0] - x[LEVER] * rate[2],
-            body[2] - (x[PITCH0] + x[SQUAT] * x[ACCEL]) * body[0],
+            body[2] - (x[PITCH0] + x[SQUAT] * along) * body[0],
         ]
     )
 

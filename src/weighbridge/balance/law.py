@@ -204,9 +204,12 @@ def torque_columns(table: ForceTable, vehicle: Vehicle) -> Floats:
     return np.asarray(rows_of(model, reading_of(torque, speed, model), speed) * gain[:, None])
 
 
-def squat_column(accel: Floats) -> Floats:
-    """Specific force that a squat of one radian per m/s^2 adds, ``g a`` (n,) [m/s^2]."""
-    return np.asarray(GRAVITY * accel)
+def squat_column(force: Floats) -> Floats:
+    """Specific force that a squat of one radian per m/s^2 adds to one ``f``, ``g f`` (n,) [m/s^2].
+
+    The body pitches by the moment of the traction, which a hill takes as an acceleration does.
+    """
+    return np.asarray(GRAVITY * force)
 
 
 def rotating_mass(vehicle: Vehicle, gearing: Floats | float) -> Floats:

@@ -1,4 +1,4 @@
-"""Squat: the body pitches as it accelerates, and the accelerometer with it."""
+"""Squat: the body pitches by the traction, uphill and as it accelerates, and the sensor with it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from weighbridge.vehicle.classes import VehicleClass
 from weighbridge.vehicle.model import Vehicle
 
 SQUAT: Final = (0.0035, 0.0025)
-"""Pitch of the body per acceleration of a vehicle of which nothing is known, and its standard
+"""Pitch of the body per specific force of a vehicle of which nothing is known, and its standard
 deviation [rad per m/s^2]: four recorded cars had 0.0024 to 0.0051, and stiff trucks squat less."""
 
 DRIVE_STD: Final = 0.0009
@@ -147,28 +147,27 @@ class ResidualSquat:
 
     Attributes
     ----------
-    squat : pitch per acceleration to take out; negative to put back [rad per m/s^2]
+    squat : pitch per specific force to take out; negative to put back [rad per m/s^2]
     std : what stays unknown of it
     """
 
     squat: float
     std: float
 
-    def squat_accel(self, accel: Floats) -> Floats:
-        """Specific force that the squat adds to an acceleration (n,) [m/s^2]."""
-        return np.asarray(self.squat * squat_column(accel))
-
-    def relative_std(self, accel: Floats, phi: Floats, used: Bools) -> float:
-        """Relative standard deviation of the mass [-]; hills, where nothing squats, weigh without.
+    def squat_accel(self, force: Floats) -> Floats:
+        """What the squat adds to the specific force (n,) [m/s^2].
 
         Parameters
         ----------
-        accel, phi : (n,) acceleration and regressor of the mass [m/s^2]
-        used : (n,)
+        force : with the squat that is to be taken out, or without that to be put back [m/s^2]
         """
-        if self.std <= 0.0:
-            return 0.0
-        return GRAVITY * self.std * share_of_accel(accel, phi, used)
+        read = 1.0 + GRAVITY * max(self.squat, 0.0)
+        return np.asarray(self.squat / read * squat_column(force))
+
+    @property
+    def relative_std(self) -> float:
+        """Relative standard deviation of the mass [-]."""
+        return GRAVITY * self.std
 
 
 def share_of_accel(accel: Floats, phi: Floats, used: Bools) -> float:

@@ -17,7 +17,6 @@ import numpy as np
 
 from weighbridge.kernels._jit import fast_kernel, inlined_fast_kernel, inlined_kernel, kernel
 from weighbridge.kernels.ins_model import (
-    ACCEL,
     BA,
     BG,
     E_ATT,
@@ -27,6 +26,7 @@ from weighbridge.kernels.ins_model import (
     E_SQUAT,
     E_V,
     E_YAW0,
+    FORCE,
     LAST,
     PSD,
     RATE,
@@ -41,7 +41,7 @@ from weighbridge.kernels.ins_model import (
     V,
 )
 from weighbridge.kernels.ins_model import ERRORS as N
-from weighbridge.kernels.ins_rows import update
+from weighbridge.kernels.ins_rows import travel_angle, update
 from weighbridge.kernels.rotation import half_turn, matrix_rows, product
 
 D = N + 1
@@ -119,8 +119,7 @@ def propagate(x, force, turn, dt, noise):
     x[TRANSITION + 11] += dt * r21
     x[TRANSITION + 12] += dt * r22
     x[RATE], x[RATE + 1], x[RATE + 2] = wx, wy, wz
-    accel = fx + noise.gravity * r20
-    x[ACCEL] += (accel - x[ACCEL]) * min(1.0, dt / noise.accel_time)
+    x[FORCE] += (fx - x[FORCE]) * min(1.0, dt / noise.force_time)
 
 
 @fast_kernel
@@ -224,7 +223,7 @@ def bridge_gap(x, cov, gap, speed, noise):
         x[P + i] += gap * x[V + i]
         if not math.isnan(speed) and old > 0.5:
             x[V + i] *= speed / old
-    x[ACCEL] = 0.0
+    x[FORCE] = 0.0
     t = min(gap, 60.0)
     for i in range(3):
         tilt = min(0.03 * math.sqrt(t), 0.1) if i < 2 else min(0.2 * t, 1.5)
@@ -245,19 +244,21 @@ def _inflate(cov, pitch_var, yaw_var):
 
 
 @inlined_kernel
-def _grade_std(x, cov):
+def _grade_std(x, cov, noise):
     """Standard deviation of the grade [rad]."""
     (r00, _, _), (r10, _, _), _ = matrix_rows(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
     n = 1.0 / math.sqrt(r00 * r00 + r10 * r10 + 1e-12)
     # pitch turns about the horizontal axis to the right of the heading; mounting and squat
     # are no grade
-    right, ahead, accel = -r10 * n, r00 * n, x[ACCEL]
+    right, ahead = -r10 * n, r00 * n
+    _, level, lean = travel_angle(x, noise.gravity)
     a, b, c, d = E_ATT, E_ATT + 1, E_PITCH0, E_SQUAT
     grade = (
         right * right * cov[a * D] + ahead * ahead * cov[b * D]
-        + cov[c * D] + accel * accel * cov[d * D]
-        + 2.0 * right * (ahead * cov[a * N + b] - cov[a * N + c] - accel * cov[a * N + d])
-        - 2.0 * ahead * (cov[b * N + c] + accel * cov[b * N + d]) + 2.0 * accel * cov[c * N + d]
+        + level * level * cov[c * D] + lean * lean * cov[d * D]
+        + 2.0 * right * (ahead * cov[a * N + b] - level * cov[a * N + c] - lean * cov[a * N + d])
+        - 2.0 * ahead * (level * cov[b * N + c] + lean * cov[b * N + d])
+        + 2.0 * level * lean * cov[c * N + d]
     )  # fmt: skip
     return math.sqrt(max(grade, 0.0))
 
@@ -332,5 +333,5 @@ def run(x, cov, samples, rot_bs, noise, rows, states, grade_std):
             _node(x, cov, z, k, noise, rows, k * step_slot)
             for a in range(SHOWN):
                 states[k, a] = x[a]
-            grade_std[k] = _grade_std(x, cov)
+            grade_std[k] = _grade_std(x, cov, noise)
             k += 1

@@ -10,10 +10,10 @@ Filter state, one flat array so that a step allocates nothing:
 13:16   gyro bias [rad/s]
 16      pitch of the body axes over the direction of travel, mounting [rad]
 17      yaw from the body's x axis to the direction of travel, mounting [rad]
-18      squat: further pitch of the body per acceleration [rad per m/s^2]
+18      squat: further pitch of the body per specific force along the road [rad per m/s^2]
 19      indicated over true vehicle speed [-]
 20      distance of the sensor ahead of the axle that does not slip sideways [m]
-21      acceleration along the body, low-passed [m/s^2]
+21      specific force along the body, bias removed, low-passed [m/s^2]
 22, 23  rows of GNSS and of vehicle speed refused in succession [-]
 24:27   last angular rate, body axes [rad/s]
 27:30   its noise power density by axis, from differences of neighbours
@@ -40,7 +40,7 @@ MEASUREMENTS = 13
 ROWS = 11
 """Most scalar rows one node can process."""
 
-P, V, Q, BA, BG, PITCH0, YAW0, SQUAT, SCALE, LEVER, ACCEL, LOST_GNSS, LOST_SPEED = (
+P, V, Q, BA, BG, PITCH0, YAW0, SQUAT, SCALE, LEVER, FORCE, LOST_GNSS, LOST_SPEED = (
     0, 3, 6, 10, 13, 16, 17, 18, 19, 20, 21, 22, 23,
 )  # fmt: skip
 LAST, PSD, RATE, TRANSITION, TIME = 24, 27, 30, 33, 46
@@ -83,7 +83,7 @@ class Noise(NamedTuple):
     rest_rate_std : angular rate of a body at rest [rad/s]
     gate : normalised innovation squared above which a row is refused [-]
     patience : refusals in succession after which a row is believed again [-]
-    accel_time : time constant of the low-passed acceleration [s]
+    force_time : time constant of the low-passed specific force [s]
     constraints : 1 with the non-holonomic rows, 0 without
     """
 
@@ -103,7 +103,7 @@ class Noise(NamedTuple):
     rest_rate_std: float
     gate: float
     patience: float
-    accel_time: float
+    force_time: float
     constraints: float
 
 

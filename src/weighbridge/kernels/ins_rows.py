@@ -14,7 +14,6 @@ import numpy as np
 
 from weighbridge.kernels._jit import contracted_kernel, fast_kernel, inlined_fast_kernel
 from weighbridge.kernels.ins_model import (
-    ACCEL,
     BA,
     E_ATT,
     E_BA,
@@ -25,6 +24,7 @@ from weighbridge.kernels.ins_model import (
     E_SQUAT,
     E_V,
     E_YAW0,
+    FORCE,
     LEVER,
     LOST_GNSS,
     LOST_SPEED,
@@ -68,8 +68,19 @@ def correct(x, dx):
     x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = unit * q0, unit * q1, unit * q2, unit * q3
 
 
+@inlined_fast_kernel
+def travel_angle(x, gravity):
+    """Pitch of the body over its direction of travel, and its slopes on mounting and squat.
+
+    The body squats by the specific force ``f`` along the road, and reads ``f (1 + g k)``.
+    """
+    read = 1.0 / (1.0 + gravity * x[SQUAT])
+    along = read * (x[FORCE] - gravity * x[PITCH0])
+    return x[PITCH0] + x[SQUAT] * along, read, read * along
+
+
 @fast_kernel
-def _set_body_row(x, h, slot, start, axis):
+def _set_body_row(x, h, slot, start, axis, gravity):
     """Set the row of one body velocity; return that velocity and the forward one.
 
     The row's direction is body axis ``axis``, for the constraints less the forward axis times
@@ -85,7 +96,7 @@ def _set_body_row(x, h, slot, start, axis):
     if axis == LATERAL:
         rx, ry, rz = r01 - x[YAW0] * r00, r11 - x[YAW0] * r10, r21 - x[YAW0] * r20
     elif axis == VERTICAL:
-        angle = x[PITCH0] + x[SQUAT] * x[ACCEL]
+        angle, _, _ = travel_angle(x, gravity)
         rx, ry, rz = r02 - angle * r00, r12 - angle * r10, r22 - angle * r20
     elif axis == STANDING + 1:
         rx, ry, rz = r01, r11, r21
@@ -182,7 +193,7 @@ def _vehicle_row(x, h, slot, start, kind, measured, noise):
     # errors of wheel speed and constraints last for about constraint_time: the
     # white noise of the same power density has this much more variance
     inflate = max(1.0, 2.0 * noise.constraint_time / max(x[TRANSITION], 1e-3))
-    v, forward = _set_body_row(x, h, slot, start, kind)
+    v, forward = _set_body_row(x, h, slot, start, kind, noise.gravity)
     yaw_rate = x[RATE + 2]
     if kind >= STANDING:
         return -v, noise.still_std**2 * inflate
@@ -196,7 +207,8 @@ def _vehicle_row(x, h, slot, start, kind, measured, noise):
         h[slot, start + E_YAW0], h[slot, start + E_LEVER] = -forward, -yaw_rate
         slip, turn = noise.lateral_slip_std * forward, noise.lateral_turn_std * yaw_rate
         return x[LEVER] * yaw_rate - v, (noise.lateral_std**2 + slip**2 + turn**2) * inflate
-    h[slot, start + E_PITCH0], h[slot, start + E_SQUAT] = -forward, -forward * x[ACCEL]
+    _, level, lean = travel_angle(x, noise.gravity)
+    h[slot, start + E_PITCH0], h[slot, start + E_SQUAT] = -forward * level, -forward * lean
     slope = noise.vertical_slope_std * forward
     return -v, (noise.vertical_std**2 + slope**2) * inflate
 

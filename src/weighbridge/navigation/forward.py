@@ -32,12 +32,14 @@ from weighbridge.navigation.layout import (
     Constants,
     Found,
     accel_along,
+    along_body,
     averaged,
     laid_out,
     level_trust,
     mounting_of,
     pose_at,
     scale_is_found,
+    travel_angle,
 )
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.rows import (
@@ -194,10 +196,12 @@ def _laid_out(
     grid = Even(time, _values_at(found, numbers, setup.rate))
     known = accel_along(grid, pose, constants, setup)
     half = round(0.5 * SQUAT_WIDTH * setup.rate)
-    last = before.accel[-half:] if before is not None else np.empty(0)
+    none = np.empty(0)
+    last, tilt = (before.accel[-half:], before.pitch[-half:]) if before else (none, none)
     accel = held(known, float(last[-1]) if last.size else 0.0)
-    mean_accel = averaged(1.0 / setup.rate, np.concatenate([last, accel]))[last.size :]
-    grade = pose.pitch - constants.pitch0 - constants.squat * mean_accel
+    read = along_body(np.concatenate([last, accel]), np.concatenate([tilt, pose.pitch]))
+    force = averaged(1.0 / setup.rate, read)[last.size :]
+    grade = pose.pitch - travel_angle(force, constants)
     least_std: Floats | float = setup.settings.body_pitch_std
     level = state.level
     pose = type(pose)(*(y[:count] for y in pose))

@@ -91,7 +91,7 @@ class Constants(NamedTuple):
     Attributes
     ----------
     pitch0, yaw0 : of the body axes over the direction of travel [rad]
-    squat : taken out of the grade [rad per m/s^2]
+    squat : pitch of the body per specific force, taken out of the grade [rad per m/s^2]
     """
 
     pitch0: Floats | float
@@ -125,8 +125,8 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
     # As large as the motion that is made of it.
     del nodes
     accel = accel_along(found.grid, pose, constants, setup)
-    accel_mean = averaged(float(time[1] - time[0]), bridged(time, accel))
-    grade = pose.pitch - constants.pitch0 - constants.squat * accel_mean
+    read = along_body(bridged(time, accel), pose.pitch)
+    grade = pose.pitch - travel_angle(averaged(float(time[1] - time[0]), read), constants)
     mounting_pitch, floor = float(end[PITCH0]), setup.settings.body_pitch_std
     if not setup.has_height:
         grade, taken, floor = _levelled(time, grade, pose, setup)
@@ -241,6 +241,22 @@ def accel_along(grid: Even, pose: Pose, constants: Constants, setup: Setup) -> F
     down = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z - pose.bias[:, 2]
     down += GRAVITY * cosine * np.cos(pose.roll)
     return np.asarray(forward + constants.yaw0 * right + constants.pitch0 * down)
+
+
+def along_body(accel: Floats, pitch: Floats) -> Floats:
+    """Specific force (n,) that an accelerometer along the body reads [m/s^2]."""
+    return np.asarray(accel + GRAVITY * np.sin(pitch))
+
+
+def travel_angle(force: Floats, constants: Constants) -> Floats:
+    """Pitch of the body over its direction of travel (n,): mounting and squat [rad].
+
+    The moment of the traction about the axles pitches the body: a hill as much as an
+    acceleration (load transfer, Gillespie 1992, eqs. 1-7 to 1-10). ``force`` is that along the
+    body [m/s^2], which the squat ``k`` itself makes ``1 + g k`` times the one along the road.
+    """
+    lean = constants.pitch0 + constants.squat * force
+    return np.asarray(lean / (1.0 + GRAVITY * constants.squat))
 
 
 def averaged(period: float, y: Floats) -> Floats:

@@ -103,7 +103,7 @@ class Motion:
     speed_scale : indicated over true vehicle speed [-]; None where not found
     speed_scale_std : its standard deviation
     speed_delay : lateness of the vehicle speed used [s]
-    squat : pitch of the body per acceleration k found and removed
+    squat : pitch of the body per specific force k found and removed
         [rad per m/s^2]; None where the drive does not show it
     squat_std : its standard deviation
     own_squat : it is the drive's, and the one of the calibration does not hold
@@ -204,12 +204,12 @@ def with_squat(motion: Motion, squat: float, std: float) -> Motion:
     Parameters
     ----------
     motion : with a ``squat``, else it is returned as it is
-    squat : pitch of the body per acceleration [rad per m/s^2]
+    squat : pitch of the body per specific force along the road [rad per m/s^2]
     std : its standard deviation
     """
     if motion.squat is None:
         return motion
-    more = (squat - motion.squat) * motion.accel
+    more = (squat - motion.squat) / (1.0 + GRAVITY * squat) * motion.specific_force
     return replace(
         motion,
         grade=motion.grade - more,

@@ -51,7 +51,7 @@ class NavigationSettings:
         with the root of the distance [m]
     constraint_time : correlation time of constraint and wheel speed errors [s]
     mounting_std : of pitch and yaw after the coarse alignment [rad]
-    squat, squat_std : pitch of the body per acceleration before the drive
+    squat, squat_std : pitch of the body per specific force before the drive
         [rad per m/s^2]; road cars lie near 0.0025 to 0.005
     squat_found_std : below this standard deviation the drive has shown its squat
     speed_scale_std : of indicated over true speed before the drive [-]
@@ -121,6 +121,6 @@ class NavigationSettings:
             rest_rate_std=0.002,
             gate=self.gate,
             patience=self.patience,
-            accel_time=0.15,
+            force_time=0.15,
             constraints=1.0 if constraints else 0.0,
         )

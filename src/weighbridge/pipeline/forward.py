@@ -342,7 +342,7 @@ def _folded(
     if set_off is None and moving[new].any():
         set_off = float(table.time[new][np.argmax(moving[new])])
     table = replace(table, set_off=set_off)
-    rows, y = design(table, setup.vehicle, squat_accel=sizes.body.squat_accel(table.accel))
+    rows, y = design(table, setup.vehicle, squat_accel=sizes.body.squat_accel(table.specific_force))
     values = np.column_stack([table.time, y, table.force_std**2, rows])
     windows, means, count, stood = window_means.run(
         state.windows,

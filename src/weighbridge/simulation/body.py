@@ -9,6 +9,7 @@ import numpy as np
 from pymap3d import rcurve
 from scipy import signal as dsp
 
+from weighbridge.constants import GRAVITY
 from weighbridge.signals import Floats
 from weighbridge.simulation.longitudinal import DT, Trajectory
 from weighbridge.simulation.route import STEP
@@ -88,7 +89,8 @@ def simulate_pose(scenario: Scenario, drive: Trajectory, rng: np.random.Generato
 
     Notes
     -----
-    Squat follows acceleration through a damped second-order system. The
+    Squat follows the specific force along the road through a damped second-order system: a hill
+    moves load between the axles as an acceleration does (Gillespie 1992, eqs. 1-7 to 1-10). The
     position is carried over the ellipsoid with the local radii of curvature, so
     that altitude is height above it and the grade is against the local level;
     Earth rotation and transport rate are left out, as is gravity's change.
@@ -102,7 +104,8 @@ def simulate_pose(scenario: Scenario, drive: Trajectory, rng: np.random.Generato
     accel = np.gradient(v, DT)
     payload = scenario.payload + (drive.loaded if scenario.loading else 0.0)
     lever = car.squat * effects.squat * (1.0 + car.squat_load * payload / car.mass)
-    squat = second_order(accel * lever, car.pitch_frequency, 0.45, zero=False)
+    force = accel + GRAVITY * np.sin(grade)
+    squat = second_order(force * lever, car.pitch_frequency, 0.45, zero=False)
     body_roll = second_order(
         lateral * (-car.roll_gain * effects.roll), car.roll_frequency, 0.35, zero=False
     )

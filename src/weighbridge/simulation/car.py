@@ -68,7 +68,7 @@ class SimulatedCar:
     yaw_drag : growth of the drag area with the squared sine of the flow angle [-]
     tyre_cooling : growth of rolling resistance per kelvin colder, ISO 28580 [1/K]
     warm_up_time : of tyres and oil [s]
-    squat : pitch of the body per forward acceleration, without payload [rad per m/s^2]
+    squat : pitch of the body per specific force along the road, without payload [rad per m/s^2]
     squat_load : growth of the squat with payload over empty mass [-]
     load_pitch : static pitch per payload, nose up [rad/kg]
     roll_gain : roll to the outside per lateral acceleration [rad per m/s^2]

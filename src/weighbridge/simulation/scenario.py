@@ -43,7 +43,7 @@ class Effects:
     load_curve : the load reading is of the torque there is at that engine speed
     drafting : others ahead shelter from the air
     traffic : others slow the driver down
-    squat : the body pitches with acceleration
+    squat : the body pitches with the traction
     load_pitch : the body pitches with payload
     roll : the body rolls in bends
     roughness : the road shakes the body

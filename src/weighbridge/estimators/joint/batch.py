@@ -208,7 +208,7 @@ def _ask(
     def of(mass: float | None) -> _Asked:
         """Squat and levels of noise are told in terms of a mass [kg]."""
         body = residual_squat(balance, vehicle, mass or rough)
-        squat_accel = body.squat_accel(table.accel)
+        squat_accel = body.squat_accel(table.specific_force)
         rows, y = design(
             table,
             vehicle,
@@ -302,7 +302,7 @@ def _track(
     systematic = math.hypot(
         _systematic_std(balance, vehicle, mass),
         unseen_std(asked.stood, vehicle.of_class.boarding_std) if by_speed else 0.0,
-        asked.body.relative_std(table.accel, phi, used),
+        asked.body.relative_std,
         inertia_relative_std(vehicle, mass, table.accel, phi, used),
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         shape_std(_moved(problem, solved, cut.mean(bends)), mass),
