@@ -234,7 +234,7 @@ def residual_squat(balance: ForceBalance, vehicle: Vehicle, mass: float) -> Resi
     balance, vehicle
     mass : rough, for squat that grows with it [kg]
 
-    An accelerometer that leans by k per acceleration reads it 1 + g k times too
+    An accelerometer that leans by k per specific force reads it 1 + g k times too
     large. The navigation takes that out where the drive shows k. A torque that
     was calibrated against such readings has the factor in it, and must meet it
     again; one of a data sheet, or calibrated by speed, must not.

@@ -192,7 +192,7 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
             Key(
                 "squat",
                 "squat",
-                "nose-up lean of the body per forward acceleration",
+                "nose-up lean of the body per specific force along the road",
                 suffix="deg",
                 tail=_PER_MPS2,
             ),
