@@ -20,10 +20,11 @@ from weighbridge.estimators.squat import (
     squat_at,
     squat_by_speed,
 )
+from weighbridge.navigation.inertial import inertial_motion
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import with_squat
 from weighbridge.signals import Drive, Signal
-from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+from weighbridge.simulation import MIDSIZE, Scenario, mixed_route, short_route, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 
 K = 0.004
@@ -250,3 +251,22 @@ def test_a_holder_that_swings_is_told_and_the_mass_is_right(weighed):
     assert any("holder" in w for w in found.warnings)
     low, high = found.interval(0.95)
     assert low < made.scenario.mass < high
+
+
+def test_gravity_on_hills_is_read_as_right_as_acceleration():
+    route = mixed_route(75, out=[("hills", 4000)], back=[("hills", 4000)])
+    made = simulate_car(Scenario(name="hills", car=MIDSIZE, route=route, seed=75))
+    motion = inertial_motion(made.drive)
+    assert motion.squat == pytest.approx(MIDSIZE.squat, abs=1e-3)
+    truth = made.truth
+    accel = np.interp(motion.time, truth.time, truth.accel)
+    gravity = GRAVITY * np.sin(np.interp(motion.time, truth.time, truth.grade))
+    second = round(motion.rate)
+    rows = np.column_stack([motion.specific_force, accel, gravity, motion.speed > 3.0])
+    rows = rows[: len(rows) // second * second].reshape(-1, second, 4).mean(axis=1)
+    rows = rows[rows[:, 3] == 1.0]
+    gains, *_ = np.linalg.lstsq(
+        np.column_stack([rows[:, 1:3], np.ones(len(rows))]), rows[:, 0], rcond=None
+    )
+    # With a squat by acceleration alone, gravity would read 1 + g k: 3.6 % too much.
+    assert_allclose(gains[:2], 1.0, atol=0.012)
