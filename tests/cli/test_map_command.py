@@ -271,3 +271,26 @@ def test_a_folder_of_foreign_names_leads_to_a_mapping_of_the_folder(weighbridge,
     (foreign / "phone.csv").unlink()
     alone = " ".join(weighbridge("inspect", foreign).err.split())
     assert f"weighbridge map {foreign / 'auto.csv'} -o map.toml" in alone
+
+
+def test_columns_without_a_header_are_named_on_the_command_line(weighbridge, tmp_path):
+    log, mapping = tmp_path / "x.csv", tmp_path / "m.toml"
+    log.write_text("".join(f"{k % 9},{100 * k}\n" for k in range(300)))
+    refused = weighbridge("map", log)
+    assert refused.code == 2
+    assert "--columns" in refused.err
+    ran = weighbridge("map", log, "--columns", "Vehicle Speed (km/h), time_ms", "-o", mapping)
+    assert ran.code == 0
+    assert "300 rows in 30 s" in " ".join(ran.out.split())
+    assert read_drive(log, mapping).signals["vehicle_speed"].duration == pytest.approx(29.9)
+    pl.DataFrame({"rpm": [1.0]}).write_parquet(tmp_path / "x.parquet")
+    refused = weighbridge("map", tmp_path / "x.parquet", "--columns", "rpm")
+    assert "leave out --columns" in refused.err
+
+
+@pytest.mark.parametrize("named", ["", "speed.npy"])
+def test_arrays_are_told_to_have_no_names(weighbridge, tmp_path, named):
+    np.save(tmp_path / "speed.npy", np.zeros(9))
+    ran = weighbridge("map", tmp_path / named)
+    assert ran.code == 2
+    assert "NumPy arrays, which have no names" in ran.err
