@@ -35,6 +35,17 @@ _ARRAYS = (
     "by number, as examples/comma2k19/mapping.toml does; docs/formats.md says how"
 )
 
+_Columns = Annotated[
+    Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
+    typer.Option(
+        "--columns",
+        help="Names of the columns of a text without a header, in their order: "
+        "time_s,rpm,speed,-; a dash for one of no use.",
+        metavar="NAMES",
+        show_default=False,
+    ),
+]
+
 _SHOWN = 12
 """Columns that are not taken, named at most."""
 
@@ -65,16 +76,7 @@ def map_log(
             show_default=False,
         ),
     ] = None,
-    columns: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            "--columns",
-            help="Names of the columns of a text without a header, in their order: "
-            "time_s,rpm,speed,-; a dash for one of no use.",
-            metavar="NAMES",
-            show_default=False,
-        ),
-    ] = None,
+    columns: _Columns = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     dbc: DbcPaths = None,
 ) -> None:
@@ -110,22 +112,48 @@ def map_log(
     if not tells_torque(*drafts):
         notice(_NO_TORQUE)
     text = mapping_text(drafts, tuple(refused), _named_dbcs(dbc or [], output))
+    again = _again(logs, columns, dbc or [], output)
+    to_ask = _to_ask(drafts, again) if not ask else ""
     if output is None:
         sys.stdout.write(text)
+        if to_ask:
+            notice(to_ask)
         return
     with whole_file(output) as part:
         part.write_text(text, encoding="utf-8")
     say_written(output)
-    if quiet():
-        return
+    if not quiet():
+        _say_next(drafts, logs, output, again)
+        if to_ask:
+            say(to_ask)
+
+
+def _say_next(drafts: list[Draft], logs: list[Path], output: Path, again: list[str]) -> None:
+    """Say what to type next; ``again`` is the command that was typed."""
     if any(found.rate_unknown for found in drafts):
-        say(f"next: weighbridge map {shlex.join(map(str, logs))} --rate HZ -o {output} --force")
+        say(f"next: {shlex.join([*again, '--rate', 'HZ'])}")
         return
     drive = logs[0] if len(drafts) == 1 else _drive(logs)
     if _drives_beside_each_other(drafts):
         say(f"if {drive} holds several drives, put the files of each into a folder of its own")
     words = ["weighbridge", "inspect", drive, "--mapping", output]
     say(f"next: {shlex.join(map(str, words))}")
+
+
+def _again(logs: list[Path], columns: str | None, dbc: list[str], output: Path | None) -> list[str]:
+    """Words of the command that was typed, replacing what it wrote."""
+    words = ["weighbridge", "map", *map(str, logs)]
+    words += ["--columns", columns] if columns is not None else []
+    words += [word for path in dbc for word in ("--dbc", path)]
+    return words + (["-o", str(output), "--force"] if output is not None else [])
+
+
+def _to_ask(drafts: list[Draft], again: list[str]) -> str:
+    """Say how to be asked, to a person at a terminal and where something is doubtful."""
+    doubtful = any(found.all_doubts for found in drafts)
+    if not (doubtful and sys.stdin.isatty() and sys.stdout.isatty()):
+        return ""
+    return f"or, to be asked about what is doubtful: {shlex.join([*again, '--ask'])}"
 
 
 def _named_dbcs(dbc: list[str], output: Path | None) -> list[str]:
