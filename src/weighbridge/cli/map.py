@@ -306,8 +306,10 @@ def _show(found: Draft, screen: Console) -> None:
         title=f"{shown(found.path.name)}{more}: {clock}, {_length(found)}",
         title_justify="left",
     )
-    for heading in ("column", "is", "unit"):
-        table.add_column(heading, overflow="fold")
+    table.add_column("column", overflow="fold")
+    # On a narrow screen the log's own names are broken, not the quantities.
+    for heading in ("is", "unit"):
+        table.add_column(heading, no_wrap=True)
     for heading in ("lowest", "median", "highest", "values", "Hz"):
         table.add_column(heading, justify="right")
     for column in found.known:
