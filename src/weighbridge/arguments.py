@@ -18,6 +18,12 @@ def type_name(given: object) -> str:
     return f"{type(given).__module__}.{type(given).__qualname__}".removeprefix("builtins.")
 
 
+def is_frame(given: object) -> bool:
+    """Tell whether something is a data frame of pandas or polars."""
+    home = type(given).__module__.partition(".")[0]
+    return home in ("pandas", "polars") and type(given).__name__ == "DataFrame"
+
+
 def check_type(name: str, given: object, kinds: type | tuple[type, ...], expected: str) -> None:
     """Refuse what is of none of the types.
 

@@ -3,6 +3,9 @@
 import json
 import math
 import os
+import pty
+import subprocess
+import sys
 
 import numpy as np
 import polars as pl
@@ -175,7 +178,7 @@ def test_a_log_without_a_clock_is_mapped_by_its_rate(weighbridge, tmp_path, monk
     assert ran.code == 0
     told = " ".join(ran.out.split())
     assert "300 of them, how many per second is not known" in told
-    assert f"next: weighbridge map {log} --rate HZ -o {mapping} --force" in told
+    assert f"next: weighbridge map {log} -o {mapping} --force --rate HZ" in told
     refused = weighbridge("inspect", log, "--mapping", mapping)
     assert refused.code == 2
     assert "rate_hz is not known yet" in refused.err
@@ -271,3 +274,44 @@ def test_a_folder_of_foreign_names_leads_to_a_mapping_of_the_folder(weighbridge,
     (foreign / "phone.csv").unlink()
     alone = " ".join(weighbridge("inspect", foreign).err.split())
     assert f"weighbridge map {foreign / 'auto.csv'} -o map.toml" in alone
+
+
+def test_columns_without_a_header_are_named_on_the_command_line(weighbridge, tmp_path):
+    log, mapping = tmp_path / "x.csv", tmp_path / "m.toml"
+    log.write_text("".join(f"{k % 9},{100 * k}\n" for k in range(300)))
+    refused = weighbridge("map", log)
+    assert refused.code == 2
+    assert "--columns" in refused.err
+    ran = weighbridge("map", log, "--columns", "Vehicle Speed (km/h), time_ms", "-o", mapping)
+    assert ran.code == 0
+    assert "300 rows in 30 s" in " ".join(ran.out.split())
+    assert read_drive(log, mapping).signals["vehicle_speed"].duration == pytest.approx(29.9)
+    pl.DataFrame({"rpm": [1.0]}).write_parquet(tmp_path / "x.parquet")
+    refused = weighbridge("map", tmp_path / "x.parquet", "--columns", "rpm")
+    assert "leave out --columns" in refused.err
+
+
+@pytest.mark.parametrize("named", ["", "speed.npy"])
+def test_arrays_are_told_to_have_no_names(weighbridge, tmp_path, named):
+    np.save(tmp_path / "speed.npy", np.zeros(9))
+    ran = weighbridge("map", tmp_path / named)
+    assert ran.code == 2
+    assert "NumPy arrays, which have no names" in ran.err
+
+
+def test_on_a_terminal_the_last_line_names_the_questions(weighbridge, tmp_path):
+    """Nothing is asked without --ask, and a script is not told of it."""
+    log, mapping = tmp_path / "x.csv", tmp_path / "m.toml"
+    log.write_text("Time,Speed,Load\n" + "".join(f"{k},{k % 9},{k % 90}\n" for k in range(300)))
+    ran = weighbridge("map", log, "-o", mapping)
+    assert ran.code == 0
+    assert "states no unit" in ran.out
+    assert "--ask" not in ran.out
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "weighbridge", "map", log, "-o", mapping, "--force"]
+    subprocess.run(command, stdin=theirs, stdout=theirs, stderr=theirs, check=True, timeout=300)
+    os.close(theirs)
+    told = os.read(ours, 1 << 16).decode()
+    os.close(ours)
+    assert "to be asked about what is doubtful" in told.splitlines()[-1]
+    assert "--force --ask" in told.splitlines()[-1]

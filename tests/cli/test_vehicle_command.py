@@ -44,6 +44,18 @@ def test_a_mistake_is_one_line(weighbridge, tmp_path):
     assert "--gear-ratios" in ran.err
 
 
+def test_all_mistakes_are_told_at_once(weighbridge, tmp_path):
+    ran = weighbridge(
+        "vehicle", "new", "--gear-ratios", "3.8;2.1", "--final-drive", 3.9, "--tare", 50,
+        "--engine", "steam", "-o", tmp_path / "v.toml",
+    )  # fmt: skip
+    assert ran.code == 2
+    assert not (tmp_path / "v.toml").exists()
+    for words in ("--gear-ratios", "tare of 50 kg", "engine must be petrol"):
+        assert words in ran.err
+    assert "needs gear ratios" not in ran.err
+
+
 def test_a_load_means_nothing_before_a_calibration(weighbridge, loaded, tmp_path):
     path = tmp_path / "car.toml"
     made = weighbridge("vehicle", "new", "--torque", "load", "--tyre", "205/55 R16", "-o", path)

@@ -3,6 +3,7 @@
 import inspect
 
 import numpy as np
+import pandas as pd
 import polars as pl
 import pytest
 
@@ -140,6 +141,9 @@ def test_wrong_types_are_one_sentence(calls):
     [
         (lambda car: wb.weigh("x", car, mapping=3), "mapping must be the path of a mapping file"),
         (lambda car: wb.weigh("x", car, settings=3), "settings must be a dictionary of values"),
+        (lambda _: wb.read_drive(pl.DataFrame({"time_s": [0.0]})), "DataFrame; read_frame reads"),
+        (lambda _: wb.read_drive(pd.DataFrame({"time_s": [0.0]})), "DataFrame; read_frame reads"),
+        (lambda _: wb.read_drive({"imu": pl.DataFrame()}), "got dict; read_frame reads data"),
         (lambda _: wb.read_drive(3), "path must be a path, as text or pathlib.Path, or a list"),
         (lambda _: wb.read_drive(["a", 3]), "each path must be a path, .* got 3"),
         (lambda _: wb.to_frames("x"), "drive must be a drive, as read_drive returns it, got 'x'"),

@@ -54,7 +54,7 @@ def test_signals_of_a_dbc_are_recognised_and_read_back(logged, tmp_path):
         "engine_speed": ("Engine.EngineSpeed", "rpm", ""),
         "engine_torque": ("Engine.EngineTorque", "nm", ""),
     }
-    assert draft.rate == pytest.approx(10.0, rel=0.01)
+    assert draft.known[0].rate == pytest.approx(10.0, rel=0.01)
     assert draft.duration == pytest.approx(19.9, abs=0.1)
     mapping = tmp_path / "map.toml"
     mapping.write_text(mapping_text([draft]), encoding="utf-8")

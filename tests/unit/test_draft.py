@@ -8,7 +8,8 @@ import pytest
 
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.io import read_drive
-from weighbridge.io.draft import HEAD_LINES, draft
+from weighbridge.io.draft import draft
+from weighbridge.io.draft_text import HEAD_LINES
 from weighbridge.io.file_patterns import file_patterns
 from weighbridge.io.mapping import load_mapping
 from weighbridge.io.mapping_text import mapping_text
@@ -234,7 +235,7 @@ def test_a_time_of_another_name_is_found(tmp_path, name):
     pl.DataFrame(columns).write_parquet(path)
     found = draft(path)
     assert (found.time, found.time_unit) == (name, "ms")
-    assert found.rate == pytest.approx(5.0)
+    assert found.known[0].rate == pytest.approx(5.0)
     assert any("rises as one" in d for d in found.doubts)
 
 
@@ -304,7 +305,7 @@ def test_rows_that_are_counted_are_a_clock_once_their_rate_is_known(tmp_path):
 def test_a_rate_above_the_header_is_taken(tmp_path):
     for line in ("Sample Rate: 4 Hz", '"Sample Rate","4.000"', "Logging rate = 4,0 Hz;"):
         found = draft(counted(tmp_path, above=["Session,12", line]))
-        assert (found.row_rate, found.rate) == (4.0, 4.0)
+        assert (found.row_rate, found.known[0].rate) == (4.0, pytest.approx(4.0))
         assert found.duration == pytest.approx(T[-1])
         text = mapping_text([found])
         assert "rate_hz = 4.0" in text
@@ -414,3 +415,51 @@ def test_what_stands_around_the_names_is_left_out(make, tmp_path):
     for name, true in (("vehicle_speed", SPEED / 3.6), ("engine_speed", RPM * np.pi / 30.0)):
         assert np.abs(drive.signals[name].values - true).max() < 0.02 * true.max()
     assert drive.signals["engine_load"].duration == pytest.approx(T[-1])
+
+
+def test_columns_of_a_text_without_a_header_are_named_in_their_order(tmp_path):
+    rows = [f"{v:.2f};{1000.0 * t:.0f};7;{n:.0f}" for t, v, n in zip(T, SPEED, RPM, strict=True)]
+    path = written(tmp_path / "bare.csv", rows)
+    with pytest.raises(DriveError, match="name its 4 columns in their order"):
+        draft(path)
+    found = draft(path, ["speed_kmh", "time_ms", "-", "rpm"])
+    assert found.rows == ROWS
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(mapping_text([found]), encoding="utf-8")
+    drive = read_drive(path, mapping)
+    np.testing.assert_allclose(drive.signals["vehicle_speed"].values, SPEED / 3.6, atol=0.002)
+    np.testing.assert_allclose(np.diff(drive.signals["engine_speed"].time), 0.25, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["time_s", "speed"], "2 columns are named and its rows have 3, such as '1,2,3'"),
+        (["time_s", "rpm", "rpm"], "two columns are called 'rpm'"),
+    ],
+)
+def test_names_that_do_not_fit_the_columns_are_refused(tmp_path, names, said):
+    path = written(tmp_path / "bare.csv", [f"{k},2,3" for k in range(1, 30)])
+    with pytest.raises(DriveError, match=said):
+        draft(path, names)
+
+
+def test_names_given_by_hand_go_in_place_of_a_header(tmp_path):
+    path = no_units(tmp_path)
+    found = draft(path, ["Date", "speed_kmh", "rpm", "-", "-"])
+    assert [c.quantity for c in found.known] == ["vehicle_speed", "engine_speed"]
+    assert found.rows == ROWS
+
+
+def test_each_column_has_the_rate_that_reading_finds(tmp_path):
+    """Two rows of each second, one quantity in every fourth row."""
+    rows = [f"{k // 2},{50 + k % 9},{'' if k % 4 else 60}" for k in range(2400)]
+    path = written(tmp_path / "log.csv", ["Time [s],Speed [km/h],Engine load [%]", *rows])
+    found = draft(path)
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(mapping_text([found]), encoding="utf-8")
+    drive = read_drive(path, mapping)
+    for column, rate in zip(found.known, (2.0, 0.5), strict=True):
+        signal = drive.signals[column.quantity]
+        assert column.rate == pytest.approx((len(signal) - 1) / signal.duration, rel=1e-6)
+        assert column.rate == pytest.approx(rate, rel=0.01)

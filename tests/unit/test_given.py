@@ -126,14 +126,18 @@ def test_what_is_neither_is_named(short_drive, short_car, wrong):
         wb.calibrate([short_drive.drive, wrong], mass=1700.0)
 
 
-def test_drives_and_weighings_are_three_lines(short_drive, short_car):
+def test_what_calls_return_is_three_lines(short_drive, short_car):
     weighing = wb.weigh(short_drive.drive, short_car)
-    for shown in (short_drive.drive, weighing):
+    inspection = wb.inspect_drive(short_drive.drive)
+    for shown in (short_drive.drive, weighing, short_car, inspection):
         lines = repr(shown).splitlines()
         assert len(lines) == 3
         assert max(map(len, lines)) <= 102
         assert shown._repr_html_().startswith("<div><strong>")
     assert f"{weighing.mass:.0f} kg" in repr(weighing)
+    assert "calibrated" in repr(short_car)
+    assert "never calibrated" in repr(wb.Vehicle())
+    assert "best way: " in repr(inspection)
     assert "engine_load" in short_drive.drive._repr_html_()
 
 

@@ -121,7 +121,7 @@ def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
         ({"drag_coefficient": 0.3}, "belong together"),
         ({"reference_torque": 320.0}, "name percent"),
         ({"tyre": "winter"}, "tyre size"),
-        ({"engine": "steam"}, "engine must be petrol, diesel, electric"),
+        ({"engine": "steam"}, "engine must be petrol, diesel or electric"),
         ({"torque": "guess"}, "torque must be"),
         ({"radius": 0.49, "tyre": "315/80 R22.5"}, "give the tyre or the radius"),
         ({"radius": 49.0}, "radius must be between 0.15 and 0.9 m"),
@@ -131,6 +131,19 @@ def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
 def test_what_cannot_be_is_refused(known, words):
     with pytest.raises(ConfigError, match=words):
         describe(Known(**known))
+
+
+def test_all_that_cannot_be_is_told_at_once():
+    wrong = {
+        "tare": 50.0, "engine": "steam", "tyre": "winter", "driven": "left", "layout": "flat",
+        "gear_ratios": (1.0, 2.0), "frontal_area": -2.0, "torque": "guess",
+    }  # fmt: skip
+    with pytest.raises(ConfigError) as refused:
+        describe(Known(**wrong))
+    told = str(refused.value).split("; ")
+    for words in ("tare of", "engine must", "tyre size", "driven must", "layout must", "must fall",
+                  "frontal area must", "belong together", "torque must"):  # fmt: skip
+        assert sum(words in one for one in told) == 1, (words, told)
 
 
 def test_a_truck_by_radius_and_axles_weighs_by_data_sheet(tmp_path):

@@ -30,6 +30,22 @@ _NO_TORQUE = (
     "mapping, as engine_torque, engine_torque_fraction, engine_load or engine_power"
 )
 
+_ARRAYS = (
+    "NumPy arrays, which have no names that map could know: write their mapping by hand, columns "
+    "by number, as examples/comma2k19/mapping.toml does; docs/formats.md says how"
+)
+
+_Columns = Annotated[
+    Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
+    typer.Option(
+        "--columns",
+        help="Names of the columns of a text without a header, in their order: "
+        "time_s,rpm,speed,-; a dash for one of no use.",
+        metavar="NAMES",
+        show_default=False,
+    ),
+]
+
 _SHOWN = 12
 """Columns that are not taken, named at most."""
 
@@ -60,6 +76,7 @@ def map_log(
             show_default=False,
         ),
     ] = None,
+    columns: _Columns = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     dbc: DbcPaths = None,
 ) -> None:
@@ -80,7 +97,8 @@ def map_log(
     if output is not None:
         refuse_results(inputs(logs, dbc=dbc), [Result("--output", output, "mapping")])
         refuse_overwriting(output, force, "mapping")
-    drafts, refused = _drafts(_files(logs, dbc or []), ask)
+    names = [name.strip() for name in columns.split(",")] if columns is not None else []
+    drafts, refused = _drafts(_files(logs, dbc or [], names), ask)
     drafts = with_compared_speeds(kinds(drafts, tuple(refused)))
     drafts = _settled(drafts, rate, ask)
     if nameless := [found for found in drafts if not found.known]:
@@ -94,22 +112,48 @@ def map_log(
     if not tells_torque(*drafts):
         notice(_NO_TORQUE)
     text = mapping_text(drafts, tuple(refused), _named_dbcs(dbc or [], output))
+    again = _again(logs, columns, dbc or [], output)
+    to_ask = _to_ask(drafts, again) if not ask else ""
     if output is None:
         sys.stdout.write(text)
+        if to_ask:
+            notice(to_ask)
         return
     with whole_file(output) as part:
         part.write_text(text, encoding="utf-8")
     say_written(output)
-    if quiet():
-        return
+    if not quiet():
+        _say_next(drafts, logs, output, again)
+        if to_ask:
+            say(to_ask)
+
+
+def _say_next(drafts: list[Draft], logs: list[Path], output: Path, again: list[str]) -> None:
+    """Say what to type next; ``again`` is the command that was typed."""
     if any(found.rate_unknown for found in drafts):
-        say(f"next: weighbridge map {shlex.join(map(str, logs))} --rate HZ -o {output} --force")
+        say(f"next: {shlex.join([*again, '--rate', 'HZ'])}")
         return
     drive = logs[0] if len(drafts) == 1 else _drive(logs)
     if _drives_beside_each_other(drafts):
         say(f"if {drive} holds several drives, put the files of each into a folder of its own")
     words = ["weighbridge", "inspect", drive, "--mapping", output]
     say(f"next: {shlex.join(map(str, words))}")
+
+
+def _again(logs: list[Path], columns: str | None, dbc: list[str], output: Path | None) -> list[str]:
+    """Words of the command that was typed, replacing what it wrote."""
+    words = ["weighbridge", "map", *map(str, logs)]
+    words += ["--columns", columns] if columns is not None else []
+    words += [word for path in dbc for word in ("--dbc", path)]
+    return words + (["-o", str(output), "--force"] if output is not None else [])
+
+
+def _to_ask(drafts: list[Draft], again: list[str]) -> str:
+    """Say how to be asked, to a person at a terminal and where something is doubtful."""
+    doubtful = any(found.all_doubts for found in drafts)
+    if not (doubtful and sys.stdin.isatty() and sys.stdout.isatty()):
+        return ""
+    return f"or, to be asked about what is doubtful: {shlex.join([*again, '--ask'])}"
 
 
 def _named_dbcs(dbc: list[str], output: Path | None) -> list[str]:
@@ -150,26 +194,33 @@ def _drafts(
     return drafts, refused
 
 
-def _files(logs: list[Path], dbc: list[str]) -> list[tuple[Path, Callable[[Path], Draft]]]:
+def _files(
+    logs: list[Path], dbc: list[str], names: list[str]
+) -> list[tuple[Path, Callable[[Path], Draft]]]:
     """Files named, those of folders included, each with what drafts its mapping."""
+    from weighbridge.errors import DriveError
     from weighbridge.io.dbc import load_dbcs
+    from weighbridge.io.formats import formats, is_log
 
     databases = load_dbcs(list(dbc))
-    from weighbridge.errors import DriveError
-    from weighbridge.io.formats import formats, is_log
 
     drafted = tuple(dict.fromkeys(s for f in formats() if f.draft is not None for s in f.suffixes))
     found = []
     for path in logs:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.is_file() and is_log(p))
-            there = [(p, draft) for p in inside if (draft := _draft(p, databases)) is not None]
+            drafts = ((p, _draft(p, databases, names)) for p in inside)
+            there = [(p, draft) for p, draft in drafts if draft is not None]
+            if not there and any(p.suffix.lower() == ".npy" for p in path.iterdir()):
+                raise DriveError(f"{path}: holds {_ARRAYS}")
             if not there:
                 raise DriveError(f"{path}: holds no table ({', '.join(drafted)})")
             found += there
         elif not path.is_file():
             raise DriveError(f"{path}: {'no plain file' if path.exists() else 'no such file'}")
-        elif (draft := _draft(path, databases)) is None:
+        elif path.suffix.lower() == ".npy":
+            raise DriveError(f"{path}: holds {_ARRAYS}")
+        elif (draft := _draft(path, databases, names)) is None:
             raise DriveError(
                 f"{path}: map drafts mappings of tables ({', '.join(drafted)}), and of CAN logs "
                 "by their DBC (--dbc FILE); other logs are read as they are: weighbridge inspect "
@@ -180,9 +231,12 @@ def _files(logs: list[Path], dbc: list[str]) -> list[tuple[Path, Callable[[Path]
     return found
 
 
-def _draft(path: Path, databases: tuple[Database, ...]) -> Callable[[Path], Draft] | None:
+def _draft(
+    path: Path, databases: tuple[Database, ...], names: list[str]
+) -> Callable[[Path], Draft] | None:
     """What drafts the mapping of a file; None where it is read as it is."""
     from weighbridge.errors import DriveError
+    from weighbridge.io import draft as tables
     from weighbridge.io.bus_draft import draft_bus
     from weighbridge.io.formats import format_of
 
@@ -194,6 +248,10 @@ def _draft(path: Path, databases: tuple[Database, ...]) -> Callable[[Path], Draf
         return None
     if databases and form.holds_frames:
         return lambda log: draft_bus(log, databases)
+    if names and form.draft is not tables.draft:
+        raise DriveError(f"{path} names what it holds itself; leave out --columns")
+    if names:
+        return lambda log: tables.draft(log, names)
     return form.draft
 
 
@@ -245,17 +303,20 @@ def _show(found: Draft, screen: Console) -> None:
         clock = f"rows counted by '{shown(found.time)}'" if found.time else "rows counted"
     more = f" and {found.files - 1} that read alike" if found.files > 1 else ""
     table = Table(
-        title=f"{shown(found.path.name)}{more}: {clock}, {_rate(found)}",
+        title=f"{shown(found.path.name)}{more}: {clock}, {_length(found)}",
         title_justify="left",
     )
-    for heading in ("column", "is", "unit"):
-        table.add_column(heading, overflow="fold")
-    for heading in ("lowest", "median", "highest", "values"):
+    table.add_column("column", overflow="fold")
+    # On a narrow screen the log's own names are broken, not the quantities.
+    for heading in ("is", "unit"):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("lowest", "median", "highest", "values", "Hz"):
         table.add_column(heading, justify="right")
     for column in found.known:
         unit = column.unit + ("" if column.stated or not column.unit else " ?")
         values = (f"{x:.4g}" for x in (column.low, column.usual, column.high))
-        table.add_row(shown(column.name), column.quantity, unit, *values, str(column.count))
+        rate = f"{column.rate:.3g}" if column.rate > 0.0 else "-"
+        table.add_row(shown(column.name), column.quantity, unit, *values, str(column.count), rate)
     screen.print(table)
     others = [c.name for c in found.columns if not c.quantity and not c.doubt]
     if others:
@@ -266,11 +327,9 @@ def _show(found: Draft, screen: Console) -> None:
         screen.print(f"  doubtful: {shown(doubt)}", highlight=False)
 
 
-def _rate(found: Draft) -> str:
-    """Rows per second, or values per second where clocks differ, and how long."""
+def _length(found: Draft) -> str:
+    """How many rows there are, and how long they last."""
     if found.rate_unknown:
         return f"{found.rows} of them, how many per second is not known"
-    if not found.rates:
-        return f"{found.rate:.3g} rows per second for {found.duration:.0f} s"
-    *others, last = (f"{rate:g}" for rate in found.rates)
-    return f"{', '.join(others)} and {last} values per second for {found.duration:.0f} s"
+    rows = f"{found.rows} rows in " if found.rows else ""
+    return f"{rows}{found.duration:.0f} s"

@@ -110,31 +110,39 @@ def new(
     -o van.toml
     """
     from weighbridge.pipeline.given import mapping_beside
+    from weighbridge.signals.tomlfile import Faults
     from weighbridge.vehicle.file import save_vehicle
     from weighbridge.vehicle.known import Known, describe
 
     refuse_results(inputs(mapping=mapping), [Result("--output", output, "vehicle file")])
     refuse_overwriting(output, force, "vehicle file")
-    made = describe(
-        Known(
-            name=name,
-            kind=kind,
-            engine=engine,  # type: ignore[arg-type]
-            tare=tare,
-            gross=gross,
-            tyre=tyre,
-            radius=radius,
-            driven=driven,  # type: ignore[arg-type]
-            gear_ratios=_ratios(gear_ratios),
-            final_drive=final_drive,
-            torque=torque,
-            reference_torque=reference_torque,
-            drag_coefficient=drag_coefficient,
-            frontal_area=frontal_area,
-            layout=layout,  # type: ignore[arg-type]
-            mapping=mapping_beside(mapping, output) if mapping is not None else None,
-        )
+    faults = Faults()
+    ratios: tuple[float, ...] = ()
+    with faults.gathered():
+        ratios = _ratios(gear_ratios)
+    unread = bool(faults.said)
+    known = Known(
+        name=name,
+        kind=kind,
+        engine=engine,  # type: ignore[arg-type]
+        tare=tare,
+        gross=gross,
+        tyre=tyre,
+        radius=radius,
+        driven=driven,  # type: ignore[arg-type]
+        gear_ratios=ratios,
+        # Without the ratios nothing is to be said of what belongs to them.
+        final_drive=None if unread else final_drive,
+        torque=torque,
+        reference_torque=reference_torque,
+        drag_coefficient=drag_coefficient,
+        frontal_area=frontal_area,
+        layout=layout,  # type: ignore[arg-type]
+        mapping=mapping_beside(mapping, output) if mapping is not None else None,
     )
+    with faults.gathered():
+        made = describe(known)
+    faults.refuse()
     save_vehicle(made.vehicle, output, made.origins)
     _print(output, made.vehicle)
     say_written(output)

@@ -58,9 +58,19 @@ OF_ANOTHER: Final = frozenset(
         "status", "state", "flt", "falt", "fault", "err", "error", "cnt", "counter", "crc", "chksm",
         "checksum", "alv", "alive", "diag", "warn", "warning", "lamp", "avail", "offset", "std",
         "sigma", "rolling",
+        "soll", "sollwert", "ziel", "durchschnitt", "mittelwert", "fehler",
+        "consigne", "cible", "moyenne", "moyen", "maxi", "defaut",
+        "objetivo", "consigna", "deseado", "deseada", "promedio", "maxima", "maximo", "minima",
+        "obiettivo", "richiesta", "richiesto", "massima", "massimo",
+        "gewenst", "gewenste", "gemiddeld", "gemiddelde", "doel", "fout",
+        "zadana", "zadany", "zadane", "srednia", "srednie", "maksymalna", "maksymalny", "blad",
+        "onskad", "onskat", "borvarde", "medel", "begard", "begart", "fel",
+        "pozadovany", "pozadovana", "pozadovane", "prumerna", "prumerny", "maximalni", "chyba",
+        "hedef", "istenen", "ortalama", "azami", "hata",
     )
 )  # fmt: skip
-"""Words of a request, a bound, a check or a state of a signal, in place of the signal."""
+"""Words of a request, a bound, an average, a check or a state of a signal, in place of the signal;
+English, German, French, Spanish, Italian, Dutch, Polish, Swedish, Czech, Turkish."""
 
 
 def spelled(words: Iterable[str]) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import difflib
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -281,7 +281,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
     named = recognise_all([_told(c.name) for c in unnamed], units)
     columns = checked(
         tuple(
-            draft_column(c.name, n, c.values, u)
+            replace(draft_column(c.name, n, c.values, u), rate=_rate(c.time))
             for c, n, u in zip(unnamed, named, units, strict=True)
             if n.quantity not in known
         )
@@ -296,7 +296,6 @@ def draft_of(path: Path, found: Recording) -> Draft:
     # Channels that stand for a name alone have no instants of their own.
     told = [c for c in channels if c.quantity or np.isfinite(c.values).any()] or channels
     ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in told]
-    rates = [(c.time.size - 1) / (b - a) for c, (a, b) in zip(told, ends, strict=True) if b > a]
     doubts = [*found.notes]
     doubts += [
         f"{n!r} is there {k} times; the longest is taken" for n, k in counted.items() if k > 1
@@ -306,8 +305,6 @@ def draft_of(path: Path, found: Recording) -> Draft:
         time=found.time,
         time_unit=found.time_unit,
         time_format=found.time_format,
-        rate=float(np.median(rates)) if rates else float("nan"),
-        rates=_rates(channels),
         duration=max(b for _, b in ends) - min(a for a, _ in ends),
         columns=columns,
         doubts=tuple(doubts),
@@ -315,9 +312,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
     )
 
 
-def _rates(channels: list[Channel]) -> tuple[float, ...]:
-    """Values per second of each clock, pauses left out, alike ones once [Hz]."""
-    clocks = {id(c.time): c.time for c in channels if c.time.size > 2}
-    periods = (float(np.median(np.diff(time))) for time in clocks.values())
-    rates = {float(f"{1.0 / period:.2g}") for period in periods if period > 0.0}
-    return tuple(sorted(rates)) if len(rates) > 1 else ()
+def _rate(time: Floats) -> float:
+    """Values per second over all [Hz]; NaN where there are none."""
+    length = float(np.nanmax(time) - np.nanmin(time))
+    return (time.size - 1) / length if length > 0.0 else float("nan")

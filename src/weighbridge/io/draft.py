@@ -14,30 +14,24 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, stated_unit, suffixes_of
+from weighbridge.io.columns import dimension_of, suffixes_of
 from weighbridge.io.draft_column import DraftColumn, checked
-from weighbridge.io.draft_time import DraftTime, find_times, is_number
+from weighbridge.io.draft_text import text_format
+from weighbridge.io.draft_time import DraftTime, find_times
 from weighbridge.io.naming import Named, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
-    SEPARATORS,
     RawTable,
     TextFormat,
-    cells,
     column_list,
     head,
     read_text,
 )
 from weighbridge.signals import QUANTITIES, Floats
+from weighbridge.signals.cleaning import spread_rows
 from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.units import UNITS, to_si
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
-
-HEAD_LINES: Final = 60
-"""Lines at the beginning that tell how a text is written."""
-
-EVEN: Final = 0.7
-"""Part of the lines that a separator cuts alike [-]."""
 
 _STRANGE_UNIT: Final = re.compile(r"[\[(]\s*([^\])\s]*[/•*·][^\])]*?)\s*[\])]\s*$")
 """A unit of two at the end of a name, such as lb/min."""
@@ -47,8 +41,6 @@ _BESIDE: Final = frozenset(("engine_speed", "vehicle_speed", "gnss_speed"))
 
 _AXES: Final = (("x",), ("y",), ("z",))
 """Names of columns that tell an axis and no more."""
-
-_COMMA: Final = re.compile(r"[-+]?\d+,\d+$")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,8 +54,6 @@ class Draft:
     time : name of the time column; empty where the format has a clock of its own
     time_unit : suffix of a time in numbers; empty for a text
     time_format : "clock", "iso" or a `strptime` format; empty for numbers
-    rate : rows per second in the median; NaN where it is not known
-    rates : values per second of each clock, rising; empty where all have one
     duration : from the first to the last row [s]
     columns : all but the time
     doubts : of the file and its time, one sentence each
@@ -80,12 +70,10 @@ class Draft:
     time: str
     time_unit: str
     time_format: str
-    rate: float
     duration: float
     columns: tuple[DraftColumn, ...]
     doubts: tuple[str, ...] = ()
     alike: tuple[Path, ...] = ()
-    rates: tuple[float, ...] = ()
     row_rate: float | None = None
     rows: int = 0
     times: tuple[DraftTime, ...] = ()
@@ -130,12 +118,13 @@ class UnknownColumnsError(DriveError):
         self.found = found
 
 
-def draft(path: Path) -> Draft:
+def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     """Look at a table and draft how it is to be read.
 
     Parameters
     ----------
     path : CSV or other separated text, or Parquet
+    names : of the columns of a text without a header, in their order; "-" for one of no use
 
     Raises
     ------
@@ -146,22 +135,24 @@ def draft(path: Path) -> Draft:
     """
     units: dict[str, str] = {}
     if path.suffix.lower() in (".parquet", ".pq"):
+        if names:
+            raise DriveError(f"{path} names its columns itself; leave out --columns")
         text, raw = TextFormat(), read_parquet(path)
     else:
-        text, units = _text_format(path)
+        text, units = text_format(path, names)
         raw = read_text(path, text)
     if raw.rows == 0:
         raise DriveError(f"{path} has a header and no rows; nothing can be told of its columns")
     above = head(path, text.skip_rows) if text.skip_rows else []
     times = find_times(raw, units, above)
     time = times[0]
-    names = [n for k, n in enumerate(raw.names) if k != time.index]
+    others = [n for k, n in enumerate(raw.names) if k != time.index]
     # Of a bare axis the name of the file says what is measured.
-    told = [f"{path.stem} {n}" if words_of(n) in _AXES else n for n in names]
-    named = recognise_all(told, [units.get(n) for n in names])
+    told = [f"{path.stem} {n}" if words_of(n) in _AXES else n for n in others]
+    named = recognise_all(told, [units.get(n) for n in others])
     columns = tuple(
         _column(raw, name, found, stated=units.get(name))
-        for name, found in zip(names, named, strict=True)
+        for name, found in zip(others, named, strict=True)
     )
     columns = checked(columns)
     found = Draft(
@@ -170,7 +161,6 @@ def draft(path: Path) -> Draft:
         time="",
         time_unit="",
         time_format="",
-        rate=float("nan"),
         duration=float("nan"),
         columns=columns,
         rows=raw.rows,
@@ -217,14 +207,15 @@ def _numbers(raw: RawTable, column: DraftColumn) -> DraftColumn:
     if known.size == 0:
         return column
     low, usual, high = (float(x) for x in np.quantile(known, (0.0, 0.5, 1.0)))
-    return replace(column, low=low, usual=usual, high=high, count=int(known.size))
+    return replace(
+        column, low=low, usual=usual, high=high, count=int(known.size), rows=np.isfinite(values)
+    )
 
 
 def timed(found: Draft, time: DraftTime) -> Draft:
     """Give the draft of a table its time: what it says of rate and length goes by it."""
     known = time.seconds[np.isfinite(time.seconds)]
     step = np.diff(known)
-    rising = step[step > 0.0]
     doubts = list(time.doubts)
     if step.size and np.mean(step == 0.0) > 0.2:
         doubts.append("several rows share one time stamp; they are spread over the step in reading")
@@ -236,88 +227,33 @@ def timed(found: Draft, time: DraftTime) -> Draft:
         )
     elif np.any(step < 0.0):
         doubts.append("the time goes back in places; rows there are left out in reading")
+    others = (c for c in found.columns if c.name != time.column)
     return replace(
         found,
         time=time.column,
         time_unit=time.unit,
         time_format=time.format,
-        rate=float(per_second / np.median(rising)) if rising.size else float("nan"),
         duration=float(known.max() - known.min()) / per_second if known.size else float("nan"),
         doubts=tuple(doubts),
         row_rate=time.row_rate,
-        columns=tuple(c for c in found.columns if c.name != time.column),
+        columns=tuple(_rated(c, time.seconds / per_second) for c in others),
     )
 
 
-def _text_format(path: Path) -> tuple[TextFormat, dict[str, str]]:
-    """Find separator, header, unit row and decimal mark of a text.
+def _rated(column: DraftColumn, time: Floats) -> DraftColumn:
+    """Give a column of a table its values per second, stamps that rows share spread as in reading.
 
-    Returns
-    -------
-    text
-    units : suffixes that a row below the header states, by column
+    Parameters
+    ----------
+    column
+    time : (n,) of the rows of the table; NaN where it is not known [s]
     """
-    found = head(path, HEAD_LINES)
-    lines = [line for line in found if line]
-    if not lines:
-        raise DriveError(f"{path} is empty; record it again")
-    separator = _separator(lines)
-    rows = [cells(line, separator) for line in lines]
-    width = int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
-    first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
-    if first is None:
-        raise DriveError(f"{path} is no table: its lines have no common separator")
-    # Numbers of the channels may stand above their names.
-    if _of_numbers(rows[first]) and first + 1 < len(rows):
-        below = rows[first + 1]
-        first += abs(len(below) - width) <= 1 and not any(map(is_number, below))
-    if _of_numbers(rows[first]):
-        raise DriveError(
-            f"{path} has no header line: its first row is {lines[first][:60]!r}; write the names "
-            "of its columns as columns in [csv] of a mapping"
-        )
-    header, units = rows[first], {}
-    if first + 1 < len(rows) and not any(map(is_number, rows[first + 1])):
-        below = rows[first + 1]
-        stated = {n: stated_unit(c) for n, c in zip(header, below, strict=False)}
-        units = {n: u for n, u in stated.items() if u is not None}
-        known = sum(u != UNKNOWN_UNIT for u in units.values())
-        units = units if known >= 0.3 * len(header) else {}
-    skipped = found.index(lines[first])
-    after = _until_rows(found[skipped + 1 :], separator, width) if units else 0
-    body = [c for r in rows[first + 1 + bool(units) :] for c in r if c]
-    commas = sum(_COMMA.match(c) is not None for c in body)
-    decimal = "," if separator != "," and commas > 0.2 * max(len(body), 1) else "."
-    text = TextFormat(
-        separator=separator, decimal=decimal, skip_rows=skipped, skip_after_header=after
-    )
-    return text, units
-
-
-def _of_numbers(row: Sequence[str]) -> bool:
-    return sum(map(is_number, row)) > 0.5 * len(row)
-
-
-def _until_rows(lines: Sequence[str], separator: str, width: int) -> int:
-    """Lines from the header to the first row with a number: of units, blank ones and marks."""
-    for k, line in enumerate(lines):
-        row = cells(line, separator)
-        if abs(len(row) - width) <= 1 and any(map(is_number, row)):
-            return k
-    return 1
-
-
-def _separator(lines: Sequence[str]) -> str:
-    """Separator that cuts most lines into equally many cells.
-
-    A comma comes last: between semicolons or tabs it is a decimal mark.
-    """
-    for separator in sorted(SEPARATORS, key=lambda s: s == ","):
-        counts = np.array([line.count(separator) for line in lines])
-        usual = int(np.median(counts))
-        if usual > 0 and np.mean(counts == usual) >= EVEN:
-            return separator
-    return max(SEPARATORS, key=lambda s: sum(line.count(s) for line in lines))
+    spread = spread_rows(time)
+    stamps = spread[0] if spread is not None else time
+    at = stamps[column.rows & np.isfinite(stamps)] if column.rows is not None else stamps[:0]
+    length = float(at.max() - at.min()) if at.size > 1 else 0.0
+    rate = (at.size - 1) / length if length > 0.0 else float("nan")
+    return replace(column, rate=rate)
 
 
 def _column(raw: RawTable, name: str, found: Named, *, stated: str | None) -> DraftColumn:
@@ -377,6 +313,7 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
         high,
         known.size,
         doubt,
+        rows=np.isfinite(values),
         unsure=found.score < 1.0 or (bool(doubt) and by_log),
     )
 

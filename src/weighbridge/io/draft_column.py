@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.io.naming import words_of
 from weighbridge.signals import QUANTITIES
+from weighbridge.signals.signal import Bools
 from weighbridge.signals.units import UNITS
 
 PERCENT: Final = (-130.0, 130.0)
@@ -41,6 +42,8 @@ class DraftColumn:
     doubt : what is not sure, one sentence; empty where it is
     valid : signal of the same message that says whether it counts; empty for none
     unsure : whether what it is taken for is not sure: its name says more, or fits two quantities
+    rows : (n,) which rows of its table have a number; None where it is not known
+    rate : values per second over all [Hz]; NaN where it is not known
     """
 
     name: str
@@ -54,6 +57,8 @@ class DraftColumn:
     doubt: str = ""
     valid: str = ""
     unsure: bool = False
+    rows: Bools | None = field(default=None, compare=False, repr=False)
+    rate: float = float("nan")
 
 
 def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:

@@ -64,6 +64,8 @@ def _csv(text: TextFormat) -> Table:
         value = getattr(text, key)
         if value != getattr(usual, key):
             table.add(key, value)
+    if text.columns:
+        table.add("columns", list(text.columns))
     return table
 
 

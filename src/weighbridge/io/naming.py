@@ -14,6 +14,7 @@ from typing import Final
 
 from weighbridge.io.abbreviations import OF_ANOTHER, SOURCES, spelled
 from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, unit_suffix
+from weighbridge.io.languages import LANGUAGES, TIMES
 from weighbridge.io.phrases import AGAINST, PHRASES, TIME_PHRASES
 from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
@@ -25,15 +26,27 @@ _NOISE: Final = frozenset(
 )  # fmt: skip
 """Words that say nothing of the quantity."""
 
+
+def _phrases(quantity: str) -> tuple[str, ...]:
+    """What loggers call a quantity in any language; its own name where nobody has one for it."""
+    found = list(PHRASES.get(quantity, (quantity.replace("_", " "),)))
+    for told in LANGUAGES.values():
+        found += told.get(quantity, ())
+    return tuple(found)
+
+
 _WANTED: Final = {
-    quantity: tuple(dict.fromkeys(frozenset(spelled(p.split())) for p in phrases))
-    for quantity, phrases in (
-        {q: (q.replace("_", " "),) for q in QUANTITIES if q not in PHRASES} | PHRASES
-    ).items()
+    quantity: tuple(dict.fromkeys(frozenset(spelled(p.split())) for p in _phrases(quantity)))
+    for quantity in QUANTITIES
 }
-"""The words of `PHRASES`, spelled out; a quantity that is not in it goes by its name."""
+"""The words of each quantity, spelled out."""
+
+_WITH_UNIT: Final = {"vehicle_speed": frozenset(("v",))}
+"""A word that is a quantity only where the log states a unit of it: v may be volts as well."""
 
 _NOT: Final = {q: frozenset(spelled(words)) | words for q, words in AGAINST.items()}
+
+_TIMES: Final = TIME_PHRASES | frozenset(TIMES)
 
 _SILENT: Final = _NOISE | SOURCES
 
@@ -70,6 +83,9 @@ _MARKS: Final = frozenset(("txt", "wgs84", "gear", "bool", "int", "float", "on/o
 
 _UNIT: Final = re.compile(r"[\[({<]\s*([^\])}>]{0,20}?)\s*[\])}>]")
 _PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)*$')
+_LETTERS: Final = str.maketrans({"ß": "ss", "ł": "l", "Ł": "L", "ı": "i", "ø": "o", "Ø": "O"})
+"""Letters that are no letter with an accent."""
+
 _WORD: Final = re.compile(r"[a-z]+|\d+")
 _CAMEL: Final = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
@@ -94,7 +110,7 @@ def words_of(name: str) -> tuple[str, ...]:
     """Words of a name in small letters, without accents and without units in brackets."""
     plain = _UNIT.sub(lambda found: _kept(found.group(1)), _piped(name))
     plain = _CAMEL.sub(" ", plain)
-    plain = unicodedata.normalize("NFKD", plain.replace("ß", "ss"))
+    plain = unicodedata.normalize("NFKD", plain.translate(_LETTERS))
     plain = "".join(c for c in plain if not unicodedata.combining(c)).lower()
     return tuple(_WORD.findall(plain))
 
@@ -165,6 +181,8 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
         if stated is not None and not _can_be(quantity, stated):
             continue
         score = max(_score(said, wanted) for said in readings for wanted in phrases)
+        if stated is not None and _WITH_UNIT.get(quantity) in readings:
+            score = max(score, LEAST)
         if score > best.score:
             best = Named(quantity, stated, score)
     return best if best.score >= LEAST else Named("", stated, best.score)
@@ -174,7 +192,7 @@ def is_time(name: str) -> bool:
     """Whether a column's name is that of a time."""
     _, words = unit_of(name)
     plain = " ".join(words_of(name))
-    return plain in TIME_PHRASES or " ".join(words) in TIME_PHRASES
+    return bool({plain, " ".join(words)} & _TIMES)
 
 
 def _can_be(quantity: str, unit: str) -> bool:

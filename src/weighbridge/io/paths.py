@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from weighbridge.arguments import check_path, check_type
-from weighbridge.errors import DriveError
+from weighbridge.arguments import check_path, check_type, is_frame, type_name
+from weighbridge.errors import ArgumentTypeError, DriveError
 
 
 def is_folder(path: Path) -> bool:
@@ -29,8 +29,13 @@ def is_folder(path: Path) -> bool:
 
 
 def given_paths(name: str, given: Iterable[str | Path]) -> list[str | Path]:
-    """Several paths, each checked."""
-    check_type(name, given, Iterable, "a path, as text or pathlib.Path, or a list of them")
+    """Several paths, each checked; data frames, which hold names of columns, are told apart."""
+    expected = "a path, as text or pathlib.Path, or a list of them"
+    if is_frame(given) or isinstance(given, Mapping):
+        raise ArgumentTypeError(
+            f"{name} must be {expected}, got {type_name(given)}; read_frame reads data frames"
+        )
+    check_type(name, given, Iterable, expected)
     paths = list(given)
     for one in paths:
         check_path(f"each {name}", one)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import polars as pl
 
-from weighbridge.arguments import check_text, type_name
+from weighbridge.arguments import check_text, is_frame, type_name
 from weighbridge.errors import ConfigError
 from weighbridge.io.channels import log_of
 from weighbridge.io.columns import UnitlessColumnError, parse_column, time_unit
@@ -38,12 +38,6 @@ Frame: TypeAlias = "pl.DataFrame | pandas.DataFrame"
 
 ASAMMDF_INDEX: Final = "timestamps"
 """Name of the index, in seconds, of frames that asammdf makes of MF4 files."""
-
-
-def is_frame(given: object) -> bool:
-    """Tell whether something is a data frame of pandas or polars."""
-    home = type(given).__module__.partition(".")[0]
-    return home in ("pandas", "polars") and type(given).__name__ == "DataFrame"
 
 
 def read_frame(

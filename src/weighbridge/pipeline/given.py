@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from weighbridge.arguments import type_name
+from weighbridge.arguments import is_frame, type_name
 from weighbridge.errors import ArgumentTypeError, ConfigError
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle
@@ -97,7 +97,7 @@ def as_drive(
         from weighbridge.io import read_drive
 
         return read_drive(given, mapping)
-    from weighbridge.io.read_frames import is_frame, read_frame
+    from weighbridge.io.read_frames import read_frame
 
     if is_frame(given) or (
         isinstance(given, Mapping) and given and all(map(is_frame, given.values()))

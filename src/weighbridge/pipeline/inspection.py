@@ -22,6 +22,7 @@ from weighbridge.pipeline.given import (
 )
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import find_power_balance
@@ -122,6 +123,29 @@ class Inspection:
     signals: tuple[SignalReport, ...]
     problems: tuple[Problem, ...]
     ways: tuple[Way, ...]
+
+    def __repr__(self) -> str:
+        return in_lines(self._summary())
+
+    def _repr_html_(self) -> str:
+        return in_html(self._summary())
+
+    def _summary(self) -> tuple[str, str, str]:
+        """Name and length, the best way to weigh or what it lacks, problems."""
+        drive, best = self.drive, self.ways[0]
+        count = plural(len(self.signals), "signal")
+        way = (
+            f"best way: {best.name}, {best.accuracy} expected"
+            if best.possible
+            else f"nearest way: {best.name}, lacks {', '.join(best.needs)}"
+        )
+        serious = sum(p.serious for p in self.problems)
+        first = f", {serious} serious: {self.problems[0].text}" if self.problems else ""
+        return (
+            f"Inspection of {drive.name!r}: {drive.duration:.0f} s, {count}",
+            way,
+            f"{plural(len(self.problems), 'problem')}{first}",
+        )
 
 
 def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Inspection:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, get_args
 
-from weighbridge.errors import ConfigError
+from weighbridge.signals.tomlfile import Faults
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import RADIUS_STD, usual_efficiency
 from weighbridge.vehicle.model import (
@@ -20,7 +20,7 @@ from weighbridge.vehicle.model import (
     TorqueModel,
     Vehicle,
 )
-from weighbridge.vehicle.possible import within
+from weighbridge.vehicle.possible import positive, within
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
 
@@ -100,7 +100,7 @@ def describe(known: Known) -> Described:
     Raises
     ------
     ConfigError
-        A value is impossible, or one is missing that another needs.
+        Values are impossible, or some are missing that others need: all of them are told.
     """
     _refuse(known)
     origins: dict[tuple[str, str], str] = {}
@@ -135,43 +135,68 @@ def _notes(known: Known) -> str:
 
 
 def _refuse(known: Known) -> None:
+    """Tell all that is wrong at once."""
+    faults = Faults()
+    faults.said += _wrong_choices(known)
+    if known.kind in VEHICLE_CLASSES:
+        faults.said += _wrong_masses(known)
+    faults.said += _wrong_gears(known)
+    if known.radius is not None and known.tyre is not None:
+        faults.said.append("a tyre tells its rolling radius; give the tyre or the radius")
+    with faults.gathered():
+        within("radius", known.radius, *RADII, "m")
+    if known.tyre is not None:
+        with faults.gathered():
+            rolling_radius(known.tyre)
+    for name in ("drag_coefficient", "frontal_area", "reference_torque"):
+        with faults.gathered():
+            positive(name.replace("_", " "), getattr(known, name))
+    if (known.drag_coefficient is None) != (known.frontal_area is None):
+        faults.said.append("drag coefficient and frontal area belong together; give both or none")
+    source = TORQUE_SOURCES.get(known.torque or "")
+    if known.reference_torque is not None and not (source and source.needs_reference):
+        faults.said.append(
+            "a reference torque is that of a torque in percent; name percent as well"
+        )
+    faults.refuse()
+
+
+def _wrong_choices(known: Known) -> Iterator[str]:
     if known.kind not in VEHICLE_CLASSES:
-        raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {known.kind!r}")
+        yield f"class must be {VEHICLE_CLASSES.names}, got {known.kind!r}"
     for name, value, choice in (
         ("engine", known.engine, get_args(EngineKind)),
         ("torque", known.torque, tuple(TORQUE_SOURCES)),
+        ("driven", known.driven, get_args(Driven)),
+        ("layout", known.layout, get_args(Layout)),
     ):
         if value is not None and value not in choice:
-            raise ConfigError(f"{name} must be {', '.join(choice)}, got {value!r}")
+            yield f"{name} must be {', '.join(choice[:-1])} or {choice[-1]}, got {value!r}"
+
+
+def _wrong_masses(known: Known) -> Iterator[str]:
     low, high = VEHICLE_CLASSES[known.kind].mass_range
     for name, mass in (("tare", known.tare), ("gross", known.gross)):
         if mass is not None and not low <= mass <= high:
-            raise ConfigError(
+            yield (
                 f"{name} of {mass:g} kg: a {known.kind} has {low:.0f} to {high:.0f} kg; "
                 "check the unit (1 lb is 0.4536 kg) and the class"
             )
     if known.tare is not None and known.gross is not None and known.gross <= known.tare:
-        raise ConfigError(
+        yield (
             f"gross of {known.gross:g} kg is not above the tare of {known.tare:g} kg; "
             "gross is the permitted mass, tare the empty one"
         )
+
+
+def _wrong_gears(known: Known) -> Iterator[str]:
     if any(b >= a for a, b in pairwise(known.gear_ratios)):
-        raise ConfigError(
-            f"gear ratios must fall from first to last gear, got {list(known.gear_ratios)}"
-        )
-    if any(ratio <= 0.0 for ratio in (*known.gear_ratios, known.final_drive or 1.0)):
-        raise ConfigError("gear ratios and final drive must be positive")
+        yield f"gear ratios must fall from first to last gear, got {list(known.gear_ratios)}"
+    final = 1.0 if known.final_drive is None else known.final_drive
+    if any(ratio <= 0.0 for ratio in (*known.gear_ratios, final)):
+        yield "gear ratios and final drive must be positive"
     if known.final_drive is not None and not known.gear_ratios and known.engine != "electric":
-        raise ConfigError("a final drive needs gear ratios, such as 3.8,2.1,1.4,1.0")
-    if known.radius is not None:
-        if known.tyre is not None:
-            raise ConfigError("a tyre tells its rolling radius; give the tyre or the radius")
-        within("radius", known.radius, *RADII, "m")
-    if (known.drag_coefficient is None) != (known.frontal_area is None):
-        raise ConfigError("drag coefficient and frontal area belong together; give both or none")
-    source = TORQUE_SOURCES[known.torque] if known.torque is not None else None
-    if known.reference_torque is not None and not (source and source.needs_reference):
-        raise ConfigError("a reference torque is that of a torque in percent; name percent as well")
+        yield "a final drive needs gear ratios, such as 3.8,2.1,1.4,1.0"
 
 
 def _radius(known: Known, origins: dict[tuple[str, str], str]) -> float:

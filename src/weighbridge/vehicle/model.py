@@ -8,6 +8,7 @@ from typing import Final, Literal, get_args
 
 from weighbridge.arguments import check_all, check_text, check_type
 from weighbridge.errors import ConfigError
+from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
 from weighbridge.vehicle.driveline import Driveline, Driven, Layout, Mounting, RoadLoad
 from weighbridge.vehicle.possible import MASSES, positive, within
@@ -101,6 +102,31 @@ class Vehicle:
             raise ConfigError(
                 f"mapping must be a path without control characters, got {self.mapping!r}"
             )
+
+    def __repr__(self) -> str:
+        return in_lines(self._summary())
+
+    def _repr_html_(self) -> str:
+        return in_html(self._summary())
+
+    def _summary(self) -> tuple[str, str, str]:
+        """Name and masses, gears and torque, calibration."""
+        masses = [
+            f"{name} {mass:.0f} kg"
+            for name, mass in (("tare", self.tare), ("permitted mass", self.gross))
+            if mass is not None
+        ]
+        kind = f"{self.engine} {self.kind}" if self.engine is not None else self.kind
+        gears = len(self.driveline.gearings)
+        known = plural(gears, "gear") if gears else "gears not known"
+        made = self.provenance
+        when = f" on {made.date}" if made.date else ""
+        by = f"calibrated{when} by {plural(len(made.masses), 'drive')}"
+        return (
+            ", ".join([f"Vehicle {self.name!r}: {kind}", *masses]),
+            f"{known}; torque by {self.torque.source}",
+            by if made.masses else "never calibrated",
+        )
 
     @property
     def of_class(self) -> VehicleClass:
