@@ -41,6 +41,12 @@ def outside_pages() -> dict[str, Path]:
     return found
 
 
+def pages() -> list[Path]:
+    """Return the Markdown files that the site shows, and the README."""
+    outside = (path for path in outside_pages().values() if path.suffix == ".md")
+    return sorted({HOME / "README.md", *(HOME / "docs").rglob("*.md"), *outside})
+
+
 def source_of(place: str) -> str:
     """Return the path in the repository of a page of the site."""
     for source, page in _PAGES.items():

@@ -42,6 +42,30 @@ RECORDS = (
 )
 """Records that a package of another may hand in, beside those of the modules."""
 
+RECIPES = (
+    "weighbridge.io.log.Log",
+    "weighbridge.io.channels.Recording",
+    "weighbridge.io.channels.reader",
+    "weighbridge.io.channels.drafter",
+    "weighbridge.signals.cleaning.clean_columns",
+    "weighbridge.signals.units.scalar_to_si",
+    "weighbridge.vehicle.torque_sources.REPORTED",
+    "weighbridge.vehicle.torque_sources.ROUGH",
+    "weighbridge.estimators.regression.regression",
+    "weighbridge.estimators.gate.GateSettings",
+    "weighbridge.estimators.judging.Evidence",
+    "weighbridge.estimators.judging.judge",
+    "weighbridge.estimators.judging.nothing",
+    "weighbridge.estimators.judging.consider_std",
+    "weighbridge.live.clock.now",
+    "weighbridge.live.device_clock.DeviceClock",
+    "weighbridge.live.sources.gathered.Gathered",
+    "weighbridge.live.sources.gathered.BLOCK",
+    "weighbridge.live.sources.links.serial_or_tcp",
+    "weighbridge.inertia.ride_checks.ride_samples",
+)
+"""What the recipes of CONTRIBUTING.md and pages of the methods take besides."""
+
 
 def groups() -> dict[str, tuple[str, ...]]:
     """Return `GROUPS`; public names that stand in none are in one of their own."""
@@ -67,6 +91,9 @@ def python_pages() -> dict[str, str]:
         if place.endswith("parts.md"):
             lines += ["## Records of entry points", ""]
             for name in RECORDS:
+                lines += _entry(name)
+            lines += ["## What recipes take besides", ""]
+            for name in RECIPES:
                 lines += _entry(name)
         pages[place] = "\n".join(lines)
     return pages

@@ -1,6 +1,8 @@
 """What the site is made of: links, reference, settings that keep it on the reader's machine."""
 
+import ast
 import re
+import textwrap
 import tomllib
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +19,30 @@ def test_every_public_name_is_in_the_reference():
     for name in set(import_module("weighbridge").__all__) - {"fleet"}:
         assert f"::: weighbridge.{name}\n" in page
     assert "Others" not in reference.groups()
+
+
+def imported(page: Path) -> set[str]:
+    """Return the names that the Python of a page imports from the package."""
+    blocks = re.findall(r"^ *```python\n(.*?)^ *```", page.read_text("utf-8"), re.M | re.S)
+    return {
+        f"{node.module}.{name.name}"
+        for block in blocks
+        for node in ast.walk(ast.parse(textwrap.dedent(block)))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("weighbridge")
+        for name in node.names
+    }
+
+
+def test_what_pages_import_is_in_the_reference():
+    pages = "\n".join(reference.python_pages().values())
+    told = set(re.findall(r"^::: (\S+)$", pages, re.MULTILINE))
+    found = {page.name: imported(page) for page in links.pages()}
+    assert len(found["CONTRIBUTING.md"]) >= 15
+    for name, names in found.items():
+        assert names <= told, name
+    for name in told:
+        module, _, last = name.rpartition(".")
+        assert hasattr(import_module(module), last), name
 
 
 def test_every_command_is_in_the_reference():
