@@ -6,7 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.unit.test_report import MASS, make_calibration, make_weighing, numbers, written
+from tests.contrast import contrast
+from tests.unit.test_report import (
+    MASS,
+    figures,
+    make_calibration,
+    make_weighing,
+    numbers,
+    written,
+)
 from tests.unit.test_report_sections import driven, launches, loaded_on_the_way
 from tests.unit.test_weighing import weighing as weighed_by_rls
 
@@ -19,7 +27,7 @@ from weighbridge.report.mass_section import fit_panel, mass_panel
 from weighbridge.report.methods_section import METHOD_STYLES, methods_section
 from weighbridge.report.residual_section import WITH_SLOW, residual_section, slow_force
 from weighbridge.report.style import REACH, REASON_STYLE
-from weighbridge.report.thinning import single
+from weighbridge.report.thinning import LINE_POINTS, single
 
 
 def test_a_method_that_does_not_fit_is_marked_in_table_and_figure(tmp_path):
@@ -140,17 +148,6 @@ def test_a_map_has_a_bar_of_a_round_length(metres):
     assert float(value) * {"m": 1.0, "km": 1e3}[unit] == pytest.approx(length)
 
 
-def luminance(colour):
-    parts = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
-    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
-    return float(linear @ (0.2126, 0.7152, 0.0722))
-
-
-def contrast(one, other):
-    dark, light = sorted((luminance(one), luminance(other)))
-    return (light + 0.05) / (dark + 0.05)
-
-
 def variables(html):
     """Colours of the light and of the dark page."""
     blocks = re.findall(r":root \{(.*?)\}", html.replace("#fff;", "#ffffff;"), re.S)
@@ -163,9 +160,9 @@ def test_colours_have_the_contrast_of_wcag_aa(tmp_path):
     light, dark, paper = variables(html)
     series = {c for c, _ in METHOD_STYLES} | {c for c, _ in REASON_STYLE.values()}
     series |= set(GEAR_COLOURS)
-    for page in (light, dark, light | paper):
+    for page in (light, dark, light | paper, dark | paper):
         for back in (page["paper"], page["card"]):
-            for text in ("ink", "soft", "good", "fair", "bad"):
+            for text in ("ink", "soft", "good", "fair", "bad", "link"):
                 assert contrast(page[text], back) >= 4.5, text
             for colour in series:
                 assert contrast(colour, back) >= 3.0, colour
@@ -178,6 +175,20 @@ def test_three_drives_with_methods_and_calibration_are_less_than_two_megabytes(t
         comparisons=[[x, replace(x, method="ekf"), replace(x, method="hybrid")] for x in w],
     )  # fmt: skip
     assert len(html.encode()) < 2_000_000
+
+
+def test_no_trace_has_more_points_than_a_screen_shows(tmp_path):
+    """A band goes there and back: twice the points of a line."""
+    w = make_weighing(hours=4.0)
+    html = written(tmp_path, [w], comparisons=[[w, replace(w, method="ekf")]])
+    assert w.result.balance.table.time.size > 10 * LINE_POINTS
+    points = [
+        len(numbers(trace["x"]))
+        for figure in figures(html).values()
+        for trace in figure["data"]
+        if trace.get("x") is not None
+    ]
+    assert LINE_POINTS / 2 < max(points) <= 2 * LINE_POINTS + 10
 
 
 def test_a_page_packs_the_same_on_every_run():
