@@ -7,6 +7,8 @@ from tests.unit.test_report import make_calibration, make_weighing
 
 from weighbridge.report import write_report
 
+PAPER_WIDTH, PAPER_HEIGHT = (int((mm - 20) / 25.4 * 96) for mm in (210, 297))
+"""A4 within margins of 10 mm [px]."""
 SHOWN = "[...document.querySelectorAll('.plot')].filter(p => !p.closest('details:not([open])'))"
 
 
@@ -62,6 +64,17 @@ def test_paper_has_one_page_for_the_answer_and_at_most_six_more(browser, report)
     folded = "document.querySelectorAll('details:not([open]) .plot[data-drawn]').length"
     assert tab.evaluate(folded) == 0
     assert told["wrong"] == []
+
+
+def test_the_first_page_of_paper_has_the_answer_and_the_first_figure(browser, report):
+    tab, _ = opened(browser, report, PAPER_WIDTH)
+    tab.emulate_media(media="print")
+    tab.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    tab.wait_for_selector(".plot[data-drawn=paper]")
+    first = "document.querySelector('nav + section')"
+    assert tab.evaluate(f"getComputedStyle({first}).breakBefore") == "auto"
+    bottom = "document.querySelector('figure').getBoundingClientRect().bottom + scrollY"
+    assert tab.evaluate(bottom) <= PAPER_HEIGHT
 
 
 def test_keys_move_zoom_and_reset_a_figure(browser, report):
