@@ -9,6 +9,8 @@ from pathlib import Path
 
 MOST = 25
 """Words of the longest sentence."""
+MOST_IN_A_CELL = 40
+"""Words of the longest cell of a table."""
 
 _FENCE = re.compile(r"^ *```.*?^ *```[ ]*$", re.MULTILINE | re.DOTALL)
 _FORMULA = re.compile(r"\$[^$]+\$")
@@ -27,12 +29,18 @@ def sentences(text: str) -> Iterator[str]:
     text = re.sub(r"<[^>]+>", " ", text)
     text = "\n".join("" if line.lstrip().startswith("|") else line for line in text.splitlines())
     text = re.sub(r"^    [^-*\d\s].*$", "", text, flags=re.MULTILINE)
-    text = _ITEM.sub("\n\n", text)
-    text = _FORMULA.sub("X", re.sub(r"`[^`\n]+`", "X", _LINK.sub(r"\1", text)))
+    text = _plain(_ITEM.sub("\n\n", text))
     for paragraph in re.split(r"\n\s*\n", text):
         flat = " ".join(paragraph.split())
         flat = re.sub(r"\b(al|e\.g|i\.e|etc|sec|eq|eqs|fig|figs|vs|ed|ch|no)\.", r"\1", flat)
         yield from (part for part in _END.split(flat) if part.strip())
+
+
+def cells(text: str) -> Iterator[str]:
+    """Yield the cells of the tables of a page. Code and formulas count as one word."""
+    for line in _FENCE.sub("", text).splitlines():
+        if line.lstrip().startswith("|"):
+            yield from (c.strip() for c in re.split(r"(?<!\\)\|", _plain(line)) if c.strip())
 
 
 def length(sentence: str) -> int:
@@ -40,9 +48,15 @@ def length(sentence: str) -> int:
     return sum(any(c.isalpha() for c in word) for word in sentence.split())
 
 
-def long_ones(text: str, most: int = MOST) -> list[str]:
-    """Return the sentences of a page that have more words than `most`."""
-    return [s for s in sentences(text) if length(s) > most]
+def long_ones(text: str) -> list[str]:
+    """Return the sentences and the cells of a page that have too many words."""
+    told = [s for s in sentences(text) if length(s) > MOST]
+    return told + [cell for cell in cells(text) if length(cell) > MOST_IN_A_CELL]
+
+
+def _plain(text: str) -> str:
+    """Return a text with its links as words, code and formulas as one word each."""
+    return _FORMULA.sub("X", re.sub(r"`[^`\n]+`", "X", _LINK.sub(r"\1", text)))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from website.sentences import MOST, length, long_ones, sentences
+from website.sentences import MOST, MOST_IN_A_CELL, cells, length, long_ones, sentences
 
 HOME = Path(__file__).parents[2]
 PAGES = sorted(
@@ -34,6 +34,13 @@ def test_sentences_of_paragraphs_items_and_titles_are_told_apart():
         "See [twelve](thirteen.md): A b.\n"
     )
     assert [length(s) for s in sentences(text)] == [2, 3, 4, 2, 1, 2, 2]
+
+
+def test_a_long_cell_is_seen():
+    cell = " ".join(["word"] * MOST_IN_A_CELL)
+    assert long_ones(f"| a | {cell} |\n|---|---|\n| `code of {cell}` | b |\n") == []
+    assert long_ones(f"| a | {cell} more |\n") == [f"{cell} more"]
+    assert list(cells("text | no\n| one `a b` | $x + y$ |\n")) == ["one X", "X"]
 
 
 def test_a_long_sentence_is_seen_across_lines():

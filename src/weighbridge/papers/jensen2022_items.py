@@ -84,9 +84,9 @@ _TABLES: Final = (
     _figure("table 6, R², paper's rules", _FIT, "0.972", "{r2_printed}"),
     _figure("table 6, R² unweighted, ours", "`calibration/rls.py`", "0.972", "{r2_ours}",
             "lateness found, rows of shifts and slip left out"),
-    _rule("table B.1", "`papers/jensen2022_drives.py`", "loads, tyres, windows, temperatures and "
-          "pauses of the paper; wind where its text has none is chosen, and drive 9 is of the day "
-          f"of 10, which its date is not; {_TYRES}", as_printed=False),
+    _rule("table B.1", "`papers/jensen2022_drives.py`", "loads, tyres, windows, temperatures, "
+          f"pauses as printed; wind chosen where none is; drive 9 on the day of 10; {_TYRES}",
+          as_printed=False),
 )  # fmt: skip
 
 _FIGURES: Final = (
