@@ -3,7 +3,8 @@
 ``python -m website.running`` runs all tutorials and renews their outputs; with names of
 pages, those alone. A block of `bash` holds commands of weighbridge, one a line; a block
 of `python` shares its names with the others of the page. A block of `text` right behind
-one of them is its output. A line ``...`` in it stands for lines that are left out.
+one of them is its output. A line ``...`` in it stands for lines that are left out. Blocks that
+`not_run.toml` lists are passed over.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +33,11 @@ BLOCK = re.compile(
 """A block of code, and its output where one follows."""
 WIDTH = 110
 """Columns of the terminal on the pages."""
+
+NOT_RUN = Path(__file__).with_name("not_run.toml")
+"""Lists the blocks that nothing runs as they stand, by page and first line, with the reason."""
+OWN_DRIVES = ("command.md", "record.md", "report.md", "methods/galvao.md", "methods/du2025.md")
+"""Pages of docs/ without outputs, for the reader's own drives: `empty/`, `loaded/`, `car.toml`."""
 
 
 class Block(NamedTuple):
@@ -73,8 +80,17 @@ def blocks(page: Path) -> list[Block]:
     return found
 
 
+def not_run(page: Path) -> dict[str, str]:
+    """Return the reasons of the blocks of a page that nothing runs, by their first line."""
+    listed = tomllib.loads(NOT_RUN.read_text(encoding="utf-8"))["block"]
+    name = page.relative_to(HOME).as_posix()
+    return {row["begins"]: row["reason"] for row in listed if row["page"] == name}
+
+
 def run(page: Path, folder: Path) -> Iterator[tuple[Block, str]]:
     """Run the blocks of a page in a folder and yield each with what it said.
+
+    The folder has the project's `examples`. Blocks of `not_run` are left out.
 
     Raises
     ------
@@ -82,7 +98,12 @@ def run(page: Path, folder: Path) -> Iterator[tuple[Block, str]]:
         If a command ends with another exit status than 0 or 1.
     """
     names: dict[str, Any] = {}
+    left_out = not_run(page)
+    if not (folder / "examples").exists():
+        (folder / "examples").symlink_to(HOME / "examples")
     for block in blocks(page):
+        if block.code.partition("\n")[0] in left_out:
+            continue
         before = Path.cwd()
         os.chdir(folder)
         try:
@@ -183,7 +204,16 @@ def _python(code: str, names: dict[str, Any]) -> str:
 
 def _bash(code: str) -> str:
     lines = code.replace("\\\n", " ").splitlines()
-    return "".join(_command(shlex.split(line, comments=True)) for line in lines)
+    return "".join(_command(_words(line)) for line in lines)
+
+
+def _words(line: str) -> list[str]:
+    """Split a line as a shell does; a word with ``*`` outside quotes stands for files."""
+    words = []
+    for word in shlex.split(line, comments=True, posix=False):
+        pattern = "*" in word and word[0] not in "\"'"
+        words += (pattern and sorted(map(str, Path().glob(word)))) or shlex.split(word)
+    return words
 
 
 def _command(words: list[str]) -> str:

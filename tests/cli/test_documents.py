@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from tests.graded import climb, coasting
 from typer.main import get_command
 from website import running
 
@@ -90,21 +91,37 @@ def test_the_how_to_pages_say_what_they_show(page, five_minutes):
 
 @pytest.fixture(scope="module")
 def own_drives(tmp_path_factory):
-    """Return a folder with the drives that README and docs/record.md name."""
+    """Return a folder with the drives that README, guide and methods name."""
     folder = tmp_path_factory.mktemp("own")
+    write_drive(climb(1400.0, 60e3), folder / "climb")
+    write_drive(coasting(1400.0, 0.0, runs=2)[0], folder / "run")
     for name, payload, seed in (("empty", 0.0, 1), ("loaded", 240.0, 2)):
         simulate_car(make_scenario("car-short", payload=payload, seed=seed)).write(folder / name)
     shutil.copytree(folder / "loaded", folder / "trip")
     return folder
 
 
-def test_the_commands_of_the_readme_weigh(own_drives):
+@pytest.fixture(scope="module")
+def own_car(own_drives):
+    """Type the commands of the README; return the folder with the vehicle file, and the codes."""
     (typed,) = (b for b in blocks(Path("README.md"), "bash") if "calibrate" in b)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(own_drives)
         codes = [app(shlex.split(line)[1:], standalone_mode=False) for line in typed.splitlines()]
+    return own_drives, codes
+
+
+def test_the_commands_of_the_readme_weigh(own_car):
+    folder, codes = own_car
     assert set(codes) <= {None, 0}
-    assert (own_drives / "loaded.html").is_file()
+    assert (folder / "loaded.html").is_file()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", running.OWN_DRIVES)
+def test_the_pages_for_own_drives_run(page, own_car):
+    folder, _ = own_car
+    assert list(running.run(HOME / "docs" / page, folder))
 
 
 def test_the_python_of_the_readme_weighs(own_drives, monkeypatch):

@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import polars as pl
 import pytest
+from tests.docs.logs import dongle_and_phone
 
 from weighbridge.io import read_drive
 
@@ -60,28 +61,8 @@ def test_from_foreign_tables_to_a_mass_in_three_commands(
 def test_a_dongle_and_a_phone_on_clocks_of_their_own(weighbridge, loaded, car, tmp_path):
     """As in docs/data.md: the app writes times of day, the phone seconds since its start."""
     trip, mapping = tmp_path / "trip", tmp_path / "map.toml"
-    trip.mkdir()
     tables = {n: pl.read_parquet(loaded.folder / f"{n}.parquet") for n in ("obd", "imu", "gnss")}
-    clock = (1e3 * (pl.col("time_s") + 50_000.0)).round().cast(pl.Int64) * 1_000_000
-    tables["obd"].select(
-        clock.cast(pl.Time).dt.to_string("%H:%M:%S%.3f").alias("time"),
-        pl.col("vehicle_speed_kmh").alias("Vehicle speed (km/h)"),
-        pl.col("engine_speed_rpm").alias("Engine RPM (rpm)"),
-        pl.col("engine_load_pct").alias("Calculated engine load value (%)"),
-    ).write_csv(trip / "elm327.csv")
-    phone = (pl.col("time_s") + 11.0).alias("Time (s)")
-    tables["imu"][::4].select(
-        phone,
-        *(pl.col(f"accel_{a}_mps2").alias(f"Acceleration {a} (m/s^2)") for a in "xyz"),
-        *(pl.col(f"gyro_{a}_radps").alias(f"Gyroscope {a} (rad/s)") for a in "xyz"),
-    ).write_csv(trip / "phone_imu.csv")
-    tables["gnss"].select(
-        phone,
-        pl.col("latitude_deg").alias("Latitude (°)"),
-        pl.col("longitude_deg").alias("Longitude (°)"),
-        pl.col("altitude_m").alias("Height (m)"),
-        pl.col("speed_mps").alias("Velocity (m/s)"),
-    ).write_csv(trip / "phone_location.csv")
+    dongle_and_phone(tables, trip)
     assert weighbridge("map", trip, "-o", mapping).code == 0
     ran = weighbridge("weigh", trip, "--mapping", mapping, "--vehicle", car, "--json", "-")
     assert ran.code == 0, ran.err
