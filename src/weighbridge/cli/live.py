@@ -178,7 +178,10 @@ def live(
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     speed = _speed(rate, replayed=replay is not None)
     sources, info, start = _sources(source or (), replay, speed, chosen, dbc, listen_only)
-    scale, keeper = _scale(car, kept, lateness, info, start, _step(replay, speed))
+    scale, keeper = _scale(
+        car, kept, lateness, info, start, _step(replay, speed),
+        by_host=replay is None and speed == 1.0,
+    )  # fmt: skip
     with (
         at_rate(1.0 if replay is not None else speed),
         keys(wanted=not any(s.name == "lines:-" for s in sources)) as pressed,
@@ -272,7 +275,14 @@ def _state_file(state: str | None, replay: Path | None, vehicle: Path) -> Path |
 
 
 def _scale(
-    car: Vehicle, state: Path | None, lateness: float, info: DriveInfo, start: float, step: float
+    car: Vehicle,
+    state: Path | None,
+    lateness: float,
+    info: DriveInfo,
+    start: float,
+    step: float,
+    *,
+    by_host: bool,
 ) -> tuple[LiveScale, Keeper | None]:
     """Go on from the state that was kept, or begin anew."""
     from weighbridge.live.keeper import Keeper
@@ -282,7 +292,9 @@ def _scale(
         return LiveScale(car, lateness=lateness, info=info, step=step), None
     refuse_missing_folder(state)
     keeper = Keeper(state)
-    scale, found = keeper.restored(car, lateness=lateness, info=info, start=start, step=step)
+    scale, found = keeper.restored(
+        car, lateness=lateness, info=info, start=start, step=step, by_host=by_host
+    )
     if found:
         complain(found)
     return scale, keeper

@@ -20,7 +20,7 @@ from weighbridge.arguments import check_text
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.model import Vehicle
 
-VERSION: Final = 4
+VERSION: Final = 5
 """Of the layout; another one is refused."""
 
 _ROOT: Final = "weighbridge."

@@ -11,8 +11,10 @@ import numpy as np
 
 from weighbridge.arguments import as_floats, check_text, check_type
 from weighbridge.errors import ConfigError
+from weighbridge.estimators.judging import STOP
 from weighbridge.live.arrival import health_of, needed_signals
 from weighbridge.live.checkpoint import packed, unpacked
+from weighbridge.live.clock import pace
 from weighbridge.live.doubts import doubts, of_before
 from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, REST, Learned, learn
 from weighbridge.live.on_the_move import moves, time_on_the_move
@@ -101,6 +103,7 @@ class LiveScale:
         self._tared: float | None = None
         self._anew = -math.inf
         self._kept_to = math.nan
+        self._kept_at = 1.0
         self._came: tuple[str, ...] = ()
         self._needed = needed_signals(self.vehicle, ())
 
@@ -167,6 +170,7 @@ class LiveScale:
             "since": self._since,
             "tared": self._tared,
             "learns": self._learns,
+            "pace": pace(),
             "lateness": self._records.lateness,
             "step": self._every,
             "info": self.info,
@@ -202,7 +206,7 @@ class LiveScale:
             scale._setup, scale._state = content["setup"], content["state"]
             scale._next, scale._learned = content["next"], content["learned"]
             scale._driven, scale._driven_this_load = content["driven"], content["driven_this_load"]
-            scale._since = content["since"]
+            scale._since, scale._kept_at = content["since"], content["pace"]
             scale._tared, scale._learns = content["tared"], content["learns"]
             scale._records.add_block(content["samples"])
             scale._kept_to = scale.newest
@@ -247,6 +251,19 @@ class LiveScale:
     def take_tare(self, other: LiveScale) -> None:
         """Set to nought what another scale of the vehicle has set to nought."""
         self._tared = other._tared
+
+    @property
+    def kept_at(self) -> float:
+        """Pace of the clock when the state was kept that it was restored from: 1 on the road."""
+        return self._kept_at
+
+    def clock_set_back(self, start: float) -> None:
+        """Tell that samples come from an instant [s] on that is earlier than the newest.
+
+        They are put behind it by as long as a load takes to change, for nobody knows how long
+        nothing came. The mass of before is not ``weighed`` until what is driven proves it.
+        """
+        self._records.follow(start, STOP)
 
     def load_changed(self) -> None:
         """Tell that the load has changed: what was weighed before says nothing of it any more.
