@@ -176,6 +176,7 @@ def live(
     read = inputs([replay] if replay is not None else [], vehicle, chosen, dbc)
     refuse_results(read, results)
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    alerts = _alerts(above, below, car)
     speed = _speed(rate, replayed=replay is not None)
     sources, info, start = _sources(source or (), replay, speed, chosen, dbc, listen_only)
     scale, keeper = _scale(
@@ -185,7 +186,7 @@ def live(
     with (
         at_rate(1.0 if replay is not None else speed),
         keys(wanted=not any(s.name == "lines:-" for s in sources)) as pressed,
-        Outputs(_outputs(json_path, mqtt, page, car, vehicle)) as outputs,
+        Outputs(_outputs(json_path, mqtt, page, car, vehicle, alerts)) as outputs,
         Feed(sources) as feed,
     ):
         session = Session(
@@ -195,7 +196,7 @@ def live(
             period=every,
             keeper=keeper,
             recorder=None if record is None else _recorder(record, info),
-            alerts=_alerts(above, below, car),
+            alerts=alerts,
             ahead=not _unwatched(replay, speed),
         )
         last = _run(session, pressed)
@@ -311,7 +312,12 @@ def _recorder(folder: Path, info: DriveInfo) -> Recorder:
 
 
 def _outputs(
-    json_path: str | None, mqtt: str | None, page: str | None, car: Vehicle, vehicle: Path
+    json_path: str | None,
+    mqtt: str | None,
+    page: str | None,
+    car: Vehicle,
+    vehicle: Path,
+    alerts: Sequence[Alert],
 ) -> list[Output]:
     """Make the outputs that were asked for; the terminal's view begins when all others stand."""
     from weighbridge.live.outputs.lines import Lines
@@ -323,7 +329,9 @@ def _outputs(
     if mqtt is not None:
         from weighbridge.live.outputs.mqtt import Mqtt, parse_broker
 
-        made.append(Mqtt(parse_broker(mqtt), car.name, vehicle.with_suffix(".outbox")))
+        sides = [alert.side for alert in alerts]
+        outbox = vehicle.with_suffix(".outbox")
+        made.append(Mqtt(parse_broker(mqtt), car.name, outbox, sides=sides))
     if page is not None:
         from weighbridge.live.outputs.page import Page
 

@@ -99,13 +99,14 @@ class Session:
             if event is not None:
                 _LOG.warning("%s", event.text)
         active = [alert.text for alert in self.alerts if alert.active]
+        states = tuple(alert.state(settled) for alert in self.alerts)
         lost = [
             trouble_text(s.name, s.error) for s in self.feed.states() if s.error and not s.ended
         ]
         told = (*active, *lost, *self._doubts())
         ahead = ahead and self.ahead
         weighing = self.scale.weighing(silence, ahead=True) if ahead else settled
-        self.outputs.show(replace(weighing, notes=(*told, *weighing.notes)))
+        self.outputs.show(replace(weighing, alerts=states, notes=(*told, *weighing.notes)))
 
     def _renew(self) -> None:
         """Tell the scale of a device that was turned on again."""
