@@ -56,7 +56,7 @@ def test_no_mass_is_exit_1(weighbridge, loaded, car, changed):
         ((), "give --source KIND:PLACE once or more, or --replay DRIVE"),
         (("--replay", "d", "--rate", "fast"), "--rate fast"),
         (("--replay", "d", "--rate", "0"), "--rate 0"),
-        (("--replay", "d", "--ticket", "1800"), "go together"),
+        (("--replay", "d", "-o", "new.toml"), "without --ticket KG"),
         (("--replay", "d", "--every", "0"), "--every 0"),
         (("--replay", "d", "--above", "-5"), "-5 kg is no mass"),
         (("--replay", "d", "--page", "here"), "--page here"),
