@@ -39,7 +39,7 @@ _CLIPPED: Final = 0.1
 _WINDOW: Final = 1.0
 """over so long [s]."""
 
-_RARE: Final = 0.01
+_RARE: Final = 0.03
 """Spikes are no larger part of the samples [-]."""
 
 
@@ -86,7 +86,7 @@ def rare_spikes(x: Floats, kind: str) -> Bools:
 
     Returns
     -------
-    (n,) all False where they are more than a hundredth: that is another unit, or noise
+    (n,) all False where they are more than `_RARE`: that is noise
     """
     found = _spikes(x, _LEAST_SPIKE[kind == "gyro"])
     few = np.count_nonzero(found) <= _RARE * x.size
