@@ -122,7 +122,7 @@ def test_after_a_clock_was_set_back_the_mass_is_that_of_before_until_it_is_prove
     unproved = [w for w in told[5:] if w.driven - before.driven < 110.0]
     assert unproved
     assert all(w.status is LiveStatus.LEARNING for w in unproved)
-    said = [n for w in unproved for n in w.notes if "for a time that nobody knows" in n]
+    said = [n for w in told for n in w.notes if "for a time that nobody knows" in n]
     assert said
     assert "e+" not in said[0]
     assert all(sum("the clock of the samples jumped once" in n for n in w.notes) == 1 for w in told)

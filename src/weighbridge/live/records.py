@@ -145,7 +145,7 @@ class Records:
         self.late: dict[str, int] = {}
         self.unfit: dict[str, int] = {}
         self._columns: dict[str, _Column] = {}
-        self._unknown = False
+        self._followed = math.nan
         self._strange = 0
         self._strange_from = math.nan
         self._sealed_to = -math.inf
@@ -225,8 +225,7 @@ class Records:
     def _resume(self, at: float) -> None:
         if at - self.newest > SILENCE and math.isfinite(self.newest):
             self.resumed = at
-            self.silence = math.inf if self._unknown else at - self.newest
-            self._unknown = False
+            self.silence = math.inf if self.newest == self._followed else at - self.newest
 
     def follow(self, start: float, after: float) -> None:
         """Take it that the clock was set back in a silence that was as long as nobody knows.
@@ -238,7 +237,7 @@ class Records:
         """
         self.offset += start - (self.newest + after)
         self.jumps += 1
-        self._unknown = True
+        self._followed = self.newest
 
     def _column(self, name: str) -> _Column:
         if name not in QUANTITIES:
