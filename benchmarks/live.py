@@ -9,10 +9,14 @@ benchmarks/live.py``; ``--hours 24`` replays a day for the memory. The yardstick
 from __future__ import annotations
 
 import argparse
+import math
+import os
 import resource
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,9 +29,13 @@ OPENPILOT = 25.0 + 9.0 + 5.0
 """Of a core, all that weighs, steers and learns there [%]."""
 
 
-def made(seed: int) -> tuple[Drive, float]:
-    """Simulate a drive with a 200 Hz inertial sensor; return it and its mass."""
-    scenario = make_scenario("car", seed=seed)
+def made(seed: int, name: str = "car", bus: float = 4.0) -> tuple[Drive, float]:
+    """Simulate a drive with a 200 Hz inertial sensor; return it and its mass.
+
+    ``bus`` is how often all values of the bus are asked for [Hz].
+    """
+    scenario = make_scenario(name, seed=seed)
+    scenario = replace(scenario, polling=replace(scenario.polling, rate=bus))
     return simulate_car(scenario).drive, scenario.mass
 
 
@@ -77,6 +85,48 @@ def on_the_way(car: wb.Vehicle, drive: Drive, every: float = 1.0) -> None:
         known = np.array(ages)[np.isfinite(ages)]
         print(f"{f'age {name}, least, median and 99 %':<44}{known.min():8.2f} s "
               f"{np.median(known):.2f} s {np.percentile(known, 99.0):.2f} s")  # fmt: skip
+
+
+class Waiting(NamedTuple):
+    """By wall clock: between two weighings shown, and their ages when one is replaced [s]."""
+
+    stalls: list[float]
+    ages: list[float]
+
+
+def by_wall_clock(car: wb.Vehicle, drive: Drive, every: float = 1.0) -> None:
+    """Feed a drive as sources do, and tell what a person sees who has a watch.
+
+    Blocks come when they are over. One thread takes them in turn; each takes as long as it was
+    measured to take here. So what waits behind a look at all records is counted.
+    """
+    scale = wb.LiveScale(car, info=drive.info)
+    free = due = drive.start
+    seen = shown = told_for = math.nan
+    waiting = Waiting([], [])
+    for k, samples in enumerate(blocks(drive, BLOCK)):
+        came = drive.start + (k + 1) * BLOCK
+        begin = time.perf_counter()
+        scale.update_block(samples)
+        told = None
+        if scale.newest >= due:
+            due = scale.newest + every
+            told = scale.weighing(ahead=True)
+        free = max(free, came) + time.perf_counter() - begin
+        if told is None:
+            continue
+        seen, shown = shown, free
+        if math.isfinite(seen):
+            waiting.stalls.append(shown - seen - every)
+        if math.isfinite(told_for):
+            waiting.ages.append(shown - told_for)
+        told_for = told.time
+    for what, values in (
+        ("longer than a second between two weighings shown", waiting.stalls),
+        ("age of a weighing when the next one takes its place", waiting.ages),
+    ):
+        low, high, most = np.percentile(values, [50.0, 99.0, 100.0])
+        print(f"{what}, median, 99 % and most{low:8.2f} s {high:.2f} s {most:.2f} s")
 
 
 def sample_by_sample(car: wb.Vehicle, drive: Drive, span: float = 300.0) -> None:
@@ -129,10 +179,14 @@ def current_memory() -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=0.0)
+    parser.add_argument("--bus", type=float, default=4.0, help="rate of the bus [Hz]")
+    parser.add_argument("--scenario", default="car", help="such as car-short")
     asked = parser.parse_args()
-    known, mass = made(61)
+    known, mass = made(61, asked.scenario, asked.bus)
     car = wb.calibrate(known, mass=mass)
-    drive, _ = made(62)
+    drive, _ = made(62, asked.scenario, asked.bus)
+    print(f"load of the machine{os.getloadavg()[0]:8.1f}")
+    by_wall_clock(car, drive)
     replayed(car, drive)
     replayed(car, drive)
     on_the_way(car, drive)

@@ -2,6 +2,8 @@
 
 import json
 import math
+import os
+import threading
 
 import polars as pl
 import pytest
@@ -56,7 +58,7 @@ def test_no_mass_is_exit_1(weighbridge, loaded, car, changed):
         ((), "give --source KIND:PLACE once or more, or --replay DRIVE"),
         (("--replay", "d", "--rate", "fast"), "--rate fast"),
         (("--replay", "d", "--rate", "0"), "--rate 0"),
-        (("--replay", "d", "--ticket", "1800"), "go together"),
+        (("--replay", "d", "-o", "new.toml"), "without --ticket KG"),
         (("--replay", "d", "--every", "0"), "--every 0"),
         (("--replay", "d", "--above", "-5"), "-5 kg is no mass"),
         (("--replay", "d", "--page", "here"), "--page here"),
@@ -87,15 +89,33 @@ def test_nothing_that_is_read_is_replaced(weighbridge, loaded, car):
 
 
 def test_a_ticket_calibrates(weighbridge, known, car, tmp_path):
-    out = tmp_path / "better.toml"
+    """Beside the vehicle file, under a name that is not there yet."""
+    there, out = tmp_path / "car.toml", tmp_path / "car-ticket-2.toml"
+    there.write_bytes(car.read_bytes())
+    (tmp_path / "car-ticket.toml").touch()
     ran = weighbridge(
-        "live", "--vehicle", car, "--replay", known.folder, "--rate", "max",
-        "--ticket", f"{known.mass:.0f}", "-o", out,
+        "live", "--vehicle", there, "--replay", known.folder, "--rate", "max",
+        "--ticket", f"{known.mass:.0f}",
     )  # fmt: skip
     assert ran.code in (0, 1), ran.err
     assert "written" in ran.err
     assert wb.Vehicle.load(out).provenance.masses == pytest.approx((known.mass,), abs=1.0)
     assert " in every mass, the one before ± " in ran.err
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
+def test_orders_come_by_a_pipe(weighbridge, loaded, car, tmp_path):
+    pipe = tmp_path / "orders"
+    os.mkfifo(pipe)
+    words = "tare\nturn back\nend\n"
+    threading.Thread(target=pipe.write_text, args=(words,), daemon=True).start()
+    ran = weighbridge(
+        "live", "--vehicle", car, "--replay", loaded.folder, "--rate", 10, "--orders", pipe
+    )
+    assert ran.code == 1
+    assert "nothing is weighed yet" in ran.err
+    assert "'turn back' is no order: there are tare, load, end" in ran.err
+    assert pipe.exists()
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """Alerts begin when their case is sure enough, and rest in between."""
 
+from statistics import NormalDist
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,17 @@ def test_below_is_the_other_side():
     assert alert.look(weighing(2450.0)) is None
     assert alert.look(weighing(2400.0)).on
     assert alert.text == "below 2500 kg"
+
+
+def test_its_state_goes_on_between_events():
+    alert = Alert(2500.0, above=False)
+    for mass, active in ((2550.0, False), (2400.0, True), (2490.0, True), (2560.0, False)):
+        alert.look(weighing(mass))
+        state = alert.state(weighing(mass))
+        assert (state.side, state.limit, state.active) == ("below", 2500.0, active)
+        # By the normal distribution's own series, not by that of the code.
+        assert state.probability == pytest.approx(NormalDist(mass, 50.0).cdf(2500.0))
+    assert alert.state(weighing(np.nan, np.nan)).probability is None
 
 
 @pytest.mark.parametrize("status", [LiveStatus.LEARNING, LiveStatus.INCONSISTENT])

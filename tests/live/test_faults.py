@@ -1,11 +1,17 @@
 """Faults in mid-drive: the mass stays right, or it is withdrawn, and the fault is shown."""
 
 from dataclasses import replace
+from threading import Event
 
 import numpy as np
 import pytest
 
 import weighbridge as wb
+from weighbridge.errors import SourceError
+from weighbridge.live.feed import Feed
+from weighbridge.live.outputs import Outputs
+from weighbridge.live.replay import Replay
+from weighbridge.live.session import Session
 from weighbridge.live.weighing import LiveStatus
 
 IMU = tuple(f"{kind}_{axis}" for kind in ("accel", "gyro") for axis in "xyz")
@@ -32,7 +38,30 @@ def frozen(s, at):
 
 def spiky(s, at):
     hit = (np.random.default_rng(1).random(len(s)) < 0.002) & (s.time > at)
-    return replace(s, values=np.where(hit, 80.0, s.values))
+    value = 8.0 if s.name.startswith("gyro") else 80.0
+    return replace(s, values=np.where(hit, value, s.values))
+
+
+def later(s, at):
+    keep = s.time > at
+    return replace(s, time=s.time[keep], values=s.values[keep])
+
+
+def held(s, at):
+    """The last value for a minute and a half, as receivers do in a tunnel."""
+    values = s.values.copy()
+    first, last = s.time.searchsorted([at, at + 90.0])
+    values[first:last] = values[first]
+    return replace(s, values=values)
+
+
+def saturated(s, at):
+    limit = 0.1 if s.name.startswith("gyro") else 1.0
+    return replace(s, values=np.where(s.time > at, np.clip(s.values, -limit, limit), s.values))
+
+
+def never(s, at):
+    """Such signals are left out."""
 
 
 def elsewhere(s, at):
@@ -47,16 +76,65 @@ def less(s, at):
 def faulty(drive, names, fault):
     at = drive.start + 0.55 * drive.duration
     present = [drive.signals[n] for n in names if n in drive.signals]
+    if fault is never:
+        return drive.without(*(s.name for s in present))
     return drive.with_signals(*(fault(s, at) for s in present))
 
 
 def told(car, drive, end):
+    """Every weighing on the way, the last one at the end."""
     scale = wb.LiveScale(car, info=drive.info)
     for start in np.arange(drive.start, end, 2.0):
         part = drive.between(start, start + 2.0)
         scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
+        yield scale.weighing()
     scale.finish()
-    return scale.weighing()
+    yield scale.weighing()
+
+
+class Unplugged:
+    """An adapter that is pulled out in mid-drive, and found again at the fifth try."""
+
+    name = "elm:/dev/ttyUSB0"
+    patient = True
+
+    def __init__(self, *parts):
+        self._parts, self._tries = parts, 0
+
+    def run(self, put, stop):
+        self._tries += 1
+        if self._tries in (1, 5):
+            Replay(self._parts[self._tries > 1], float("inf")).run(put, stop)
+        if self._tries < 5:
+            raise SourceError("/dev/ttyUSB0 is gone")
+
+
+class Shown:
+    name = "test"
+
+    def __init__(self):
+        self.weighings = []
+
+    def show(self, weighing):
+        self.weighings.append(weighing)
+
+    def close(self):
+        pass
+
+
+def test_an_adapter_that_is_pulled_out_is_told_once(short, weighing, setup, loaded, caplog):
+    middle = short.start + 150.0
+    parts = short.between(short.start, middle), short.between(middle + 12.0, short.end)
+    scale, shown = wb.LiveScale(weighing.vehicle, setup=setup, info=short.info), Shown()
+    with Outputs([shown]) as outputs, Feed([Unplugged(*parts)], pauses=(0.02, 0.05)) as feed:
+        last = Session(feed=feed, scale=scale, outputs=outputs).run(Event())
+    said = [r.getMessage() for r in caplog.records]
+    assert [("is gone" in s, "is back" in s) for s in said] == [(True, False), (False, True)]
+    true = float(loaded.truth.mass[-1])
+    known = [w for w in shown.weighings if np.isfinite(w.mass) and w.status is LiveStatus.WEIGHED]
+    assert known
+    assert max(abs(w.mass - true) / w.std for w in [*known, last]) < 2.5
+    assert scale.recorded().end == pytest.approx(short.end, abs=1.0)
 
 
 QUICK = [("accelerometer frozen", IMU[:3], frozen), ("load times 0.8", ("engine_load",), less)]
@@ -69,6 +147,14 @@ MORE = [
     ("bus silent", BUS, silent),
     ("speed frozen", BUS[:1], frozen),
     ("load frozen", ("engine_load",), frozen),
+    ("GNSS never", GNSS, never),
+    ("GNSS on midway", GNSS, later),
+    ("tunnel", GNSS, held),
+    ("gyro gone", IMU[3:], gone),
+    ("gyro frozen", IMU[3:], frozen),
+    ("gyro spikes", IMU[3:], spiky),
+    ("gyro saturated", IMU[3:], saturated),
+    ("accelerometer saturated", IMU[:2], saturated),
 ]
 
 
@@ -81,13 +167,24 @@ MORE = [
 )
 def test_a_fault_in_mid_drive_is_survived_or_withdraws_the_mass(car, loaded, names, fault):
     drive = faulty(loaded.drive, names, fault)
-    found = told(car, drive, loaded.drive.end)
+    readings = list(told(car, drive, loaded.drive.end))
+    found, true = readings[-1], float(loaded.truth.mass[-1])
+    weighed = [w for w in readings if w.status is LiveStatus.WEIGHED]
+    assert weighed
     if fault is less:
         assert found.status is LiveStatus.INCONSISTENT
         assert np.isnan(found.mass)
         assert "engine_load reads 0." in found.reason
         return
-    true = float(loaded.truth.mass[-1])
+    assert max(abs(w.mass - true) / w.std for w in weighed) < 2.5
+    if fault in (frozen, saturated) and set(names) <= set(IMU):
+        shown = " ".join((found.reason, *found.notes))
+        assert "inertial sensor" in shown or any(name in shown for name in names)
+    if found.status is LiveStatus.INCONSISTENT:
+        # What failed is named, and no unit is blamed.
+        assert "inertial sensor" in found.reason
+        assert "unit" not in found.reason
+        return
     assert abs(found.mass - true) < 2.5 * found.std
     assert found.std < 0.02 * true
     lost = [s.name for s in found.signals if s.needed and not s.fresh]

@@ -2,12 +2,16 @@
 
 import logging
 import os
+import time
 
 import pytest
 
 import weighbridge as wb
+from weighbridge.estimators.judging import STOP
+from weighbridge.live import clock
 from weighbridge.live.keeper import Keeper
 from weighbridge.signals import DriveInfo
+from weighbridge.signals.recent import BEHIND
 from weighbridge.vehicle.model import Driveline, Vehicle
 
 
@@ -16,8 +20,8 @@ def car():
     return Vehicle(name="van", tare=2000.0, driveline=Driveline(gearings=(40.0, 20.0, 12.0)))
 
 
-def restored(keeper, car, start=10.0):
-    return keeper.restored(car, lateness=1.0, info=DriveInfo(), start=start)
+def restored(keeper, car, start=10.0, **more):
+    return keeper.restored(car, lateness=1.0, info=DriveInfo(), start=start, **more)
 
 
 def test_nothing_there_is_a_new_scale(car, tmp_path):
@@ -50,14 +54,16 @@ def test_a_damaged_state_is_set_aside(car, tmp_path):
 
 
 @pytest.mark.parametrize("start", [1.79e9 - 900.0, 1.79e9 - 90.0, 30.0])
-def test_a_state_that_is_later_than_its_samples_is_set_aside(car, tmp_path, start):
-    """That of an emulated drive at five times the rate, or a computer whose clock begins anew."""
+@pytest.mark.parametrize("emulated", [True, False])
+def test_a_state_that_is_later_than_its_samples_is_set_aside(car, tmp_path, start, emulated):
+    """That of an emulated drive at five times the rate, or a replay of another drive."""
     path = tmp_path / "car.state"
     scale = wb.LiveScale(car)
     for k in range(100):
         scale.update(1.79e9 + 0.1 * k, "vehicle_speed", 10.0)
-    Keeper(path).write(scale)
-    new, said = restored(Keeper(path), car, start)
+    with clock.at_rate(5.0 if emulated else 1.0):
+        Keeper(path).write(scale)
+    new, said = restored(Keeper(path), car, start, by_host=emulated)
     assert "later than those that come" in said
     assert "e+" not in said
     assert "set aside as car.state.bad" in said
@@ -69,6 +75,55 @@ def test_a_state_that_is_later_than_its_samples_is_set_aside(car, tmp_path, star
     assert not found.notes
     speed = next(s for s in found.signals if s.name == "vehicle_speed")
     assert (speed.late, speed.unfit) == (0, 0)
+
+
+@pytest.fixture
+def host(monkeypatch):
+    """A host whose date can be set, and whose programs can be started anew."""
+
+    class Host:
+        date = 1.79e9
+
+        def start(self):
+            course = clock._Course(time.time(), time.monotonic(), 1.0)
+            monkeypatch.setattr(clock, "_course", course)
+
+    made = Host()
+    monkeypatch.setattr(time, "time", lambda: made.date)
+    made.start()
+    return made
+
+
+@pytest.mark.parametrize("back", [30.0, 7200.0, 1.79e9 - 30.0])
+def test_a_state_is_gone_on_from_where_the_hosts_clock_was_set_back(car, tmp_path, host, back):
+    """A computer without a battery for its clock, after a power cut: an hour ago, or 1970."""
+    path = tmp_path / "car.state"
+    scale = wb.LiveScale(car)
+    begin = clock.now()
+    for k in range(1000):
+        scale.update(begin + 0.1 * k, "vehicle_speed", 10.0)
+    Keeper(path).write(scale)
+    host.date -= back
+    # The date alone moves nothing: the program that runs has a clock of its own.
+    assert clock.now() == pytest.approx(begin, abs=60.0)
+    host.start()
+    start = clock.now()
+    assert start == pytest.approx(begin - back, abs=60.0)
+    again, said = restored(Keeper(path), car, start)
+    assert "the clock was set back" in said
+    assert "e+" not in said
+    assert path.exists()
+    before = again.weighing().driven
+    assert before == scale.weighing().driven > 90.0
+    for k in range(1000):
+        again.update(start + 0.1 * k, "vehicle_speed", 10.0)
+    found = again.weighing()
+    speed = next(s for s in found.signals if s.name == "vehicle_speed")
+    assert (speed.late, speed.unfit) == (0, 0)
+    # A silence in motion counts for as long as the stages look back.
+    assert 97.0 < found.driven - before < 99.0 + BEHIND + 2.0
+    # The state holds the last seconds; what comes is put behind them as after a stop.
+    assert again.recorded().duration == pytest.approx(BEHIND + STOP + 99.0, abs=2.0)
 
 
 @pytest.mark.parametrize(("after", "goes_on"), [(3000.0, True), (4000.0, False), (90_000.0, False)])

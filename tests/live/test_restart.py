@@ -102,6 +102,32 @@ def test_after_a_silence_it_is_said_that_the_mass_is_that_of_before(
     assert not scale.weighing().notes
 
 
+def test_after_a_clock_was_set_back_the_mass_is_that_of_before_until_it_is_proved(
+    short, weighing, setup
+):
+    middle = short.start + 150.0
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
+    part = short.between(short.start, middle)
+    scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
+    before = scale.weighing()
+    assert before.mass > 0.0
+    scale = wb.LiveScale.restore(weighing.vehicle, scale.checkpoint())
+    back = 7200.0
+    scale.clock_set_back(middle - back)
+    told = []
+    for at in np.arange(middle, short.end, 1.0):
+        part = short.between(at, at + 1.0)
+        scale.update_block({n: (s.time - back, s.values) for n, s in part.signals.items()})
+        told.append(scale.weighing())
+    unproved = [w for w in told[5:] if w.driven - before.driven < 110.0]
+    assert unproved
+    assert all(w.status is LiveStatus.LEARNING for w in unproved)
+    said = [n for w in told for n in w.notes if "for a time that nobody knows" in n]
+    assert said
+    assert "e+" not in said[0]
+    assert all(sum("the clock of the samples jumped once" in n for n in w.notes) == 1 for w in told)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("first", "gap"), [(250.0, 40.0), (400.0, 8.0)])
 def test_the_mass_is_right_or_withdrawn_after_all_began_anew(car, loaded, first, gap):

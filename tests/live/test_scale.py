@@ -254,7 +254,7 @@ def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
     [
         (lambda b: b[: len(b) // 2], "damaged"),
         (lambda b: b.replace('"d"', '"x"', 1), "damaged"),
-        (lambda b: b.replace('checkpoint": 4', 'checkpoint": 9', 1), "version 9"),
+        (lambda b: b.replace('checkpoint": 5', 'checkpoint": 9', 1), "version 9"),
         (lambda b: "\xff" + b, "damaged"),
         (lambda b: "", "damaged"),
     ],

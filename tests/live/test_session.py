@@ -113,11 +113,11 @@ def test_a_lost_source_is_told_and_weighing_goes_on(minute, weighing, setup):
 
 def test_orders_of_a_person(short, weighing, setup):
     scale = LiveScale(weighing.vehicle, setup=setup, info=short.info)
-    assert "nothing is weighed yet" in order(scale, "t")
+    assert "nothing is weighed yet" in order(scale, "tare")
     scale.update_block({n: (s.time, s.values) for n, s in short.signals.items()})
-    assert "tare " in order(scale, "t")
-    assert "changed" in order(scale, "l")
-    assert order(scale, "x") == ""
+    assert "tare " in order(scale, "tare")
+    assert "changed" in order(scale, "load")
+    assert "no order: there are tare, load, end" in order(scale, "x")
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])

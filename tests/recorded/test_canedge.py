@@ -212,3 +212,21 @@ def test_a_mirrored_axis_of_the_gyro_is_found(long, axis):
         turned = replace(drive.signals[name], values=-drive.signals[name].values)
         found = [p for p in check_drive(drive.with_signals(turned)) if p.serious]
         assert found, drive.name
+
+
+def test_a_log_is_weighed_live_as_it_is_as_a_whole(long):
+    """The mass on the way, before all records are looked at once more, and that at the end."""
+    drive, car = next(iter(long.values())), wb.Vehicle.load(CANEDGE / "vehicle.toml")
+    low, high = wb.weigh(drive, car).interval(0.95)
+    scale = wb.LiveScale(car, info=drive.info, step=1.0)
+    for start in np.arange(drive.start, drive.end, 1.0):
+        part = drive.between(start, start + 1.0)
+        scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
+    before = scale.weighing()
+    scale.finish()
+    for told in (before, scale.weighing()):
+        assert all(s.fresh for s in told.signals if s.needed)
+        assert sum(s.late + s.unfit for s in told.signals) == 0
+        live_low, live_high = told.interval()
+        assert live_low < high
+        assert low < live_high

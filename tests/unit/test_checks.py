@@ -158,6 +158,20 @@ def test_gyro_in_degrees(sane):
     assert "seems to be in deg/s: name its columns gyro_x_degps" in only(fast).text
 
 
+def spiky(drive, value):
+    """Single samples of the gyro that no car turns at."""
+    hit = np.random.default_rng(3).random(len(drive.signals["gyro_x"])) < 0.004
+    return drive.with_signals(
+        *(replace(s, values=np.where(hit, value, s.values)) for s in map(drive.signals.get, GYRO))
+    )
+
+
+def test_a_few_spikes_of_a_gyro_are_no_other_unit(sane):
+    assert serious(spiky(sane, 8.0)) == []
+    fast = scaled(sane, **dict.fromkeys(GYRO, 180 / np.pi))
+    assert "seems to be in deg/s: name its columns gyro_x_degps" in only(spiky(fast, 400.0)).text
+
+
 def test_a_gyro_that_stays_at_zero_is_stuck(sane):
     still = scaled(sane, **dict.fromkeys(GYRO, 0.0))
     assert "gyro_x is 0 radps all the time" in only(still).text

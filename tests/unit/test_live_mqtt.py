@@ -8,11 +8,13 @@ import sqlite3
 import threading
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 from tests.unit.made_weighings import drive, weighing
 
 from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.live.alerts import Alert
 from weighbridge.live.outputs.mqtt import Mqtt, Topics, parse_broker, slug
 from weighbridge.live.outputs.outbox import Outbox
 from weighbridge.live.weighing import LiveStatus
@@ -152,7 +154,9 @@ def test_home_assistant_is_told_of_the_sensors_of_one_device(tmp_path):
         mqtt = sender(port, tmp_path)
         until(lambda: len(Taken.messages) >= 6)
         mqtt.close()
-    sensors = {t: json.loads(p) for t, p, _ in Taken.messages if t.startswith("homeassistant/")}
+    sensors = {
+        t: json.loads(p) for t, p, _ in Taken.messages if t.startswith("homeassistant/sensor/")
+    }
     assert [t.split("/")[3] for t in sensors] == ["mass", "std", "payload", "status", "overload"]
     assert len({s["unique_id"] for s in sensors.values()}) == 5
     for topic, sensor in sensors.items():
@@ -163,6 +167,36 @@ def test_home_assistant_is_told_of_the_sensors_of_one_device(tmp_path):
         assert sensor["availability_topic"] == "fleet/delivery-van/available"
         key = sensor["value_template"].partition("value_json.")[2].split()[0].rstrip(")")
         assert key in weighing().to_dict()
+
+
+def test_an_alert_is_a_binary_sensor_and_sent_at_once(tmp_path):
+    jinja2 = pytest.importorskip("jinja2", reason="Home Assistant's templates are jinja2's")
+    with broker() as port:
+        mqtt = sender(port, tmp_path, sides=["above"])
+        alert = Alert(2050.0)
+        for k, w in enumerate((weighing(300.0, mass=2000.0), weighing(301.0))):
+            alert.look(w)
+            mqtt.show(replace(w, alerts=(alert.state(w),)))
+            assert alert.active == (k == 1)
+        until(lambda: len(Taken.of(TOPIC)) >= 2)
+        mqtt.close()
+    found = {t: p for t, p, _ in Taken.messages if t.startswith("homeassistant/binary_sensor/")}
+    assert found["homeassistant/binary_sensor/weighbridge_delivery-van/below/config"] == b""
+    told = json.loads(found["homeassistant/binary_sensor/weighbridge_delivery-van/above/config"])
+    assert told["device_class"] == "problem"
+    template = jinja2.Environment(autoescape=False).from_string(told["value_template"])
+    sent = [json.loads(p) for p in in_order(Taken.of(TOPIC))]
+    assert [template.render(value_json=line) for line in sent] == ["OFF", "ON"]
+    assert template.render(value_json={**sent[1], "alerts": []}) == "OFF"
+    # 2100 kg with a standard deviation of 25 kg is two of them above.
+    assert sent[1]["alerts"] == [
+        {
+            "side": "above",
+            "limit_kg": 2050.0,
+            "active": True,
+            "probability": pytest.approx(0.9772, abs=1e-4),
+        }
+    ]
 
 
 def test_nothing_is_lost_while_the_broker_restarts_and_the_order_stays(tmp_path, caplog):

@@ -10,7 +10,8 @@ from rich.console import Console
 from tests.unit.made_weighings import NAMES, drive, health, weighing
 
 from weighbridge.live.outputs.terminal import PlainLines, TerminalView, lines, terminal
-from weighbridge.live.weighing import LiveStatus
+from weighbridge.live.outputs.words import needed_text, overload_text
+from weighbridge.live.weighing import AlertState, LiveStatus
 
 
 def text(found):
@@ -64,7 +65,27 @@ def test_a_view_without_a_mass_or_permitted_mass_shows_what_there_is():
     assert "no mass yet" in shown
     assert "nan" not in shown.lower()
     assert "permitted" not in shown
-    assert "not by driving like this" in shown
+    assert "± 2 %: not by driving on" in shown
+
+
+def test_what_driving_on_never_reaches_says_what_is_left_open():
+    w = weighing(minutes_to_2=math.inf, reach=0.02001)
+    assert needed_text(w) == (
+        "± 5 %: reached, ± 2 %: not by driving on, vehicle file and sensors leave ± 2.1 %"
+    )
+    both = weighing(minutes_to_2=math.inf, minutes_to_5=math.inf, reach=0.063)
+    assert needed_text(both) == (
+        "± 5 %, ± 2 %: not by driving on, vehicle file and sensors leave ± 6.3 %"
+    )
+
+
+def test_a_limit_takes_the_place_of_a_permitted_mass():
+    limit = AlertState(limit=2000.0, side="above", active=True, probability=0.97)
+    assert overload_text(weighing(gross=None, alerts=(limit,))) == (
+        "above 2000 kg with probability 97 %"
+    )
+    below = AlertState(limit=2000.0, side="below", active=False, probability=0.03)
+    assert "no permitted mass" in overload_text(weighing(gross=None, alerts=(below,)))
 
 
 def test_control_characters_of_a_name_do_not_act():

@@ -48,7 +48,28 @@ def test_json_says_what_the_words_say(noise, floor):
     for percent, minutes in ((2, made.minutes_to_2), (5, made.minutes_to_5)):
         by_json = line[f"minutes_to_{percent}_percent"] is None
         by_json = by_json and line["reach_percent"] >= percent
-        assert by_json == ("not by driving like this" in remaining_text(minutes, percent))
+        assert by_json == ("not by driving on" in remaining_text(minutes, percent, made.reach))
+
+
+@given(st.floats(1.0, 300.0), st.floats(0.0, 0.06), st.floats(60.0, 2700.0))
+def test_what_hours_of_driving_leave_is_the_outlook(noise, floor, driven):
+    """Whoever drives for the minutes told has the interval; who is told of none has reach left."""
+    mass, target = 2000.0, 0.02
+
+    def half(seconds):
+        var = noise**2 * driven / (driven + seconds) + (floor * mass) ** 2
+        return 1.96 * math.sqrt(var) / mass
+
+    found = outlook(
+        mass, math.hypot(noise, floor * mass), floor,
+        driven=driven, reason="", silent=(), first=60.0,
+    )  # fmt: skip
+    assert found.reach == pytest.approx(half(4.5 * 3600.0), rel=1e-4)
+    if math.isinf(found.minutes_to_2):
+        assert half(4.5 * 3600.0) > 0.9999 * target
+    elif found.minutes_to_2:
+        assert found.minutes_to_2 < 270.0
+        assert half(60.0 * found.minutes_to_2) == pytest.approx(target, rel=1e-4)
 
 
 def test_minutes_of_a_mass_that_waits_for_a_look_fall_with_the_driving():

@@ -80,7 +80,7 @@ def _changing(time: Floats, ratio: Floats, gearings: Floats, name: str) -> str:
     off = ((count >= FEWEST_OF_PART) & (on < OFF * count))[number]
     if np.count_nonzero(off) < max(LEAST * off.size, FEWEST_RATIOS):
         return ""
-    scale, share, _ = _best(ratio[off], gearings)
+    scale, share, own = _best(ratio[off], gearings)
     # A gear that the file lacks is off, too; a scale moves several.
     moved = ratio[off] - np.log(scale)
     nearest = np.argmin(np.abs(moved[:, None] - gearings), axis=1)
@@ -88,6 +88,13 @@ def _changing(time: Floats, ratio: Floats, gearings: Floats, name: str) -> str:
     if share <= FITS or gears < 2:
         return ""
     begin, end = float(time[off][0]), float(time[off][-1])
+    if own > share - BETTER:
+        # No other unit: a speed that drifts by some percent.
+        return (
+            f"from {span(begin, end)} the motion is some percent faster or slower than engine "
+            f"speed and the gearings of {name} say, and elsewhere it is not: the inertial sensor "
+            "or the vehicle speed fails there or shortly before; cut the recording there"
+        )
     return (
         f"from {span(begin, end)} engine over vehicle speed is {scale:.2f} times what the "
         f"gearings of {name} need, and elsewhere it is right: the unit of one of the speeds "

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from weighbridge.live.alerts import Alert
     from weighbridge.live.keeper import Keeper
+    from weighbridge.live.orders import OrderFile
     from weighbridge.live.outputs import Output
     from weighbridge.live.recorder import Recorder
     from weighbridge.live.scale import LiveScale
@@ -100,7 +101,9 @@ _Ticket = Annotated[
 ]
 _Out = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("-o", "--out", help="Vehicle file that --ticket writes."),
+    typer.Option(
+        "-o", "--out", help="Vehicle file that --ticket writes; by default beside the vehicle file."
+    ),
 ]
 _State = Annotated[
     Optional[str],  # noqa: UP045
@@ -109,6 +112,14 @@ _State = Annotated[
         help="File that keeps what was weighed over a power cut or a short stop; by default "
         "beside the vehicle file, none for a replay.",
         metavar="FILE|none",
+    ),
+]
+_Orders = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--orders",
+        help="Take orders from a named pipe, made where nothing is there, or from a file that is "
+        "appended to: a line tare, load or end.",
     ),
 ]
 _Lateness = Annotated[
@@ -135,6 +146,7 @@ def live(
     ticket: _Ticket = None,
     out: _Out = None,
     state: _State = None,
+    orders: _Orders = None,
     lateness: _Lateness = 1.0,
     listen_only: _ListenOnly = False,
     force: _Force = False,
@@ -143,7 +155,7 @@ def live(
 ) -> None:
     """Weigh a vehicle while it drives.
 
-    On a terminal: t tares, l tells that the load has changed, q ends.
+    On a terminal: t tares, l tells that the load has changed, q ends. Without one --orders does it.
     Exits with 0 where there is a mass at the end, with 1 where there is none.
 
     Example: weighbridge live --vehicle car.toml --replay drive/ --rate 20
@@ -154,12 +166,13 @@ def live(
     from weighbridge.live.clock import at_rate
     from weighbridge.live.feed import Feed
     from weighbridge.live.keys import keys
+    from weighbridge.live.orders import orders as order_file
     from weighbridge.live.outputs import Outputs
     from weighbridge.live.session import Session
     from weighbridge.vehicle.model import Vehicle
 
-    if (ticket is None) != (out is None):
-        raise ConfigError("--ticket KG and -o FILE go together: the vehicle file that it writes")
+    if ticket is None and out is not None:
+        raise ConfigError(f"-o {out}: without --ticket KG no vehicle file is written")
     if not every > 0.0:
         raise ConfigError(f"--every {every:g}: give seconds above 0")
     if bool(source) == (replay is not None):
@@ -168,6 +181,9 @@ def live(
     chosen = chosen_mapping(car, vehicle, mapping)
     kept = _state_file(state, replay, vehicle)
     results = asked_for(track=None, report=None, json=json_path)
+    if ticket is not None and out is None:
+        out = _free_file(vehicle)
+        notice(f"the ticket writes {out}")
     if out is not None:
         refuse_overwriting(out, force, "vehicle file")
         results.append(Result("--out", out, "vehicle file"))
@@ -176,14 +192,19 @@ def live(
     read = inputs([replay] if replay is not None else [], vehicle, chosen, dbc)
     refuse_results(read, results)
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    alerts = _alerts(above, below, car)
     speed = _speed(rate, replayed=replay is not None)
     sources, info, start = _sources(source or (), replay, speed, chosen, dbc, listen_only)
-    scale, keeper = _scale(car, kept, lateness, info, start, _step(replay, speed))
+    scale, keeper = _scale(
+        car, kept, lateness, info, start, _step(replay, speed),
+        by_host=replay is None and speed == 1.0,
+    )  # fmt: skip
     with (
         at_rate(1.0 if replay is not None else speed),
         keys(wanted=not any(s.name == "lines:-" for s in sources)) as pressed,
-        Outputs(_outputs(json_path, mqtt, page, car, vehicle)) as outputs,
+        Outputs(_outputs(json_path, mqtt, page, car, vehicle, alerts)) as outputs,
         Feed(sources) as feed,
+        order_file(orders) as ordered,
     ):
         session = Session(
             feed=feed,
@@ -192,10 +213,10 @@ def live(
             period=every,
             keeper=keeper,
             recorder=None if record is None else _recorder(record, info),
-            alerts=_alerts(above, below, car),
+            alerts=alerts,
             ahead=not _unwatched(replay, speed),
         )
-        last = _run(session, pressed)
+        last = _run(session, pressed, ordered)
     if ticket is not None and out is not None:
         _calibrate(scale, ticket, car, out)
     _conclude(last, aloud=json_path != "-")
@@ -272,7 +293,14 @@ def _state_file(state: str | None, replay: Path | None, vehicle: Path) -> Path |
 
 
 def _scale(
-    car: Vehicle, state: Path | None, lateness: float, info: DriveInfo, start: float, step: float
+    car: Vehicle,
+    state: Path | None,
+    lateness: float,
+    info: DriveInfo,
+    start: float,
+    step: float,
+    *,
+    by_host: bool,
 ) -> tuple[LiveScale, Keeper | None]:
     """Go on from the state that was kept, or begin anew."""
     from weighbridge.live.keeper import Keeper
@@ -282,10 +310,21 @@ def _scale(
         return LiveScale(car, lateness=lateness, info=info, step=step), None
     refuse_missing_folder(state)
     keeper = Keeper(state)
-    scale, found = keeper.restored(car, lateness=lateness, info=info, start=start, step=step)
+    scale, found = keeper.restored(
+        car, lateness=lateness, info=info, start=start, step=step, by_host=by_host
+    )
     if found:
         complain(found)
     return scale, keeper
+
+
+def _free_file(vehicle: Path) -> Path:
+    """Name a vehicle file beside another that is not there yet: ``car-ticket.toml``."""
+    found, number = vehicle.with_stem(f"{vehicle.stem}-ticket"), 1
+    while found.exists():
+        number += 1
+        found = vehicle.with_stem(f"{vehicle.stem}-ticket-{number}")
+    return found
 
 
 def _recorder(folder: Path, info: DriveInfo) -> Recorder:
@@ -299,7 +338,12 @@ def _recorder(folder: Path, info: DriveInfo) -> Recorder:
 
 
 def _outputs(
-    json_path: str | None, mqtt: str | None, page: str | None, car: Vehicle, vehicle: Path
+    json_path: str | None,
+    mqtt: str | None,
+    page: str | None,
+    car: Vehicle,
+    vehicle: Path,
+    alerts: Sequence[Alert],
 ) -> list[Output]:
     """Make the outputs that were asked for; the terminal's view begins when all others stand."""
     from weighbridge.live.outputs.lines import Lines
@@ -311,7 +355,9 @@ def _outputs(
     if mqtt is not None:
         from weighbridge.live.outputs.mqtt import Mqtt, parse_broker
 
-        made.append(Mqtt(parse_broker(mqtt), car.name, vehicle.with_suffix(".outbox")))
+        sides = [alert.side for alert in alerts]
+        outbox = vehicle.with_suffix(".outbox")
+        made.append(Mqtt(parse_broker(mqtt), car.name, outbox, sides=sides))
     if page is not None:
         from weighbridge.live.outputs.page import Page
 
@@ -342,18 +388,21 @@ def _alerts(above: float | None, below: float | None, car: Vehicle) -> list[Aler
     ]
 
 
-def _run(session: Session, pressed: Callable[[], str]) -> LiveWeighing:
-    """Weigh until the sources end, q is pressed, or the process is asked to end."""
+def _run(session: Session, pressed: Callable[[], str], ordered: OrderFile | None) -> LiveWeighing:
+    """Weigh until the sources end, somebody says so, or the process is asked to end."""
+    from weighbridge.live.keys import ORDER_OF
+    from weighbridge.live.orders import END
     from weighbridge.live.session import order
 
     stop = Event()
 
     def orders(scale: LiveScale) -> None:
-        for key in pressed():
-            if key == "q":
+        words = [ORDER_OF[key] for key in pressed() if key in ORDER_OF]
+        for word in [*words, *(ordered.read() if ordered is not None else ())]:
+            if word == END:
                 stop.set()
-            elif said := order(scale, key):
-                complain(said)
+            else:
+                complain(order(scale, word))
 
     session.orders = orders
     before = {

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from weighbridge.errors import ConfigError
-from weighbridge.live.weighing import LiveStatus, LiveWeighing
+from weighbridge.live.weighing import AlertState, LiveStatus, LiveWeighing, Side
 
 ON: Final = 0.95
 """An alert begins when its case is so probable [-],"""
@@ -58,9 +58,27 @@ class Alert:
         self._on, self._off = on, off
 
     @property
+    def side(self) -> Side:
+        """On which side of the limit its case is."""
+        return "above" if self.above else "below"
+
+    @property
     def text(self) -> str:
         """What it says while it is active."""
-        return f"{'above' if self.above else 'below'} {self.limit:.0f} kg"
+        return f"{self.side} {self.limit:.0f} kg"
+
+    def state(self, weighing: LiveWeighing) -> AlertState:
+        """Return how it stands at a weighing."""
+        return AlertState(
+            limit=self.limit,
+            side=self.side,
+            active=self.active,
+            probability=self._probability(weighing),
+        )
+
+    def _probability(self, weighing: LiveWeighing) -> float | None:
+        probability = weighing.above(self.limit)
+        return probability if self.above or probability is None else 1.0 - probability
 
     def look(self, weighing: LiveWeighing) -> Event | None:
         """Return the event that a weighing makes; None where nothing changes.
@@ -69,17 +87,15 @@ class Alert:
         """
         if weighing.status is not LiveStatus.WEIGHED:
             return None
-        probability = weighing.above(self.limit)
-        if probability is None:
+        case = self._probability(weighing)
+        if case is None:
             return None
-        case = probability if self.above else 1.0 - probability
         wanted = case >= (self._off if self.active else self._on)
         if wanted == self.active:
             return None
         self.active = wanted
-        side = "above" if self.above else "below"
         text = (
-            f"{'' if wanted else 'no longer '}{side} {self.limit:.0f} kg: "
+            f"{'' if wanted else 'no longer '}{self.text}: "
             f"{weighing.mass:.0f} kg, with probability {case:.2f}"
         )
         return Event(text, wanted, case)

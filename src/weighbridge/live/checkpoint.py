@@ -18,10 +18,14 @@ import numpy as np
 
 from weighbridge.arguments import check_text
 from weighbridge.errors import ConfigError
+from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.vehicle.model import Vehicle
 
-VERSION: Final = 4
+VERSION: Final = 5
 """Of the layout; another one is refused."""
+
+LIGHTEST, HEAVIEST = 50.0, 200e3
+"""Masses that road vehicles have [kg]."""
 
 _ROOT: Final = "weighbridge."
 _MOST: Final = 64 * 2**20
@@ -79,6 +83,21 @@ def unpacked(text: str, vehicle: Vehicle) -> Any:
         return _made(json.loads(body))
     except (ValueError, KeyError, TypeError, AttributeError, ImportError, RecursionError) as error:
         raise ConfigError(f"{refused}: {error}") from None
+
+
+def refuse_absurd(state: ForwardState | None, setup: ForwardSetup | None) -> None:
+    """Refuse a state with a mass that no vehicle has.
+
+    Raises
+    ------
+    ConfigError
+        The sentence names it.
+    """
+    if state is None or setup is None or not state.joint.windows:
+        return
+    mass, std = state.joint.mass, state.joint.std(setup.joint)
+    if not (LIGHTEST < mass < HEAVIEST and 0.0 < std < mass):
+        raise ConfigError(f"the checkpoint is not used: it holds {mass:.0f} ± {std:.0f} kg")
 
 
 def _plain(value: Any) -> Any:

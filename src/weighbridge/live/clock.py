@@ -30,6 +30,11 @@ def now() -> float:
     return _course.at(time.monotonic())
 
 
+def pace() -> float:
+    """Return how fast the clock goes: 1, or as many times as that of an emulated vehicle."""
+    return _course.rate
+
+
 @contextmanager
 def at_rate(rate: float) -> Iterator[None]:
     """Let the clock go faster or slower for a while, as that of an emulated vehicle does.

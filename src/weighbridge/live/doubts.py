@@ -27,8 +27,13 @@ def of_before(records: Records, *, driven_since: float, goes_on: bool) -> str:
     """
     if not (goes_on and records.silence >= STOP and driven_since < PROVED):
         return ""
+    silence = (
+        f"for {duration(records.silence)}"
+        if math.isfinite(records.silence)
+        else "for a time that nobody knows"
+    )
     return (
-        f"nothing came for {duration(records.silence)} until {instant(records.resumed)}: the load "
+        f"nothing came {silence} until {instant(records.resumed)}: the load "
         f"may have changed, and a mass takes {PROVED:.0f} s on the move"
     )
 

@@ -44,13 +44,14 @@ class Keeper:
 
     def restored(
         self, vehicle: Vehicle, *, lateness: float, info: DriveInfo, start: float,
-        step: float = STEP,
+        step: float = STEP, by_host: bool = True,
     ) -> tuple[LiveScale, str]:  # fmt: skip
         """Return the scale of the checkpoint, or a new one; and one sentence on it.
 
         A checkpoint that cannot be used is set aside beside it, under a name that ends in
-        ``.bad``. Of one that is later than the samples, or older by more than `OLDEST`, what was
-        set to nought is taken over, and nothing else.
+        ``.bad``. Of one that is older than the samples by more than `OLDEST`, what was set to
+        nought is taken over, and nothing else; likewise of one that is later, unless the host's
+        clock was set back: then it is gone on from, behind its newest sample.
 
         Parameters
         ----------
@@ -59,6 +60,7 @@ class Keeper:
         info : of a new scale
         start : instant from which samples come [s]
         step : of a new scale [s]
+        by_host : whether ``start`` is of the host's clock, which a power cut may set back
         """
         new = LiveScale(vehicle, lateness=lateness, info=info, step=step)
         try:
@@ -72,6 +74,9 @@ class Keeper:
         except ConfigError as error:
             return new, f"{self.path}: {error}{self._set_aside()}"
         after = start - scale.newest
+        if after < -_AHEAD and by_host and scale.kept_at == 1.0:
+            scale.clock_set_back(start)
+            return scale, f"{self.path}: {_set_back(scale.newest, start)}"
         if not -_AHEAD <= after <= OLDEST and math.isfinite(after):
             new.take_tare(scale)
             return new, f"{self.path}: {self._of_another_time(scale.newest, start)}"
@@ -90,7 +95,7 @@ class Keeper:
             return f"it is {hours:.0f} h old, and the load may have changed: weighed anew"
         return (
             f"it holds samples until {instant(newest)}, later than those that come from "
-            f"{instant(start)} on: an emulated drive or a clock that was set back"
+            f"{instant(start)} on: of an emulated or another drive"
             f"{self._set_aside()}"
         )
 
@@ -120,3 +125,12 @@ class Keeper:
         if self._failed:
             _LOG.warning("%s: checkpoints are written again", self.path)
         self._failed = False
+
+
+def _set_back(newest: float, start: float) -> str:
+    """Say that a checkpoint of a later clock is gone on from."""
+    return (
+        f"it holds samples until {instant(newest)}, later than the clock's {instant(start)}: the "
+        "clock was set back, and nobody knows for how long; going on behind them, and the mass is "
+        "that of before until the vehicle was driven: press l where the load has changed"
+    )

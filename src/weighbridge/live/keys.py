@@ -6,6 +6,12 @@ import contextlib
 import select
 import sys
 from collections.abc import Callable, Iterator
+from typing import Final
+
+from weighbridge.live.orders import END, LOAD, TARE
+
+ORDER_OF: Final = {"t": TARE, "l": LOAD, "q": END}
+"""What a key asks for."""
 
 
 @contextlib.contextmanager

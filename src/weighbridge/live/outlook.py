@@ -17,6 +17,12 @@ GOOD, BETTER = 0.05, 0.02
 _REACH: Final = float(ndtri(0.975))
 """Half width of the 95 % interval in standard deviations [-]."""
 
+LONGEST: Final = 16_200.0
+"""Driving on for longer is no remedy [s]: 4.5 h, after which a driver rests (EU 561/2006)."""
+
+CALIBRATE: Final = "a calibration on more drives of several masses leaves less open"
+"""What helps where driving on does not."""
+
 ADVICE: Final = (
     "starts, hills and changes of speed tell most; steady driving and braking tell little"
 )
@@ -93,11 +99,24 @@ def outlook(
         status=LiveStatus.LEARNING if reason else LiveStatus.WEIGHED,
         reason=reason,
         progress=min(1.0, (BETTER / half) ** 2),
-        reach=_REACH * floor,
+        reach=_reach(mass, noise, floor, driven),
         minutes_to_5=to_good,
         minutes_to_2=to_better,
-        advice="" if to_better == 0.0 else ADVICE,
+        advice=_advice(to_good, to_better),
     )
+
+
+def _advice(to_good: float, to_better: float) -> str:
+    """Say what helps, by the minutes until 5 and 2 %."""
+    if to_better == 0.0:
+        return ""
+    return CALIBRATE if math.isinf(to_better) and to_good in (0.0, math.inf) else ADVICE
+
+
+def _reach(mass: float, noise: float, floor: float, driven: float) -> float:
+    """Half width of the interval over the mass after `LONGEST` more of driving [-]."""
+    left = noise * driven / (driven + LONGEST) if math.isfinite(noise) else 0.0
+    return _REACH * math.hypot(floor, math.sqrt(left) / mass)
 
 
 def _later(minutes: float, since: float, wait: float) -> float:
@@ -119,10 +138,14 @@ def _allowed(half: float, mass: float, floor: float) -> float:
 
 
 def _minutes(half: float, mass: float, noise: float, floor: float, driven: float) -> float:
-    """Time on the move until the interval is as narrow [min]; NaN where there is no interval."""
+    """Time on the move until the interval is as narrow [min].
+
+    NaN where there is no interval, infinite where `LONGEST` does not do.
+    """
     if math.isinf(noise):
         return math.nan
     allowed = _allowed(half, mass, floor)
     if noise <= allowed:
         return 0.0
-    return driven / 60.0 * (noise / allowed - 1.0) if allowed > 0.0 else math.inf
+    longest = driven * (noise / allowed - 1.0) if allowed > 0.0 else math.inf
+    return longest / 60.0 if longest < LONGEST else math.inf

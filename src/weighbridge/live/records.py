@@ -126,7 +126,7 @@ class Records:
     jumps : jumps of the clock so far
     resumed : instant of the first sample after all were silent for `SILENCE` the last time [s];
         -inf before that
-    silence : length of that silence [s]; 0 before any
+    silence : length of that silence [s]; 0 before any, infinite where nobody knows
     late, unfit : samples dropped because they came too late, or were no finite number or
         impossible instant, by signal
     """
@@ -145,6 +145,7 @@ class Records:
         self.late: dict[str, int] = {}
         self.unfit: dict[str, int] = {}
         self._columns: dict[str, _Column] = {}
+        self._followed = math.nan
         self._strange = 0
         self._strange_from = math.nan
         self._sealed_to = -math.inf
@@ -223,7 +224,20 @@ class Records:
 
     def _resume(self, at: float) -> None:
         if at - self.newest > SILENCE and math.isfinite(self.newest):
-            self.resumed, self.silence = at, at - self.newest
+            self.resumed = at
+            self.silence = math.inf if self.newest == self._followed else at - self.newest
+
+    def follow(self, start: float, after: float) -> None:
+        """Take it that the clock was set back in a silence that was as long as nobody knows.
+
+        Parameters
+        ----------
+        start : instant by that clock from which samples come now [s]
+        after : so long behind the newest it is put [s]
+        """
+        self.offset += start - (self.newest + after)
+        self.jumps += 1
+        self._followed = self.newest
 
     def _column(self, name: str) -> _Column:
         if name not in QUANTITIES:

@@ -11,8 +11,10 @@ import numpy as np
 
 from weighbridge.arguments import as_floats, check_text, check_type
 from weighbridge.errors import ConfigError
+from weighbridge.estimators.judging import STOP
 from weighbridge.live.arrival import health_of, needed_signals
-from weighbridge.live.checkpoint import packed, unpacked
+from weighbridge.live.checkpoint import packed, refuse_absurd, unpacked
+from weighbridge.live.clock import pace
 from weighbridge.live.doubts import doubts, of_before
 from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, REST, Learned, learn
 from weighbridge.live.on_the_move import moves, time_on_the_move
@@ -38,9 +40,6 @@ LEAST_FAR: Final = 0.03
 RENEWED: Final = 60.0
 """A clock that begins anew no later after a silence belongs to it [s]."""
 
-LIGHTEST, HEAVIEST = 50.0, 200e3
-"""Masses that road vehicles have [kg]."""
-
 
 class LiveScale:
     """Weighs a vehicle from samples as they come.
@@ -62,6 +61,10 @@ class LiveScale:
     info : what is known beside the samples, such as wind and temperature
     step : in which samples are weighed [s], one of `weighbridge.signals.recent.STEPS`: shorter ones
         tell sooner and cost more; that of ``setup`` where there is one
+
+    Attributes
+    ----------
+    kept_at : pace of the clock when the state was kept that it goes on from
 
     Notes
     -----
@@ -101,6 +104,7 @@ class LiveScale:
         self._tared: float | None = None
         self._anew = -math.inf
         self._kept_to = math.nan
+        self.kept_at = 1.0
         self._came: tuple[str, ...] = ()
         self._needed = needed_signals(self.vehicle, ())
 
@@ -167,6 +171,7 @@ class LiveScale:
             "since": self._since,
             "tared": self._tared,
             "learns": self._learns,
+            "pace": pace(),
             "lateness": self._records.lateness,
             "step": self._every,
             "info": self.info,
@@ -194,16 +199,13 @@ class LiveScale:
         content = unpacked(checkpoint, vehicle)
         try:
             scale = cls(
-                vehicle,
-                lateness=content["lateness"],
-                info=content["info"],
-                step=content["step"],
+                vehicle, lateness=content["lateness"], info=content["info"], step=content["step"]
             )
             scale._setup, scale._state = content["setup"], content["state"]
             scale._next, scale._learned = content["next"], content["learned"]
             scale._driven, scale._driven_this_load = content["driven"], content["driven_this_load"]
-            scale._since = content["since"]
-            scale._tared, scale._learns = content["tared"], content["learns"]
+            scale._since, scale._tared = content["since"], content["tared"]
+            scale._learns, scale.kept_at = content["learns"], content["pace"]
             scale._records.add_block(content["samples"])
             scale._kept_to = scale.newest
             if scale._next is not None:
@@ -213,12 +215,7 @@ class LiveScale:
             raise ConfigError(f"the checkpoint is not used: {error}") from None
         scale._learned_at = scale._driven
         scale._learn_at = scale._driven + FIRST
-        state, setup = scale._state, scale._setup
-        if state is None or setup is None or not state.joint.windows:
-            return scale
-        mass, std = state.joint.mass, state.joint.std(setup.joint)
-        if not (LIGHTEST < mass < HEAVIEST and 0.0 < std < mass):
-            raise ConfigError(f"the checkpoint is not used: it holds {mass:.0f} ± {std:.0f} kg")
+        refuse_absurd(scale._state, scale._setup)
         return scale
 
     @property
@@ -247,6 +244,10 @@ class LiveScale:
     def take_tare(self, other: LiveScale) -> None:
         """Set to nought what another scale of the vehicle has set to nought."""
         self._tared = other._tared
+
+    def clock_set_back(self, start: float) -> None:
+        """Put samples from an earlier instant on [s] behind the newest, as after a stop."""
+        self._records.follow(start, STOP)
 
     def load_changed(self) -> None:
         """Tell that the load has changed: what was weighed before says nothing of it any more.

@@ -14,10 +14,12 @@ from weighbridge.live.alerts import Alert
 from weighbridge.live.clock import now
 from weighbridge.live.feed import Feed, trouble_text
 from weighbridge.live.keeper import Keeper
+from weighbridge.live.orders import LOAD, ORDERS, TARE
 from weighbridge.live.outputs import Outputs
 from weighbridge.live.recorder import Recorder
 from weighbridge.live.scale import LiveScale
 from weighbridge.live.weighing import LiveWeighing
+from weighbridge.visible import cut, visible
 
 _LOG = logging.getLogger(__name__)
 
@@ -40,7 +42,7 @@ class Session:
     keeper : writes checkpoints; None for none
     recorder : records what comes; None for none
     alerts : limits that are watched, by the settled mass
-    orders : looked at between samples: what a person at the terminal asks for
+    orders : looked at between samples: what a person asks for, at the terminal or by a file
     ahead : show the provisional mass, which is younger; see `LiveScale.weighing`
     """
 
@@ -99,13 +101,14 @@ class Session:
             if event is not None:
                 _LOG.warning("%s", event.text)
         active = [alert.text for alert in self.alerts if alert.active]
+        states = tuple(alert.state(settled) for alert in self.alerts)
         lost = [
             trouble_text(s.name, s.error) for s in self.feed.states() if s.error and not s.ended
         ]
         told = (*active, *lost, *self._doubts())
         ahead = ahead and self.ahead
         weighing = self.scale.weighing(silence, ahead=True) if ahead else settled
-        self.outputs.show(replace(weighing, notes=(*told, *weighing.notes)))
+        self.outputs.show(replace(weighing, alerts=states, notes=(*told, *weighing.notes)))
 
     def _renew(self) -> None:
         """Tell the scale of a device that was turned on again."""
@@ -127,14 +130,14 @@ class Session:
         return [problem] if problem else []
 
 
-def order(scale: LiveScale, key: str) -> str:
-    """Do what a key asks for; return one sentence, empty for a key that asks for nothing."""
+def order(scale: LiveScale, word: str) -> str:
+    """Do what `weighbridge.live.orders.ORDERS` lists; return one sentence."""
     try:
-        if key == "t":
+        if word == TARE:
             return f"tare {scale.tare():.0f} kg: the payload counts from here"
-        if key == "l":
+        if word == LOAD:
             scale.load_changed()
             return "the load has changed: what was weighed before is forgotten"
     except WeighbridgeError as error:
         return str(error)
-    return ""
+    return f"{visible(cut(word))!r} is no order: there are {', '.join(ORDERS)}"

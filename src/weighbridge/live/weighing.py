@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, Literal
 
 from scipy.special import ndtr, ndtri
 
 from weighbridge.arguments import check_number
 from weighbridge.results.writing import check_level
+
+Side = Literal["above", "below"]
+"""Of a limit."""
 
 
 class LiveStatus(StrEnum):
@@ -49,6 +52,24 @@ class SignalHealth:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AlertState:
+    """How the watch over one limit stands.
+
+    Attributes
+    ----------
+    limit : [kg]
+    side : on which its case is
+    active : the alert has begun, and not ended
+    probability : of a mass on that side [-]; None where there is no mass
+    """
+
+    limit: float
+    side: Side
+    active: bool
+    probability: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LiveWeighing:
     """The mass at one moment of a drive, how sure it is, and what would make it surer.
 
@@ -65,15 +86,16 @@ class LiveWeighing:
     tared : mass that the user has set to nought [kg]; None for ``tare``
     driven : time on the move so far [s]
     progress : part of the way to 2 % [-], 0 to 1: the variance that is allowed then over that now
-    reach : half width of the 95 % interval over the mass that no driving gets below, by what
-        vehicle file and equipment leave open [-]; NaN where unknown
+    reach : half width of the 95 % interval over the mass that 4.5 h more of driving leave, nearly
+        all of it by vehicle file and equipment [-]; NaN where unknown
     minutes_to_5, minutes_to_2 : of driving like until now until the interval of 95 % is as narrow
-        as so many percent; 0 where it is, infinite where it will not be, NaN where unknown
+        as so many percent; 0 where it is, infinite beyond 4.5 h, NaN where unknown
     advice : which driving would help; empty where nothing more is needed
     look : part of the driving between two looks at all records that is done [-], 0 to 1; NaN where
         the mass does not wait for the next one
     provisional : the mass counts samples among which others may still come; the next one is made
         anew from the settled state
+    alerts : limits that are watched, by the settled mass
     signals : health of each
     notes : what was found or doubted, one sentence each
     """
@@ -96,6 +118,7 @@ class LiveWeighing:
     reach: float = math.nan
     look: float = math.nan
     provisional: bool = False
+    alerts: tuple[AlertState, ...] = ()
     signals: tuple[SignalHealth, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -149,6 +172,15 @@ class LiveWeighing:
             "permitted_kg": self.gross,
             "share_of_permitted": self.share,
             "overload_probability": self.overload,
+            "alerts": [
+                {
+                    "side": a.side,
+                    "limit_kg": a.limit,
+                    "active": a.active,
+                    "probability": a.probability,
+                }
+                for a in self.alerts
+            ],
             "driven_s": self.driven,
             "progress": self.progress,
             "look": _known(self.look),

@@ -8,6 +8,7 @@ import re
 import secrets
 import sqlite3
 import unicodedata
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Condition, Event, Thread
@@ -18,7 +19,7 @@ from urllib.parse import unquote, urlsplit
 from weighbridge.errors import ConfigError, MissingExtraError
 from weighbridge.live.outputs.lines import json_line
 from weighbridge.live.outputs.outbox import MOST, Outbox
-from weighbridge.live.weighing import LiveStatus, LiveWeighing
+from weighbridge.live.weighing import LiveStatus, LiveWeighing, Side
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client
@@ -32,6 +33,8 @@ VSS_TOPIC: Final = "Vehicle/CurrentOverallWeight"
 """COVESA Vehicle Signal Specification 5.0, ``Vehicle.CurrentOverallWeight``: uint16, kg."""
 
 _HIGHEST: Final = 65_535
+
+_SIDES: Final[tuple[Side, ...]] = ("above", "below")
 
 # Messages that the broker has not yet confirmed at once.
 _WINDOW: Final = 20
@@ -112,9 +115,11 @@ class Topics:
     ----------
     prefix : first levels of all
     vehicle : its name
+    sides : of the limits that are watched
     """
 
-    def __init__(self, prefix: str, vehicle: str) -> None:
+    def __init__(self, prefix: str, vehicle: str, sides: Collection[Side] = ()) -> None:
+        self._sides = sides
         self.vehicle = vehicle
         self.node = slug(vehicle)
         self.weighing = f"{prefix}/{self.node}/weighing"
@@ -135,7 +140,10 @@ class Topics:
         ]
 
     def discovery(self) -> list[tuple[str, bytes]]:
-        """Return what tells Home Assistant of the sensors, as topic and payload."""
+        """Return what tells Home Assistant of the sensors, as topic and payload.
+
+        An alert that is not watched any more is taken back by an empty message.
+        """
         device = {
             "identifiers": [f"weighbridge_{self.node}"],
             "name": self.vehicle,
@@ -160,10 +168,23 @@ class Topics:
             ("status", "Status", "{{ value_json.status }}", {"icon": "mdi:scale"}),
             ("overload", "Overload probability", overload, part),
         )
+        alerts = [
+            (
+                side,
+                f"{side.capitalize()} the limit",
+                f"{{{{ 'ON' if value_json.alerts | selectattr('side', 'eq', '{side}') "
+                "| selectattr('active') | list else 'OFF' }}",
+                {"device_class": "problem"},
+            )
+            for side in _SIDES
+        ]
+        rows = [("sensor", *row) for row in sensors] + [("binary_sensor", *row) for row in alerts]
         return [
             (
-                f"homeassistant/sensor/weighbridge_{self.node}/{key}/config",
-                json.dumps(
+                f"homeassistant/{kind}/weighbridge_{self.node}/{key}/config",
+                b""
+                if kind == "binary_sensor" and key not in self._sides
+                else json.dumps(
                     {
                         "name": name,
                         "unique_id": f"weighbridge_{self.node}_{key}",
@@ -176,7 +197,7 @@ class Topics:
                     }
                 ).encode(),
             )
-            for key, name, template, more in sensors
+            for kind, key, name, template, more in rows
         ]
 
 
@@ -191,8 +212,9 @@ class Mqtt:
     broker : where it is
     vehicle : name of the vehicle
     outbox : file of the messages that wait
+    sides : of the limits that are watched
     most : of them; beyond, the oldest are dropped and counted
-    period : a weighing is sent so often, and on a change of status [s]
+    period : a weighing is sent so often, and where status or an alert change [s]
     pauses : shortest and longest time until a lost broker is tried again [s]
 
     Raises
@@ -209,6 +231,7 @@ class Mqtt:
         vehicle: str,
         outbox: str | Path,
         *,
+        sides: Collection[Side] = (),
         most: int = MOST,
         period: float = PERIOD,
         pauses: tuple[float, float] = (_SHORTEST_PAUSE, _LONGEST_PAUSE),
@@ -219,11 +242,11 @@ class Mqtt:
             raise MissingExtraError("paho-mqtt", "mqtt", "sending to a broker of MQTT") from None
         self.name = broker.name
         self._broker = broker
-        self._topics = Topics(broker.prefix, vehicle)
+        self._topics = Topics(broker.prefix, vehicle, sides)
         self._period = period
         self._pauses = pauses
         self._outbox = Outbox(outbox, most)
-        self._last: tuple[float, LiveStatus] | None = None
+        self._last: tuple[float, _News] | None = None
         self._stop = Event()
         self._changed = Condition()
         self._told = False
@@ -249,13 +272,13 @@ class Mqtt:
             The disk is full or gone.
         """
         if self._last is not None:
-            time, status = self._last
-            if status is weighing.status and 0.0 <= weighing.time - time < self._period:
+            time, news = self._last
+            if news == _news(weighing) and 0.0 <= weighing.time - time < self._period:
                 return
-            if status is weighing.status and weighing.time != weighing.time:
+            if news == _news(weighing) and weighing.time != weighing.time:
                 return
         self._outbox.put(self._topics.messages(weighing))
-        self._last = weighing.time, weighing.status
+        self._last = weighing.time, _news(weighing)
         with self._changed:
             self._changed.notify_all()
 
@@ -293,6 +316,14 @@ class Mqtt:
         elif not trouble and self._told:
             _logger.warning("%s is back, %d messages waited", self.name, self.waiting)
         self._told = bool(trouble)
+
+
+_News = tuple[LiveStatus, tuple[bool, ...]]
+
+
+def _news(weighing: LiveWeighing) -> _News:
+    """Return what is told at once where it changes."""
+    return weighing.status, tuple(alert.active for alert in weighing.alerts)
 
 
 class _Session:

@@ -31,12 +31,18 @@ def payload_text(weighing: LiveWeighing) -> str:
 def overload_text(weighing: LiveWeighing) -> str:
     """Write the probability that the permitted mass is exceeded, or why there is none.
 
-    Empty where there is no mass yet.
+    Without a permitted mass a limit of ``--above`` takes its place. Empty where there is no mass
+    yet.
     """
-    if weighing.gross is None and math.isfinite(weighing.mass):
-        return "no permitted mass in the vehicle file"
-    p = weighing.overload
-    return "" if p is None else f"overload probability {_percent(p)}"
+    if not math.isfinite(weighing.mass):
+        return ""
+    if weighing.gross is not None:
+        p = weighing.overload
+        return "" if p is None else f"overload probability {_percent(p)}"
+    for alert in weighing.alerts:
+        if alert.side == "above" and alert.probability is not None:
+            return f"above {kg(alert.limit)} with probability {_percent(alert.probability)}"
+    return "no permitted mass in the vehicle file"
 
 
 def _percent(p: float) -> str:
@@ -47,22 +53,38 @@ def _percent(p: float) -> str:
     return f"{100.0 * p:.0f} %"
 
 
-def remaining_text(minutes: float, percent: int) -> str:
-    """Write how long until the interval is within so many percent."""
+def remaining_text(minutes: float, percent: int, reach: float) -> str:
+    """Write how long until the interval is within so many percent.
+
+    Parameters
+    ----------
+    minutes, percent
+    reach : see `weighbridge.live.weighing.LiveWeighing`
+    """
     if math.isnan(minutes):
         return f"± {percent} %: not known yet"
     if minutes == 0.0:
         return f"± {percent} %: reached"
     if math.isinf(minutes):
-        return f"± {percent} %: not by driving like this"
+        return f"± {percent} %: {_never(reach)}"
     more = f"{minutes:.0f} min" if minutes >= 1.0 else "less than 1 min"
     return f"± {percent} %: {more} more"
 
 
+def _never(reach: float) -> str:
+    """Say what stays open; rounded up, or it would look as if it did."""
+    if math.isnan(reach):
+        return "not by driving on"
+    left = math.ceil(1000.0 * reach) / 10.0
+    return f"not by driving on, vehicle file and sensors leave ± {left:.1f} %"
+
+
 def needed_text(weighing: LiveWeighing) -> str:
     """Write what is needed until 5 % and 2 %."""
-    two = remaining_text(weighing.minutes_to_2, 2)
-    five = remaining_text(weighing.minutes_to_5, 5)
+    two = remaining_text(weighing.minutes_to_2, 2, weighing.reach)
+    five = remaining_text(weighing.minutes_to_5, 5, weighing.reach)
+    if math.isinf(weighing.minutes_to_5):
+        return f"± 5 %, {two}"
     reached = weighing.minutes_to_2 == 0.0
     same = math.isnan(weighing.minutes_to_5) and math.isnan(weighing.minutes_to_2)
     return two if reached else "time left not known yet" if same else f"{five}, {two}"

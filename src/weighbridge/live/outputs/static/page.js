@@ -117,13 +117,16 @@ function draw() {
 function needed(w) {
   // Without a number of minutes: never where the mass cannot get so sure, else not known.
   const never = (p) => w.reach_percent !== null && w.reach_percent >= p;
+  // Rounded up, or it would look as if it did.
+  const left = () => `not by driving on, vehicle file and sensors leave ± ${(Math.ceil(10 * w.reach_percent) / 10).toFixed(1)} %`;
   const one = (m, p) => {
-    if (m === null) return `± ${p} %: ${never(p) ? "not by driving like this" : "not known yet"}`;
+    if (m === null) return `± ${p} %: ${never(p) ? left() : "not known yet"}`;
     if (m === 0) return `± ${p} %: reached`;
     return `± ${p} %: ${m < 1 ? "less than 1" : Math.round(m)} min more`;
   };
   const [five, two] = [w.minutes_to_5_percent, w.minutes_to_2_percent];
   if (five === null && two === null && !never(2)) return "time left not known yet";
+  if (five === null && never(5)) return `± 5 %, ${one(two, 2)}`;
   return two === 0 ? one(two, 2) : `${one(five, 5)}, ${one(two, 2)}`;
 }
 
@@ -166,9 +169,13 @@ function show(w) {
   put("reason", w.reason);
   put("payload-name", w.tared_kg === null ? "Payload" : "Payload since the tare");
   put("payload", kg(w.payload_kg));
-  at("overload-box").hidden = w.permitted_kg === null;
-  at("no-limit").hidden = w.permitted_kg !== null;
-  put("overload", percent(w.overload_probability));
+  // Without a permitted mass a limit of the command takes its place.
+  const above = w.alerts.find((a) => a.side === "above");
+  const watched = w.permitted_kg === null && above !== undefined;
+  at("overload-box").hidden = w.permitted_kg === null && !watched;
+  at("no-limit").hidden = w.permitted_kg !== null || watched;
+  put("overload-name", watched ? `Above ${kg(above.limit_kg)}` : "Overload probability");
+  put("overload", percent(watched ? above.probability : w.overload_probability));
   put("driven", duration(w.driven_s));
   at("load").hidden = w.share_of_permitted === null;
   if (w.share_of_permitted !== null) {
@@ -177,7 +184,8 @@ function show(w) {
     at("share-bar").value = Math.min(w.share_of_permitted, 1);
     at("share-bar").className = p >= 0.5 ? "bad" : p >= 0.05 ? "fair" : "";
   }
-  limit = w.permitted_kg;
+  limit = watched ? above.limit_kg : w.permitted_kg;
+  put("limit-name", watched ? "limit" : "permitted");
   at("look").hidden = w.look === null;
   if (w.look !== null) {
     put("look-share", `${Math.round(100 * w.look)} %`);

@@ -1,0 +1,64 @@
+"""The page in a browser while an hour of driving is replayed as fast as it goes."""
+
+import contextlib
+import threading
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.live.outputs.page import MOST, Page
+from weighbridge.live.replay import FASTEST_STEP
+
+pytest.importorskip("starlette", reason="starlette is not installed")
+pytest.importorskip("uvicorn", reason="uvicorn is not installed")
+
+STOP = 300.0
+"""Between two drives [s]."""
+
+
+def hour(car, drive):
+    """Weighings of a drive again and again, with stops, one each second."""
+    scale, shift = wb.LiveScale(car, info=drive.info, step=FASTEST_STEP), 0.0
+    while True:
+        for start in np.arange(drive.start, drive.end, 1.0):
+            part = drive.between(start, start + 1.0)
+            scale.update_block({n: (s.time + shift, s.values) for n, s in part.signals.items()})
+            yield scale.weighing()
+        shift += drive.duration + STOP
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_an_hour_of_replay_does_not_let_the_page_grow(car, loaded, browser):
+    context = browser.new_context(viewport={"width": 390, "height": 844})
+    tab, wrong, sizes = context.new_page(), [], []
+    tab.on("console", lambda m: wrong.append(m.text))
+    tab.on("pageerror", lambda e: wrong.append(str(e)))
+    with contextlib.closing(Page(port=0)) as page:
+        tab.goto(page.name)
+        session = context.new_cdp_session(tab)
+        told = hour(car, loaded.drive)
+        for k in range(3600):
+            weighing = next(told)
+            page.show(weighing)
+            if k % 60 == 0:
+                threading.Event().wait(0.02)
+            if k % 900 < 899:
+                continue
+            mass = f"{weighing.mass:.0f}"
+            while tab.inner_text("#mass") != mass:
+                tab.wait_for_timeout(100)
+            session.send("HeapProfiler.collectGarbage")
+            points = tab.evaluate("document.documentElement.dataset.points")
+            elements = tab.evaluate("document.querySelectorAll('*').length")
+            heap = tab.evaluate("performance.memory.usedJSHeapSize")
+            sizes.append((int(points), elements, heap))
+        assert tab.evaluate("document.documentElement.scrollWidth") == 390
+    assert wrong == []
+    # The window is full after half an hour; notes of what is looked at come and go.
+    points, elements, heaps = zip(*sizes, strict=True)
+    assert max(points) <= MOST
+    assert elements[-1] < elements[0] + 20
+    assert heaps[-1] < 1.2 * heaps[1]
