@@ -13,8 +13,9 @@ import numpy as np
 import polars as pl
 
 from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.fleet.engine import WORKER_DIED, SchedulerLost, scheduler_needed
 from weighbridge.fleet.inputs import Recording
-from weighbridge.fleet.job import local_paths
+from weighbridge.fleet.job import TRIES, local_paths, named_error
 from weighbridge.fleet.tickets import read_tickets, ticketed
 from weighbridge.fleet.vehicles import Assigned, Vehicles
 from weighbridge.pipeline.given import mapping_beside
@@ -95,6 +96,8 @@ def learn_fleet(
     ------
     ConfigError
         Tickets cannot be read, or the folder not be written to.
+    SchedulerLost
+        The scheduler is gone.
     """
     from weighbridge.fleet.reading import read_drives
 
@@ -109,11 +112,67 @@ def learn_fleet(
             lessons.append(
                 Lesson(assigned=assigned, drives=known, output=str(output.resolve()), whole=whole)
             )
-    rows = client.gather(client.map(learn_vehicle, lessons, pure=False))
+    with scheduler_needed(client):
+        rows = _learnt(client, lessons)
     frame = pl.DataFrame(rows, schema=COLUMNS, orient="row").sort("vehicle_id")
     with whole_file(results / LEARNT) as part:
         frame.write_parquet(part)
     return frame
+
+
+def _learnt(client: Client, lessons: Sequence[Lesson]) -> list[dict[str, Any]]:
+    """Return a row of each vehicle, also of one whose worker died.
+
+    One whose worker died is tried again when the others are done, alone, so that it takes no other
+    with it.
+    """
+    rows, suspects = _tried(client, lessons)
+    for lesson in suspects:
+        for _ in range(TRIES - 1):
+            own, again = _tried(client, [lesson])
+            rows += own
+            if not again:
+                break
+        else:
+            rows.append(_unlearnt(lesson, WORKER_DIED))
+    return rows
+
+
+def _tried(client: Client, lessons: Sequence[Lesson]) -> tuple[list[dict[str, Any]], list[Lesson]]:
+    """Return a row of each vehicle but of those whose worker died, and the lessons of these."""
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
+    futures = client.map(learn_vehicle, lessons, pure=False)
+    given = dict(zip((future.key for future in futures), lessons, strict=True))
+    rows, killed = [], []
+    try:
+        for future in as_completed(futures, loop=client.loop):
+            lesson = given[future.key]
+            if future.status in ("cancelled", "lost"):
+                raise SchedulerLost
+            try:
+                rows.append(future.result())
+            except KilledWorker:
+                killed.append(lesson)
+            except Exception as problem:
+                if future.status != "error":
+                    raise
+                rows.append(_unlearnt(lesson, named_error(problem)))
+    finally:
+        if client.status == "running":
+            client.cancel(futures, force=True)
+    return rows, killed
+
+
+def _unlearnt(lesson: Lesson, why: str) -> dict[str, Any]:
+    weighed = sum(math.isfinite(known.weighed) for known in lesson.drives)
+    return {
+        "vehicle_id": lesson.assigned.id,
+        "drives": len(lesson.drives),
+        "weighed": weighed,
+        "told": f"nothing was learnt: {why}",
+    }
 
 
 COLUMNS: Final[dict[str, Any]] = {
