@@ -42,6 +42,8 @@ def test_drives_that_contradict_their_file_refine_it(tmp_path, short_drive, shor
     assert row["error_pct"] == pytest.approx(100.0 * off.mean(), abs=0.1)
     assert row["contradicted"]
     assert "too heavy" in row["told"]
+    (told,) = wb.fleet.report(results).to_dict()["learnt"]
+    assert (told["verdict"], told["told"]) == ("contradicted", row["told"])
     assert (cars / "car.toml").read_bytes() == before
     again = wb.weigh(drives / "car" / "trip-0", learnt / "car.toml")
     assert again.mass == pytest.approx(mass, rel=0.03)

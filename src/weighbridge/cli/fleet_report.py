@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final, Optional
+from typing import TYPE_CHECKING, Annotated, Final, Optional
 
 import typer
 
@@ -11,7 +11,10 @@ from weighbridge.cli.results import Inputs, asked_for, refuse_results
 from weighbridge.cli.terminal import say
 from weighbridge.cli.verbosity import say_written
 
-_TOLD: Final = 10  # legs in the answer
+if TYPE_CHECKING:
+    import polars as pl
+
+_TOLD: Final = 10  # legs in the answer, and vehicles of what was learnt
 
 
 def report(
@@ -82,6 +85,26 @@ def report(
     more = found.overloads.height - _TOLD
     if more > 0:
         say(f"  and {more} more, surest first: -o fleet.html has all")
+    _say_learnt(found.learnt)
     for written in (page, json):
         if written is not None:
             say_written(written)
+
+
+def _say_learnt(learnt: pl.DataFrame) -> None:
+    """Tell vehicles whose drives of known mass contradict their file, or that drift."""
+    if learnt.is_empty():
+        return
+    of = "1 vehicle" if learnt.height == 1 else f"{learnt.height} vehicles"
+    contradicted, drifts = learnt["contradicted"].sum(), learnt["drifts"].sum()
+    say(
+        f"learnt from the tickets of {of}: {contradicted} contradicted by "
+        f"{'its' if contradicted == 1 else 'their'} drives, "
+        f"{drifts} {'drifts' if drifts == 1 else 'drift'}"
+    )
+    doubted = learnt.filter(learnt["contradicted"] | learnt["drifts"])
+    for row in doubted.head(_TOLD).iter_rows(named=True):
+        say(f"  {row['vehicle_id']}: {row['told']}")
+    more = doubted.height - _TOLD
+    if more > 0:
+        say(f"  and {more} more: -o fleet.html has all")

@@ -16,6 +16,7 @@ from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.fleet.engine import WORKER_DIED, SchedulerLost, scheduler_needed
 from weighbridge.fleet.inputs import Recording
 from weighbridge.fleet.job import TRIES, local_paths, named_error
+from weighbridge.fleet.learnt import COLUMNS, LEARNT, SURE
 from weighbridge.fleet.tickets import read_tickets, ticketed
 from weighbridge.fleet.vehicles import Assigned, Vehicles
 from weighbridge.pipeline.given import mapping_beside
@@ -29,16 +30,11 @@ if TYPE_CHECKING:
 MOST: Final = 12
 """Drives that refine one vehicle file, at most: those over all masses, and over all of the time."""
 
-SURE: Final = 3.0
-"""A drift is told where it is so many standard deviations [-]."""
-
 FEW: Final = 4
 """Drives that show a drift, at least."""
 
 APART: Final = 2.0
 """Masses contradict a vehicle file where they are off by so many standard deviations [-]."""
-
-LEARNT: Final = "learnt.parquet"
 
 
 class Known(NamedTuple):
@@ -173,27 +169,6 @@ def _unlearnt(lesson: Lesson, why: str) -> dict[str, Any]:
         "weighed": weighed,
         "told": f"nothing was learnt: {why}",
     }
-
-
-COLUMNS: Final[dict[str, Any]] = {
-    "vehicle_id": pl.String,
-    "drives": pl.Int32,
-    "weighed": pl.Int32,
-    "error_pct": pl.Float64,
-    "error_std_pct": pl.Float64,
-    "contradicted": pl.Boolean,
-    "torque_drift_pct": pl.Float64,
-    "torque_drift_std_pct": pl.Float64,
-    "rolling_drift": pl.Float64,
-    "rolling_drift_std": pl.Float64,
-    "pitch_drift_deg": pl.Float64,
-    "pitch_drift_std_deg": pl.Float64,
-    "refined": pl.String,
-    "told": pl.String,
-}
-"""Columns of what was learnt of a vehicle: drives with a ticket, those with a mass, how far these
-are from their tickets in the mean (positive: too heavy) and how far they may be; drifts per 30
-days; name of the refined file, and sentences."""
 
 
 def refuse_output(output: Path, shelf: Vehicles) -> None:

@@ -79,7 +79,7 @@ function table(key, count, columns, order) {
   arrange();
 }
 
-const L = data.legs, T = data.track, V = data.vehicles, C = data.changes, Q = data.quality, R = data.verdicts;
+const L = data.legs, T = data.track, V = data.vehicles, C = data.changes, Q = data.quality, R = data.verdicts, G = data.learnt;
 const of = (column) => (k) => column[k];
 const named = (column) => ({ head: "vehicle", value: (k) => names[column[k]], press: (k) => choose(column[k], true) });
 
@@ -333,6 +333,24 @@ function quality() {
   ], [1, true]);
 }
 
+function learnt() {
+  const rank = { contradicted: 3, drifts: 2, "not refined": 1, refined: 0 };
+  const spread = (x, std, digits) => (x === null ? "–" : `${x > 0 ? "+" : ""}${x.toFixed(digits)} ±\u00a0${std.toFixed(digits)}`);
+  const drift = (head, name, std, digits) =>
+    ({ head, value: of(G[name]), show: (x, k) => spread(x, G[std][k], digits), kind: "n" });
+  table("learnt", G.v.length, [
+    named(G.v),
+    { head: "verdict", value: (k) => rank[G.verdict[k]], show: (_, k) => G.verdict[k],
+      mark: (k) => (rank[G.verdict[k]] > 1 ? ["alarm-text"] : []) },
+    { head: "drives", value: of(G.drives), kind: "n" },
+    drift("mean error, %", "error_pct", "error_std_pct", 1),
+    drift("torque scale, %", "torque_drift_pct", "torque_drift_std_pct", 1),
+    drift("rolling", "rolling_drift", "rolling_drift_std", 4),
+    drift("pitch, deg", "pitch_drift_deg", "pitch_drift_std_deg", 2),
+    { head: "told", value: of(G.told), kind: "w" },
+  ], [1, true]);
+}
+
 function verdicts() {
   const rank = { failed: 2, passed: 1, incomplete: 0 };
   table("verdicts", R.v.length, [
@@ -346,7 +364,7 @@ function verdicts() {
   ], [1, true]);
 }
 
-overloads(); vehicles(); history(); map(); quality(); verdicts();
+overloads(); vehicles(); history(); map(); quality(); learnt(); verdicts();
 const worst = V.worst_overload.reduce((best, x, k) => ((x ?? -1) > (V.worst_overload[best] ?? -1) ? k : best), 0);
 if (names.length) choose(worst);
 document.body.dataset.ready = "yes";

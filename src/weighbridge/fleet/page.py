@@ -32,6 +32,12 @@ _SECTIONS: Final = (
     ("history", "History of a vehicle", "Mass of each leg with its 95 % interval."),
     ("map", "Where loads changed", "Each mark is a stop; no map is loaded from the net."),
     ("quality", "Data quality", "What keeps drives from being weighed, and what was doubted."),
+    (
+        "learnt",
+        "Learnt from tickets",
+        "Vehicle files that their drives contradict, and what drifts in 30 days. Here ± is one "
+        "standard deviation.",
+    ),
     ("verdicts", "Known masses", "Verdicts by the loads of Regulation (EU) 2019/1213, Annex IV."),
 )
 
@@ -222,6 +228,13 @@ def _data(report: FleetReport) -> dict[str, Any]:
         "track": columns(report.track, {"start": 0, "end": 0, "mass_kg": 0, "state": 0}),
         "quality": columns(
             report.quality, {"kind": 0, "example": 0, "drives": 0, "share": 3, "last": 0}
+        ),
+        # The drives of one may have been removed since.
+        "learnt": columns(
+            report.learnt.filter(pl.col("vehicle_id").is_in(ids)),
+            {"verdict": 0, "drives": 0, "error_pct": 1, "error_std_pct": 1, "torque_drift_pct": 1,
+             "torque_drift_std_pct": 1, "rolling_drift": 5, "rolling_drift_std": 5,
+             "pitch_drift_deg": 2, "pitch_drift_std_deg": 2, "told": 0},
         ),
         "verdicts": columns(
             report.verdicts,

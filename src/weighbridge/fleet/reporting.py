@@ -11,6 +11,7 @@ import polars as pl
 
 from weighbridge.fleet import figures, protocol
 from weighbridge.fleet.couplings import read_couplings
+from weighbridge.fleet.learnt import read_learnt
 from weighbridge.fleet.legs import Limits, legs, load_changes
 from weighbridge.fleet.reading import collected, read_drives, read_segments
 from weighbridge.fleet.tickets import read_tickets
@@ -36,6 +37,7 @@ class FleetReport:
     speed_mass : distance by speed and mass, see `weighbridge.fleet.figures.speed_mass`
     verdicts : of the protocol, see `weighbridge.fleet.protocol.verdicts`
     rfms : last masses, see `weighbridge.fleet.figures.rfms`
+    learnt : from drives of known mass, see `weighbridge.fleet.learnt.read_learnt`
     """
 
     limits: Limits
@@ -49,6 +51,7 @@ class FleetReport:
     speed_mass: pl.DataFrame
     verdicts: pl.DataFrame
     rfms: pl.DataFrame
+    learnt: pl.DataFrame
 
     @property
     def overloads(self) -> pl.DataFrame:
@@ -69,6 +72,7 @@ class FleetReport:
             "speed_mass": _rows(self.speed_mass),
             "verdicts": _rows(self.verdicts),
             "rfms": _rows(self.rfms),
+            "learnt": _rows(self.learnt),
         }
 
     def to_json(self, path: str | Path) -> None:
@@ -104,7 +108,7 @@ def report(
     Raises
     ------
     ConfigError
-        The folder holds no results, a limit cannot be, or a table cannot be read.
+        The folder holds no results, a limit cannot be, or a table cannot be read or is damaged.
     """
     limits = limits or Limits()
     told = [] if tickets is None else read_tickets(Path(tickets))
@@ -126,6 +130,7 @@ def report(
         speed_mass=figures.speed_mass(drives, segments),
         verdicts=protocol.verdicts(known, tolerance),
         rfms=figures.rfms(rows),
+        learnt=read_learnt(results),
     )
 
 
