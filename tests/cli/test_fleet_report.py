@@ -2,6 +2,7 @@
 
 import json
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 import polars as pl
@@ -98,6 +99,37 @@ def test_a_damaged_file_of_what_was_learnt_is_named(weighbridge, results):
     (results / LEARNT).write_bytes(b"PAR1")
     ran = weighbridge("fleet", "report", results)
     assert (ran.code, "learnt.parquet: is damaged" in ran.err) == (2, True)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_legs_are_written_as_a_table_with_the_interval_of_the_payload(
+    weighbridge, results, tmp_path, suffix
+):
+    path = tmp_path / f"legs.{suffix}"
+    for _ in range(2):
+        assert weighbridge("fleet", "report", results, "--legs", path).code == 0
+    read = {"csv": pl.read_csv, "parquet": pl.read_parquet}[suffix]
+    rows = {row["key"][0]: row for row in read(path).to_dicts()}
+    assert sorted(rows) == ["a", "b", "c", "d"]
+    # The empty mass is 8000 kg; freedom is infinite, so that the interval is 1.96 times 500 kg.
+    row = rows["a"]
+    assert [row["payload_kg"], row["payload_low95_kg"], row["payload_high95_kg"]] == pytest.approx(
+        [12000.0, 11020.0, 12980.0], abs=0.1
+    )
+    begun = "2026-05-04T06:00:00Z" if suffix == "csv" else datetime(2026, 5, 4, 6, tzinfo=UTC)
+    assert (row["start"], rows["d"]["start"], rows["d"]["payload_kg"]) == (begun, None, None)
+
+
+def test_legs_take_the_place_of_no_other_table(weighbridge, results, tmp_path):
+    other = tmp_path / "mine.csv"
+    other.write_text("leg,colour\n1,red\n")
+    ran = weighbridge("fleet", "report", results, "--legs", other)
+    assert (ran.code, "is no table of legs" in ran.err) == (2, True)
+    ran = weighbridge("fleet", "report", results, "--legs", tmp_path / "legs.xlsx")
+    assert (ran.code, "is written as .csv or .parquet" in ran.err) == (2, True)
+    ran = weighbridge("fleet", "report", results, "--legs", results / "legs.csv")
+    assert (ran.code, "within the results" in ran.err) == (2, True)
+    assert other.read_text() == "leg,colour\n1,red\n"
 
 
 def test_the_answer_tells_how_many_it_leaves_out(weighbridge, tmp_path):

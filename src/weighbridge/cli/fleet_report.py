@@ -27,6 +27,12 @@ def report(
         Optional[str],  # noqa: UP045
         typer.Option("--json", help="File for the same figures as JSON."),
     ] = None,
+    legs: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--legs", help="Table of all legs, payload with its interval: .csv or .parquet."
+        ),
+    ] = None,
     tickets: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--tickets", help="Known masses: CSV or Parquet with vehicle, time, mass_kg."),
@@ -56,8 +62,8 @@ def report(
     if json == "-":
         raise ConfigError("--json -: name a file; standard output has the summary")
     read = Inputs(files=tuple(path for path in (tickets, couplings) if path is not None))
-    refuse_results(read, asked_for(track=None, report=page, json=json))
-    for path in (page, None if json is None else Path(json)):
+    refuse_results(read, asked_for(report=page, json=json, legs=legs))
+    for path in (page, None if json is None else Path(json), legs):
         if path is not None and path.resolve().is_relative_to(results.resolve()):
             raise ConfigError(f"{path}: is within the results; name a file elsewhere")
     found = figures(
@@ -71,10 +77,12 @@ def report(
         write_page(found, page)
     if json is not None:
         found.to_json(json)
+    if legs is not None:
+        found.write_legs(legs)
     t = found.totals
     say(f"{t['drives']} drives of {t['vehicles']} vehicles, {t['distance_km']:.0f} km")
-    legs = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
-    say(f"overloaded: {legs} at least {100 * alarm:g} % sure, {t['warnings']} likely")
+    sure = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
+    say(f"overloaded: {sure} at least {100 * alarm:g} % sure, {t['warnings']} likely")
     for row in found.overloads.head(_TOLD).iter_rows(named=True):
         when = "no time" if row["start"] is None else f"{row['start']:%Y-%m-%d %H:%M} UTC"
         say(
@@ -86,7 +94,7 @@ def report(
     if more > 0:
         say(f"  and {more} more, surest first: -o fleet.html has all")
     _say_learnt(found.learnt)
-    for written in (page, json):
+    for written in (page, json, legs):
         if written is not None:
             say_written(written)
 

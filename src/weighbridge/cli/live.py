@@ -167,7 +167,7 @@ def live(
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)
     kept = _state_file(state, replay, vehicle)
-    results = asked_for(track=None, report=None, json=json_path)
+    results = asked_for(json=json_path)
     if out is not None:
         refuse_overwriting(out, force, "vehicle file")
         results.append(Result("--out", out, "vehicle file"))

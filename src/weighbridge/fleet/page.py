@@ -30,6 +30,7 @@ _SECTIONS: Final = (
     ("overloads", "Overloads", "Legs whose mass is likely above the permitted one."),
     ("vehicles", "Vehicles", "Choose one for its history."),
     ("history", "History of a vehicle", "Mass of each leg with its 95 % interval."),
+    ("legs", "Legs", "Spans with one load, with 95 % intervals; below zero a payload is none."),
     ("map", "Where loads changed", "Each mark is a stop; no map is loaded from the net."),
     ("quality", "Data quality", "What keeps drives from being weighed, and what was doubted."),
     (
@@ -207,7 +208,8 @@ def _data(report: FleetReport) -> dict[str, Any]:
     vehicles = columns(
         report.vehicles,
         {"vehicle_class": 0, "tare_kg": 0, "gross_kg": 0, "drives": 0, "distance_km": 0,
-         "known_share": 3, "tkm": 0, "tkm_std": 0, "mean_payload_kg": 0, "empty_share": 3,
+         "known_share": 3, "tkm": 0, "tkm_std": 0, "mean_payload_kg": 0, "mean_payload_std_kg": 0,
+         "empty_share": 3,
          "alarms": 0, "warnings": 0, "worst_overload": 4, "changes": 0, "last_kg": 0,
          "last_std_kg": 0, "last_time": 0, "has_file": 0},
     )  # fmt: skip

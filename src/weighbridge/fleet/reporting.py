@@ -9,6 +9,7 @@ from typing import Any
 
 import polars as pl
 
+from weighbridge.errors import ConfigError
 from weighbridge.fleet import figures, protocol
 from weighbridge.fleet.couplings import read_couplings
 from weighbridge.fleet.learnt import read_learnt
@@ -60,7 +61,7 @@ class FleetReport:
         return told.sort("overload", "mass_kg", descending=True, nulls_last=True)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything but the legs as plain values; instants as ISO 8601."""
+        """Return all but the legs, which `write_legs` writes, as plain values."""
         return {
             "limits": {**self.limits._asdict(), "tolerance": self.tolerance},
             "totals": self.totals,
@@ -85,6 +86,21 @@ class FleetReport:
         """
         text = json.dumps(self.to_dict(), ensure_ascii=False, indent=1)
         write_whole(path, visible_json(text) + "\n")
+
+    def write_legs(self, path: str | Path) -> None:
+        """Write the legs, one row each, as CSV or Parquet, by the suffix of ``path``.
+
+        Instants of a CSV are ISO 8601 in UTC.
+
+        Raises
+        ------
+        ConfigError
+            The suffix is neither, or the file cannot be written.
+        """
+        from weighbridge.io.write import write_frame
+
+        as_text = Path(path).suffix.lower() == ".csv"
+        write_frame(_texts(self.legs) if as_text else self.legs, path, ConfigError)
 
 
 def report(
@@ -135,6 +151,10 @@ def report(
 
 
 def _rows(frame: pl.DataFrame) -> list[dict[str, Any]]:
-    instants = pl.selectors.datetime()
-    texts = frame.with_columns(instants.dt.strftime("%Y-%m-%dT%H:%M:%SZ"))
-    return texts.with_columns(pl.selectors.float().fill_nan(None)).to_dicts()
+    return _texts(frame).to_dicts()
+
+
+def _texts(frame: pl.DataFrame) -> pl.DataFrame:
+    """Instants as ISO 8601, and null for what is no number."""
+    instants = pl.selectors.datetime().dt.strftime("%Y-%m-%dT%H:%M:%SZ")
+    return frame.with_columns(instants, pl.selectors.float().fill_nan(None))
