@@ -35,10 +35,11 @@ class SourceError(WeighbridgeError):
 
 
 class MissingExtraError(WeighbridgeError):
-    """An optional dependency is needed and not installed."""
+    """An optional dependency is needed and not installed; ``extra`` is None where none has it."""
 
-    def __init__(self, package: str, extra: str, purpose: str) -> None:
+    def __init__(self, package: str, extra: str | None, purpose: str) -> None:
+        install = package if extra is None else f'"weighbridge[{extra}]"'
         super().__init__(
             f"{purpose} needs the package {package!r}, which is not installed: "
-            f'pip install "weighbridge[{extra}]"'
+            f"pip install {install}"
         )

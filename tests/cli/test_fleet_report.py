@@ -2,11 +2,14 @@
 
 import json
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 
+import polars as pl
 import pytest
 from tests.fleet.made_rows import drive, segment
 
+from weighbridge.fleet.learnt import COLUMNS, LEARNT
 from weighbridge.fleet.schema import PART
 from weighbridge.fleet.store import Results, write_part
 
@@ -56,6 +59,77 @@ def test_the_page_answers_who_when_and_how_sure(weighbridge, results, tmp_path):
     told = json.loads((tmp_path / "fleet.json").read_text())
     assert [r["vehicle_id"] for r in told["overloads"]] == ["truck1", HOSTILE]
     assert told["totals"]["distance_km"] == 80.0
+
+
+def lesson(vehicle, **more):
+    row = dict.fromkeys(COLUMNS) | {"vehicle_id": vehicle, "drives": 5, "weighed": 5}
+    return row | {"error_pct": 1.0, "error_std_pct": 5.0, "refined": f"{vehicle}.toml", **more}
+
+
+def test_what_was_learnt_is_told_those_to_look_at_first(weighbridge, results, tmp_path):
+    rows = [
+        lesson("truck3", torque_drift_pct=2.0, torque_drift_std_pct=0.7, told=""),
+        lesson("gone", rolling_drift=float("nan"), rolling_drift_std=float("nan"), told=""),
+        lesson("truck1", pitch_drift_deg=-0.4, pitch_drift_std_deg=0.1, told="the pitch drifts"),
+        lesson(HOSTILE, contradicted=True, error_pct=12.0, told="5 drives contradict the file"),
+    ]
+    pl.DataFrame(rows, schema=COLUMNS, orient="row").write_parquet(results / LEARNT)
+    ran = weighbridge("fleet", "report", results, "-o", tmp_path / "fleet.html",
+                      "--json", tmp_path / "fleet.json")  # fmt: skip
+    assert ran.code == 0
+    lines = ran.out.splitlines()
+    at = lines.index(
+        "learnt from the tickets of 4 vehicles: 1 contradicted by its drives, 1 drifts"
+    )
+    assert lines[at + 1].endswith('onerror="alert(1)">\\u202e: 5 drives contradict the file')
+    assert lines[at + 2] == "  truck1: the pitch drifts"
+    told = json.loads((tmp_path / "fleet.json").read_text())["learnt"]
+    assert [(row["vehicle_id"], row["verdict"]) for row in told] == [
+        (HOSTILE, "contradicted"),
+        ("truck1", "drifts"),
+        ("gone", "refined"),
+        ("truck3", "refined"),
+    ]
+    shown = data_of((tmp_path / "fleet.html").read_text())["learnt"]
+    assert shown["verdict"] == ["contradicted", "drifts", "refined"]
+    assert shown["torque_drift_pct"] == [None, None, 2.0]
+
+
+def test_a_damaged_file_of_what_was_learnt_is_named(weighbridge, results):
+    (results / LEARNT).write_bytes(b"PAR1")
+    ran = weighbridge("fleet", "report", results)
+    assert (ran.code, "learnt.parquet: is damaged" in ran.err) == (2, True)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_legs_are_written_as_a_table_with_the_interval_of_the_payload(
+    weighbridge, results, tmp_path, suffix
+):
+    path = tmp_path / f"legs.{suffix}"
+    for _ in range(2):
+        assert weighbridge("fleet", "report", results, "--legs", path).code == 0
+    read = {"csv": pl.read_csv, "parquet": pl.read_parquet}[suffix]
+    rows = {row["key"][0]: row for row in read(path).to_dicts()}
+    assert sorted(rows) == ["a", "b", "c", "d"]
+    # The empty mass is 8000 kg; freedom is infinite, so that the interval is 1.96 times 500 kg.
+    row = rows["a"]
+    assert [row["payload_kg"], row["payload_low95_kg"], row["payload_high95_kg"]] == pytest.approx(
+        [12000.0, 11020.0, 12980.0], abs=0.1
+    )
+    begun = "2026-05-04T06:00:00Z" if suffix == "csv" else datetime(2026, 5, 4, 6, tzinfo=UTC)
+    assert (row["start"], rows["d"]["start"], rows["d"]["payload_kg"]) == (begun, None, None)
+
+
+def test_legs_take_the_place_of_no_other_table(weighbridge, results, tmp_path):
+    other = tmp_path / "mine.csv"
+    other.write_text("leg,colour\n1,red\n")
+    ran = weighbridge("fleet", "report", results, "--legs", other)
+    assert (ran.code, "is no table of legs" in ran.err) == (2, True)
+    ran = weighbridge("fleet", "report", results, "--legs", tmp_path / "legs.xlsx")
+    assert (ran.code, "is written as .csv or .parquet" in ran.err) == (2, True)
+    ran = weighbridge("fleet", "report", results, "--legs", results / "legs.csv")
+    assert (ran.code, "within the results" in ran.err) == (2, True)
+    assert other.read_text() == "leg,colour\n1,red\n"
 
 
 def test_the_answer_tells_how_many_it_leaves_out(weighbridge, tmp_path):

@@ -1,13 +1,14 @@
 """Drives in an S3 store, results as Delta tables, the same function on Ray and Spark."""
 
 import shutil
+import sys
 
 import polars as pl
 import pytest
 
 import weighbridge as wb
 from tests.fleet.fleets import compared, tiny_fleet
-from weighbridge.errors import DriveError
+from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.fleet import remote
 from weighbridge.fleet.inputs import recordings
 
@@ -120,6 +121,12 @@ def test_delta_tables_hold_each_row_once(tiny, scheduler, tmp_path):
     assert rows().filter(vehicle_id="van0")["tare_kg"].unique().to_list() == [2100.0]
 
 
+def test_without_ray_the_remedy_is_its_own_package(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(MissingExtraError, match=r"needs the package 'ray'.*: pip install ray$"):
+        wb.fleet.weigh_on_ray(tmp_path, tmp_path, tmp_path / "results")
+
+
 @pytest.mark.filterwarnings("ignore::FutureWarning:ray")
 def test_ray_gives_the_same_rows(tiny, scheduler, tmp_path):
     ray = pytest.importorskip("ray", reason="ray is not installed")
@@ -135,13 +142,15 @@ def test_ray_gives_the_same_rows(tiny, scheduler, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*PySpark does not yet fully support pandas")
-def test_spark_gives_the_same_rows(tiny, scheduler, tmp_path):
+def test_spark_gives_the_same_rows(tiny, scheduler, tmp_path, monkeypatch):
     sql = pytest.importorskip("pyspark.sql", reason="pyspark is not installed")
     if shutil.which("java") is None:
         pytest.skip("Spark needs Java, and there is none")
     drives, cars = tiny
     some = drives / "van0"
     here = wb.fleet.weigh_drives(some, cars, tmp_path / "here", scheduler=scheduler)
+    # Its workers take another Python otherwise, which may lack the package.
+    monkeypatch.setenv("PYSPARK_PYTHON", sys.executable)
     spark = sql.SparkSession.builder.master("local[2]").getOrCreate()
     try:
         there = wb.fleet.weigh_on_spark(spark, some, cars, tmp_path / "there")

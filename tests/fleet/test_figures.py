@@ -176,6 +176,9 @@ def test_sums_of_a_vehicle_and_of_all(kind, shared):
     assert first["tkm"] == pytest.approx(5.0 * 20.0 + 0.2 * 10.0)
     # 400 kg on all of 30 km, 300 kg on each part by itself.
     assert first["tkm_std"] == pytest.approx(math.hypot(0.4 * 30.0, 0.3 * 20.0, 0.3 * 10.0))
+    # The mean over 30 km: 400 kg in common, 300 kg on two thirds and on one.
+    assert first["mean_payload_kg"] == pytest.approx(5000.0 * 2 / 3 + 200.0 / 3)
+    assert first["mean_payload_std_kg"] == pytest.approx(math.hypot(400.0, 200.0, 100.0))
     assert first["empty_share"] == pytest.approx(10.0 / 30.0)
     assert (first["last_kg"], first["changes"], first["drives"]) == (8200.0, 1, 3)
     assert (second["alarms"], second["worst_overload"]) == (1, pytest.approx(0.99997, abs=1e-5))

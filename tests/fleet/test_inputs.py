@@ -1,5 +1,7 @@
 """Which recordings a fleet has, and whose they are."""
 
+from dataclasses import replace
+
 import polars as pl
 import pytest
 
@@ -157,3 +159,23 @@ def test_an_impossible_class_is_told(shelf):
 def test_no_folder_of_vehicles(tmp_path):
     with pytest.raises(ConfigError, match="no such folder"):
         Vehicles(tmp_path / "none")
+
+
+def test_a_mapping_of_many_vehicles_is_read_once_and_its_content_counts(tmp_path, monkeypatch):
+    from weighbridge.fleet import vehicles
+
+    text = '[signals.vehicle_speed]\ncolumn = "v"\nunit = "km/h"\n'
+    (tmp_path / "map.toml").write_text(text)
+    for name in ("van1", "van2"):
+        vehicle = describe(Known(name=name, kind="van")).vehicle
+        replace(vehicle, mapping="map.toml").save(tmp_path / f"{name}.toml")
+    read, real = [], vehicles.load_mapping
+    monkeypatch.setattr(vehicles, "load_mapping", lambda path: read.append(path) or real(path))
+    first = Vehicles(tmp_path)
+    assert read == [tmp_path / "map.toml"]
+    found = [first.of((f"{name}.csv",)) for name in ("van1", "van2")]
+    for assigned in found:
+        assert assigned.mapping == {"signals": {"vehicle_speed": {"column": "v", "unit": "km/h"}}}
+    (tmp_path / "map.toml").write_text(text.replace("km/h", "m/s"))
+    again = [Vehicles(tmp_path).of((f"{name}.csv",)) for name in ("van1", "van2")]
+    assert len({a.digest for a in (*found, *again)}) == 4

@@ -90,8 +90,9 @@ def cluster(tmp_path):
     made.stop()
 
 
-def begun(address, drives, cars, results):
+def begun(address, drives, cars, results, *more):
     words = [str(drives), "--vehicles", str(cars), "-o", str(results), "--scheduler", address]
+    words += map(str, more)
     return subprocess.Popen(
         [sys.executable, "-m", "weighbridge", "fleet", *words],
         stdout=subprocess.PIPE,
@@ -172,3 +173,36 @@ def test_a_scheduler_and_two_workers_started_by_hand(cluster, tmp_path, tiny):
     assert (process.returncode, err) == (1, ""), out
     assert "40 drives of 3 vehicles: 0 with a mass, 40 missing_signals" in out
     assert rows_there(results) == 40
+
+
+def test_a_scheduler_that_dies_while_a_fleet_learns_is_told(cluster, tmp_path, monkeypatch):
+    """It is killed while a worker learns; the same command learns later."""
+    drives, cars = tiny_fleet(tmp_path, 1, vehicles=1)
+    under_way, fault = tmp_path / "under-way", tmp_path / "fault.py"
+    fault.write_text(
+        "import pathlib, time\n"
+        "from weighbridge.fleet import learning\n"
+        "def chosen(drives):\n"
+        f"    pathlib.Path({str(under_way)!r}).touch()\n"
+        "    time.sleep(60)\n"
+        "learning.chosen = chosen\n"
+    )
+    tickets = tmp_path / "tickets.csv"
+    tickets.write_text("vehicle,time,mass_kg\nvan0,2026-05-01T06:00:00Z,2500\n")
+    learn = ("--tickets", tickets, "--learn", tmp_path / "learnt")
+    results = tmp_path / "results"
+    with monkeypatch.context() as patch:
+        patch.setenv("DASK_DISTRIBUTED__WORKER__PRELOAD", str(fault))
+        process = begun(cluster.start(), drives, cars, results, *learn)
+    until = time.monotonic() + 120
+    while not under_way.exists() and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.05)
+    cluster.scheduler.kill()
+    _, err = process.communicate(timeout=120)
+    assert (process.returncode, err.count("\n")) == (2, 1), err
+    assert "the scheduler is gone" in err
+    assert not (results / "learnt.parquet").exists()
+    process = begun(cluster.start(), drives, cars, results, *learn)
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, err) == (1, ""), out
+    assert "van0: 1 drives with a ticket, not refined" in out

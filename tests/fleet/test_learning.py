@@ -1,14 +1,16 @@
 """Vehicle files refined by tickets; drift, and files that their drives contradict."""
 
+import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
+import dask
 import numpy as np
 import polars as pl
 import pytest
 
 import weighbridge as wb
-from tests.fleet.fleets import real_fleet
+from tests.fleet.fleets import real_fleet, tiny_drive
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.learning import MOST, Known, chosen, drift
 from weighbridge.fleet.tickets import Ticket, read_tickets, ticketed
@@ -40,9 +42,45 @@ def test_drives_that_contradict_their_file_refine_it(tmp_path, short_drive, shor
     assert row["error_pct"] == pytest.approx(100.0 * off.mean(), abs=0.1)
     assert row["contradicted"]
     assert "too heavy" in row["told"]
+    (told,) = wb.fleet.report(results).to_dict()["learnt"]
+    assert (told["verdict"], told["told"]) == ("contradicted", row["told"])
     assert (cars / "car.toml").read_bytes() == before
     again = wb.weigh(drives / "car" / "trip-0", learnt / "car.toml")
     assert again.mass == pytest.approx(mass, rel=0.03)
+
+
+def test_a_vehicle_that_kills_its_worker_loses_nothing_of_the_others(
+    tmp_path, short_drive, short_car
+):
+    drives, cars = real_fleet(tmp_path, short_drive.drive, short_car, 1)
+    mass = float(short_drive.truth.mass[0])
+    rows = [("car", "2026-05-01T06:05:00Z", mass)]
+    for number, name in enumerate(("deadly", "odd"), start=1):
+        shutil.copy(cars / "car.toml", cars / f"{name}.toml")
+        tiny_drive(drives / name / "trip", number)
+        rows.append((name, f"2026-05-0{1 + number}T06:0{number}:00Z", mass))
+    fault = tmp_path / "fault.py"
+    fault.write_text(
+        "import os, signal\n"
+        "from weighbridge.fleet import learning\n"
+        "real = getattr(learning.chosen, 'real', learning.chosen)\n"
+        "def chosen(drives):\n"
+        "    name = os.path.basename(os.path.dirname(drives[0].paths[0]))\n"
+        "    if name == 'deadly':\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    return {}['gone'] if name == 'odd' else real(drives)\n"
+        "chosen.real = real\n"
+        "learning.chosen = chosen\n"
+    )
+    how = {"learn": tmp_path / "learnt", "tickets": tickets_at(tmp_path / "t.csv", *rows)}
+    with dask.config.set({"distributed.worker.preload": [str(fault)]}):
+        wb.fleet.weigh_drives(drives, cars, tmp_path / "results", workers=2, **how)
+    car, deadly, odd = pl.read_parquet(tmp_path / "results" / "learnt.parquet").to_dicts()
+    assert (car["vehicle_id"], car["weighed"], car["refined"]) == ("car", 1, "car.toml")
+    assert wb.Vehicle.load(tmp_path / "learnt" / "car.toml").torque is not None
+    assert (deadly["vehicle_id"], deadly["drives"], deadly["refined"]) == ("deadly", 1, None)
+    assert deadly["told"].startswith("nothing was learnt: its worker died 3 times")
+    assert odd["told"] == "nothing was learnt: KeyError: 'gone'"
 
 
 def test_learning_never_writes_over_what_is_read(tiny, tmp_path, scheduler):

@@ -3,13 +3,20 @@
 import filecmp
 from dataclasses import replace
 
+import numpy as np
 import polars as pl
 import pytest
 
 import weighbridge as wb
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.fleet.table import rows
-from weighbridge.simulation.fleet import FAULTS, FleetSettings, plan_fleet, with_fault
+from weighbridge.simulation.fleet import (
+    FAULTS,
+    FleetSettings,
+    plan_fleet,
+    with_fault,
+    with_torque_scale,
+)
 from weighbridge.simulation.fleet_files import _write_day, write_fleet
 
 SMALL = FleetSettings(vehicles=2, days=1, drives=2, minutes=2.0, seed=169110)
@@ -108,6 +115,23 @@ def test_faults_are_in_the_drive(small):
     assert len(set(torque[torque.size // 2 :])) == 1
 
 
+def test_every_third_vehicle_reads_more_torque_from_day_to_day(small):
+    plain = plan_fleet(replace(SMALL, vehicles=5, days=3))[1]
+    days = plan_fleet(replace(SMALL, vehicles=5, days=3, drift=0.1))[1]
+    scales = {
+        d.vehicle.id: [e.torque_scale for e in days if e.vehicle.id == d.vehicle.id] for d in days
+    }
+    assert scales["van002"] == scales["car005"] == pytest.approx([1.0, 1.05, 1.1])
+    assert scales["truck001"] == scales["truck003"] == scales["bus004"] == [1.0] * 3
+    assert [replace(d, torque_scale=1.0) for d in days] == list(plain)
+    drive = wb.read_drive(next((small / "drives/van002").iterdir()))
+    read = drive.signals["engine_torque_fraction"].values
+    more = with_torque_scale(drive, 1.1).signals["engine_torque_fraction"].values
+    step = np.diff(np.unique(np.round(read, 9))).min()
+    assert np.abs(more - 1.1 * read).max() <= 0.5 * step * (1 + 1e-6)
+    assert np.abs(more / step - np.round(more / step)).max() < 1e-6
+
+
 def test_a_broken_file_cannot_be_read(tmp_path):
     _, (day, *_) = plan_fleet(replace(SMALL, drives=1))
     ((row, *_), _) = _write_day(tmp_path, replace(day, faults=("broken file",)))
@@ -132,7 +156,12 @@ def test_nothing_is_overwritten_and_nothing_half_written(small, tmp_path, monkey
 
 @pytest.mark.parametrize(
     ("field", "value", "word"),
-    [("vehicles", 0, "vehicles"), ("minutes", 1.0, "minutes"), ("start", "soon", "no date")],
+    [
+        ("vehicles", 0, "vehicles"),
+        ("minutes", 1.0, "minutes"),
+        ("start", "soon", "no date"),
+        ("drift", 0.6, "drift"),
+    ],
 )
 def test_impossible_fleets_are_refused(field, value, word):
     with pytest.raises(ConfigError, match=word):

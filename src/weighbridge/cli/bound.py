@@ -47,9 +47,7 @@ def bound(
 
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)
-    refuse_results(
-        inputs([drive], vehicle, chosen, dbc), asked_for(track=None, report=None, json=json_path)
-    )
+    refuse_results(inputs([drive], vehicle, chosen, dbc), asked_for(json=json_path))
     read = load(drive, chosen, dbc)
     found = mass_bound(read, car, 1e3 * power, power_std=0.01 * power_std)
     if not write_json(json_path, found.to_json(read.name)):

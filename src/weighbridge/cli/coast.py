@@ -54,9 +54,7 @@ def coast(
     chosen = chosen_mapping(car, vehicle, mapping)
     spans = [[_span(option, text) for text in texts]
              for option, texts in (("--there", there), ("--back", back))]  # fmt: skip
-    refuse_results(
-        inputs([drive], vehicle, chosen, dbc), asked_for(track=None, report=None, json=json_path)
-    )
+    refuse_results(inputs([drive], vehicle, chosen, dbc), asked_for(json=json_path))
     read = load(drive, chosen, dbc)
     found = coast_down(read, *spans, vehicle=car)
     if not write_json(json_path, found.to_json(read.name)):

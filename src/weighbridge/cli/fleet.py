@@ -237,12 +237,9 @@ def _say_summary(found: dict[str, Any]) -> None:
 
 
 def _say_learnt(results: Path, learn: Path) -> None:
-    import polars as pl
+    from weighbridge.fleet.learnt import read_learnt
 
-    from weighbridge.fleet.learning import LEARNT
-
-    rows = pl.read_parquet((results / LEARNT).read_bytes())
-    for row in rows.iter_rows(named=True):
+    for row in read_learnt(results).iter_rows(named=True):
         refined = f"refined: {learn / row['refined']}" if row["refined"] else "not refined"
         say(f"{row['vehicle_id']}: {row['drives']} drives with a ticket, {refined}")
         if row["told"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final, Optional
+from typing import TYPE_CHECKING, Annotated, Final, Optional
 
 import typer
 
@@ -11,7 +11,10 @@ from weighbridge.cli.results import Inputs, asked_for, refuse_results
 from weighbridge.cli.terminal import say
 from weighbridge.cli.verbosity import say_written
 
-_TOLD: Final = 10  # legs in the answer
+if TYPE_CHECKING:
+    import polars as pl
+
+_TOLD: Final = 10  # legs in the answer, and vehicles of what was learnt
 
 
 def report(
@@ -23,6 +26,12 @@ def report(
     json: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option("--json", help="File for the same figures as JSON."),
+    ] = None,
+    legs: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--legs", help="Table of all legs, payload with its interval: .csv or .parquet."
+        ),
     ] = None,
     tickets: Annotated[
         Optional[Path],  # noqa: UP045
@@ -53,8 +62,8 @@ def report(
     if json == "-":
         raise ConfigError("--json -: name a file; standard output has the summary")
     read = Inputs(files=tuple(path for path in (tickets, couplings) if path is not None))
-    refuse_results(read, asked_for(track=None, report=page, json=json))
-    for path in (page, None if json is None else Path(json)):
+    refuse_results(read, asked_for(report=page, json=json, legs=legs))
+    for path in (page, None if json is None else Path(json), legs):
         if path is not None and path.resolve().is_relative_to(results.resolve()):
             raise ConfigError(f"{path}: is within the results; name a file elsewhere")
     found = figures(
@@ -68,10 +77,12 @@ def report(
         write_page(found, page)
     if json is not None:
         found.to_json(json)
+    if legs is not None:
+        found.write_legs(legs)
     t = found.totals
     say(f"{t['drives']} drives of {t['vehicles']} vehicles, {t['distance_km']:.0f} km")
-    legs = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
-    say(f"overloaded: {legs} at least {100 * alarm:g} % sure, {t['warnings']} likely")
+    sure = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
+    say(f"overloaded: {sure} at least {100 * alarm:g} % sure, {t['warnings']} likely")
     for row in found.overloads.head(_TOLD).iter_rows(named=True):
         when = "no time" if row["start"] is None else f"{row['start']:%Y-%m-%d %H:%M} UTC"
         say(
@@ -82,6 +93,26 @@ def report(
     more = found.overloads.height - _TOLD
     if more > 0:
         say(f"  and {more} more, surest first: -o fleet.html has all")
-    for written in (page, json):
+    _say_learnt(found.learnt)
+    for written in (page, json, legs):
         if written is not None:
             say_written(written)
+
+
+def _say_learnt(learnt: pl.DataFrame) -> None:
+    """Tell vehicles whose drives of known mass contradict their file, or that drift."""
+    if learnt.is_empty():
+        return
+    of = "1 vehicle" if learnt.height == 1 else f"{learnt.height} vehicles"
+    contradicted, drifts = learnt["contradicted"].sum(), learnt["drifts"].sum()
+    say(
+        f"learnt from the tickets of {of}: {contradicted} contradicted by "
+        f"{'its' if contradicted == 1 else 'their'} drives, "
+        f"{drifts} {'drifts' if drifts == 1 else 'drift'}"
+    )
+    doubted = learnt.filter(learnt["contradicted"] | learnt["drifts"])
+    for row in doubted.head(_TOLD).iter_rows(named=True):
+        say(f"  {row['vehicle_id']}: {row['told']}")
+    more = doubted.height - _TOLD
+    if more > 0:
+        say(f"  and {more} more: -o fleet.html has all")

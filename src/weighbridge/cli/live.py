@@ -180,7 +180,7 @@ def live(
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)
     kept = _state_file(state, replay, vehicle)
-    results = asked_for(track=None, report=None, json=json_path)
+    results = asked_for(json=json_path)
     if ticket is not None and out is None:
         out = _free_file(vehicle)
         notice(f"the ticket writes {out}")

@@ -15,7 +15,15 @@ from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.whole import is_stream, write_whole
 
 Kind = Literal[
-    "report", "list of items", "JSON file", "track", "vehicle file", "mapping", "MF4", "state"
+    "report",
+    "list of items",
+    "JSON file",
+    "track",
+    "table of legs",
+    "vehicle file",
+    "mapping",
+    "MF4",
+    "state",
 ]
 
 # What a file of each kind shows at its beginning.
@@ -25,6 +33,7 @@ _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
     "JSON file": re.compile(rb"\A\s*\{"),
     # Columns that no drive has and no truth; a Parquet file names them within its first page.
     "track": re.compile(rb"\A[^\r\n]*\btime_s\b[^\r\n]*(?:\bstd_kg\b|\bsprung_mass_std_kg\b)"),
+    "table of legs": re.compile(rb"\A[^\r\n]*\bleg\b[^\r\n]*\bpayload_low95_kg\b"),
     "vehicle file": re.compile(
         rb"^[ \t]*\[[ \t]*(?:vehicle|driveline|torque|road_load|provenance)[ \t]*\]", re.MULTILINE
     ),
@@ -32,6 +41,8 @@ _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
     "state": re.compile(rb'\A\{"weighbridge_checkpoint"'),
     "MF4": re.compile(rb"\A(?:MDF     |UnFinMF )"),
 }
+
+_TABLES: Final[frozenset[Kind]] = frozenset({"track", "table of legs"})
 
 # Bytes in which a file shows what it is.
 _HEAD: Final = 65_536
@@ -105,9 +116,17 @@ def _dbcs_of(mapping: Path | None) -> tuple[str, ...]:
         return ()
 
 
-def asked_for(*, track: Path | None, report: Path | None, json: str | None) -> list[Result]:
+def asked_for(
+    *,
+    track: Path | None = None,
+    report: Path | None = None,
+    json: str | None = None,
+    legs: Path | None = None,
+) -> list[Result]:
     """Gather the files that a command is to write; ``-`` is standard output."""
     found = []
+    if legs is not None:
+        found.append(Result("--legs", legs, "table of legs"))
     if track is not None:
         found.append(Result("--track", track, "track"))
     if report is not None:
@@ -135,8 +154,10 @@ def refuse_results(read: Inputs, results: Sequence[Result]) -> None:
     asked: dict[object, Result] = {}
     for result in results:
         path = result.path
-        if result.kind == "track" and path.suffix.lower() not in (".csv", ".parquet"):
-            raise ConfigError(f"{result.option} {path}: a track is written as .csv or .parquet")
+        if result.kind in _TABLES and path.suffix.lower() not in (".csv", ".parquet"):
+            raise ConfigError(
+                f"{result.option} {path}: a {result.kind} is written as .csv or .parquet"
+            )
         refuse_missing_folder(path)
         if is_stream(path):
             continue
@@ -263,21 +284,21 @@ def _is_of_kind(path: Path, kind: Kind) -> bool:
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
-            if head[:4] == b"PAR1" and kind == "track":
-                return _names_a_track(path)
+            if head[:4] == b"PAR1" and kind in _TABLES:
+                return _BEGINS[kind].search(_columns(path)) is not None
     except OSError:
         return False
     return not head or _BEGINS[kind].search(head) is not None
 
 
-def _names_a_track(path: Path) -> bool:
+def _columns(path: Path) -> bytes:
+    """Names of the columns of a Parquet file; none where it is damaged."""
     import polars as pl
 
     from weighbridge.io.quiet import PARSE_ERRORS, quietly
 
     try:
         with path.open("rb") as file, quietly():
-            names = ",".join(pl.read_parquet_schema(file))
+            return ",".join(pl.read_parquet_schema(file)).encode()
     except (*PARSE_ERRORS, OSError):
-        return False
-    return _BEGINS["track"].search(names.encode()) is not None
+        return b""

@@ -109,6 +109,13 @@ def fleet(
     minutes: Annotated[float, typer.Option("--minutes", help="Length of a drive.")] = 20.0,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of everything random.")] = 1,
     start: Annotated[str, typer.Option("--start", help="First day.")] = "2026-05-04",
+    drift: Annotated[
+        float,
+        typer.Option(
+            "--drift",
+            help="More torque read on the last day than on the first by every third vehicle, in %.",
+        ),
+    ] = 0.0,
     workers: Annotated[
         Optional[int],  # noqa: UP045
         typer.Option("--workers", help="Processes; one per core unless given."),
@@ -125,7 +132,13 @@ def fleet(
     from weighbridge.simulation.fleet_files import write_fleet
 
     settings = FleetSettings(
-        vehicles=vehicles, days=days, drives=drives, minutes=minutes, seed=seed, start=start
+        vehicles=vehicles,
+        days=days,
+        drives=drives,
+        minutes=minutes,
+        seed=seed,
+        start=start,
+        drift=drift / 100.0,
     )
     with progress("simulating the drives") as bar:
         count = write_fleet(output, settings, workers=workers, tell=bar.tell)

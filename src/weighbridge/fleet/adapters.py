@@ -53,7 +53,7 @@ def weigh_on_ray(
     try:
         import ray
     except ImportError:
-        raise MissingExtraError("ray", "fleet", "weighing on Ray") from None
+        raise MissingExtraError("ray", None, "weighing on Ray") from None
     from weighbridge.fleet.reading import read_drives
 
     task = ray.remote(num_cpus=1, max_retries=2)(first_alone)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
+import contextlib
 import queue
 import time
 import uuid
-from asyncio import CancelledError
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
@@ -25,6 +27,12 @@ _LEAST: Final = 8
 _LOOK: Final = 0.02  # spent at a time on finding out how many jobs there are [s]
 _TICK: Final = 0.2  # waited at most for a receipt [s]
 _MEASURED: Final = 1.0  # between looks at the cluster's size [s]
+_CANCELLED: Final = (asyncio.CancelledError, concurrent.futures.CancelledError)
+
+WORKER_DIED: Final = (
+    f"its worker died {TRIES} times, as one does that runs out of memory: give workers more"
+)
+"""Why a job has no receipt."""
 
 
 class SchedulerLost(WeighbridgeError):
@@ -135,17 +143,14 @@ class _Run:
 
     def run(self) -> Count:
         try:
-            while self._fill() or self._inside or not self.count.complete:
-                self._look_ahead()
-                self._collect(self._suspects)
-                self._told()
-            for job in self._suspects:
-                self._try_alone(job)
-                self._told()
-        except (OSError, CancelledError) as error:
-            if self._client.status == "running" and not _of_the_network(error):
-                raise
-            raise SchedulerLost from None
+            with scheduler_needed(self._client):
+                while self._fill() or self._inside or not self.count.complete:
+                    self._look_ahead()
+                    self._collect(self._suspects)
+                    self._told()
+                for job in self._suspects:
+                    self._try_alone(job)
+                    self._told()
         finally:
             futures = [future for future, _ in self._inside.values()]
             if futures and self._client.status == "running":
@@ -260,23 +265,28 @@ class _Run:
                 self._told()
             if not again:
                 return
-        self.count.add(
-            fail_job(
-                job,
-                f"its worker died {TRIES} times, as one does that runs out of memory: give workers "
-                "more, or take the recording in pieces",
-            )
-        )
+        self.count.add(fail_job(job, f"{WORKER_DIED}, or take the recording in pieces"))
 
     def _told(self) -> None:
         if self._tell is not None:
             self._tell(self.count)
 
 
+@contextlib.contextmanager
+def scheduler_needed(client: Client) -> Iterator[None]:
+    """Raise `SchedulerLost` for whatever the block raises because the scheduler is gone."""
+    try:
+        yield
+    except (OSError, *_CANCELLED) as error:
+        if client.status == "running" and not _of_the_network(error):
+            raise
+        raise SchedulerLost from None
+
+
 def _of_the_network(error: BaseException) -> bool:
     from distributed.comm.core import CommClosedError
 
-    return isinstance(error, CommClosedError | TimeoutError | CancelledError | ConnectionError)
+    return isinstance(error, (CommClosedError, TimeoutError, ConnectionError, *_CANCELLED))
 
 
 def plain(count: Count) -> dict[str, Any]:

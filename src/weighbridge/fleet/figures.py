@@ -32,7 +32,8 @@ def per_vehicle(legs: pl.DataFrame, changes: pl.DataFrame) -> pl.DataFrame:
         ``vehicle_id``, ``vehicle_class``, ``has_file``, ``tare_kg``, ``gross_kg``, ``drives``,
         ``legs``, ``distance_km``, ``known_km`` (with a mass), ``known_share``, ``tkm``,
         ``tkm_std``, ``tkm_shared`` (part of it from the vehicle file), ``payload_km`` (with a
-        payload), ``mean_payload_kg`` (by distance), ``empty_km``, ``empty_share``, ``warnings``,
+        payload), ``mean_payload_kg`` (by distance), ``mean_payload_std_kg``,
+        ``empty_km``, ``empty_share``, ``warnings``,
         ``alarms`` (legs), ``worst_overload``, ``trailer_legs``, ``changes``, ``last_kg``,
         ``last_std_kg``, ``last_time``.
     """
@@ -73,6 +74,7 @@ def per_vehicle(legs: pl.DataFrame, changes: pl.DataFrame) -> pl.DataFrame:
             pl.col("changes").fill_null(0),
             known_share=_ratio("known_km", "distance_km"),
             mean_payload_kg=_ratio("load_km", "payload_km"),
+            mean_payload_std_kg=1e3 * _ratio("tkm_std", "payload_km"),
             empty_share=_ratio("empty_km", "judged_km"),
         )
         .rename(

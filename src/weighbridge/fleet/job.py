@@ -113,7 +113,7 @@ def weigh_job(job: Job) -> Receipt:
                 rows = [_row(job, UNREAD, str(error))]
                 break
             key = failed_key(job)
-            rows = [_row(job, FAILED, f"failed {tries} times: {_named(error)}")]
+            rows = [_row(job, FAILED, f"failed {tries} times: {named_error(error)}")]
             if tries < TRIES:
                 time.sleep(_PAUSE * tries)
     return _written(job, key, rows, tries, begin)
@@ -276,5 +276,6 @@ def _of_the_machine(error: BaseException | None) -> bool:
     return False
 
 
-def _named(error: Exception) -> str:
+def named_error(error: Exception) -> str:
+    """Say what an error says, with the kind of one that is not told to users."""
     return str(error) if isinstance(error, WeighbridgeError) else f"{type(error).__name__}: {error}"

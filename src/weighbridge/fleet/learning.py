@@ -13,8 +13,10 @@ import numpy as np
 import polars as pl
 
 from weighbridge.errors import ConfigError, WeighbridgeError
+from weighbridge.fleet.engine import WORKER_DIED, SchedulerLost, scheduler_needed
 from weighbridge.fleet.inputs import Recording
-from weighbridge.fleet.job import local_paths
+from weighbridge.fleet.job import TRIES, local_paths, named_error
+from weighbridge.fleet.learnt import COLUMNS, LEARNT, SURE
 from weighbridge.fleet.tickets import read_tickets, ticketed
 from weighbridge.fleet.vehicles import Assigned, Vehicles
 from weighbridge.pipeline.given import mapping_beside
@@ -28,16 +30,11 @@ if TYPE_CHECKING:
 MOST: Final = 12
 """Drives that refine one vehicle file, at most: those over all masses, and over all of the time."""
 
-SURE: Final = 3.0
-"""A drift is told where it is so many standard deviations [-]."""
-
 FEW: Final = 4
 """Drives that show a drift, at least."""
 
 APART: Final = 2.0
 """Masses contradict a vehicle file where they are off by so many standard deviations [-]."""
-
-LEARNT: Final = "learnt.parquet"
 
 
 class Known(NamedTuple):
@@ -95,6 +92,8 @@ def learn_fleet(
     ------
     ConfigError
         Tickets cannot be read, or the folder not be written to.
+    SchedulerLost
+        The scheduler is gone.
     """
     from weighbridge.fleet.reading import read_drives
 
@@ -109,32 +108,67 @@ def learn_fleet(
             lessons.append(
                 Lesson(assigned=assigned, drives=known, output=str(output.resolve()), whole=whole)
             )
-    rows = client.gather(client.map(learn_vehicle, lessons, pure=False))
+    with scheduler_needed(client):
+        rows = _learnt(client, lessons)
     frame = pl.DataFrame(rows, schema=COLUMNS, orient="row").sort("vehicle_id")
     with whole_file(results / LEARNT) as part:
         frame.write_parquet(part)
     return frame
 
 
-COLUMNS: Final[dict[str, Any]] = {
-    "vehicle_id": pl.String,
-    "drives": pl.Int32,
-    "weighed": pl.Int32,
-    "error_pct": pl.Float64,
-    "error_std_pct": pl.Float64,
-    "contradicted": pl.Boolean,
-    "torque_drift_pct": pl.Float64,
-    "torque_drift_std_pct": pl.Float64,
-    "rolling_drift": pl.Float64,
-    "rolling_drift_std": pl.Float64,
-    "pitch_drift_deg": pl.Float64,
-    "pitch_drift_std_deg": pl.Float64,
-    "refined": pl.String,
-    "told": pl.String,
-}
-"""Columns of what was learnt of a vehicle: drives with a ticket, those with a mass, how far these
-are from their tickets in the mean (positive: too heavy) and how far they may be; drifts per 30
-days; name of the refined file, and sentences."""
+def _learnt(client: Client, lessons: Sequence[Lesson]) -> list[dict[str, Any]]:
+    """Return a row of each vehicle, also of one whose worker died.
+
+    One whose worker died is tried again when the others are done, alone, so that it takes no other
+    with it.
+    """
+    rows, suspects = _tried(client, lessons)
+    for lesson in suspects:
+        for _ in range(TRIES - 1):
+            own, again = _tried(client, [lesson])
+            rows += own
+            if not again:
+                break
+        else:
+            rows.append(_unlearnt(lesson, WORKER_DIED))
+    return rows
+
+
+def _tried(client: Client, lessons: Sequence[Lesson]) -> tuple[list[dict[str, Any]], list[Lesson]]:
+    """Return a row of each vehicle but of those whose worker died, and the lessons of these."""
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
+    futures = client.map(learn_vehicle, lessons, pure=False)
+    given = dict(zip((future.key for future in futures), lessons, strict=True))
+    rows, killed = [], []
+    try:
+        for future in as_completed(futures, loop=client.loop):
+            lesson = given[future.key]
+            if future.status in ("cancelled", "lost"):
+                raise SchedulerLost
+            try:
+                rows.append(future.result())
+            except KilledWorker:
+                killed.append(lesson)
+            except Exception as problem:
+                if future.status != "error":
+                    raise
+                rows.append(_unlearnt(lesson, named_error(problem)))
+    finally:
+        if client.status == "running":
+            client.cancel(futures, force=True)
+    return rows, killed
+
+
+def _unlearnt(lesson: Lesson, why: str) -> dict[str, Any]:
+    weighed = sum(math.isfinite(known.weighed) for known in lesson.drives)
+    return {
+        "vehicle_id": lesson.assigned.id,
+        "drives": len(lesson.drives),
+        "weighed": weighed,
+        "told": f"nothing was learnt: {why}",
+    }
 
 
 def refuse_output(output: Path, shelf: Vehicles) -> None:

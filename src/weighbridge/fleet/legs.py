@@ -89,8 +89,9 @@ def legs(
     polars.DataFrame
         Beside columns of the drive: ``leg``, ``start``, ``end`` [UTC], ``duration_s``,
         ``mass_kg``, ``std_kg``, ``shared_kg`` (part of it that all legs of the vehicle share),
-        ``low95_kg``, ``high95_kg``, ``payload_kg``, ``permitted_kg`` (with the trailer that is
-        known to be coupled), ``coupled``, ``overload`` (probability), ``level`` (ok, warn, alarm),
+        ``low95_kg``, ``high95_kg``, ``payload_kg``, ``payload_low95_kg``, ``payload_high95_kg``
+        (the empty mass is taken for exact), ``permitted_kg`` (with the trailer that is known to be
+        coupled), ``coupled``, ``overload`` (probability), ``level`` (ok, warn, alarm),
         ``trailer``, ``empty``, ``tkm``.
 
     Raises
@@ -170,6 +171,8 @@ def _judged(rows: pl.DataFrame, limits: Limits) -> pl.DataFrame:
         overload=_column(overload),
     ).with_columns(
         level=level,
+        payload_low95_kg=pl.col("low95_kg") - pl.col("tare_kg"),
+        payload_high95_kg=pl.col("high95_kg") - pl.col("tare_kg"),
         trailer=pl.col("coupled") | (pl.col("mass_kg") > limits.trailer * pl.col("gross_kg")),
         empty=pl.col("payload_kg") < limits.empty * room,
         tkm=1e-3 * pl.col("payload_kg").clip(lower_bound=0.0) * pl.col("distance_km"),

@@ -11,7 +11,8 @@ function make(tag, text, kind) {
 }
 const place = (key) => document.querySelector(`#${key} .body`);
 // A number is never broken at its thousands, nor before its ±.
-const number = (x, unit = "") => (x === null ? "–" : x.toLocaleString("en").replaceAll(",", "\u202f") + unit);
+const plain = new Intl.NumberFormat("en");
+const number = (x, unit = "") => (x === null ? "–" : plain.format(x).replaceAll(",", "\u202f") + unit);
 const pair = (x, half) => (x === null ? "–" : `${number(x)} ±\u00a0${number(Math.round(half))}`);
 const percent = (x) => (x === null ? "–" : `${(100 * x).toFixed(1)} %`);
 const sure = (x) => (x !== null && x > 0.999 ? "> 99.9 %" : percent(x));
@@ -79,7 +80,7 @@ function table(key, count, columns, order) {
   arrange();
 }
 
-const L = data.legs, T = data.track, V = data.vehicles, C = data.changes, Q = data.quality, R = data.verdicts;
+const L = data.legs, T = data.track, V = data.vehicles, C = data.changes, Q = data.quality, R = data.verdicts, G = data.learnt;
 const of = (column) => (k) => column[k];
 const named = (column) => ({ head: "vehicle", value: (k) => names[column[k]], press: (k) => choose(column[k], true) });
 
@@ -108,7 +109,8 @@ function vehicles() {
     { head: "mass known", value: of(V.known_share), show: percent, kind: "n" },
     { head: "t·km", value: of(V.tkm), kind: "n",
       show: (x, k) => pair(x, 1.96 * V.tkm_std[k]) },
-    { head: "mean payload, kg", value: of(V.mean_payload_kg), show: (x) => number(x), kind: "n" },
+    { head: "mean payload, kg", value: of(V.mean_payload_kg), kind: "n",
+      show: (x, k) => pair(x, 1.96 * V.mean_payload_std_kg[k]) },
     { head: "empty", value: of(V.empty_share), show: percent, kind: "n" },
     { head: "overloads", value: (k) => 1e6 * V.alarms[k] + V.warnings[k], kind: "n",
       show: (x, k) => (V.worst_overload[k] === null ? "not judged" : `${V.alarms[k]} sure, ${V.warnings[k]} likely`), mark: (k) => (V.alarms[k] ? ["alarm-text"] : []) },
@@ -117,6 +119,19 @@ function vehicles() {
       show: (x, k) => pair(x, 1.96 * V.last_std_kg[k]) },
     { head: "file", value: of(V.has_file), show: (x) => (x ? "yes" : "none") },
   ], [8, true]);
+}
+
+function legs() {
+  const half = (k) => L.high95_kg[k] - L.mass_kg[k];
+  table("legs", L.v.length, [
+    named(L.v),
+    { head: "when, UTC", value: of(L.start), show: time, kind: "n" },
+    { head: "km", value: of(L.distance_km), show: (x) => number(x), kind: "n" },
+    { head: "mass, kg", value: of(L.mass_kg), show: (x, k) => pair(x, half(k)), kind: "n" },
+    { head: "payload, kg", value: of(L.payload_kg), show: (x, k) => pair(x, half(k)), kind: "n" },
+    { head: "overload", value: of(L.overload), show: sure, kind: "n",
+      mark: (k) => (L.level[k] === "ok" || L.level[k] === null ? [] : [`${L.level[k]}-text`]) },
+  ], [1, true]);
 }
 
 // A canvas as sharp as the screen; `draw` gets its context, width and height.
@@ -333,6 +348,24 @@ function quality() {
   ], [1, true]);
 }
 
+function learnt() {
+  const rank = { contradicted: 3, drifts: 2, "not refined": 1, refined: 0 };
+  const spread = (x, std, digits) => (x === null ? "–" : `${x > 0 ? "+" : ""}${x.toFixed(digits)} ±\u00a0${std.toFixed(digits)}`);
+  const drift = (head, name, std, digits) =>
+    ({ head, value: of(G[name]), show: (x, k) => spread(x, G[std][k], digits), kind: "n" });
+  table("learnt", G.v.length, [
+    named(G.v),
+    { head: "verdict", value: (k) => rank[G.verdict[k]], show: (_, k) => G.verdict[k],
+      mark: (k) => (rank[G.verdict[k]] > 1 ? ["alarm-text"] : []) },
+    { head: "drives", value: of(G.drives), kind: "n" },
+    drift("mean error, %", "error_pct", "error_std_pct", 1),
+    drift("torque scale, %", "torque_drift_pct", "torque_drift_std_pct", 1),
+    drift("rolling", "rolling_drift", "rolling_drift_std", 4),
+    drift("pitch, deg", "pitch_drift_deg", "pitch_drift_std_deg", 2),
+    { head: "told", value: of(G.told), kind: "w" },
+  ], [1, true]);
+}
+
 function verdicts() {
   const rank = { failed: 2, passed: 1, incomplete: 0 };
   table("verdicts", R.v.length, [
@@ -346,7 +379,7 @@ function verdicts() {
   ], [1, true]);
 }
 
-overloads(); vehicles(); history(); map(); quality(); verdicts();
+overloads(); vehicles(); history(); legs(); map(); quality(); learnt(); verdicts();
 const worst = V.worst_overload.reduce((best, x, k) => ((x ?? -1) > (V.worst_overload[best] ?? -1) ? k : best), 0);
 if (names.length) choose(worst);
 document.body.dataset.ready = "yes";

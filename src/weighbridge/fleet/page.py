@@ -30,8 +30,15 @@ _SECTIONS: Final = (
     ("overloads", "Overloads", "Legs whose mass is likely above the permitted one."),
     ("vehicles", "Vehicles", "Choose one for its history."),
     ("history", "History of a vehicle", "Mass of each leg with its 95 % interval."),
+    ("legs", "Legs", "Spans with one load, with 95 % intervals; below zero a payload is none."),
     ("map", "Where loads changed", "Each mark is a stop; no map is loaded from the net."),
     ("quality", "Data quality", "What keeps drives from being weighed, and what was doubted."),
+    (
+        "learnt",
+        "Learnt from tickets",
+        "Vehicle files that their drives contradict, and what drifts in 30 days. Here ± is one "
+        "standard deviation.",
+    ),
     ("verdicts", "Known masses", "Verdicts by the loads of Regulation (EU) 2019/1213, Annex IV."),
 )
 
@@ -201,7 +208,8 @@ def _data(report: FleetReport) -> dict[str, Any]:
     vehicles = columns(
         report.vehicles,
         {"vehicle_class": 0, "tare_kg": 0, "gross_kg": 0, "drives": 0, "distance_km": 0,
-         "known_share": 3, "tkm": 0, "tkm_std": 0, "mean_payload_kg": 0, "empty_share": 3,
+         "known_share": 3, "tkm": 0, "tkm_std": 0, "mean_payload_kg": 0, "mean_payload_std_kg": 0,
+         "empty_share": 3,
          "alarms": 0, "warnings": 0, "worst_overload": 4, "changes": 0, "last_kg": 0,
          "last_std_kg": 0, "last_time": 0, "has_file": 0},
     )  # fmt: skip
@@ -222,6 +230,13 @@ def _data(report: FleetReport) -> dict[str, Any]:
         "track": columns(report.track, {"start": 0, "end": 0, "mass_kg": 0, "state": 0}),
         "quality": columns(
             report.quality, {"kind": 0, "example": 0, "drives": 0, "share": 3, "last": 0}
+        ),
+        # The drives of one may have been removed since.
+        "learnt": columns(
+            report.learnt.filter(pl.col("vehicle_id").is_in(ids)),
+            {"verdict": 0, "drives": 0, "error_pct": 1, "error_std_pct": 1, "torque_drift_pct": 1,
+             "torque_drift_std_pct": 1, "rolling_drift": 5, "rolling_drift_std": 5,
+             "pitch_drift_deg": 2, "pitch_drift_std_deg": 2, "told": 0},
         ),
         "verdicts": columns(
             report.verdicts,

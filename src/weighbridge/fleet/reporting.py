@@ -9,8 +9,10 @@ from typing import Any
 
 import polars as pl
 
+from weighbridge.errors import ConfigError
 from weighbridge.fleet import figures, protocol
 from weighbridge.fleet.couplings import read_couplings
+from weighbridge.fleet.learnt import read_learnt
 from weighbridge.fleet.legs import Limits, legs, load_changes
 from weighbridge.fleet.reading import collected, read_drives, read_segments
 from weighbridge.fleet.tickets import read_tickets
@@ -36,6 +38,7 @@ class FleetReport:
     speed_mass : distance by speed and mass, see `weighbridge.fleet.figures.speed_mass`
     verdicts : of the protocol, see `weighbridge.fleet.protocol.verdicts`
     rfms : last masses, see `weighbridge.fleet.figures.rfms`
+    learnt : from drives of known mass, see `weighbridge.fleet.learnt.read_learnt`
     """
 
     limits: Limits
@@ -49,6 +52,7 @@ class FleetReport:
     speed_mass: pl.DataFrame
     verdicts: pl.DataFrame
     rfms: pl.DataFrame
+    learnt: pl.DataFrame
 
     @property
     def overloads(self) -> pl.DataFrame:
@@ -57,7 +61,7 @@ class FleetReport:
         return told.sort("overload", "mass_kg", descending=True, nulls_last=True)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything but the legs as plain values; instants as ISO 8601."""
+        """Return all but the legs, which `write_legs` writes, as plain values."""
         return {
             "limits": {**self.limits._asdict(), "tolerance": self.tolerance},
             "totals": self.totals,
@@ -69,6 +73,7 @@ class FleetReport:
             "speed_mass": _rows(self.speed_mass),
             "verdicts": _rows(self.verdicts),
             "rfms": _rows(self.rfms),
+            "learnt": _rows(self.learnt),
         }
 
     def to_json(self, path: str | Path) -> None:
@@ -81,6 +86,21 @@ class FleetReport:
         """
         text = json.dumps(self.to_dict(), ensure_ascii=False, indent=1)
         write_whole(path, visible_json(text) + "\n")
+
+    def write_legs(self, path: str | Path) -> None:
+        """Write the legs, one row each, as CSV or Parquet, by the suffix of ``path``.
+
+        Instants of a CSV are ISO 8601 in UTC.
+
+        Raises
+        ------
+        ConfigError
+            The suffix is neither, or the file cannot be written.
+        """
+        from weighbridge.io.write import write_frame
+
+        as_text = Path(path).suffix.lower() == ".csv"
+        write_frame(_texts(self.legs) if as_text else self.legs, path, ConfigError)
 
 
 def report(
@@ -104,7 +124,7 @@ def report(
     Raises
     ------
     ConfigError
-        The folder holds no results, a limit cannot be, or a table cannot be read.
+        The folder holds no results, a limit cannot be, or a table cannot be read or is damaged.
     """
     limits = limits or Limits()
     told = [] if tickets is None else read_tickets(Path(tickets))
@@ -126,10 +146,15 @@ def report(
         speed_mass=figures.speed_mass(drives, segments),
         verdicts=protocol.verdicts(known, tolerance),
         rfms=figures.rfms(rows),
+        learnt=read_learnt(results),
     )
 
 
 def _rows(frame: pl.DataFrame) -> list[dict[str, Any]]:
-    instants = pl.selectors.datetime()
-    texts = frame.with_columns(instants.dt.strftime("%Y-%m-%dT%H:%M:%SZ"))
-    return texts.with_columns(pl.selectors.float().fill_nan(None)).to_dicts()
+    return _texts(frame).to_dicts()
+
+
+def _texts(frame: pl.DataFrame) -> pl.DataFrame:
+    """Instants as ISO 8601, and null for what is no number."""
+    instants = pl.selectors.datetime().dt.strftime("%Y-%m-%dT%H:%M:%SZ")
+    return frame.with_columns(instants, pl.selectors.float().fill_nan(None))

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.keys import file_digest, text_digest
@@ -71,6 +71,23 @@ class Assigned:
         )
 
 
+class _MappingFile(NamedTuple):
+    """What a mapping file says, to be sent to a worker that may not see the file.
+
+    The DBC files that it names are sent by their whole paths, and are seen by all workers.
+
+    Attributes
+    ----------
+    said : None where there is no mapping
+    digests : of the file and of the DBC files that it names
+    path : of the file
+    """
+
+    said: Mapping[str, Any] | None = None
+    digests: tuple[str, ...] = ("",)
+    path: str | None = None
+
+
 class Vehicles:
     """The vehicle files of a folder, each read once, by the name of the file.
 
@@ -96,6 +113,7 @@ class Vehicles:
         self.files = tuple(
             f for f in sorted(folder.glob("*.toml")) if f.is_file() and _is_vehicle(f)
         )
+        self._mappings: dict[Path, _MappingFile] = {}
         self._known = {path.stem: self._read(path) for path in self.files}
         self._sheets: dict[tuple[str | None, str], Assigned] = {}
 
@@ -136,61 +154,58 @@ class Vehicles:
 
     def _read(self, path: Path) -> Assigned:
         vehicle = Vehicle.load(path)
-        named = mapping_of(vehicle, path, self._mapping)
+        mapping = self._mapping_file(mapping_of(vehicle, path, self._mapping))
         return Assigned(
             id=path.stem,
             file=path.name,
             vehicle=vehicle,
             kind=vehicle.kind,
-            mapping=_mapping(named),
-            digest=text_digest([file_digest(path), *_digests(named)]),
-            mapping_file=None if named is None else str(named.resolve()),
+            mapping=mapping.said,
+            digest=text_digest([file_digest(path), *mapping.digests]),
+            mapping_file=mapping.path,
         )
+
+    def _mapping_file(self, path: Path | None) -> _MappingFile:
+        """Read a mapping once, however many vehicles name it."""
+        if path is None:
+            return _MappingFile()
+        if path not in self._mappings:
+            self._mappings[path] = _read_mapping(path)
+        return self._mappings[path]
 
     def _sheet(self, name: str | None, kind: str | None) -> Assigned:
         kind = kind or self._kind
         if kind not in VEHICLE_CLASSES:
             raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {kind!r}")
         if (name, kind) not in self._sheets:
-            named = self._mapping
+            mapping = self._mapping_file(self._mapping)
             self._sheets[name, kind] = Assigned(
                 id=name,
                 file=None,
                 vehicle=None,
                 kind=kind,
-                mapping=_mapping(named),
-                digest=text_digest([kind, *_digests(named)]),
+                mapping=mapping.said,
+                digest=text_digest([kind, *mapping.digests]),
             )
         return self._sheets[name, kind]
 
 
-def _mapping(path: Path | None) -> Mapping[str, Any] | None:
-    """Return what a mapping file says, to be sent to a worker that may not see the file.
-
-    The DBC files that it names are sent by their whole paths, and are seen by all workers.
+def _read_mapping(path: Path) -> _MappingFile:
+    """Read a mapping file.
 
     Raises
     ------
     ConfigError
         It cannot be used.
     """
-    if path is None:
-        return None
     import tomllib
 
     dbc = named_dbcs(load_mapping(path))
     said = tomllib.loads(path.read_text(encoding="utf-8"))
     if dbc:
         said["dbc"] = [with_path(name, dbc_path(name).resolve()) for name in dbc]
-    return said
-
-
-def _digests(mapping: Path | None) -> list[str]:
-    """Digests of a mapping file and of the DBC files that it names."""
-    if mapping is None:
-        return [""]
-    named = map(dbc_path, named_dbcs(load_mapping(mapping)))
-    return [file_digest(path) for path in (mapping, *named)]
+    digests = tuple(file_digest(p) for p in (path, *map(dbc_path, dbc)))
+    return _MappingFile(said, digests, str(path.resolve()))
 
 
 def _is_vehicle(path: Path) -> bool:

@@ -39,6 +39,8 @@ _TRAILER: Final = (0.6, 1.0)  # mass of a trailer over that of the empty truck [
 _SHARE: Final = {"overload": 0.08, "empty": 0.25, "stop": 0.2, "trailer": 0.1, "fault": 0.04}
 _TICKETS: Final = 0.3  # part of the departures that go over a weighbridge [-]
 _NO_FILE: Final = 10  # every tenth vehicle has no file
+_DRIFTING: Final = 3  # every third vehicle, where a drift is asked for
+_TORQUES: Final = ("engine_torque", "engine_torque_fraction")
 _DEPOT: Final = (math.radians(51.2), math.radians(9.5))
 _SPREAD: Final = math.radians(0.6)
 _FASTEST: Final = 25.0  # no drive is longer than at this speed all the time [m/s]
@@ -60,6 +62,8 @@ class FleetSettings:
     minutes : length of a drive
     seed : of everything random
     start : first day, ISO 8601
+    drift : how much more torque every third vehicle reads on its last day than on its first, even
+        in between; its true torque stays [-]
     """
 
     vehicles: int = 50
@@ -68,6 +72,7 @@ class FleetSettings:
     minutes: float = 20.0
     seed: int = 1
     start: str = "2026-05-04"
+    drift: float = 0.0
 
     def __post_init__(self) -> None:
         for name, high in (("vehicles", 9999), ("days", 366), ("drives", 24)):
@@ -76,6 +81,8 @@ class FleetSettings:
                 raise ConfigError(f"{name} must be 1 to {high}, got {value}")
         if not 2.0 <= self.minutes <= 120.0:
             raise ConfigError(f"minutes must be 2 to 120, got {self.minutes:g}")
+        if not abs(self.drift) <= 0.5:
+            raise ConfigError(f"drift must be -50 to 50 %, got {100.0 * self.drift:g} %")
         if self.drives * (self.minutes + 20.0) > 24 * 60:
             raise ConfigError(
                 f"{self.drives} drives of {self.minutes:g} minutes do not fit into a day"
@@ -119,6 +126,7 @@ class PlannedDay:
     tickets : whether the departure was weighed
     faults : of each recording
     minutes : length of a drive
+    torque_scale : of the torque's reading by that of the first day [-]
     """
 
     vehicle: FleetVehicle
@@ -130,6 +138,7 @@ class PlannedDay:
     tickets: tuple[bool, ...]
     faults: tuple[Fault, ...]
     minutes: float
+    torque_scale: float = 1.0
 
 
 def plan_fleet(settings: FleetSettings) -> tuple[tuple[FleetVehicle, ...], tuple[PlannedDay, ...]]:
@@ -156,7 +165,11 @@ def plan_fleet(settings: FleetSettings) -> tuple[tuple[FleetVehicle, ...], tuple
         vehicles.append(vehicle)
         for day in range(settings.days):
             own = np.random.default_rng([settings.seed, number, day])
-            days.append(_day(own, vehicle, first + timedelta(days=day), settings))
+            planned = _day(own, vehicle, first + timedelta(days=day), settings)
+            if number % _DRIFTING == 1 and settings.days > 1:
+                grown = 1.0 + settings.drift * day / (settings.days - 1)
+                planned = replace(planned, torque_scale=grown)
+            days.append(planned)
     return tuple(vehicles), tuple(days)
 
 
@@ -183,7 +196,7 @@ def with_fault(drive: Drive, fault: Fault) -> Drive:
     if fault == "no inertial sensor":
         signals = {n: s for n, s in signals.items() if not n.startswith(("accel_", "gyro_"))}
     elif fault == "frozen torque":
-        for name in ("engine_torque", "engine_torque_fraction"):
+        for name in _TORQUES:
             if name in signals:
                 signals[name] = _frozen(signals[name])
     elif fault == "cut short":
@@ -192,6 +205,21 @@ def with_fault(drive: Drive, fault: Fault) -> Drive:
         speed = signals["vehicle_speed"]
         signals["vehicle_speed"] = replace(speed, values=speed.values / 1.609344)
     return replace(drive, signals=signals)
+
+
+def with_torque_scale(drive: Drive, scale: float) -> Drive:
+    """Return a drive whose torque reads so many times as much, in the same steps."""
+    if scale == 1.0:
+        return drive
+    return drive.with_signals(
+        *(_scaled(drive.signals[name], scale) for name in _TORQUES if name in drive.signals)
+    )
+
+
+def _scaled(signal: Signal, scale: float) -> Signal:
+    steps = np.diff(np.unique(np.round(signal.values, 9)))
+    step = float(steps.min()) if steps.size else 1.0
+    return replace(signal, values=step * np.round(scale * signal.values / step))
 
 
 def _frozen(signal: Signal) -> Signal:

@@ -22,6 +22,7 @@ from weighbridge.simulation.fleet import (
     plan_fleet,
     simulate_day,
     with_fault,
+    with_torque_scale,
 )
 from weighbridge.simulation.simulate import SimulatedDrive
 from weighbridge.vehicle.known import Known, describe
@@ -41,6 +42,7 @@ TRUTH: Final = {
     "gross_kg": pl.Float64(),
     "trailer_kg": pl.Float64(),
     "fault": pl.String(),
+    "torque_scale": pl.Float64(),
 }
 """Columns of ``truth.csv``: one row per leg, with the mass at its begin."""
 
@@ -162,7 +164,8 @@ def _write_day(part: Path, day: PlannedDay) -> _Made:
         fault, start = day.faults[number], day.starts[number]
         inside = f"drives/{vehicle.id}/{made.drive.name}"
         info = replace(made.drive.info, mass=None, notes=None, vehicle=vehicle.id)
-        drive = replace(with_fault(made.drive, fault), info=info)
+        read = with_torque_scale(made.drive, day.torque_scale)
+        drive = replace(with_fault(read, fault), info=info)
         write_drive(drive, part / inside, "parquet")
         if fault == "broken file":
             _break(part / inside / "obd.parquet")
@@ -178,6 +181,7 @@ def _write_day(part: Path, day: PlannedDay) -> _Made:
                     "gross_kg": vehicle.gross,
                     "trailer_kg": day.trailers[number],
                     "fault": fault,
+                    "torque_scale": day.torque_scale,
                 }
             )
         if day.tickets[number]:
