@@ -26,10 +26,6 @@ from weighbridge.estimators import ESTIMATORS
 from weighbridge.estimators.robust_rls import RobustRlsSettings
 from weighbridge.estimators.robust_rls import estimate as robust_rls
 from weighbridge.papers import du2025_methods as paper
-from weighbridge.papers.claims import markdown
-from weighbridge.papers.claims import tables as item_tables
-from weighbridge.papers.du2025 import ITEMS, reproduced
-from weighbridge.papers.du2025 import SEED as SEED_OF_PAPER
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.simulation import make_scenario, simulate_car
 
@@ -99,15 +95,7 @@ def bmw() -> Part:
     return Part({"bmw": "\n".join(lines)}, curves)
 
 
-def items() -> Part:
-    """Reproduce as the command does, for the table of docs/methods/du2025.md."""
-    done = reproduced(SEED_OF_PAPER, None)
-    tables = item_tables("Du et al. 2025", ITEMS, done.figures)
-    return Part({"items": f"{done.title}.\n\n" + "\n".join(map(markdown, tables))})
-
-
 PARTS = {
-    "items": items,
     "bus": du2025_bus.bus,
     "opposite": du2025_bus.opposite,
     "city": du2025_bus.city,
@@ -120,7 +108,6 @@ PARTS = {
 }
 """What each makes: tables by the name of their place in the template, and curves of one drive."""
 
-METHOD_PAGE = HERE.parent / "docs" / "methods" / "du2025.md"
 SHOWN = ("bus", "urban", "car", "bmw")
 
 
@@ -149,16 +136,6 @@ def tables_of(page: Path) -> dict[str, str]:
     return found
 
 
-def put_items(text: str) -> None:
-    """Write the items between their marks on the method's page."""
-    before, _, rest = METHOD_PAGE.read_text(encoding="utf-8").partition("<!-- items -->\n")
-    _, mark, after = rest.partition("<!-- end of items -->")
-    if not mark:
-        raise SystemExit(f"{METHOD_PAGE} has no marks around its items")
-    page = f"{before}<!-- items -->\n{text}\n{mark}{after}"
-    METHOD_PAGE.write_text(page, encoding="utf-8")
-
-
 def main(names: list[str]) -> None:
     page = HERE / "du2025.md"
     tables = tables_of(page)
@@ -168,9 +145,6 @@ def main(names: list[str]) -> None:
     with ProcessPoolExecutor(2) as pool:
         for name, running in [(n, pool.submit(PARTS[n])) for n in asked]:
             done = running.result()
-            if name == "items":
-                put_items(done.tables["items"])
-                continue
             tables |= done.tables
             if done.curves is not None:
                 curves[name] = done.curves

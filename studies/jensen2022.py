@@ -26,11 +26,9 @@ from weighbridge.calibration.run import run_calibration
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.papers import jensen2022 as paper
 from weighbridge.papers import jensen2022_tables as tables
-from weighbridge.papers import section_of
 from weighbridge.papers.jensen2022_drives import without_weather
 from weighbridge.papers.jensen2022_judged import BAND
 from weighbridge.papers.jensen2022_reproduction import Reproduction, perturbed
-from weighbridge.papers.reproduced import Reproduced
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.simulation import MIDSIZE, make_scenario, random_car, simulate_car
 
@@ -267,26 +265,15 @@ def masses_figure(done: Reproduction) -> None:
     plt.close(figure)
 
 
-def write_items(reproduced: Reproduced) -> None:
-    """Put the table of items with today's figures into the page of the method."""
-    path = HERE.parent / "docs" / "methods" / "jensen2022.md"
-    section = section_of("jensen2022", reproduced).markdown()
-    before, rest = path.read_text(encoding="utf-8").split("<!-- items begin -->\n")
-    _, after = rest.split("<!-- items end -->")
-    text = f"{before}<!-- items begin -->\n{section}<!-- items end -->{after}"
-    path.write_text(text, encoding="utf-8")
-
-
 def drives() -> dict[str, str]:
-    """Reproduce the paper: tables and figures of the study, and the items of the method's page."""
+    """Reproduce the paper: tables and figures of the study."""
     return reproduction(paper.reproduce())
 
 
 def reproduction(done: Reproduction) -> dict[str, str]:
     """Make of a reproduction what is shown of it; returns the tables of this page."""
-    reproduced = paper.as_reproduced(done)
-    reproduced.write_report(Path(tempfile.gettempdir()) / "jensen2022.html")
-    write_items(reproduced)
+    page = Path(tempfile.gettempdir()) / "jensen2022.html"
+    paper.as_reproduced(done).write_report(page)
     sensitivity_figure(done)
     masses_figure(done)
     return {

@@ -1,7 +1,6 @@
 """The experiment of Du 2025: one drive of it, its tables and its page."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -112,20 +111,6 @@ def test_every_equation_table_and_figure_has_its_item():
     # Our own filters know more than the paper's: they stand apart.
     like = [item for item in du2025.ITEMS if item.like_for_like]
     assert not any("{ours_" in item.ours for item in like)
-
-
-def test_the_page_of_the_method_lists_the_items_of_today():
-    page = Path(__file__).parents[2] / "docs" / "methods" / "du2025.md"
-    shown = page.read_text(encoding="utf-8").partition("<!-- items -->")[2]
-    rows = [line.split(" | ") for line in shown.splitlines() if line.startswith("| ")]
-    rows = [[cell.strip("| ") for cell in row[:5]] for row in rows]
-    like = [item for item in du2025.ITEMS if item.like_for_like]
-    other = [item for item in du2025.ITEMS if not item.like_for_like]
-    wanted = [
-        [i.paper_item, i.where, "yes" if i.as_printed else "no", i.departure, i.printed]
-        for i in (*like, *other)
-    ]
-    assert [row for row in rows if row[0] not in ("paper", "---")] == wanted
 
 
 def test_tables_and_page_name_what_falls_behind(judged, tmp_path, monkeypatch):
