@@ -16,12 +16,12 @@ HEADS = ("drive", "true kg", "robust-rls %", "ekf %", "hybrid %", "RMSE robust-r
 ROW = (LONG, "10000", "-0.57", "-0.17", "-0.16", "96", "37", "37", "robust-rls")
 
 
-def made(good):
+def made(good, like=True):
     """Return a reproduction with a table that is wider than any pipe."""
     return reproduced.Reproduced(
         title="a paper",
         tables=(Table("Drives", HEADS, (ROW,)),),
-        comparisons=(reproduced.Comparison("RMSE of all", "1 kg", "2 kg", good),),
+        comparisons=(reproduced.Comparison("RMSE of all", "1 kg", "2 kg", good, like),),
         write_page=lambda tables, path: None,
     )
 
@@ -39,6 +39,14 @@ def test_what_is_behind_is_named_at_the_end(weighbridge, monkeypatch):
         ran = weighbridge("reproduce", "galvao")
         assert ran.code == code
         assert ("behind, galvao: RMSE of all" in ran.out) is not good
+
+
+def test_other_conditions_are_told_beside_the_figures():
+    rows = [
+        made(good, like).comparison.rows[0][-1] for like in (True, False) for good in (True, False)
+    ]
+    assert rows == ["", "behind", "other conditions", "behind, other conditions"]
+    assert made(good=False, like=False).behind == ("RMSE of all (other conditions)",)
 
 
 def test_a_page_begins_with_the_papers_figures(tmp_path):

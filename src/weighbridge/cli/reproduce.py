@@ -47,6 +47,8 @@ def reproduce(
 ) -> None:
     """Reproduce a published system on simulated drives; exits with 1 where we fall behind.
 
+    A figure that was made under other conditions than the paper's is marked so.
+
     Example: weighbridge reproduce jensen2022 --report jensen2022.html
     """
     from weighbridge import papers

@@ -19,6 +19,7 @@ from weighbridge.estimators import MassTrack
 from weighbridge.estimators.hybrid import Blend
 from weighbridge.papers.claims import tables as item_tables
 from weighbridge.papers.du2025_bus import LOADS, data_sheet, known_bus, simulate
+from weighbridge.papers.du2025_compared import comparisons
 from weighbridge.papers.du2025_items import ITEMS
 from weighbridge.papers.du2025_methods import (
     BAND,
@@ -30,8 +31,8 @@ from weighbridge.papers.du2025_methods import (
     setting_rows,
 )
 from weighbridge.papers.du2025_panels import panels
-from weighbridge.papers.du2025_results import DriveResult, Reproduction
-from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
+from weighbridge.papers.du2025_results import DriveResult, Reproduction, cell
+from weighbridge.papers.reproduced import Progress, Reproduced
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats
@@ -137,6 +138,13 @@ def judge(
         found = {m: estimate(balance, vehicle) for m, estimate in chosen.estimators.items()}
         done.printed[form] = {m: rms(late_error(track)) for m, track in found.items()}
         done.printed_mean[form] = {m: float(np.mean(late_error(t))) for m, t in found.items()}
+        done.printed_worst[form] = {
+            m: float(np.max(np.abs(late_error(t)))) / mass for m, t in found.items()
+        }
+        kilogram = chosen.started_within(1.0 / mass).estimators
+        done.printed_unit_start[form] = {
+            m: rms(late_error(kilogram[m](balance, vehicle))) for m in METHODS[1:]
+        }
         if rolling is None:
             steady = {m: steady_from(track, mass, start) for m, track in found.items()}
             done.printed_steady_at.update(steady)
@@ -224,11 +232,6 @@ def reproduce(
     )
 
 
-def cell(drives: tuple[DriveResult, ...], load: str, method: str, name: str) -> Floats:
-    """Return one figure of a cell of Table 2, drive by drive."""
-    return np.array([getattr(d, name)[method] for d in drives if d.load == load])
-
-
 def reproduced(
     seed: int, progress: Progress | None, settings: Settings | None = None
 ) -> Reproduced:
@@ -259,7 +262,7 @@ def reproduced(
             _settings_table(done),
             _vehicle_table(done),
         ),
-        comparisons=_comparisons(done),
+        comparisons=comparisons(done),
         figures=values,
         write_page=write,
     )
@@ -275,11 +278,18 @@ def figures(done: Reproduction) -> dict[str, str]:
             found[f"ours_{name}"] = f"{every.mean():.0f} kg"
             found[f"road_{name}"] = f"{cell(done.road, load, m, 'late_rmse').mean():.0f} kg"
             for key, form in zip(("printed", "tenfold", "tyres"), PRINTED_ROLLING, strict=True):
-                mean = np.mean([d.printed[form][m] for d in done.drives if d.load == load])
+                mean = cell(done.drives, load, m, "printed", form).mean()
                 found[f"{key}_{name}"] = f"{mean:.0f} kg"
             found[f"seconds_{name}"] = f"{cell(done.drives, load, m, 'seconds').mean():.3f} s"
     for name, drives in (("ours", done.drives), ("road", done.road)):
         found[f"{name}_largest"] = f"{100.0 * max(max(d.worst.values()) for d in drives):.1f} %"
+    for key, form in zip(("printed", "tenfold", "tyres"), PRINTED_ROLLING, strict=True):
+        largest = max(max(d.printed_worst[form].values()) for d in done.drives)
+        found[f"{key}_largest"] = f"{100.0 * largest:.1f} %"
+        units = [
+            cell(done.drives, load, "ekf", "printed_unit_start", form).mean() for load in LOADS
+        ]
+        found[f"{key}_unit_start"] = " / ".join(f"{x:.0f}" for x in units) + " kg"
     for m in METHODS[:2]:
         name = m.replace("-", "_")
         steady = [d.printed_steady_at[m] for d in done.drives]
@@ -296,9 +306,8 @@ def printed_table(done: Reproduction) -> Table:
         for method, paper in zip(METHODS, theirs, strict=True):
             row = [f"{load}, {method}", f"{paper:.0f}"]
             for form in PRINTED_ROLLING:
-                drives = [d for d in done.drives if d.load == load]
-                mean = np.mean([d.printed[form][method] for d in drives])
-                lean = np.mean([d.printed_mean[form][method] for d in drives])
+                mean = cell(done.drives, load, method, "printed", form).mean()
+                lean = cell(done.drives, load, method, "printed_mean", form).mean()
                 row.append(f"{mean:.0f} ({lean:+.0f})")
             rows.append(tuple(row))
     return Table(
@@ -405,54 +414,6 @@ def _vehicle_table(done: Reproduction) -> Table:
              f"{car.road.rolling_coefficient.value:.4f}"),
         ),
     )  # fmt: skip
-
-
-def _comparisons(done: Reproduction) -> tuple[Comparison, ...]:
-    """Figures beside the paper's: by its own settings first, which is no contest, then by ours."""
-    out = []
-    for form in tuple(PRINTED_ROLLING)[:2]:
-        for load, theirs in PAPER_RMSE.items():
-            printed = [
-                np.mean([d.printed[form][m] for d in done.drives if d.load == load])
-                for m in METHODS
-            ]
-            out.append(
-                Comparison(f"RMSE as printed, {form}, {load}, {', '.join(METHODS)}",
-                           ", ".join(f"{x:.0f}" for x in theirs) + " kg",
-                           ", ".join(f"{x:.0f}" for x in printed) + " kg", True)
-            )  # fmt: skip
-    for load, theirs in PAPER_RMSE.items():
-        for method, paper in zip(METHODS, theirs, strict=True):
-            every = cell(done.drives, load, method, "late_rmse")
-            out.append(
-                Comparison(
-                    f"RMSE of ours, told the tyres' rolling, {load}, {method}",
-                    f"{paper:.0f} kg",
-                    f"{every.mean():.0f} kg, worst drive {every.max():.0f} kg",
-                    bool(every.mean() < paper),
-                )
-            )
-    for name, drives in (("", done.drives), (", with all effects", done.road)):
-        largest = max(max(d.worst.values()) for d in drives)
-        out.append(
-            Comparison(f"largest error from 21 s on, all methods and drives{name}",
-                       "below 10 %", f"{100.0 * largest:.1f} %", largest < BAND)
-        )  # fmt: skip
-        means = {m: float(np.mean([d.late_rmse[m] for d in drives])) for m in METHODS}
-        order = sorted(METHODS, key=lambda m, means=means: means[m])  # type: ignore[misc]
-        out.append(
-            Comparison(f"order of merit, mean RMSE of all drives{name}",
-                       "hybrid, ekf, robust-rls",
-                       ", ".join(f"{m} {means[m]:.0f} kg" for m in order), True)
-        )  # fmt: skip
-    seconds = {m: float(np.mean([d.seconds[m] for d in done.drives])) for m in METHODS}
-    theirs_time = np.mean([PAPER_TIME[load] for load in LOADS], axis=0)
-    out.append(
-        Comparison("computing time of a drive, " + ", ".join(METHODS),
-                   ", ".join(f"{t:.1f}" for t in theirs_time) + " s",
-                   ", ".join(f"{seconds[m]:.3f}" for m in METHODS) + " s", True)
-    )  # fmt: skip
-    return tuple(out)
 
 
 def rms(values: Floats) -> float:

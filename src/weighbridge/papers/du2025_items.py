@@ -52,6 +52,10 @@ _FILTERS: Final = (
     Item("eqs. 29-33", f"{_KALMAN}: step, fold", False, "Joseph's form, one measurement after the "
          "other; Q and R are not printed and are chosen. P0 is typically the identity by sec. 3.2, "
          "which is 1 kg² of mass; ours is 30 % of it (printed.ekf.start_std)", "", "", True),
+    Item("sec. 3.2, P0 = I, table 2, ekf", f"{_KALMAN}; papers/du2025.py", False, "printed "
+         "settings, the first mass ± 1 kg: at no, half and full load", "299 / 389 / 275 kg",
+         "f = 0.0005: {printed_unit_start}; f = 0.005: {tenfold_unit_start}; f of the tyres: "
+         "{tyres_unit_start}", True),
     Item("eq. 34", f"{_BLEND}: step", False, "blend=speed is as printed; by default the share "
          "follows how well each filter foretold the forces", "", "", True),
 )  # fmt: skip
@@ -113,6 +117,9 @@ _TEXT: Final = (
          "fluctuate", "{swing_robust_rls}", True),
     Item("sec. 4.2, Kalman filter after braking", "papers/du2025.py: swing", False, "the same",
          "not affected", "{swing_ekf}", True),
+    Item("sec. 5, largest error after convergence, printed settings", _TABLES, False, "all methods "
+         "and drives; another simulator and other tyres", "below 10 %", "f = 0.0005: "
+         "{printed_largest}; f = 0.005: {tenfold_largest}; f of the tyres: {tyres_largest}", True),
     Item("sec. 5, largest error after convergence", "papers/du2025.py", False, "our filters, told "
          "the tyres' rolling resistance; then calibrated, with all effects", "below 10 %",
          "{ours_largest}; all effects: {road_largest}", False),

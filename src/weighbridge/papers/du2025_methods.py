@@ -97,6 +97,11 @@ class Settings:
             whole = replace(whole, blend=self.blend)
         return replace(whole, ekf=replace(whole.ekf, start=least))
 
+    def started_within(self, std: float) -> Settings:
+        """Return the same with another start of the printed Kalman filter, relative [-]."""
+        kalman = replace(self.printed.ekf, start_std=std)
+        return replace(self, printed=replace(self.printed, ekf=kalman))
+
     def blended(self, blend: hybrid.Blend) -> Settings:
         """Return the same with another blend of ours."""
         usual = hybrid.HybridSettings().blend

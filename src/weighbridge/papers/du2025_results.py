@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from weighbridge.estimators import MassTrack
+from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 
 
@@ -29,6 +33,8 @@ class DriveResult:
     printed : ``late_rmse`` of each method as printed, by `PRINTED_ROLLING`; empty where the bus
         is not known
     printed_mean : mean error of the running mass of the same [kg]
+    printed_worst : largest relative error of the running mass of the same from `CONVERGED` [-]
+    printed_unit_start : ``printed`` with a first variance of the mass of 1 kg², P0 = I
     printed_steady_at : ``steady_at`` of each method as printed, told the tyres' rolling resistance
     printed_swing : farthest that the running mass of the same moves after a braking in the cruise
         [-]
@@ -48,6 +54,8 @@ class DriveResult:
     blends: dict[str, float]
     printed: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_mean: dict[str, dict[str, float]] = field(default_factory=dict)
+    printed_worst: dict[str, dict[str, float]] = field(default_factory=dict)
+    printed_unit_start: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_steady_at: dict[str, float] = field(default_factory=dict)
     printed_swing: dict[str, float] = field(default_factory=dict)
 
@@ -68,3 +76,20 @@ class Reproduction:
     road: tuple[DriveResult, ...]
     sheet: tuple[DriveResult, ...]
     vehicle: Vehicle
+
+
+def cell(
+    drives: Sequence[DriveResult], load: str, method: str, name: str, form: str = ""
+) -> Floats:
+    """Return one figure of a cell of Table 2, drive by drive.
+
+    Parameters
+    ----------
+    drives : of any load
+    load : of `LOADS`
+    method : of `METHODS`
+    name : field of `DriveResult`
+    form : of `PRINTED_ROLLING`, where the field has one value for each
+    """
+    values = [getattr(d, name) for d in drives if d.load == load]
+    return np.array([(v[form] if form else v)[method] for v in values])

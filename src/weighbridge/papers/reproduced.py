@@ -21,12 +21,21 @@ class Comparison:
     figure : what is compared
     theirs, ours : as printed; ``theirs`` is empty where the paper has none
     good : False where ours falls behind
+    like_for_like : ours was made under the conditions of the printed figure, as far as a
+        simulated drive can be; where it was not, it is never ahead
     """
 
     figure: str
     theirs: str
     ours: str
     good: bool
+    like_for_like: bool = True
+
+    @property
+    def verdict(self) -> str:
+        """What stands beside the figures."""
+        told = (("behind", not self.good), ("other conditions", not self.like_for_like))
+        return ", ".join(word for word, so in told if so)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,13 +59,12 @@ class Reproduced:
 
     @property
     def comparison(self) -> Table:
-        """The figures beside the paper's, those behind marked."""
+        """The figures beside the paper's, those behind or of other conditions marked."""
         return Table(
             self.title,
             ("figure", "paper", "ours", ""),
-            tuple((c.figure, c.theirs, c.ours, "" if c.good else "behind")
-                  for c in self.comparisons),
-        )  # fmt: skip
+            tuple((c.figure, c.theirs, c.ours, c.verdict) for c in self.comparisons),
+        )
 
     def write_report(self, path: Path) -> None:
         """Write a page that begins with what the paper has and what we have.
@@ -70,5 +78,9 @@ class Reproduced:
 
     @property
     def behind(self) -> tuple[str, ...]:
-        """Names of the figures that fall behind."""
-        return tuple(c.figure for c in self.comparisons if not c.good)
+        """Names of the figures that fall behind, and whether that is under other conditions."""
+        return tuple(
+            c.figure if c.like_for_like else f"{c.figure} (other conditions)"
+            for c in self.comparisons
+            if not c.good
+        )
