@@ -57,24 +57,40 @@ def test_ten_percent_are_reached_before_five(done):
     r = results[paper.PAPERS_CASE.name][0]
     assert np.all(r.near <= r.settled)
     # Row by row from the end: the last sample outside 10 % of the first load.
-    relative = np.abs(shown.track.parameters / shown.made.inertias - 1.0)[: 7 * 1000, 0]
+    ours = shown[paper.PAPERS_CASE.name]
+    relative = np.abs(ours.track.parameters / ours.made.inertias - 1.0)[: 7 * 1000, 0]
     assert r.near[0, 0] == pytest.approx((np.flatnonzero(relative > 0.1)[-1] + 1) / 1000.0)
 
 
 def test_errors_are_those_of_eq_10(done):
     results, shown = done
-    r = results[paper.CASES[0].name][0]
-    error = shown.track.parameters[:, 2] - shown.made.inertias[:, 2]
+    r, run = results[paper.CASES[0].name][0], shown[paper.CASES[0].name]
+    error = run.track.parameters[:, 2] - run.made.inertias[:, 2]
     assert r.rmse[2] == pytest.approx(np.sqrt(np.mean(error**2)))
-    assert r.mape[2] == pytest.approx(np.mean(np.abs(error) / shown.made.inertias[:, 2]))
+    assert r.mape[2] == pytest.approx(np.mean(np.abs(error) / run.made.inertias[:, 2]))
 
 
 def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
     monkeypatch.setattr(paper, "reproduce", lambda **_: done)
     page = tmp_path / "page.html"
-    paper.reproduced(5, None).write_report(page)
+    made = paper.reproduced(5, None)
+    made.write_report(page)
     text = page.read_text(encoding="utf-8")
     assert text.index("MAPE of the sprung mass, worst road") < text.index("Table 2 of the paper")
+    for case in (paper.PAPERS_CASE, paper.EXTENDED):
+        assert f"Sprung mass: {case.name}" in text
+        assert f"Vertical velocity: {case.name}" in text
+
+
+def test_the_filter_as_printed_is_judged_and_ours_is_of_other_conditions(done):
+    told = {c.figure: c.verdict for c in paper._comparisons(done[0])}
+    printed = "MAPE of mass, roll and pitch, {}, median road"
+    assert told[printed.format(paper.AS_IN_PRINT.name)] == "behind"
+    assert told[printed.format(paper.PRINTED_NOISE.name)] == "behind"
+    assert told[printed.format(paper.EXTENDED.name)] == ""
+    ours = [verdict for figure, verdict in told.items() if figure.startswith("ours")]
+    assert len(ours) == 13
+    assert set(ours) == {"other conditions"}
 
 
 def test_settings_reach_the_cases_that_have_the_papers():

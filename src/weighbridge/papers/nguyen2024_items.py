@@ -67,8 +67,8 @@ ITEMS: Final = (
     *_followed("inverse"),
     Item("table 2, MAPE, noise read as variance", _OURS, False, "hypotheses of jumps in place of a "
          "fixed Q; v as variance drowns the velocities", _TABLE_2, "{mape variance}", True),
-    Item("figs. 5, 6", "the report's figures", False, "of our filter, hypotheses of jumps", "", "",
-         True),
+    Item("figs. 5, 6", "the report's figures", False, "by the paper's filter, `extended` with Q "
+         "per parameter, and by ours, hypotheses of jumps", "", "", True),
     Item("table 2, MAPE", _OURS, False, "hypotheses of jumps in place of a fixed Q", _TABLE_2,
          "{mape}", False),
     Item("table 2, RMSE", _OURS, False, "the same", "509.4 kg / 566.7 / 1829.5 kg m²",
