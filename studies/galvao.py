@@ -51,8 +51,7 @@ def markdown(table: Table) -> str:
 def comparison_table(done: paper.Reproduction) -> str:
     lines = ["| figure | paper | ours | |", "|---|---|---|---|"]
     lines += [
-        f"| {c.figure} | {c.theirs} | {c.ours} | {'' if c.good else 'behind'} |"
-        for c in paper.comparisons(done)
+        f"| {c.figure} | {c.theirs} | {c.ours} | {c.verdict} |" for c in paper.comparisons(done)
     ]
     return "\n".join(lines)
 

@@ -8,9 +8,17 @@ import pytest
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.settings import changed
 from weighbridge.papers import PAPERS, galvao
+from weighbridge.papers.galvao_bounds import speed_says
 from weighbridge.papers.galvao_figures import item_figures
 from weighbridge.papers.galvao_statistics import rank_correlation, slope
-from weighbridge.papers.galvao_torque import TorqueTrial, torque_figures, torque_table, torque_trial
+from weighbridge.papers.galvao_torque import (
+    WAYS,
+    TorqueTrial,
+    Weighed,
+    torque_figures,
+    torque_table,
+    torque_trial,
+)
 
 
 @pytest.fixture(scope="module")
@@ -20,8 +28,9 @@ def three():
 
 @pytest.fixture
 def done(three):
-    fitted, _, tests = three
+    fitted, drives, tests = three
     masses = np.linspace(1092.0, 1492.0, 9)
+    std30, std40 = np.full(5, 30.0), np.full(5, 40.0)
     wild = 1000.0 + 700.0 * np.sin(np.arange(9.0))
     trial = galvao.Trial(
         kind="other masses", masses=masses, answers=np.full(9, 1092.0), pinned=wild
@@ -35,11 +44,19 @@ def done(three):
         trials=(trial, trial),
         torque=TorqueTrial(
             masses=np.array([1092.0, 1092.0, 1092.0, 1292.0, 1492.0]),
-            by_grade=np.array([1092.0, 1081.08, 1102.92, 1292.0, np.nan]),
-            by_grade_std=np.full(5, 30.0),
-            blind=np.array([1092.0, 982.8, 982.8, 1292.0, 1492.0]),
-            blind_std=np.full(5, 40.0),
+            ways=dict(
+                zip(
+                    WAYS,
+                    (
+                        Weighed(np.array([1092.0, 1081.08, 1102.92, 1292.0, np.nan]), std30),
+                        Weighed(np.array([1092.0, 982.8, 982.8, 1292.0, 1492.0]), std40),
+                        Weighed(np.array([1092.0, 1092.0, 1092.0, 1192.0, 1292.0]), std40),
+                    ),
+                    strict=True,
+                )
+            ),
         ),
+        says=speed_says(drives, 1234),
     )
 
 
@@ -90,7 +107,8 @@ def test_sample_time_model_and_mean_are_settings(three):
 def test_what_falls_behind_is_told(done):
     by_start, band, printed, *_ = galvao.comparisons(done)
     assert "gives back the mass it is started from" in by_start.figure
-    assert (by_start.good, band.good, printed.good) == (True, True, False)
+    verdicts = (by_start.verdict, band.verdict, printed.verdict)
+    assert verdicts == ("other conditions", "other conditions", "behind")
     off = done.tests[0]
     moved = replace(off, mass=1.01 * off.mass)
     worse = galvao.comparisons(replace(done, tests=(moved, *done.tests[1:])))
@@ -125,11 +143,24 @@ def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
     assert text.index("largest error from 1500 kg") < text.index("Test 01")
 
 
-def test_recorded_torque_weighs_the_load_where_speed_alone_does_not():
-    done = torque_trial(1234, galvao.easy_route(1234))
-    assert np.max(np.abs(done.errors(done.by_grade))) < 0.05
-    gain = np.polyfit(done.masses, done.by_grade, 1)[0]
+@pytest.fixture(scope="module")
+def trial():
+    return torque_trial(1234, galvao.easy_route(1234))
+
+
+def test_recorded_torque_weighs_the_load_where_speed_alone_does_not(trial):
+    by_map, *_ = WAYS
+    assert np.max(np.abs(trial.errors(by_map))) < 0.05
+    gain = np.polyfit(trial.masses, trial.ways[by_map].mass, 1)[0]
     assert gain == pytest.approx(1.0, abs=0.15)
+    assert trial.slope(by_map)[0] == pytest.approx(gain)
+
+
+def test_a_calibration_that_knows_more_of_the_grade_than_the_drive_makes_it_light(trial):
+    _, alike, mixed = WAYS
+    # Drives that no calibration saw.
+    by_alike, by_mixed = (np.mean(trial.errors(way)[1:]) for way in (alike, mixed))
+    assert by_mixed < by_alike - 0.03
 
 
 def test_errors_of_recorded_torque_are_told(done):
@@ -139,11 +170,24 @@ def test_errors_of_recorded_torque_are_told(done):
     # 109 kg off with ± 78 told, twice.
     assert said["blind torque errors"].endswith("3 of 5 within 95 % told")
     assert said["torque errors"].endswith("4 of 4 within 95 % told")
-    last = torque_table(done.torque).rows[-1]
+    *_, last, slopes = torque_table(done.torque).rows
     assert last[2] == "no mass"
+    # 100 kg found for 200 loaded, and 200 for 400.
+    assert slopes[-2] == "+0.50 ± 0.00"
+    assert said["torque slopes"].startswith(slopes[2])
 
 
 def test_the_error_that_stays_is_that_of_the_run(done):
     said = item_figures(done)["printed late errors"]
     ends = [100.0 * abs(t.printed.mass[t.printed.used][-1] / t.mass - 1.0) for t in done.tests]
     assert said.endswith(f"at the end {' / '.join(f'{x:.0f}' for x in ends)} %")
+
+
+def test_speed_alone_bounds_the_mass_and_tells_the_drag_over_it(done):
+    assert np.all(done.says.bounds > 1092.0)
+    assert np.all(done.says.bounds < 10_000.0)
+    low, high = done.says.coast.interval()
+    # Drag area and mass of sec. 2.1.
+    assert low < 0.35 * 2.15 / 1092.0 < high
+    assert done.says.coast.drag_over_mass == pytest.approx(0.35 * 2.15 / 1092.0, rel=0.05)
+    assert item_figures(done)["bounds"].endswith("truly 1092")

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.estimators.speed_ekf import FilterRun
+from weighbridge.papers.galvao_bounds import speed_figures
 from weighbridge.papers.galvao_results import Reproduction, Test
 from weighbridge.papers.galvao_statistics import slope
 from weighbridge.papers.galvao_torque import torque_figures
@@ -34,6 +35,7 @@ def item_figures(done: Reproduction) -> dict[str, str]:
     return {
         **found,
         **torque_figures(done.torque),
+        **speed_figures(done.says),
         "slope": "{:+.4f} ± {:.4f}".format(*slope(done.trials[-1].masses, done.trials[-1].answers)),
     }
 

@@ -10,6 +10,7 @@ import numpy as np
 from weighbridge.balance import ForceBalance
 from weighbridge.calibration.speed_fit import SpeedRows
 from weighbridge.estimators.speed_ekf import FilterRun
+from weighbridge.papers.galvao_bounds import SpeedSays
 from weighbridge.papers.galvao_torque import TorqueTrial
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
@@ -83,6 +84,7 @@ class Reproduction:
         the fit
     trials : drives the paper did not try
     torque : the tests with the torque recorded
+    says : what speed alone tells of the tests
     """
 
     vehicle: Vehicle
@@ -92,3 +94,4 @@ class Reproduction:
     stated: tuple[tuple[float, float, float], ...]
     trials: tuple[Trial, ...]
     torque: TorqueTrial
+    says: SpeedSays

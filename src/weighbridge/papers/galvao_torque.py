@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Final
 
@@ -11,10 +12,11 @@ from weighbridge.calibration.run import run_calibration
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.estimators.speed_torque_ekf import SpeedTorqueSettings
 from weighbridge.papers.galvao_drives import CAR, mass_of, scenario, with_grade
+from weighbridge.papers.galvao_statistics import slope
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
-from weighbridge.signals import Floats
-from weighbridge.simulation import Polling, Route, SimulatedDrive, simulate_car
+from weighbridge.signals import Drive, Floats
+from weighbridge.simulation import Polling, Route, simulate_car
 from weighbridge.vehicle.model import Driveline, Vehicle
 
 METHOD: Final = "speed-torque-ekf"
@@ -34,28 +36,47 @@ POLLED: Final = Polling(
 """Speed, engine speed and load at 4 Hz, a third of which is the torque."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TorqueTrial:
-    """Drives of one road, weighed by speed and recorded torque; arrays (n,) one value a drive.
+WAYS: Final = ("grade of a map", "no grade", "no grade, calibrated with one")
+"""What is known of the grade."""
 
-    The model is calibrated on the first drive with its true grade, as the paper does.
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """Drives as weighed in one way; arrays (n,) one value a drive.
 
     Attributes
     ----------
-    masses : true [kg]
-    by_grade, by_grade_std : weighed with the grade of a map, and standard deviation [kg]
-    blind, blind_std : weighed without a grade, as the paper's filter [kg]
+    mass : NaN where there is none [kg]
+    std : [kg]
+    """
+
+    mass: Floats
+    std: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TorqueTrial:
+    """Drives of one road, weighed by speed and recorded torque.
+
+    Attributes
+    ----------
+    masses : true (n,) [kg]
+    ways : the same drives weighed, by `WAYS`; each is calibrated on the first drive with what the
+        way knows of the grade, the last one as the paper: with the true grade
     """
 
     masses: Floats
-    by_grade: Floats
-    by_grade_std: Floats
-    blind: Floats
-    blind_std: Floats
+    ways: Mapping[str, Weighed]
 
-    def errors(self, found: Floats) -> Floats:
-        """Relative errors of masses that were found (n,) [-]."""
-        return found / self.masses - 1.0
+    def errors(self, way: str) -> Floats:
+        """Relative errors of a way (n,) [-]."""
+        return self.ways[way].mass / self.masses - 1.0
+
+    def slope(self, way: str) -> tuple[float, float]:
+        """Kg found per kg loaded by a way, and standard error, of the drives with a mass [-]."""
+        found = self.ways[way].mass
+        known = np.isfinite(found)
+        return slope(self.masses[known], found[known])
 
 
 def torque_trial(
@@ -70,39 +91,37 @@ def torque_trial(
     settings : of the method; the defaults from the paper's start when None
     """
     settings = settings or FROM_PRINTED_START
-    drives = [
+    made = [
         simulate_car(replace(scenario(seed + k, route, payload=load), polling=POLLED))
         for k, load in enumerate(LOADS)
     ]
-    base = Vehicle(name=CAR.name, driveline=Driveline(wheel_radius=CAR.wheel_radius))
-    car = run_calibration(
-        [with_grade(drives[0])],
-        [mass_of(drives[0])],
-        vehicle=base,
-        settings=CalibrationSettings(method=METHOD),
-    ).vehicle
-    by_grade = _weighed(drives, car, settings, graded=True)
-    blind = _weighed(drives, car, settings, graded=False)
+    masses = np.array([mass_of(one) for one in made])
+    plain = [one.drive for one in made]
+    graded = [with_grade(one) for one in made]
+    car = _calibrated(plain[0], masses[0])
+    graded_car = _calibrated(graded[0], masses[0])
+    ways = ((graded, graded_car), (plain, car), (plain, graded_car))
     return TorqueTrial(
-        masses=np.array([mass_of(made) for made in drives]),
-        by_grade=by_grade[0],
-        by_grade_std=by_grade[1],
-        blind=blind[0],
-        blind_std=blind[1],
+        masses=masses,
+        ways={
+            name: _weighed(drives, by, settings)
+            for name, (drives, by) in zip(WAYS, ways, strict=True)
+        },
     )
 
 
-def _weighed(
-    drives: list[SimulatedDrive], car: Vehicle, settings: SpeedTorqueSettings, *, graded: bool
-) -> tuple[Floats, Floats]:
+def _calibrated(drive: Drive, mass: float) -> Vehicle:
+    base = Vehicle(name=CAR.name, driveline=Driveline(wheel_radius=CAR.wheel_radius))
+    settings = CalibrationSettings(method=METHOD)
+    return run_calibration([drive], [mass], vehicle=base, settings=settings).vehicle
+
+
+def _weighed(drives: list[Drive], car: Vehicle, settings: SpeedTorqueSettings) -> Weighed:
     usual = SpeedTorqueSettings()
     values = {f.name: getattr(settings, f.name) for f in fields(settings)}
     changed = {name: value for name, value in values.items() if value != getattr(usual, name)}
-    found = [
-        weigh(with_grade(made) if graded else made.drive, car, METHOD, settings=changed)
-        for made in drives
-    ]
-    return np.array([w.mass for w in found]), np.array([w.std for w in found])
+    found = [weigh(drive, car, METHOD, settings=changed) for drive in drives]
+    return Weighed(np.array([w.mass for w in found]), np.array([w.std for w in found]))
 
 
 def torque_table(done: TorqueTrial) -> Table:
@@ -111,27 +130,34 @@ def torque_table(done: TorqueTrial) -> Table:
     for k, load in enumerate(LOADS):
         name = f"Test {k + 1:02d}" if load == 0.0 else f"{load:.0f} kg loaded"
         cells = []
-        for found, std in ((done.by_grade, done.by_grade_std), (done.blind, done.blind_std)):
+        for way, found in done.ways.items():
+            mass, half = found.mass[k], 1.96 * found.std[k]
+            known = np.isfinite(mass)
             cells += [
-                f"{found[k]:.0f} ± {1.96 * std[k]:.0f}" if np.isfinite(found[k]) else "no mass",
-                f"{100.0 * (found[k] / done.masses[k] - 1.0):+.1f}",
+                f"{mass:.0f} ± {half:.0f}" if known else "no mass",
+                f"{100.0 * done.errors(way)[k]:+.1f}" if known else "",
             ]
         rows.append((name, f"{done.masses[k]:.0f}", *cells))
+    per_load = [cell for way in done.ways for cell in (_per_load(done, way), "")]
+    rows.append(("kg found per kg loaded", "", *per_load))
+    heads = [head for way in done.ways for head in (f"{way}: kg", "error %")]
     return Table(
         f"Torque recorded (eq. 13), started at {START:.0f} kg; Test 01 is the calibration's",
-        ("drive", "true kg", "grade of a map: kg", "error %", "no grade: kg", "error %"),
+        ("drive", "true kg", *heads),
         tuple(rows),
     )
+
+
+def _per_load(done: TorqueTrial, way: str) -> str:
+    return "{:+.2f} ± {:.2f}".format(*done.slope(way))
 
 
 def torque_figures(done: TorqueTrial) -> dict[str, str]:
     """Figures that the paper's items ask for."""
     found = {}
-    for name, masses, std in (
-        ("torque", done.by_grade, done.by_grade_std),
-        ("blind torque", done.blind, done.blind_std),
-    ):
-        errors = 100.0 * done.errors(masses)
+    for name, way in zip(("torque", "blind torque", "mixed torque"), WAYS, strict=True):
+        errors = 100.0 * done.errors(way)
+        masses, std = done.ways[way].mass, done.ways[way].std
         known = np.isfinite(masses)
         held = np.count_nonzero(np.abs(masses - done.masses)[known] < 1.96 * std[known])
         tests = " / ".join(f"{abs(x):.1f}" for x in errors[:3])
@@ -140,4 +166,5 @@ def torque_figures(done: TorqueTrial) -> dict[str, str]:
             f"errors {tests} %; 200 and 400 kg loaded {loaded} %; {held} of {known.sum()} within "
             "95 % told"
         )
+    found["torque slopes"] = f"{_per_load(done, WAYS[0])}; no grade {_per_load(done, WAYS[1])}"
     return found

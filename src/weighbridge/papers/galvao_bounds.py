@@ -1,0 +1,133 @@
+"""What speed alone does say of the paper's car: a bound of its mass, and drag over mass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from weighbridge.constants import (
+    GAS_CONSTANT_DRY_AIR,
+    GRAVITY,
+    STANDARD_PRESSURE,
+    STANDARD_TEMPERATURE,
+)
+from weighbridge.papers.galvao_drives import CAR, with_grade
+from weighbridge.pipeline.speed_bounds import CoastDown, coast_down, mass_bound
+from weighbridge.signals import Drive, Floats, Signal
+from weighbridge.signals.units import from_si, to_si
+from weighbridge.simulation import SimulatedDrive
+from weighbridge.vehicle.model import Driveline, RoadLoad, Vehicle
+
+FULL_POWER: Final = float(np.max(np.multiply(CAR.curve_speed, CAR.curve_torque)))
+"""Of the engine by its data sheet; what is lost on the way makes the bound higher [W]."""
+
+SHEET: Final = Vehicle(
+    name=CAR.name,
+    tare=CAR.mass,
+    driveline=Driveline(wheel_radius=CAR.wheel_radius, wheel_inertia=CAR.wheel_inertia),
+    road_load=RoadLoad(
+        drag_area=CAR.drag_area,
+        drag_area_std=0.03,
+        rolling_coefficient=CAR.rolling_coefficient,
+        rolling_coefficient_std=0.001,
+    ),
+)
+"""The car as its papers have it."""
+
+COASTS: Final = 3
+"""Coast-downs in each direction."""
+
+FAST, SLOW, STEP, PERIOD = 30.0, 10.0, 0.01, 0.25
+"""First and last speed of a coast-down [m/s]; steps of the motion and of the record [s]."""
+
+WIND, WIND_STD = 3.0, 0.5
+"""Along the road, and how it differs from one coast-down to the next [m/s]."""
+
+Spans = list[tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedSays:
+    """What speed and grade tell without a torque.
+
+    Attributes
+    ----------
+    bounds : highest mass that each of the tests allows [kg]
+    coast : of coasting in both directions, wind along the road
+    drag_over_mass : true [m^2/kg]
+    """
+
+    bounds: Floats
+    coast: CoastDown
+    drag_over_mass: float
+
+
+def speed_says(tests: Sequence[SimulatedDrive], seed: int) -> SpeedSays:
+    """Bound the mass of the tests by the engine's full power, and coast the same car down."""
+    bounds = [mass_bound(with_grade(made), SHEET, FULL_POWER).mass for made in tests]
+    return SpeedSays(
+        bounds=np.array(bounds),
+        coast=coast_down(*coasting(seed), vehicle=SHEET),
+        drag_over_mass=CAR.drag_area / CAR.mass,
+    )
+
+
+def coasting(seed: int) -> tuple[Drive, Spans, Spans]:
+    """Coast down there and back on a level road; the speed is read in whole km/h at 4 Hz.
+
+    Parameters
+    ----------
+    seed : of the wind
+
+    Returns
+    -------
+    drive : with speed and grade
+    there, back : spans out of gear [s]
+    """
+    parts: list[Floats] = []
+    spans: tuple[Spans, Spans] = ([], [])
+    now = 0.0
+    winds = np.random.default_rng(seed).normal(WIND, WIND_STD, 2 * COASTS)
+    for run, wind in enumerate(winds):
+        back = run % 2
+        course = _coast(-wind if back else wind)
+        spans[back].append((now + 2.0, now + STEP * course.size - 2.0))
+        up = np.linspace(SLOW, FAST, round(15.0 / STEP))
+        parts += [course, up]
+        now += STEP * (course.size + up.size)
+    speed = np.concatenate(parts)[:: round(PERIOD / STEP)]
+    time = PERIOD * np.arange(speed.size, dtype=np.float64)
+    read = to_si(np.round(from_si(speed, "kmh")), "kmh")
+    level = np.zeros(speed.size)
+    signals = (
+        Signal("vehicle_speed", time, read),
+        Signal("grade", time, level),
+        Signal("altitude", time, level),
+    )
+    return Drive(name="coast-down", signals={s.name: s for s in signals}), *spans
+
+
+def _coast(head_wind: float) -> Floats:
+    """Speeds of one coast-down, step by step [m/s]."""
+    turning = CAR.mass + CAR.wheel_inertia / CAR.wheel_radius**2
+    rolling = CAR.mass * GRAVITY * CAR.rolling_coefficient
+    density = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)
+    drag = 0.5 * density * CAR.drag_area
+    course = [FAST]
+    while course[-1] > SLOW:
+        force = drag * (course[-1] + head_wind) ** 2 + rolling
+        course.append(course[-1] - STEP * force / turning)
+    return np.array(course)
+
+
+def speed_figures(said: SpeedSays) -> dict[str, str]:
+    """Figures that the paper's items ask for."""
+    low, high = said.coast.interval()
+    return {
+        "bounds": f"at most {' / '.join(f'{x:.0f}' for x in said.bounds)} kg, truly {CAR.mass:.0f}",
+        "coast": f"{1e3 * said.coast.drag_over_mass:.3f} ({1e3 * low:.3f} to {1e3 * high:.3f}), "
+        f"truly {1e3 * said.drag_over_mass:.3f} m²/t",
+    }
