@@ -160,7 +160,8 @@ def test_a_wrong_scale_is_corrected(any_vehicle, gain):
     assert not any("its scale is off" in n for n in plain.notes)
     assert motion.specific_force_scale_std > 0.0
     slope, _ = force_slope(motion, plain)
-    assert slope == pytest.approx(1.0, abs=0.025)
+    # Left as it is the worst of them is 10 % off, the step half of that on average.
+    assert slope == pytest.approx(1.0, abs=0.035)
 
 
 @pytest.mark.parametrize("lag", [0.7, 1.5, 3.0])
