@@ -118,7 +118,8 @@ def agrees(shown: str, said: str, tolerance: float) -> bool:
 
     Another processor rounds otherwise: numbers may differ by a part `tolerance` of
     themselves or by as much in absolute terms, whichever is more. A number of kilograms may
-    differ by that part of the greatest one shown, since a payload is a difference of masses.
+    differ by that part of the greatest one shown, since a payload is a difference of masses, and
+    those of a line with percents by 1.
     Lines of ``...`` stand for any number of lines.
     """
     return _found(shown, said, tolerance) is not None
@@ -187,10 +188,11 @@ def _alike(a: str, b: str, tolerance: float, heaviest: float) -> bool:
     if _RULES.sub(" ", _NUMBER.sub("#", a)).split() != _RULES.sub(" ", _NUMBER.sub("#", b)).split():
         return False
     masses = {match.start(1) for match in _MASS.finditer(a)}
+    least = 1.0 if "%" in a else tolerance
     for left, right in zip(_NUMBER.finditer(a), _NUMBER.findall(b), strict=True):
         x, y = _number(left[0]), _number(right)
         greatest = max(1.0, abs(x), abs(y), heaviest if left.start() in masses else 0.0)
-        if x != y and abs(x - y) > tolerance * greatest:
+        if abs(x - y) > max(least, tolerance * greatest):
             return False
     return True
 

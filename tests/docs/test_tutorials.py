@@ -82,6 +82,7 @@ def test_a_notebook_runs_alone_and_says_what_it_shows(page, tmp_path):
         ("mass 1000 kg, payload 200 kg", "mass 1000 kg, payload 240 kg", False),
         ("mass 1000 kg, drag 0.60 m²", "mass 1000 kg, drag 0.80 m²", False),
         ("mass 1000 kg, share 20 %", "mass 1000 kg, share 23 %", False),
+        ("error -0.2 %, 95 % from -1.4 %", "error 0.1 %, 95 % from -1.9 %", True),
         ("a 1\n...\nc 3", "a 1\nb 2\nb 2\nc 3", True),
         ("a 1\n...\nc 3", "a 1\nb 2", False),
         ("a 1\n...", "a 1\nb 2", True),
