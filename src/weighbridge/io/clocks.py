@@ -194,8 +194,9 @@ def _put(counted: Sequence[Log], offset: float, dated: Sequence[Log], why: str) 
     zone = math.remainder(-offset, 86_400.0) / 3600.0
     return Problem(
         "",
-        f"{why}: they were put on {day:%Y-%m-%d}, {zone:+.1f} h from UTC; if the clocks differ by "
-        f"seconds, {_REMEDY}",
+        f"{why}: they were put on {day:%Y-%m-%d}, {zone:+.1f} h from UTC; if the clocks differ, by "
+        "tenths of a second even, set align = true or offset_s under [time] of the file's table in "
+        "a mapping",
     )
 
 
