@@ -227,6 +227,28 @@ def test_decimal_commas_in_a_sparse_table(tmp_path):
     assert {c.quantity for c in found.known} == {"vehicle_speed", "engine_speed"}
 
 
+def clock_rows(stamps, rest):
+    return [f"{t // 60 + 8:02d}:{t % 60:02d}:02,610;{rest}" for t in stamps]
+
+
+@pytest.mark.parametrize("name", ["Uur", "Godzina", "Godz.", "Czas lokalny"])
+def test_a_clock_of_any_name_is_the_time(tmp_path, name):
+    rows = clock_rows(range(90), "0;820,5")
+    path = written(tmp_path / "obd.csv", [f"{name};Speed [km/h];Obroty [obr/min]", *rows])
+    found = draft(path)
+    assert (found.time, found.time_format, found.row_rate) == (name, "clock", None)
+    assert found.duration == pytest.approx(89 * 60.0)
+    assert any("rises as one" in d for d in found.doubts) == (name == "Uur")
+
+
+@pytest.mark.parametrize("stamps", [[7] * 40, [50 - k for k in range(40)]])
+def test_a_clock_that_does_not_rise_is_not_the_time(tmp_path, stamps):
+    rows = clock_rows(stamps, "0;820,5")
+    found = draft(written(tmp_path / "obd.csv", ["Start;Speed [km/h];RPM", *rows]))
+    assert found.time == ""
+    assert found.rate_unknown
+
+
 @pytest.mark.parametrize("name", ["event_time", "ts_ecu", "EventTs", "x"])
 def test_a_time_of_another_name_is_found(tmp_path, name):
     path = tmp_path / "trip.parquet"

@@ -174,15 +174,15 @@ def _told_rate(above: Sequence[str]) -> float:
 
 
 def _likely_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime | None:
-    """Read a column that rises as a time where part of its name, or its size, says so."""
+    """Read a column that rises as a time where part of its name, its size or its text says so."""
     unit, _ = unit_of(raw.names[index])
     named = bool(TIME_WORDS & set(words_of(raw.names[index])))
     named = named or (unit is not None and UNITS[unit].dimension == "s")
     found = _as_time(raw, index, units)
-    if found is None or not (named or since_1970(found.seconds)):
+    if found is None or not (named or since_1970(found.seconds) or found.format == "clock"):
         return None
-    steps = np.diff(found.seconds[np.isfinite(found.seconds)])
-    if np.mean(steps >= 0.0) < RISES:
+    known = found.seconds[np.isfinite(found.seconds)]
+    if known.size < 2 or known[-1] <= known[0] or np.mean(np.diff(known) >= 0.0) < RISES:
         return None
     found.doubts.append(f"{found.column!r} is taken for the time, for it rises as one")
     return found
