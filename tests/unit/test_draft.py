@@ -453,6 +453,12 @@ def test_columns_of_a_text_without_a_header_are_named_in_their_order(tmp_path):
     np.testing.assert_allclose(np.diff(drive.signals["engine_speed"].time), 0.25, atol=1e-6)
 
 
+def test_a_first_row_of_a_clock_and_empty_cells_is_no_header(tmp_path):
+    rows = [row + ";;" for row in clock_rows(range(90), "0")]
+    with pytest.raises(DriveError, match=r"has no header line.*--columns"):
+        draft(written(tmp_path / "obd.csv", rows))
+
+
 @pytest.mark.parametrize(
     ("names", "said"),
     [

@@ -95,6 +95,11 @@ def is_number(cell: str) -> bool:
     return _NUMBER.match(cell) is not None
 
 
+def is_clock(cell: str) -> bool:
+    """Tell whether a cell is a time of day, such as 08:14:02.610."""
+    return _CLOCK.match(cell) is not None
+
+
 def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) -> list[DraftTime]:
     """Find the columns that can be the time, the likeliest first.
 
@@ -271,7 +276,7 @@ def text_time_format(texts: Sequence[str]) -> tuple[str, list[str]]:
     """
     if not texts:
         return "", []
-    if all(_CLOCK.match(t) for t in texts):
+    if all(map(is_clock, texts)):
         return "clock", []
     if all(_ISO.match(t) for t in texts):
         return "iso", []
