@@ -227,6 +227,28 @@ def test_decimal_commas_in_a_sparse_table(tmp_path):
     assert {c.quantity for c in found.known} == {"vehicle_speed", "engine_speed"}
 
 
+def clock_rows(stamps, rest):
+    return [f"{t // 60 + 8:02d}:{t % 60:02d}:02,610;{rest}" for t in stamps]
+
+
+@pytest.mark.parametrize("name", ["Uur", "Godzina", "Godz.", "Czas lokalny"])
+def test_a_clock_of_any_name_is_the_time(tmp_path, name):
+    rows = clock_rows(range(90), "0;820,5")
+    path = written(tmp_path / "obd.csv", [f"{name};Speed [km/h];Obroty [obr/min]", *rows])
+    found = draft(path)
+    assert (found.time, found.time_format, found.row_rate) == (name, "clock", None)
+    assert found.duration == pytest.approx(89 * 60.0)
+    assert any("rises as one" in d for d in found.doubts) == (name == "Uur")
+
+
+@pytest.mark.parametrize("stamps", [[7] * 40, [50 - k for k in range(40)]])
+def test_a_clock_that_does_not_rise_is_not_the_time(tmp_path, stamps):
+    rows = clock_rows(stamps, "0;820,5")
+    found = draft(written(tmp_path / "obd.csv", ["Start;Speed [km/h];RPM", *rows]))
+    assert found.time == ""
+    assert found.rate_unknown
+
+
 @pytest.mark.parametrize("name", ["event_time", "ts_ecu", "EventTs", "x"])
 def test_a_time_of_another_name_is_found(tmp_path, name):
     path = tmp_path / "trip.parquet"
@@ -429,6 +451,12 @@ def test_columns_of_a_text_without_a_header_are_named_in_their_order(tmp_path):
     drive = read_drive(path, mapping)
     np.testing.assert_allclose(drive.signals["vehicle_speed"].values, SPEED / 3.6, atol=0.002)
     np.testing.assert_allclose(np.diff(drive.signals["engine_speed"].time), 0.25, atol=1e-6)
+
+
+def test_a_first_row_of_a_clock_and_empty_cells_is_no_header(tmp_path):
+    rows = [row + ";;" for row in clock_rows(range(90), "0")]
+    with pytest.raises(DriveError, match=r"has no header line.*--columns"):
+        draft(written(tmp_path / "obd.csv", rows))
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from weighbridge.io.columns import stated_unit
-from weighbridge.io.naming import is_time, recognise_all
+from weighbridge.io.naming import is_time, recognise, recognise_all
 
 HEADERS = tomllib.loads((Path(__file__).parent / "logger_headers.toml").read_text("utf-8"))
 APPS = tomllib.loads((Path(__file__).parent / "app_headers.toml").read_text("utf-8"))
@@ -92,6 +92,37 @@ def test_columns_in_nine_languages(held_out, least):
 def test_a_last_word_is_a_unit_where_the_quantity_has_it(name, quantity, unit):
     found = recognise_all([name])[0]
     assert (found.quantity, found.unit) == (quantity, unit)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("Obroty silnika [obr/min]", "engine_speed", "rpm"),
+        ("Otáčky motoru [ot/min]", "engine_speed", "rpm"),
+        ("Motor devri [dev/dk]", "engine_speed", "rpm"),
+        ("Motor devri (d/dk)", "engine_speed", "rpm"),
+        ("Motorvarvtal [varv/min]", "engine_speed", "rpm"),
+        ("Motortoerental [omw/min]", "engine_speed", "rpm"),
+        ("Giri motore [giri/min]", "engine_speed", "rpm"),
+        ("Régime moteur [tr/min]", "engine_speed", "rpm"),
+        ("Motordrehzahl [U/min]", "engine_speed", "rpm"),
+        ("przysp_x", "accel_x", None),
+        ("Przyspieszenie Y [m/s2]", "accel_y", "mps2"),
+        ("żyro_z", "gyro_z", None),
+        ("szer_geo", "latitude", None),
+        ("dlug_geo", "longitude", None),
+        ("Długość geo", "longitude", None),
+        ("wysokosc", "altitude", None),
+        ("predkosc_gps", "gnss_speed", None),
+    ],
+)
+def test_names_and_units_of_an_engine_s_turns_and_of_a_polish_phone(name, quantity, unit):
+    found = recognise(name)
+    assert (found.quantity, found.unit) == (quantity, unit)
+
+
+def test_an_acceleration_without_gravity_is_none_of_the_sensor():
+    assert recognise("Przyspieszenie liniowe X").quantity == ""
 
 
 def test_axes_are_named_by_the_directions_of_the_vehicle():

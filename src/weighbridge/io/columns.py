@@ -23,7 +23,9 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "°f": "degf", "℉": "degf", "f": "degf", "â°c": "degc", "â°": "deg",
     "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
     "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
-    "tr/min": "rpm",
+    "tr/min": "rpm", "tours/min": "rpm", "giri/min": "rpm", "r.p.m.": "rpm", "min⁻¹": "rpm",
+    "omw/min": "rpm", "toeren/min": "rpm", "varv/min": "rpm", "obr/min": "rpm", "obr./min": "rpm",
+    "ot/min": "rpm", "ot./min": "rpm", "dev/dk": "rpm", "d/dk": "rpm", "dev/dak": "rpm",
     "kg/h": "kgph", "kg/hr": "kgph", "lb/min": "lbpmin", "lbs/min": "lbpmin", "msec": "ms",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip

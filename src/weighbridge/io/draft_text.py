@@ -11,7 +11,7 @@ import numpy as np
 
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import UNKNOWN_UNIT, stated_unit
-from weighbridge.io.draft_time import is_number
+from weighbridge.io.draft_time import is_clock, is_number
 from weighbridge.io.table import SEPARATORS, TextFormat, cells, head
 
 HEAD_LINES: Final = 60
@@ -122,6 +122,11 @@ def _named_by_hand(
 
 
 def _of_numbers(row: Sequence[str]) -> bool:
+    """Whether a row holds values and no names: numbers, times of day, empty cells."""
+    filled = [cell for cell in row if cell]
+    clocks = sum(map(is_clock, filled))
+    if sum(map(is_number, filled)) + clocks == len(filled) and clocks:
+        return True
     return sum(map(is_number, row)) > 0.5 * len(row)
 
 

@@ -95,6 +95,11 @@ def is_number(cell: str) -> bool:
     return _NUMBER.match(cell) is not None
 
 
+def is_clock(cell: str) -> bool:
+    """Tell whether a cell is a time of day, such as 08:14:02.610."""
+    return _CLOCK.match(cell) is not None
+
+
 def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) -> list[DraftTime]:
     """Find the columns that can be the time, the likeliest first.
 
@@ -174,15 +179,15 @@ def _told_rate(above: Sequence[str]) -> float:
 
 
 def _likely_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime | None:
-    """Read a column that rises as a time where part of its name, or its size, says so."""
+    """Read a column that rises as a time where part of its name, its size or its text says so."""
     unit, _ = unit_of(raw.names[index])
     named = bool(TIME_WORDS & set(words_of(raw.names[index])))
     named = named or (unit is not None and UNITS[unit].dimension == "s")
     found = _as_time(raw, index, units)
-    if found is None or not (named or since_1970(found.seconds)):
+    if found is None or not (named or since_1970(found.seconds) or found.format == "clock"):
         return None
-    steps = np.diff(found.seconds[np.isfinite(found.seconds)])
-    if np.mean(steps >= 0.0) < RISES:
+    known = found.seconds[np.isfinite(found.seconds)]
+    if known.size < 2 or known[-1] <= known[0] or np.mean(np.diff(known) >= 0.0) < RISES:
         return None
     found.doubts.append(f"{found.column!r} is taken for the time, for it rises as one")
     return found
@@ -271,7 +276,7 @@ def text_time_format(texts: Sequence[str]) -> tuple[str, list[str]]:
     """
     if not texts:
         return "", []
-    if all(_CLOCK.match(t) for t in texts):
+    if all(map(is_clock, texts)):
         return "clock", []
     if all(_ISO.match(t) for t in texts):
         return "iso", []

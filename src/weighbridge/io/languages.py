@@ -68,8 +68,10 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "clutch_switch": ("sprzeglo", "pedal sprzegla"),
         "module_voltage": ("napiecie modulu sterujacego", "napiecie adaptera", "napiecie zasilania"),
         "odometer": ("przebieg", "licznik kilometrow"),
-        "latitude": ("szerokosc geograficzna", "szerokosc geogr", "szer geogr"),
-        "longitude": ("dlugosc geograficzna", "dlugosc geogr", "dl geogr"),
+        **{f"accel_{a}": (f"przyspieszenie {a}", f"przysp {a}", f"akcelerometr {a}") for a in "xyz"},
+        **{f"gyro_{a}": (f"zyroskop {a}", f"zyro {a}", f"predkosc katowa {a}") for a in "xyz"},
+        "latitude": ("szerokosc geograficzna", "szerokosc geogr", "szer geogr", "szer geo", "szerokosc geo"),
+        "longitude": ("dlugosc geograficzna", "dlugosc geogr", "dl geogr", "dlug geo", "dlugosc geo", "dl geo"),
         "altitude": ("wysokosc", "wysokosc n p m", "wysokosc gps", "wysokosc nad poziomem morza"),
         "gnss_speed": ("predkosc gps",),
         "gnss_course": ("kierunek", "azymut"),
@@ -181,7 +183,7 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
 """Phrases by language and quantity."""
 
 TIMES: Final = (
-    "tijd", "tijdstip", "tijdstempel", "datum tijd", "datum en tijd", "czas", "data czas", "data i czas", "znacznik czasu",
+    "tijd", "tijdstip", "tijdstempel", "datum tijd", "datum en tijd", "czas", "czas lokalny", "godzina", "godz", "data czas", "data i czas", "znacznik czasu",
     "tid", "tidpunkt", "tidsstampel", "datum tid", "datum och tid", "cas", "datum a cas", "datum cas", "casova znacka", "zaman",
     "tarih", "saat", "tarih saat", "zaman damgasi",
 )  # fmt: skip

@@ -252,7 +252,7 @@ AGAINST: Final[dict[str, frozenset[str]]] = {
     "lambda_1": frozenset(("commanded", "voltage", "2", "current", "target", "desired")),
     "odometer": frozenset(("trip",)),
     "oil_temperature": frozenset(("transmission", "gearbox", "axle", "differential", "atf")),
-    **{f"accel_{a}": frozenset(("linear", "user", "gravity", "free", "without", "angular")) for a in "xyz"},
+    **{f"accel_{a}": frozenset(("linear", "user", "gravity", "free", "without", "angular", "liniowe", "katowe")) for a in "xyz"},
     **{f"gyro_{a}": frozenset(("accel", "acceleration", "uncalibrated", "vector", "bias", "drift")) for a in "xyz"},
 }  # fmt: skip
 """Words with which a name means something else."""
