@@ -180,17 +180,12 @@ def live(
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)
     kept = _state_file(state, replay, vehicle)
-    results = asked_for(json=json_path)
     if ticket is not None and out is None:
         out = _free_file(vehicle)
         notice(f"the ticket writes {out}")
-    if out is not None:
-        refuse_overwriting(out, force, "vehicle file")
-        results.append(Result("--out", out, "vehicle file"))
-    if kept is not None and (state is not None or kept == vehicle):
-        results.append(Result("--state", kept, "state"))
+    named = kept if state is not None or kept == vehicle else None
     read = inputs([replay] if replay is not None else [], vehicle, chosen, dbc)
-    refuse_results(read, results)
+    refuse_results(read, _results(json_path, out, named, force=force))
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     alerts = _alerts(above, below, car)
     speed = _speed(rate, replayed=replay is not None)
@@ -220,6 +215,19 @@ def live(
     if ticket is not None and out is not None:
         _calibrate(scale, ticket, car, out)
     _conclude(last, aloud=json_path != "-")
+
+
+def _results(
+    json: str | None, out: Path | None, state: Path | None, *, force: bool
+) -> list[Result]:
+    """Files that are to be written; a vehicle file is refused where it would be overwritten."""
+    results = asked_for(json=json)
+    if out is not None:
+        refuse_overwriting(out, force, "vehicle file")
+        results.append(Result("--out", out, "vehicle file"))
+    if state is not None:
+        results.append(Result("--state", state, "state"))
+    return results
 
 
 def _conclude(last: LiveWeighing, *, aloud: bool) -> None:

@@ -10,10 +10,12 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from weighbridge.balance import ForceBalance
 from weighbridge.calibration.run import run_calibration
 from weighbridge.estimators import MassTrack
 from weighbridge.estimators.hybrid import Blend
@@ -93,10 +95,7 @@ def judge(
         raise RuntimeError(f"{load}, seed {made.scenario.seed}: nothing was weighed")
     balance = weighed.balance
     start = made.drive.start
-
-    def late_error(track: MassTrack) -> Floats:
-        return np.asarray((track.running_mass - mass)[track.time >= start + CONVERGED])
-
+    late_error = partial(_late_error, mass=mass, start=start)
     tracks: dict[str, MassTrack] = {}
     rmse, late_rmse, worst, held, seconds, steady_at = {}, {}, {}, {}, {}, {}
     for name, estimate in settings.estimators.items():
@@ -133,7 +132,27 @@ def judge(
             for blend in Blend
         },
     )
-    for form, rolling in PRINTED_ROLLING.items() if printed else ():
+    if printed:
+        _run_as_printed(done, balance, vehicle, made, settings)
+    return done
+
+
+def _late_error(track: MassTrack, mass: float, start: float) -> Floats:
+    """Error of the running mass once it should have converged [kg]."""
+    return np.asarray((track.running_mass - mass)[track.time >= start + CONVERGED])
+
+
+def _run_as_printed(
+    done: DriveResult,
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    made: SimulatedDrive,
+    settings: Settings,
+) -> None:
+    """Run the methods as printed too, by each rolling resistance, and keep how far off they are."""
+    mass, start = done.true_mass, made.drive.start
+    late_error = partial(_late_error, mass=mass, start=start)
+    for form, rolling in PRINTED_ROLLING.items():
         chosen = replace(settings, as_printed=True, rolling_coefficient=rolling)
         found = {m: estimate(balance, vehicle) for m, estimate in chosen.estimators.items()}
         done.printed[form] = {m: rms(late_error(track)) for m, track in found.items()}
@@ -150,7 +169,6 @@ def judge(
             done.printed_steady_at.update(steady)
             swings = {m: swing(track, made) for m, track in found.items()}
             done.printed_swing.update(swings)
-    return done
 
 
 def steady_from(track: MassTrack, mass: float, start: float) -> float:
