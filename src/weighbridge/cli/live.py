@@ -162,7 +162,6 @@ def live(
     """
     import logging
 
-    from weighbridge.errors import ConfigError
     from weighbridge.live.clock import at_rate
     from weighbridge.live.feed import Feed
     from weighbridge.live.keys import keys
@@ -171,12 +170,7 @@ def live(
     from weighbridge.live.session import Session
     from weighbridge.vehicle.model import Vehicle
 
-    if ticket is None and out is not None:
-        raise ConfigError(f"-o {out}: without --ticket KG no vehicle file is written")
-    if not every > 0.0:
-        raise ConfigError(f"--every {every:g}: give seconds above 0")
-    if bool(source) == (replay is not None):
-        raise ConfigError("give --source KIND:PLACE once or more, or --replay DRIVE")
+    _refuse_options(source, replay, every, ticket, out)
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)
     kept = _state_file(state, replay, vehicle)
@@ -215,6 +209,24 @@ def live(
     if ticket is not None and out is not None:
         _calibrate(scale, ticket, car, out)
     _conclude(last, aloud=json_path != "-")
+
+
+def _refuse_options(
+    source: list[str] | None,
+    replay: Path | None,
+    every: float,
+    ticket: float | None,
+    out: Path | None,
+) -> None:
+    """Refuse options that do not go together."""
+    from weighbridge.errors import ConfigError
+
+    if ticket is None and out is not None:
+        raise ConfigError(f"-o {out}: without --ticket KG no vehicle file is written")
+    if not every > 0.0:
+        raise ConfigError(f"--every {every:g}: give seconds above 0")
+    if bool(source) == (replay is not None):
+        raise ConfigError("give --source KIND:PLACE once or more, or --replay DRIVE")
 
 
 def _results(
