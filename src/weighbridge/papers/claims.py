@@ -138,9 +138,9 @@ def document(sections: Iterable[Section]) -> str:
     parts = [
         "# The papers, item by item\n",
         "Written by `weighbridge reproduce all --report docs/papers.md`; the figures are of that "
-        "run. A paper's\nconditions come first: its method, its settings and drives like its own, "
-        "though simulated. What we do\nbetter under other conditions stands in a table of its "
-        "own.\n",
+        "run. A paper's\nconditions come first: drives and inputs like its own, though simulated. "
+        "There, rows of *ours* are\nanother method. What was measured under other conditions "
+        "stands in a table of its own.\n",
     ]
     for section in sections:
         parts += [f"## {section.title}\n", section.markdown()]

@@ -63,8 +63,8 @@ _MODEL: Final = (
           "load and engine speed unless `--straight`"),
     _rule("eq. 50", "`vehicle/gear.py`", "samples with a steady ratio alone, intervals evenly "
           "apart in the logarithm", as_printed=False),
-    _rule("eq. 51", "`vehicle/torque_sources.py`", "divided by the engine speed, without which "
-          "its unit is that of a power; `printed.engine_efficiency` is 0.33", as_printed=False),
+    _rule("eq. 51", "`vehicle/torque_sources.py`", "its fraction is lost in the text at hand; "
+          "read as 30 over π N_e, as in eq. 10; `printed.engine_efficiency` is 0.33"),
 )  # fmt: skip
 
 _TABLES: Final = (
