@@ -17,7 +17,7 @@ from weighbridge.cli.terminal import console, say, shown
 from weighbridge.cli.verbosity import notice, quiet, say_written
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from rich.console import Console
 
@@ -211,16 +211,14 @@ def _files(
             inside = sorted(p for p in path.iterdir() if p.is_file() and is_log(p))
             drafts = ((p, _draft(p, databases, names)) for p in inside)
             there = [(p, draft) for p, draft in drafts if draft is not None]
-            if not there and any(p.suffix.lower() == ".npy" for p in path.iterdir()):
-                raise DriveError(f"{path}: holds {_ARRAYS}")
             if not there:
+                _refuse_arrays(path, path.iterdir())
                 raise DriveError(f"{path}: holds no table ({', '.join(drafted)})")
             found += there
         elif not path.is_file():
             raise DriveError(f"{path}: {'no plain file' if path.exists() else 'no such file'}")
-        elif path.suffix.lower() == ".npy":
-            raise DriveError(f"{path}: holds {_ARRAYS}")
         elif (draft := _draft(path, databases, names)) is None:
+            _refuse_arrays(path, [path])
             raise DriveError(
                 f"{path}: map drafts mappings of tables ({', '.join(drafted)}), and of CAN logs "
                 "by their DBC (--dbc FILE); other logs are read as they are: weighbridge inspect "
@@ -229,6 +227,14 @@ def _files(
         else:
             found.append((path, draft))
     return found
+
+
+def _refuse_arrays(path: Path, files: Iterable[Path]) -> None:
+    """Refuse a log or folder that holds NumPy arrays; they have no names that map could know."""
+    from weighbridge.errors import DriveError
+
+    if any(file.suffix.lower() == ".npy" for file in files):
+        raise DriveError(f"{path}: holds {_ARRAYS}")
 
 
 def _draft(
