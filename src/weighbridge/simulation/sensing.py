@@ -11,6 +11,7 @@ from scipy import signal as dsp
 from scipy.spatial.transform import Rotation
 
 from weighbridge.constants import (
+    EARTH_RADIUS,
     GRAVITY,
     PETROL_STOICHIOMETRIC_RATIO,
     STANDARD_TEMPERATURE,
@@ -206,9 +207,8 @@ def simulate_gnss(
     north, east = north / math.sqrt(2.0), east / math.sqrt(2.0)
     latitude, altitude = at(pose.latitude), at(pose.altitude) + up
     # A few metres: the mean Earth radius is exact enough for an error.
-    radius = 6.371e6
-    longitude = at(pose.longitude) + east / (radius * np.cos(latitude))
-    latitude = latitude + north / radius
+    longitude = at(pose.longitude) + east / (EARTH_RADIUS * np.cos(latitude))
+    latitude = latitude + north / EARTH_RADIUS
     noise = effects.gnss_white * sensors.gnss_speed_noise
     v_north = at(pose.velocity_n[0]) + noise * rng.standard_normal(n)
     v_east = at(pose.velocity_n[1]) + noise * rng.standard_normal(n)
