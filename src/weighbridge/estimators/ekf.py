@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ from weighbridge.kernels import robust_rls as rls_kernel
 from weighbridge.signals import Bools
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive
+
+NOISE_SHARE: Final = 0.5
+"""What noise of the motion costs, see `weighbridge.estimators.noisy_motion.row_noise_std` [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,6 +207,7 @@ def estimate(
         vehicle,
         fit,
         filter_reason(balance, valid, taken),
+        noise_share=NOISE_SHARE,
         gate=settings,
         running=mass,
         spread=np.sqrt(var),

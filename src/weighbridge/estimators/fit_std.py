@@ -156,7 +156,7 @@ def judged(
     phi: Floats,
     fitted: Fitted,
     slow: float,
-    method: str,
+    noise_share: float,
     gate: GateSettings,
 ) -> Judged:
     """Find how sure a fit of a published method is, and whether it carries a mass.
@@ -168,12 +168,12 @@ def judged(
     phi : (n,) regressor of the mass [m/s^2]
     fitted
     slow : `weighbridge.estimators.judging.consider_std` [-]
-    method : name of the estimator, which takes the motion as exact
+    noise_share : of the estimator, which takes the motion as exact: see `row_noise_std` [-]
     gate : what a mass needs
     """
     passing, lasting = slow_std(balance, vehicle, fitted.index, fitted.influence, fitted.mass)
     inertial = balance.motion.source == "inertial"
-    noisy = row_noise_std(balance.table, phi, used, method) if inertial else 0.0
+    noisy = row_noise_std(balance.table, phi, used, noise_share) if inertial else 0.0
     passing = float(np.hypot(passing, fitted.mass * noisy))
     systematic = float(np.hypot(fitted.mass * slow, lasting))
     std, freedom = honest_std(fitted.scatter, fitted.blocks, passing, systematic)

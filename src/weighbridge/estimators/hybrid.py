@@ -155,6 +155,7 @@ def estimate(
         vehicle,
         fit,
         row_reason,
+        noise_share=ekf.NOISE_SHARE,
         gate=settings,
         running=mass,
         spread=np.sqrt(var),

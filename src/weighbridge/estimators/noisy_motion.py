@@ -37,12 +37,6 @@ def attenuation(weight: Floats, variance: Floats, mass_var: Floats, begins: Bool
     return np.asarray(mass_var * np.bincount(load, weight * variance)[load])
 
 
-ROW_SHARE: Final = {"rls": 2.0, "robust-rls": 1.5, "ekf": 0.5, "hybrid": 0.5}
-"""Error of a mass by method over the noise's part of the rows' mean square [-]: white noise of 0.5
-to 2 m/s^2 in simulated drives of nine vehicles took 1.5 to 3.2 times as much off by rls, 1 to 2.5
-by robust-rls, and moved the others either way. Rows show more noise than white noise is
-between them, for navigation smooths it."""
-
 ROW_FAST: Final = 2.0
 """Rows below this speed tell no noise [m/s]."""
 
@@ -53,21 +47,26 @@ MOST: Final = 0.07
 """Above this a method that takes the motion as exact gives no mass [-]."""
 
 
-def row_noise_std(table: ForceTable, phi: Floats, used: Bools, method: str) -> float:
+def row_noise_std(table: ForceTable, phi: Floats, used: Bools, share: float) -> float:
     """Relative standard deviation of a mass by a method that takes the motion as exact [-].
+
+    White noise of 0.5 to 2 m/s^2 in simulated drives of nine vehicles took 1.5 to 3.2 times the
+    noise's part of the rows' mean square off by rls, 1 to 2.5 times by robust-rls, and moved the
+    others either way. Rows show more noise than white noise is between them, for navigation
+    smooths it.
 
     Parameters
     ----------
     table : the rows
     phi : (n,) regressor of the mass [m/s^2]
     used : (n,)
-    method : of `ROW_SHARE`; another one is taken to lose the most
+    share : error of the method's mass over the noise's part of the rows' mean square [-]
     """
     moving = table.specific_force[np.isfinite(table.specific_force) & (table.speed > ROW_FAST)]
     if not used.any() or moving.size < 10:
         return 0.0
     part = noise_level(moving) ** 2 / float(np.mean(phi[used] ** 2))
-    std = ROW_SHARE.get(method, max(ROW_SHARE.values())) * part
+    std = share * part
     return std if std > LEAST else 0.0
 
 

@@ -24,6 +24,9 @@ from weighbridge.vehicle.model import Vehicle
 BLOCK: Final = 60.0
 """Rows nearer than this share wind, grade and torque errors [s]."""
 
+NOISE_SHARE: Final = 2.0
+"""What noise of the motion costs, see `weighbridge.estimators.noisy_motion.row_noise_std` [-]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RlsSettings(GateSettings):
@@ -128,7 +131,7 @@ def estimate(
         index=np.flatnonzero(used),
         influence=phi[used] / np.sum(phi[used] ** 2),
     )
-    found = judged(balance, vehicle, used, phi, fitted, slow, "rls", settings)
+    found = judged(balance, vehicle, used, phi, fitted, slow, NOISE_SHARE, settings)
     residual = np.where(used, y - phi * mass, np.nan)
     # Before the first row there is a start value, but no measurement.
     running = np.where(np.cumsum(used) > 0, theta[:, 0], np.nan)

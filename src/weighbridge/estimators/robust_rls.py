@@ -31,6 +31,9 @@ from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive, within
 
+NOISE_SHARE: Final = 1.5
+"""What noise of the motion costs, see `weighbridge.estimators.noisy_motion.row_noise_std` [-]."""
+
 DEPENDENCE: Final = 5.0
 """Rows nearer than this share their error, in the running standard deviation [s]."""
 
@@ -357,6 +360,7 @@ def estimate(
         vehicle,
         window_fit(table.time, mean_phi, mean_y, params),
         window_reason(table, valid, mean_phi),
+        noise_share=NOISE_SHARE,
         gate=settings,
         running=np.where(informed, running, np.nan),
         spread=np.sqrt(var),
@@ -372,6 +376,7 @@ def finish(
     fit: WindowFit,
     row_reason: NDArray[np.uint8],
     *,
+    noise_share: float,
     gate: GateSettings,
     running: Floats,
     spread: Floats,
@@ -387,6 +392,8 @@ def finish(
     balance, vehicle
     fit : windows of the drive, for standard deviation and bound
     row_reason : (n,) why a row was not used
+    noise_share : what noise of the motion costs, see
+        `weighbridge.estimators.noisy_motion.row_noise_std` [-]
     gate : what a mass needs
     running, spread : (n,) running mass and its standard deviation from noise [kg]
     phi, y : (n,) regressor and right-hand side
@@ -403,7 +410,7 @@ def finish(
     # What holds an offset of the force knows it; a filter without one takes it for mass.
     influence = fit.influence if final is None else fit.phi / np.sum(fit.phi**2)
     weighed = Fitted(mass=mass, scatter=scatter, blocks=blocks, index=index, influence=influence)
-    found = judged(balance, vehicle, used, phi, weighed, slow, method, gate)
+    found = judged(balance, vehicle, used, phi, weighed, slow, noise_share, gate)
     # A running mass that forgets is that of a stretch of time.
     passing = np.hypot(slow, UNMODELLED_STD)
 
