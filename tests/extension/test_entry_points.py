@@ -12,43 +12,13 @@ from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
-CLASS = '''
-"""Three-wheeled goods carriers."""
-
-from weighbridge.vehicle.classes import VehicleClass
-
-rickshaw = VehicleClass(
-    name="rickshaw",
-    mass_range=(300.0, 2_500.0),
-    typical_mass=1400.0,
-    emptied=100.0,
-    loaded=2.5,
-    heaviest=3.0,
-    drag_area=(0.7, 0.2),
-    rolling_coefficient=(0.012, 0.004),
-    engine_inertia=(0.15, 0.06),
-    wheel_inertia=(5.0, 1.0),
-    drag_area_range=(0.3, 1.2),
-    rolling_coefficient_range=(0.002, 0.03),
-    engine_inertia_range=(0.02, 1.0),
-    wheel_inertia_range=(2.0, 12.0),
-    efficiency=(0.93, 0.03),
-    tyre="205/55 R16",
-    fastest=60.0,
-    strongest=120.0,
-)
-'''
-
 FILES = {
     "fuel_source": code("fuel_source.py"),
-    "rickshaw_class": CLASS,
+    "rickshaw_class": code("rickshaw_class.py"),
     "median_estimator": code("median_estimator.py"),
 }
 TRIED_ELSEWHERE = {"weighbridge.formats", "weighbridge.sources"}
-POINTS = {
-    **{group: line for group, line in entry_points().items() if group not in TRIED_ELSEWHERE},
-    "weighbridge.vehicle_classes": "rickshaw = rickshaw_class:rickshaw",
-}
+POINTS = {group: line for group, line in entry_points().items() if group not in TRIED_ELSEWHERE}
 
 TABLES = (TORQUE_SOURCES, VEHICLE_CLASSES, ESTIMATORS)
 
