@@ -18,8 +18,10 @@ def plain(text):
     return re.sub(r"[^\x00-\x7f]+", "~", text)
 
 
-QUICK = "electric"
-"""The tutorial whose notebook takes the least time."""
+BY_KERNEL = [page for page in TUTORIALS if page.stem in ("electric", "live-replay", "own-csv")]
+"""Tutorials whose notebooks are run too: with a data frame, a replay, and files that they write.
+The others have the cells of their pages, which run.
+"""
 
 
 @pytest.mark.slow
@@ -48,13 +50,8 @@ def test_a_notebook_has_the_code_and_the_output_of_its_page(page):
         assert [o.text for o in cell.outputs] == ([block.output] if block.output else [])
 
 
-@pytest.mark.parametrize(
-    "page",
-    [
-        pytest.param(page, id=page.stem, marks=() if page.stem == QUICK else pytest.mark.slow)
-        for page in TUTORIALS
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("page", BY_KERNEL, ids=lambda p: p.stem)
 def test_a_notebook_runs_alone_and_says_what_it_shows(page, tmp_path):
     """As a reader has it: the file in an empty folder, run by the kernel of Jupyter."""
     made = nbformat.reads(notebooks.notebook(page), as_version=4)
