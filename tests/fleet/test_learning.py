@@ -3,6 +3,7 @@
 import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import dask
 import numpy as np
@@ -12,9 +13,20 @@ import pytest
 import weighbridge as wb
 from tests.fleet.fleets import real_fleet, tiny_drive
 from weighbridge.errors import ConfigError
-from weighbridge.fleet.learning import MOST, Known, chosen, drift
+from weighbridge.fleet.learning import (
+    MOST,
+    Drift,
+    Known,
+    Lesson,
+    chosen,
+    drift,
+    learn_vehicle,
+    with_drift,
+)
 from weighbridge.fleet.tickets import Ticket, read_tickets, ticketed
+from weighbridge.fleet.vehicles import Assigned
 
+GOLDEN = Path(__file__).parents[1] / "golden"
 NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)
 
 
@@ -173,3 +185,31 @@ def test_few_drives_are_chosen_over_all_masses():
     assert (masses[0], masses[-1]) == (1000.0, 1029.0)
     assert [k.begin for k in found] == sorted(k.begin for k in found)
     assert chosen(drives[:3]) == drives[:3]
+
+
+@pytest.mark.parametrize("per_month", [3.0, -3.0])
+def test_a_file_refined_from_drives_that_drift_is_no_surer_than_the_drift(short_car, per_month):
+    days = [NOON + timedelta(days=k) for k in range(60)]
+    line = per_month * np.arange(60) / 30.0
+    change = drift(days, line + np.random.default_rng(1).normal(0.0, 0.1, 60))
+    before = 0.005
+    car = replace(short_car, provenance=replace(short_car.provenance, mass_scale_std=before))
+    refined = with_drift(car, change, days)
+    left = refined.provenance.mass_scale_std
+    # How the scales of these drives lie around their mean.
+    assert left == pytest.approx(np.hypot(before, 0.01 * np.std(line)), rel=0.03)
+    assert left > 3.0 * before
+    assert "the torque scale drifts by" in refined.provenance.notes
+    assert with_drift(car, Drift(per_month, 1e3), days) is car
+    assert with_drift(car, change, days[:1]) is car
+
+
+def test_raw_logs_are_learnt_from_with_the_databases_of_the_fleet(tmp_path, short_car):
+    known = Known((f"{GOLDEN / 'can.log'}",), 0, NOON, 1500.0, 30.0, 1500.0)
+    car = Assigned(
+        id="car", file="car.toml", vehicle=short_car, kind="car", mapping=None, digest=""
+    )
+    lesson = Lesson(assigned=car, drives=(known,), output=str(tmp_path))
+    assert "engine_torque" in learn_vehicle(lesson)["told"]
+    lost = learn_vehicle(replace(lesson, dbc=(str(tmp_path / "lost.dbc"),)))["told"]
+    assert "lost.dbc: no such file" in lost

@@ -33,6 +33,16 @@ MOST: Final = 12
 FEW: Final = 4
 """Drives that show a drift, at least."""
 
+MONTH: Final = 30 * 86_400.0
+"""The time that drifts are told for [s]."""
+
+DRIFTS: Final = (
+    ("torque_drift{}_pct", "torque scale", "%"),
+    ("rolling_drift{}", "rolling resistance", ""),
+    ("pitch_drift{}_deg", "pitch of the sensor", "deg"),
+)
+"""What is watched: the column with a place for ``_std``, its name, and its unit."""
+
 APART: Final = 2.0
 """Masses contradict a vehicle file where they are off by so many standard deviations [-]."""
 
@@ -56,6 +66,7 @@ class Lesson:
     drives: tuple[Known, ...]
     output: str
     whole: bool = False
+    dbc: tuple[str, ...] = ()
 
 
 class Drift(NamedTuple):
@@ -71,7 +82,14 @@ class Drift(NamedTuple):
 
 
 def learn_fleet(
-    client: Client, results: Path, shelf: Vehicles, tickets: Path, output: Path, *, whole: bool
+    client: Client,
+    results: Path,
+    shelf: Vehicles,
+    tickets: Path,
+    output: Path,
+    *,
+    whole: bool,
+    dbc: Sequence[str] = (),
 ) -> pl.DataFrame:
     """Refine the vehicle files of a fleet by its tickets.
 
@@ -82,7 +100,7 @@ def learn_fleet(
     shelf : the vehicle files
     tickets : table of them
     output : folder of the refined files, none of the old ones
-    whole : as the drives were weighed
+    whole, dbc : as the drives were weighed
 
     Returns
     -------
@@ -106,7 +124,13 @@ def learn_fleet(
         if assigned.vehicle is not None:
             known = tuple(_known(row) for row in own.iter_rows(named=True))
             lessons.append(
-                Lesson(assigned=assigned, drives=known, output=str(output.resolve()), whole=whole)
+                Lesson(
+                    assigned=assigned,
+                    drives=known,
+                    output=str(output.resolve()),
+                    whole=whole,
+                    dbc=tuple(dbc),
+                )
             )
     with scheduler_needed(client):
         rows = _learnt(client, lessons)
@@ -233,10 +257,12 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
         times.append(known.begin)
         mounting = one.mounting.pitch if one.mounting is not None else math.nan
         alone.append((one.road.rolling_coefficient.value, math.degrees(mounting)))
-    row |= _drifts(weighed, times, np.array(alone, dtype=float).reshape(-1, 2), told)
+    changes = _drifts(weighed, times, np.array(alone, dtype=float).reshape(-1, 2))
+    row |= _columns(changes)
+    told += [text for text in map(_drift_text, DRIFTS, changes) if text]
     if drives:
         try:
-            refined = calibrate(drives, masses, vehicle=car)
+            refined = with_drift(calibrate(drives, masses, vehicle=car), changes[0], times)
             name = f"{lesson.assigned.id}.toml"
             target = Path(lesson.output) / name
             if refined.mapping is not None and lesson.assigned.mapping_file is not None:
@@ -271,22 +297,58 @@ def _mean_error(weighed: Sequence[Known]) -> tuple[float, float]:
 
 
 def _drifts(
-    weighed: Sequence[Known], times: Sequence[datetime], alone: Floats, told: list[str]
-) -> dict[str, float]:
+    weighed: Sequence[Known], times: Sequence[datetime], alone: Floats
+) -> tuple[Drift, ...]:
+    """Find what changes with time, in the order of `DRIFTS`."""
     scales = np.array([100.0 * (k.weighed / k.known - 1.0) for k in weighed])
-    found = {
-        "torque_drift{}_pct": (drift([k.begin for k in weighed], scales), "torque scale", "%"),
-        "rolling_drift{}": (drift(times, alone[:, 0]), "rolling resistance", ""),
-        "pitch_drift{}_deg": (drift(times, alone[:, 1]), "pitch of the sensor", "deg"),
-    }
+    return (
+        drift([k.begin for k in weighed], scales),
+        drift(times, alone[:, 0]),
+        drift(times, alone[:, 1]),
+    )
+
+
+def _columns(changes: Sequence[Drift]) -> dict[str, float]:
     row = {}
-    for column, (change, what, unit) in found.items():
+    for (column, _, _), change in zip(DRIFTS, changes, strict=True):
         row[column.format("")], row[column.format("_std")] = change
-        if change.sure:
-            told.append(
-                f"the {what} drifts by {change.slope:+.2g} ± {change.std:.1g} {unit} in 30 days"
-            )
     return row
+
+
+def _drift_text(watched: tuple[str, str, str], change: Drift) -> str:
+    """Say what drifts; empty where nothing does for sure."""
+    _, what, unit = watched
+    if not change.sure:
+        return ""
+    return f"the {what} drifts by {change.slope:+.2g} ± {change.std:.1g} {unit} in 30 days"
+
+
+def with_drift(refined: Vehicle, change: Drift, times: Sequence[datetime]) -> Vehicle:
+    """Count a drift of the torque scale in what a refined file leaves open, and note it.
+
+    The file holds the mean of its drives. Evenly spread over a time, drives of a scale that
+    changes by d over it lie ``d / sqrt(12)`` around that mean; later ones lie farther off.
+
+    Parameters
+    ----------
+    refined : calibrated by drives that begin at ``times``
+    change : of the torque scale [%]
+    times
+    """
+    if not change.sure or len(times) < 2:
+        return refined
+    months = (max(times) - min(times)).total_seconds() / MONTH
+    std = 0.01 * abs(change.slope) * months / math.sqrt(12.0)
+    made = refined.provenance
+    told = f"{_drift_text(DRIFTS[0], change)}: learn anew as new tickets come"
+    return replace(
+        refined,
+        provenance=replace(
+            made,
+            mass_scale_std=math.hypot(made.mass_scale_std or 0.0, std),
+            notes=f"{made.notes}; {told}" if made.notes else told,
+        ),
+    )
 
 
 def drift(times: Sequence[datetime], values: Floats) -> Drift:
@@ -304,7 +366,7 @@ def drift(times: Sequence[datetime], values: Floats) -> Drift:
     good = np.isfinite(values)
     if np.count_nonzero(good) < FEW:
         return Drift(math.nan, math.nan)
-    day = np.array([t.timestamp() for t, g in zip(times, good, strict=True) if g]) / (30 * 86_400.0)
+    day = np.array([t.timestamp() for t, g in zip(times, good, strict=True) if g]) / MONTH
     day -= day.mean()
     spread = float(day @ day)
     if spread <= 0.0:
@@ -332,5 +394,5 @@ def _read(lesson: Lesson, known: Known) -> Drive:
     with local_paths(Recording(known.paths)) as paths:
         given = paths[0] if len(paths) == 1 else paths
         if lesson.whole:
-            return read_drive(given, lesson.assigned.mapping)
-        return read_drives(given, lesson.assigned.mapping)[known.part]
+            return read_drive(given, lesson.assigned.mapping, lesson.dbc)
+        return read_drives(given, lesson.assigned.mapping, lesson.dbc)[known.part]

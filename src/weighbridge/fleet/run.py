@@ -162,7 +162,15 @@ def run_fleet(
                 count = run_jobs(client, jobs, teller)
                 if how.learn is not None and how.tickets is not None:
                     shelf = Vehicles(vehicles, how.kind, how.mapping)
-                    learn_fleet(client, folder, shelf, how.tickets, how.learn, whole=how.whole)
+                    learn_fleet(
+                        client,
+                        folder,
+                        shelf,
+                        how.tickets,
+                        how.learn,
+                        whole=how.whole,
+                        dbc=how.dbc,
+                    )
                 return count
         finally:
             teller.ended()
