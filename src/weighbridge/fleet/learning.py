@@ -326,8 +326,8 @@ def _drift_text(watched: tuple[str, str, str], change: Drift) -> str:
 def with_drift(refined: Vehicle, change: Drift, times: Sequence[datetime]) -> Vehicle:
     """Count a drift of the torque scale in what a refined file leaves open, and note it.
 
-    The file holds the mean of its drives. Evenly spread over a time, drives of a scale that
-    changes by d over it lie ``d / sqrt(12)`` around that mean; later ones lie farther off.
+    The file holds the mean of its drives. Where the scale changes by d over their time, the next
+    drives, which the file is for, are at least ``d / 2`` off.
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ def with_drift(refined: Vehicle, change: Drift, times: Sequence[datetime]) -> Ve
     if not change.sure or len(times) < 2:
         return refined
     months = (max(times) - min(times)).total_seconds() / MONTH
-    std = 0.01 * abs(change.slope) * months / math.sqrt(12.0)
+    std = 0.5 * 0.01 * abs(change.slope) * months
     made = refined.provenance
     told = f"{_drift_text(DRIFTS[0], change)}: learn anew as new tickets come"
     return replace(
