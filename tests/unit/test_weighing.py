@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 import re
 from dataclasses import replace
 
@@ -82,6 +83,12 @@ def test_numbers_are_null_where_there_is_no_mass(status):
     if status is Status.INCONSISTENT:
         assert result["segments"]
         assert all(s["mass_kg"] is None and s["std_kg"] is None for s in result["segments"])
+
+
+def test_a_row_is_light_whatever_the_drive_holds(good):
+    row = pickle.dumps(good.row)
+    assert len(row) < 5000 < len(pickle.dumps(good)) / 10
+    assert pickle.loads(row) == good.row
 
 
 def test_interval_is_students(good):
