@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import io
 import json
 import os
 import re
@@ -13,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from weighbridge.cli.terminal import console, guarded, say, say_json, shown
+from weighbridge.cli.terminal import Terminal, console, guarded, say, say_json, shown
 
 GOLDEN = Path(__file__).parent.parent / "golden"
 RUN = "from weighbridge.__main__ import run; run()"
@@ -131,6 +132,16 @@ def test_texts_of_a_dbc(weighbridge, tmp_path):
     harmless(weighbridge("inspect", GOLDEN / "can.blf", "--dbc", dbc))
     dbc.write_text("BO_ 1 \x1b[31mX: 8 Y\n SG_ \x1b[2J", encoding="cp1252")
     harmless(weighbridge("inspect", GOLDEN / "can.blf", "--dbc", dbc))
+
+
+def test_a_terminal_outlives_the_stream_below():
+    below = io.StringIO()
+    terminal = Terminal(below)
+    terminal.write("last words")
+    below.close()
+    terminal.flush()
+    assert not terminal.isatty()
+    terminal.close()
 
 
 def test_marks_of_tables_are_text(weighbridge, tmp_path):

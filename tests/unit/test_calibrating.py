@@ -162,6 +162,15 @@ def test_single_speed_electric_car(electric):
     assert found.mass == pytest.approx(electric.info.mass, rel=0.01)
 
 
+def test_a_motor_that_is_warmer_next_time_is_in_every_mass(electric, monkeypatch):
+    left = calibrate(electric).provenance.mass_scale_std
+    # Once for the drive of the calibration, once for the one that is weighed.
+    source = replace(TORQUE_SOURCES["measured"], motor_between_std=None)
+    monkeypatch.setitem(TORQUE_SOURCES._own, "measured", source)
+    without = calibrate(electric).provenance.mass_scale_std
+    assert left == pytest.approx(np.hypot(without, np.sqrt(2.0) * 0.006), rel=0.02)
+
+
 def test_single_speed_without_engine_speed(electric):
     known = Vehicle(driveline=Driveline(gearings=calibrate(electric).driveline.gearings))
     car = calibrate(electric.without("engine_speed"), vehicle=known)

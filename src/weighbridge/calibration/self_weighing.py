@@ -128,7 +128,7 @@ def self_weighed(
         # Levels of noise may fall into another optimum, and the mass jump with them.
         slope = float(np.clip((tried[-1][1] - ratio) / (scale - before), *SLOPES))
     scale, ratio, bound, direction, count = min(tried, key=lambda t: abs(t[1] - 1.0))
-    between = problem.source.between_std
+    between = problem.source.between(single_speed=vehicle.driveline.single_speed)
     each = math.hypot(TRANSFER_STD[1], between, UNMODELLED * bound)
     # Where the torque could not be fitted anew, what its own fit left open stays. The drive that
     # is weighed differs from others as those of the calibration do.

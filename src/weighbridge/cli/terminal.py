@@ -55,13 +55,15 @@ class Terminal(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Flush the stream below."""
+        """Flush the stream below; a closed one has nothing to flush, as at the end of Python."""
         with _named():
-            self.below.flush()
+            if not self.below.closed:
+                self.below.flush()
 
     def isatty(self) -> bool:
         """Tell whether a person reads along."""
-        return os.environ.get("TTY_COMPATIBLE") != "0" and self.below.isatty()
+        compatible = os.environ.get("TTY_COMPATIBLE") != "0"
+        return compatible and not self.below.closed and self.below.isatty()
 
     def fileno(self) -> int:
         """Return the number of the open file."""

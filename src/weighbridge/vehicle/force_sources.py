@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.signals import Drive, Floats, Signal
-from weighbridge.vehicle.torque_source import REPORTED, TorqueConstants
+from weighbridge.vehicle.torque_source import MOTOR_BETWEEN_STD, REPORTED, TorqueConstants
 
 SLOWEST_POWER: Final = 1.0
 """Slower than this a power says nothing of a force [m/s]."""
@@ -213,6 +213,7 @@ POWER: Final = REPORTED(
     words="power of engine or motor over its speed",
     axis="Torque from power [N m]",
     motor_scale_std=0.03,
+    motor_between_std=MOTOR_BETWEEN_STD,
 )
 
 POWER_BY_SPEED: Final = REPORTED(

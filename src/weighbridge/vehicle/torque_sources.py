@@ -22,6 +22,7 @@ from weighbridge.vehicle.force_sources import (
     WHEEL_TORQUE,
 )
 from weighbridge.vehicle.torque_source import (
+    MOTOR_BETWEEN_STD,
     REPORTED,
     REPORTED_TERMS,
     ROUGH,
@@ -153,6 +154,7 @@ _MEASURED: Final = REPORTED(
     axis="Recorded torque [N m]",
     # Told from the currents of a motor; its limit is 5 %.
     motor_scale_std=0.03,
+    motor_between_std=MOTOR_BETWEEN_STD,
 )
 
 _PERCENT: Final = REPORTED(
@@ -160,6 +162,7 @@ _PERCENT: Final = REPORTED(
     signals=("engine_torque_fraction",),
     reading=_percent,
     needs_reference=True,
+    motor_between_std=MOTOR_BETWEEN_STD,
     title="torque in percent",
     words="torque in percent of the reference torque",
     axis="Recorded torque [N m]",
