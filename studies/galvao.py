@@ -9,6 +9,7 @@ all but the table of speed and torque anew, which takes an hour, and ``torque`` 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -56,19 +57,26 @@ def comparison_table(done: paper.Reproduction) -> str:
     return "\n".join(lines)
 
 
+def furthest(errors: Iterable[float]) -> float:
+    """Return the error that is farthest from nothing, with its sign."""
+    return max(errors, key=abs)
+
+
 def other_roads() -> str:
     """Repeat the experiment on other roads."""
     lines = [
-        "| road | R² of the fit | largest error % | widest band kg | largest error % as printed |",
-        "|---|---|---|---|---|",
+        "| road and seeds of its drives | R² of the fit | largest error % | widest band kg "
+        "| largest error % as printed | widest band as printed kg |",
+        "|" + "---|" * 6,
     ]
     for seed in OTHER_SEEDS:
         fitted, _, tests = paper.weigh_three(seed)
         lines.append(
-            f"| {seed} | {fitted.fit.r_squared:.2f} "
-            f"| {100 * max(abs(t.error(t.ours)) for t in tests):.4f} "
+            f"| {seed} to {seed + 2} | {fitted.fit.r_squared:.2f} "
+            f"| {100 * furthest(t.error(t.ours) for t in tests):+.4f} "
             f"| ± {max(t.band(t.ours) for t in tests):.0f} "
-            f"| {100 * max(abs(t.error(t.printed)) for t in tests):.0f} |"
+            f"| {100 * furthest(t.error(t.printed) for t in tests):+.0f} "
+            f"| ± {max(t.band(t.printed) for t in tests):.0f} |"
         )
     return "\n".join(lines)
 
@@ -87,12 +95,12 @@ def corrected_gravity() -> str:
         speeds = tests[0].balance.table.speed[tests[0].ours.used]
         at = np.percentile(speeds, [10.0, 50.0, 90.0])
         gravity = params.gravity + params.corrections[4] + params.corrections[5] * at
-        errors = [100.0 * abs(t.error(t.printed)) for t in tests]
+        errors = [100.0 * t.error(t.printed) for t in tests]
         bands = [100.0 * t.band(t.printed) / t.mass for t in tests]
-        ratio = max(e / b for e, b in zip(errors, bands, strict=True))
+        ratio = max(abs(e) / b for e, b in zip(errors, bands, strict=True))
         lines.append(
             f"| {seed} | {', '.join(f'{g:+.1f}' for g in gravity)} "
-            f"| {', '.join(f'{e:.0f}' for e in errors)} | {', '.join(f'{b:.0f}' for b in bands)} "
+            f"| {', '.join(f'{e:+.0f}' for e in errors)} | {', '.join(f'{b:.0f}' for b in bands)} "
             f"| {ratio:.1f} |"
         )
     return "\n".join(lines)
@@ -130,7 +138,7 @@ def readings() -> str:
     )  # fmt: skip
     three = [paper.weigh_three(seed)[1] for seed in OTHER_SEEDS]
     base = Vehicle(name=paper.CAR.name)
-    lines = ["| reading | median error % | smallest % | largest % |", "|---|---|---|---|"]
+    lines = ["| reading | median error % | nearest % | farthest % |", "|---|---|---|---|"]
     for name, settings, length, flat in cases:
         errors = []
         for drives in three:
@@ -142,9 +150,10 @@ def readings() -> str:
                 balance = speed_balance(made.drive, vehicle)
                 run = run_filter(balance, vehicle, settings, flat=flat)
                 mass = mean_mass(run.mass, run.used)
-                errors.append(100.0 * abs(mass / paper.mass_of(made) - 1.0))
+                errors.append(100.0 * (mass / paper.mass_of(made) - 1.0))
         lines.append(
-            f"| {name} | {np.median(errors):.1f} | {min(errors):.2f} | {max(errors):.1f} |"
+            f"| {name} | {np.median(errors):+.1f} | {min(errors, key=abs):+.2f} "
+            f"| {furthest(errors):+.1f} |"
         )
     return "\n".join(lines)
 
@@ -258,7 +267,7 @@ def other_models() -> str:
         ("torque earlier, whole course", 1, lambda r: fit_course(r, 1)),
     )
     lines = [
-        "| fit of the model | road | median error % | smallest % | best road's worst drive % |",
+        "| fit of the model | road | median error % | nearest % | best road's worst drive % |",
         "|---|---|---|---|---|",
     ]
     for place, road in (("country", paper.easy_route), ("city", city_road)):
@@ -267,10 +276,11 @@ def other_models() -> str:
             off = []
             for three in drives:
                 c = fit(three[0])
-                off.append([100.0 * abs(printed_filter(r, c, lag) / r.mass - 1.0) for r in three])
+                off.append([100.0 * (printed_filter(r, c, lag) / r.mass - 1.0) for r in three])
+            every = np.ravel(off)
             lines.append(
-                f"| {name} | {place} | {np.median(off):.1f} | {np.min(off):.2f} "
-                f"| {np.min(np.max(off, axis=1)):.1f} |"
+                f"| {name} | {place} | {np.median(every):+.1f} | {min(every, key=abs):+.2f} "
+                f"| {min(map(furthest, off), key=abs):+.1f} |"
             )
     return "\n".join(lines)
 
@@ -302,10 +312,10 @@ def sampling() -> str:
         errors, used = [], 0
         for drive in (made, *others):
             run = run_filter(speed_balance(drive.drive, fitted.vehicle), fitted.vehicle)
-            errors.append(abs(mean_mass(run.mass, run.used) / paper.mass_of(drive) - 1.0))
+            errors.append(mean_mass(run.mass, run.used) / paper.mass_of(drive) - 1.0)
             used = int(np.count_nonzero(run.used))
         lines.append(
-            f"| {length:g} | {used} | {fitted.fit.r_squared:.2f} | {100 * max(errors):.4f} |"
+            f"| {length:g} | {used} | {fitted.fit.r_squared:.2f} | {100 * furthest(errors):+.4f} |"
         )
     return "\n".join(lines)
 

@@ -1,7 +1,7 @@
 """Figures of studies/jensen2022.md: the 18 drives, other cars, recorded navigation, sensitivity.
 
 Run from the checkout: ``python studies/jensen2022.py``, or with the names of some parts
-(``drives``, ``cars``, ``recorded``), which alone are made anew. Recorded drives lie in
+(``drives``, ``cars``, ``maps``, ``recorded``), which alone are made anew. Recorded drives lie in
 ``../shared/data`` and are not part of the project; without them their tables say so.
 """
 
@@ -12,6 +12,7 @@ import math
 import re
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +22,7 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import navigation as recorded
+from scipy.stats import pearsonr
 
 from weighbridge.calibration.run import run_calibration
 from weighbridge.calibration.settings import CalibrationSettings
@@ -34,6 +36,10 @@ from weighbridge.simulation import MIDSIZE, make_scenario, random_car, simulate_
 
 HERE = Path(__file__).parent
 CARS = (101, 102, 103, 104, 105, 106)
+UNSEEN_CARS = range(173_000, 175_000, 100)
+"""Seeds of the cars that the torque maps are compared on; nothing was chosen on them."""
+LOADS = (0.0, 300.0)
+"""Of the drives that each of them is weighed on [kg]."""
 
 
 def degrees(angle: float) -> str:
@@ -175,6 +181,86 @@ def other_cars(*, curved: bool) -> str:
     return "\n".join(lines) + f"\n\nRMS error {rms:.2f} %, {held} of {len(errors)} intervals hold."
 
 
+def both_maps(seed: int) -> dict[bool, list[tuple[float, float, float]]]:
+    """Calibrate one car with the curved map and with the straight one, and weigh its drives.
+
+    Returns
+    -------
+    found : error, its 95 % half width and R² of the fit of each drive [-]; by whether curved
+    """
+    car = random_car(np.random.default_rng(seed))
+    known = simulate_car(replace(make_scenario("car-calibration", seed=seed), car=car))
+    trips = [
+        simulate_car(replace(make_scenario("car", payload=load, seed=seed + 50 + k), car=car))
+        for k, load in enumerate(LOADS)
+    ]
+    found: dict[bool, list[tuple[float, float, float]]] = {}
+    for curved in (True, False):
+        fitted = run_calibration(
+            without_weather(known.drive),
+            float(np.mean(known.truth.mass)),
+            settings=CalibrationSettings(method="rls", curved=curved),
+        )
+        found[curved] = []
+        for trip in trips:
+            true = float(np.mean(trip.truth.mass))
+            w = weigh(without_weather(trip.drive), fitted.vehicle, method="rls")
+            low, high = w.interval()
+            error, width = w.mass / true - 1.0, 0.5 * (high - low) / true
+            found[curved].append((error, width, fitted.rows.r_squared))
+    return found
+
+
+def maps_table() -> str:
+    """Compare the two torque maps on cars that nothing was chosen on."""
+    by_car = {seed: both_maps(seed) for seed in UNSEEN_CARS}
+    lines = [
+        "| torque map | drives | RMS error % | mean % | scatter % | worst % | ± 95 %, median "
+        "| held | R² of the fit |",
+        "|" + "---|" * 9,
+    ]
+    for curved, words in ((True, "curved"), (False, "straight, as eq. 49 prints")):
+        error, width, r_squared = np.array([r for f in by_car.values() for r in f[curved]]).T
+        lines.append(
+            f"| {words} | {error.size} | {100 * np.sqrt(np.mean(error**2)):.2f} "
+            f"| {100 * error.mean():+.2f} | {100 * error.std(ddof=1):.2f} "
+            f"| {100 * np.max(np.abs(error)):.1f} | {100 * np.median(width):.1f} "
+            f"| {np.count_nonzero(np.abs(error) <= width)} of {error.size} "
+            f"| {r_squared.mean():.4f} |"
+        )
+    return "\n".join(lines) + "\n\n" + which_is_better(by_car)
+
+
+def which_is_better(by_car: dict[int, dict[bool, list[tuple[float, float, float]]]]) -> str:
+    """Compare size and scatter of the errors of the cars by both maps.
+
+    References
+    ----------
+    Pitman 1939, A note on normal correlation: both variances are equal where sum and difference do
+    not correlate.
+    """
+
+    def of_cars(size: Callable[[float], float]) -> np.ndarray:
+        """Mean over each car's drives, curved and straight (cars, 2) [%]."""
+        return 100.0 * np.array(
+            [[np.mean([size(r[0]) for r in f[curved]]) for curved in (True, False)]
+             for f in by_car.values()]
+        )  # fmt: skip
+
+    curved, straight = of_cars(abs).T
+    gap = curved - straight
+    mean = of_cars(float)
+    chance = pearsonr(mean.sum(axis=1), mean[:, 0] - mean[:, 1]).pvalue
+    scatter = mean.std(axis=0, ddof=1)
+    return (
+        f"Curved less straight, absolute error of a car's drives: {gap.mean():+.2f} ± "
+        f"{gap.std(ddof=1) / np.sqrt(gap.size):.2f} % (one standard error); curved is better on "
+        f"{np.count_nonzero(gap < 0.0)} of {gap.size} cars. The cars' mean errors scatter by "
+        f"{scatter[0]:.2f} and {scatter[1]:.2f} %; if both maps scattered alike, the chance of "
+        f"that would be {chance:.0e} (Pitman and Morgan)."
+    )
+
+
 def recorded_tables() -> str:
     if not recorded.DATA.is_dir():
         return "The recordings were not there when this page was made."
@@ -288,12 +374,17 @@ def cars() -> dict[str, str]:
     return {"cars": other_cars(curved=True), "straight cars": other_cars(curved=False)}
 
 
+def maps() -> dict[str, str]:
+    """Compare the curved torque map and the straight one on unseen cars."""
+    return {"maps": maps_table()}
+
+
 def recordings() -> dict[str, str]:
     """Navigate by recorded sensors."""
     return {"recorded": recorded_tables(), "pyins": beside_pyins()}
 
 
-PARTS = {"drives": drives, "cars": cars, "recorded": recordings}
+PARTS = {"drives": drives, "cars": cars, "maps": maps, "recorded": recordings}
 
 
 def write_page(tables: dict[str, str]) -> None:

@@ -24,13 +24,13 @@ def item_figures(done: Reproduction) -> dict[str, str]:
         ("printed ", [t.printed for t in done.tests]),
     ):
         tests = list(zip(done.tests, runs, strict=True))
-        errors = " / ".join(f"{100.0 * abs(t.error(r)):.4f}" for t, r in tests)
+        errors = " / ".join(f"{100.0 * t.error(r):+.4f}" for t, r in tests)
         found[f"{name}errors"] = f"errors {errors} %"
         found[f"{name}bands"] = f"± {' / '.join(f'{t.band(r):.0f}' for t, r in tests)} kg"
     late = [_late_errors(t.printed, t) for t in done.tests]
     found["printed late errors"] = (
-        f"errors after 5 min {' / '.join(f'{a:.0f}' for a, _ in late)} %, "
-        f"at the end {' / '.join(f'{b:.0f}' for _, b in late)} %"
+        f"errors after 5 min {' / '.join(f'{a:+.0f}' for a, _ in late)} %, "
+        f"at the end {' / '.join(f'{b:+.0f}' for _, b in late)} %"
     )
     return {
         **found,
@@ -43,5 +43,5 @@ def item_figures(done: Reproduction) -> dict[str, str]:
 def _late_errors(run: FilterRun, test: Test) -> tuple[float, float]:
     """Error of the running mass after `CONVERGED` and at the end [%]."""
     time = test.balance.table.time[run.used]
-    error = 100.0 * np.abs(run.mass[run.used] / test.mass - 1.0)
+    error = 100.0 * (run.mass[run.used] / test.mass - 1.0)
     return float(np.interp(time[0] + CONVERGED, time, error)), float(error[-1])

@@ -160,11 +160,16 @@ def torque_figures(done: TorqueTrial) -> dict[str, str]:
         masses, std = done.ways[way].mass, done.ways[way].std
         known = np.isfinite(masses)
         held = np.count_nonzero(np.abs(masses - done.masses)[known] < 1.96 * std[known])
-        tests = " / ".join(f"{abs(x):.1f}" for x in errors[:3])
-        loaded = " / ".join(f"{x:+.1f}" for x in errors[3:])
+        width = 196.0 * std / done.masses
+
+        def told(part: slice, errors: Floats = errors, width: Floats = width) -> str:
+            """Errors of some drives and the half widths told of them."""
+            off = " / ".join(f"{x:+.1f}" if np.isfinite(x) else "no mass" for x in errors[part])
+            return f"{off} % ± {' / '.join(f'{x:.1f}' for x in width[part])} %"
+
         found[f"{name} errors"] = (
-            f"errors {tests} %; 200 and 400 kg loaded {loaded} %; {held} of {known.sum()} within "
-            "95 % told"
+            f"errors {told(slice(3))}; 200 and 400 kg loaded {told(slice(3, None))}; {held} of "
+            f"{known.sum()} within 95 % told"
         )
     found["torque slopes"] = f"{_per_load(done, WAYS[0])}; no grade {_per_load(done, WAYS[1])}"
     return found
