@@ -315,6 +315,7 @@ def _read_file(
         )
     if mapping is not None:
         log.align = mapping.time.align
+        log.placed = mapping.time.offset != 0.0
         if not names:
             shift_clock(log, mapping.time.offset)
         if log.frames is not None:
