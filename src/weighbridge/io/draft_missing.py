@@ -13,9 +13,8 @@ _LOOKS: Final[tuple[tuple[str, tuple[str, ...], frozenset[str]], ...]] = (
         "the accelerometer",
         ("accel_x", "accel_y", "accel_z", "longitudinal_accel"),
         frozenset(
-            ("acc", "accel", "accl", "accelerometer", "acceleration", "acx", "acy",
-             "beschleunigung", "aceleracion", "accelerazione", "versnelling", "przyspieszenie", "acz",
-             "gforce")
+            ("acc", "accel", "accl", "accelerometer", "acceleration", "acx", "acy", "acz", "gforce",
+             "beschleunigung", "aceleracion", "accelerazione", "versnelling", "przyspieszenie")
         ),
     ),
     (
