@@ -230,3 +230,52 @@ def test_times_of_day_that_fit_twice_are_refused(tmp_path):
         read_drive(*on_the_clock(tmp_path, 1.0, 120.0))
     assert "offset_s" in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+
+
+MOVING_MAP = """
+[tables.obd]
+files = "obd.csv"
+[tables.obd.time]
+column = "time"
+format = "clock"
+[tables.obd.signals.vehicle_speed]
+column = "v"
+unit = "kmh"
+"""
+
+
+def clock_and_track(folder, apart, extra=""):
+    """Wheel speeds by an hour ahead of UTC and ``apart`` [s] beside a track with dates."""
+    day = 11.0 * 3600.0 + WHEEL + apart
+    stamps = [f"{int(s // 3600):02d}:{int(s // 60 % 60):02d}:{s % 60.0:06.3f}" for s in day]
+    rows = [f"{s},{3.6 * v:.3f}" for s, v in zip(stamps, road_speed(WHEEL), strict=True)]
+    (folder / "obd.csv").write_text("time,v\n" + "\n".join(rows) + "\n")
+    text = MOVING_MAP.replace('format = "clock"', f'format = "clock"\n{extra}')
+    (folder / "map.toml").write_text(text)
+    return read_drive([folder / "obd.csv", gpx(folder)], folder / "map.toml")
+
+
+@pytest.mark.parametrize("apart", [-2.0, -0.55, -0.3, 0.0, 0.3, 0.55, 0.65])
+def test_times_of_day_are_aligned_however_little_they_are_apart(tmp_path, apart):
+    drive = clock_and_track(tmp_path, apart)
+    _, std = moved_by(drive)
+    first = drive.signals["latitude"].time[0] - drive.signals["vehicle_speed"].time[0]
+    assert abs(first - 100.0) < 4.0 * std + 0.02
+    assert not any(p.serious for p in drive.problems)
+
+
+def test_times_of_day_stay_where_a_mapping_puts_them(tmp_path):
+    drive = clock_and_track(tmp_path, 0.3, "offset_s = -0.1")
+    first = drive.signals["latitude"].time[0] - drive.signals["vehicle_speed"].time[0]
+    assert abs(first - 99.8) < 0.001
+
+
+@pytest.mark.parametrize(("apart", "told_of"), [(0.3, []), (1.0, [False]), (3.0, [True])])
+def test_dates_that_disagree_by_a_second_are_told(tmp_path, apart, told_of):
+    start = np.datetime64("2021-03-05T10:00:00", "ms")
+    stamps = [start + np.timedelta64(round(1000 * (t + apart)), "ms") for t in WHEEL]
+    rows = [f"{t}Z,{3.6 * v:.3f}" for t, v in zip(stamps, road_speed(WHEEL), strict=True)]
+    (tmp_path / "obd.csv").write_text("time,v\n" + "\n".join(rows) + "\n")
+    (tmp_path / "map.toml").write_text(MOVING_MAP.replace("clock", "iso"))
+    drive = read_drive([tmp_path / "obd.csv", gpx(tmp_path)], tmp_path / "map.toml")
+    assert [p.serious for p in told(drive)] == told_of

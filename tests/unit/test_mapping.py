@@ -190,6 +190,30 @@ def test_a_mapping_of_canonical_columns_is_told_to_be_left_out(tmp_path, separat
         read_drive(log, mapping)
 
 
+@pytest.mark.parametrize(
+    ("text", "separator"),
+    [
+        ("0;36,5;800\n1;37,5;900\n", ";"),
+        ("0;36,5;800\n1;37,5;900\n", ","),
+        ("0,36.5,800\n1,37.5,900\n", ","),
+        ("10:00:01.5,36.5,800,\n10:00:02.5,37.5,900,\n", ","),
+    ],
+)
+def test_a_text_without_a_header_is_told_as_such(tmp_path, text, separator):
+    log = write(tmp_path / "log.csv", text)
+    mapping = {"csv": {"separator": separator}, "time": {"column": "t"}, "signals": SPEED}
+    with pytest.raises(DriveError, match="it has no header: name its") as caught:
+        read_drive(log, mapping)
+    assert "set separator" not in str(caught.value)
+    assert f"weighbridge map {log} --columns NAMES" in str(caught.value)
+    names = {"separator": text[1] if text[1] in ";," else ",", "columns": ["t", "v", "-", "-"]}
+    names["columns"] = names["columns"][: text.split("\n")[0].count(names["separator"]) + 1]
+    names["decimal"] = "," if names["separator"] == ";" else "."
+    time = {"column": "t", **({"format": "clock"} if ":" in text else {})}
+    read = read_drive(log, {"csv": names, "time": time, "signals": SPEED})
+    assert list(read.signals["vehicle_speed"].values * 3.6) == pytest.approx([36.5, 37.5])
+
+
 def test_absent_time_column_is_told(tmp_path):
     log = write(tmp_path / "log.csv", "t,v\n0,36\n")
     with pytest.raises(DriveError, match=r"no time column 'clock'.*it has 't', 'v'"):

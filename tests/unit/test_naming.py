@@ -87,6 +87,15 @@ def test_columns_in_nine_languages(held_out, least):
         ("maf_gps", "mass_air_flow", "gps"),
         ("engine_run_time_ms", "run_time", "ms"),
         ("delay_ms", "", "ms"),
+        ("gx_dps", "gyro_x", "degps"),
+        ("gy [deg/s]", "gyro_y", "degps"),
+        ("gz (rad/s)", "gyro_z", "radps"),
+        ("gz_g", "accel_z", "g"),
+        ("gx", "", None),
+        ("ax_ms2", "accel_x", "mps2"),
+        ("ret_tq_pct", "retarder_torque", "pct"),
+        ("RetTrq [%]", "retarder_torque", "pct"),
+        ("eng_tq_pct", "engine_torque_fraction", "pct"),
     ],
 )
 def test_a_last_word_is_a_unit_where_the_quantity_has_it(name, quantity, unit):

@@ -90,6 +90,7 @@ def map_log(
     from weighbridge.errors import DriveError
     from weighbridge.io.draft import tells_torque
     from weighbridge.io.draft_alike import kinds
+    from weighbridge.io.draft_missing import missing
     from weighbridge.io.draft_speeds import with_compared_speeds
     from weighbridge.io.mapping_text import mapping_text
     from weighbridge.whole import whole_file
@@ -111,6 +112,8 @@ def map_log(
         notice(f"  left out: {sentence}")
     if not tells_torque(*drafts):
         notice(_NO_TORQUE)
+    for sentence in missing(drafts):
+        notice(f"  {shown(sentence)}")
     text = mapping_text(drafts, tuple(refused), _named_dbcs(dbc or [], output))
     again = _again(logs, columns, dbc or [], output)
     to_ask = _to_ask(drafts, again) if not ask else ""

@@ -16,7 +16,12 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
+from weighbridge.io.columns import (
+    UnitlessColumnError,
+    parse_column,
+    stated_unit,
+    unit_suffix,
+)
 from weighbridge.io.draft import Draft, draft_column
 from weighbridge.io.draft_column import checked
 from weighbridge.io.frames import Frames
@@ -277,7 +282,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
         raise DriveError(f"{path} has no channel with samples; record it again")
     known = {c.quantity for c in channels if c.quantity}
     unnamed = [c for c in channels if not c.quantity]
-    units = [unit_suffix(c.unit) for c in unnamed]
+    units = [stated_unit(c.unit) for c in unnamed]
     named = recognise_all([_told(c.name) for c in unnamed], units)
     columns = checked(
         tuple(

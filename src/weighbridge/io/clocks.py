@@ -124,14 +124,17 @@ def _doubts(logs: Sequence[Log]) -> list[Problem]:
             if {s.name for s in log.signals} & {s.name for s in other.signals}:
                 continue
             found, what = _offset([other], [log])
-            if found is not None and found.found and abs(found.offset) > _LATE + 5.0 * found.std:
+            if found is None or not found.found:
+                continue
+            apart = abs(found.offset) - 5.0 * found.std
+            if apart > 2.0 * _LATENESS:
                 problems.append(
                     Problem(
                         "",
                         f"the clocks of {other.path.name} and {log.path.name} seem to be "
                         f"{_told(found)} apart, by {what}; set align = true under [time] of its "
                         "table in a mapping to move it",
-                        serious=True,
+                        serious=apart > _LATE,
                     )
                 )
     return problems
@@ -157,9 +160,12 @@ def _move(fixed: Sequence[Log], group: Sequence[Log], why: str) -> Problem:
 
 
 def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem:
-    """Put times of day on the day of files with dates, by what they share or by the hour.
+    """Put times of day on the day of files with dates, by what they share, else by the hour.
 
-    The times of day may be those of any zone, whole or half hours from UTC.
+    What they share tells how far the clocks are apart, tenths of a second included: every drive of
+    the two devices is then on one clock. The hour alone leaves what the clocks differ by. It may be
+    that of any zone, whole or half hours from UTC; where a mapping gives the offset, no more is
+    sought.
 
     Raises
     ------
@@ -168,9 +174,9 @@ def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem
     """
     shared_motion, what = _offset(dated, counted)
     if shared_motion is not None:
-        zone = _ZONE * round(shared_motion.offset / _ZONE)
-        if not shared_motion.found or abs(shared_motion.offset - zone) > 2.0 * _LATENESS:
+        if not shared_motion.found or not any(log.placed for log in counted):
             return _move(dated, counted, why)
+        zone = _ZONE * round(shared_motion.offset / _ZONE)
         return _put(counted, zone, dated, f"{why}, which by {what} are {_told(shared_motion)} off")
     (a0, a1), (b0, b1) = _span(dated), _span(counted)
     shorter = min(a1 - a0, b1 - b0)

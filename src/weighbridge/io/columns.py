@@ -13,10 +13,15 @@ from weighbridge.signals.units import UNITS
 UNIT_TEXTS: Final[dict[str, str]] = {
     "km/h": "kmh", "kph": "kmh", "km/hr": "kmh", "kmph": "kmh", "mi/h": "mph", "m/s": "mps",
     "meters/second": "mps", "knots": "kn",
-    "m/s^2": "mps2", "m/s²": "mps2", "m/s2": "mps2", "m/s/s": "mps2", "gn": "g",
+    "m/s^2": "mps2", "m/s²": "mps2", "m/s2": "mps2", "m/s/s": "mps2", "ms2": "mps2",
+    "m/s**2": "mps2", "ms-2": "mps2", "ms^-2": "mps2", "gn": "g",
     "1/min": "rpm", "rev/min": "rpm", "r/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
     "rad/s": "radps", "deg/s": "degps", "°/s": "degps", "dps": "degps",
     "°": "deg", "degrees": "deg", "radians": "rad",
+    "lb-ft": "lbft", "lb ft": "lbft", "lb·ft": "lbft", "lbf-ft": "lbft", "lbf·ft": "lbft",
+    "lbf ft": "lbft", "lbfft": "lbft", "ft-lb": "lbft", "ft lb": "lbft", "ft-lbs": "lbft",
+    "ft·lb": "lbft", "ft-lbf": "lbft", "ft·lbf": "lbft", "ftlb": "lbft", "lbs-ft": "lbft",
+    "mdps": "mdegps", "mdeg/s": "mdegps", "m°/s": "mdegps",
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
     "%": "pct", "percent": "pct", "prozent": "pct", "proz": "pct", "-": "ratio", "1": "ratio",
     "°c": "degc", "℃": "degc", "c": "degc", "deg c": "degc", "celsius": "degc",
@@ -32,7 +37,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
 """Units as people and loggers write them, and the suffix each stands for."""
 
 UNKNOWN_UNIT: Final = "?"
-"""Stands for a unit that a log states and nobody knows: no quantity is in it."""
+"""Stands before a unit that a log states and nobody knows: no quantity is in it."""
 
 # Letters of a name that may resemble a canonical one; comparing takes their square.
 _LONGEST_NAME: Final = 200
@@ -65,15 +70,30 @@ def unit_suffix(text: str) -> str | None:
     return UNIT_TEXTS.get(word)
 
 
+def unit_refused(quantity: Quantity, text: str) -> str:
+    """Say why a column whose name is a quantity's is not taken for it, by its unit.
+
+    Parameters
+    ----------
+    quantity
+    text : its unit as the log writes it
+    """
+    why = "is not known" if unit_suffix(text) is None else "measures something else"
+    return (
+        f"not taken for {quantity.name}: its unit {text!r} {why}; it can be in "
+        f"{_either(suffixes_of(quantity))}"
+    )
+
+
 def stated_unit(text: str) -> str | None:
-    """Unit suffix of a unit that a log states: `UNKNOWN_UNIT` for one that is not known; or None.
+    """Unit suffix of a unit that a log states, after `UNKNOWN_UNIT` one that is not known; or None.
 
     Parameters
     ----------
     text : what stands in a row or column of units; empty, or a mark such as - for none
     """
     word = text.strip().strip("[]()").strip()
-    return (unit_suffix(word) or UNKNOWN_UNIT) if word else None
+    return (unit_suffix(word) or f"{UNKNOWN_UNIT}{word}") if word else None
 
 
 def bracketed_unit(column: str) -> str | None:

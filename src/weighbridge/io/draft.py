@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import dimension_of, suffixes_of
+from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
 from weighbridge.io.draft_column import DraftColumn, checked
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, find_times
@@ -33,8 +33,10 @@ from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.units import UNITS, to_si
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
-_STRANGE_UNIT: Final = re.compile(r"[\[(]\s*([^\])\s]*[/•*·][^\])]*?)\s*[\])]\s*$")
-"""A unit of two at the end of a name, such as lb/min."""
+_STRANGE_UNIT: Final = re.compile(
+    r"[\[(]\s*([^\])\s]*[/•*·][^\])]*?|[kK]?Hz|rps|kgf?[ .]?m|lsb|LSB|counts?)\s*[\])]\s*$"
+)
+"""A unit at the end of a name that is not known: one of two, such as lb/min, or Hz and the like."""
 
 _BESIDE: Final = frozenset(("engine_speed", "vehicle_speed", "gnss_speed"))
 """Signals of a torque source that tell no torque by themselves."""
@@ -258,17 +260,16 @@ def _rated(column: DraftColumn, time: Floats) -> DraftColumn:
 
 def _column(raw: RawTable, name: str, found: Named, *, stated: str | None) -> DraftColumn:
     if not found.quantity:
-        return _nothing(name)
+        return _nothing(name, found.misfit)
     try:
         values, _ = raw.numbers(raw.names.index(name))
     except DriveError:
-        doubt = f"not taken for {found.quantity}: its cells are no numbers"
-        return replace(_nothing(name), doubt=doubt)
+        return _nothing(name, f"not taken for {found.quantity}: its cells are no numbers")
     return draft_column(name, found, values, stated)
 
 
-def _nothing(name: str) -> DraftColumn:
-    return DraftColumn(name, "", "", False, float("nan"), float("nan"), float("nan"), 0)
+def _nothing(name: str, doubt: str) -> DraftColumn:
+    return DraftColumn(name, "", "", False, float("nan"), float("nan"), float("nan"), 0, doubt)
 
 
 def draft_column(name: str, found: Named, values: Floats, stated: str | None) -> DraftColumn:
@@ -281,20 +282,16 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     values : (n,) in the log's unit; NaN where there is none
     stated : suffix of the unit that the log states elsewhere than in the name
     """
-    nothing = _nothing(name)
     if not found.quantity:
-        return nothing
+        return _nothing(name, found.misfit)
     known = values[np.isfinite(values)]
     if known.size == 0:
-        return replace(nothing, doubt=f"not taken for {found.quantity}: it has no values")
+        return _nothing(name, f"not taken for {found.quantity}: it has no values")
     quantity = QUANTITIES[found.quantity]
     unit, doubt, by_log = stated or found.unit, "", True
     strange = _STRANGE_UNIT.search(name)
     if quantity.suffix and unit is None and strange is not None:
-        return replace(
-            nothing,
-            doubt=f"not taken for {found.quantity}: its unit {strange.group(1)!r} is not known",
-        )
+        return _nothing(name, unit_refused(quantity, strange.group(1)))
     if not quantity.suffix:
         unit = ""
     elif unit is not None and UNITS[unit].dimension == dimension_of(quantity):

@@ -72,7 +72,7 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
         below = rows[first + 1]
         stated = {n: stated_unit(c) for n, c in zip(header, below, strict=False)}
         units = {n: u for n, u in stated.items() if u is not None}
-        known = sum(u != UNKNOWN_UNIT for u in units.values())
+        known = sum(not u.startswith(UNKNOWN_UNIT) for u in units.values())
         units = units if known >= 0.3 * len(header) else {}
     skipped = found.index(lines[first])
     after = _until_rows(found[skipped + 1 :], separator, width) if units else 0

@@ -26,6 +26,7 @@ class Log:
     start : where the clock begins [s since 1970], if it does not count from there
         and the file tells; None otherwise
     of_day : whether the clock counts from midnight, of a day that the file does not tell
+    placed : whether a mapping gives the offset of its clock
     align : whether a mapping asks to align its clock with the drive's other files
     frames : raw bus traffic, decoded once all files of a drive are read
     info : what the file knows of the drive beside its signals
@@ -40,6 +41,7 @@ class Log:
     absolute: bool = False
     start: float | None = None
     of_day: bool = False
+    placed: bool = False
     align: bool = False
     frames: Frames | None = None
     info: DriveInfo | None = None

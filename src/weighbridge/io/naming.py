@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from weighbridge.io.abbreviations import OF_ANOTHER, SOURCES, spelled
-from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, unit_suffix
+from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, unit_refused, unit_suffix
 from weighbridge.io.languages import LANGUAGES, TIMES
 from weighbridge.io.phrases import AGAINST, PHRASES, TIME_PHRASES
 from weighbridge.signals import QUANTITIES
@@ -41,8 +41,13 @@ _WANTED: Final = {
 }
 """The words of each quantity, spelled out."""
 
-_WITH_UNIT: Final = {"vehicle_speed": frozenset(("v",))}
-"""A word that is a quantity only where the log states a unit of it: v may be volts as well."""
+_WITH_UNIT: Final = {
+    "vehicle_speed": ("v",),
+    **{f"accel_{a}": (f"g{a}",) for a in "xyz"},
+    **{f"gyro_{a}": (f"g{a}", f"rot {a}", f"gy{a}") for a in "xyz"},
+}
+"""Words that are a quantity only where the log states a unit of it: v may be volts as well, and gx
+an acceleration or a rate."""
 
 _NOT: Final = {q: frozenset(spelled(words)) | words for q, words in AGAINST.items()}
 
@@ -86,6 +91,7 @@ _PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)
 _LETTERS: Final = str.maketrans({"ß": "ss", "ł": "l", "Ł": "L", "ı": "i", "ø": "o", "Ø": "O"})
 """Letters that are no letter with an accent."""
 
+_TAIL: Final = re.compile(r"[A-Za-z°%²/^]{2,8}\d?$")
 _WORD: Final = re.compile(r"[a-z]+|\d+")
 _CAMEL: Final = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
@@ -99,11 +105,14 @@ class Named:
     quantity : canonical name; empty where none is recognised
     unit : suffix of the unit that the name states; None where it states none
     score : part of the name's words that speak for it [-]
+    misfit : why it is not the quantity that the name without its unit would be; empty where there
+        is none
     """
 
     quantity: str
     unit: str | None
     score: float
+    misfit: str = ""
 
 
 def words_of(name: str) -> tuple[str, ...]:
@@ -181,7 +190,9 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
         if stated is not None and not _can_be(quantity, stated):
             continue
         score = max(_score(said, wanted) for said in readings for wanted in phrases)
-        if stated is not None and _WITH_UNIT.get(quantity) in readings:
+        if stated is not None and any(
+            frozenset(said.split()) in readings for said in _WITH_UNIT.get(quantity, ())
+        ):
             score = max(score, LEAST)
         if score > best.score:
             best = Named(quantity, stated, score)
@@ -198,8 +209,8 @@ def is_time(name: str) -> bool:
 def _can_be(quantity: str, unit: str) -> bool:
     q = QUANTITIES[quantity]
     if not q.suffix:
-        return unit in ("ratio", UNKNOWN_UNIT)
-    return unit != UNKNOWN_UNIT and UNITS[unit].dimension == dimension_of(q)
+        return unit == "ratio" or unit.startswith(UNKNOWN_UNIT)
+    return unit in UNITS and UNITS[unit].dimension == dimension_of(q)
 
 
 def _score(words: frozenset[str], phrase: frozenset[str]) -> float:
@@ -240,10 +251,38 @@ def recognise_all(names: Sequence[str], units: Sequence[str | None] | None = Non
         other = best.get(named.quantity)
         if other is None or named.score > found[other].score:
             best[named.quantity] = k
+    taken = {named.quantity for named in found}
+    stated = units or [None] * len(names)
     return [
-        named if best[named.quantity] == k else Named("", named.unit, named.score)
-        for k, named in enumerate(found)
+        Named("", named.unit, named.score, _misfit(name, unit, taken))
+        if not named.quantity
+        else named
+        if best[named.quantity] == k
+        else Named("", named.unit, named.score)
+        for k, (name, unit, named) in enumerate(zip(names, stated, found, strict=True))
     ]
+
+
+def _misfit(name: str, stated: str | None, taken: set[str]) -> str:
+    """Say that a name would be a quantity's that is not taken, but for the unit it states."""
+    for base, text in _without_unit(_piped(name), stated):
+        quantity = _recognised(base, words_of(base), None)
+        of_another = OF_ANOTHER | _SILENT | _NOT.get(quantity.quantity, frozenset())
+        if quantity.score < 1.0 or quantity.quantity in taken or of_another & set(words_of(text)):
+            continue
+        if QUANTITIES[quantity.quantity].suffix:
+            return unit_refused(QUANTITIES[quantity.quantity], text)
+    return ""
+
+
+def _without_unit(name: str, stated: str | None) -> list[tuple[str, str]]:
+    """Ways to part a name and its unit, each as the log writes them."""
+    if stated is not None:
+        return [(name, stated.removeprefix(UNKNOWN_UNIT))]
+    if brackets := [found for found in _UNIT.finditer(name) if found.group(1)]:
+        return [(name[: brackets[-1].start()] + name[brackets[-1].end() :], brackets[-1].group(1))]
+    base, _, tail = name.rpartition("_")
+    return [(base, tail)] if base and _TAIL.match(tail) else []
 
 
 def _axes_by_direction(names: Sequence[str], found: list[Named]) -> list[Named]:

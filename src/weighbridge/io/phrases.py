@@ -59,7 +59,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "reference_torque": (
         "engine reference torque", "reference torque", "referenzmoment", "bezugsmoment", "m ref", "m bezug", "reference engine torque",
     ),
-    "retarder_torque": ("actual retarder percent torque", "retarder percent torque", "actual retarder torque", "retarder torque", "retardermoment", "m ret", "m retarder"),
+    "retarder_torque": ("actual retarder percent torque", "retarder percent torque", "actual retarder torque", "retarder torque", "ret torque", "ret percent torque", "retardermoment", "m ret", "m retarder"),
     "mass_air_flow": ("luftmassenmesser", "luftmassenstrom maf", "debit masse air", "flujo masico aire", "flusso aria", "flusso massa aria", "portata massica aria", "mass airflow",
         "mass air flow", "mass air flow rate", "maf", "air flow", "maf rate", "maf air flow rate", "air flow rate",
         "luftmassenstrom", "luftmasse", "debit air", "debit massique air", "flujo masa aire", "flujo aire",
@@ -220,8 +220,8 @@ AGAINST: Final[dict[str, frozenset[str]]] = {
                       "target", "accuracy", "set", "shaft", "output", "input", "turbine", "angular", "idle", "course")),
     "engine_speed": frozenset(("idle", "max", "min", "target", "wheel", "shaft", "turbo", "vehicle", "fan", "limit", "desired", "average")),
     "engine_load": frozenset(("absolute", "sensor", "cpu", "axle", "torque")),
-    "engine_torque": frozenset(("steer", "eps", "reserve", "resv", "reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder", "axle")),
-    "engine_torque_fraction": frozenset(("steer", "eps", "reserve", "resv", "reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "nominal", "converter")),
+    "engine_torque": frozenset(("steer", "eps", "reserve", "resv", "reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder", "ret", "axle")),
+    "engine_torque_fraction": frozenset(("steer", "eps", "reserve", "resv", "reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "ret", "nominal", "converter")),
     "engine_power": frozenset(("max", "min", "limit", "available", "charge", "charger", "charging", "battery", "heater", "ac", "steering", "window", "supply", "seat",
                                "mode", "state", "level", "demand", "demanded", "request", "requested", "target", "regen", "rated", "reference", "accessory", "hvac", "front", "rear", "ecu")),
     **{

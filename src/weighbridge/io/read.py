@@ -23,6 +23,7 @@ from weighbridge.io.formats import format_of, is_log, suffixes
 from weighbridge.io.frames import Frames, join_frames, settle_clock
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
+from weighbridge.io.left_out import left_out
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import (
     MappingSource,
@@ -38,11 +39,11 @@ from weighbridge.io.parquet import read_parquet
 from weighbridge.io.parts import part_folders, read_parts
 from weighbridge.io.paths import given_paths, is_folder
 from weighbridge.io.quiet import PARSE_ERRORS, first_line
+from weighbridge.io.repeats import joined_signal, settle_repeats
 from weighbridge.io.table import read_text, start_text
 from weighbridge.signals import QUANTITIES, Drive, DriveInfo, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
-from weighbridge.signals.instants import instant
 from weighbridge.signals.parts import numbered, parted
 from weighbridge.visible import visible
 from weighbridge.whole import REPLACING
@@ -214,7 +215,7 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
     if tables and not mappings:
         others = [f for f in files if f not in tables.values() and _self_described(f)]
         known = [*((f, t) for t, f in tables.items()), *((f, None) for f in others)]
-        return _read_files(known, ()) + parts, info
+        return _read_known(folder, known, (), files) + parts, info
     if not files and not parts:
         raise DriveError(
             f"{folder} holds no drive: it needs at least one of "
@@ -230,13 +231,30 @@ def _read_folder(folder: Path, mappings: tuple[TableMapping, ...]) -> tuple[list
         ]
         if not files and not parts:
             raise none_fits(folder, there, mappings)
+    else:
+        there = files
+    return _read_known(folder, [(f, None) for f in files], mappings, there) + parts, info
+
+
+def _read_known(
+    folder: Path,
+    known: Sequence[tuple[Path, str | None]],
+    mappings: tuple[TableMapping, ...],
+    there: Sequence[Path],
+) -> list[Log]:
+    """Read the files of a folder that can be read, and tell of others there that look like logs."""
     try:
-        return _read_files([(f, None) for f in files], mappings) + parts, info
+        logs = _read_files(known, mappings)
     except UnnamedError as error:
-        if mappings or len(files) == 1:
+        if mappings or len(there) == 1:
             raise
         # One mapping is for all files of the folder.
         raise DriveError(f"{error.what}: {how_to_name(folder)}") from None
+    source = mappings[0].source if mappings else ""
+    others = [f for f in there if f not in {path for path, _ in known}]
+    if logs:
+        logs[0].problems += left_out(folder, others, source)
+    return logs
 
 
 def _read_files(
@@ -315,6 +333,7 @@ def _read_file(
         )
     if mapping is not None:
         log.align = mapping.time.align
+        log.placed = mapping.time.offset != 0.0
         if not names:
             shift_clock(log, mapping.time.offset)
         if log.frames is not None:
@@ -353,6 +372,7 @@ def joined_drive(
     problems = [p for log in logs for p in log.problems]
     parts: dict[str, list[tuple[Log, Signal]]] = {}
     problems += settle_clocks(logs)
+    problems += settle_repeats(logs)
     info = _rebase(logs, info)
     for log in logs:
         for s in log.signals:
@@ -365,7 +385,7 @@ def joined_drive(
             f"{name} holds no samples: every table ({files}) is empty{why}; record it again"
         )
     joined: dict[tuple[int, ...], Floats] = {}
-    signals = {n: p[0][1] if len(p) == 1 else _joined(n, p, joined) for n, p in parts.items()}
+    signals = {n: p[0][1] if len(p) == 1 else joined_signal(n, p, joined) for n, p in parts.items()}
     signals, filled = true_fixes(signals)
     problems += filled
     drive = Drive(
@@ -457,24 +477,6 @@ def _overlap(a: Frames, b: Frames) -> float:
     both = float(min(a.time[-1], b.time[-1]) - b.time[0])
     span = float(min(a.time[-1] - a.time[0], b.time[-1] - b.time[0]))
     return math.inf if 0.0 <= 0.5 * span < both else both
-
-
-def _joined(
-    name: str, parts: list[tuple[Log, Signal]], clocks: dict[tuple[int, ...], Floats]
-) -> Signal:
-    """Put the pieces of one signal from several files one after another."""
-    parts = sorted(parts, key=lambda p: float(p[1].time[0]))
-    for (log_a, a), (log_b, b) in pairwise(parts):
-        if b.time[0] <= a.time[-1]:
-            raise DriveError(
-                f"{name} is both in {log_a.path} (up to {instant(float(a.time[-1]))}) and "
-                f"in {log_b.path} (from {instant(float(b.time[0]))}); read them as drives of "
-                "their own, or leave one out"
-            )
-    key = tuple(id(s.time) for _, s in parts)
-    if key not in clocks:
-        clocks[key] = np.concatenate([s.time for _, s in parts])
-    return Signal(name, clocks[key], np.concatenate([s.values for _, s in parts]))
 
 
 def _begin(time: Floats) -> float:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -33,6 +36,10 @@ from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.parts import find_restarts
 from weighbridge.signals.tomlfile import Faults
 from weighbridge.signals.units import UNITS, to_si
+
+_PARTED: Final = re.compile(f"[{re.escape(''.join(SEPARATORS))}]")
+_NUMBER: Final = re.compile(r"\s*[-+]?[\d.:]*\d[\d.:]*(?:[eE][-+]?\d+)?\s*$")
+"""A number or a time of day."""
 
 
 def read_csv(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -228,6 +235,13 @@ def _no_time(raw: RawTable, known: bool) -> DriveError:
 
 def _named_hint(raw: RawTable) -> str:
     """What to do about a mapping whose columns are not there."""
+    if raw.separator and _of_numbers(raw.names):
+        names = json.dumps([TIME_COLUMN, "vehicle_speed_kmh", "-"])
+        return (
+            f": these are the values of its first line, and it has no header: name its "
+            f"{len(raw.names)} columns in their order, as columns = {names} under csv there, or "
+            f"draft another mapping: weighbridge map {shlex.quote(str(raw.path))} --columns NAMES"
+        )
     other = _other_separator(raw)
     cells = [cell for name in raw.names for cell in name.split(other)] if other else raw.names
     if _canonical(cells):
@@ -236,6 +250,12 @@ def _named_hint(raw: RawTable) -> str:
             "file that names it"
         )
     return f"; set separator = {json.dumps(other)} there" if other else ""
+
+
+def _of_numbers(names: Sequence[str]) -> bool:
+    """Whether what stands for names is a row of numbers and times, whatever parts them."""
+    cells = [cell for name in names for cell in _PARTED.split(name) if cell.strip()]
+    return bool(cells) and sum(_NUMBER.match(cell) is not None for cell in cells) > 0.5 * len(cells)
 
 
 def _other_separator(raw: RawTable) -> str:

@@ -1,0 +1,97 @@
+"""A folder of several loggers: what is advised, what is left unread, what two of them have."""
+
+import numpy as np
+import pytest
+from tests.unit.test_alignment import road_speed
+
+from weighbridge.errors import DriveError
+from weighbridge.io import read_drive
+
+T = np.arange(0.0, 600.0, 0.5)
+SPEED = road_speed(T)
+FOREIGN = "Time (s),Speed (km/h),Engine RPM (rpm)"
+AXES = "Time (s),ax (m/s^2),ay (m/s^2),az (m/s^2)"
+
+
+def table(path, head, *columns, time=T):
+    rows = np.column_stack([time, *columns])
+    path.write_text("\n".join([head, *(",".join(f"{x:.6f}" for x in row) for row in rows)]) + "\n")
+    return path
+
+
+def obd(path, head=FOREIGN):
+    return table(path, head, 3.6 * SPEED, 100.0 * SPEED)
+
+
+def phone(path, time=T):
+    zero = np.zeros(time.size)
+    return table(path, AXES, zero, zero, zero + 9.81, time=time)
+
+
+def texts(drive):
+    return [p.text for p in drive.problems]
+
+
+def test_foreign_tables_of_canonical_files_are_mapped_as_a_folder(tmp_path):
+    obd(tmp_path / "obd.csv")
+    phone(tmp_path / "imu.csv")
+    with pytest.raises(DriveError, match=f"weighbridge map {tmp_path} -o map.toml"):
+        read_drive(tmp_path)
+
+
+def test_a_table_with_its_own_names_beside_canonical_ones_is_told(tmp_path):
+    obd(tmp_path / "obd.csv", "time_s,vehicle_speed_kmh,engine_speed_rpm")
+    phone(tmp_path / "phone.csv")
+    (tmp_path / "notes.txt").write_text("tyres pumped up\nleft at eight\n")
+    table(tmp_path / "track.csv", "time_s,mass_kg,std_kg,speed_mps,gear", *(4 * [SPEED]))
+    told = texts(read_drive(tmp_path))
+    assert [text.split(",")[0] for text in told] == ["phone.csv was not read"]
+    assert f"weighbridge map {tmp_path} -o map.toml" in told[0]
+
+
+def test_a_table_that_no_pattern_fits_is_told(tmp_path):
+    obd(tmp_path / "dongle.csv")
+    phone(tmp_path / "phone.csv")
+    mapping = {
+        "tables": {
+            "obd": {
+                "files": "dongle*",
+                "time": {"column": "Time (s)", "unit": "s"},
+                "signals": {"vehicle_speed": {"column": "Speed (km/h)", "unit": "kmh"}},
+            }
+        }
+    }
+    told = texts(read_drive(tmp_path, mapping))
+    assert "phone.csv was not read, for no pattern of mapping fits it" in told[0]
+
+
+def gps(path, lateness=0.0, speed=SPEED, **more):
+    names = ["gnss_speed_mps", *more]
+    columns = [np.interp(T - lateness, T, speed), *more.values()]
+    return table(path, ",".join(["time_s", *names]), *columns)
+
+
+def test_of_two_receivers_in_one_drive_one_is_taken(tmp_path):
+    rich = gps(tmp_path / "rich.csv", 0.3, gnss_course_deg=np.zeros(T.size))
+    poor = gps(tmp_path / "poor.csv")
+    drive = read_drive([poor, rich])
+    assert np.allclose(drive.signals["gnss_speed"].values, np.interp(T - 0.3, T, SPEED))
+    assert texts(drive) == [
+        "rich.csv and poor.csv both hold gnss_speed of one drive, as speed or position shows; "
+        "what rich.csv has is taken"
+    ]
+
+
+@pytest.mark.parametrize("case", ["another drive", "a part of it", "the vehicle's own"])
+def test_what_may_be_two_drives_is_refused(tmp_path, case):
+    first = gps(tmp_path / "a.csv")
+    if case == "another drive":
+        second = gps(tmp_path / "b.csv", speed=road_speed(T, 9))
+    elif case == "a part of it":
+        late = T + 300.0
+        second = table(tmp_path / "b.csv", "time_s,gnss_speed_mps", road_speed(late), time=late)
+    else:
+        names = "time_s,vehicle_speed_kmh,engine_speed_rpm"
+        first, second = obd(tmp_path / "a.csv", names), obd(tmp_path / "b.csv", names)
+    with pytest.raises(DriveError, match=r"is both in .* or its column in the mapping"):
+        read_drive([first, second])
