@@ -52,6 +52,10 @@ class Case:
         return all(f.harmless for f, _ in self.faults)
 
     @property
+    def must_tell(self) -> bool:
+        return any(f.must_tell for f, _ in self.faults)
+
+    @property
     def damage(self) -> str:
         return "+".join(f"{f.name}@{severity:g}" for f, severity in self.faults)
 
@@ -212,11 +216,30 @@ def _broken(case: Case, method: str, error: Exception) -> Outcome:
     return Outcome(case, method, kind, text=text)
 
 
-def naming(case: Case, subject: Subject, told: Sequence[str]) -> str:
+def naming(fault: Fault, subject: Subject, told: Sequence[str]) -> str:
     """Return the first warning that names a fault and that the undamaged drive lacks."""
-    words = re.compile("|".join(f.words for f, _ in case.faults), re.IGNORECASE)
+    words = re.compile(fault.words, re.IGNORECASE)
     fresh = (t for t in told if without_numbers(t) not in subject.warnings)
     return next((t for t in fresh if words.search(t)), "")
+
+
+def telling(case: Case, subject: Subject, told: Sequence[str], method: str) -> str:
+    """Return a warning where each fault of a case that spoils the mass is named; else nothing.
+
+    A fault that is not named is put in alone: where the mass is right then, it is none of the
+    reasons.
+    """
+    named = {f: naming(f, subject, told) for f, _ in case.faults}
+    found = next((text for text in named.values() if text), "")
+    if not found or len(case.faults) == 1:
+        return found
+    for fault, severity in case.faults:
+        if named[fault] or fault.harmless:
+            continue
+        alone = run_case(Case(((fault, severity),), case.vehicle), subject)
+        if any(o.method == method and o.kind != "right" for o in alone):
+            return ""
+    return found
 
 
 def judge(case: Case, subject: Subject, weighing: Weighing, shared: Sequence[str] = ()) -> Outcome:
@@ -231,16 +254,17 @@ def judge(case: Case, subject: Subject, weighing: Weighing, shared: Sequence[str
         return Outcome(case, method, "refused", text=weighing.reason, where=str(weighing.status))
     truth = subject.truth(method)
     error, std = mass / truth - 1.0, weighing.std / truth
-    warning = naming(case, subject, (*shared, *weighing.warnings))
     low, high = weighing.interval(0.95)
     right = (
         low <= truth <= high
         or abs(mass / subject.undamaged[method] - 1.0) < NEAR
         or abs(error) <= max(FAR, FAR_STD * std, abs(subject.error(method)))
     )
+    told = (*shared, *weighing.warnings)
+    warning = telling(case, subject, told, method) if not right or case.must_tell else ""
     # A payload that may be nothing need not be told; one that is unknown counts as impossible.
     possible = weighing.payload > -FAR_STD * weighing.std
-    if any(f.must_tell for f, _ in case.faults) and not warning and not possible:
+    if case.must_tell and not warning and not possible:
         return Outcome(case, method, "silent", error, std, "nothing is told of it")
     kind = "right" if right else "told" if warning else "silent"
     wider = weighing.std / subject.stds[method]

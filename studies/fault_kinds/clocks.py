@@ -9,9 +9,10 @@ from weighbridge.signals import Drive, Floats
 
 GROUP = "clocks"
 WORDS = (
-    r"clock|drift|time stamp|stamps|later|earlier|\blag|jitter|apart|delay"
-    r"|rows? (are|were) (lost|missing)"
+    r"\bclocks?\b|time stamps?|run apart|\blags?\b|late against|\bspread evenly"
+    r"|rows? (are|were) (lost|missing)|samples? every"
 )
+LATE_WORDS = WORDS + r"|torque delay|is late"
 
 Rng = np.random.Generator
 
@@ -125,8 +126,8 @@ FAULTS = (
     Fault(GROUP, imu_clock_step, (2.0,), WORDS, ("truck", "long")),
     Fault(GROUP, bus_clock_step, (0.5, 2.0, -1.0), WORDS),
     Fault(GROUP, imu_clock_offset, (0.5, 2.0, 18.0, 3600.0), WORDS),
-    Fault(GROUP, torque_late, (0.3, 0.5, 1.0, -0.5), WORDS),
-    Fault(GROUP, torque_later_and_later, (0.5, 1.0, 3.0), WORDS),
+    Fault(GROUP, torque_late, (0.3, 0.5, 1.0, -0.5), LATE_WORDS),
+    Fault(GROUP, torque_later_and_later, (0.5, 1.0, 3.0), LATE_WORDS),
     Fault(GROUP, imu_rows_lost_uncounted, (0.0002, 0.0005, 0.002, 0.01), WORDS),
     Fault(GROUP, imu_rows_lost_in_runs, (0.0005, 0.002), WORDS),
     Fault(GROUP, imu_jitter_and_gaps, (0.02, 0.05, 0.1), WORDS),

@@ -20,13 +20,20 @@ from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.model import Vehicle
 
 SPEED = "speed of the engine"
-SPEED_WORDS = r"engine.speed|rpm|gearing|ratio|another vehicle"
+SPEED_WORDS = r"engine.speed|gearings?\b|gears change|another vehicle|two vehicles"
 TORQUE = "load and torque"
-TORQUE_WORDS = r"load|torque|air.?flow|dropout|full scale|clip|step"
+TORQUE_WORDS = (
+    r"engine_load|engine_torque|reference_torque|reference torque"
+    r"|(the|its|high) torques? (or load )?(that was|of|reads?|runs|tells)|load or torque"
+)
 UNITS = "speed and units"
-UNITS_WORDS = r"mph|mile|km/h|unit|speed|scale|lb"
+UNITS_WORDS = (
+    r"(?<!engine_)(?<!engine )\bvehicle.speed\b|\bspeed from|jumps? of the speed|\bmph\b|miles"
+    r"|speed's (unit|scale)|\btyres\b|rolls? .* around|the two speeds|\bboth speeds"
+)
 WHOLE = "another vehicle, impossible values"
-WHOLE_WORDS = r"another vehicle|two vehicles|plausible|outside|range|out of|gearing|impossible"
+WHOLE_WORDS = r"another vehicle|two vehicles|gears change|\bgearings?\b|different drives"
+ACCEL_WORDS = r"accel_x .*outside|values of accel_x|samples of accel_x|inertial samples are"
 
 Rng = np.random.Generator
 
@@ -287,12 +294,12 @@ FAULTS = (
     Fault(UNITS, speed_steps, (5, 20), UNITS_WORDS),
     Fault(WHOLE, followed_by_another, (0.3, 0.5, 0.8), WHOLE_WORDS, stage="splice"),
     Fault(WHOLE, bus_of_another, (0.0,), WHOLE_WORDS + "|clock|apart", stage="splice"),
-    Fault(WHOLE, accel_out_of_range, (1e-5, 0.001, 0.05), WHOLE_WORDS),
-    Fault(WHOLE, engine_speed_out_of_range, (0.001, 0.05), WHOLE_WORDS),
-    Fault(WHOLE, speed_out_of_range, (0.001, 0.05), WHOLE_WORDS),
-    Fault(WHOLE, torque_out_of_range, (0.001, 0.05), WHOLE_WORDS),
+    Fault(WHOLE, accel_out_of_range, (1e-5, 0.001, 0.05), ACCEL_WORDS),
+    Fault(WHOLE, engine_speed_out_of_range, (0.001, 0.05), SPEED_WORDS),
+    Fault(WHOLE, speed_out_of_range, (0.001, 0.05), UNITS_WORDS),
+    Fault(WHOLE, torque_out_of_range, (0.001, 0.05), TORQUE_WORDS),
     Fault(
-        WHOLE, tare_above_mass, (273, 600), r"payload|tare|below zero|negative",
+        WHOLE, tare_above_mass, (273, 600), r"below nothing|below the tare|negative payload",
         stage="vehicle", must_tell=True,
     ),
 )  # fmt: skip

@@ -10,11 +10,16 @@ import numpy as np
 from fault_kinds.shaping import Fault
 
 STAMPS = "stamps in files"
-STAMPS_WORDS = r"clock|stamp|time|1970|jump|rows"
+STAMPS_WORDS = (
+    r"\bclocks?\b|time stamps?|1970|spread evenly|rows .*(left out|sorted)|samples? every"
+)
 CELLS = "cells in files"
-CELLS_WORDS = r"plausible|outside|range|left out|value|impossible|infinite"
+CELLS_WORDS = r"values? of \w+ (is|are) (outside|infinite)|samples of \w+ leap|inertial samples are"
 MASSES = "mass of a calibration"
-MASSES_WORDS = r"tare|pound|\blb|calibration|masses|mass given|plausible"
+MASSES_WORDS = (
+    r"by the calibration, above|kg the torque of|has a drag area of|against its \d+ kg"
+    r"|which no engine does|masses given alone"
+)
 
 Rng = np.random.Generator
 Cells = list[list[str]]

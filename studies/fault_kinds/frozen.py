@@ -18,10 +18,7 @@ from fault_kinds.shaping import (
 from weighbridge.signals import Drive, Floats
 
 GROUP = "frozen"
-WORDS = (
-    r"froz|freez|stuck|same value|does not change|constant|stops? changing"
-    r"|holds? (one|the same)|hung"
-)
+WORDS = r"froze|frozen|\bstuck\b|same value|does not change|all the time|repeats? (its|one|their)"
 
 Rng = np.random.Generator
 

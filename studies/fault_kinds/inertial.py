@@ -21,12 +21,19 @@ from fault_kinds.shaping import (
 from weighbridge.signals import Bools, Drive, Floats, Signal
 
 MOUNTING = "mounting"
-MOUNTING_WORDS = r"mount|tilt|turned|moved in|gravity|lean|orient|axes|holder|slipp"
+MOUNTING_WORDS = (
+    r"sensor (was|is) (moved|turned)|\bmounting\b|\bholder\b|wrong sign"
+    r"|axes .*(swapped|reversed|mirrored|alike)|accelerometer('s)? offset"
+)
 SCALE = "scale of the inertial sensor"
-SCALE_WORDS = r"scale|gravity|gain|reads? (too )?(high|low|much|little)|m/s²"
+SCALE_WORDS = (
+    r"accelerometer (reads \d|offset|is recorded in)|\baccel_[xyz]\b|accelerometer\b.*\bin g\b"
+)
+TURN_WORDS = r"\bgyro(scope)?\b|\bgyro_[xyz]\b"
 QUALITY = "noise, rate and range"
 QUALITY_WORDS = (
-    r"nois|white|clip|range|saturat|rate|\bHz\b|samples|slow|coarse|resolution|steps|round"
+    r"\baccel_[xyz]\b|accelerometer (is so noisy|is noisy|shakes|is recorded in)"
+    r"|inertial (samples|sensor) (are|come|is|shakes)|vibration|was smoothed"
 )
 
 Rng = np.random.Generator
@@ -205,17 +212,17 @@ FAULTS = (
     Fault(SCALE, accel_scale_x, (0.9, 1.05, 1.1), SCALE_WORDS),
     Fault(SCALE, accel_gain_ramps, (1.05, 1.1, 1.2), SCALE_WORDS),
     Fault(SCALE, accel_gain_ramps_x, (1.1, 1.2), SCALE_WORDS),
-    Fault(SCALE, gyro_scale, (0.9, 1.1, 1.5), SCALE_WORDS),
+    Fault(SCALE, gyro_scale, (0.9, 1.1, 1.5), TURN_WORDS),
     Fault(SCALE, accel_unit_changes, (1.0 / 9.80665, 0.3048), SCALE_WORDS),
     Fault(SCALE, accel_bias_ramps, (0.3, 1.0), SCALE_WORDS + "|" + MOUNTING_WORDS),
     Fault(SCALE, accel_bias_steps, (0.2, 0.5), SCALE_WORDS + "|" + MOUNTING_WORDS),
     Fault(QUALITY, accel_noise, (0.5, 1, 2, 5), QUALITY_WORDS),
     Fault(QUALITY, accel_noise_z, (2,), QUALITY_WORDS),
-    Fault(QUALITY, gyro_noise, (0.05, 0.3), QUALITY_WORDS),
-    Fault(QUALITY, accel_spikes, (0.001, 0.01, 0.1), QUALITY_WORDS + "|spike|outli|far off"),
+    Fault(QUALITY, gyro_noise, (0.05, 0.3), TURN_WORDS),
+    Fault(QUALITY, accel_spikes, (0.001, 0.01, 0.1), QUALITY_WORDS + "|spikes"),
     Fault(QUALITY, imu_rate, (25, 10, 5), QUALITY_WORDS),
     Fault(QUALITY, accel_clipped, (9.9, 10, 12), QUALITY_WORDS),
     Fault(QUALITY, accel_clipped_x, (0.8, 1.5), QUALITY_WORDS),
     Fault(QUALITY, accel_steps, (0.1, 0.5), QUALITY_WORDS),
-    Fault(QUALITY, shaken, (1, 4), QUALITY_WORDS + "|vibrat|shak|ring"),
+    Fault(QUALITY, shaken, (1, 4), QUALITY_WORDS + "|rings"),
 )

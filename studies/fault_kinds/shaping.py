@@ -32,7 +32,8 @@ class Fault:
         vehicle: ``(vehicle, mass, severity) -> Vehicle``; calibration:
         ``(masses, severity) -> masses`` [kg]
     severities : in the unit that the function tells
-    words : regular expression of a warning that names the fault
+    words : regular expression of a warning that names the damaged signal or the cause, which no
+        warning of another signal holds
     vehicles : names of the subjects it is put into
     harmless : must be weighed
     must_tell : the mass is right, and something else is wrong that a warning must tell

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from weighbridge import Vehicle, __version__, read_drive
-from weighbridge.cli.own_masses import own_mass_lines
+from weighbridge.cli.own_masses import own_masses
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.papers import jensen2022
 from weighbridge.results.weighing import TRACK_COLUMNS
@@ -116,20 +116,22 @@ def test_calibrate_refuses(weighbridge, known, tmp_path, words, said):
 
 def test_a_calibration_weighs_its_own_drives(weighbridge, car, known):
     drive = read_drive(known.folder)
-    first, told, *notes = own_mass_lines(Vehicle.load(car), [drive])
+    own = own_masses(Vehicle.load(car), [drive])
+    first, told, *notes = own.lines
     assert "no proof" in first
     ran = weighbridge("weigh", known.folder, "--vehicle", car, "--json", "-")
     weighed = json.loads(ran.out)
     percent = 100.0 * (weighed["mass_kg"] / 1580.0 - 1.0)
     assert f"{known.folder.name}: {weighed['mass_kg']:.0f} kg, {percent:+.1f} % of the 1580" in told
     assert [n.removeprefix("    note: ") for n in notes] == weighed["warnings"]
+    assert own.doubt == ""
 
 
 def test_what_weigh_would_note_of_a_drive_of_a_calibration_is_told(car, known):
     drive = read_drive(known.folder)
     later = replace(drive.signals["engine_load"], time=drive.signals["engine_load"].time + 0.3)
-    lines = list(own_mass_lines(Vehicle.load(car), [drive.with_signals(later)]))
-    assert any("its clock was moved by that" in line for line in lines)
+    own = own_masses(Vehicle.load(car), [drive.with_signals(later)])
+    assert any("its clock was moved by that" in line for line in own.lines)
 
 
 def test_weigh_in_words(weighbridge, car, loaded):

@@ -103,3 +103,23 @@ def test_a_drag_area_that_no_car_has_is_told(area, source, said):
     )
     told = drag_doubt(car, [2568.0])
     assert (said in told) if said else not told
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_masses_a_fifth_too_heavy_are_refused_by_permitted_mass_and_torque(stated):
+    known = [
+        simulate_car(replace(make_scenario("electric", payload=load, seed=911), duration=900.0))
+        for load in (0.0, 400.0)
+    ]
+    true = [float(made.truth.mass[0]) for made in known]
+    base = Vehicle(kind="car", tare=true[0], gross=1.05 * true[1] if stated else None)
+    drives = [made.drive for made in known]
+    right = wb.calibrate(drives, true, vehicle=base)
+    assert not any("permitted" in doubt for doubt in right.provenance.doubts)
+    heavy = [1.2 * kg for kg in true]
+    if not stated:
+        doubted = wb.calibrate(drives, heavy, vehicle=base)
+        assert any("the torque of" in doubt for doubt in doubted.provenance.doubts)
+        return
+    with pytest.raises(DriveError, match=r"above the permitted mass of .* would read 0\.8\d of"):
+        wb.calibrate(drives, heavy, vehicle=base)

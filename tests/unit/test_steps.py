@@ -1,11 +1,15 @@
 """Steps of the torque's reading: another factor, unit or filter than in the calibration shows."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from weighbridge.balance.disagreement import Finding
 from weighbridge.checks.steps import check_steps, reading_step
+from weighbridge.errors import DriveError
+from weighbridge.pipeline.weighing import weigh
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.model import TorqueModel, Vehicle
@@ -47,12 +51,71 @@ def test_the_steps_of_a_control_unit_are_found(car, electric):
     assert not list(check_steps(drive, Vehicle(torque=replace(vehicle.torque, reading_step=None))))
 
 
-@pytest.mark.parametrize("factor", [0.8, 0.9, 0.97, 1.1, 1.5])
-def test_a_factor_is_told(car, factor):
+@pytest.mark.parametrize("factor", [0.8, 0.9, 0.96, 0.98, 1.02, 1.1, 1.5])
+def test_a_factor_is_told_and_one_that_matters_gives_no_mass(car, factor):
     drive, vehicle = car
     (found,) = check_steps(with_values(drive, "engine_load", lambda x: factor * x), vehicle)
     assert f"multiplied by {factor:.3g} after it was sent" in found.text
+    assert found.serious == (abs(factor - 1.0) > 0.03)
+    assert ("trusted = true" in found.text) == found.serious
+
+
+def test_a_person_or_a_witness_clears_a_factor(car):
+    drive, vehicle = car
+    scaled = with_values(drive, "engine_load", lambda x: 0.8 * x)
+    trusted = replace(scaled, info=replace(drive.info, trusted=("engine_load",)))
+    (found,) = check_steps(trusted, vehicle)
     assert not found.serious
+
+    def heard(scale, verdict="agrees"):
+        finding = Finding("mass_air_flow", verdict, scale, 0.0)
+        return next(check_steps(scaled, vehicle, (finding,))).serious
+
+    # Air unknown: a witness may agree with either; it clears what it is nearer to.
+    assert not heard(1.02)
+    assert heard(0.82)
+    assert heard(0.95, "doubtful")
+
+
+@pytest.mark.parametrize("factor", [0.8, 0.9, 1.1])
+def test_a_factor_from_the_middle_on_is_told_with_its_time(car, factor):
+    drive, vehicle = car
+    middle = 0.5 * (drive.start + drive.end)
+    load = drive.signals["engine_load"]
+    late = load.time >= middle
+    made = drive.with_signals(
+        Signal("engine_load", load.time, np.where(late, factor, 1.0) * load.values)
+    )
+    (found,) = check_steps(made, vehicle)
+    assert f"it was multiplied by {factor:.3g}" in found.text
+    assert found.serious
+    begin, end = map(float, re.search(r"here from (\d+) to (\d+) s", found.text).groups())
+    assert begin == pytest.approx(middle, abs=0.1 * drive.duration)
+    assert end == pytest.approx(drive.end, abs=1.0)
+
+
+def test_an_offset_or_a_filter_from_the_middle_on_is_told(car):
+    drive, vehicle = car
+    late = np.arange(len(drive.signals["engine_load"])) > 0.5 * len(drive.signals["engine_load"])
+    (found,) = check_steps(with_values(drive, "engine_load", lambda x: x + 0.1313 * late), vehicle)
+    assert "lies between them here from" in found.text
+    assert not found.serious
+
+
+def test_one_part_off_the_steps_is_no_change(car):
+    drive, vehicle = car
+    size = len(drive.signals["engine_load"])
+    early = np.arange(size) < size // 10
+    assert not list(
+        check_steps(with_values(drive, "engine_load", lambda x: x + 0.0017 * early), vehicle)
+    )
+
+
+def test_weigh_refuses_a_factor(car):
+    drive, vehicle = car
+    scaled = with_values(drive, "engine_load", lambda x: 0.8 * x)
+    with pytest.raises(DriveError, match=r"steps of 0\.3137 pct here: it was multiplied by 0\.8"):
+        weigh(scaled, vehicle)
 
 
 @pytest.mark.parametrize("factor", [1.0 / POUND_FOOT, POUND_FOOT])

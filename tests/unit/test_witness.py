@@ -11,7 +11,7 @@ import weighbridge as wb
 from weighbridge.balance.disagreement import accepted_scales, findings
 from weighbridge.balance.witness import BY_SIGNAL, compare, rows_of
 from weighbridge.balance.witness_learning import learn_witnesses
-from weighbridge.checks.witnesses import check_witnesses
+from weighbridge.checks.witnesses import check_reading, check_witnesses
 from weighbridge.errors import DriveError
 from weighbridge.estimators import ESTIMATORS
 from weighbridge.signals import Drive, DriveInfo, Signal
@@ -171,6 +171,18 @@ def test_a_moderate_disagreement_is_a_warning():
     (problem,) = check_witnesses(made, ALONE)
     assert not problem.serious
     assert "0.93 times as much as mass_air_flow" in problem.text
+
+
+def test_a_moderate_disagreement_with_a_reading_altered_on_the_way_gives_no_mass():
+    step = 1.0 / 255.0
+    sent = changed(drive(20), "engine_load", lambda t, x: step * np.round(x / step))
+    made = changed(sent, "engine_load", lambda t, x: 0.93 * x)
+    known = replace(ALONE, torque=replace(ALONE.torque, reading_step=step))
+    steps, witness = check_reading(made, known)
+    assert "multiplied by 0.93" in steps.text
+    assert steps.serious
+    assert witness.serious
+    assert not any(p.serious for p in check_reading(sent, known))
 
 
 def test_where_the_change_begins_is_told():

@@ -72,6 +72,31 @@ def doubted_masses(
     return contradictions + contradicting(names, masses, ratios, stds)
 
 
+def refuse_too_heavy(vehicle: Vehicle, masses: Sequence[float], doubts: Sequence[str]) -> None:
+    """Refuse masses that are too heavy by two signs: the permitted mass, and what the drives show.
+
+    Parameters
+    ----------
+    vehicle : calibrated
+    masses : it was calibrated with [kg]
+    doubts : sentences that say that the masses are too heavy; a single sign is told and kept
+
+    Raises
+    ------
+    DriveError
+        Both are there.
+    """
+    gross = vehicle.gross
+    if gross is None or not doubts or max(masses) <= OVER * gross:
+        return
+    name = vehicle.provenance.drives[int(np.argmax(masses))]
+    raise DriveError(
+        f"{name} has {max(masses):.0f} kg by the calibration, above the permitted mass of "
+        f"{gross:.0f} kg, and {doubts[0]}; weigh it again, or correct gross_kg under [vehicle] of "
+        "--vehicle"
+    )
+
+
 def contradicting(
     names: Sequence[str], masses: Sequence[float], ratios: Floats, stds: Floats
 ) -> list[str]:

@@ -90,6 +90,19 @@ def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:
     )
 
 
+def scale_by_mass(vehicle: Vehicle) -> float:
+    """Scale that a calibration gives a torque in N m or percent over a data sheet's [-].
+
+    1 where the torque has no scale of its own. More than 1 is a mass that is too heavy, or a torque
+    that reads too low.
+    """
+    model = vehicle.torque
+    if not source_of(vehicle).signed or len(model.coefficients) < 2:
+        return 1.0
+    slope = model.coefficients[1] + (float(np.mean(model.knot_slopes)) if model.knots else 0.0)
+    return slope / usual_efficiency(vehicle)[0]
+
+
 def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
     """Compare the scale that a calibration gives a torque in N m or percent with a data sheet's.
 
@@ -108,12 +121,7 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
     DriveError
         No torque is so far off.
     """
-    model = vehicle.torque
-    if not source_of(vehicle).signed or len(model.coefficients) < 2:
-        return ""
-    slope = model.coefficients[1] + (float(np.mean(model.knot_slopes)) if model.knots else 0.0)
-    ratio = slope / usual_efficiency(vehicle)[0]
-    std = scale_std(vehicle)
+    ratio, std = scale_by_mass(vehicle), scale_std(vehicle)
     if abs(ratio - 1.0) <= DOUBTFUL * std:
         return ""
     listed = " and ".join(f"{kg:.0f}" for kg in masses)

@@ -13,10 +13,20 @@ import numpy as np
 from weighbridge.arguments import check_type
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.witness_learning import learn_witnesses
-from weighbridge.calibration.doubted_masses import doubted_masses, unbacked_scale, with_doubts
+from weighbridge.calibration.doubted_masses import (
+    doubted_masses,
+    refuse_too_heavy,
+    unbacked_scale,
+    with_doubts,
+)
 from weighbridge.calibration.fitted import Fitted, fitted_rows, noted, rebalanced
 from weighbridge.calibration.joint import fit_joint, fit_speed_torque
-from weighbridge.calibration.known_mass import drag_doubt, fuel_doubt, scale_doubt
+from weighbridge.calibration.known_mass import (
+    drag_doubt,
+    fuel_doubt,
+    scale_by_mass,
+    scale_doubt,
+)
 from weighbridge.calibration.problem import Problem, checked, problem_of
 from weighbridge.calibration.rls import fit_rls
 from weighbridge.calibration.settings import CalibrationSettings
@@ -148,14 +158,10 @@ def run_calibration(
         ),
     )
     balances = tuple(rebalanced(problem, done))
-    of_masses = [
-        scale_doubt(done, problem.masses, problem.names),
-        drag_doubt(done, problem.masses),
-        *(fuel_doubt(*each) for each in zip(recorded, balances, problem.masses, strict=True)),
-    ]
+    of_masses = _mass_doubts(done, recorded, balances, problem)
     few = f"made from {rows.time.size} samples only; poll faster, or drive longer"
     doubts = [
-        *(doubt for doubt in of_masses if doubt),
+        *of_masses,
         *doubted_masses(done, balances, problem.masses),
     ]
     others = [
@@ -183,6 +189,19 @@ def run_calibration(
         search=fitted.search,
         held=fitted.held,
     )
+
+
+def _mass_doubts(
+    vehicle: Vehicle, drives: Sequence[Drive], balances: Sequence[ForceBalance], problem: Problem
+) -> list[str]:
+    """Say what torque, drag and fuel tell against the masses; refuse those above gross as well."""
+    masses = problem.masses
+    scale = scale_doubt(vehicle, masses, problem.names)
+    each = zip(drives, balances, masses, strict=True)
+    fuel = [doubt for one in each if (doubt := fuel_doubt(*one))]
+    heavy = [scale] if scale and scale_by_mass(vehicle) > 1.0 else []
+    refuse_too_heavy(vehicle, masses, [*heavy, *fuel])
+    return [doubt for doubt in (scale, drag_doubt(vehicle, masses), *fuel) if doubt]
 
 
 def _unmeasured_grade(problem: Problem) -> float:

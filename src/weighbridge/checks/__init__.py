@@ -21,11 +21,10 @@ from weighbridge.checks.ranges import check_range, within_ranges, without_strays
 from weighbridge.checks.smoothed_imu import check_smoothed
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
-from weighbridge.checks.steps import check_steps
 from weighbridge.checks.travel import check_sign, check_standstill
 from weighbridge.checks.values import check_load, check_pressure, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
-from weighbridge.checks.witnesses import check_witnesses
+from weighbridge.checks.witnesses import check_reading
 from weighbridge.errors import DriveError
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
@@ -52,7 +51,6 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_scales,
     check_imu,
     check_vehicle,
-    check_steps,
     check_range,
     check_standstill,
 )
@@ -102,7 +100,7 @@ def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
         return clean
     clean = mended(clean, vehicle)
     # Last: what froze or dropped out is not held against a witness.
-    problems = [*clean.problems[len(earlier) :], *check_witnesses(clean, vehicle)]
+    problems = [*clean.problems[len(earlier) :], *check_reading(clean, vehicle)]
     problems.sort(key=lambda p: not p.serious)
     return replace(clean, problems=(*earlier, *problems))
 

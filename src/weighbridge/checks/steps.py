@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
+from weighbridge.balance.disagreement import Finding
 from weighbridge.checks.needed import show
+from weighbridge.checks.speed import SETTLED
 from weighbridge.navigation.aiding import resolution
 from weighbridge.signals import Drive, Floats, Problem
+from weighbridge.signals.instants import span
 from weighbridge.vehicle.model import Vehicle
 
 SAME: Final = 0.003
@@ -29,6 +33,19 @@ few."""
 FEWEST: Final = 500
 """Fewer samples show no steps."""
 
+PARTS: Final = 8
+"""A drive is looked at in so many parts at most."""
+
+FEWEST_OF_PART: Final = 250
+"""Samples of a part at least: of random values 0.2 +- 0.03 lie on steps then [-]."""
+
+IN_A_ROW: Final = 2
+"""So many parts off the steps, one after another, are no chance."""
+
+MATTERS: Final = 0.03
+"""A factor farther from one moves a mass by more than weighing is worth [-]: there is no mass
+then, unless a witness of the torque agrees with the reading."""
+
 POUND_FOOT: Final = 1.35581795
 """A pound-foot [N m]."""
 
@@ -38,45 +55,87 @@ def reading_step(values: Floats) -> float:
     return resolution(np.round(values, 9)) if values.size >= FEWEST else 0.0
 
 
-def check_steps(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+def check_steps(
+    drive: Drive, vehicle: Vehicle | None, witnesses: Sequence[Finding] = ()
+) -> Iterator[Problem]:
     """Compare the steps of the torque's reading with those of the calibration.
 
     A control unit sends whole steps. Where they are others, the reading was multiplied after it was
     sent: by the factor of a mapping, a DBC or an app, or by a unit. Where it lies between them, it
     was filtered or worked out anew. What the control unit itself reads wrong has steps as before.
+
+    Parameters
+    ----------
+    drive, vehicle
+    witnesses : what the witnesses of the torque say of the reading
     """
     known = None if vehicle is None else vehicle.torque.reading_step
     if vehicle is None or known is None:
         return
     name = vehicle.torque.of_source.found(drive)[0]
     signal = drive.get(name)
-    if signal is None or len(signal) < FEWEST or _on_steps(signal.values, known) > OFF:
+    if signal is None or len(signal) < FEWEST:
         return
-    step = reading_step(signal.values)
+    first, last = _off_steps(signal.values, known)
+    if last == first:
+        return
+    step = reading_step(signal.values[first:last])
     ratio = step / known
+    part = last - first < len(signal)
+    begin, end = np.round(signal.time[[first, last - 1]])
+    when = f" from {span(float(begin), float(end))}" if part else ""
     before = f"{name} came in steps of {show(name, known)} in the calibration"
     if ratio < 1.0 / FARTHEST:
         yield Problem(
             name,
-            f"{before}, and lies between them here: it was filtered, multiplied or worked out anew "
-            "after it was sent, or another source tells it, and a mass may be wrong by as much; "
-            "record it as in the calibration",
+            f"{before}, and lies between them here{when}: it was filtered, multiplied or worked "
+            "out anew after it was sent, or another source tells it, and a mass may be wrong by as "
+            "much; record it as in the calibration",
         )
     elif abs(ratio - 1.0) > SAME and ratio < FARTHEST:
         unit = _unit(ratio) if name == "engine_torque" else ""
+        serious = abs(ratio - 1.0) > MATTERS and not _cleared(ratio, witnesses)
         yield Problem(
             name,
-            f"{before}, and comes in steps of {show(name, step)} here: it was multiplied by "
+            f"{before}, and comes in steps of {show(name, step)} here{when}: it was multiplied by "
             f"{ratio:.3g} after it was sent{unit}, and a mass is wrong by about as much; correct "
-            "its unit or factor in the mapping, or calibrate with the logger in use",
-            serious=bool(unit),
+            "its unit or factor in the mapping, or calibrate with the logger in use"
+            f"{SETTLED if serious else ''}",
+            serious=(serious or bool(unit)) and name not in drive.info.trusted,
         )
 
 
-def _on_steps(values: Floats, step: float) -> float:
+def _cleared(ratio: float, witnesses: Sequence[Finding]) -> bool:
+    """Tell whether a witness has the reading nearer to what it was than to so much of it."""
+    return any(
+        f.verdict == "agrees" and abs(f.scale - 1.0) < abs(f.scale - ratio) for f in witnesses
+    )
+
+
+def _off_steps(values: Floats, step: float) -> tuple[int, int]:
+    """First and last sample, exclusive, from and to which values lie on no steps."""
+    if _on_steps(values, step) <= OFF:
+        return 0, values.size
+    parts = min(PARTS, values.size // FEWEST_OF_PART)
+    if parts <= IN_A_ROW:
+        return 0, 0
+    edges = np.linspace(0, values.size, parts + 1).astype(int)
+    off = [_on_steps(values[a:b], step, FEWEST_OF_PART // 2) <= OFF for a, b in pairwise(edges)]
+    best = (0, 0)
+    begin = 0
+    for k, is_off in enumerate([*off, False]):
+        if is_off:
+            continue
+        if k - begin >= max(IN_A_ROW, best[1] - best[0] + 1):
+            best = (begin, k)
+        begin = k + 1
+    return int(edges[best[0]]), int(edges[best[1]])
+
+
+def _on_steps(values: Floats, step: float, fewest: int = FEWEST) -> float:
     """Part of the values that lie on the steps [-]; zeros lie on any."""
     place = values[values != 0.0] / step
-    if place.size < FEWEST:
+    if place.size < fewest:
         return 1.0
     return float(np.mean(np.abs(place - np.rint(place)) < NEAR))
 

@@ -10,13 +10,42 @@ import numpy as np
 from weighbridge.balance.disagreement import DOUBTFUL, Finding, difference, findings
 from weighbridge.balance.witness import BY_SIGNAL
 from weighbridge.checks.frozen import frozen
+from weighbridge.checks.steps import check_steps
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 
-def check_witnesses(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:
+def check_reading(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:
+    """Hold the torque's reading against its witnesses, and against the steps of the calibration.
+
+    Where the reading was altered after it was sent, a witness that doubts it is believed.
+
+    Parameters
+    ----------
+    drive : without samples that are known to be false
+    vehicle : with the witnesses of its calibration; None where there is none
+    """
+    found = witnessed(drive, vehicle)
+    steps = tuple(check_steps(drive, vehicle, found))
+    return (*steps, *check_witnesses(drive, vehicle, found, altered=bool(steps)))
+
+
+def witnessed(drive: Drive, vehicle: Vehicle | None) -> tuple[Finding, ...]:
+    """What the witnesses of a vehicle file say of the reading; nothing where there are none."""
+    if vehicle is None or not vehicle.witnesses:
+        return ()
+    return findings(_thawed(drive, vehicle), vehicle)
+
+
+def check_witnesses(
+    drive: Drive,
+    vehicle: Vehicle | None,
+    found: tuple[Finding, ...] | None = None,
+    *,
+    altered: bool = False,
+) -> tuple[Problem, ...]:
     """Hold the torque's reading against the witnesses of the vehicle file.
 
     One witness that agrees with the reading clears it: those that do not are then off themselves.
@@ -25,14 +54,16 @@ def check_witnesses(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...
     ----------
     drive : without samples that are known to be false
     vehicle : with the witnesses of its calibration; None where there is none
+    found : what they say, if it is known already
+    altered : the reading's steps say that it was altered after it was sent
 
     Returns
     -------
     Problems, of the reading, or of witnesses that are off
     """
-    if vehicle is None or not vehicle.witnesses:
+    found = witnessed(drive, vehicle) if found is None else found
+    if vehicle is None or not found:
         return ()
-    found = findings(_thawed(drive, vehicle), vehicle)
     reading = source_of(vehicle).found(drive)[0]
     off = [f for f in found if f.verdict != "agrees"]
     # What only the unknown air makes agree clears nothing.
@@ -43,7 +74,7 @@ def check_witnesses(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...
         return ()
     worst = max(off, key=lambda f: (f.verdict == "serious", abs(f.scale - 1.0)))
     together = [f for f in off if (f.blur > 0.0, f.sign) == (worst.blur > 0.0, worst.sign)]
-    serious = worst.verdict == "serious" and reading not in drive.info.trusted
+    serious = (altered or worst.verdict == "serious") and reading not in drive.info.trusted
     return (
         Problem(
             reading, _reading_off(reading, vehicle, worst, together, len(off)), serious=serious

@@ -17,10 +17,10 @@ from weighbridge.cli.options import (
     chosen_mapping,
     load_parts,
 )
-from weighbridge.cli.own_masses import own_mass_lines
+from weighbridge.cli.own_masses import doubted, own_masses
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
-from weighbridge.cli.terminal import console, say
+from weighbridge.cli.terminal import complain, console, say
 from weighbridge.cli.terminal import shown as _shown
 from weighbridge.cli.verbosity import notice, say_written
 
@@ -160,13 +160,21 @@ def calibrate(
         if chosen is not None:
             car = replace(car, mapping=mapping_beside(chosen, output))
         car.save(output)
+        own = None
         if settings.fit.torque:
             bar.begin("weighing by it", len(recorded))
-            notes += list(own_mass_lines(car, recorded, bar.within))
+            own = own_masses(car, recorded, bar.within)
+            notes += own.lines
+            if own.doubt:
+                doubted(car, own).save(output)
     console().print(found)
     for line in notes:
         say(line)
     say_written(output)
+    if own is not None and own.doubt:
+        complain(f"weighbridge: {output}: {own.doubt}")
+        if own.useless:
+            raise typer.Exit(1)
 
 
 def _fitted(

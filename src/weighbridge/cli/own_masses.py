@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -10,10 +11,54 @@ if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
 
 
-def own_mass_lines(
+@dataclass(frozen=True)
+class OwnMasses:
+    """What the drives of a calibration weigh by its file.
+
+    Attributes
+    ----------
+    lines : what each drive weighs, and what `weigh` would note of it
+    unweighed : drives that have no mass, with the reason, in their order
+    drives : how many were weighed or not
+    """
+
+    lines: tuple[str, ...]
+    unweighed: tuple[tuple[str, str], ...]
+    drives: int
+
+    @property
+    def useless(self) -> bool:
+        """Whether the file weighs none of the drives it was made from."""
+        return len(self.unweighed) == self.drives
+
+    @property
+    def doubt(self) -> str:
+        """What is to be told of the file; empty where it weighs all of its drives."""
+        if not self.unweighed:
+            return ""
+        name, reason = self.unweighed[0]
+        if not self.useless:
+            return (
+                f"the calibration has no mass of {len(self.unweighed)} of its {self.drives} own "
+                f"drives, such as {name} ({reason}): leave it out, or record it again"
+            )
+        which = f"of its own drive {name}" if self.drives == 1 else "of any of its own drives"
+        return (
+            f"the calibration has no mass {which} ({reason}), so that nothing backs what it "
+            "weighs: calibrate again on longer drives with starts and hills"
+        )
+
+
+def doubted(car: Vehicle, own: OwnMasses) -> Vehicle:
+    """Keep in a vehicle file what is to be told of it at each weighing."""
+    made = car.provenance
+    return replace(car, provenance=replace(made, doubts=(*made.doubts, own.doubt)))
+
+
+def own_masses(
     car: Vehicle, drives: Sequence[Drive], progress: Callable[[int, int], None] | None = None
-) -> Iterator[str]:
-    """Say what each drive weighs with its own calibration, and what `weigh` would note of it.
+) -> OwnMasses:
+    """Weigh each drive with its own calibration.
 
     Parameters
     ----------
@@ -25,23 +70,25 @@ def own_mass_lines(
     from weighbridge.pipeline.weighing import DEFAULT_METHOD, weigh
 
     made = car.provenance
-    yield "its own drives, weighed with it (they made it, so this is no proof of others):"
+    lines = ["its own drives, weighed with it (they made it, so this is no proof of others):"]
+    unweighed = []
     for k, (drive, kg) in enumerate(zip(drives, made.masses, strict=True)):
         if progress is not None:
             progress(k, len(drives))
         try:
             own = weigh(drive, car, made.method or DEFAULT_METHOD)
         except WeighbridgeError as error:
-            yield f"  {drive.name}: no mass: {error}"
+            lines.append(f"  {drive.name}: no mass: {error}")
+            unweighed.append((drive.name, str(error)))
             continue
         if own.status == "converged":
             low, high = (100.0 * (bound / kg - 1.0) for bound in own.interval(0.95))
-            yield (
+            lines.append(
                 f"  {drive.name}: {own.mass:.0f} kg, {100.0 * (own.mass / kg - 1.0):+.1f} % of the "
                 f"{kg:.0f} kg known (95 % between {low:+.1f} and {high:+.1f} %)"
             )
         else:
-            yield f"  {drive.name}: no mass ({own.status}): {own.reason}"
-        for warning in own.warnings:
-            if warning not in made.doubts:
-                yield f"    note: {warning}"
+            lines.append(f"  {drive.name}: no mass ({own.status}): {own.reason}")
+            unweighed.append((drive.name, own.reason))
+        lines += [f"    note: {text}" for text in own.warnings if text not in made.doubts]
+    return OwnMasses(tuple(lines), tuple(unweighed), len(drives))

@@ -83,7 +83,9 @@ def calibration_std(balance: ForceBalance, vehicle: Vehicle) -> float:
     if scale is None:
         scale = uncalibrated_std(vehicle, balance.motion)
     hidden = HIDDEN_BRAKE_STD if balance.brake_hidden else 0.0
-    return math.hypot(scale, MOTION_STD[balance.motion.source], hidden, balance.coarse_std)
+    motion = balance.motion
+    moved = math.hypot(MOTION_STD[motion.source], motion.specific_force_scale_std)
+    return math.hypot(scale, moved, hidden, balance.coarse_std)
 
 
 def lacks_accelerometer(vehicle: Vehicle, motion: Motion) -> bool:

@@ -1,0 +1,53 @@
+"""A calibration that cannot weigh what it was made from says so aloud, then and ever after."""
+
+from dataclasses import replace
+
+import pytest
+
+from weighbridge import Vehicle, read_drive
+from weighbridge.cli.own_masses import own_masses
+from weighbridge.io.write import write_drive
+from weighbridge.simulation import make_scenario, simulate_car
+
+
+@pytest.fixture(scope="module")
+def cruise(tmp_path_factory):
+    """Return 160 s of a motorway: enough for a fit, too little for a mass."""
+    made = simulate_car(replace(make_scenario("car", payload=0.0, seed=4711), duration=3045.0))
+    folder = tmp_path_factory.mktemp("cruise") / "cruise"
+    write_drive(made.drive.between(made.drive.start + 2880.0, made.drive.start + 3040.0), folder)
+    return folder
+
+
+def test_a_file_that_weighs_none_of_its_drives_is_told_and_status_1(weighbridge, cruise, tmp_path):
+    output = tmp_path / "car.toml"
+    ran = weighbridge("calibrate", cruise, "--mass", "1580", "-o", output)
+    assert ran.code == 1
+    assert "car.toml: the calibration has no mass of its own drive cruise (only" in ran.err
+    assert "calibrate again on longer drives" in ran.err
+    assert ran.err.count("\n") == 1
+    assert "cruise: no mass (not_excited)" in ran.out
+    (doubt,) = [d for d in Vehicle.load(output).provenance.doubts if "its own drive" in d]
+    assert doubt in ran.err
+
+
+def test_quiet_does_not_hide_it(weighbridge, cruise, tmp_path):
+    ran = weighbridge("calibrate", cruise, "--mass", "1580", "-o", tmp_path / "a.toml", "--quiet")
+    assert ran.code == 1
+    assert "has no mass of its own drive" in ran.err
+
+
+def test_a_file_tells_it_of_every_drive_it_weighs(weighbridge, cruise, known, tmp_path):
+    output = tmp_path / "car.toml"
+    weighbridge("calibrate", cruise, "--mass", "1580", "-o", output)
+    ran = weighbridge("weigh", known.folder, "--vehicle", output)
+    assert "the calibration has no mass of its own drive cruise" in " ".join(ran.out.split())
+
+
+def test_one_drive_of_several_without_a_mass_is_told_and_no_failure(car, known, cruise):
+    drive = read_drive(known.folder)
+    vehicle = Vehicle.load(car)
+    made = replace(vehicle.provenance, masses=(*vehicle.provenance.masses, 1580.0))
+    own = own_masses(replace(vehicle, provenance=made), [drive, read_drive(cruise)])
+    assert not own.useless
+    assert own.doubt.startswith("the calibration has no mass of 1 of its 2 own drives, such as cru")
