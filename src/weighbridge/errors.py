@@ -9,7 +9,7 @@ from weighbridge.visible import cut
 
 
 class WeighbridgeError(Exception):
-    """Base of all errors a caller can mend; the command line exits with 2.
+    """Base of all errors that a caller can correct; the command line exits with 2.
 
     Its text is cut to what a screen shows: what it quotes of a file may be endless.
     """
@@ -27,7 +27,7 @@ class ArgumentTypeError(ConfigError, TypeError):
 
 
 class DriveError(WeighbridgeError):
-    """A drive cannot be read, or what it says cannot be so."""
+    """A drive cannot be read, or its data cannot be right."""
 
 
 class SourceError(WeighbridgeError):
@@ -35,7 +35,7 @@ class SourceError(WeighbridgeError):
 
 
 class MissingExtraError(WeighbridgeError):
-    """An optional dependency is needed and not installed; ``extra`` is None where none has it."""
+    """An optional dependency is needed but not installed; ``extra`` is None if no extra has it."""
 
     def __init__(self, package: str, extra: str | None, purpose: str) -> None:
         install = package if extra is None else f'"weighbridge[{extra}]"'

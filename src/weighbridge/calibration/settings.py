@@ -20,7 +20,7 @@ class CalibrationSettings:
     order : highest power of engine speed in the torque regression; 2 for load
         and air flow, 0 for measured torque when None
     source : torque source; the best the drives have when None
-    grid : solve on the grid of Jensen 2022, Table 5, in place of the bounds
+    grid : solve on the grid of Jensen 2022, Table 5, instead of within bounds
     curved : let the torque per load change with engine speed and load; off for
         the regression of eq. 49 as printed
     method : estimator the vehicle is calibrated for: "joint", "rls" by eq. 48,

@@ -22,23 +22,23 @@ def bound(
         float,
         typer.Option(
             "--power",
-            help="Full power at the wheels in kW; that of the engine makes a wider bound, which "
-            "holds too.",
+            help="Full power at the wheels in kW. The engine's power is valid too, but gives a"
+            " higher bound.",
             show_default=False,
         ),
     ],
     power_std: Annotated[
-        float, typer.Option("--power-std", help="Its standard deviation in percent.")
+        float, typer.Option("--power-std", help="Standard deviation of the power in percent.")
     ] = 5.0,
     json_path: JsonPath = None,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
-    """Bound the mass of a drive from above by its speed, the grade and the engine's full power.
+    """Find an upper bound of the mass from speed, grade and the engine's full power.
 
-    Needs no torque: a speed, and a grade (of a map) or heights. A bound is no weighing, for
-    nothing shows that the engine gave all its power. Exits with 0 where there is a bound, with 1
-    where no climb or start is hard enough.
+    Needs a speed, and a grade (from a map) or heights, but no torque. An upper bound is not a
+    weighing, because nothing shows that the engine gave its full power.
+    Exit status: 0 if there is a bound, 1 if no climb or start is hard enough.
 
     Example: weighbridge bound climb/ --vehicle car.toml --power 60
     """

@@ -62,20 +62,22 @@ _Masses = Annotated[
     Optional[list[float]],  # noqa: UP045
     typer.Option(
         "--mass",
-        help="Known mass in kg as the drive begins; repeat it where they differ, one for each "
-        "recording, or one for each drive that recordings hold. Without it, mass_kg of each "
-        "drive.toml.",
+        help="Known mass in kg at the start of the drive. If the masses differ, repeat it:"
+        " once for each recording, or once for each drive in the recordings. Without "
+        "it, mass_kg of each drive.toml is used.",
         parser=_kilograms,
         metavar="KG",
     ),
 ]
 _Base = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--vehicle", help="What is known already: class, wheel radius, gearings."),
+    typer.Option(
+        "--vehicle", help="Vehicle file with what is known already: class, wheel radius, gearings."
+    ),
 ]
 _Tare = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option("--tare", help="Mass without payload in kg; payloads count from it."),
+    typer.Option("--tare", help="Mass without payload in kg; payload is the mass minus the tare."),
 ]
 _Method = Annotated[
     str,
@@ -89,10 +91,13 @@ _Order = Annotated[
 ]
 _Torque = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option("--torque", help="What the drives tell: a torque source."),
+    typer.Option("--torque", help="Torque source of the drives."),
 ]
 _Grid = Annotated[
-    bool, typer.Option("--grid", help="Search the grid of Jensen 2022, Table 5, instead.")
+    bool,
+    typer.Option(
+        "--grid", help="Search the parameter grid of Jensen 2022, Table 5, instead of a fit."
+    ),
 ]
 _Straight = Annotated[
     bool,
@@ -118,8 +123,8 @@ def calibrate(
 ) -> None:
     """Calibrate a vehicle from drives of known mass.
 
-    A recording of several drives (a day's file, a splice) is parted, as `weighbridge weigh` parts
-    it: `weighbridge inspect` lists its drives.
+    A recording of several drives (such as a file of a whole day) is split as `weighbridge weigh`
+    splits it. `weighbridge inspect` lists its drives.
 
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """

@@ -18,7 +18,7 @@ def coast(
         list[str],
         typer.Option(
             "--there",
-            help="Coast-down in the one direction, from and to in seconds; two at least.",
+            help="Coast-down in one direction, FROM:TO in seconds; give at least two.",
             metavar="FROM:TO",
             show_default=False,
         ),
@@ -27,7 +27,7 @@ def coast(
         list[str],
         typer.Option(
             "--back",
-            help="Coast-down in the other direction; repeat it, two at least.",
+            help="Coast-down in the other direction, FROM:TO in seconds; give at least two.",
             metavar="FROM:TO",
             show_default=False,
         ),
@@ -40,10 +40,10 @@ def coast(
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
-    """Find drag area over mass from spans that coast out of gear in opposite directions.
+    """Find drag area over mass from coast-downs out of gear in opposite directions.
 
-    Needs no torque: a speed, and a grade (of a map) or heights. It tells no mass. Wind along the
-    road cancels between the directions. Exits with 0.
+    Needs a speed, and a grade (from a map) or heights, but no torque. It does not give a mass.
+    Wind along the road cancels between the two directions. Exit status: 0.
 
     Example: weighbridge coast run/ --there 10:40 --there 200:230 --back 90:120 --back 300:330
     """

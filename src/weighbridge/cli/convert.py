@@ -33,14 +33,16 @@ def convert(
         ),
     ],
     out: Annotated[
-        Path, typer.Argument(help="Folder to write, or a file .mf4.", show_default=False)
+        Path, typer.Argument(help="Folder to write, or an .mf4 file.", show_default=False)
     ],
     table_format: Annotated[
-        str, typer.Option("--format", help="Tables of a folder: parquet or csv.")
+        str, typer.Option("--format", help="Format of the tables in a folder: parquet or csv.")
     ] = "parquet",
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace an existing folder or file.")
+    ] = False,
 ) -> None:
     """Write a drive with canonical names and units: a folder of tables, or one MF4.
 

@@ -26,9 +26,12 @@ def demo(
     output: Annotated[Path, typer.Option("-o", "--output", help="Report to write.")] = Path(
         "weighbridge-demo.html"
     ),
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of everything random.")] = 7,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")] = 7,
     open_report: Annotated[
-        bool, typer.Option("--open/--no-open", help="Open the report; on a terminal only.")
+        bool,
+        typer.Option(
+            "--open/--no-open", help="Open the report in a browser; only when run on a terminal."
+        ),
     ] = True,
 ) -> None:
     """Simulate a calibration drive and three loaded drives, weigh them, write a report.

@@ -21,13 +21,12 @@ if TYPE_CHECKING:
 def doctor(
     json_path: Annotated[
         Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option("--json", help="Write a JSON object to a file, or - for here."),
+        typer.Option("--json", help="Write a JSON object to a file, or - for standard output."),
     ] = None,
 ) -> None:
-    """Tell what is installed: versions, extras, compiled kernels, and what is missing.
+    """Show what is installed: versions, extras, compiled kernels, and what is missing.
 
-    Extras that are not installed are no fault. Exits with 0 where nothing is amiss, with 1 where
-    something is.
+    A missing extra is not a fault. Exit status: 0 if there is no fault, 1 if there is one.
 
     Example: weighbridge doctor --json -
     """

@@ -32,18 +32,24 @@ def emulate(
     ] = 10110,
     sensor: Annotated[
         int,
-        typer.Option("--lines", min=1, max=65535, help="UDP port the inertial sensor sends to."),
+        typer.Option(
+            "--lines", min=1, max=65535, help="UDP port to which the inertial sensor sends."
+        ),
     ] = 5005,
     rate: Annotated[
-        float, typer.Option("--rate", help="1 as recorded, 5 fivefold; live needs the same.")
+        float,
+        typer.Option(
+            "--rate",
+            help="Speed: 1 as recorded, 5 five times as fast; use the same --rate for live.",
+        ),
     ] = 1.0,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
-    """Let a drive come out of an ELM327 adapter, a GNSS receiver and an inertial sensor.
+    """Play a drive as an ELM327 adapter, a GNSS receiver and an inertial sensor would send it.
 
-    The vehicle begins to drive when the adapter is first asked. All ports are of this computer
-    alone. Ctrl-C ends it.
+    The drive starts with the first request to the adapter. All ports are open on this computer
+    only. Ctrl-C ends it.
 
     Example: weighbridge emulate drive/ --rate 5
     """

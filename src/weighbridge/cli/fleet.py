@@ -50,7 +50,7 @@ class Unnamed(TyperCommand):
         formatter.write_usage(group.command_path, " ".join(self.collect_usage_pieces(ctx)))
 
 
-app = typer.Typer(cls=RunsDrives, help="Weigh the drives of a fleet, in parallel.")
+app = typer.Typer(cls=RunsDrives, help="Weigh the drives of a fleet in parallel.")
 app.command()(fleet_report.report)
 
 
@@ -66,7 +66,8 @@ _Vehicles = Annotated[
     Path,
     typer.Option(
         "--vehicles",
-        help="Folder of vehicle files, ID.toml each; a drive's folder or file is named ID.",
+        help="Folder of vehicle files named ID.toml; the folder or file of a drive has the"
+        " name ID.",
         show_default=False,
     ),
 ]
@@ -75,7 +76,7 @@ _Output = Annotated[
     typer.Option(
         "-o",
         "--output",
-        help="Folder of the results; what is there already is not weighed again.",
+        help="Folder of the results; drives that have a result there are not weighed again.",
         show_default=False,
     ),
 ]
@@ -85,14 +86,14 @@ _Scheduler = Annotated[
 ]
 _Workers = Annotated[
     Optional[int],  # noqa: UP045
-    typer.Option("--workers", help="Processes of this machine; one per core unless given."),
+    typer.Option("--workers", help="Processes on this machine; one per core by default."),
 ]
 _Memory = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option("--memory", help="Limit of each process, such as '1 GB'."),
+    typer.Option("--memory", help="Memory limit of each process, such as '1 GB'."),
 ]
 _Kind = Annotated[
-    str, typer.Option("--class", help="Class of vehicles without a file: car, van, bus, truck.")
+    str, typer.Option("--class", help="Class of vehicles that have no file: car, van, bus, truck.")
 ]
 _Learn = Annotated[
     Optional[Path],  # noqa: UP045
@@ -129,11 +130,11 @@ def run(
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
-    """Weigh the drives of a fleet in parallel, and go on where an earlier run ended.
+    """Weigh the drives of a fleet in parallel, and continue an earlier run.
 
-    Exits with 0 where every drive has a mass, with 1 where one has none, with 2 where one could
-    not be read. `weighbridge fleet status RESULTS` tells how far a run is, and
-    `weighbridge fleet report RESULTS` who was overloaded.
+    Exit status: 0 if every drive has a mass, 1 if one has none, 2 if one could not be read.
+    `weighbridge fleet status RESULTS` shows how far a run is. `weighbridge fleet report RESULTS`
+    shows which vehicles were overloaded.
 
     Example: weighbridge fleet 'drives/**' --vehicles vehicles/ -o results/
     """
@@ -172,7 +173,7 @@ def run(
 def status(
     results: Annotated[Path, typer.Argument(help="Folder of the results.", show_default=False)],
 ) -> None:
-    """Tell how far a fleet is: drives weighed, without a mass and why, and how long it takes.
+    """Show how far a run is: drives weighed, drives without a mass and why, and the time left.
 
     Example: weighbridge fleet status results/
     """

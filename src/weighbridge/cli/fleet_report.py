@@ -16,6 +16,29 @@ if TYPE_CHECKING:
 
 _TOLD: Final = 10  # legs in the answer, and vehicles of what was learnt
 
+_Couplings = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--couplings",
+        help="Times with a trailer: CSV or Parquet with vehicle, start, end, permitted_kg "
+        "(vehicle and trailer together).",
+    ),
+]
+_Warn = Annotated[
+    float,
+    typer.Option("--warn", help="Probability from which an overload is reported as likely."),
+]
+_Alarm = Annotated[
+    float,
+    typer.Option("--alarm", help="Probability from which an overload is reported as certain."),
+]
+_Tolerance = Annotated[
+    float,
+    typer.Option(
+        "--tolerance", help="Largest error that passes the tests of known mass, as a share."
+    ),
+]
+
 
 def report(
     results: Annotated[Path, typer.Argument(help="Folder of the results.", show_default=False)],
@@ -25,32 +48,24 @@ def report(
     ] = None,
     json: Annotated[
         Optional[str],  # noqa: UP045
-        typer.Option("--json", help="File for the same figures as JSON."),
+        typer.Option("--json", help="File to which the same figures are written as JSON."),
     ] = None,
     legs: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
-            "--legs", help="Table of all legs, payload with its interval: .csv or .parquet."
+            "--legs", help="Write a table of all legs, payload with its interval: .csv or .parquet."
         ),
     ] = None,
     tickets: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--tickets", help="Known masses: CSV or Parquet with vehicle, time, mass_kg."),
     ] = None,
-    couplings: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option(
-            "--couplings",
-            help="Trailers: CSV or Parquet with vehicle, start, end, permitted_kg of both.",
-        ),
-    ] = None,
-    warn: Annotated[float, typer.Option("--warn", help="Overload told from here on.")] = 0.5,
-    alarm: Annotated[float, typer.Option("--alarm", help="Overload told as sure.")] = 0.95,
-    tolerance: Annotated[
-        float, typer.Option("--tolerance", help="Error that passes the tests of known mass.")
-    ] = 0.05,
+    couplings: _Couplings = None,
+    warn: _Warn = 0.5,
+    alarm: _Alarm = 0.95,
+    tolerance: _Tolerance = 0.05,
 ) -> None:
-    """Tell who was overloaded, what was carried, where loads changed, and how good the data are.
+    """Report overloaded vehicles, transport, changes of load, and how good the data are.
 
     Example: weighbridge fleet report results/ -o fleet.html --tickets tickets.csv
     """

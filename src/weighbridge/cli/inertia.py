@@ -33,7 +33,8 @@ def inertia(
         str,
         typer.Option(
             "--method",
-            help="kalman-bucy, or with one fixed process noise inverse, extended, printed.",
+            help="Filter: kalman-bucy; or inverse, extended or printed, with one fixed process"
+            " noise.",
         ),
     ] = "kalman-bucy",
     settings: Annotated[
@@ -53,10 +54,10 @@ def inertia(
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
-    """Estimate sprung mass, roll and pitch inertia from how a vehicle rides.
+    """Estimate sprung mass, roll and pitch inertia from the ride of a vehicle.
 
     Needs suspension travel and rate at four wheels and the body's vertical, roll and pitch
-    velocity. Exits with 0 where the ride gave a mass, with 1 where it could not.
+    velocity. Exit status: 0 if the ride gave a mass, 1 if it did not.
 
     Example: weighbridge inertia ride/ --vehicle truck.toml --report ride.html
     """

@@ -41,17 +41,17 @@ def inspect(
     dbc: DbcPaths = None,
     vehicle: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--vehicle", help="Vehicle file: judges the speed by its gears."),
+        typer.Option("--vehicle", help="Vehicle file; its gearings check the speed."),
     ] = None,
     every_way: Annotated[
-        bool, typer.Option("--all", help="List the ways that lack signals, too.")
+        bool, typer.Option("--all", help="Also list the methods for which signals are missing.")
     ] = False,
     whole: Whole = False,
 ) -> None:
-    """Tell what a drive holds: signals, rates, gaps, problems, possible methods.
+    """Show what a drive holds: signals, rates, gaps, problems, possible methods.
 
-    A recording of several drives (a day's file, a splice) is parted, as `weighbridge weigh` parts
-    it, and each is told of.
+    A recording of several drives (such as a file of a whole day) is split as `weighbridge weigh`
+    splits it. Each drive is shown.
 
     Example: weighbridge inspect drive/ --vehicle car.toml
     """

@@ -27,7 +27,7 @@ class TellsSources(TyperCommand):
         """Write the help page."""
         for option in self.params:
             if isinstance(option, TyperOption) and option.name == "torque":
-                option.help = f"What the drives tell: {sources()}."
+                option.help = f"Torque source of the drives: {sources()}."
         super().format_help(ctx, formatter)
 
 

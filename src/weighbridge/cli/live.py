@@ -40,32 +40,37 @@ if TYPE_CHECKING:
 _NO_STATE = "none"
 
 _VehiclePath = Annotated[
-    Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
+    Path,
+    typer.Option(
+        "--vehicle", help="Vehicle file, written by calibrate or vehicle new.", show_default=False
+    ),
 ]
 _Sources = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(
         "--source",
-        help="Where samples come from, such as elm:/dev/ttyUSB0 or can:socketcan:can0; "
-        "repeat it for more. docs/live.md lists them.",
+        help="Source of samples, such as elm:/dev/ttyUSB0 or can:socketcan:can0; repeat it"
+        " for more. docs/live.md lists all.",
         metavar="KIND:PLACE",
     ),
 ]
 _Replay = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--replay", help="Take a recorded drive as the source.", metavar="DRIVE"),
+    typer.Option("--replay", help="Use a recorded drive as the source.", metavar="DRIVE"),
 ]
 _Rate = Annotated[
     str,
     typer.Option(
         "--rate",
-        help="Of the replay: 1 as recorded, 10 tenfold, or max. Of emulated sources: that of "
-        "emulate; a vehicle that is there has 1.",
+        help="Speed of the replay: 1 as recorded, 10 ten times as fast, or max. For "
+        "emulated sources, the --rate of emulate; for a real vehicle, 1.",
     ),
 ]
 _Json = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option("--json", help="Write a JSON line per weighing to a file, or - for here."),
+    typer.Option(
+        "--json", help="Write a JSON line per weighing to a file, or - for standard output."
+    ),
 ]
 _Mqtt = Annotated[
     Optional[str],  # noqa: UP045
@@ -75,42 +80,45 @@ _Page = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
         "--page",
-        help="Show a page at this port, for this computer alone; HOST:PORT for others too.",
+        help="Serve a page at this port, for this computer only; HOST:PORT for others too.",
         metavar="[HOST:]PORT",
     ),
 ]
 _Record = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--record", help="Record what comes as a drive, too.", metavar="DRIVE"),
+    typer.Option("--record", help="Also record the samples as a drive.", metavar="DRIVE"),
 ]
 _Every = Annotated[float, typer.Option("--every", help="Seconds between weighings.")]
 _Above = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option("--above", help="Alert above so many kg; the permitted mass by default."),
+    typer.Option("--above", help="Alert above this mass in kg; the permitted mass by default."),
 ]
 _Below = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option("--below", help="Alert below so many kg."),
+    typer.Option("--below", help="Alert below this mass in kg."),
 ]
 _Ticket = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
         "--ticket",
-        help="Mass in kg by a weighbridge: calibrate the vehicle with this drive at its end.",
+        help="Mass in kg from a weighbridge ticket: at the end, calibrate the vehicle with"
+        " this drive.",
     ),
 ]
 _Out = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option(
-        "-o", "--out", help="Vehicle file that --ticket writes; by default beside the vehicle file."
+        "-o",
+        "--out",
+        help="Vehicle file that --ticket writes; by default in the folder of the vehicle file.",
     ),
 ]
 _State = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
         "--state",
-        help="File that keeps what was weighed over a power cut or a short stop; by default "
-        "beside the vehicle file, none for a replay.",
+        help="File that keeps the result over a power cut or a short stop; by default in "
+        "the folder of the vehicle file, none for a replay.",
         metavar="FILE|none",
     ),
 ]
@@ -118,15 +126,15 @@ _Orders = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option(
         "--orders",
-        help="Take orders from a named pipe, made where nothing is there, or from a file that is "
-        "appended to: a line tare, load or end.",
+        help="Read orders (tare, load or end, one on each line) from a named pipe, which "
+        "is made if missing, or from a file to which lines are added.",
     ),
 ]
 _Lateness = Annotated[
-    float, typer.Option("--lateness", help="Seconds that a sample may come late.")
+    float, typer.Option("--lateness", help="Seconds by which a sample may be late.")
 ]
 _ListenOnly = Annotated[
-    bool, typer.Option("--listen-only", help="Send nothing to the vehicle, no request either.")
+    bool, typer.Option("--listen-only", help="Send nothing to the vehicle, not even requests.")
 ]
 _Force = Annotated[bool, typer.Option("--force", help="Replace the file of -o.")]
 
@@ -155,8 +163,8 @@ def live(
 ) -> None:
     """Weigh a vehicle while it drives.
 
-    On a terminal: t tares, l tells that the load has changed, q ends. Without one --orders does it.
-    Exits with 0 where there is a mass at the end, with 1 where there is none.
+    Keys on a terminal: t tares, l says that the load has changed, q ends. Without a terminal use
+    --orders. Exit status: 0 if there is a mass at the end, 1 if there is none.
 
     Example: weighbridge live --vehicle car.toml --replay drive/ --rate 20
     """

@@ -39,8 +39,8 @@ _Columns = Annotated[
     Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
     typer.Option(
         "--columns",
-        help="Names of the columns of a text without a header, in their order: "
-        "time_s,rpm,speed,-; a dash for one of no use.",
+        help="Column names, in order, for a text without a header: time_s,rpm,speed,-; a "
+        "dash for an unused column.",
         metavar="NAMES",
         show_default=False,
     ),
@@ -54,24 +54,26 @@ def map_log(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="Logs of one drive or one logger whose names are foreign (CSV, Parquet …), or "
-            "a folder of them.",
+            help="Logs of one drive or of one logger with other column names (CSV, Parquet …),"
+            " or a folder of such logs.",
             show_default=False,
         ),
     ],
     output: Annotated[
         Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
-        typer.Option("-o", "--output", help="Mapping to write; else it is printed."),
+        typer.Option(
+            "-o", "--output", help="Mapping file to write; without it the mapping is printed."
+        ),
     ] = None,
     ask: Annotated[
         bool,
-        typer.Option("--ask", help="Ask about what is not sure: time, columns, units, rate."),
+        typer.Option("--ask", help="Ask about everything doubtful: time, columns, units, rate."),
     ] = False,
     rate: Annotated[
         Optional[float],  # noqa: UP045
         typer.Option(
             "--rate",
-            help="Rows per second, of a log without a clock.",
+            help="Rows per second, for a log without a clock.",
             metavar="HZ",
             show_default=False,
         ),
@@ -80,10 +82,10 @@ def map_log(
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     dbc: DbcPaths = None,
 ) -> None:
-    """Draft the mapping of a log: its separator, its time, its columns and their units.
+    """Draft the mapping of a log: its separator, time, columns and units.
 
-    Files that read alike, such as one a day, get one mapping that fits those of other days too.
-    Of raw CAN logs it finds which signals of a DBC mean what.
+    Files of the same form, such as one per day, get one mapping that fits other days too.
+    For raw CAN logs it finds the meaning of the signals of a DBC.
 
     Example: weighbridge map trip.csv -o map.toml
     """

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 DrivePaths = Annotated[
     list[Path],
     typer.Argument(
-        help="Drives, each for itself: a folder of tables, a folder of logs that are one drive "
-        "(joined by time), or one log.",
+        help="One or more drives. A drive is a folder of tables, a folder of logs of one "
+        "drive (joined by time), or one log.",
         show_default=False,
     ),
 ]
@@ -24,11 +24,14 @@ OneDrive = Annotated[
 ]
 JsonPath = Annotated[
     Optional[str],  # noqa: UP045  (typer reads the annotation at run time)
-    typer.Option("--json", help="Write a JSON object to a file, or - for here."),
+    typer.Option("--json", help="Write a JSON object to a file, or - for standard output."),
 ]
 MappingPath = Annotated[
     Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
-    typer.Option("--mapping", help="TOML that names foreign columns, units and signs."),
+    typer.Option(
+        "--mapping",
+        help="Mapping: a TOML file that gives the meaning, unit and sign of each column.",
+    ),
 ]
 ReportPath = Annotated[
     Optional[Path],  # noqa: UP045
@@ -38,14 +41,14 @@ DbcPaths = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(
         "--dbc",
-        help="DBC of raw CAN logs; repeat it for more, write 1:FILE for bus 1 alone.",
+        help="DBC for raw CAN logs; repeat it for more files; write 1:FILE for bus 1 only.",
         metavar="FILE",
     ),
 ]
 
 Whole = Annotated[
     bool,
-    typer.Option("--whole", help="Take each recording as one drive, whatever it holds."),
+    typer.Option("--whole", help="Treat each recording as one drive; do not split it."),
 ]
 
 

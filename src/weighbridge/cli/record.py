@@ -39,7 +39,7 @@ _TOLD: Final = 60.0
 def record(
     source: Annotated[
         list[str],
-        typer.Option("--source", help="Where samples come from; repeatable.", show_default=False),
+        typer.Option("--source", help="Source of samples; repeat it for more.", show_default=False),
     ],
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Folder to record into.", show_default=False)
@@ -51,20 +51,25 @@ def record(
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
     listen_only: Annotated[
-        bool, typer.Option("--listen-only", help="Refuse sources that ask the vehicle.")
+        bool,
+        typer.Option("--listen-only", help="Refuse sources that send requests to the vehicle."),
     ] = False,
     check: Annotated[
         float,
-        typer.Option("--check", min=0.0, help="How long to wait for all signals, in s; 0: not."),
+        typer.Option(
+            "--check", min=0.0, help="Time to wait for all signals in s; 0 does not wait."
+        ),
     ] = 20.0,
     duration: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option("--duration", min=0.0, help="End after so many s; else with Ctrl-C."),
+        typer.Option(
+            "--duration", min=0.0, help="End after this time in s; otherwise end with Ctrl-C."
+        ),
     ] = None,
 ) -> None:
-    """Record live sources as a drive, after a look whether all signals arrive.
+    """Record live sources as a drive, after a check that all signals arrive.
 
-    A power cut costs less than the last minute. Ctrl-C ends the recording.
+    After a power cut less than the last minute is missing. Ctrl-C ends the recording.
 
     Example: weighbridge record --source elm:/dev/ttyUSB0 --source gpsd:localhost:2947 -o drive/
     """

@@ -26,28 +26,33 @@ def reproduce(
         Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
         typer.Option(
             "--report",
-            help="Write a report with the paper's figures from our data; of all papers, the "
-            "paper's name goes before the suffix. As .md: every equation, table and figure of the "
-            "papers, where it is, and our figure of this run.",
+            help="Write a report with the paper's figures from our data. With several papers, "
+            "each report has the paper's name before the suffix. As .md: a list of every "
+            "equation, table and figure, where it is in the code, and our figure of this "
+            "run.",
         ),
     ] = None,
     seed: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option("--seed", min=0, help="Of the simulated drives; the paper's own by default."),
+        typer.Option(
+            "--seed",
+            min=0,
+            help="Seed of the simulated drives; by default the one chosen for the paper.",
+        ),
     ] = None,
     changes: Annotated[
         Optional[list[str]],  # noqa: UP045
         typer.Option(
             "--set",
-            help="Change what a paper varies, such as printed.forgetting=0.998; repeat it for "
-            "more. Of one paper.",
+            help="Change a setting that the paper varies, such as printed.forgetting=0.998; "
+            "repeat it for more. For one paper only.",
             metavar="NAME=VALUE",
         ),
     ] = None,
 ) -> None:
-    """Reproduce a published system on simulated drives; exits with 1 where we fall behind.
+    """Reproduce a published system on simulated drives; exit status 1 if our result is worse.
 
-    A figure that was made under other conditions than the paper's is marked so.
+    Figures that were made under other conditions than the paper's are marked.
 
     Example: weighbridge reproduce jensen2022 --report jensen2022.html
     """

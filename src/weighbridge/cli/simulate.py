@@ -34,18 +34,18 @@ def simulate(
         Optional[float],  # noqa: UP045  (typer reads the annotation at run time)
         typer.Option("--mass", help="Mass at the start in kg; the empty car's by default."),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of everything random.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")] = 1,
     wind: Annotated[
         Optional[float],  # noqa: UP045
         typer.Option("--wind", help="Mean wind at 10 m height in m/s."),
     ] = None,
     wind_from: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option("--wind-from", help="Where it blows from, degrees clockwise from north."),
+        typer.Option("--wind-from", help="Where wind comes from, degrees clockwise from north."),
     ] = None,
     without: Annotated[
         Optional[list[str]],  # noqa: UP045
-        typer.Option("--without", help="Effect to switch off, such as squat; repeatable."),
+        typer.Option("--without", help="Effect to switch off, such as squat; repeat it for more."),
     ] = None,
     road: Annotated[
         Optional[str],  # noqa: UP045
@@ -53,12 +53,12 @@ def simulate(
     ] = None,
     speed: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option("--speed", help="For ride: km/h; 60 by default."),
+        typer.Option("--speed", help="For ride: speed in km/h; 60 by default."),
     ] = None,
-    table: Annotated[str, typer.Option("--format", help="csv or parquet.")] = "parquet",
+    table: Annotated[str, typer.Option("--format", help="Tables: csv or parquet.")] = "parquet",
     force: Annotated[bool, typer.Option("--force", help="Write into an existing folder.")] = False,
 ) -> None:
-    """Simulate a drive and write it as a folder of tables, with its truth.
+    """Simulate a drive and write it as a folder of tables, with the true values.
 
     Example: weighbridge simulate car -o drive/ --mass 1700 --seed 7 --wind 5 --wind-from 270
     """
@@ -101,30 +101,37 @@ def simulate(
 def fleet(
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", help="Folder to make; it must be new.", show_default=False),
+        typer.Option(
+            "-o", "--output", help="Folder to write; it must not exist yet.", show_default=False
+        ),
     ],
-    vehicles: Annotated[int, typer.Option("--vehicles", help="Of the fleet.")] = 50,
-    days: Annotated[int, typer.Option("--days", help="Of drives.")] = 5,
-    drives: Annotated[int, typer.Option("--drives", help="Of each vehicle and day.")] = 4,
-    minutes: Annotated[float, typer.Option("--minutes", help="Length of a drive.")] = 20.0,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of everything random.")] = 1,
-    start: Annotated[str, typer.Option("--start", help="First day.")] = "2026-05-04",
+    vehicles: Annotated[int, typer.Option("--vehicles", help="Number of vehicles.")] = 50,
+    days: Annotated[int, typer.Option("--days", help="Number of days.")] = 5,
+    drives: Annotated[
+        int, typer.Option("--drives", help="Number of drives per vehicle and day.")
+    ] = 4,
+    minutes: Annotated[
+        float, typer.Option("--minutes", help="Length of a drive in minutes.")
+    ] = 20.0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")] = 1,
+    start: Annotated[str, typer.Option("--start", help="Date of the first day.")] = "2026-05-04",
     drift: Annotated[
         float,
         typer.Option(
             "--drift",
-            help="More torque read on the last day than on the first by every third vehicle, in %.",
+            help="Drift of the torque reading of every third vehicle, from the first to the "
+            "last day, in %.",
         ),
     ] = 0.0,
     workers: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option("--workers", help="Processes; one per core unless given."),
+        typer.Option("--workers", help="Processes; one per core by default."),
     ] = None,
 ) -> None:
     """Simulate days of trucks, vans, buses and cars: loads, overloads, trailers, broken sensors.
 
-    Writes drives, vehicle files, drives.csv, tickets.csv of weighed departures and truth.csv; the
-    same for the same seed, by any number of processes.
+    Writes drives, vehicle files, drives.csv, tickets.csv of weighed departures and truth.csv.
+    The same seed gives the same files, with any number of processes.
 
     Example: weighbridge simulate fleet -o fleet/ --vehicles 10 --days 2 --minutes 10
     """

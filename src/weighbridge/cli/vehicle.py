@@ -16,7 +16,7 @@ from weighbridge.cli.verbosity import say_written
 if TYPE_CHECKING:
     from weighbridge.vehicle.model import Vehicle
 
-app = typer.Typer(no_args_is_help=True, help="Write a vehicle file, or tell what one says.")
+app = typer.Typer(no_args_is_help=True, help="Write a vehicle file, or explain an existing one.")
 
 _Text = Optional[str]  # noqa: UP045  (typer reads the annotation at run time)
 _Number = Optional[float]  # noqa: UP045
@@ -25,7 +25,7 @@ _Tare = Annotated[
     _Number,
     typer.Option(
         "--tare",
-        help="Empty mass in kg; field G of an EU registration document.",
+        help="Mass without payload in kg; field G of an EU registration document.",
         show_default=False,
     ),
 ]
@@ -34,13 +34,13 @@ _Gross = Annotated[
     typer.Option("--gross", help="Permitted mass in kg, field F.1 or F.2.", show_default=False),
 ]
 _Tyre = Annotated[
-    _Text, typer.Option("--tyre", help="Size, such as '205/55 R16'.", show_default=False)
+    _Text, typer.Option("--tyre", help="Tyre size, such as '205/55 R16'.", show_default=False)
 ]
 _Radius = Annotated[
     _Number,
     typer.Option(
         "--radius",
-        help="Rolling radius of the driven wheels in m, in place of the tyre.",
+        help="Rolling radius of the driven wheels in m, instead of the tyre size.",
         show_default=False,
     ),
 ]
@@ -50,13 +50,15 @@ _DrivenAxles = Annotated[
 ]
 _GearRatios = Annotated[
     _Text,
-    typer.Option("--gear-ratios", help="Such as 3.77,2.09,1.32,0.98,0.78.", show_default=False),
+    typer.Option(
+        "--gear-ratios", help="Gear ratios, such as 3.77,2.09,1.32,0.98,0.78.", show_default=False
+    ),
 ]
 _Torque = Annotated[
     _Text,
     typer.Option(
         "--torque",
-        help="What the drives tell: a torque source.",
+        help="Torque source of the drives.",
         show_default=False,
     ),
 ]
@@ -64,7 +66,7 @@ _Layout = Annotated[
     _Text,
     typer.Option(
         "--layout",
-        help="Engine transverse or longitudinal, of a car or van.",
+        help="Engine of a car or van: transverse or longitudinal.",
         show_default=False,
     ),
 ]
@@ -76,7 +78,7 @@ def new(
         Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
     ],
     kind: Annotated[str, typer.Option("--class", help="car, van, bus or truck.")] = "car",
-    name: Annotated[str, typer.Option("--name", help="For people.")] = "vehicle",
+    name: Annotated[str, typer.Option("--name", help="Name shown in results.")] = "vehicle",
     engine: Annotated[
         _Text, typer.Option("--engine", help="petrol, diesel or electric.", show_default=False)
     ] = None,
@@ -87,24 +89,28 @@ def new(
     driven: _DrivenAxles = None,
     gear_ratios: _GearRatios = None,
     final_drive: Annotated[
-        _Number, typer.Option("--final-drive", help="Ratio of the axle.", show_default=False)
+        _Number,
+        typer.Option("--final-drive", help="Final drive ratio of the axle.", show_default=False),
     ] = None,
     torque: _Torque = None,
     reference_torque: Annotated[
         _Number,
-        typer.Option("--reference-torque", help="100 % torque in N m.", show_default=False),
+        typer.Option(
+            "--reference-torque", help="Torque in N m that 100 % means.", show_default=False
+        ),
     ] = None,
     drag_coefficient: Annotated[
-        _Number, typer.Option("--drag-coefficient", help="C_d.", show_default=False)
+        _Number,
+        typer.Option("--drag-coefficient", help="Drag coefficient C_d.", show_default=False),
     ] = None,
     frontal_area: Annotated[
-        _Number, typer.Option("--frontal-area", help="In m².", show_default=False)
+        _Number, typer.Option("--frontal-area", help="Frontal area in m².", show_default=False)
     ] = None,
     layout: _Layout = None,
     mapping: MappingPath = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
-    """Write a vehicle file from what an owner knows; the rest is usual for the class.
+    """Write a vehicle file from what an owner knows; other values are usual ones of the class.
 
     Example: weighbridge vehicle new --class van --tare 2150 --gross 3500 --tyre "235/65 R16"
     -o van.toml
@@ -152,7 +158,7 @@ def new(
 def show(
     path: Annotated[Path, typer.Argument(help="Vehicle file.", show_default=False)],
 ) -> None:
-    """Tell in words what a vehicle file says, and how good it is.
+    """Explain in words what a vehicle file says, and how good it is.
 
     Example: weighbridge vehicle show car.toml
     """

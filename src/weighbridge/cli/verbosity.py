@@ -66,7 +66,7 @@ Verbose = Annotated[
         callback=_take_verbose,
         metavar="",
         show_default=False,
-        help="Log to standard error what is done; -vv logs more.",
+        help="Log each step to standard error; -vv logs more.",
     ),
 ]
 

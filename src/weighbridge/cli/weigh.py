@@ -48,7 +48,10 @@ _NOTED = 3
 
 
 _VehiclePath = Annotated[
-    Path, typer.Option("--vehicle", help="Vehicle file, as of calibrate.", show_default=False)
+    Path,
+    typer.Option(
+        "--vehicle", help="Vehicle file, written by calibrate or vehicle new.", show_default=False
+    ),
 ]
 _Method = Annotated[str, typer.Option("--method", help="Estimator.")]
 _Changes = Annotated[
@@ -61,16 +64,21 @@ _Changes = Annotated[
 ]
 _Json = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option("--json", help="Write one JSON object per drive to a file, or - for here."),
+    typer.Option(
+        "--json", help="Write one JSON object per drive to a file, or - for standard output."
+    ),
 ]
 _Track = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--track", help="Write the mass over time: .csv or .parquet. One drive."),
+    typer.Option(
+        "--track", help="Write the mass over time as .csv or .parquet; for one drive only."
+    ),
 ]
 _Compare = Annotated[
     bool,
     typer.Option(
-        "--compare", help="Weigh by every method; show them side by side, in the report too."
+        "--compare",
+        help="Weigh with every method; show all results side by side, also in the report.",
     ),
 ]
 _Tiles = Annotated[
@@ -100,9 +108,9 @@ def weigh(
 ) -> None:
     """Weigh a vehicle from one or more drives.
 
-    A recording of several drives (a day's file, a splice) is parted, and each is weighed: it
-    parts at pauses of 5 minutes, stops of 10, and jumps.
-    Exits with 0 where every drive gave a mass, with 1 where one could not.
+    A recording of several drives (such as a file of a whole day) is split at pauses of 5 minutes,
+    at stops of 10 minutes and at jumps. Each drive is weighed.
+    Exit status: 0 if every drive gave a mass, 1 if one did not.
 
     Example: weighbridge weigh drive-1/ drive-2/ --vehicle car.toml --report weighed.html
     """

@@ -17,7 +17,7 @@ file does not say [-]: chosen, for data-sheet values of springs (some 3 %) and d
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InertiaSettings:
-    """What the filters assume beside the vehicle file.
+    """Assumptions of the filters besides the vehicle file.
 
     Attributes
     ----------

@@ -81,12 +81,12 @@ def read_drive(
     Returns
     -------
     Drive
-        What had to be left out is in its ``problems``.
+        Its ``problems`` list what was left out.
 
     Raises
     ------
     DriveError
-        Nothing is there, a file cannot be read, or a column cannot be
+        The path does not exist, a file cannot be read, or a column cannot be
         understood.
     ConfigError
         The mapping cannot be used.
@@ -100,7 +100,7 @@ def read_drives(
     mapping: MappingSource | None = None,
     dbc: DbcSource | Sequence[DbcSource] = (),
 ) -> list[Drive]:
-    """Read the drives that a recording holds: a day's file, or several put one behind another.
+    """Read the drives of a recording, such as a file of a whole day or several joined drives.
 
     A drive ends where nothing is recorded for 5 minutes, where the vehicle stands for 10, where
     speed, position or coolant jump as no vehicle's do, and where a table's clock begins anew.
@@ -355,7 +355,7 @@ def joined_drive(
     ----------
     name : of the drive
     logs : what was read of each file
-    info : what is known beside the signals
+    info : what is known besides the signals
     mappings, databases : what the files were read with
 
     Raises

@@ -50,7 +50,7 @@ class Recorder:
     Parameters
     ----------
     folder : of the drive; made where it is not there
-    info : what is known beside the signals; the start is found
+    info : what is known besides the signals; the start is found
     period : time between parts [s]
     clock : that time [s]
 

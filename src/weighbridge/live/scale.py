@@ -42,7 +42,7 @@ RENEWED: Final = 60.0
 
 
 class LiveScale:
-    """Weighs a vehicle from samples as they come.
+    """Weigh a vehicle from samples while they arrive.
 
     The first minutes are weighed as a whole, again and again, until they tell mounting, delays and
     noise; from then on each step is weighed by the forward stages

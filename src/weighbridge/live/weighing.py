@@ -71,19 +71,19 @@ class AlertState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveWeighing:
-    """The mass at one moment of a drive, how sure it is, and what would make it surer.
+    """The mass at one moment of a drive, its uncertainty, and what would reduce it.
 
     Attributes
     ----------
     vehicle : its name
     time : instant it holds for, on the clock of the samples [s]; NaN before the first
-    age : by how much the newest sample is later [s]
+    age : time from that instant to the newest sample [s]
     status : ``learning`` until the mass is within 5 % with 95 % probability, ``weighed``, or
         ``inconsistent`` where the drive contradicts itself or the vehicle file
-    reason : why it is not ``weighed``; empty where it is
+    reason : why the status is not ``weighed``; empty if it is
     mass, std : [kg]; NaN where there is none
     tare, gross : of the vehicle file [kg]; None where it does not say
-    tared : mass that the user has set to nought [kg]; None for ``tare``
+    tared : mass that the user has tared [kg]; None for ``tare``
     driven : time on the move so far [s]
     progress : part of the way to 2 % [-], 0 to 1: the variance that is allowed then over that now
     reach : half width of the 95 % interval over the mass that 4.5 h more of driving leave, nearly

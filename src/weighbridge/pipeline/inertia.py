@@ -87,7 +87,7 @@ TILT_PART: Final = 0.3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inertia(InertiaResult):
-    """Sprung mass and inertias at the end of a drive, how sure they are, and why."""
+    """Sprung mass and inertias at the end of a drive, their uncertainty and the reason."""
 
     def report(self, path: str | Path) -> None:
         """Write a self-contained HTML report that opens offline."""
@@ -124,7 +124,7 @@ def estimate_inertia(
     ConfigError
         The method or a setting is not known, or the vehicle file has no suspension.
     DriveError
-        What the drive says cannot be so, such as a wrong unit or sign.
+        The data of the drive cannot be right, for example because of a wrong unit or sign.
     """
     check_text("method", method)
     kinds = (InertiaSettings, Mapping, type(None))

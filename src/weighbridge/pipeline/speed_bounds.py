@@ -45,16 +45,16 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MassBound:
-    """An upper bound of the mass by the power of the engine.
+    """An upper bound of the mass, from the power of the engine.
 
     Attributes
     ----------
-    mass : the vehicle has at most this mass with 95 % probability [kg]; NaN without a climb
+    mass : upper bound of the mass with 95 % probability [kg]; NaN without a climb
     nearest, nearest_std : mass that the window of the bound would say if it was driven at full
         power, and its standard deviation [kg]
     start : when that window begins [s]
     windows : how many were hard enough to bound a mass
-    status : never `Status.CONVERGED`, for nothing proves full load
+    status : never `Status.CONVERGED`, because nothing proves full power
     reason : in a sentence
     """
 
@@ -94,7 +94,7 @@ def _check_given(drive: Drive, vehicle: Vehicle) -> None:
 def mass_bound(
     drive: Drive, vehicle: Vehicle, power: float, *, power_std: float = 0.05
 ) -> MassBound:
-    """Bound the mass of a drive from above by speed, grade and the engine's full power.
+    """Find an upper bound of the mass from speed, grade and the engine's full power.
 
     No window of a drive asks for more power than the engine has: kinetic and potential energy and
     rolling resistance, all in proportion to the mass, and air drag. Each window bounds the mass;
@@ -110,9 +110,9 @@ def mass_bound(
     Raises
     ------
     ConfigError
-        The power is none.
+        The power is not positive.
     DriveError
-        There is no speed, or nothing tells the grade.
+        There is no speed, or neither grade nor heights.
 
     References
     ----------
@@ -210,14 +210,14 @@ def _windows(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoastDown:
-    """What coasting in both directions tells.
+    """Result of coasting in both directions.
 
     Attributes
     ----------
     drag_over_mass, drag_over_mass_std : C_d A over the mass [m^2/kg]
     rolling, rolling_std : rolling resistance coefficient, driveline drag taken in [-]
-    degrees_of_freedom : behind the standard deviations
-    status : `Status.NOT_EXCITED`, for it tells no mass
+    degrees_of_freedom : of the standard deviations
+    status : `Status.NOT_EXCITED`, because coasting gives no mass
     """
 
     drag_over_mass: float
@@ -254,7 +254,7 @@ class CoastDown:
 def coast_down(
     drive: Drive, there: Sequence[Span], back: Sequence[Span], *, vehicle: Vehicle | None = None
 ) -> CoastDown:
-    """Find C_d A over mass from spans of a drive that coast out of gear, in opposite directions.
+    """Find C_d A over mass from coast-downs out of gear in opposite directions.
 
     In each span the retardation, grade taken off, is a line in the dynamic pressure: its slope is
     C_d A / m, times the part of the inertia that rolls. Wind along the road adds opposite parts to
@@ -271,7 +271,7 @@ def coast_down(
     ConfigError
         There are fewer spans than two in a direction, or one is too short.
     DriveError
-        There is no speed, or nothing tells the grade.
+        There is no speed, or neither grade nor heights.
 
     References
     ----------

@@ -80,7 +80,7 @@ ONE_TABLE: Final = 0.4
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Weighing(MassResult):
-    """The mass of one drive, how sure it is, and why; shows itself, and other methods beside it."""
+    """The mass of one drive, its uncertainty and reason; writes its report and compares methods."""
 
     def compare(self) -> tuple[Weighing, ...]:
         """Weigh the same drive by every method, this one included, see `compare`."""
@@ -132,14 +132,14 @@ def weigh(
     Returns
     -------
     Weighing
-        Without a mass, but with a reason, where the data cannot carry one.
+        Without a mass, but with a reason, if the data do not allow one.
 
     Raises
     ------
     ConfigError
         The method is not known, or has no such setting.
     DriveError
-        What the drive says cannot be so, such as a wrong unit.
+        The data of the drive cannot be right, for example because of a wrong unit.
     """
     check_text("method", method)
     if settings is not None:
@@ -290,7 +290,7 @@ def without_mass(
 
 
 def compare(weighing: Weighing) -> tuple[Weighing, ...]:
-    """Weigh a drive that has been weighed by one method by all the others too.
+    """Weigh a drive with all other methods, after it was weighed with one.
 
     The drive is not checked again, and forces and motion, which cost most, are
     taken over.

@@ -51,7 +51,7 @@ class LoadSegment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InertiaResult:
-    """Sprung mass and inertias at the end of a drive, how sure they are, and why.
+    """Sprung mass and inertias at the end of a drive, their uncertainty and the reason.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ _NUMBERS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class DriveInfo:
-    """What is known of a drive beside its signals (``drive.toml``).
+    """What is known about a drive besides its signals (``drive.toml``).
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class DriveInfo:
     wind_speed : reported wind at 10 m height [m/s]
     wind_from : direction the wind blows from, clockwise from north [rad]
     notes : free text
-    trusted : signals whose values and units a person vouches for, whatever they look like
+    trusted : signals with values and units that are right, even if they look wrong
     """
 
     start_time: str | None = None
@@ -66,13 +66,13 @@ class DriveInfo:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Something wrong with a drive that was mended or must be settled.
+    """A fault of a drive that was mended, or that the user must correct.
 
     Attributes
     ----------
     signal : name of the signal, or empty for the whole drive
     text : one sentence with the value and the remedy
-    serious : a mass made in spite of it could be wrong, so `weigh` refuses
+    serious : a mass could be wrong because of it, so `weigh` refuses the drive
 
     The text is cut to what a screen shows: what it quotes of a file may be endless.
     """
@@ -96,9 +96,9 @@ class Drive:
     ----------
     name : the folder's or file's name
     signals : by canonical name, in SI
-    info : what is known beside the signals
-    problems : what reading the drive had to mend or doubts
-    contents : what raw bus logs held, decoded or not, in sentences
+    info : what is known besides the signals
+    problems : what was mended or is doubtful in the data
+    contents : what raw bus logs hold, decoded or not, in sentences
     """
 
     name: str

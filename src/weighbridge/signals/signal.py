@@ -23,7 +23,7 @@ HELD: Final = 10.0
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Signal:
-    """One quantity, sampled on a clock of its own.
+    """One quantity with its own sampling times.
 
     Attributes
     ----------

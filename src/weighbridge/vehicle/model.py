@@ -45,7 +45,7 @@ _PARTS: Final[dict[str, tuple[type, bool]]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
-    """All that is known of one vehicle; see ``VEHICLE.toml``.
+    """Everything that is known about one vehicle; see ``VEHICLE.toml``.
 
     Attributes
     ----------
