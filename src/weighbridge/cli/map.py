@@ -203,7 +203,7 @@ def _files(
     """Files named, those of folders included, each with what drafts its mapping."""
     from weighbridge.errors import DriveError
     from weighbridge.io.dbc import load_dbcs
-    from weighbridge.io.formats import formats, is_log
+    from weighbridge.io.formats import format_of, formats, is_log, unreadable
 
     databases = load_dbcs(list(dbc))
 
@@ -224,6 +224,8 @@ def _files(
         elif path.suffix.lower() == ".npy":
             raise DriveError(f"{path}: holds {_ARRAYS}")
         elif (draft := _draft(path, databases, names)) is None:
+            if format_of(path) is None:
+                raise DriveError(unreadable(path))
             raise DriveError(
                 f"{path}: map drafts mappings of tables ({', '.join(drafted)}), and of CAN logs "
                 "by their DBC (--dbc FILE); other logs are read as they are: weighbridge inspect "
