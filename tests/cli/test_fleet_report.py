@@ -141,6 +141,31 @@ def test_the_answer_tells_how_many_it_leaves_out(weighbridge, tmp_path):
     assert (told.count("\n  truck"), "and 3 more" in told) == (10, True)
 
 
+def test_known_masses_outside_the_interval_are_told_everywhere(weighbridge, results, tmp_path):
+    tickets = tmp_path / "tickets.csv"
+    tickets.write_text(
+        "vehicle,time,mass_kg\ntruck1,2026-05-04T06:05:00Z,18500\n"
+        "truck3,2026-05-04T09:05:00Z,9300\n"
+    )
+    words = ("-o", tmp_path / "fleet.html", "--json", tmp_path / "fleet.json")
+    ran = weighbridge("fleet", "report", results, "--tickets", tickets, *words)
+    assert ran.code == 0
+    assert "outside the 95 % interval: 1 of 2 known masses; by chance one in twenty is" in ran.out
+    worst = "worst 2026-05-04 06:00 UTC: known 18500 kg, told 19020 to 20980 kg (+8.1 %)"
+    assert f"  truck1: 1 of 1, {worst}" in ran.out
+    told = json.loads((tmp_path / "fleet.json").read_text())
+    assert [(r["vehicle_id"], r["outside"]) for r in told["outside"]] == [
+        ("truck1", 1),
+        ("truck3", 0),
+    ]
+    assert (told["totals"]["known_legs"], told["totals"]["outside"]) == (2, 1)
+    page = (tmp_path / "fleet.html").read_text()
+    assert "1 of 2 known masses" in page[: page.index("<nav")]
+    section = page[page.index('<section id="outside">') :]
+    assert "19\u202f020 to 20\u202f980" in section
+    assert "outside the 95 %" not in weighbridge("fleet", "report", results).out
+
+
 def test_texts_are_shown_and_never_obeyed(weighbridge, results, tmp_path):
     weighbridge("fleet", "report", results, "-o", tmp_path / "fleet.html")
     page = (tmp_path / "fleet.html").read_text()

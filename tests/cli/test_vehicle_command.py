@@ -1,5 +1,9 @@
 """``weighbridge vehicle``: written from papers, told in words."""
 
+import re
+import shutil
+from pathlib import Path
+
 import polars as pl
 import pytest
 
@@ -130,3 +134,24 @@ def test_a_mapping_that_a_vehicle_file_names_and_is_gone(weighbridge, loaded, ca
     assert "drives are read by gone.toml" in " ".join(
         weighbridge("vehicle", "show", named).out.split()
     )
+
+
+def test_the_next_command_names_the_dbc_of_the_calibration(weighbridge, known, tmp_path):
+    dbc = tmp_path / "bus" / "golden.dbc"
+    dbc.parent.mkdir()
+    shutil.copy(Path(__file__).parents[1] / "golden" / "golden.dbc", dbc)
+    (tmp_path / "files").mkdir()
+    path = tmp_path / "files" / "car.toml"
+    ran = weighbridge("calibrate", known.folder, "--dbc", f"1:{dbc}", "-o", path)
+    assert ran.code == 0, ran.err
+    assert Vehicle.load(path).provenance.dbc == ("1:../bus/golden.dbc",)
+    said = weighbridge("vehicle", "show", path).out
+    asked = re.search(r"^next: (.*)$", said, re.MULTILINE).group(1).split()
+    assert asked[:5] == ["weighbridge", "weigh", "DRIVE", "--vehicle", str(path)]
+    assert asked[5] == "--dbc"
+    assert asked[6].startswith("1:")
+    assert Path(asked[6][2:]).resolve() == dbc
+
+
+def test_without_a_dbc_none_is_named(weighbridge, car):
+    assert "--dbc" not in weighbridge("vehicle", "show", car).out

@@ -12,7 +12,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.fleet.couplings import Coupling, read_couplings
 from weighbridge.fleet.figures import per_vehicle, quality, rfms, speed_mass, totals
 from weighbridge.fleet.legs import Limits, legs, load_changes
-from weighbridge.fleet.protocol import known_masses, verdicts
+from weighbridge.fleet.protocol import known_masses, outside, verdicts
 from weighbridge.fleet.tickets import Ticket
 from weighbridge.fleet.track import track
 
@@ -272,6 +272,31 @@ def test_verdicts_need_all_three_loads_within_the_tolerance():
     assert verdict((0.0, 0.0, 0.0), first_mass_s=901.0)["late"] == 3
     assert verdict((0.0, 0.0, 0.0), checked_kg=[None])["verdict"] == "failed"
     assert verdict((0.0, 0.0, 0.0), checked_kg=[9450.0])["worst_50"] == pytest.approx(0.05)
+
+
+def test_known_masses_outside_the_interval_are_counted_and_the_worst_is_named():
+    told = [("a", 9000.0, 9100.0), ("b", 9000.0, 9700.0), ("c", 9000.0, 8100.0), ("d", None, 9e3)]
+    rows = frames(
+        [
+            *(
+                drive(
+                    key, start=at(6 + k), mass=mass, std=300.0 if mass else None, known_mass_kg=kg
+                )
+                for k, (key, mass, kg) in enumerate(told)
+            ),
+            drive("e", "van9", mass=2000.0, std=50.0, known_mass_kg=2010.0),
+            drive("f", "van8", mass=2000.0, std=50.0),
+        ]
+    )
+    first, second = outside(known_masses(legs(*rows), rows[0])).to_dicts()
+    # 1.96 standard deviations are 588 kg.
+    assert (first["vehicle_id"], first["known"], first["outside"]) == ("truck1", 3, 2)
+    assert first["worst_known_kg"] == 8100.0
+    assert first["worst_low95_kg"] == pytest.approx(9000.0 - 588.0, abs=1.0)
+    assert first["worst_error"] == pytest.approx(9000.0 / 8100.0 - 1.0)
+    assert first["worst_start"] == datetime(2026, 5, 4, 8, tzinfo=UTC)
+    assert (second["vehicle_id"], second["known"], second["outside"]) == ("van9", 1, 0)
+    assert second["worst_known_kg"] is None
 
 
 @pytest.mark.parametrize(

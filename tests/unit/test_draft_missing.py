@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from weighbridge.errors import DriveError
+from weighbridge.io import read_drive
 from weighbridge.io.draft import draft
 from weighbridge.io.draft_missing import missing
+from weighbridge.io.mapping_text import mapping_text
 from weighbridge.io.naming import recognise_all
 
 ROWS = 100
@@ -47,11 +50,11 @@ def test_the_unit_of_a_row_of_units_is_named(tmp_path):
     "name", ["Engine RPM x1000 (rpm)", "engine_speed_target", "Average speed (km/h)", "Note"]
 )
 def test_another_thing_is_not_blamed_on_its_unit(name):
-    assert not recognise_all([name])[0].misfit
+    assert not recognise_all([name], misfits=True)[0].misfit
 
 
 def test_what_another_column_is_taken_for_is_no_misfit():
-    found = recognise_all(["engine_speed_rpm", "engine_speed_pct"])
+    found = recognise_all(["engine_speed_rpm", "engine_speed_pct"], misfits=True)
     assert [f.quantity for f in found] == ["engine_speed", ""]
     assert not found[1].misfit
 
@@ -80,3 +83,35 @@ def test_pound_feet_and_thousandths_are_units(tmp_path):
     }  # fmt: skip
     assert all(c.stated for c in columns.values())
     assert np.isclose(columns["engine_torque"].low, 1.0)
+
+
+def test_cells_that_are_no_numbers_are_shown(tmp_path):
+    rows = [f"{k},{50 + k % 2} km/h,{k}" for k in range(ROWS)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["Time (s),Speed (km/h),Load (%)", *rows]))
+    (doubt,) = (d for d in draft(path).all_doubts if "Speed" in d)
+    assert "its cells are no numbers, such as '50 km/h'" in doubt
+
+
+def test_lines_that_end_in_carriage_returns_alone_are_told(tmp_path):
+    (tmp_path / "mac.csv").write_bytes(b"time_s,rpm\r0,900\r1,950\r2,980\r")
+    with pytest.raises(DriveError, match="lines end in carriage returns alone"):
+        draft(tmp_path / "mac.csv")
+
+
+@pytest.mark.parametrize("date", ["06.05.2024", "06/05/2024"])
+def test_dates_with_a_decimal_comma_are_the_time(tmp_path, date):
+    rows = [f"{date} 11:58:{k // 10:02d},{k % 10}00;{50 + k % 9};{900 + k}" for k in range(ROWS)]
+    (tmp_path / "x.csv").write_text("\n".join(["Zeit;v [km/h];Drehzahl [1/min]", *rows]))
+    found = draft(tmp_path / "x.csv")
+    assert found.duration == pytest.approx(0.1 * (ROWS - 1))
+    (tmp_path / "x.toml").write_text(mapping_text([found]))
+    drive = read_drive(tmp_path / "x.csv", tmp_path / "x.toml")
+    assert drive.signals["engine_speed"].time[-1] == pytest.approx(0.1 * (ROWS - 1), abs=1e-3)
+
+
+def test_a_logger_s_name_beside_canonical_ones_is_answered_by_the_canonical_one(tmp_path):
+    path = table(tmp_path, ["time_s", "engine_load_pct", "Speed (mph)", "Drehzahl [1/min]"])
+    (note,) = read_drive(path).problems
+    assert "'Speed (mph)' (did you mean vehicle_speed_mph?)" in note.text
+    assert "'Drehzahl [1/min]' (did you mean engine_speed_rpm?)" in note.text

@@ -95,3 +95,21 @@ def test_what_may_be_two_drives_is_refused(tmp_path, case):
         first, second = obd(tmp_path / "a.csv", names), obd(tmp_path / "b.csv", names)
     with pytest.raises(DriveError, match=r"is both in .* or its column in the mapping"):
         read_drive([first, second])
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [
+        ("trip.xlsx", "save its sheet as CSV"),
+        ("trip.csv.gz", "unpack it first"),
+        ("trip.KML", "export the track as GPX"),
+        ("trip.ld", "export it as CSV from i2"),
+        ("car.dbc", "give it by --dbc"),
+        ("car.toml", "a vehicle file goes with --vehicle"),
+        ("trip.odd", "known are .csv"),
+    ],
+)
+def test_a_file_that_is_not_read_is_answered_with_what_helps(tmp_path, name, remedy):
+    (tmp_path / name).write_bytes(b"x" * 100)
+    with pytest.raises(DriveError, match=f"cannot be read; .*{remedy}"):
+        read_drive(tmp_path / name)

@@ -4,11 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import config
 
+import weighbridge as wb
+from weighbridge.checks import mend_drive
 from weighbridge.checks.smoothed_imu import check_smoothed
 from weighbridge.signals import Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.vehicle.known import Known, describe
 
 
 @pytest.fixture(scope="module", params=[("car", 51), ("truck", 52), ("electric", 53)])
@@ -52,3 +56,50 @@ def test_a_sensor_of_few_samples_cannot_tell(drive):
     assert not list(check_smoothed(drive.with_signals(*slow), None))
     standing = replace(drive.signals["vehicle_speed"], values=0.0 * drive.speed.values)
     assert not list(check_smoothed(smoothed(drive.with_signals(standing), 3.0), None))
+
+
+def test_with_heights_a_smoothed_sensor_is_left_out_and_the_rest_weighs(drive):
+    found = mend_drive(smoothed(drive, 3.0))
+    assert not any(p.serious for p in found.problems)
+    assert not set(found.signals) & set(IMU_SIGNALS)
+    assert {"vehicle_speed", "altitude"} <= set(found.signals)
+    (said,) = (p.text for p in found.problems if "was smoothed" in p.text)
+    assert "accelerometer and gyroscope were left out" in said
+    assert said.endswith("record it unfiltered")
+
+
+def test_without_heights_or_where_a_person_vouches_nothing_is_left_out(drive):
+    flat = mend_drive(smoothed(drive.without("altitude"), 3.0))
+    assert any(p.serious and "was smoothed" in p.text for p in flat.problems)
+    vouched = replace(drive, info=replace(drive.info, trusted=IMU_SIGNALS))
+    kept = mend_drive(smoothed(vouched, 3.0))
+    assert set(IMU_SIGNALS) <= set(kept.signals)
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="whole drives take minutes uncompiled")
+def test_means_over_a_tenth_of_a_second_weigh_a_truck():
+    """Means at 10 Hz, as trackers send them, are as good as the raw sensor."""
+    known, loaded = (
+        simulate_car(replace(make_scenario(name, payload=kg, seed=seed), duration=900.0))
+        for name, kg, seed in (("truck-calibration", 2000.0, 61), ("truck", 11_000.0, 62))
+    )
+    papers = Known(kind="truck", tare=9000.0, gross=18_000.0, torque="percent")
+    slow = (tenths(d.drive) for d in (known, loaded))
+    truck = wb.calibrate([next(slow)], [known.drive.info.mass], vehicle=describe(papers).vehicle)
+    w = wb.weigh(next(slow), truck)
+    true = loaded.drive.info.mass
+    assert w.mass == pytest.approx(true, rel=0.03)
+    assert w.interval(0.95)[0] < true < w.interval(0.95)[1]
+    assert any("above the permitted mass of 18000 kg" in text for text in w.warnings)
+
+
+def tenths(drive):
+    """Means of the inertial sensor over 0.1 s."""
+    signals = []
+    for name in IMU_SIGNALS:
+        s = drive.signals[name]
+        bins = np.floor(s.time / 0.1)
+        _, at, count = np.unique(bins, return_index=True, return_counts=True)
+        means = [np.add.reduceat(x, at) / count for x in (s.time, s.values)]
+        signals.append(Signal(name, *means))
+    return drive.with_signals(*signals)

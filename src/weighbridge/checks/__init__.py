@@ -18,7 +18,7 @@ from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
 from weighbridge.checks.mending import mended
 from weighbridge.checks.ranges import check_range, within_ranges, without_strays
-from weighbridge.checks.smoothed_imu import check_smoothed
+from weighbridge.checks.smoothed_imu import check_smoothed, without_smoothed
 from weighbridge.checks.speed import check_scales
 from weighbridge.checks.spikes import without_spikes
 from weighbridge.checks.travel import check_sign, check_standstill
@@ -86,7 +86,7 @@ def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     # Before rows are left out: a pause is one of the recording.
     found = (*found, *check_pauses(drive, vehicle))
     if not any(p.serious for p in check_range(drive, vehicle)):
-        drive = mend_clocks(drive)
+        drive = without_smoothed(mend_clocks(drive), vehicle)
     problems = [*drive.problems[len(earlier) :], *found]
     if not any(p.serious for p in problems):
         problems += (

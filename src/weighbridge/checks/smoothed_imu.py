@@ -34,8 +34,35 @@ FAST: Final = 5.0
 PART: Final = 0.2
 """Part of the driving that has to be quiet [-]."""
 
+_REMEDY: Final = "; record it unfiltered"
+
 SLOWEST: Final = 0.2
 """Samples further apart do not show the shaking [s]."""
+
+
+def without_smoothed(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
+    """Leave out an accelerometer that was smoothed, where speed and heights weigh without it.
+
+    Signals that a person vouches for (``drive.info.trusted``) stay as they are.
+
+    Parameters
+    ----------
+    drive, vehicle : as of `weighbridge.checks.mend_drive`
+    """
+    heights = drive.has("altitude") or drive.has("grade")
+    trusted = set(IMU_SIGNALS) & set(drive.info.trusted)
+    if trusted or not (drive.has("vehicle_speed") and heights):
+        return drive
+    for found in check_smoothed(drive, vehicle):
+        text = found.text.removesuffix(_REMEDY)
+        return drive.without(*IMU_SIGNALS).with_problems(
+            Problem(
+                found.signal,
+                f"{text}; accelerometer and gyroscope were left out, and speed and heights weigh "
+                "less surely: record it unfiltered",
+            )
+        )
+    return drive
 
 
 def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -62,7 +89,7 @@ def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         f"the accelerometer shakes by {float(np.median(shaking[quiet])):.2g} m/s^2 only within "
         f"{SECOND:g} s as the vehicle drives, from {span(round(start + BLOCK * first), round(end))}"
         ", and a road shakes it by 0.1 and more: it was smoothed, and quick changes of the motion "
-        "are lost; record it unfiltered",
+        f"are lost{_REMEDY}",
         serious=True,
     )
 

@@ -59,6 +59,14 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
                 "reference_torque in trusted of drive.toml where it is right",
                 serious=model.of_source.needs_reference,
             )
+        stated = model.reference_torque if known is None else None
+        if told and stated and abs(told / stated - 1.0) > SAME_REFERENCE:
+            yield Problem(
+                reference.name,
+                f"reference_torque is {told:.0f} N m in the drive, which was taken, and "
+                f"{stated:.0f} N m in the vehicle file: the vehicle file is another vehicle's, or "
+                "reference_torque_nm under [torque] is wrong",
+            )
         return
     values = np.array([value for value, _ in reported])
     nearest = np.argmin(np.abs(reference.values[:, None] - values[None, :]), axis=1)

@@ -130,6 +130,7 @@ def calibrate(
     """
     from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError
+    from weighbridge.io.dbc import dbc_path, with_path
     from weighbridge.pipeline.given import mapping_beside
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -164,6 +165,9 @@ def calibrate(
         car, found, notes = _fitted(recorded, masses, base, settings, tare, bar.within)
         if chosen is not None:
             car = replace(car, mapping=mapping_beside(chosen, output))
+        if dbc:
+            beside = tuple(with_path(d, Path(mapping_beside(dbc_path(d), output))) for d in dbc)
+            car = replace(car, provenance=replace(car.provenance, dbc=beside))
         car.save(output)
         own = None
         if settings.fit.torque:

@@ -14,6 +14,8 @@ from weighbridge.cli.verbosity import say_written
 if TYPE_CHECKING:
     import polars as pl
 
+    from weighbridge.fleet.reporting import FleetReport
+
 _TOLD: Final = 10  # legs in the answer, and vehicles of what was learnt
 
 _Couplings = Annotated[
@@ -71,7 +73,7 @@ def report(
     """
     from weighbridge.errors import ConfigError
     from weighbridge.fleet.legs import Limits
-    from weighbridge.fleet.page import how_sure, write_page
+    from weighbridge.fleet.page import write_page
     from weighbridge.fleet.reporting import report as figures
 
     if json == "-":
@@ -94,6 +96,18 @@ def report(
         found.to_json(json)
     if legs is not None:
         found.write_legs(legs)
+    _say_answer(found, alarm)
+    _say_outside(found.outside)
+    _say_learnt(found.learnt)
+    for written in (page, json, legs):
+        if written is not None:
+            say_written(written)
+
+
+def _say_answer(found: FleetReport, alarm: float) -> None:
+    """Tell who was overloaded, surest first; ``alarm`` is the probability that is sure."""
+    from weighbridge.fleet.page import how_sure
+
     t = found.totals
     say(f"{t['drives']} drives of {t['vehicles']} vehicles, {t['distance_km']:.0f} km")
     sure = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
@@ -108,10 +122,26 @@ def report(
     more = found.overloads.height - _TOLD
     if more > 0:
         say(f"  and {more} more, surest first: -o fleet.html has all")
-    _say_learnt(found.learnt)
-    for written in (page, json, legs):
-        if written is not None:
-            say_written(written)
+
+
+def _say_outside(outside: pl.DataFrame) -> None:
+    """Tell how many known masses lie outside the interval that was told, and which is the worst."""
+    if outside.is_empty():
+        return
+    known, out = int(outside["known"].sum()), int(outside["outside"].sum())
+    of = "1 known mass" if known == 1 else f"{known} known masses"
+    say(f"outside the 95 % interval: {out} of {of}; by chance one in twenty is")
+    doubted = outside.filter(outside["outside"] > 0)
+    for row in doubted.head(_TOLD).iter_rows(named=True):
+        when = "" if row["worst_start"] is None else f" {row['worst_start']:%Y-%m-%d %H:%M} UTC"
+        say(
+            f"  {row['vehicle_id']}: {row['outside']} of {row['known']}, worst{when}: known "
+            f"{row['worst_known_kg']:.0f} kg, told {row['worst_low95_kg']:.0f} to "
+            f"{row['worst_high95_kg']:.0f} kg ({100.0 * row['worst_error']:+.1f} %)"
+        )
+    more = doubted.height - _TOLD
+    if more > 0:
+        say(f"  and {more} more: -o fleet.html has all")
 
 
 def _say_learnt(learnt: pl.DataFrame) -> None:

@@ -205,7 +205,7 @@ def _files(
     """Files named, those of folders included, each with what drafts its mapping."""
     from weighbridge.errors import DriveError
     from weighbridge.io.dbc import load_dbcs
-    from weighbridge.io.formats import formats, is_log
+    from weighbridge.io.formats import format_of, formats, is_log, unreadable
 
     databases = load_dbcs(list(dbc))
 
@@ -224,6 +224,8 @@ def _files(
             raise DriveError(f"{path}: {'no plain file' if path.exists() else 'no such file'}")
         elif (draft := _draft(path, databases, names)) is None:
             _refuse_arrays(path, [path])
+            if format_of(path) is None:
+                raise DriveError(unreadable(path))
             raise DriveError(
                 f"{path}: map drafts mappings of tables ({', '.join(drafted)}), and of CAN logs "
                 "by their DBC (--dbc FILE); other logs are read as they are: weighbridge inspect "

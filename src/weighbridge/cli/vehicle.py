@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Optional
 
@@ -191,8 +192,19 @@ def _print(path: Path, vehicle: Vehicle) -> None:
         table.add_row(heading, shown(sentence))
     console().print(table)
     weighs = can_weigh(vehicle)
+    read = "".join(f" --dbc {dbc}" for dbc in _dbcs(path, vehicle))
     if weighs:
-        say(f"next: weighbridge weigh DRIVE --vehicle {path}")
+        say(f"next: weighbridge weigh DRIVE --vehicle {path}{read}")
     if not weighs or by_data_sheet(vehicle):
         lead = "better" if weighs else "next"
-        say(f"{lead}: weighbridge calibrate DRIVE --mass KG --vehicle {path} -o calibrated.toml")
+        say(
+            f"{lead}: weighbridge calibrate DRIVE --mass KG --vehicle {path}{read} "
+            "-o calibrated.toml"
+        )
+
+
+def _dbcs(path: Path, vehicle: Vehicle) -> list[str]:
+    """DBC files that the calibration was given, as a command names them from here."""
+    from weighbridge.io.dbc import seen_from
+
+    return [shlex.quote(shown(seen_from(dbc, path.parent))) for dbc in vehicle.provenance.dbc]

@@ -42,6 +42,10 @@ HIDDEN_BRAKE_STD: Final = 0.03
 another simulator had 1.7 % RMS, 3 % at worst, before their braked rows were found, and cruises
 whose few starts are all that weighs more."""
 
+TOWING: Final = 2.5
+"""A mass over the permitted one that neither an overload nor a trailer explains [-]: a truck of
+18 t draws 40 t, a van of 3.5 t as much again."""
+
 LIGHTEST: Final = 0.95
 """Least mass of an empty vehicle over its tare [-]: tank and driver's seat may be empty."""
 
@@ -285,6 +289,13 @@ def _plausible(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
             f"the estimate is {mass:.0f} kg, more than {vehicle.of_class.heaviest:g} times the "
             f"{lightest:.0f} kg of the empty {vehicle.kind}; check that the vehicle file is this "
             "vehicle's, and the unit and scale of the torque or load"
+        )
+    gross = vehicle.gross
+    if lightest is None and gross is not None and mass - 2.0 * std > TOWING * gross:
+        return Status.INCONSISTENT, (
+            f"the estimate is {mass:.0f} kg, {mass / gross:.1f} times the permitted {gross:.0f} kg "
+            f"of the {vehicle.kind}, which neither load nor a trailer explains; check that the "
+            "vehicle file is this vehicle's, and the unit and scale of the torque or load"
         )
     if vehicle.tare is None:
         return _PASSED

@@ -85,7 +85,8 @@ def page(report: FleetReport, title: str) -> str:
         f"<body><h1>{title}</h1>",
         _answer(report),
         _facts(report),
-        f'<nav aria-label="Sections">{links}<a href="#speeds">Speed and mass</a></nav>',
+        f'<nav aria-label="Sections">{links}<a href="#outside">Outside the interval</a>'
+        '<a href="#speeds">Speed and mass</a></nav>',
         "<noscript><p>Without JavaScript only the lists above and the last table are shown.</p>"
         "</noscript>",
         *(
@@ -93,6 +94,7 @@ def page(report: FleetReport, title: str) -> str:
             "</div></section>"
             for key, name, lead in _SECTIONS
         ),
+        _outside(report),
         _speeds(report),
         "<footer>Made by weighbridge from data the vehicles recorded. For screening: not a "
         "legal-for-trade weighing. Times are UTC.</footer>",
@@ -156,10 +158,40 @@ def _facts(report: FleetReport) -> str:
         ("transported", f"{_number(t['tkm'])} ± {_number(1.96 * t['tkm_std'])} t·km"),
         ("driven empty", _share(t["empty_share"])),
         ("load changes", f"{t['changes']}"),
+        ("outside the interval", f"{t['outside']} of {t['known_legs']} known masses"),
         ("legs with a trailer?", f"{t['trailer_legs']}"),
     )
     items = "".join(f"<div><dt>{k}</dt><dd>{v}</dd></div>" for k, v in facts)
     return f"<dl>{items}</dl>"
+
+
+def _outside(report: FleetReport) -> str:
+    """Table of vehicles with known masses: how many lie outside the intervals, and the worst."""
+    rows = "".join(
+        f"<tr><td>{_text(row['vehicle_id'])}</td>"
+        f"<td class=n>{row['outside']} of {row['known']}</td>"
+        + (
+            f"<td class=n>{_when(row['worst_start'])}</td>"
+            f"<td class=n>{_number(row['worst_known_kg'])}</td>"
+            f"<td class=n>{_number(row['worst_low95_kg'])} to "
+            f"{_number(row['worst_high95_kg'])}</td>"
+            f"<td class=n>{100.0 * row['worst_error']:+.1f}</td></tr>"
+            if row["outside"]
+            else f"<td class=n>{NOTHING}</td>" * 4 + "</tr>"
+        )
+        for row in report.outside.iter_rows(named=True)
+    )
+    none = "" if rows else "<p>No leg has both a known mass and an interval.</p>"
+    table = (
+        '<div class="scroll"><table><thead><tr><th>vehicle<th class=n>outside<th class=n>worst, UTC'
+        "<th class=n>known, kg<th class=n>told 95 %, kg<th class=n>error, %</tr></thead>"
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+    return (
+        '<section id="outside"><h3>Outside the interval</h3><p class="lead">Legs whose known mass '
+        "(ticket or drive.toml) lies outside the 95 % interval that was told. By chance it is one "
+        f"in twenty.</p>{none or table}</section>"
+    )
 
 
 def _speeds(report: FleetReport) -> str:

@@ -59,6 +59,46 @@ def known_masses(
     )
 
 
+def outside(known: pl.DataFrame) -> pl.DataFrame:
+    """Compare known masses with the intervals that were told.
+
+    Of intervals of 95 % one known mass in twenty lies outside by chance.
+
+    Parameters
+    ----------
+    known : as of `known_masses`
+
+    Returns
+    -------
+    polars.DataFrame
+        One row per vehicle with a leg of known mass and an interval, most outside first:
+        ``vehicle_id``, ``known`` (such legs), ``outside`` (whose known mass is not in the
+        interval), and of the one farthest from it, relative to the half interval: ``worst_start``,
+        ``worst_known_kg``, ``worst_low95_kg``, ``worst_high95_kg``, ``worst_error`` (of the mass,
+        relative); null where none is outside.
+    """
+    low, high, true = pl.col("low95_kg"), pl.col("high95_kg"), pl.col("known_kg")
+    told = known.filter(low.is_not_null() & high.is_not_null()).with_columns(
+        out=(true < low) | (true > high),
+        far=((true - pl.col("mass_kg")) / (0.5 * (high - low))).abs(),
+    )
+    worst = pl.col("start", "known_kg", "low95_kg", "high95_kg", "error")
+    return (
+        told.group_by("vehicle_id", maintain_order=True)
+        .agg(
+            pl.len().cast(pl.Int64).alias("known"),
+            pl.col("out").sum().cast(pl.Int64).alias("outside"),
+            worst.filter("out")
+            .sort_by(pl.col("far").filter("out"), descending=True)
+            .first()
+            .name.prefix("worst_"),
+            pl.col("far").max(),
+        )
+        .sort("outside", "far", "vehicle_id", descending=[True, True, False])
+        .drop("far")
+    )
+
+
 def verdicts(known: pl.DataFrame, tolerance: float = TOLERANCE) -> pl.DataFrame:
     """Judge each vehicle that has drives of known mass.
 

@@ -36,6 +36,7 @@ class FleetReport:
     totals : sums, see `weighbridge.fleet.figures.totals`
     quality : what is wrong with the data, see `weighbridge.fleet.figures.quality`
     speed_mass : distance by speed and mass, see `weighbridge.fleet.figures.speed_mass`
+    outside : known masses outside their intervals, see `weighbridge.fleet.protocol.outside`
     verdicts : of the protocol, see `weighbridge.fleet.protocol.verdicts`
     rfms : last masses, see `weighbridge.fleet.figures.rfms`
     learnt : from drives of known mass, see `weighbridge.fleet.learnt.read_learnt`
@@ -50,6 +51,7 @@ class FleetReport:
     totals: dict[str, Any]
     quality: pl.DataFrame
     speed_mass: pl.DataFrame
+    outside: pl.DataFrame
     verdicts: pl.DataFrame
     rfms: pl.DataFrame
     learnt: pl.DataFrame
@@ -71,6 +73,7 @@ class FleetReport:
             "track": _rows(self.track),
             "quality": _rows(self.quality),
             "speed_mass": _rows(self.speed_mass),
+            "outside": _rows(self.outside),
             "verdicts": _rows(self.verdicts),
             "rfms": _rows(self.rfms),
             "learnt": _rows(self.learnt),
@@ -134,6 +137,7 @@ def report(
     changes = load_changes(rows)
     vehicles = figures.per_vehicle(rows, changes)
     known = protocol.known_masses(rows, drives, told)
+    out = protocol.outside(known)
     return FleetReport(
         limits=limits,
         tolerance=tolerance,
@@ -141,9 +145,14 @@ def report(
         changes=changes,
         track=track(rows, limits),
         vehicles=vehicles,
-        totals=figures.totals(vehicles),
+        totals={
+            **figures.totals(vehicles),
+            "known_legs": int(out["known"].sum()),
+            "outside": int(out["outside"].sum()),
+        },
         quality=figures.quality(drives),
         speed_mass=figures.speed_mass(drives, segments),
+        outside=out,
         verdicts=protocol.verdicts(known, tolerance),
         rfms=figures.rfms(rows),
         learnt=read_learnt(results),

@@ -14,7 +14,7 @@ from weighbridge.io.channels import Channel, Recording, draft_of
 from weighbridge.io.columns import unit_suffix
 from weighbridge.io.dbc import Database, Found, is_readable, message_frames, physical
 from weighbridge.io.draft import Draft
-from weighbridge.io.formats import format_of
+from weighbridge.io.formats import format_of, unreadable
 from weighbridge.io.frames import Frames
 from weighbridge.io.j1939 import decode_j1939, is_j1939
 from weighbridge.io.naming import recognise_all
@@ -36,7 +36,7 @@ def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
     """
     form = format_of(path)
     if form is None:
-        raise DriveError(f"{path}: logs of kind {path.suffix!r} cannot be read")
+        raise DriveError(unreadable(path))
     if form.read is mdf.read_mdf:
         found = mdf.recording_of(path)
     else:

@@ -283,7 +283,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
     known = {c.quantity for c in channels if c.quantity}
     unnamed = [c for c in channels if not c.quantity]
     units = [stated_unit(c.unit) for c in unnamed]
-    named = recognise_all([_told(c.name) for c in unnamed], units)
+    named = recognise_all([_told(c.name) for c in unnamed], units, misfits=True)
     columns = checked(
         tuple(
             replace(draft_column(c.name, n, c.values, u), rate=_rate(c.time))

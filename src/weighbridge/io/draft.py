@@ -17,7 +17,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
 from weighbridge.io.draft_column import DraftColumn, checked
 from weighbridge.io.draft_text import text_format
-from weighbridge.io.draft_time import DraftTime, find_times
+from weighbridge.io.draft_time import DraftTime, find_times, is_number
 from weighbridge.io.naming import Named, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
@@ -151,7 +151,7 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     others = [n for k, n in enumerate(raw.names) if k != time.index]
     # Of a bare axis the name of the file says what is measured.
     told = [f"{path.stem} {n}" if words_of(n) in _AXES else n for n in others]
-    named = recognise_all(told, [units.get(n) for n in others])
+    named = recognise_all(told, [units.get(n) for n in others], misfits=True)
     columns = tuple(
         _column(raw, name, found, stated=units.get(name))
         for name, found in zip(others, named, strict=True)
@@ -261,11 +261,19 @@ def _rated(column: DraftColumn, time: Floats) -> DraftColumn:
 def _column(raw: RawTable, name: str, found: Named, *, stated: str | None) -> DraftColumn:
     if not found.quantity:
         return _nothing(name, found.misfit)
+    index = raw.names.index(name)
     try:
-        values, _ = raw.numbers(raw.names.index(name))
+        values, _ = raw.numbers(index)
     except DriveError:
-        return _nothing(name, f"not taken for {found.quantity}: its cells are no numbers")
+        cell = next((c for c in raw.column(index).drop_nulls().to_list() if not _number(c)), "")
+        return _nothing(
+            name, f"not taken for {found.quantity}: its cells are no numbers, such as {cell!r:.30}"
+        )
     return draft_column(name, found, values, stated)
+
+
+def _number(cell: object) -> bool:
+    return not str(cell).strip() or is_number(str(cell).strip())
 
 
 def _nothing(name: str, doubt: str) -> DraftColumn:

@@ -49,6 +49,11 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
     lines = [line for line in found if line]
     if not lines:
         raise DriveError(f"{path} is empty; record it again")
+    if any("\r" in line for line in lines):
+        raise DriveError(
+            f"{path}: its lines end in carriage returns alone, as of an old Macintosh; save it "
+            "again with other line ends"
+        )
     separator = _separator(lines)
     rows = [cells(line, separator) for line in lines]
     width = int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))

@@ -28,6 +28,8 @@ DATE_FORMATS: Final = (
     "%d-%b-%Y %H:%M:%S%.f",
     "%Y/%m/%d %H:%M:%S%.f",
     "%Y-%m-%d %H:%M:%S:%3f",
+    "%d.%m.%Y %H:%M:%S,%3f",
+    "%d/%m/%Y %H:%M:%S,%3f",
     "%Y-%m-%d %H-%M-%S%.f",
     "%Y-%m-%d %H-%M-%S_%3f",
     "%Y%m%d %H%M%S%.f",

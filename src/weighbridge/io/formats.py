@@ -335,6 +335,41 @@ def is_log(path: Path) -> bool:
     return any(f.ends(path.name) for f in formats())
 
 
+_SHEET: Final = "it is a spreadsheet: save its sheet as CSV"
+_PACKED: Final = "it is packed: unpack it first"
+_TRACK: Final = "export the track as GPX"
+_RACE: Final = "export it as CSV from Race Studio"
+
+_REMEDIES: Final = {
+    **dict.fromkeys((".xlsx", ".xls", ".xlsm", ".ods", ".numbers"), _SHEET),
+    **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".xz"), _PACKED),
+    **dict.fromkeys((".fit", ".tcx", ".kml", ".kmz", ".igc"), _TRACK),
+    **dict.fromkeys((".xrk", ".xrz", ".drk"), _RACE),
+    ".ld": "export it as CSV from i2",
+    ".dbc": "it is the database of a bus and no log: give it by --dbc beside the log",
+    ".toml": "it is no log: a vehicle file goes with --vehicle, a mapping with --mapping",
+    ".html": "it is a report and no log",
+    ".json": "write one row per instant as CSV, or one object per line as .jsonl",
+    ".db": "export its table as CSV",
+    ".sqlite": "export its table as CSV",
+}
+"""What helps with files that are no logs, or of formats that are not read, by suffix."""
+
+
+def unreadable(path: Path) -> str:
+    """Say of a file of no known format what helps, in a sentence.
+
+    Parameters
+    ----------
+    path : the file
+    """
+    remedy = _REMEDIES.get(path.suffix.lower(), "")
+    return (
+        f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; known are "
+        f"{', '.join(suffixes())}, and folders of tables{'; ' if remedy else ''}{remedy}"
+    )
+
+
 def format_of(path: Path) -> Format | None:
     """Format of a file, by its name and by its first bytes; None where it is not known.
 

@@ -53,7 +53,8 @@ def _looks_like_a_log(path: Path) -> bool:
             lines = head(path, HEAD_LINES)
             names = cells(lines[text.skip_rows], text.separator or ",")
         else:
-            return True
+            # An array is one of many, and which are of use the mapping says.
+            return path.suffix.lower() != ".npy"
     except (DriveError, OSError, pa.ArrowException):
         return False
     if set(names) & set(_OWN):

@@ -223,7 +223,12 @@ def _score(words: frozenset[str], phrase: frozenset[str]) -> float:
     return len(wanted) / len(said) if said and wanted <= said else 0.0
 
 
-def recognise_all(names: Sequence[str], units: Sequence[str | None] | None = None) -> list[Named]:
+def recognise_all(
+    names: Sequence[str],
+    units: Sequence[str | None] | None = None,
+    *,
+    misfits: bool = False,
+) -> list[Named]:
     """Recognise the columns of one table together.
 
     A quantity is given once, to the name that fits best. A speed without more words is that of
@@ -235,6 +240,7 @@ def recognise_all(names: Sequence[str], units: Sequence[str | None] | None = Non
     ----------
     names : of the columns
     units : suffixes of their units, where the log states them elsewhere
+    misfits : whether it is to be told of a name why its unit keeps it from being a quantity
 
     Returns
     -------
@@ -254,7 +260,7 @@ def recognise_all(names: Sequence[str], units: Sequence[str | None] | None = Non
     taken = {named.quantity for named in found}
     stated = units or [None] * len(names)
     return [
-        Named("", named.unit, named.score, _misfit(name, unit, taken))
+        Named("", named.unit, named.score, _misfit(name, unit, taken) if misfits else "")
         if not named.quantity
         else named
         if best[named.quantity] == k

@@ -19,7 +19,7 @@ from weighbridge.io.clocks import settle_clocks, shift_clock
 from weighbridge.io.dbc import Database, DbcSource, load_dbcs
 from weighbridge.io.filled_positions import true_fixes
 from weighbridge.io.format import Format, Takes
-from weighbridge.io.formats import format_of, is_log, suffixes
+from weighbridge.io.formats import format_of, is_log, suffixes, unreadable
 from weighbridge.io.frames import Frames, join_frames, settle_clock
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.info import read_info
@@ -292,10 +292,7 @@ def _format(path: Path) -> Format:
     except OSError as e:
         raise DriveError(f"{path} cannot be read: {e.strerror or e}") from None
     if found is None:
-        raise DriveError(
-            f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; "
-            f"known are {', '.join(suffixes())}, and folders of tables"
-        )
+        raise DriveError(unreadable(path))
     return found
 
 

@@ -22,6 +22,7 @@ from weighbridge.io.columns import (
 )
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, UnnamedError, lacking, resolved_unit
+from weighbridge.io.naming import recognise
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
     SEPARATORS,
@@ -30,7 +31,7 @@ from weighbridge.io.table import (
     read_text,
     time_seconds,
 )
-from weighbridge.signals import Floats, Problem
+from weighbridge.signals import QUANTITIES, Floats, Problem
 from weighbridge.signals.catalogue import TIME_COLUMN
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.parts import find_restarts
@@ -278,10 +279,20 @@ def _near(column: str, raw: RawTable) -> str:
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
+def _column_named(name: str) -> str:
+    """Canonical column that a logger's name stands for; empty where its name tells none surely."""
+    found = recognise(name)
+    if not found.quantity or found.score < 1.0:
+        return ""
+    quantity = QUANTITIES[found.quantity]
+    suffix = found.unit or quantity.suffix
+    return f"{quantity.name}_{suffix}" if suffix else quantity.name
+
+
 def _unknown_text(names: list[str]) -> str:
     parts = []
     for name in names[:6]:
-        near = near_column(name)
+        near = near_column(name) or _column_named(name)
         parts.append(f"{name!r} (did you mean {near}?)" if near else f"{name!r}")
     more = f" and {len(names) - 6} more" if len(names) > 6 else ""
     return f"not known and ignored: {', '.join(parts)}{more}"

@@ -78,13 +78,47 @@ def beside_speed(drive: Drive) -> tuple[str, ...]:
     )
 
 
+FAR_ABOVE: Final = 1.25
+"""Above so much of the permitted mass a trailer is as likely as a load, as of legs of a fleet, or
+the vehicle file another's [-]."""
+
+SMALL: Final = 4.0
+"""The usual mass of a class over that of its lightest vehicles [-]: cars of 0.4 t and trucks of
+3.7 t."""
+
+
 def overload(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
     """Say in a sentence whether a mass is above the permitted one; nothing if not."""
     gross = vehicle.gross
     if gross is None or result.status is not Status.CONVERGED or result.mass <= gross:
         return ()
     sure = "surely" if result.mass - 2.0 * result.std > gross else "perhaps"
-    return (f"{sure} above the permitted mass of {gross:.0f} kg",)
+    text = f"{sure} above the permitted mass of {gross:.0f} kg"
+    if result.mass - 2.0 * result.std <= FAR_ABOVE * gross:
+        return (text,)
+    return (
+        f"{text}, {result.mass / gross:.1f} times it: a trailer, a gross overload, or the vehicle "
+        f"file is another vehicle's; check that this was {vehicle.name}",
+    )
+
+
+def beyond_class(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
+    """Say in a sentence whether a mass is far from those of the class; nothing if not.
+
+    Where the vehicle file states tare or permitted mass, or was calibrated, those tell more.
+    """
+    known = (vehicle.tare, vehicle.gross, *vehicle.provenance.masses)
+    if any(mass is not None for mass in known) or result.status is not Status.CONVERGED:
+        return ()
+    of_class = vehicle.of_class
+    low, high = of_class.typical_mass / SMALL, of_class.typical_mass * of_class.heaviest
+    if low <= result.mass + 2.0 * result.std and result.mass - 2.0 * result.std <= high:
+        return ()
+    return (
+        f"{result.mass:.0f} kg is far from the usual masses of the class {of_class.name}, "
+        f"{low:.0f} to {high:.0f} kg: the vehicle file is another vehicle's, or of the "
+        "wrong class; state tare_kg and gross_kg under [vehicle], so that it can be checked",
+    )
 
 
 def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:

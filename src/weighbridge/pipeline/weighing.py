@@ -45,6 +45,7 @@ from weighbridge.pipeline.given import (
 from weighbridge.pipeline.notes import (
     below_tare,
     beside_speed,
+    beyond_class,
     fitted_for_another,
     lighter_than_known,
     no_speed,
@@ -261,6 +262,7 @@ def weigh_balance(
         warnings=(
             *warnings,
             *overload(vehicle, result),
+            *beyond_class(vehicle, result),
             *below_tare(vehicle, result),
             *lighter_than_known(vehicle, result),
         ),

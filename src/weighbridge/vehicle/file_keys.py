@@ -317,6 +317,9 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "mass_scale_std",
                 "part of any mass weighed with this file, as standard deviation",
             ),
+            Key(
+                "dbc", "dbc", "DBC files they were read with, seen from this file's folder", "texts"
+            ),
             Key("notes", "notes", "free text", "text"),
             Key("doubts", "doubts", "of its masses, told at each weighing", "texts"),
             Key(

@@ -32,6 +32,7 @@ class Provenance:
     fit_cov : covariance of what was fitted, once the scale of every mass is known: lower
         triangle, row by row, of torque coefficients, curvature, slopes at the knots, drag area,
         rolling coefficient, engine and wheel inertia; empty where it is not known
+    dbc : DBC files that the drives were read with and no mapping names, seen from the file's folder
     notes : free text
     doubts : of the masses of the calibration, told at each weighing
     """
@@ -47,6 +48,7 @@ class Provenance:
     unmeasured_grade: float | None = None
     mass_scale_std: float | None = None
     fit_cov: tuple[float, ...] = ()
+    dbc: tuple[str, ...] = ()
     notes: str | None = None
     doubts: tuple[str, ...] = ()
 

@@ -1,0 +1,59 @@
+"""A mass far from what its vehicle file allows is told: the file may be another vehicle's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.checks.vehicle import check_vehicle
+from weighbridge.signals import Signal
+from weighbridge.vehicle.known import Known, describe
+
+
+@pytest.fixture(scope="module")
+def weighed(short_drive, short_car):
+    """Weigh the drive by its file, changed, without the masses that the calibration knew."""
+
+    def weigh(**changes):
+        blank = replace(short_car.provenance, masses=())
+        return wb.weigh(short_drive.drive, replace(short_car, provenance=blank, **changes))
+
+    return weigh
+
+
+def test_far_above_the_permitted_mass_another_vehicle_is_thought_of(weighed):
+    mass = weighed().mass
+    near = " ".join(weighed(gross=mass / 1.15).warnings)
+    assert "surely above the permitted mass" in near
+    assert "another vehicle's" not in near
+    far = " ".join(weighed(gross=mass / 1.5).warnings)
+    assert f"surely above the permitted mass of {mass / 1.5:.0f} kg, 1.5 times it" in far
+    assert "or the vehicle file is another vehicle's" in far
+
+
+def test_beyond_what_a_trailer_explains_there_is_no_mass(weighed):
+    found = weighed(gross=weighed().mass / 3.0)
+    assert found.status is wb.Status.INCONSISTENT
+    assert "3.0 times the permitted" in found.reason
+    assert "check that the vehicle file is this vehicle's" in found.reason
+
+
+def test_a_mass_of_no_such_class_is_told(weighed, short_drive, short_car):
+    assert not any("usual masses" in text for text in weighed().warnings)
+    told = " ".join(weighed(kind="truck").warnings)
+    assert "far from the usual masses of the class truck, 3750 to 120000 kg" in told
+    known = wb.weigh(short_drive.drive, replace(short_car, kind="truck")).warnings
+    assert not any("usual masses" in text for text in known)
+
+
+@pytest.mark.parametrize(("told", "known"), [(2500.0, 1), (401.0, 0)])
+def test_another_reference_torque_than_that_of_the_file_is_told(short_drive, told, known):
+    time = short_drive.drive.signals["vehicle_speed"].time
+    drive = short_drive.drive.with_signals(
+        Signal("reference_torque", time, np.full(time.size, told))
+    )
+    van = describe(Known(kind="van", torque="percent", reference_torque=400.0)).vehicle
+    found = [p for p in check_vehicle(drive, van) if p.signal == "reference_torque"]
+    assert len(found) == known
+    assert all("the vehicle file is another vehicle's" in p.text for p in found)
