@@ -47,7 +47,8 @@ def reproduce(
 ) -> None:
     """Reproduce a published system on simulated drives; exits with 1 where we fall behind.
 
-    A figure that was made under other conditions than the paper's is marked so.
+    A figure that was made under other conditions than the paper's is marked so. A sentence of a
+    paper that our drives do not bear out is "not found", and counts as behind.
 
     Example: weighbridge reproduce jensen2022 --report jensen2022.html
     """
