@@ -49,6 +49,16 @@ def test_other_conditions_are_told_beside_the_figures():
     assert made(good=False, like=False).behind == ("RMSE of all (other conditions)",)
 
 
+def test_a_sentence_of_the_paper_is_found_or_not():
+    for so, verdict, behind in (
+        (True, "", ()),
+        (False, "not found", ("brakings (not found)",)),
+    ):
+        row = reproduced.Comparison("brakings", "fluctuate", "do not", so, claim=True)
+        assert row.verdict == verdict
+        assert replace(made(good=True), comparisons=(row,)).behind == behind
+
+
 def test_a_page_begins_with_the_papers_figures(tmp_path):
     asked = []
     done = replace(made(good=False), write_page=lambda tables, path: asked.append((tables, path)))
@@ -67,13 +77,16 @@ def test_jensens_page_begins_so_too(tmp_path, monkeypatch):
     )
     monkeypatch.setattr(jensen2022, "reproduce", lambda **_: nothing)
     monkeypatch.setattr(jensen2022, "drives_table", lambda _: made(True).tables[0])
+    monkeypatch.setattr(
+        jensen2022, "parameters_table", lambda _: Table("Table 6", ("parameter",), ())
+    )
     monkeypatch.setattr(jensen2022, "comparisons", lambda _: made(True).comparisons)
     monkeypatch.setattr(jensen2022, "figures", lambda _: {})
     monkeypatch.setattr("weighbridge.papers.jensen2022_figures.panels", lambda _: ())
     monkeypatch.setattr("weighbridge.report.write_report", lambda *_, **k: given.update(k))
     done = jensen2022.reproduced(5, None)
     done.write_report(tmp_path / "page.html")
-    assert [t.columns[0] for t in given["tables"]] == ["figure", "drive"]
+    assert [t.columns[0] for t in given["tables"]] == ["figure", "drive", "parameter"]
     assert "seeds 5 to 6, not held out" in done.title
 
 

@@ -9,7 +9,9 @@ from weighbridge.estimators.hybrid import Blend
 from weighbridge.estimators.settings import changed, parsed
 from weighbridge.papers import du2025
 from weighbridge.papers.claims import NOT_REPRODUCED
+from weighbridge.papers.du2025_claims import CLAIMS
 from weighbridge.papers.du2025_methods import BAND, METHODS, PAPER_RMSE, PRINTED_ROLLING
+from weighbridge.papers.du2025_told import swing, told
 from weighbridge.papers.reproduced import Reproduced
 
 SEED = 3
@@ -97,8 +99,84 @@ def test_a_braking_moves_the_least_squares_and_not_the_kalman_filter(judged):
     for at in (115.0, 147.0):
         mass = track.running_mass[(track.time >= start + at) & (track.time <= start + at + 20.0)]
         expected = max(expected, np.ptp(np.append(mass, mass[0])) / mass[0])
-    assert 0.4 * expected < du2025.swing(track, made) <= expected
-    assert judged.printed_swing["robust-rls"] > 3.0 * judged.printed_swing["ekf"]
+    assert 0.4 * expected < swing(track, made) <= expected
+    printed = judged.printed_told["f of the tyres"]
+    assert printed["robust-rls"].swing > 3.0 * printed["ekf"].swing
+
+
+def test_what_a_running_mass_does_is_told_from_its_rows(judged):
+    track, mass = judged.tracks["robust-rls"], judged.true_mass
+    found = told(track, du2025.simulate(3000.0, SEED, as_paper=True), mass)
+    since = track.time - track.time[0]
+    error = np.abs(track.running_mass - mass)
+    known = np.isfinite(error)
+    slow = track.balance.table.speed < 40.0 / 3.6
+    assert found.first == pytest.approx(error[known][0] / mass)
+    assert found.slow**2 == pytest.approx(np.mean(error[known & slow] ** 2))
+    every = found.slow**2 * np.sum(known & slow) + found.fast**2 * np.sum(known & ~slow)
+    assert every == pytest.approx(np.sum(error[known] ** 2))
+    assert found.early == pytest.approx(np.mean(error[(since >= 21.0) & (since < 61.0)]), rel=0.01)
+    assert found.late == pytest.approx(np.mean(error[since > since[-1] - 40.0]), rel=0.01)
+    assert found.wander == pytest.approx(np.std(track.running_mass[since >= 21.0]), rel=0.01)
+
+
+def claimed(judged, **other):
+    """Say what the claims become of drives whose printed runs told something else."""
+    drives = tuple(replace(judged, load=load, **other) for load in du2025.LOADS)
+    made = du2025.Reproduction(drives=drives, road=(), sheet=(), vehicle=du2025.known_bus())
+    return {c.code: c.judge(made, "f = 0.0005") for c in CLAIMS}
+
+
+def test_each_sentence_of_the_text_is_judged_by_the_printed_runs(judged):
+    form = "f = 0.0005"
+
+    def runs(**by_method):
+        usual = judged.printed_told[form]
+        return {form: {m: replace(usual[m], **by_method[m.replace("-", "_")]) for m in METHODS}}
+
+    least = {
+        "first": 0.9, "steady_at": 20.0, "swing": 0.05, "slow": 50.0, "fast": 200.0,
+        "early": 60.0, "late": 90.0, "wander": 40.0,
+    }  # fmt: skip
+    kalman = {
+        "first": 0.2, "steady_at": 9.0, "swing": 0.001, "slow": 80.0, "fast": 100.0,
+        "early": 50.0, "late": 40.0, "wander": 10.0,
+    }  # fmt: skip
+    masses = dict(zip(METHODS, (300.0, 200.0, 100.0), strict=True))
+    worst = dict.fromkeys(METHODS, 0.05)
+    like = {"printed": {form: masses}, "printed_worst": {form: worst}}
+    as_told = claimed(
+        judged, printed_told=runs(robust_rls=least, ekf=kalman, hybrid=kalman), **like
+    )
+    assert {code for code, (_, so) in as_told.items() if not so} == {"twice"}
+    assert as_told["blend_half_load"][0] == "100 of 300 and 200 kg: better than both"
+    assert as_told["sooner"][0] == "9 s; least squares 20 s"
+    # The other way round no sentence holds but those of one method or of the loads alone.
+    masses = dict(zip(METHODS, (200.0, 300.0, 250.0), strict=True))
+    worst = {form: dict.fromkeys(METHODS, 0.2)}
+    turned = claimed(
+        judged, printed={form: masses}, printed_worst=worst,
+        printed_told=runs(robust_rls=kalman | {"late": 40.0}, ekf=least, hybrid=kalman),
+    )  # fmt: skip
+    assert {code for code, (_, so) in turned.items() if so} == {"first", "steady", "loads"}
+    assert turned["blend_no_load"][0] == "250 of 200 and 300 kg: between them"
+    never = claimed(
+        judged, printed_told=runs(robust_rls=least | {"steady_at": 1e3}, ekf=kalman, hybrid=kalman)
+    )
+    assert never["steady"] == ("never", False)
+    assert never["sooner"] == ("9 s; least squares never", True)
+
+
+def test_a_sentence_that_no_run_bears_out_is_not_found(judged):
+    rows = {c.figure: c for c in du2025.comparisons(du2025.Reproduction(
+        drives=tuple(replace(judged, load=load) for load in du2025.LOADS),
+        road=tuple(replace(judged, load=load) for load in du2025.LOADS),
+        sheet=(), vehicle=du2025.known_bus(),
+    ))}  # fmt: skip
+    for form, words in (("f = 0.0005", "not found"), ("f of the tyres", None)):
+        row = rows[f"sec. 4.3, RMSE of the hybrid, half-load, as printed, {form}"]
+        assert row.theirs == "101 of 589 and 389 kg: better than both"
+        assert row.verdict == (words or "not found, other conditions")
 
 
 def test_every_equation_table_and_figure_has_its_item():

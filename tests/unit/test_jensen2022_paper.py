@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ from weighbridge.papers.jensen2022_drives import (
 from weighbridge.papers.jensen2022_gradient import gradient_road, gradient_scenario
 from weighbridge.papers.jensen2022_judged import joined, torques
 from weighbridge.papers.jensen2022_printed import calibrate_as_printed, pulling
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.papers.jensen2022_tables import parameters_table, passes, weights
+from weighbridge.simulation import MIDSIZE, make_scenario, simulate_car
 
 
 @pytest.fixture(scope="module")
@@ -143,6 +145,60 @@ def test_what_the_paper_varies_is_a_setting():
         replace(made, forgettings=(0.5, 0.9995, 0.9999))
 
 
+def test_table_6_has_the_truth_and_our_fit_beside_the_printed_ones(car):
+    found = car.vehicle
+    ours = replace(found, road_load=replace(found.road_load, drag_area=0.5))
+    told = np.array([10.0, 50.0, 90.0])
+    done = SimpleNamespace(
+        printed_car=car,
+        car=ours,
+        calibration=SimpleNamespace(
+            rows=SimpleNamespace(motion_torque=told, source_torque=told + 2.0)
+        ),
+    )
+    table = parameters_table(done)
+    rows = {row[0]: row[1:] for row in table.rows}
+    assert table.columns[1:] == ("paper's car", "paper's rules", "ours", "truly, simulated car")
+    printed = found.road.drag_area.value
+    assert rows["C_d A m²"] == ("0.70", f"{printed:.3f}", "0.500", f"{MIDSIZE.drag_area:.3f}")
+    assert rows["I_w kg m²"][-1] == f"{MIDSIZE.wheel_inertia:.1f}"
+    # Load in percent: a hundredth of the torque at full load.
+    assert float(rows["w1 N m/%"][1]) == pytest.approx(found.torque.coefficients[1] / 100.0, 0.01)
+    rpm = math.pi / 30.0
+    assert float(rows["w2 N m/rpm"][1]) == pytest.approx(found.torque.coefficients[2] * rpm, 0.01)
+    # 2 N m off each, of torques that scatter by 40 N m to both sides.
+    assert rows["R², each row counted once"][2] == f"{1.0 - 12.0 / 3200.0:.3f}"
+    told_weights = weights(car.vehicle).split(", ")
+    assert told_weights[1].endswith(" N m/%")
+    assert float(told_weights[1].split()[0]) == float(rows["w1 N m/%"][1])
+    units = [i for i in jensen2022.ITEMS if i.paper_item.startswith("table 6, C_d A")]
+    assert len(units) == 2
+    assert all("truly {road_true}" in i.ours for i in units)
+
+
+def test_the_motorway_is_told_by_direction():
+    def drive(running, speed, north):
+        table = SimpleNamespace(
+            speed=np.array(speed), direction=(np.array(north), np.zeros(len(north)))
+        )
+        return SimpleNamespace(
+            balance=SimpleNamespace(table=table),
+            track=SimpleNamespace(running_mass=np.array(running)),
+            true_mass=1000.0,
+        )
+
+    both = drive(
+        [np.nan, 900.0, 980.0, 1020.0, 1040.0, 1500.0],
+        [30.0, 30.0, 30.0, 30.0, 30.0, 20.0],
+        [-1.0, -0.9, -0.8, 0.9, 1.0, 1.0],
+    )
+    # Nothing is known in the first row, and the last one is no motorway.
+    assert passes([both]) == "southward -6.0, northward +3.0 %"
+    assert passes([both, drive([1100.0], [30.0], [-1.0])]).startswith("southward -0.7, ")
+    assert passes([drive([1000.0], [30.0], [-1.0])]) == "not driven"
+    assert passes([]) == "not driven"
+
+
 @pytest.mark.slow
 def test_a_reproduction_has_every_figure_and_its_page(tmp_path):
     rows = tuple(r for r in TABLE_B1 if r.number in (4, 7))
@@ -153,6 +209,11 @@ def test_a_reproduction_has_every_figure_and_its_page(tmp_path):
     assert len(done.gradient) == 3
     assert all(0.0 < r.largest[1] < math.radians(1.5) for r in done.gradient)
     assert "no choice of the weighing was made on" in made.title
+    hills = [made.figures[f"hills_{way}"] for way in ("printed", "ours")]
+    assert all(h.startswith("-") and " to +" in h and h.endswith("°") for h in hills)
+    assert all(f"{n} m/s: " in made.figures["wind_ours"] for n in (3, 6, 9))
+    assert made.figures["drag_printed"].startswith("0.85 times: ")
+    assert "0 m/s: ± " in made.figures["calm_printed"]
     by_print, ours = done.printed[1], done.drives[1]
     assert 0.003 < by_print.pitch_largest < math.radians(3.0)
     assert ours.pitch_largest < by_print.pitch_largest

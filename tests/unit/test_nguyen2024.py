@@ -34,6 +34,38 @@ def test_filter_as_printed_stays_where_it_began(done):
         np.testing.assert_allclose(r.settled[:, 0], [7.0, 7.0, 6.001], atol=1e-9)
 
 
+def test_the_row_as_printed_has_q_and_r_as_printed():
+    case = paper.Settings().of(paper.AS_IN_PRINT)
+    assert (case.method, case.settings.process_densities) == ("printed", (1.0,) * 6)
+    assert case.settings.noise_densities == (5e-5, 5e-4, 5e-4)
+    assert "Q and R" in case.name
+    rows = [i for i in paper.ITEMS if i.paper_item.endswith(", as printed")]
+    assert len(rows) == 5
+    assert all(i.as_printed and i.where.endswith("`printed`") for i in rows)
+
+
+def test_every_filter_is_told_with_its_velocities_and_one_criterion(done, monkeypatch):
+    results, _ = done
+    monkeypatch.setattr(paper, "reproduce", lambda **_: done)
+    made = paper.reproduced(5, None)
+    told = {c.figure: c for c in made.comparisons}
+    for case in (paper.AS_IN_PRINT, paper.PRINTED_NOISE, paper.EXTENDED):
+        runs = results[case.name]
+        rmse = np.median([r.velocity_rmse for r in runs], axis=0)
+        row = told[f"RMSE of the velocities, {case.name}, median road"]
+        assert row.ours == " / ".join(f"{v:.5f}" for v in rmse)
+        assert row.verdict == ("" if np.all(rmse <= paper.PAPER_VELOCITY_RMSE) else "behind")
+        assert f"MAPE of the velocities, {case.name}, median road" in told
+        late = np.array([r.near[1:] for r in runs])
+        row = told[f"time after a change until within 10 % for good, {case.name}, median"]
+        assert row.ours == f"{np.median(late):.2f} s, {late.max():.2f} s at worst"
+    # One criterion for all: within 10 % for good, as print has it.
+    assert not any("5 %" in name for name in told)
+    near = [i.ours for i in paper.ITEMS if "within 10 %" in i.paper_item]
+    assert len(near) == len(paper.FOLLOWED)
+    assert made.figures["near ours"].endswith("12 later than 0.5 s")
+
+
 def test_q_and_r_as_printed_cannot_follow_tonnes(done):
     results, _ = done
     for r in results[paper.PRINTED_NOISE.name]:

@@ -52,7 +52,8 @@ def reproduce(
 ) -> None:
     """Reproduce a published system on simulated drives; exit status 1 if our result is worse.
 
-    Figures that were made under other conditions than the paper's are marked.
+    Figures that were made under other conditions than the paper's are marked. A sentence of a paper
+    that our drives do not confirm is "not found", and counts as behind.
 
     Example: weighbridge reproduce jensen2022 --report jensen2022.html
     """

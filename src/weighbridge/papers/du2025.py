@@ -21,10 +21,10 @@ from weighbridge.estimators import MassTrack
 from weighbridge.estimators.hybrid import Blend
 from weighbridge.papers.claims import tables as item_tables
 from weighbridge.papers.du2025_bus import LOADS, data_sheet, known_bus, simulate
+from weighbridge.papers.du2025_claims import CLAIMS, work
 from weighbridge.papers.du2025_compared import comparisons
 from weighbridge.papers.du2025_items import ITEMS
 from weighbridge.papers.du2025_methods import (
-    BAND,
     METHODS,
     PAPER_RMSE,
     PAPER_TIME,
@@ -34,6 +34,8 @@ from weighbridge.papers.du2025_methods import (
 )
 from weighbridge.papers.du2025_panels import panels
 from weighbridge.papers.du2025_results import DriveResult, Reproduction, cell
+from weighbridge.papers.du2025_told import CONVERGED as CONVERGED
+from weighbridge.papers.du2025_told import rms, steady_from, told
 from weighbridge.papers.reproduced import Progress, Reproduced
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
@@ -45,12 +47,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from weighbridge.simulation import SimulatedDrive
-
-CONVERGED: Final = 21.0
-"""From when the paper's least squares count as converged [s] (sec. 4.2)."""
-
-AFTER: Final = 20.0
-"""After a braking in the cruise its effect on the mass is looked at for so long [s]."""
 
 SEED: Final = 171_000
 """Of the drives that are judged; none of them was seen when anything was chosen."""
@@ -164,30 +160,7 @@ def _run_as_printed(
         done.printed_unit_start[form] = {
             m: rms(late_error(kilogram[m](balance, vehicle))) for m in METHODS[1:]
         }
-        if rolling is None:
-            steady = {m: steady_from(track, mass, start) for m, track in found.items()}
-            done.printed_steady_at.update(steady)
-            swings = {m: swing(track, made) for m, track in found.items()}
-            done.printed_swing.update(swings)
-
-
-def steady_from(track: MassTrack, mass: float, start: float) -> float:
-    """Time since the start from when on a running mass stays within `BAND` of the true one [s]."""
-    outside = ~(np.abs(track.running_mass / mass - 1.0) <= BAND)
-    last = np.flatnonzero(outside)
-    return float(track.time[last[-1]] - start) if last.size else 0.0
-
-
-def swing(track: MassTrack, made: SimulatedDrive) -> float:
-    """Farthest that a running mass moves within `AFTER` of a braking in the cruise [-]."""
-    moved = 0.0
-    for braking in made.scenario.brakings:
-        begin = made.drive.start + braking.time
-        within = (track.time >= begin) & (track.time <= begin + AFTER)
-        if braking.time > CONVERGED and within.any():
-            mass = track.running_mass[within]
-            moved = max(moved, float(np.max(np.abs(mass / mass[0] - 1.0))))
-    return moved
+        done.printed_told[form] = {m: told(track, made, mass) for m, track in found.items()}
 
 
 def reproduce(
@@ -303,17 +276,14 @@ def figures(done: Reproduction) -> dict[str, str]:
         found[f"{name}_largest"] = f"{100.0 * max(max(d.worst.values()) for d in drives):.1f} %"
     for key, form in zip(("printed", "tenfold", "tyres"), PRINTED_ROLLING, strict=True):
         largest = max(max(d.printed_worst[form].values()) for d in done.drives)
-        found[f"{key}_largest"] = f"{100.0 * largest:.1f} %"
+        found[f"{key}_largest_of_all"] = f"{100.0 * largest:.1f} %"
         units = [
             cell(done.drives, load, "ekf", "printed_unit_start", form).mean() for load in LOADS
         ]
         found[f"{key}_unit_start"] = " / ".join(f"{x:.0f}" for x in units) + " kg"
-    for m in METHODS[:2]:
-        name = m.replace("-", "_")
-        steady = [d.printed_steady_at[m] for d in done.drives]
-        found[f"steady_{name}"] = f"{np.mean(steady):.0f} s, at the latest {np.max(steady):.0f} s"
-        moved = 100.0 * np.array([d.printed_swing[m] for d in done.drives])
-        found[f"swing_{name}"] = f"{moved.mean():.1f} %, {moved.max():.1f} % at most"
+        for each in CLAIMS:
+            found[f"{key}_{each.code}"] = each.judge(done, form)[0]
+    found["work"] = work(done.drives)[0]
     return found
 
 
@@ -432,8 +402,3 @@ def _vehicle_table(done: Reproduction) -> Table:
              f"{car.road.rolling_coefficient.value:.4f}"),
         ),
     )  # fmt: skip
-
-
-def rms(values: Floats) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")

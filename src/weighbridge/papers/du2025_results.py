@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from weighbridge.estimators import MassTrack
+from weighbridge.papers.du2025_told import Told
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 
@@ -35,9 +36,7 @@ class DriveResult:
     printed_mean : mean error of the running mass of the same [kg]
     printed_worst : largest relative error of the running mass of the same from `CONVERGED` [-]
     printed_unit_start : ``printed`` with a first variance of the mass of 1 kg², P0 = I
-    printed_steady_at : ``steady_at`` of each method as printed, told the tyres' rolling resistance
-    printed_swing : farthest that the running mass of the same moves after a braking in the cruise
-        [-]
+    printed_told : what the running mass of the same does, method by method
     """
 
     load: str
@@ -56,8 +55,7 @@ class DriveResult:
     printed_mean: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_worst: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_unit_start: dict[str, dict[str, float]] = field(default_factory=dict)
-    printed_steady_at: dict[str, float] = field(default_factory=dict)
-    printed_swing: dict[str, float] = field(default_factory=dict)
+    printed_told: dict[str, dict[str, Told]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,12 @@ from typing import TYPE_CHECKING, Final
 from weighbridge.papers.jensen2022_drives import TABLE_B1, scenario
 from weighbridge.papers.jensen2022_items import ITEMS
 from weighbridge.papers.jensen2022_reproduction import SEED, Reproduction, Settings, reproduce
-from weighbridge.papers.jensen2022_tables import comparisons, drives_table, figures
+from weighbridge.papers.jensen2022_tables import (
+    comparisons,
+    drives_table,
+    figures,
+    parameters_table,
+)
 from weighbridge.papers.reproduced import Progress, Reproduced
 
 if TYPE_CHECKING:
@@ -69,7 +74,7 @@ def as_reproduced(done: Reproduction) -> Reproduced:
     apart = "which no choice of the weighing was made on" if done.seed >= SEED else "not held out"
     return Reproduced(
         title=f"Jensen et al. 2022, {seeds}, {apart}",
-        tables=(drives_table(done),),
+        tables=(drives_table(done), parameters_table(done)),
         comparisons=comparisons(done),
         write_page=write,
         figures=figures(done),

@@ -23,10 +23,14 @@ from weighbridge.report.table import Table
 from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si, scalar_from_si, scalar_to_si
+from weighbridge.simulation import MIDSIZE
 from weighbridge.vehicle.model import Vehicle
 
 PAPER_R_SQUARED: Final = 0.972
 """Of the torque fit (Table 6)."""
+
+WEIGHT_UNITS: Final = ("N m", "N m/%", "N m/rpm", "N m/rpm²", "N m/rpm³", "N m/rpm⁴")
+"""Of the coefficients of eq. 49: load in percent, engine speed in rpm."""
 
 PERTURBED_DRIVE: Final = 7
 """Drive of figs. 17-19: the captions say 6 with 240 kg, which by Table B.1 is 7."""
@@ -118,12 +122,15 @@ def figures(done: Reproduction) -> dict[str, str]:
         "gears_ours": _gears(done.car),
         "speed_peaks": _peaks(done),
         "hills_printed": _hills(done.printed),
+        "hills_ours": _hills(done.drives),
         "r2_printed": f"{done.printed_car.r_squared:.3f}",
         "r2_ours": f"{unweighted(done.calibration):.3f}",
         "r2_weighted": f"{done.calibration.rows.r_squared:.3f}",
         "road_printed": _road(done.printed_car.vehicle),
         "road_ours": _road(done.car),
-        "weights_printed": _weights(done.printed_car.vehicle),
+        "road_true": _road_values(_truth()),
+        "weights_printed": weights(done.printed_car.vehicle),
+        "weights_ours": weights(done.car),
         "pitch_printed": pitch(done.printed),
         "pitch_ours": pitch(done.drives),
         "slope_printed": slope(done.printed),
@@ -154,6 +161,8 @@ def figures(done: Reproduction) -> dict[str, str]:
             found[f"{name}_{way}"] = _day([d for d in drives if d.drive.number in numbers])
     for way, drives in (("printed", done.printed), ("ours", done.drives)):
         found[f"loads_{way}"] = _loads(drives)
+        for name, numbers in (("load", (4, 5, 6, 7, 8)), ("window", (14, 15, 16, 17, 18))):
+            found[f"passes_{name}_{way}"] = passes([d for d in drives if d.drive.number in numbers])
     for way, drives, car, rls in ways(done):
         found |= {f"{k}_{way}": v for k, v in _memory(done, drives, car, rls).items()}
         found |= {f"{k}_{way}": v for k, v in _perturbed(done, drives, car, rls).items()}
@@ -237,23 +246,23 @@ def _perturbed(
     """How far each perturbation moves the running mass after the first third, at most."""
     found = {}
     for kind, cases in perturbations(done, drives, car, rls).items():
-        neutral = cases[0.0 if kind == "wind" else 1.0]
+        neutral, unit = (cases[0.0], " m/s") if kind == "wind" else (cases[1.0], " times")
         part = slice(neutral.size // 3, None)
         moved = [
-            f"{value:g}: {100.0 * _furthest(mass[part] / neutral[part] - 1.0):+.1f} %"
+            f"{value:g}{unit}: {100.0 * _furthest(mass[part] / neutral[part] - 1.0):+.1f} %"
             for value, mass in cases.items()
             if mass is not neutral
         ]
         found[kind] = ", ".join(moved)
         if kind == "wind":
             found["calm"] = ", ".join(
-                f"{value:g}: ± {np.std(mass[part]):.0f} kg" for value, mass in cases.items()
+                f"{value:g}{unit}: ± {np.std(mass[part]):.0f} kg" for value, mass in cases.items()
             )
     return found
 
 
 def _highway(done: Reproduction, way: str, car: Vehicle, rls: RlsSettings) -> dict[str, str]:
-    """Range of the running mass on the highway in high and low wind."""
+    """Running mass on the highway in high and low wind: range, and mean error by direction."""
     found = {}
     for wind in ("high", "low"):
         trips = highways(done, way, wind)
@@ -261,9 +270,14 @@ def _highway(done: Reproduction, way: str, car: Vehicle, rls: RlsSettings) -> di
             continue
         masses = run_in_turn([h.balance for h in trips], car, rls)
         errors = np.concatenate([m / h.true_mass for m, h in zip(masses, trips, strict=True)])
+        north = np.concatenate([h.balance.table.direction[0] for h in trips])
         table = trips[0].balance.table
-        late = errors[int(np.searchsorted(table.time - table.time[0], SETTLED)) :] - 1.0
-        found[wind] = f"{100.0 * late.min():+.1f} to {100.0 * late.max():+.1f} %"
+        late = slice(int(np.searchsorted(table.time - table.time[0], SETTLED)), None)
+        errors, north = 100.0 * (errors[late] - 1.0), north[late]
+        found[wind] = (
+            f"{errors.min():+.1f} to {errors.max():+.1f} %; mean northward "
+            f"{errors[north > 0.5].mean():+.1f}, southward {errors[north < -0.5].mean():+.1f} %"
+        )
     return found
 
 
@@ -276,6 +290,22 @@ def _day(drives: Sequence[DriveResult]) -> str:
         f"{within(drives)} of {len(drives)} within; worst {percent(max(d.worst for d in drives))}; "
         f"means {means} %"
     )
+
+
+def passes(drives: Sequence[DriveResult]) -> str:
+    """Mean error of the running mass on the motorway, southward and northward."""
+    south, north = [np.empty(0)], [np.empty(0)]
+    for d in drives:
+        table = d.balance.table
+        off = 100.0 * (d.track.running_mass / d.true_mass - 1.0)
+        fast = (table.speed > HIGHWAY_SPEED) & np.isfinite(off)
+        along, _ = table.direction
+        south.append(off[fast & (along < -0.5)])
+        north.append(off[fast & (along > 0.5)])
+    there, back = np.concatenate(south), np.concatenate(north)
+    if not (there.size and back.size):
+        return "not driven"
+    return f"southward {there.mean():+.1f}, northward {back.mean():+.1f} %"
 
 
 def _loads(drives: Sequence[DriveResult]) -> str:
@@ -307,7 +337,8 @@ def _hills(drives: Sequence[DriveResult]) -> str:
 
 def _gears(car: Vehicle) -> str:
     """Gearings in turns per minute over metres per second, as in table 4."""
-    return ", ".join(f"{scalar_from_si(g, 'rpm'):.1f}" for g in car.driveline.gearings)
+    gears = ", ".join(f"{scalar_from_si(g, 'rpm'):.1f}" for g in car.driveline.gearings)
+    return f"{gears} rpm s/m"
 
 
 def _inside(drives: Sequence[DriveResult]) -> str:
@@ -338,19 +369,75 @@ def _highest(done: Reproduction, name: str) -> str:
 
 def _road(car: Vehicle) -> str:
     """C_d A, C_r, I_e and I_w of a vehicle."""
+    return _road_values(_fitted(car))
+
+
+def _road_values(values: tuple[float, float, float, float]) -> str:
+    drag, rolling, engine, wheels = values
+    return f"{drag:.2f} m², {rolling:.4f}, {engine:.2f} kg m², {wheels:.1f} kg m²"
+
+
+def _fitted(car: Vehicle) -> tuple[float, float, float, float]:
     road, line = car.road, car.driveline
     return (
-        f"{road.drag_area.value:.2f} m², {road.rolling_coefficient.value:.4f}, "
-        f"{line.engine_inertia or 0.0:.2f} kg m², {line.wheel_inertia or 0.0:.1f} kg m²"
+        road.drag_area.value,
+        road.rolling_coefficient.value,
+        line.engine_inertia or 0.0,
+        line.wheel_inertia or 0.0,
     )
 
 
-def _weights(car: Vehicle) -> str:
-    """w0 to w3 of eq. 49 in the paper's units: load in percent, engine speed in rpm."""
+def _truth() -> tuple[float, float, float, float]:
+    """C_d A, C_r, I_e and I_w of the simulated car."""
+    car = MIDSIZE
+    return car.drag_area, car.rolling_coefficient, car.engine_inertia, car.wheel_inertia
+
+
+def parameters_table(done: Reproduction) -> Table:
+    """Table 6: the paper's car, both fits to the simulated one, and what that one truly has."""
+    found = [
+        [f"{w:.3g}" for w in _in_papers_units(car)] for car in (done.printed_car.vehicle, done.car)
+    ]
+    fits = (_fitted(done.printed_car.vehicle), _fitted(done.car), _truth())
+    rows = [
+        (name, theirs, *(f"{fit[k]:{form}}" for fit in fits))
+        for k, (name, theirs, form) in enumerate(
+            (
+                ("C_d A m²", "0.70", ".3f"),
+                ("C_r", "0.008", ".4f"),
+                ("I_e kg m²", "0.14", ".3f"),
+                ("I_w kg m²", "7.0", ".1f"),
+            )
+        )
+    ]
+    rows += [
+        (f"w{k} {unit}", theirs, found[0][k], found[1][k], "")
+        for k, (unit, theirs) in enumerate(
+            zip(WEIGHT_UNITS, ("-17.85", "9.64", "2.5e-3", "-1.44e-6"), strict=False)
+        )
+        if all(k < len(each) for each in found)
+    ]
+    rows.append(
+        ("R², each row counted once", f"{PAPER_R_SQUARED}", f"{done.printed_car.r_squared:.3f}",
+         f"{unweighted(done.calibration):.3f}", "")
+    )  # fmt: skip
+    return Table(
+        "Table 6: the paper's is another car; the simulated one has no torque of this form",
+        ("parameter", "paper's car", "paper's rules", "ours", "truly, simulated car"),
+        tuple(rows),
+    )
+
+
+def _in_papers_units(car: Vehicle) -> list[float]:
     rpm = scalar_to_si(1.0, "rpm")
     scales = (1.0, 0.01, *(rpm**k for k in range(1, 5)))
-    found = [w * s for w, s in zip(car.torque.coefficients, scales, strict=False)]
-    return ", ".join(f"{w:.3g}" for w in found)
+    return [w * s for w, s in zip(car.torque.coefficients, scales, strict=False)]
+
+
+def weights(car: Vehicle) -> str:
+    """w0 to w3 of eq. 49 in the paper's units: load in percent, engine speed in rpm."""
+    both = zip(_in_papers_units(car), WEIGHT_UNITS, strict=False)
+    return ", ".join(f"{w:.3g} {unit}" for w, unit in both)
 
 
 def _furthest(values: Floats) -> float:

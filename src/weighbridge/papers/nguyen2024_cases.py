@@ -134,7 +134,7 @@ ORDINARY_SENSORS: Final = Case("with jumps, ordinary sensors at 500 Hz", sensors
 
 INVERSE: Final = Case("inverse form, one fixed process noise", "inverse")
 EXTENDED: Final = Case("extended, one fixed process noise", "extended")
-AS_IN_PRINT: Final = Case("as printed, A_02 = 0", "printed")
+AS_IN_PRINT: Final = Case("as printed, A_02 = 0 and Q and R", "printed", noise_scale=1.0)
 
 CASES: Final = (
     PAPERS_CASE,

@@ -23,6 +23,7 @@ class Comparison:
     good : False where ours falls behind
     like_for_like : ours was made under the conditions of the printed figure, as far as a
         simulated drive can be; where it was not, it is never ahead
+    claim : ``theirs`` is a sentence of the paper, which our figure bears out or not
     """
 
     figure: str
@@ -30,11 +31,17 @@ class Comparison:
     ours: str
     good: bool
     like_for_like: bool = True
+    claim: bool = False
+
+    @property
+    def short(self) -> str:
+        """What ours is where it is not ``good``."""
+        return "not found" if self.claim else "behind"
 
     @property
     def verdict(self) -> str:
         """What stands beside the figures."""
-        told = (("behind", not self.good), ("other conditions", not self.like_for_like))
+        told = ((self.short, not self.good), ("other conditions", not self.like_for_like))
         return ", ".join(word for word, so in told if so)
 
 
@@ -78,9 +85,12 @@ class Reproduced:
 
     @property
     def behind(self) -> tuple[str, ...]:
-        """Names of the figures that fall behind, and whether that is under other conditions."""
-        return tuple(
-            c.figure if c.like_for_like else f"{c.figure} (other conditions)"
-            for c in self.comparisons
-            if not c.good
-        )
+        """Names of the figures that fall behind, of claims that were not found, and how so."""
+        return tuple(map(_told, (c for c in self.comparisons if not c.good)))
+
+
+def _told(row: Comparison) -> str:
+    """Name a row that falls behind, with what limits the word."""
+    marks = (("other conditions", not row.like_for_like), (row.short, row.claim))
+    said = ", ".join(word for word, so in marks if so)
+    return f"{row.figure} ({said})" if said else row.figure
