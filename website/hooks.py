@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html as markup
 import re
 import sys
 from pathlib import Path
@@ -16,10 +17,20 @@ from website import links, notebooks, reference
 
 _DISPLAY = re.compile(r'<div class="arithmatex">\\\[(.*?)\\\]</div>', re.DOTALL)
 _INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
+_OUTPUT = re.compile(r'<div class="language-text highlight"><pre>(.*?)</pre></div>', re.DOTALL)
+_LINE = re.compile(r'(<span id="__span-[\d-]+")>((?:<a [^>]*></a>)?)([^\n]*)(?=\n</span>)')
+_DRAWN = re.compile(r"[\u2500-\u259f]|^ {3,}\S|\S {2,}\S")
+_CELL = re.compile(r"<t[dh][ >].*?</t[dh]>", re.DOTALL)
+_CODE = re.compile(r"<code>[^<]*</code>")
+
+_LONG, _LONGEST = 102, 128
+"""Signs of the longest line that fits a page in the usual size of code, and in the smaller one."""
 
 _WEIGHTS = (
     *((name, 3.0) for name in ("start", "record", "data", "files", "accuracy", "troubleshooting")),
+    *((name, 3.0) for name in ("live", "fleet.")),
     ("questions", 2.0),
+    ("studies/recorded", 1.0),
     *((f"{folder}/", 3.0) for folder in ("howto", "tutorials", "concepts")),
     *((name, 0.3) for name in ("changelog", "papers", "studies/", "reference/", "licence")),
 )
@@ -63,5 +74,48 @@ def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
         source = found[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
         return latex2mathml.converter.convert(source, display=display)
 
+    html = outputs(html, page.file.src_uri)
+    if page.file.src_uri.startswith("tutorials/"):
+        # Else the code that makes data fills the first screen of what a search finds.
+        begin = '<details class="example"'
+        html = html.replace(begin, f"{begin} data-search-exclude")
     html = _DISPLAY.sub(lambda found: f'<div class="equation">{drawn(found, "block")}</div>', html)
     return _INLINE.sub(lambda found: drawn(found, "inline"), html)
+
+
+def on_post_page(output: str, page: Any, config: Any) -> str:
+    """Let names in tables break behind an underscore, and nowhere else."""
+
+    def cell(found: re.Match[str]) -> str:
+        return _CODE.sub(lambda code: code[0].replace("_", "_<wbr>"), found[0])
+
+    return _CELL.sub(cell, output)
+
+
+def outputs(html: str, place: str) -> str:
+    """Return a page whose outputs may wrap what is said, but not what is drawn.
+
+    Parameters
+    ----------
+    html : of the page
+    place : of the page
+    """
+    return _OUTPUT.sub(lambda found: _output(found[1], place), html)
+
+
+def _output(inside: str, place: str) -> str:
+    longest = 0
+
+    def line(found: re.Match[str]) -> str:
+        nonlocal longest
+        begin, anchor, said = found.groups()
+        if not _DRAWN.search(said):
+            return f'{begin} class="said">{anchor}{said}'
+        longest = max(longest, len(markup.unescape(said)))
+        return found[0]
+
+    inside = _LINE.sub(line, inside)
+    size = (" wide" if longest > _LONG else "") + (" wider" if longest > _LONGEST else "")
+    # Outputs of tutorials hold numbers of one run, which nobody searches.
+    skip = " data-search-exclude" if place.startswith(("tutorials/", "start")) else ""
+    return f'<div class="language-text highlight{size}"><pre{skip}>{inside}</pre></div>'

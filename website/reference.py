@@ -8,6 +8,8 @@ from typing import Any, get_args
 
 from typer.main import get_command
 
+from weighbridge.cli.listed import TellsSources
+
 GROUPS = {
     "Weigh": (
         "weigh", "compare", "calibrate", "inspect_drive", "Weighing", "WeighingRow", "Segment",
@@ -122,6 +124,8 @@ def _tell(command: Any, words: str, lines: list[str]) -> None:
     inside = getattr(command, "commands", None)
     if words != "weighbridge":
         own = getattr(command, "fallback", command)
+        if isinstance(own, TellsSources):
+            own.name_sources()
         lines += [f"## {words}", "", _paragraphs(getattr(command, "help", "") or ""), ""]
         rows = [_row(p) for p in own.params if p.name != "help" and not p.hidden]
         if rows:

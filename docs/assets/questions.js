@@ -1,5 +1,19 @@
 // Whole questions may be typed into the search. Words that every page has are left out of them.
+// Words that no page has stand for those of the pages.
 {
+  const meant = [
+    [/\b(while\b.*)?\bstill (going on|driving|running|under way)\b/gi, "live"],
+    [/\b(real[ -]?time|streams?|streaming)\b/gi, "live"],
+    [/\b(bulk|batch(es)?)\b/gi, "fleet"],
+    [/\b(validation|validate[ds]?|precision|precise)\b/gi, "accuracy"],
+    [/\bbenchmarks?\b/gi, "$& accuracy"],
+    [/\b(coverage|confidence)\b/gi, "interval"],
+    [/\b(no|without|missing) torque\b/gi, "$& only speed"],
+    [/\bsigmas?\b/gi, "standard deviation"],
+    [/\bplug[ -]?ins?\b/gi, "plug-in own method"],
+    [/\bgps\b/gi, "$& gnss"],
+    [/\breal data\b/gi, "recorded drives"],
+  ];
   const common = new Set(
     ("a an and are at be by call called can do does for from has have how i in is it may mean means " +
       "much must my of on or our should that the their this to use we what when where which who why will " +
@@ -9,7 +23,8 @@
   const send = Worker.prototype.postMessage;
   Worker.prototype.postMessage = function (message, ...more) {
     if (message?.type === QUERY && typeof message.data === "string") {
-      const words = message.data.replace(/[?!.,]+(?=\s|$)/g, "").split(/\s+/).filter(Boolean);
+      const asked = meant.reduce((text, [said, word]) => text.replace(said, word), message.data);
+      const words = asked.replace(/[?!.,]+(?=\s|$)/g, "").split(/\s+/).filter(Boolean);
       const rare = words.filter((word) => !common.has(word.toLowerCase()));
       message = { ...message, data: (rare.length ? rare : words).join(" ") };
     }

@@ -17,6 +17,7 @@ MADE = {
     ("docs/data.md",): logs.own_data,
     ("docs/fleet.md", "docs/fleet_figures.md"): logs.fleet,
     ("docs/live.md",): lambda folder: None,
+    ("docs/questions.md",): lambda folder: None,
 }
 """Pages that run here, one after the other in one folder, and what makes the logs they name."""
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import latex2mathml.converter
 import pytest
-from website import docstrings, links, reference
+from website import docstrings, hooks, links, reference
 
 HOME = Path(__file__).parents[2]
 
@@ -121,3 +121,26 @@ def test_the_theme_asks_no_host():
     text = (HOME / "mkdocs.yml").read_text(encoding="utf-8")
     assert "font: false" in text
     assert "http" not in text
+
+
+def test_the_reference_of_commands_names_the_torque_sources():
+    rows = [r for r in reference.commands_page().splitlines() if r.startswith("| `--torque`")]
+    assert len(rows) == 2
+    for row in rows:
+        assert "wheel_torque (torque at the wheels)" in row
+        assert "battery (" in row
+
+
+def test_sentences_of_an_output_may_wrap_and_drawings_may_not():
+    line = '<span id="__span-0-{}"><a href="#"></a>{}\n</span>'.format
+    told = [line(1, "a note"), line(2, "│ a │"), line(3, "mass   12 kg"), line(4, "x" * 150)]
+    page = '<div class="language-text highlight"><pre><code>{}</code></pre></div>'.format
+    shown = hooks.outputs(page("".join(told)), "files.md")
+    assert shown.count('class="said"') == 2
+    assert '1" class="said"' in shown
+    assert '4" class="said"' in shown
+    assert "wide" not in shown
+    assert "data-search-exclude" not in shown
+    wide = hooks.outputs(page(line(1, "│" * 120)), "tutorials/ticket.md")
+    assert 'highlight wide"><pre data-search-exclude>' in wide
+    assert "wide wider" in hooks.outputs(page(line(1, "│" * 140)), "files.md")

@@ -100,6 +100,27 @@ def test_each_source_weighs(driven, source, kind, names, engine_speed):
     assert alone.std < 0.07 * truth
 
 
+def test_a_sensor_at_the_hub_may_measure_the_brake(driven):
+    made, readings = driven["petrol_dct"][1]
+    truth, radius = made.truth, made.scenario.car.wheel_radius
+    front, rear = readings["wheel_torque_front"], readings["wheel_torque_rear"]
+    shafts = front.values + rear.values
+    brake = radius * np.interp(front.time - LATE, truth.time, truth.brake_force)
+    assert np.mean(brake > 100.0) > 0.05
+    car = wb.Vehicle(
+        driveline=Driveline(wheel_radius=radius), torque=TorqueModel(source="wheel_torque")
+    )
+    plain = without_weather(made.drive).without("brake_switch")
+    told = [
+        wb.weigh(plain.with_signals(wb.Signal("wheel_torque", front.time, values)), car)
+        for values in (shafts, shafts - brake)
+    ]
+    assert told[1].mass == pytest.approx(told[0].mass, rel=0.005)
+    assert abs(told[1].mass - truth.mass[-1]) < 2.0 * told[1].std
+    with pytest.raises(DriveError, match="against the motion"):
+        wb.weigh(plain.with_signals(wb.Signal("wheel_torque", front.time, -shafts)), car)
+
+
 def test_an_axle_alone_is_weighed_only_where_no_other_is_driven(driven):
     drive = drive_of(driven["petrol_dct"][1], ("wheel_torque_front",), engine_speed=True)
     for driven_axle, why in (

@@ -25,10 +25,14 @@ class TellsSources(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help page."""
+        self.name_sources()
+        super().format_help(ctx, formatter)
+
+    def name_sources(self) -> None:
+        """List the torque sources in the help of ``--torque``."""
         for option in self.params:
             if isinstance(option, TyperOption) and option.name == "torque":
                 option.help = f"Torque source of the drives: {sources()}."
-        super().format_help(ctx, formatter)
 
 
 def sources() -> str:
