@@ -22,6 +22,7 @@ _LINE = re.compile(r'(<span id="__span-[\d-]+")>((?:<a [^>]*></a>)?)([^\n]*)(?=\
 _DRAWN = re.compile(r"[\u2500-\u259f]|^ {3,}\S|\S {2,}\S")
 _CELL = re.compile(r"<t[dh][ >].*?</t[dh]>", re.DOTALL)
 _CODE = re.compile(r"<code>[^<]*</code>")
+_JOINT = re.compile(r"(?<=[^\W_]_)(?=[^\W_])")
 
 _LONG, _LONGEST = 102, 128
 """Signs of the longest line that fits a page in the usual size of code, and in the smaller one."""
@@ -87,7 +88,7 @@ def on_post_page(output: str, page: Any, config: Any) -> str:
     """Let names in tables break behind an underscore, and nowhere else."""
 
     def cell(found: re.Match[str]) -> str:
-        return _CODE.sub(lambda code: code[0].replace("_", "_<wbr>"), found[0])
+        return _CODE.sub(lambda code: _JOINT.sub("<wbr>", code[0]), found[0])
 
     return _CELL.sub(cell, output)
 

@@ -40,9 +40,9 @@ def test_nothing_is_cut_on_a_desktop(site, browser, place):
     page.close()
 
 
-@pytest.mark.parametrize("place", ["methods/index.html", "methods/joint.html"])
+@pytest.mark.parametrize("place", ["index", "joint", "jensen2022", "galvao"])
 def test_equations_fit_a_phone(site, browser, place):
-    page = opened(browser, site, place, PHONE)
+    page = opened(browser, site, f"methods/{place}.html", PHONE)
     widths = "[...document.querySelectorAll('.equation')].map(e => e.scrollWidth - e.clientWidth)"
     found = page.evaluate(widths)
     assert len(found) >= 2
