@@ -42,10 +42,8 @@ def test_the_readme_has_rows_of_the_page():
         ("the same, one calibration drive", [("inertial", True)] * 2),
         ("the same, five minutes of driving", [("inertial", True)]),
         ("OBD at 1 Hz with an IMU", [("inertial", False)]),
-        (
-            "OBD at 4 Hz, at 1 Hz, with GNSS, no IMU",
-            [("speed_grade", True), ("speed_grade", False)],
-        ),
+        ("OBD at 4 Hz with GNSS, no IMU", [("speed_grade", True)]),
+        ("OBD at 1 Hz with GNSS, no IMU", [("speed_grade", False)]),
         ("a truck: speed, torque in percent", [("speed_grade", True)]),
         ("OBD at 2 Hz alone", [("speed", False)]),
     ],
