@@ -69,7 +69,9 @@ def balance(mass=10_000.0, *, seed=1, minutes=6.0, grade=0.01, swing=1.0, offset
         fuel_burnt=np.zeros(n),
         reason=reason,
     )
-    motion = SimpleNamespace(source="inertial", unmeasured_grade=0.0, recorded_speed=None)
+    motion = SimpleNamespace(
+        source="inertial", unmeasured_grade=0.0, recorded_speed=None, specific_force_scale_std=0.0
+    )
     return ForceBalance(motion=motion, table=table)
 
 

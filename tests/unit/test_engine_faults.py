@@ -33,7 +33,14 @@ from weighbridge.simulation.named import make_scenario
 from weighbridge.vehicle.model import DraggedReading, Driveline, TorqueModel, Vehicle
 
 SOURCE = {"car": "engine_load", "truck": "engine_torque_fraction", "electric": "engine_torque"}
+STEPS = {"car": 1.0 / 255.0, "truck": 0.01, "electric": 0.5}
+"""In which each control unit sends it [SI]."""
 MADE_BY = {"car": "car-calibration", "truck": "truck-calibration", "electric": "electric"}
+
+
+def as_sent(kind, change):
+    """Return a change that the control unit itself makes: it sends its steps all the same."""
+    return lambda t, x: np.round(change(t, x) / STEPS[kind]) * STEPS[kind]
 
 
 class Fleet:
@@ -223,7 +230,8 @@ def test_torque_whose_scale_changes_while_driving_gives_no_mass(fleet, kind, ram
     def change(t, x):
         return x * (1.0 - 0.25 * (np.clip((t - 500.0) / 700.0, 0.0, 1.0) if ramp else t > 500.0))
 
-    found = fleet.weigh_alone(kind, with_signal(fleet.drive(kind), SOURCE[kind], change))
+    damaged = with_signal(fleet.drive(kind), SOURCE[kind], as_sent(kind, change))
+    found = fleet.weigh_alone(kind, damaged)
     assert found.status is Status.INCONSISTENT
     assert "while the vehicle drives, where no load can change" in found.reason
     assert np.isnan(found.mass)
@@ -234,7 +242,7 @@ def test_every_method_obeys_a_scale_that_changes(fleet, method):
     def change(t, x):
         return x * np.where(t > 500.0, 1.25, 1.0)
 
-    damaged = with_signal(fleet.drive("truck"), SOURCE["truck"], change)
+    damaged = with_signal(fleet.drive("truck"), SOURCE["truck"], as_sent("truck", change))
     found = fleet.weigh("truck", damaged, method)
     assert np.isnan(found.mass)
     weighed = {w.method: w for w in fleet.weigh("truck", damaged).compare()}
@@ -246,8 +254,7 @@ def test_air_flow_shows_a_load_that_is_scaled_or_smoothed(fleet, method):
     (witness,) = fleet.files["car"].witnesses
     assert witness.signal == "mass_air_flow"
 
-    def scaled(t, x):
-        return 0.8 * x
+    scaled = as_sent("car", lambda _, x: 0.8 * x)
 
     def smoothed(t, x):
         made, _ = lfilter([0.08], [1.0, -0.92], x, zi=[0.92 * x[0]])
@@ -622,7 +629,8 @@ def test_tyres_of_another_circumference_are_found_and_corrected(fleet, kind, sca
     for name in ("vehicle_speed", "engine_speed"):
         drive = with_signal(drive, name, lambda _, x: x / scale)
     highest = np.inf if kind == "electric" else 1.0
-    drive = with_signal(drive, SOURCE[kind], lambda _, x: np.minimum(x * scale, highest))
+    reads = as_sent(kind, lambda _, x: np.minimum(x * scale, highest))
+    drive = with_signal(drive, SOURCE[kind], reads)
     weighing = fleet.weigh_alone(kind, drive)
     said = "larger around" if scale > 1.0 else "smaller around"
     assert any(said in w for w in weighing.warnings)
@@ -675,7 +683,7 @@ def test_a_torque_that_reads_otherwise_at_its_top_makes_no_mass(fleet, kind, cha
 @pytest.mark.parametrize("kind", SOURCE)
 def test_a_torque_that_reads_too_low_throughout_bends_no_more_than_an_undamaged_one(fleet, kind):
     """The scale of the reading is the mass's, and no bend of it."""
-    low = with_signal(fleet.drive(kind), SOURCE[kind], lambda _, x: 0.93 * x)
+    low = with_signal(fleet.drive(kind), SOURCE[kind], as_sent(kind, lambda _, x: 0.93 * x))
     bends = [
         joint.estimate(fleet.weigh_alone(kind, d).result.balance, fleet.files[kind]).bend
         for d in (fleet.drive(kind), low)
