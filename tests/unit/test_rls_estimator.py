@@ -24,7 +24,7 @@ def test_a_cold_start_counts_by_its_share_of_the_information():
     share = 600 * 4.0 / (600 * 4.0 + 2400)
     balance = SimpleNamespace(
         table=SimpleNamespace(time=time),
-        motion=SimpleNamespace(source="inertial"),
+        motion=SimpleNamespace(source="inertial", specific_force_scale_std=0.0),
         brake_hidden=False,
         coarse_std=0.0,
     )

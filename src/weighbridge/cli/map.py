@@ -90,9 +90,7 @@ def map_log(
     Example: weighbridge map trip.csv -o map.toml
     """
     from weighbridge.errors import DriveError
-    from weighbridge.io.draft import tells_torque
     from weighbridge.io.draft_alike import kinds
-    from weighbridge.io.draft_missing import missing
     from weighbridge.io.draft_speeds import with_compared_speeds
     from weighbridge.io.mapping_text import mapping_text
     from weighbridge.whole import whole_file
@@ -110,12 +108,7 @@ def map_log(
     if output is not None or not quiet():
         for found in drafts:
             _show(found, screen)
-    for sentence in refused.values():
-        notice(f"  left out: {sentence}")
-    if not tells_torque(*drafts):
-        notice(_NO_TORQUE)
-    for sentence in missing(drafts):
-        notice(f"  {shown(sentence)}")
+    _tell_lacking(drafts, refused)
     text = mapping_text(drafts, tuple(refused), _named_dbcs(dbc or [], output))
     again = _again(logs, columns, dbc or [], output)
     to_ask = _to_ask(drafts, again) if not ask else ""
@@ -131,6 +124,19 @@ def map_log(
         _say_next(drafts, logs, output, again)
         if to_ask:
             say(to_ask)
+
+
+def _tell_lacking(drafts: list[Draft], refused: dict[Path, str]) -> None:
+    """Tell files that were left out, and what no column was taken for."""
+    from weighbridge.io.draft import tells_torque
+    from weighbridge.io.draft_missing import missing
+
+    for sentence in refused.values():
+        notice(f"  left out: {sentence}")
+    if not tells_torque(*drafts):
+        notice(_NO_TORQUE)
+    for sentence in missing(drafts):
+        notice(f"  {shown(sentence)}")
 
 
 def _say_next(drafts: list[Draft], logs: list[Path], output: Path, again: list[str]) -> None:
