@@ -335,20 +335,16 @@ def with_drift(refined: Vehicle, change: Drift, times: Sequence[datetime]) -> Ve
     change : of the torque scale [%]
     times
     """
+    from weighbridge.calibration.fitted import noted
+
     if not change.sure or len(times) < 2:
         return refined
     months = (max(times) - min(times)).total_seconds() / MONTH
     std = 0.5 * 0.01 * abs(change.slope) * months
     made = refined.provenance
-    told = f"{_drift_text(DRIFTS[0], change)}: learn anew as new tickets come"
-    return replace(
-        refined,
-        provenance=replace(
-            made,
-            mass_scale_std=math.hypot(made.mass_scale_std or 0.0, std),
-            notes=f"{made.notes}; {told}" if made.notes else told,
-        ),
-    )
+    left = math.hypot(made.mass_scale_std or 0.0, std)
+    wider = replace(refined, provenance=replace(made, mass_scale_std=left))
+    return noted(wider, f"{_drift_text(DRIFTS[0], change)}: learn anew as new tickets come")
 
 
 def drift(times: Sequence[datetime], values: Floats) -> Drift:
