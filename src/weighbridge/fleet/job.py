@@ -21,6 +21,7 @@ from weighbridge.fleet.keys import content_digest, text_digest
 from weighbridge.fleet.schema import FAILED, FORMAT_VERSION, UNREAD, WEIGHED
 from weighbridge.fleet.store import part_path, write_part
 from weighbridge.fleet.vehicles import Assigned
+from weighbridge.signals import Drive
 from weighbridge.version import VERSION
 
 TRIES: Final = 3
@@ -189,17 +190,24 @@ def local_paths(recording: Recording) -> Iterator[list[Path]]:
         yield remote.fetch(recording.paths, Path(home))
 
 
+def drives_of(
+    paths: list[Path], mapping: Mapping[str, Any] | None, dbc: tuple[str, ...], *, whole: bool
+) -> list[Drive]:
+    """Read the drives that a recording holds; all of it as one drive where it is ``whole``."""
+    from weighbridge.io import read_drive, read_drives
+
+    given: Path | list[Path] = paths[0] if len(paths) == 1 else paths
+    return [read_drive(given, mapping, dbc)] if whole else read_drives(given, mapping, dbc)
+
+
 def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
     """Weigh each drive of a recording, as the command ``weigh`` does."""
     from dataclasses import replace
 
     from weighbridge.fleet.facts import row_of
-    from weighbridge.io import read_drive, read_drives
     from weighbridge.pipeline.weighing import weigh
 
-    given: Path | list[Path] = paths[0] if len(paths) == 1 else paths
-    read = (lambda *a: [read_drive(*a)]) if job.whole else read_drives
-    drives = read(given, job.assigned.mapping, job.dbc)
+    drives = drives_of(paths, job.assigned.mapping, job.dbc, whole=job.whole)
     if job.recording.start is not None:
         begun = job.recording.start
         drives = [

@@ -15,7 +15,7 @@ import polars as pl
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.fleet.engine import WORKER_DIED, SchedulerLost, scheduler_needed
 from weighbridge.fleet.inputs import Recording
-from weighbridge.fleet.job import TRIES, local_paths, named_error
+from weighbridge.fleet.job import TRIES, drives_of, local_paths, named_error
 from weighbridge.fleet.learnt import COLUMNS, LEARNT, SURE
 from weighbridge.fleet.tickets import read_tickets, ticketed
 from weighbridge.fleet.vehicles import Assigned, Vehicles
@@ -385,10 +385,6 @@ def _known(row: Mapping[str, Any]) -> Known:
 
 
 def _read(lesson: Lesson, known: Known) -> Drive:
-    from weighbridge.io import read_drive, read_drives
-
     with local_paths(Recording(known.paths)) as paths:
-        given = paths[0] if len(paths) == 1 else paths
-        if lesson.whole:
-            return read_drive(given, lesson.assigned.mapping, lesson.dbc)
-        return read_drives(given, lesson.assigned.mapping, lesson.dbc)[known.part]
+        held = drives_of(paths, lesson.assigned.mapping, lesson.dbc, whole=lesson.whole)
+        return held[known.part]
