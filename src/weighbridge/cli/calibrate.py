@@ -130,8 +130,7 @@ def calibrate(
     """
     from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError
-    from weighbridge.io.dbc import dbc_path, with_path
-    from weighbridge.pipeline.given import mapping_beside
+    from weighbridge.pipeline.given import dbcs_beside, mapping_beside
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -166,8 +165,8 @@ def calibrate(
         if chosen is not None:
             car = replace(car, mapping=mapping_beside(chosen, output))
         if dbc:
-            beside = tuple(with_path(d, Path(mapping_beside(dbc_path(d), output))) for d in dbc)
-            car = replace(car, provenance=replace(car.provenance, dbc=beside))
+            read_with = tuple(dbcs_beside(dbc, output))
+            car = replace(car, provenance=replace(car.provenance, dbc=read_with))
         car.save(output)
         own = None
         if settings.fit.torque:

@@ -169,11 +169,9 @@ def _to_ask(drafts: list[Draft], again: list[str]) -> str:
 
 def _named_dbcs(dbc: list[str], output: Path | None) -> list[str]:
     """DBC files as the mapping names them: seen from its folder, or from here where it is shown."""
-    from weighbridge.io.dbc import dbc_path, with_path
-    from weighbridge.pipeline.given import mapping_beside
+    from weighbridge.pipeline.given import dbcs_beside
 
-    home = output if output is not None else Path("map.toml")
-    return [with_path(d, Path(mapping_beside(dbc_path(d), home))) for d in dbc]
+    return dbcs_beside(dbc, output if output is not None else Path("map.toml"))
 
 
 def _drafts(

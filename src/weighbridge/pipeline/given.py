@@ -42,6 +42,13 @@ def mapping_of(
     return named if named.is_absolute() or home is None else home.parent / named
 
 
+def dbcs_beside(dbc: Sequence[str], home: Path) -> list[str]:
+    """DBC files of a command as a file at ``home`` names them: seen from its folder, bus kept."""
+    from weighbridge.io.dbc import dbc_path, with_path
+
+    return [with_path(name, Path(mapping_beside(dbc_path(name), home))) for name in dbc]
+
+
 def mapping_beside(mapping: Path, home: Path) -> str:
     """Path of a mapping as a vehicle file names it: seen from that file's folder where it can be.
 
