@@ -17,7 +17,7 @@ from weighbridge.cli.options import (
     chosen_mapping,
     load_parts,
 )
-from weighbridge.cli.own_masses import doubted, own_masses
+from weighbridge.cli.own_masses import own_masses
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import complain, console, say
@@ -128,6 +128,7 @@ def calibrate(
 
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
+    from weighbridge.calibration.doubted_masses import with_doubts
     from weighbridge.calibration.settings import CalibrationSettings
     from weighbridge.errors import ConfigError
     from weighbridge.pipeline.given import dbcs_beside, mapping_beside
@@ -167,14 +168,14 @@ def calibrate(
         if dbc:
             read_with = tuple(dbcs_beside(dbc, output))
             car = replace(car, provenance=replace(car.provenance, dbc=read_with))
-        car.save(output)
         own = None
         if settings.fit.torque:
             bar.begin("weighing by it", len(recorded))
             own = own_masses(car, recorded, bar.within)
             notes += own.lines
             if own.doubt:
-                doubted(car, own).save(output)
+                car = with_doubts(car, (*car.provenance.doubts, own.doubt))
+        car.save(output)
     console().print(found)
     for line in notes:
         say(line)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -47,12 +47,6 @@ class OwnMasses:
             f"the calibration has no mass {which} ({reason}), so that nothing backs what it "
             "weighs: calibrate again on longer drives with starts and hills"
         )
-
-
-def doubted(car: Vehicle, own: OwnMasses) -> Vehicle:
-    """Keep in a vehicle file what is to be told of it at each weighing."""
-    made = car.provenance
-    return replace(car, provenance=replace(made, doubts=(*made.doubts, own.doubt)))
 
 
 def own_masses(
