@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -51,13 +51,9 @@ def settle_repeats(logs: Sequence[Log]) -> list[Problem]:
     What was left out of which file.
     """
     problems = []
-    for a, b in combinations(logs, 2):
-        twice = [
-            x.name
-            for x in a.signals
-            for y in b.signals
-            if x.name == y.name and QUANTITIES[x.name].table in _WHOLE and _overlap(x, y)
-        ]
+    for i, j in _meeting(logs):
+        a, b = logs[i], logs[j]
+        twice = _recorded_twice(a, b)
         if not twice or not _one_drive(a, b):
             continue
         for table in dict.fromkeys(QUANTITIES[name].table for name in twice):
@@ -72,6 +68,37 @@ def settle_repeats(logs: Sequence[Log]) -> list[Problem]:
                 )
             )
     return problems
+
+
+def _span(log: Log) -> tuple[float, float]:
+    """First and last stamp of a file [s]; what has no stamps meets nothing."""
+    held = [s.time for s in log.signals if len(s)]
+    if not held:
+        return np.inf, -np.inf
+    return min(float(t[0]) for t in held), max(float(t[-1]) for t in held)
+
+
+def _meeting(logs: Sequence[Log]) -> list[tuple[int, int]]:
+    """Pairs of files of which one begins before the other ends, by their places."""
+    spans = [_span(log) for log in logs]
+    by_begin = sorted(range(len(logs)), key=lambda k: spans[k][0])
+    found = []
+    for place, i in enumerate(by_begin):
+        for j in by_begin[place + 1 :]:
+            if spans[j][0] > spans[i][1]:
+                break
+            found.append((min(i, j), max(i, j)))
+    return sorted(found)
+
+
+def _recorded_twice(a: Log, b: Log) -> list[str]:
+    """Quantities of a sensor that both files have at the same time."""
+    second = {s.name: s for s in b.signals}
+    return [
+        x.name
+        for x in a.signals
+        if x.name in second and QUANTITIES[x.name].table in _WHOLE and _overlap(x, second[x.name])
+    ]
 
 
 def _overlap(x: Signal, y: Signal) -> bool:
