@@ -7,6 +7,7 @@ from typing import Final
 
 from weighbridge.io.draft import Draft
 from weighbridge.io.naming import words_of
+from weighbridge.io.table import column_list
 
 _LOOKS: Final[tuple[tuple[str, tuple[str, ...], frozenset[str]], ...]] = (
     (
@@ -60,13 +61,12 @@ def missing(drafts: Sequence[Draft]) -> Iterator[str]:
         alike = [(one, name) for one, name in left if words & set(words_of(name))]
         if not alike:
             continue
-        names = ", ".join(repr(name) for _, name in alike[:_SHOWN])
-        more = f" and {len(alike) - _SHOWN} more" if len(alike) > _SHOWN else ""
+        names = column_list((name for _, name in alike), _SHOWN)
         of = f"no column of {alike[0][0].path.name} was taken for {what}"
         if all(_WITHOUT_GRAVITY & set(words_of(name)) for _, name in alike):
-            yield f"{of}: {names}{more} have no gravity in them; record the raw accelerometer"
+            yield f"{of}: {names} have no gravity in them; record the raw accelerometer"
             continue
         yield (
-            f"{of}, though {names}{more} may be its: if so, name it in the mapping as "
+            f"{of}, though {names} may be its: if so, name it in the mapping as "
             f"{' or '.join(quantities[:3])}, with its unit"
         )
