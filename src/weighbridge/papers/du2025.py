@@ -35,8 +35,8 @@ from weighbridge.papers.du2025_methods import (
 from weighbridge.papers.du2025_panels import panels
 from weighbridge.papers.du2025_results import DriveResult, Reproduction, cell
 from weighbridge.papers.du2025_told import CONVERGED as CONVERGED
-from weighbridge.papers.du2025_told import rms, steady_from, told
-from weighbridge.papers.reproduced import Progress, Reproduced
+from weighbridge.papers.du2025_told import steady_from, told
+from weighbridge.papers.reproduced import Progress, Reproduced, rms
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats

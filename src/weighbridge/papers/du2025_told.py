@@ -9,7 +9,8 @@ import numpy as np
 
 from weighbridge.estimators import MassTrack
 from weighbridge.papers.du2025_methods import BAND
-from weighbridge.signals import Bools, Floats
+from weighbridge.papers.reproduced import rms
+from weighbridge.signals import Bools
 from weighbridge.signals.units import scalar_to_si
 
 if TYPE_CHECKING:
@@ -98,8 +99,3 @@ def swing(track: MassTrack, made: SimulatedDrive) -> float:
             mass = track.running_mass[within]
             moved = max(moved, float(np.max(np.abs(mass / mass[0] - 1.0))))
     return moved
-
-
-def rms(values: Floats) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")

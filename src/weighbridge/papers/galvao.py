@@ -46,7 +46,7 @@ from weighbridge.papers.galvao_torque import (
     torque_table,
     torque_trial,
 )
-from weighbridge.papers.reproduced import Comparison, Progress, Reproduced
+from weighbridge.papers.reproduced import Comparison, Progress, Reproduced, rms
 from weighbridge.report.study import write_study
 from weighbridge.report.style import (
     BLUE,
@@ -346,7 +346,7 @@ def trials_table(done: Reproduction) -> Table:
                 str(trial.masses.size),
                 f"{trial.masses.min():.0f}–{trial.masses.max():.0f}",
                 f"{trial.answers.min():.0f}–{trial.answers.max():.0f}",
-                f"{100.0 * _rms(trial.answers / trial.masses - 1.0):.2f}",
+                f"{100.0 * rms(trial.answers / trial.masses - 1.0):.2f}",
                 f"{found:+.4f} ± {std:.4f}" if loaded else "",
                 f"{np.median(off):.0f}",
                 f"{rank_correlation(trial.masses, trial.pinned):+.2f}" if loaded else "",
@@ -451,7 +451,3 @@ def _mass_panel(trial: Trial) -> Panel:
         figure=figure,
         wide=True,
     )
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

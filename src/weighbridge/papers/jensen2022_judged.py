@@ -13,6 +13,7 @@ from weighbridge.balance.law import force_on_mass, mass_column
 from weighbridge.estimators.track import MassTrack
 from weighbridge.navigation.motion import Motion
 from weighbridge.papers.jensen2022_drives import TestDrive
+from weighbridge.papers.reproduced import rms
 from weighbridge.pipeline.weighing import Weighing
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.signals.units import scalar_to_si
@@ -222,8 +223,3 @@ def joined(parts: Sequence[Torques]) -> Torques:
 def kilometres(motion: Motion, time: Floats) -> Floats:
     """Distance driven at instants (n,) [km]."""
     return np.asarray(np.interp(time, motion.time, motion.distance) / 1e3)
-
-
-def rms(values: Floats) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")

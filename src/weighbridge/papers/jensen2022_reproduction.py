@@ -29,7 +29,6 @@ from weighbridge.papers.jensen2022_judged import (
     Torques,
     judge,
     judge_track,
-    rms,
     torques,
 )
 from weighbridge.papers.jensen2022_printed import (
@@ -39,7 +38,7 @@ from weighbridge.papers.jensen2022_printed import (
     pulling,
     weigh_as_printed,
 )
-from weighbridge.papers.reproduced import Progress
+from weighbridge.papers.reproduced import Progress, rms
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive, Floats

@@ -12,13 +12,13 @@ from scipy.stats import gaussian_kde
 
 from weighbridge.estimators.rls import RlsSettings, run_in_turn
 from weighbridge.papers.jensen2022_gradient import gradient_figures
-from weighbridge.papers.jensen2022_judged import BAND, DriveResult, joined, rms, within
+from weighbridge.papers.jensen2022_judged import BAND, DriveResult, joined, within
 from weighbridge.papers.jensen2022_reproduction import (
     HighwayResult,
     Reproduction,
     perturbed,
 )
-from weighbridge.papers.reproduced import Comparison
+from weighbridge.papers.reproduced import Comparison, rms
 from weighbridge.report.table import Table
 from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Floats

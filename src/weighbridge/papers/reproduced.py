@@ -6,7 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from weighbridge.report.table import Table
+from weighbridge.signals import Floats
 
 Progress = Callable[[int, int], None]
 """Called with steps done and steps in all."""
@@ -94,3 +97,8 @@ def _told(row: Comparison) -> str:
     marks = (("other conditions", not row.like_for_like), (row.short, row.claim))
     said = ", ".join(word for word, so in marks if so)
     return f"{row.figure} ({said})" if said else row.figure
+
+
+def rms(values: Floats) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")
