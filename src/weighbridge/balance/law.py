@@ -9,13 +9,14 @@ Along the road, with the traction force F at the wheels::
       + s d + c                                     gusts and fast errors, lasting offset
       + G q_c exp(-t / tau)                         cold engine: friction in the reading
       + G (o + p G v / N_0)                         torque that is told too high, all data sheets
+      + P eta G / N                                 power that the engine gives beside the wheels
 
     F = eta G T(reading, engine speed)
 
 with the specific force f = dv/dt + g sin(grade), acceleration a, dynamic pressure q, gearing G
-(engine angle per distance), heading psi and speed v. A column is the traction force that one unit
-of its parameter takes, so that the sum of columns times parameters is the traction. Weighing,
-calibration, delay search and sensitivity pick the columns they need.
+(engine angle per distance), engine speed N, heading psi and speed v. A column is the traction
+force that one unit of its parameter takes, so that the sum of columns times parameters is the
+traction. Weighing, calibration, delay search and sensitivity pick the columns they need.
 
 References
 ----------
@@ -53,6 +54,9 @@ other simulators is highest."""
 
 WARM_UP: Final = 500.0
 """Time constant of engine and oil getting warm [s]."""
+
+SLOWEST_ENGINE: Final = 50.0
+"""Of an engine that drives accessories [rad/s]."""
 
 ROAD_PARAMETERS: Final = ("drag_area", "rolling_coefficient", "engine_inertia", "wheel_inertia")
 """Parameters of `road_columns`, in order."""
@@ -172,6 +176,18 @@ def torque_growth_column(table: ForceTable) -> Floats:
     """
     gearing = np.nan_to_num(table.gearing)
     return np.asarray(gearing * (gearing * table.speed / USUAL_SPEED))
+
+
+def accessory_column(table: ForceTable, vehicle: Vehicle) -> Floats:
+    """Of a power that an engine gives to accessories, ``eta G / N`` (n,) [N/W]; 0 for a motor.
+
+    A torque that is told at the crank counts it as traction.
+    """
+    if vehicle.driveline.single_speed:
+        return np.zeros(table.time.size)
+    gain = traction_gain(vehicle, np.nan_to_num(table.torque), np.nan_to_num(table.gearing))
+    turning = np.maximum(np.nan_to_num(table.engine_speed), SLOWEST_ENGINE)
+    return np.asarray(np.nan_to_num(gain) / turning)
 
 
 def reading_columns(

@@ -48,6 +48,7 @@ class DriveRows:
     usable : rows to take
     mass : known, as the drive begins [kg]
     motion : of the drive
+    beside : (n,) force that the torque gives beside the wheels, told by another fit [N]
     """
 
     table: ForceTable
@@ -56,6 +57,7 @@ class DriveRows:
     usable: Bools
     mass: float
     motion: Motion
+    beside: Floats | float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -292,7 +294,7 @@ def _columns(d: DriveRows, reading: Floats, settings: FitSettings) -> Floats:
     table = d.table
     north, east = law.wind_columns(table)
     mass = d.mass - table.fuel_burnt
-    pushed = mass * table.specific_force
+    pushed = mass * table.specific_force + d.beside
     road = law.road_columns(table, mass, settings.wheel_radius)
     if settings.lasting_drag:
         lasting = lasting_pressure(table)

@@ -19,6 +19,7 @@ from weighbridge.calibration.fitted import (
     learnt_dragged,
     noted,
     ranges,
+    rebalanced,
 )
 from weighbridge.calibration.inverse import (
     DriveRows,
@@ -38,7 +39,9 @@ from weighbridge.calibration.self_weighing import (
     self_weighed,
 )
 from weighbridge.errors import DriveError
+from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
+from weighbridge.estimators.joint.switched import Switched
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Timing, Vehicle
@@ -143,7 +146,12 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     turning = np.concatenate([part.engine_speed[part.usable] for part in rows])
     noise = _noise(problem, rows, replace(settings, torque_noise=quick.torque_noise))
     settings = replace(settings, torque_noise=noise, knots=problem.knots(turning))
-    found = fit_with_gusts(_drive_rows(problem, rows), settings)
+    given = _drive_rows(problem, rows)
+    found = fit_with_gusts(given, settings)
+    first = replace(_with(problem.draft, found, settings), timing=timing)
+    beside = _accessories(problem, first)
+    if any(beside):
+        found = fit_with_gusts(_without(given, beside, first), settings)
     refuse_nonsense(problem, *_driven_slope(problem, found, rows))
     mean, std = settings.prior
     if np.any(np.abs(found.road - mean)[:2] > FARTHEST * std[:2]):
@@ -163,6 +171,24 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
         vehicle = noted(vehicle, NOT_TOLD)
     held = ("drag_area",) if found.road[0] <= 0.0 else ()
     return Fitted(vehicle=vehicle, rows=rows, search=search, held=held), found.cov
+
+
+def _accessories(problem: Problem, vehicle: Vehicle) -> list[Switched | None]:
+    """Find in each drive, by a first fit, what the engine drives on and off beside the wheels."""
+    return [
+        joint.estimate(balance, vehicle, load_changes=False).switched
+        for balance in rebalanced(problem, vehicle)
+    ]
+
+
+def _without(
+    drives: Sequence[DriveRows], beside: Sequence[Switched | None], vehicle: Vehicle
+) -> list[DriveRows]:
+    """Let the rows of drives know what the engine drives beside the wheels."""
+    return [
+        rows if found is None else replace(rows, beside=found.force(rows.table, vehicle))
+        for rows, found in zip(drives, beside, strict=True)
+    ]
 
 
 def _rows(problem: Problem, delay: float, lag: float) -> tuple[DelayedRows, ...]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from weighbridge.estimators.joint.possible import PossibleChange
     from weighbridge.estimators.joint.problem import FilterInput, JointSizes
     from weighbridge.estimators.joint.slow_errors import SlowErrors
+    from weighbridge.estimators.joint.switched import Switched
 
 
 class Status(StrEnum):
@@ -73,6 +74,7 @@ class MassTrack:
     filter_input : what the filter of the joint estimator was given; None of other methods
     possible_change : of the load that was not found and may have been; None of other methods
     bend : of the torque's reading; None of other methods and without an accelerometer
+    switched : accessories that go on and off; None where nothing shows them, and of other methods
     sizes : of noise and states, by which the joint estimator runs forward; None of other methods
     """
 
@@ -96,6 +98,7 @@ class MassTrack:
     filter_input: FilterInput | None = None
     possible_change: PossibleChange | None = None
     bend: TorqueBend | None = None
+    switched: Switched | None = None
     sizes: JointSizes | None = None
 
     @property

@@ -52,7 +52,7 @@ def initial_state(x, cov, time):
 
 
 @inlined_kernel
-def _faded(state, time, params):
+def faded(state, time, params):
     """Estimate and covariance at ``time``, and the part of each state that is left (n,)."""
     n = state.x.size
     x, cov, left = np.empty(n), np.empty((n, n)), np.empty(n)
@@ -68,7 +68,7 @@ def _faded(state, time, params):
 
 
 @inlined_kernel
-def _predicted(x, cov, row, noise_var, cov_row):
+def predicted(x, cov, row, noise_var, cov_row):
     """Mean and variance of a measurement; ``cov_row`` (n,) becomes ``cov @ row``."""
     mean = 0.0
     var = noise_var
@@ -108,9 +108,9 @@ def step(state, time, row, y, noise_var, params):
     ----------
     Gelb, Applied Optimal Estimation, 1974, ch. 3.8 (Gauss-Markov), 4.2.
     """
-    x, cov, _ = _faded(state, time, params)
+    x, cov, _ = faded(state, time, params)
     cov_row = np.empty(x.size)
-    mean, innovation_var = _predicted(x, cov, row, noise_var, cov_row)
+    mean, innovation_var = predicted(x, cov, row, noise_var, cov_row)
     innovation = (y - mean) / np.sqrt(innovation_var)
     taken = state.rows < params.settle_rows or abs(innovation) <= params.gate
     seen = min(abs(innovation), params.gate)
@@ -182,8 +182,8 @@ def weighed(state, time, rows, columns, noise_var, added, params):
     cov_row = np.empty(state.x.size)
     for k in range(time.size):
         state = inflated(state, added[k])
-        none, cov, left = _faded(state, time[k], params)
-        _, innovation_var = _predicted(none, cov, rows[k], noise_var[k], cov_row)
+        none, cov, left = faded(state, time[k], params)
+        _, innovation_var = predicted(none, cov, rows[k], noise_var[k], cov_row)
         for j in range(count):
             mean = 0.0
             for i in range(left.size):
@@ -210,8 +210,8 @@ def inflated(state, variance):
 @kernel
 def weight(state, time, row, noise_var, params):
     """Inverse variance of a measurement given all before it; parameters as of ``step``."""
-    x, cov, _ = _faded(state, time, params)
-    return 1.0 / _predicted(x, cov, row, noise_var, np.empty(x.size))[1]
+    x, cov, _ = faded(state, time, params)
+    return 1.0 / predicted(x, cov, row, noise_var, np.empty(x.size))[1]
 
 
 @kernel
@@ -261,10 +261,10 @@ def smooth(state, time, rows, y, noise_var, added, params):
     weight = np.zeros(m)
     for k in range(m):
         state = inflated(state, added[k])
-        x, cov, left = _faded(state, time[k], params)
+        x, cov, left = faded(state, time[k], params)
         state, _, taken[k] = step(state, time[k], rows[k], y[k], noise_var[k], params)
         if taken[k]:
-            mean, var = _predicted(x, cov, rows[k], noise_var[k], gain[k])
+            mean, var = predicted(x, cov, rows[k], noise_var[k], gain[k])
             inverse[k] = 1.0 / var
             error[k] = y[k] - mean
         for i in range(n):

@@ -19,6 +19,7 @@ from weighbridge.arguments import check_number
 from weighbridge.balance import forward as force_rows
 from weighbridge.balance.averaging import WINDOW, window_params
 from weighbridge.balance.force_balance import ForceState
+from weighbridge.balance.law import accessory_column
 from weighbridge.balance.table import ForceTable
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.joint import forward as joint_forward
@@ -205,7 +206,7 @@ NO_WINDOWS: Final = Running(np.empty(0), np.empty(0), np.empty(0))
 
 def begin(setup: ForwardSetup, start: float) -> ForwardState:
     """Return the state before the first record, which comes at ``start`` [s] or later."""
-    columns = 3 + setup.joint.std.size
+    columns = 4 + setup.joint.std.size
     return ForwardState(
         motion=forward.begin(setup.navigation, start),
         windows=window_means.initial_state(columns),  # type: ignore[no-untyped-call]
@@ -326,8 +327,9 @@ def with_open(state: ForwardState, setup: ForwardSetup) -> JointState:
     mean = windows.sums / windows.rows
     part = min(windows.rows * setup.period / WINDOW, 1.0)
     window = Window(
-        float(mean[0]), mean[3:], float(mean[1]), float(mean[2] / windows.rows), windows.stood
-    )
+        time=float(mean[0]), row=mean[4:], y=float(mean[1]), accessory=float(mean[3]),
+        torque_var=float(mean[2] / windows.rows), stood=windows.stood,
+    )  # fmt: skip
     noisier = replace(sizes, motion_var=sizes.motion_var / part**2)
     return joint_forward.step(state.joint, window, noisier)
 
@@ -343,7 +345,8 @@ def _folded(
         set_off = float(table.time[new][np.argmax(moving[new])])
     table = replace(table, set_off=set_off)
     rows, y = design(table, setup.vehicle, squat_accel=sizes.body.squat_accel(table.specific_force))
-    values = np.column_stack([table.time, y, table.force_std**2, rows])
+    beside = accessory_column(table, setup.vehicle)
+    values = np.column_stack([table.time, y, table.force_std**2, beside, rows])
     windows, means, count, stood = window_means.run(
         state.windows,
         np.ascontiguousarray(table.time[new]),
@@ -354,7 +357,10 @@ def _folded(
     )
     joint, mass, std = state.joint, np.empty(len(means)), np.empty(len(means))
     for k, (mean, many) in enumerate(zip(means, count, strict=True)):
-        window = Window(float(mean[0]), mean[3:], float(mean[1]), float(mean[2] / many), stood[k])
+        window = Window(
+            time=float(mean[0]), row=mean[4:], y=float(mean[1]), accessory=float(mean[3]),
+            torque_var=float(mean[2] / many), stood=stood[k],
+        )  # fmt: skip
         joint = joint_forward.step(joint, window, sizes)
         mass[k], std[k] = joint.mass, joint.std(sizes)
     light = np.interp(means[:, 0], table.time, burnt)

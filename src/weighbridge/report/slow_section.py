@@ -138,9 +138,31 @@ def slow_section(weighing: MassResult, tiles: Tiles | None = None) -> Section:
                 slow.resistance,
                 slow.resistance_std,
             ),
+            *accessory_panels(weighing),
             wind_panel(weighing, wind, blind),
             wind_map(weighing, wind, blind, tiles),
             disturbance_map(weighing, slow, tiles),
+        ),
+    )
+
+
+def accessory_panels(weighing: MassResult) -> tuple[Panel, ...]:
+    """Draw the power that an engine gives on and off beside the wheels; nothing without."""
+    found = weighing.result.switched if weighing.result is not None else None
+    if found is None:
+        return ()
+    figure = blank(TIME_AXIS, "Power at the engine [kW]")
+    x, power = thin_line(
+        minutes(weighing.drive, found.time), 1e-3 * found.power * found.on, points=POINTS
+    )
+    line(figure, x, power, "taken out", BLUE, line_width=1.6)
+    kilowatts, share = 1e-3 * found.power, 100.0 * float(np.mean(found.on))
+    return (
+        Panel(
+            title=f"Accessories that go on and off: {kilowatts:.1f} kW, {share:.0f} % of the time",
+            caption="A compressor or a fan takes the same power whenever it is on. The torque "
+            "counts it as traction; it was found by its steps and taken out.",
+            figure=figure,
         ),
     )
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import highest_torque
+from weighbridge.balance.law import accessory_column
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
 from weighbridge.estimators.joint.bend import KNEE, above_knee, torque_bend
@@ -40,6 +41,7 @@ from weighbridge.estimators.joint.slow_errors import (
     usable_rows,
     window_motion_variance,
 )
+from weighbridge.estimators.joint.switched import Switched, find_switched, without_switched
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
     OTHER_METHOD_STD,
@@ -147,7 +149,18 @@ def estimate(
     if not load_changes:
         problem = replace(asked.problem, odds=np.full(asked.stood.size, np.nan))
         asked = replace(asked, problem=problem)
-    return _track(balance, vehicle, cut, row_reason, asked, _solve(asked))
+    solved = _solve(asked)
+    column = cut.mean(accessory_column(table, vehicle))
+    found = find_switched(asked.problem, column, solved.added, (solved.fast, solved.slow))
+    if found is not None:
+        asked = replace(
+            asked,
+            problem=without_switched(asked.problem, column, found),
+            y=asked.y - found.force(table, vehicle),
+            switched=found,
+        )
+        solved = _solve(asked)
+    return _track(balance, vehicle, cut, row_reason, asked, solved)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,6 +173,7 @@ class _Asked:
     body : squat that rows and torque do not have in common
     rows, y : (n, k), (n,) of `weighbridge.estimators.joint.slow_errors.design`
     stood : (m,) how long the vehicle stood before each window [s]
+    switched : what is switched on and off, taken out of problem and ``y``; None where nothing is
     """
 
     problem: Problem
@@ -167,6 +181,7 @@ class _Asked:
     rows: Floats
     y: Floats
     stood: Floats
+    switched: Switched | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -341,6 +356,7 @@ def _track(
         filter_input=given,
         possible_change=possible,
         bend=bend,
+        switched=asked.switched,
         sizes=_sizes(balance, asked, solved, shown, systematic),
     )
 
@@ -365,6 +381,7 @@ def _sizes(
         motion_var=window_motion_variance(balance.motion),
         noise_information=shown * float(np.sum(solved.weight)),
         systematic_std=systematic,
+        switched_power=0.0 if asked.switched is None else asked.switched.power,
         settings=asked.problem.settings,
     )
 

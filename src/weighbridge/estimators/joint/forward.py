@@ -17,8 +17,9 @@ from weighbridge.estimators.joint.problem import (
     load_params,
 )
 from weighbridge.estimators.joint.slow_errors import window_noise
+from weighbridge.estimators.joint.switched import doubt_variance, switch_params
 from weighbridge.estimators.judging import STOP
-from weighbridge.kernels import disturbance, load_change
+from weighbridge.kernels import disturbance, load_change, switched
 from weighbridge.signals import Floats
 
 
@@ -51,6 +52,7 @@ class JointState(NamedTuple):
     Attributes
     ----------
     load : both hypotheses of the load; None before the first window
+    switch : both of what is switched; None before the first window, and where nothing is
     total : weight of all windows so far [1/N^2]
     total_at_load : the same when the load of the mass began
     total_at_trial : the same when the change of load that is tried began
@@ -60,6 +62,7 @@ class JointState(NamedTuple):
     """
 
     load: load_change.LoadState | None = None
+    switch: switched.SwitchState | None = None
     total: float = 0.0
     total_at_load: float = 0.0
     total_at_trial: float = 0.0
@@ -96,6 +99,7 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
     load = load_change.initial_state(end)  # type: ignore[no-untyped-call]
     return JointState(
         load=load._replace(rows=seen),
+        switch=_first_switch(end._replace(rows=seen), given.params, setup),
         total=total,
         total_at_load=before,
         total_at_trial=before,
@@ -115,6 +119,7 @@ class Window(NamedTuple):
     y : force that is left for them [N]
     torque_var : variance of its noise that is the torque's [N^2]
     stood : how long the vehicle stood before it [s]
+    accessory : of `weighbridge.balance.law.accessory_column` [N/W]
     """
 
     time: float
@@ -122,6 +127,7 @@ class Window(NamedTuple):
     y: float
     torque_var: float
     stood: float
+    accessory: float = 0.0
 
 
 def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
@@ -134,7 +140,8 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     Parameters
     ----------
     state : before it
-    window
+    window : accessories of the power that the setup tells are taken out of it as far as the
+        windows until then show that they are on
     setup
 
     References
@@ -144,19 +151,32 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     """
     start, params = first_state(setup.std, setup.slow, window.time, setup.settings)
     load, at_load, at_trial = state.load, state.total_at_load, state.total_at_trial
+    switch = state.switch
     if load is None:
         load = load_change.initial_state(start)  # type: ignore[no-untyped-call]
+        switch = _first_switch(start, params, setup)
     noise = setup.fast**2 * window_noise(window.torque_var, setup.mass, setup.motion_var)
+    y = window.y
+    if switch is not None:
+        force, none = setup.switched_power * window.accessory, np.zeros(window.row.size)
+        switch = switched.advance(
+            switch, window.time, window.row, y, noise, force, none, switch_params(params)
+        )
+        on = float(switch.share[1])
+        y -= force * on
+        noise += setup.fast**2 * doubt_variance(force, on)
     long = state.windows > 0 and window.stood >= STOP
     odds = float(change_odds(np.array([window.stood]))[0]) if long else np.nan
     weight = disturbance.weight(load.same, window.time, window.row, noise, params)
     trial_row = load.trial_row
     weighed = load_params(params, setup.std, setup.settings)
     load, mass, var, changed = load_change.step(
-        load, window.time, window.row, window.y, noise, odds, weighed
+        load, window.time, window.row, y, noise, odds, weighed
     )
     if changed >= 0:
         at_load = at_trial
+        if switch is not None:
+            switch = _with_load(switch, load.same)
     if load.open and load.trial_row != trial_row:
         at_trial = state.total
     total = state.total + weight
@@ -164,6 +184,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     low = load.same.cov[0, 0] * setup.attenuating_var * (total - at_load)
     return JointState(
         load=load,
+        switch=switch,
         total=total,
         total_at_load=at_load,
         total_at_trial=at_trial,
@@ -171,3 +192,22 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
         mass=float(mass * (1.0 + low)),
         var=float(var),
     )
+
+
+def _first_switch(
+    state: disturbance.DisturbanceState, params: disturbance.DisturbanceParams, setup: JointSetup
+) -> switched.SwitchState | None:
+    """Begin to tell when accessories are on; None where none are switched."""
+    if not setup.switched_power > 0.0:
+        return None
+    return switched.initial_state(  # type: ignore[no-any-return]
+        state, switch_params(params)
+    )
+
+
+def _with_load(
+    switch: switched.SwitchState, load: disturbance.DisturbanceState
+) -> switched.SwitchState:
+    """Go on with the states of another load, off or on as it was."""
+    both = np.array([load.x, load.x]), np.array([load.cov, load.cov])
+    return switch._replace(x=both[0], cov=both[1])

@@ -188,6 +188,7 @@ class JointSizes:
     noise_information : trace of the windows' information times the noise of the motion in them,
         which times the variance of the mass is the part that it is too low by [1/kg^2]
     systematic_std : relative standard deviation of the mass that no row takes away [-]
+    switched_power : of accessories that go on and off; 0 without [W]
     settings : of the estimator
     """
 
@@ -198,6 +199,7 @@ class JointSizes:
     motion_var: float
     noise_information: float
     systematic_std: float
+    switched_power: float
     settings: JointSettings
 
     @property

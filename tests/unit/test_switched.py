@@ -1,0 +1,119 @@
+"""A compressor that the engine drives on and off: found by its steps, taken out of the mass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import weighbridge as wb
+from weighbridge.balance.law import accessory_column
+from weighbridge.calibration import joint as joint_fit
+from weighbridge.estimators.joint import batch
+from weighbridge.pipeline.forward import forward_weigh, identify_forward
+from weighbridge.report.slow_section import slow_section
+from weighbridge.simulation import MIDSIZE, Scenario, make_scenario, short_route, simulate_car
+
+POWER = 2800.0
+SUMMER = 305.0
+
+
+def drive(power, seed, payload=0.0):
+    return simulate_car(
+        Scenario(
+            name="summer",
+            car=replace(MIDSIZE, compressor_power=power),
+            route=short_route(),
+            ambient_temperature=SUMMER,
+            payload=payload,
+            seed=seed,
+        )
+    )
+
+
+def calibrated(made):
+    return wb.calibrate([d.drive for d in made], mass=[d.scenario.mass for d in made])
+
+
+def pair(power):
+    return [drive(power, 4101), drive(power, 4106, payload=300.0)]
+
+
+@pytest.fixture(scope="module")
+def switched():
+    return pair(POWER)
+
+
+@pytest.fixture(scope="module")
+def car(switched):
+    return calibrated(switched)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return drive(POWER, 4102, payload=200.0)
+
+
+@pytest.fixture(scope="module")
+def weighing(made, car):
+    return wb.weigh(made.drive, car)
+
+
+def test_the_power_and_its_times_are_found(weighing):
+    found = weighing.result.switched
+    assert found.power == pytest.approx(POWER, rel=0.25)
+    # The simulator's compressor is on for 40 s of 70.
+    truly = (found.time - weighing.drive.start) % 70.0 < 40.0
+    assert np.mean((found.on > 0.5) == truly) > 0.85
+
+
+def test_nothing_is_found_where_nothing_is_switched(car):
+    plain = wb.weigh(drive(0.0, 4103, payload=200.0).drive, car)
+    assert plain.status == "converged"
+    assert plain.result.switched is None
+
+
+def test_a_motor_has_no_such_load():
+    made = simulate_car(make_scenario("electric", seed=4104))
+    file = wb.calibrate([made.drive], mass=made.scenario.mass)
+    table = wb.weigh(made.drive, file).result.balance.table
+    assert np.nan_to_num(table.torque).any()
+    assert not accessory_column(table, file).any()
+
+
+def test_the_interval_is_narrower_than_that_of_a_scale_that_takes_it_for_noise(
+    weighing, monkeypatch
+):
+    monkeypatch.setattr(batch, "find_switched", lambda *_: None)
+    blind = wb.weigh(weighing.drive, weighing.vehicle)
+    assert weighing.result.bound_std < 0.75 * blind.result.bound_std
+    assert weighing.result.sizes.slow < 0.75 * blind.result.sizes.slow
+
+
+def test_a_calibration_knows_what_was_switched(switched, car, monkeypatch):
+    """It tells the torque at no load as a calibration without a compressor does."""
+    without = calibrated(pair(0.0))
+    monkeypatch.setattr(joint_fit, "_accessories", lambda *_: [None, None])
+    blind = calibrated(switched)
+    offset, plain, blindly = (f.torque.coefficients[0] for f in (car, without, blind))
+    assert abs(offset - plain) < 0.5 * abs(blindly - plain)
+
+
+def test_it_is_taken_out_on_the_way_too(made, weighing):
+    setup = identify_forward(weighing)
+    assert setup.joint.switched_power == weighing.result.switched.power
+    blind = replace(setup, joint=replace(setup.joint, switched_power=0.0))
+    truth, errors = made.scenario.mass, []
+    for each in (setup, blind):
+        track = forward_weigh(weighing.drive, each)
+        assert (track.state.switch is None) == (each is blind)
+        late = track.time > weighing.drive.start + 300.0
+        errors.append(np.sqrt(np.mean((track.mass[late] - truth) ** 2)) / truth)
+    assert errors[0] < 0.01
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_the_report_shows_it(weighing):
+    panels = slow_section(weighing).panels
+    titles = [p.title for p in panels if "on and off" in p.title]
+    assert len(titles) == 1
+    assert f"{weighing.result.switched.power / 1e3:.1f} kW" in titles[0]
