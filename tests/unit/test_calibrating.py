@@ -338,7 +338,7 @@ def test_joint_calibration_weighs_its_own_drive(empty):
     joint = calibrate(empty.drive, settings=CalibrationSettings(method="joint"))
     w = weigh(empty.drive, joint, method="joint")
     assert w.mass == pytest.approx(empty.drive.info.mass, rel=0.005)
-    assert 0.0 <= joint.timing.torque_lag <= 0.45
+    assert 0.0 <= joint.timing.torque_lag <= 0.3
     assert joint.provenance.method == "joint"
 
 
