@@ -28,7 +28,7 @@ def test_the_search_goes_no_farther_than_its_farthest():
     assert min(tried) == pytest.approx(-FARTHEST)
 
 
-@pytest.mark.parametrize(("delay", "lag"), [(-1.4, 0.3), (-0.1, 0.2), (1.6, 0.45)])
+@pytest.mark.parametrize(("delay", "lag"), [(-1.4, 0.3), (-0.1, 0.2), (1.6, 0.1)])
 def test_delay_and_lag_are_found_far_off_too(delay, lag):
     def misfits(pairs):
         return np.array([(d + x - delay - lag) ** 2 + 0.5 * (x - lag) ** 2 for d, x in pairs])

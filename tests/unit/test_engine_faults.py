@@ -194,6 +194,22 @@ def test_a_torque_through_a_filter_of_seconds_is_found(fleet):
     assert "was smoothed" in said
 
 
+def test_a_noisy_accelerometer_is_not_taken_for_a_smoothed_torque(fleet):
+    vehicle, drive = fleet.files["truck"], fleet.drive("truck")
+    motion, late = find_motion(drive, vehicle), vehicle.timing.torque_delay
+    balance = force_balance(drive, vehicle, motion, delay=late)
+    table = balance.table
+    std, period = 0.35, float(np.median(np.diff(table.time)))
+    shaken = np.random.default_rng(5).normal(0.0, std, table.time.size)
+    noisy = replace(balance, table=replace(table, specific_force=table.specific_force + shaken))
+
+    def noise(span):
+        return std**2 * period / span
+
+    assert "was smoothed" in smoothed_torque(noisy, vehicle)
+    assert smoothed_torque(noisy, vehicle, noise=noise) == ""
+
+
 def test_a_torque_of_the_other_sign_is_blamed_on_nothing_else(fleet):
     drive = fleet.drive("electric")
     turned = with_signal(drive, SOURCE["electric"], lambda t, x: -x)

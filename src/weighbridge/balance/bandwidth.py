@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -31,6 +32,9 @@ FEWEST_ROWS: Final = 200
 FOLLOWS: Final = 0.5
 """Least correlation of force and acceleration over `SLOW` [-]: beneath, they say nothing."""
 
+MOSTLY_MOTION: Final = 0.5
+"""Part of the changes of acceleration that may not be noise, at least [-]."""
+
 THERE: Final = 0.6
 """Part of the time before and after that rows have to cover [-]."""
 
@@ -44,32 +48,45 @@ LONGEST_PERIOD: Final = 0.6
 """Torque that comes less often does not show `FAST` [s]."""
 
 
-def smoothed_torque(balance: ForceBalance, vehicle: Vehicle) -> str:
+def smoothed_torque(
+    balance: ForceBalance,
+    vehicle: Vehicle,
+    *,
+    beside: Floats | float = 0.0,
+    noise: Callable[[float], float] = lambda _: 0.0,
+) -> str:
     """Say that quick changes of the force lack in the torque, in a sentence; empty if not.
 
     Means of the rows before and after an instant are compared, over a short and a long time: what
     the force changes by for each change of the specific force is the mass, over both. A torque that
-    was filtered lacks the quick changes; noise of the motion lowers the mass over the short time
-    too.
+    was filtered lacks the quick changes. Noise of the motion lowers the mass over the short time
+    too, and is allowed for as far as it is known.
 
     Parameters
     ----------
     balance, vehicle
+    beside : (n,) force that is known to be accessories' [N]
+    noise : variance of the mean specific force over a time [s] [m^2/s^4]
+
+    References
+    ----------
+    Regression with errors of known variance in the regressor: Fuller, Measurement Error Models,
+    1987, ch. 1.
     """
     table = balance.table
     if balance.motion.source != "inertial" or table.time.size < FEWEST_ROWS:
         return ""
     if not float(np.median(np.diff(table.time))) <= LONGEST_PERIOD:
         return ""
-    force = force_on_mass(table, vehicle)
+    force = force_on_mass(table, vehicle) - beside
     use = table.usable & np.isfinite(force) & np.isfinite(table.specific_force)
     slow = None
     for span in SLOW:
-        slow = slow or _slopes(table.time, use, force, table.specific_force, span)
+        slow = slow or _slopes(table.time, use, force, table.specific_force, span, noise(span))
     if slow is None:
         return ""
     for span in FAST:
-        fast = _slopes(table.time, use, force, table.specific_force, span)
+        fast = _slopes(table.time, use, force, table.specific_force, span, noise(span))
         if fast is not None and (said := _lacking(fast, slow, span, vehicle)):
             return said
     return ""
@@ -94,11 +111,12 @@ def _lacking(
 
 
 def _slopes(
-    time: Floats, use: Bools, force: Floats, specific: Floats, span: float
+    time: Floats, use: Bools, force: Floats, specific: Floats, span: float, noise: float
 ) -> tuple[Floats, Floats] | None:
     """Sums over blocks of force times acceleration, and of acceleration squared.
 
-    Both are changes of the mean over ``span`` from before an instant to after it.
+    Both are changes of the mean over ``span`` from before an instant to after it; ``noise`` is the
+    variance of such a mean, of which two are in each change.
 
     Returns
     -------
@@ -120,8 +138,10 @@ def _slopes(
         return np.asarray(later - (total[here] - total[before])[whole] / (here - before)[whole])
 
     by_force, by_motion = change(force), change(specific)
-    common, square = by_force * by_motion, by_motion**2
-    least = FOLLOWS * np.sqrt(square.sum() * float(by_force @ by_force))
+    common, square = by_force * by_motion, by_motion**2 - 2.0 * noise
+    if square.sum() < MOSTLY_MOTION * float(by_motion @ by_motion):
+        return None
+    least = FOLLOWS * np.sqrt(float(by_motion @ by_motion) * float(by_force @ by_force))
     if common.sum() < least and span > max(FAST):
         return None
     block = ((time[whole] - time[0]) / BLOCK).astype(np.int64)

@@ -6,6 +6,7 @@ import logging
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -30,6 +31,7 @@ from weighbridge.estimators.joint.bend import bent
 from weighbridge.estimators.joint.changing import in_place_of_loads, largest
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
+from weighbridge.estimators.joint.slow_errors import motion_variance
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.navigation.motion import Motion
@@ -226,7 +228,7 @@ def weigh_balance(
         why := scale_contradiction(balance, vehicle)
         or foreign_part(balance, vehicle)
         or shaken(drive, balance.motion)
-        or _smoothed(drive, vehicle, balance)
+        or _smoothed(drive, vehicle, result)
     ):
         status, reason = Status.INCONSISTENT, why
     if status is Status.CONVERGED and not estimator.speed_alone:
@@ -270,10 +272,17 @@ def weigh_balance(
     )
 
 
-def _smoothed(drive: Drive, vehicle: Vehicle, balance: ForceBalance) -> str:
+def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> str:
     """Say that the torque was smoothed, unless a person vouches for it."""
-    trusted = set(source_of(vehicle).found(drive)) & set(drive.info.trusted)
-    return "" if trusted else smoothed_torque(balance, vehicle)
+    if set(source_of(vehicle).found(drive)) & set(drive.info.trusted):
+        return ""
+    balance, found = track.balance, track.switched
+    return smoothed_torque(
+        balance,
+        vehicle,
+        beside=0.0 if found is None else found.force(balance.table, vehicle),
+        noise=partial(motion_variance, balance.motion),
+    )
 
 
 def without_mass(
