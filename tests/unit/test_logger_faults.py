@@ -69,6 +69,14 @@ def test_a_sensor_recorded_in_turns_comes_in_no_packets(made):
     assert not any("packets" in p.text for p in mend_drive(turns).problems)
 
 
+def test_a_torque_polled_every_four_seconds_is_told_so(made, car):
+    s = made.drive.signals["engine_load"]
+    sparse = made.drive.with_signals(replace(s, time=s.time[::16], values=s.values[::16]))
+    weighing = wb.weigh(sparse, car)
+    assert weighing.status == "not_excited"
+    assert "too short a stretch, for torque comes every 4 s: record it" in weighing.reason
+
+
 def test_a_speed_of_one_row_breaks_nothing(made, car):
     s = made.drive.signals["vehicle_speed"]
     weighing = wb.weigh(
