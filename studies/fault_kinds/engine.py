@@ -32,6 +32,7 @@ UNITS_WORDS = (
     r"|speed's (unit|scale)|\btyres\b|rolls? .* around|the two speeds|\bboth speeds"
 )
 WHOLE = "another vehicle, impossible values"
+SPLICE_WORDS = "recordings are put one behind another"
 WHOLE_WORDS = r"another vehicle|two vehicles|gears change|\bgearings?\b|different drives"
 ACCEL_WORDS = r"accel_x .*outside|values of accel_x|samples of accel_x|inertial samples are"
 
@@ -292,7 +293,13 @@ FAULTS = (
     Fault(UNITS, speed_scale, (0.6214, 0.9, 1.05, 1.1), UNITS_WORDS),
     Fault(UNITS, speed_dropouts, (0.01, 0.1), UNITS_WORDS),
     Fault(UNITS, speed_steps, (5, 20), UNITS_WORDS),
-    Fault(WHOLE, followed_by_another, (0.3, 0.5, 0.8), WHOLE_WORDS, stage="splice"),
+    Fault(
+        WHOLE,
+        followed_by_another,
+        (0.3, 0.5, 0.8),
+        f"{WHOLE_WORDS}|{SPLICE_WORDS}",
+        stage="splice",
+    ),
     Fault(WHOLE, bus_of_another, (0.0,), WHOLE_WORDS + "|clock|apart", stage="splice"),
     Fault(WHOLE, accel_out_of_range, (1e-5, 0.001, 0.05), ACCEL_WORDS),
     Fault(WHOLE, engine_speed_out_of_range, (0.001, 0.05), SPEED_WORDS),

@@ -100,6 +100,31 @@ def test_rows_out_of_order_are_sorted(order):
     ]
 
 
+@pytest.mark.parametrize("falling", [False, True])
+def test_a_table_sorted_by_another_column_is_put_in_the_order_of_time(falling):
+    """Signals that are polled in turn lie one to a row, and empty cells come first."""
+    time = 0.1 * np.arange(6000)
+    speed, revs = 15.0 + 10.0 * np.sin(0.05 * time), 200.0 + 50.0 * np.cos(0.03 * time)
+    speed = np.where(np.arange(time.size) % 2 == 0, np.round(speed, 1), np.nan)
+    revs = np.where(np.arange(time.size) % 2 == 1, revs, np.nan)
+    key = np.nan_to_num(-speed if falling else speed, nan=-99.0)
+    rows = np.argsort(key, kind="stable")
+    table = [("vehicle_speed", speed[rows]), ("engine_speed", revs[rows])]
+    signals, problems = clean_columns(time[rows], table, "x.csv")
+    assert_array_equal(signals[0].time, time[::2])
+    assert_array_equal(signals[0].values, speed[::2])
+    assert_array_equal(signals[1].time, time[1::2])
+    assert [p.text for p in problems] == [
+        "x.csv: the rows are sorted by vehicle_speed, not by time; they were sorted"
+    ]
+
+
+def test_an_odometer_that_rises_does_not_sort_a_clock_that_is_set_back():
+    time = np.concatenate([95.0 * k + 0.1 * np.arange(1000) + 0.003 * k for k in range(12)])
+    _, problems = clean_columns(time, [("odometer", np.arange(time.size))], "x.csv")
+    assert "the clock runs backwards" in problems[0].text
+
+
 def test_a_clock_that_is_set_back_is_not_sorted():
     # Twelve recordings of which each begins 5 s before the last ended.
     pieces = [95.0 * k + 0.1 * np.arange(1000) + 0.003 * k for k in range(12)]

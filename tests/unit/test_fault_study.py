@@ -125,6 +125,8 @@ SAID = {
     "squat": "the drive does not show the squat: pitch of the body is taken as grade",
     "level": "no grade and no altitude: the road is taken as level",
     "noisy": "the gyro is noisy: it reads 0.3 rad/s while the vehicle stands",
+    "splice": "there are jumps of the position, once, at 449 s, as where recordings are put one "
+    "behind another: weighbridge weigh parts them, and read_drives in Python",
     "step": "engine_torque came in steps of 0.5 N m in the calibration, and lies between them here",
 }
 """Sentences of the program."""
@@ -143,7 +145,7 @@ NAMED_BY = {
     "engine_speed_scale": {"air"},
     "speed_scale": set(),
     "speed_freezes": set(),
-    "followed_by_another": set(),
+    "followed_by_another": {"splice"},
     "calibration_mass_scale": {"masses"},
     "two_accel_cells": set(),
     "one_stamp": {"drift"},

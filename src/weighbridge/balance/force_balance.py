@@ -124,7 +124,7 @@ def force_balance(
             full_torque=read.full_torque,
             torque_noise=_torque_noise(vehicle, table),
             fill=fill,
-            periods={name: s.period for name, s in drive.signals.items() if len(s) > 1},
+            periods=drive.periods,
         )
     return ForceBalance(
         table=replace(table, force_std=setup.torque_noise * np.nan_to_num(table.gearing)),

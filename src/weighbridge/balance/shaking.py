@@ -49,7 +49,9 @@ def shaken(drive: Drive, motion: Motion) -> str:
     motion : of its accelerometer
     """
     speed, engine = drive.get("vehicle_speed"), drive.get("engine_speed")
-    if motion.mounting is None or speed is None or engine is None or len(engine) < 2:
+    if motion.mounting is None or speed is None or engine is None:
+        return ""
+    if min(len(speed), len(engine)) < 2:
         return ""
     pairs = changes_of_speed(motion, speed, SPAN)
     if pairs is None:

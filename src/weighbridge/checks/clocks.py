@@ -21,6 +21,11 @@ from weighbridge.vehicle.model import Vehicle
 _SLOW_SENSOR: Final = 5.0
 _SAME_TIME: Final = 0.5
 
+# Samples of a packet lie nearer than those of any sensor of a vehicle [s], and nearer by this
+# factor than samples in the mean [-].
+_NO_SENSOR: Final = 1.5e-3
+_APART: Final = 10.0
+
 # A pause in which nothing was recorded is told [s].
 _PAUSE: Final = 60.0
 
@@ -56,6 +61,8 @@ def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 "name the column time_ms or set the unit in [time] of the mapping",
                 serious=True,
             )
+        elif table == "imu" and (packets := _packets(s)):
+            yield Problem("", f"{name} {packets}", serious=True)
         elif period < fast:
             yield Problem(
                 "",
@@ -63,6 +70,20 @@ def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 "name the column time_s or set the unit in [time] of the mapping",
                 serious=True,
             )
+
+
+def _packets(signal: Signal) -> str:
+    """Say that samples come in packets, each stamped as it arrived; empty where they do not."""
+    step = np.diff(signal.time)
+    step = step[step <= _PAUSE]
+    usual, between = signal.period, step > _APART * signal.period
+    if usual > _NO_SENSOR or np.mean(step) < _APART * usual:
+        return ""
+    return (
+        f"comes in packets of about {1.0 / np.mean(between):.0f} samples, {1e3 * usual:.2g} ms "
+        f"apart, and every {np.median(step[between]):.2g} s a packet: all of one were stamped as "
+        "they arrived; write the sensor's own stamps"
+    )
 
 
 def _as_long_as_speed(drive: Drive, signal: Signal) -> bool:

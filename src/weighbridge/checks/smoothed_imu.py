@@ -36,6 +36,9 @@ PART: Final = 0.2
 
 _REMEDY: Final = "; record it unfiltered"
 
+AT_ONCE: Final = 1 << 20
+"""Samples that are looked at together: a day of them has no room twice."""
+
 SLOWEST: Final = 0.2
 """Samples further apart do not show the shaking [s]."""
 
@@ -99,13 +102,17 @@ def _shaking(axis: Signal, speed: Signal, start: float, count: int) -> Floats:
     long = max(2, round(SECOND / axis.period))
     if len(axis) <= 2 * long:
         return np.zeros(count)
-    total = np.concatenate(([0.0], np.cumsum(axis.values - axis.values[0])))
-    mean = (total[long:] - total[:-long]) / long + axis.values[0]
-    middle = slice(long // 2, long // 2 + mean.size)
-    time, beside = axis.time[middle], axis.values[middle] - mean
-    moving = np.interp(time, speed.time, np.abs(speed.values)) > FAST
-    block = ((time[moving] - start) / BLOCK).astype(np.int64)
-    square = np.bincount(block, beside[moving] ** 2, minlength=count)
-    samples = np.bincount(block, minlength=count)
+    square, samples = np.zeros(count), np.zeros(count)
+    fast = np.abs(speed.values)
+    for first in range(0, len(axis) - long + 1, AT_ONCE):
+        values = axis.values[first : first + AT_ONCE + long - 1]
+        total = np.concatenate(([0.0], np.cumsum(values - values[0])))
+        mean = (total[long:] - total[:-long]) / long + values[0]
+        middle = slice(long // 2, long // 2 + mean.size)
+        time, beside = axis.time[first:][middle], values[middle] - mean
+        moving = np.interp(time, speed.time, fast) > FAST
+        block = ((time[moving] - start) / BLOCK).astype(np.int64)
+        square += np.bincount(block, beside[moving] ** 2, minlength=count)
+        samples += np.bincount(block, minlength=count)
     enough = samples * axis.period > 0.3 * BLOCK
     return np.asarray(np.sqrt(np.where(enough, square / np.maximum(samples, 1), 0.0)))

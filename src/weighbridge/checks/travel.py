@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 import numpy as np
 
@@ -13,9 +14,13 @@ from weighbridge.signals.runs import marked_runs
 from weighbridge.signals.words import counted
 from weighbridge.vehicle.model import Vehicle
 
+IN_TURN: Final = 0.1
+"""Part of the samples in motion from which jumps are no cuts [-]: wheels that spin as often as a
+driver can make them jump in 0.01 of them."""
+
 
 def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
-    """Tell of long standstills and cuts; neither spoils a mass."""
+    """Tell of long standstills and cuts, which spoil no mass, and of a speed of two sources."""
     s = drive.speed
     if s is None or len(s) < 2:
         return
@@ -38,12 +43,18 @@ def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     cut = (jump > 15.0 * step + 1.5) & (step < 1.0)
     if count := int(np.count_nonzero(cut)):
         k = int(np.argmax(np.where(cut, jump, 0.0)))
+        in_turn = count > IN_TURN * max(int(np.count_nonzero(~standing)), 1)
+        why = (
+            "two sources or units take turns in it; map one of them"
+            if in_turn
+            else "a piece may be cut out of the recording there"
+        )
         yield Problem(
             s.name,
             f"{s.name} jumps {counted(count, 'time')}, as from "
             f"{show(s.name, float(s.values[k]))} to {show(s.name, float(s.values[k + 1]))} "
-            f"within {step[k]:.2g} s at {instant(s.time[k])}; "
-            "a piece may be cut out of the recording there",
+            f"within {step[k]:.2g} s at {instant(s.time[k])}; {why}",
+            serious=in_turn,
         )
 
 

@@ -203,15 +203,29 @@ def judge(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
     return Status.CONVERGED, ""
 
 
+SLOW_TORQUE: Final = 1.5
+"""Rows further apart are told, where stretches of them are too short [s]: of a van's torque every
+1 s most rows were used, every 2 s a third, every 3 s none."""
+
 _PASSED: Final = (Status.CONVERGED, "")
+
+
+def _most_of_the_others(table: ForceTable, used: Bools) -> str:
+    """Why most rows that were not used were not, in words."""
+    reasons, share = np.unique(table.reason[table.reason != 0], return_counts=True)
+    alone = np.count_nonzero(table.usable & ~used)
+    if reasons.size and share.max() >= alone:
+        return Reason(int(reasons[np.argmax(share)])).text
+    apart = float(np.median(np.diff(table.time))) if table.time.size > 1 else 0.0
+    slow = f", for torque comes every {apart:.2g} s: record it every second or faster"
+    return Reason.TOO_SHORT.text + (slow if apart > SLOW_TORQUE else "")
 
 
 def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, str]:
     table, count = found.table, int(np.count_nonzero(found.used))
     if count >= found.gate.fewest_rows and found.blocks >= found.gate.fewest_blocks:
         return _PASSED
-    reasons, share = np.unique(table.reason[table.reason != 0], return_counts=True)
-    most = Reason(int(reasons[np.argmax(share)])).text if reasons.size else "too short"
+    most = _most_of_the_others(table, found.used)
     return Status.NOT_EXCITED, (
         f"only {count} usable samples, in {found.blocks} stretch(es) of time; "
         + (found.slow_speed or f"most of the others: {most}")

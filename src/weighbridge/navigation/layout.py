@@ -198,29 +198,24 @@ def pose_at(time: Floats, nodes: Nodes, *, longest: float = math.inf) -> Pose:
     """
     if math.isfinite(longest):
         time = _held_time(time, nodes.time, longest)
-    states = nodes.states
-    angles = np.empty((nodes.time.size, 3))
-    for first in range(0, nodes.time.size, _AT_ONCE):
-        part = slice(first, first + _AT_ONCE)
-        quaternions_to_euler(np.ascontiguousarray(states[part, Q : Q + 4]), angles[part])
-
-    def on_grid(y: Floats) -> Floats:
-        return interpolate(time, nodes.time, y)
 
     def three(first: int) -> Floats:
         out = np.empty((time.size, 3))
         for i in range(3):
-            out[:, i] = on_grid(states[:, first + i])
+            out[:, i] = interpolate(time, nodes.time, nodes.states[:, first + i])
         return out
 
-    return Pose(
-        on_grid(angles[:, 0]),
-        on_grid(angles[:, 1]),
-        on_grid(np.unwrap(angles[:, 2])),
-        three(BA),
-        three(V),
-        three(P),
-    )
+    return Pose(*_angles_at(time, nodes), three(BA), three(V), three(P))
+
+
+def _angles_at(time: Floats, nodes: Nodes) -> tuple[Floats, Floats, Floats]:
+    """Roll, pitch and heading at instants (n,) [rad]."""
+    angles = np.empty((nodes.time.size, 3))
+    for first in range(0, nodes.time.size, _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        quaternions_to_euler(np.ascontiguousarray(nodes.states[part, Q : Q + 4]), angles[part])
+    roll, pitch = (interpolate(time, nodes.time, angles[:, k]) for k in range(2))
+    return roll, pitch, interpolate(time, nodes.time, np.unwrap(angles[:, 2]))
 
 
 def _held_time(time: Floats, nodes: Floats, longest: float) -> Floats:

@@ -128,6 +128,37 @@ def order_of_time(time: Floats) -> Rows | None:
     return np.argsort(time, kind="stable")
 
 
+def sorted_by(time: Floats, columns: Sequence[tuple[str, Floats]]) -> str:
+    """Name of the column whose values rise, or fall, from row to row where the time does not.
+
+    No signal of a drive does so over many runs of its clock, but an odometer whose clock was set
+    back; a table that was sorted does.
+
+    Parameters
+    ----------
+    time : (n,) as recorded; NaN where missing [s]
+    columns : names and (n,) values; NaN where a cell is empty
+
+    Returns
+    -------
+    Empty where there is none.
+    """
+    timed = np.isfinite(time)
+    if (np.diff(time[timed]) >= 0.0).all():
+        return ""
+    for name, raw in columns:
+        if name == "odometer":
+            continue
+        there = timed & np.isfinite(raw)
+        steps = np.diff(raw[there])
+        falls = np.count_nonzero(np.diff(time[there]) < 0.0)
+        if min(falls, np.count_nonzero(steps)) < _FEWEST_RUNS or steps.size < FEWEST_ROWS:
+            continue
+        if (steps >= 0.0).all() or (steps <= 0.0).all():
+            return name
+    return ""
+
+
 def clean_clock(time: Floats, source: str) -> Clock:
     """Leave out stamps that are missing, repeated or out of order.
 
@@ -288,12 +319,12 @@ def clean_columns(
             signals.append(Signal(name, time[there], raw[there]))
         return signals, []
     problems: list[Problem] = []
-    order = order_of_time(time)
+    order, by = order_of_time(time), "not in the order of their time"
+    if order is None and (name := sorted_by(time, columns)):
+        order, by = np.argsort(time, kind="stable"), f"sorted by {name}, not by time"
     if order is not None:
         time, columns = time[order], [(name, raw[order]) for name, raw in columns]
-        problems.append(
-            Problem("", f"{source}: the rows are not in the order of their time; they were sorted")
-        )
+        problems.append(Problem("", f"{source}: the rows are {by}; they were sorted"))
     coarse = spread_rows(time)
     if coarse is not None:
         time, step = coarse

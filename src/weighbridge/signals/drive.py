@@ -184,6 +184,16 @@ class Drive:
         """Time between the first and the last stamp of any signal [s]."""
         return self.end - self.start
 
+    @property
+    def periods(self) -> dict[str, float]:
+        """Median time between samples by name [s]; found once for signals that share a clock."""
+        found: dict[int, float] = {}
+        several = [s for s in self.signals.values() if len(s) > 1]
+        for s in several:
+            if id(s.time) not in found:
+                found[id(s.time)] = s.period
+        return {s.name: found[id(s.time)] for s in several}
+
     def with_signals(self, *signals: Signal) -> Drive:
         """Return a drive in which these signals are added or replaced."""
         check_all("signals", signals, Signal, "weighbridge.Signal")

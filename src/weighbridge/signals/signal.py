@@ -90,7 +90,7 @@ class Signal:
             return self.usual
         if self._period is None:
             steps = np.diff(self.time)
-            usual = float(np.median(steps)) if steps.size else float("nan")
+            usual = float(np.median(steps, overwrite_input=True)) if steps.size else float("nan")
             object.__setattr__(self, "_period", usual)
             return usual
         return self._period

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
@@ -30,6 +31,7 @@ _SLOW: Final = 1.0
 """Slower, wheels do not tell their speed [m/s]."""
 
 _BLOCK: Final = 60.0
+_AT_ONCE: Final = 1 << 20
 """Blocks tell how the scale scatters and changes [s]."""
 
 _FEWEST: Final = 5
@@ -133,12 +135,21 @@ def gravity_read(time: Floats, accel: Axes) -> tuple[Floats, Floats]:
     time : (k,) of the blocks [s]
     part : (k,) of gravity [-]
     """
-    starts = np.flatnonzero(np.diff(np.floor((time - time[0]) / _BLOCK), prepend=-1.0))
+    starts = _starts(time)
     count = np.diff(np.append(starts, time.size))
     sums = np.column_stack([np.add.reduceat(x, starts) for x in accel.columns])
     mean = sums / count[:, None]
     part = np.linalg.norm(mean, axis=1) / GRAVITY
     return np.add.reduceat(time, starts) / count, part
+
+
+def _starts(time: Floats) -> NDArray[np.intp]:
+    """First sample of each block of a minute that has any; looks at a part after another."""
+    found = [np.zeros(1, dtype=np.intp)]
+    for first in range(0, time.size, _AT_ONCE):
+        block = np.floor((time[first : first + _AT_ONCE + 1] - time[0]) / _BLOCK)
+        found.append(first + 1 + np.flatnonzero(np.diff(block)))
+    return np.concatenate(found)
 
 
 def find_gain(

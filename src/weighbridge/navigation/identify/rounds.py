@@ -263,6 +263,8 @@ def _identified(
     end, _ = run(setup.start, found.block.part(0, int(nodes[min(nodes.size, cut) - 1]) + 1), setup)
     rot_bs, start = restarted(setup.rot_bs, setup.start, end)
     setup = replace(setup, rot_bs=rot_bs, start=start)
+    # Smoothing a day takes what memory there is.
+    del still, node_time
     motion = smoothed_motion(found, setup)
     return (
         replace(
