@@ -9,6 +9,7 @@ import weighbridge as wb
 from weighbridge.balance.law import accessory_column
 from weighbridge.calibration import joint as joint_fit
 from weighbridge.estimators.joint import batch
+from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.report.slow_section import slow_section
 from weighbridge.simulation import MIDSIZE, Scenario, make_scenario, short_route, simulate_car
@@ -70,6 +71,13 @@ def test_nothing_is_found_where_nothing_is_switched(car):
     plain = wb.weigh(drive(0.0, 4103, payload=200.0).drive, car)
     assert plain.status == "converged"
     assert plain.result.switched is None
+
+
+def test_without_an_accelerometer_hills_may_look_alike(made, car):
+    imu = [n for n in made.drive.signals if n.startswith(("accel_", "gyro_"))]
+    blind = wb.weigh(made.drive.without(*imu), car)
+    assert blind.result.balance.motion.source in BY_SPEED
+    assert blind.result.switched is None
 
 
 def test_a_motor_has_no_such_load():
