@@ -382,7 +382,9 @@ def j1939_truck() -> str:
         f"{speed.max():.0f} km/h; {sum(found.summary.decoded.values())} frames of "
         f"{len(found.summary.decoded)} groups read, {len(found.summary.ignored)} groups not used.",
         "",
-        f"`weigh` says `{w.status}`: {w.reason}.",
+        f"`weigh` says `{w.status}`:",
+        "",
+        f"```text\n{w.reason}\n```",
         "",
         "Force against acceleration by least squares, with a free constant that takes rolling "
         f"resistance and an even grade: {fit[0]:.0f} kg, 95 % interval "
@@ -658,7 +660,7 @@ def seat_leon() -> str:
         gear_line("all together", drives, known),
     ]
     w = wb.weigh(drives[0], wb.Vehicle.load(SEAT / "vehicle.toml"), method="rls")
-    lines += ["", f"`weigh` says `{w.status}`: {w.reason}."]
+    lines += ["", f"`weigh` says `{w.status}`:", "", f"```text\n{w.reason}\n```"]
     return "\n".join(lines)
 
 
