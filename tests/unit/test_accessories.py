@@ -1,6 +1,7 @@
 """A compressor that the engine drives on and off: found by its steps, taken out of the mass."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -118,6 +119,22 @@ def test_it_is_taken_out_on_the_way_too(made, weighing):
         errors.append(np.sqrt(np.mean((track.mass[late] - truth) ** 2)) / truth)
     assert errors[0] < 0.01
     assert errors[0] < 0.5 * errors[1]
+
+
+def test_live_takes_it_out_as_the_forward_pass_does(made, weighing):
+    """To the last bit, in blocks of three seconds."""
+    setup = identify_forward(weighing)
+    drive = weighing.drive
+    part = drive.between(drive.start, drive.start + 240.0)
+    track = forward_weigh(part, setup)
+    assert track.state.switch is not None
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=drive.info)
+    edges = np.append(np.arange(part.start, part.end, 3.0), part.end + 1.0)
+    for first, last in pairwise(edges):
+        block = part.between(first, last)
+        scale.update_block({n: (s.time, s.values) for n, s in block.signals.items()})
+    scale.finish()
+    assert scale.weighing().std == track.std[-1]
 
 
 def test_the_report_shows_it(weighing):
