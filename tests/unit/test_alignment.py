@@ -5,6 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from weighbridge.constants import EARTH_RADIUS
+from weighbridge.io.clocks import settle_clocks
+from weighbridge.io.log import Log
 from weighbridge.signals import Signal
 from weighbridge.signals.alignment import align
 
@@ -146,3 +149,37 @@ def test_repeated_speed_without_noise_is_ambiguous_too():
     v = 15.0 + 8.0 * np.sin(2.0 * np.pi * t / 40.0)
     found = align(Signal("vehicle_speed", t, v), Signal("gnss_speed", t + 5000.0, v))
     assert "two offsets fit alike" in found.refusal
+
+
+@pytest.mark.parametrize("held", [1, 4])
+def test_turning_aligns_where_an_app_repeats_the_last_fix(tmp_path, held):
+    """Fixes of once per second stand in each row of a log of four rows per second."""
+    rng = np.random.default_rng(12)
+    fixes = np.arange(0.0, 900.0, 1.0)
+    turn = 0.05 * (road_speed(np.arange(0.0, 900.0, 0.02), 5) - 15.0)
+    heading = np.cumsum(turn) * 0.02
+    course = heading[::50] + np.deg2rad(rng.normal(0.0, 1.0, fixes.size))
+    rows = np.repeat(np.arange(fixes.size), held)
+    stamps = 1.7e9 + np.arange(rows.size) / held
+    path = np.cumsum(10.0 * np.cos(course)) / EARTH_RADIUS
+    app = Log(
+        path=tmp_path / "app.csv",
+        absolute=True,
+        signals=[
+            Signal("gnss_course", stamps, np.mod(course, 2.0 * np.pi)[rows]),
+            Signal("gnss_speed", stamps, np.full(rows.size, 10.0)),
+            Signal("latitude", stamps, path[rows]),
+        ],
+    )
+    time = np.arange(turn.size) * 0.02 + 4.0
+    phone = Log(
+        path=tmp_path / "phone.csv",
+        signals=[
+            Signal(f"gyro_{axis}", time, part * turn + rng.normal(0.0, 0.02, turn.size))
+            for axis, part in zip("xyz", (0.6, 0.0, 0.8), strict=True)
+        ],
+    )
+    (problem,) = settle_clocks([app, phone])
+    assert "by yaw rate" in problem.text
+    late = phone.signals[0].time[0] - stamps[0]
+    assert abs(late) < 1.0

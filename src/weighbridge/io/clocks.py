@@ -12,7 +12,7 @@ import numpy as np
 from weighbridge.constants import EARTH_RADIUS
 from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
-from weighbridge.signals import Floats, Problem, Signal
+from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.alignment import Alignment, align
 
 _Signals = Mapping[str, Signal]
@@ -338,8 +338,22 @@ def _yaw_rate(signals: _Signals) -> Signal | None:
     course, speed = signals.get("gnss_course"), signals.get("gnss_speed")
     if course is None or speed is None or len(course) < 3:
         return None
-    step = np.diff(course.time)
-    turn = (np.diff(course.values) + np.pi) % (2.0 * np.pi) - np.pi
-    middle = 0.5 * (course.time[1:] + course.time[:-1])
+    fresh = _fresh(course, signals)
+    if np.count_nonzero(fresh) < 3:
+        return None
+    time, values = course.time[fresh], course.values[fresh]
+    step = np.diff(time)
+    turn = (np.diff(values) + np.pi) % (2.0 * np.pi) - np.pi
+    middle = 0.5 * (time[1:] + time[:-1])
     good = (step < 3.0) & (np.nan_to_num(speed.at(middle)) > _MOVING)
     return Signal("yaw_rate", middle[good], (turn / step)[good]) if good.any() else None
+
+
+def _fresh(course: Signal, signals: _Signals) -> Bools:
+    """Rows with a new fix: some apps repeat the last one until the next comes."""
+    new = np.append(True, np.diff(course.values) != 0.0)
+    for name in ("latitude", "longitude"):
+        beside = signals.get(name)
+        if beside is not None and np.array_equal(beside.time, course.time):
+            new[1:] |= np.diff(beside.values) != 0.0
+    return new

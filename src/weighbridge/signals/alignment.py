@@ -22,8 +22,8 @@ LEVEL: Final = 60.0
 SHORTEST: Final = 30.0
 """Least time in common [s]; and `_SHARE` of the shorter signal."""
 
-LIKENESS: Final = 0.8
-"""Least correlation at the offset found [-]."""
+LIKENESS: Final = 0.72
+"""Least correlation at the offset found [-]; the next best has to explain far less as well."""
 
 AMBIGUOUS: Final = 0.5
 """Above this ratio of what is left unexplained, best over next best, two offsets are comparable."""
