@@ -69,7 +69,9 @@ def test_files_of_two_drives_are_a_table_for_each_kind(tmp_path):
 def test_files_whose_names_tell_no_kind_keep_a_table_each(tmp_path):
     paths = [p for k in ("a", "b") for p in recorded(tmp_path / k, "20210305_180000")]
     paths[0] = paths[0].rename(tmp_path / "a" / "x.csv")
-    assert len(kinds([draft(path) for path in paths])) == 4
+    found = kinds([draft(path) for path in paths])
+    # The adapter's names differ by their date alone; of the phone's two nothing is alike.
+    assert sorted(len(kind.names) for kind in found) == [1, 1, 2]
 
 
 def test_a_table_beside_a_file_that_is_none_is_for_its_own_names(tmp_path):
@@ -86,3 +88,24 @@ def test_a_mapping_that_is_for_no_file_there_says_so(tmp_path):
     words = r"no pattern in files of mapping.*'phone_2020.csv'.*'20210305_180000.csv'.*map "
     with pytest.raises(DriveError, match=words):
         read_drive(tmp_path / "a", mapping)
+
+
+def test_vehicles_of_a_fleet_are_told_apart_by_name_where_kinds_of_file_are_not(tmp_path):
+    """Two read alike, a third otherwise, and one of its files was cut off."""
+    names = [
+        f"KA-{v}_2026-03-0{day}.parquet" for v in ("SE-40", "TR-17", "VN-03") for day in (2, 3)
+    ]
+    paths = []
+    for name in names:
+        torque = "eng_trq_act_nm" if "VN" in name else "eng_trq_pct"
+        columns = {"t_s": T, "eng_spd_rpm": 900.0 + T, torque: 2.0 * T}
+        paths.append(tmp_path / name)
+        pl.DataFrame(columns).write_parquet(paths[-1])
+    cut_off = tmp_path / "KA-VN-03_2026-03-04.parquet"
+    cut_off.write_bytes(b"PAR1")
+    found = kinds([draft(path) for path in paths], [cut_off])
+    assert [len(kind.names) for kind in found] == [2, 2, 2]
+    text = mapping_text(found, [cut_off])
+    for vehicle in ("SE", "TR", "VN"):
+        assert f'files = "KA-{vehicle}-*.parquet"' in text
+    assert file_patterns([kind.names for kind in found], ["KA-VN-notes.parquet"]) == []

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from weighbridge.io.draft import Draft
 from weighbridge.io.draft_column import DraftColumn, gyro_checked
-from weighbridge.io.file_patterns import file_patterns
+from weighbridge.io.file_patterns import file_patterns, undated
 
 
 def merged(drafts: Sequence[Draft]) -> Draft | None:
@@ -42,19 +42,31 @@ def kinds(drafts: Sequence[Draft], others: Sequence[Path] = ()) -> list[Draft]:
     -------
     In the order of their first files; ``drafts`` where names do not tell the kinds apart.
     """
-    groups: list[list[Draft]] = []
+    beside = [path.name for path in others]
+    # Vehicles whose files read alike may have names that only tell each of them from the others.
+    for group in (_layout, _layout_and_name):
+        found = [joined for each in _grouped(drafts, group) if (joined := merged(each)) is not None]
+        alone = len(found) == 1 and not others
+        if alone or file_patterns([kind.names for kind in found], beside):
+            return found
+    return list(drafts)
+
+
+def _grouped(drafts: Sequence[Draft], by: Callable[[Draft], object]) -> list[list[Draft]]:
+    """Put together what has the same key, in the order of the first of each."""
+    groups: list[tuple[object, list[Draft]]] = []
     for one in drafts:
-        known = (g for g in groups if _layout(g[0]) == _layout(one))
-        group = next(known, None)
+        key = by(one)
+        group = next((g for other, g in groups if other == key), None)
         if group is None:
-            groups.append([one])
+            groups.append((key, [one]))
         else:
             group.append(one)
-    found = [joined for group in groups if (joined := merged(group)) is not None]
-    names = [kind.names for kind in found]
-    alone = len(found) == 1 and not others
-    apart = alone or file_patterns(names, [path.name for path in others])
-    return found if apart else list(drafts)
+    return [group for _, group in groups]
+
+
+def _layout_and_name(one: Draft) -> tuple[object, ...]:
+    return _layout(one), undated(one.path.name)
 
 
 def _layout(one: Draft) -> tuple[object, ...]:

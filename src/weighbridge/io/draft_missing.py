@@ -61,7 +61,7 @@ def missing(drafts: Sequence[Draft]) -> Iterator[str]:
         alike = [(one, name) for one, name in left if words & set(words_of(name))]
         if not alike:
             continue
-        names = column_list((name for _, name in alike), _SHOWN)
+        names = column_list(dict.fromkeys(name for _, name in alike), _SHOWN)
         of = f"no column of {alike[0][0].path.name} was taken for {what}"
         if all(_WITHOUT_GRAVITY & set(words_of(name)) for _, name in alike):
             yield f"{of}: {names} have no gravity in them; record the raw accelerometer"

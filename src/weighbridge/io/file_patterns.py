@@ -26,7 +26,8 @@ def file_patterns(kinds: Sequence[Sequence[str]], others: Sequence[str] = ()) ->
     Parameters
     ----------
     kinds : names of the files of each kind
-    others : names of files that are of no kind
+    others : names of files that are of no kind, such as those that cannot be read; where a date
+        alone tells one from a file of a kind, that kind's pattern may fit it
 
     Returns
     -------
@@ -45,7 +46,9 @@ def file_patterns(kinds: Sequence[Sequence[str]], others: Sequence[str] = ()) ->
 def _apart(patterns: Sequence[str], kinds: Sequence[Sequence[str]], others: Sequence[str]) -> bool:
     """Whether each pattern fits the files of its kind and no other."""
     for pattern, own in zip(patterns, kinds, strict=True):
-        foreign = [n for names in kinds if names is not own for n in names] + list(others)
+        alike = set(map(undated, own))
+        foreign = [n for names in kinds if names is not own for n in names]
+        foreign += [n for n in others if undated(n) not in alike]
         if not pattern.removesuffix(Path(own[0]).suffix).strip("*"):
             return False
         if not all(_fits(n, pattern) for n in own) or any(_fits(n, pattern) for n in foreign):
@@ -73,13 +76,18 @@ def _inner(names: Sequence[str]) -> list[str]:
 
 def _of_kind(names: Sequence[str]) -> str:
     """Pattern of the names of one kind: dates may be anything, else what differs."""
-    undated = list(dict.fromkeys(_undated(glob.escape(name)) for name in names))
-    if len(undated) == 1:
-        return undated[0]
+    without_dates = list(dict.fromkeys(map(undated, names)))
+    if len(without_dates) == 1:
+        return without_dates[0]
     stems = [Path(name).stem for name in names]
     before = _common(stems)
     after = _common([stem[len(before) :][::-1] for stem in stems])[::-1]
     return f"{glob.escape(before)}*{glob.escape(after)}{glob.escape(Path(names[0]).suffix)}"
+
+
+def undated(name: str) -> str:
+    """Pattern of a name in which a date, a time or a running number may be anything."""
+    return _undated(glob.escape(name))
 
 
 def _undated(pattern: str) -> str:

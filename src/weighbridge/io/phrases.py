@@ -158,7 +158,7 @@ PHRASES: Final[dict[str, tuple[str, ...]]] = {
     "gnss_course": ("crs", "course", "heading", "bearing", "gps course", "gps bearing", "gps heading", "course over ground", "cog", "kurs", "cap", "rumbo", "track angle", "location course", "direction", "gps direction", "location bearing"),
     "hdop": ("hdop", "horizontal dilution of precision", "dop", "gps hdop"),
     "gnss_accuracy": ("horizontal accu", "accuracy", "gps accuracy", "horizontal accuracy", "genauigkeit", "precision", "location accuracy", "location horizontal accuracy", "position accuracy", "h accuracy", "gps horizontal accuracy"),
-    "longitudinal_accel": ("beschleunigung langs", "beschleunigung laengs", "aceleracion longitudinal", "accelerazione longitudinale", "a x veh", "ax veh", "a long", "along", "veh ax", "longitudinal acceleration", "longitudinal accel", "long accel", "langsbeschleunigung", "laengsbeschleunigung", "acceleration longitudinale", "ax vehicle", "long acceleration", "lon acceleration", "longitudinal acc", "inline acc", "inline acceleration"),
+    "longitudinal_accel": ("beschleunigung langs", "beschleunigung laengs", "aceleracion longitudinal", "accelerazione longitudinale", "a x veh", "ax veh", "a long", "along", "veh ax", "longitudinal acceleration", "longitudinal accel", "long accel", "lon accel", "long acc", "lon acc", "langsbeschleunigung", "laengsbeschleunigung", "acceleration longitudinale", "ax vehicle", "long acceleration", "lon acceleration", "longitudinal acc", "inline acc", "inline acceleration"),
     "grade": ("grade", "road grade", "slope", "steigung", "road slope", "pente", "gradient", "pendiente", "pendenza", "inclination road"),
     **{
         f"accel_{a}": (
