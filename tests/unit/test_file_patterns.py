@@ -70,8 +70,8 @@ def test_files_whose_names_tell_no_kind_keep_a_table_each(tmp_path):
     paths = [p for k in ("a", "b") for p in recorded(tmp_path / k, "20210305_180000")]
     paths[0] = paths[0].rename(tmp_path / "a" / "x.csv")
     found = kinds([draft(path) for path in paths])
-    # The adapter's names differ by their date alone; of the phone's two nothing is alike.
-    assert sorted(len(kind.names) for kind in found) == [1, 1, 2]
+    # The adapter names its files alike; of the phone's two nothing is.
+    assert sorted(kind.files for kind in found) == [1, 1, 2]
 
 
 def test_a_table_beside_a_file_that_is_none_is_for_its_own_names(tmp_path):
