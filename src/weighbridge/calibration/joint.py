@@ -149,17 +149,12 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     settings = replace(settings, torque_noise=noise, knots=problem.knots(turning))
     given = _drive_rows(problem, rows)
     found = fit_with_gusts(given, settings)
+    _refuse_strange(problem, found, rows, settings)
     first = replace(_with(problem.draft, found, settings), timing=timing)
     beside = _accessories(problem, first)
     if any(beside):
         found = fit_with_gusts(_without(given, beside, first), settings)
-    refuse_nonsense(problem, *_driven_slope(problem, found, rows))
-    mean, std = settings.prior
-    if np.any(np.abs(found.road - mean)[:2] > FARTHEST * std[:2]):
-        raise _NoRoadLoad(
-            f"the drives make its drag area {found.road[0]:.1f} m^2 and its rolling coefficient "
-            f"{found.road[1]:.3f}, which no {problem.draft.kind} has"
-        )
+        _refuse_strange(problem, found, rows, settings)
     vehicle = _with(problem.draft, found, settings)
     speeds, loads = ranges(problem, rows)
     vehicle = replace(
@@ -172,6 +167,19 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
         vehicle = noted(vehicle, NOT_TOLD)
     held = ("drag_area",) if found.road[0] <= 0.0 else ()
     return Fitted(vehicle=vehicle, rows=rows, search=search, held=held), found.cov
+
+
+def _refuse_strange(
+    problem: Problem, found: InverseFit, rows: Sequence[DelayedRows], settings: FitSettings
+) -> None:
+    """Refuse a torque that falls with its reading, and a road load that no vehicle has."""
+    refuse_nonsense(problem, *_driven_slope(problem, found, rows))
+    mean, std = settings.prior
+    if np.any(np.abs(found.road - mean)[:2] > FARTHEST * std[:2]):
+        raise _NoRoadLoad(
+            f"the drives make its drag area {found.road[0]:.1f} m^2 and its rolling coefficient "
+            f"{found.road[1]:.3f}, which no {problem.draft.kind} has"
+        )
 
 
 def _accessories(problem: Problem, vehicle: Vehicle) -> list[Switched | None]:
