@@ -4,8 +4,10 @@ import json
 import math
 import os
 import pty
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -296,3 +298,21 @@ def test_on_a_terminal_the_last_line_names_the_questions(weighbridge, tmp_path):
     os.close(ours)
     assert "to be asked about what is doubtful" in told.splitlines()[-1]
     assert "--force --ask" in told.splitlines()[-1]
+
+
+def test_a_folder_of_frames_and_channels_takes_the_dbc_for_its_frames(weighbridge, tmp_path):
+    golden = Path(__file__).parent.parent / "golden"
+    folder, mapping = tmp_path / "drive", tmp_path / "map.toml"
+    folder.mkdir()
+    for name in ("can.mf4", "log.mf4"):
+        shutil.copy(golden / name, folder / name)
+    ran = weighbridge("map", folder, "--dbc", golden / "golden.dbc", "-o", mapping)
+    assert ran.code == 0, ran.err
+    assert "left out" not in ran.out
+    text = mapping.read_text(encoding="utf-8")
+    assert 'files = "can.mf4"' in text
+    assert 'files = "log.mf4"' in text
+    # Alone it is no log that a DBC is for.
+    ran = weighbridge("map", folder / "log.mf4", "--dbc", golden / "golden.dbc")
+    assert ran.code == 2
+    assert "has no CAN frames; leave --dbc out" in ran.err

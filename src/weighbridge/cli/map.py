@@ -218,7 +218,7 @@ def _files(
     for path in logs:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.is_file() and is_log(p))
-            drafts = ((p, _draft(p, databases, names)) for p in inside)
+            drafts = ((p, _draft(p, databases, names, beside=True)) for p in inside)
             there = [(p, draft) for p, draft in drafts if draft is not None]
             if not there:
                 _refuse_arrays(path, path.iterdir())
@@ -249,12 +249,15 @@ def _refuse_arrays(path: Path, files: Iterable[Path]) -> None:
 
 
 def _draft(
-    path: Path, databases: tuple[Database, ...], names: list[str]
+    path: Path, databases: tuple[Database, ...], names: list[str], *, beside: bool = False
 ) -> Callable[[Path], Draft] | None:
-    """What drafts the mapping of a file; None where it is read as it is."""
+    """What drafts the mapping of a file; None where it is read as it is.
+
+    The DBC of a folder may be that of other files ``beside`` it: without frames it is not asked.
+    """
     from weighbridge.errors import DriveError
     from weighbridge.io import draft as tables
-    from weighbridge.io.bus_draft import draft_bus
+    from weighbridge.io.bus_draft import NoFramesError, draft_bus
     from weighbridge.io.formats import format_of
 
     try:
@@ -264,7 +267,17 @@ def _draft(
     if form is None:
         return None
     if databases and form.holds_frames:
-        return lambda log: draft_bus(log, databases)
+        channels = form.draft if beside else None
+
+        def by_frames(log: Path) -> Draft:
+            try:
+                return draft_bus(log, databases)
+            except NoFramesError:
+                if channels is None:
+                    raise
+                return channels(log)
+
+        return by_frames
     if names and form.draft is not tables.draft:
         raise DriveError(f"{path} names what it holds itself; leave out --columns")
     if names:

@@ -21,6 +21,10 @@ from weighbridge.io.naming import recognise_all
 from weighbridge.io.obd import decode_obd
 
 
+class NoFramesError(DriveError):
+    """A log for which a DBC was given has no CAN frames."""
+
+
 def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
     """Look at the frames of a log, and at its channels if it has any, and draft their mapping.
 
@@ -31,8 +35,10 @@ def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
 
     Raises
     ------
+    NoFramesError
+        It has no frames.
     DriveError
-        It has no frames, none of the databases' messages, or no signal that is known.
+        It has none of the databases' messages, or no signal that is known.
     """
     form = format_of(path)
     if form is None:
@@ -43,7 +49,7 @@ def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
         found = Recording([], frames=form.read(path, None, None).frames)
     frames = found.frames
     if frames is None or not len(frames):
-        raise DriveError(f"{path} has no CAN frames; leave --dbc out")
+        raise NoFramesError(f"{path} has no CAN frames; leave --dbc out")
     signals = bus_channels(frames, databases)
     if not signals:
         names = " and ".join(d.path.name for d in databases)
