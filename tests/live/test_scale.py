@@ -13,6 +13,7 @@ from tests.live.conftest import SHORT
 from weighbridge.balance.averaging import WINDOW
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
+from weighbridge.live.checkpoint import VERSION
 from weighbridge.live.learning import REST, _nothing
 from weighbridge.live.records import LATENESS
 from weighbridge.live.weighing import LiveStatus
@@ -254,7 +255,7 @@ def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
     [
         (lambda b: b[: len(b) // 2], "damaged"),
         (lambda b: b.replace('"d"', '"x"', 1), "damaged"),
-        (lambda b: b.replace('checkpoint": 5', 'checkpoint": 9', 1), "version 9"),
+        (lambda b: b.replace(f'checkpoint": {VERSION}', 'checkpoint": 99', 1), "version 99"),
         (lambda b: "\xff" + b, "damaged"),
         (lambda b: "", "damaged"),
     ],
