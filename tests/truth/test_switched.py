@@ -68,7 +68,7 @@ def test_without_a_force_it_is_the_plain_filter():
     assert_allclose(on, 0.5, rtol=1e-9)
     assert told == pytest.approx(plain.log_likelihood, rel=1e-9)
     for k in range(300):
-        state = kernel.advance(state, time[k], rows[k], y[k], noise[k], 0.0, added[k], params)
+        state = kernel.step(state, time[k], rows[k], y[k], noise[k], 0.0, added[k], params)
     assert_allclose(state.x[0], plain.x, rtol=1e-9)
     assert_allclose(state.cov[1], plain.cov, rtol=1e-8)
 

@@ -207,9 +207,3 @@ def run(state, time, rows, y, noise_var, force, added, params):
             was_on += (on[k + 1] if j == 1 else 1.0 - on[k + 1]) * part
         on[k] = was_on
     return on, state.log_likelihood
-
-
-@kernel
-def advance(state, time, row, y, noise_var, force, added, params):
-    """Apply ``step`` to one row; parameters as there."""
-    return step(state, time, row, y, noise_var, force, added, params)

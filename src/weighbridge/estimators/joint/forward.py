@@ -159,7 +159,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     y = window.y
     if switch is not None:
         force, none = setup.switched_power * window.accessory, np.zeros(window.row.size)
-        switch = switched.advance(
+        switch = switched.step(
             switch, window.time, window.row, y, noise, force, none, switch_params(params)
         )
         on = float(switch.share[1])
@@ -209,5 +209,4 @@ def _with_load(
     switch: switched.SwitchState, load: disturbance.DisturbanceState
 ) -> switched.SwitchState:
     """Go on with the states of another load, off or on as it was."""
-    both = np.array([load.x, load.x]), np.array([load.cov, load.cov])
-    return switch._replace(x=both[0], cov=both[1])
+    return switch._replace(x=np.array([load.x, load.x]), cov=np.array([load.cov, load.cov]))
