@@ -252,18 +252,15 @@ def _names(logs: Sequence[Log]) -> str:
 
 
 def _span(logs: Sequence[Log]) -> tuple[float, float]:
-    return (
-        min(float(s.time[0]) for log in logs for s in log.signals),
-        max(float(s.time[-1]) for log in logs for s in log.signals),
-    )
+    return min(log.span[0] for log in logs), max(log.span[1] for log in logs)
 
 
 def _overlapping(logs: Sequence[Log]) -> list[list[Log]]:
     """Group files whose times overlap."""
     groups: list[list[Log]] = []
     end = -np.inf
-    for log in sorted(logs, key=lambda log: _span([log])[0]):
-        start, last = _span([log])
+    for log in sorted(logs, key=lambda log: log.span[0]):
+        start, last = log.span
         if groups and start <= end:
             groups[-1].append(log)
         else:

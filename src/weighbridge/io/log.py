@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -46,6 +47,14 @@ class Log:
     frames: Frames | None = None
     info: DriveInfo | None = None
     pieces: list[Log] = field(default_factory=list)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last stamp [s]; from after all to before all where there is none."""
+        held = [s.time for s in self.signals if len(s)]
+        if not held:
+            return math.inf, -math.inf
+        return min(float(t[0]) for t in held), max(float(t[-1]) for t in held)
 
 
 Reader = Callable[[Path, "str | None", "TableMapping | None"], Log]

@@ -70,17 +70,9 @@ def settle_repeats(logs: Sequence[Log]) -> list[Problem]:
     return problems
 
 
-def _span(log: Log) -> tuple[float, float]:
-    """First and last stamp of a file [s]; what has no stamps meets nothing."""
-    held = [s.time for s in log.signals if len(s)]
-    if not held:
-        return np.inf, -np.inf
-    return min(float(t[0]) for t in held), max(float(t[-1]) for t in held)
-
-
 def _meeting(logs: Sequence[Log]) -> list[tuple[int, int]]:
     """Pairs of files of which one begins before the other ends, by their places."""
-    spans = [_span(log) for log in logs]
+    spans = [log.span for log in logs]
     by_begin = sorted(range(len(logs)), key=lambda k: spans[k][0])
     found = []
     for place, i in enumerate(by_begin):
