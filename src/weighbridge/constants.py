@@ -28,3 +28,6 @@ PETROL_HEATING_VALUE: Final = 45.0e6
 
 HUBER: Final = 1.345
 """Residual over noise beyond which a row counts less [-] (Huber 1964, 95 % efficiency)."""
+
+SAMPLES_AT_ONCE: Final = 1 << 20
+"""Samples of a drive that are looked at together, where those of a day have no room twice."""

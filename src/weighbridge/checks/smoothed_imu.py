@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.constants import SAMPLES_AT_ONCE
 from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -35,9 +36,6 @@ PART: Final = 0.2
 """Part of the driving that has to be quiet [-]."""
 
 _REMEDY: Final = "; record it unfiltered"
-
-AT_ONCE: Final = 1 << 20
-"""Samples that are looked at together: a day of them has no room twice."""
 
 SLOWEST: Final = 0.2
 """Samples further apart do not show the shaking [s]."""
@@ -104,8 +102,8 @@ def _shaking(axis: Signal, speed: Signal, start: float, count: int) -> Floats:
         return np.zeros(count)
     square, samples = np.zeros(count), np.zeros(count)
     fast = np.abs(speed.values)
-    for first in range(0, len(axis) - long + 1, AT_ONCE):
-        values = axis.values[first : first + AT_ONCE + long - 1]
+    for first in range(0, len(axis) - long + 1, SAMPLES_AT_ONCE):
+        values = axis.values[first : first + SAMPLES_AT_ONCE + long - 1]
         total = np.concatenate(([0.0], np.cumsum(values - values[0])))
         mean = (total[long:] - total[:-long]) / long + values[0]
         middle = slice(long // 2, long // 2 + mean.size)

@@ -22,6 +22,10 @@ from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
+SLOW_TORQUE: Final = 1.5
+"""Rows further apart are told, where stretches of them are too short [s]: of a van's torque every
+1 s most rows were used, every 2 s a third, every 3 s none."""
+
 STOP: Final = 20.0
 """A standstill this long may change the load [s]."""
 
@@ -202,10 +206,6 @@ def judge(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
             return status, reason
     return Status.CONVERGED, ""
 
-
-SLOW_TORQUE: Final = 1.5
-"""Rows further apart are told, where stretches of them are too short [s]: of a van's torque every
-1 s most rows were used, every 2 s a third, every 3 s none."""
 
 _PASSED: Final = (Status.CONVERGED, "")
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
+from weighbridge.constants import SAMPLES_AT_ONCE
 from weighbridge.navigation.aiding import resolution
 from weighbridge.signals import Bools, Floats, Signal
 from weighbridge.signals.interpolation import interpolate
@@ -33,8 +34,6 @@ _HOP: Final = 90.0
 _ABOUT: Final = 15.0
 # Stamps so close are enough for the integrals [s].
 _FINE: Final = 0.02
-# Samples that are integrated together.
-_AT_ONCE: Final = 1 << 20
 # Gaps across which force and speed are not followed [s].
 _FORCE_GAP: Final = 0.5
 _SPEED_GAP: Final = 3.0
@@ -273,8 +272,8 @@ def _integral(s: Signal, stride: int) -> Floats:
     # Less gravity, so that the sum stays small.
     level = np.median(s.values[:: max(1, len(s) // 1000)])
     found, area = [np.zeros(1)], 0.0
-    for first in range(0, len(s) - 1, _AT_ONCE):
-        here = slice(first, first + _AT_ONCE + 1)
+    for first in range(0, len(s) - 1, SAMPLES_AT_ONCE):
+        here = slice(first, first + SAMPLES_AT_ONCE + 1)
         values = s.values[here] - level
         grown = 0.5 * (values[1:] + values[:-1]) * np.diff(s.time[here])
         grown[0] += area

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from weighbridge.constants import GRAVITY
+from weighbridge.constants import GRAVITY, SAMPLES_AT_ONCE
 from weighbridge.navigation.aiding import resolution
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
@@ -31,7 +31,6 @@ _SLOW: Final = 1.0
 """Slower, wheels do not tell their speed [m/s]."""
 
 _BLOCK: Final = 60.0
-_AT_ONCE: Final = 1 << 20
 """Blocks tell how the scale scatters and changes [s]."""
 
 _FEWEST: Final = 5
@@ -146,8 +145,8 @@ def gravity_read(time: Floats, accel: Axes) -> tuple[Floats, Floats]:
 def _starts(time: Floats) -> NDArray[np.intp]:
     """First sample of each block of a minute that has any; looks at a part after another."""
     found = [np.zeros(1, dtype=np.intp)]
-    for first in range(0, time.size, _AT_ONCE):
-        block = np.floor((time[first : first + _AT_ONCE + 1] - time[0]) / _BLOCK)
+    for first in range(0, time.size, SAMPLES_AT_ONCE):
+        block = np.floor((time[first : first + SAMPLES_AT_ONCE + 1] - time[0]) / _BLOCK)
         found.append(first + 1 + np.flatnonzero(np.diff(block)))
     return np.concatenate(found)
 
