@@ -116,8 +116,8 @@ def test_a_day_is_looked_at_in_parts_and_found_as_in_one(short, monkeypatch):
     accel = [short.signals[f"accel_{a}"] for a in "xyz"]
     time = np.cumsum(np.random.default_rng(1).uniform(0.0, 40.0, 3001))
     whole, minutes = Integrated.of(accel), gain._starts(time)
-    monkeypatch.setattr(clock_lag, "_AT_ONCE", 1001)
-    monkeypatch.setattr(gain, "_AT_ONCE", 7)
+    monkeypatch.setattr(clock_lag, "SAMPLES_AT_ONCE", 1001)
+    monkeypatch.setattr(gain, "SAMPLES_AT_ONCE", 7)
     in_parts = Integrated.of(accel)
     for one, other in zip(whole.integrals, in_parts.integrals, strict=True):
         assert_array_equal(one, other)
