@@ -88,45 +88,49 @@ def on_the_way(car: wb.Vehicle, drive: Drive, every: float = 1.0) -> None:
 
 
 class Waiting(NamedTuple):
-    """By wall clock: between two weighings shown, and their ages when one is replaced [s]."""
+    """By wall clock: between two weighings, and their ages when shown and replaced [s]."""
 
     stalls: list[float]
     ages: list[float]
+    replaced: list[float]
 
 
-def by_wall_clock(car: wb.Vehicle, drive: Drive, every: float = 1.0) -> None:
-    """Feed a drive as sources do, and tell what a person sees who has a watch.
+def by_wall_clock(car: wb.Vehicle, drive: Drive, *, aside: bool, every: float = 1.0) -> None:
+    """Feed a drive as sources do, in its own time, and tell what a person sees who has a watch.
 
-    Blocks come when they are over. One thread takes them in turn; each takes as long as it was
-    measured to take here. So what waits behind a look at all records is counted.
+    Blocks come when they are over. One thread takes them in turn. It waits while it looks at all
+    records, or with ``aside`` goes on meanwhile, as ``weighbridge live`` does in a vehicle.
     """
     scale = wb.LiveScale(car, info=drive.info)
-    free = due = drive.start
+    scale.looks_aside = aside
+    due, begin = drive.start, time.perf_counter()
     seen = shown = told_for = math.nan
-    waiting = Waiting([], [])
+    waiting = Waiting([], [], [])
     for k, samples in enumerate(blocks(drive, BLOCK)):
-        came = drive.start + (k + 1) * BLOCK
-        begin = time.perf_counter()
+        time.sleep(max(0.0, begin + (k + 1) * BLOCK - time.perf_counter()))
         scale.update_block(samples)
-        told = None
-        if scale.newest >= due:
-            due = scale.newest + every
-            told = scale.weighing(ahead=True)
-        free = max(free, came) + time.perf_counter() - begin
-        if told is None:
+        if scale.newest < due:
             continue
-        seen, shown = shown, free
+        due = scale.newest + every
+        told = scale.weighing(ahead=True)
+        seen, shown = shown, drive.start + time.perf_counter() - begin
         if math.isfinite(seen):
             waiting.stalls.append(shown - seen - every)
+        if math.isfinite(told.time):
+            waiting.ages.append(shown - told.time)
         if math.isfinite(told_for):
-            waiting.ages.append(shown - told_for)
+            waiting.replaced.append(shown - told_for)
         told_for = told.time
+    scale.finish()
+    print(f"by a watch, looks {'beside' if aside else 'in between'}, median, 99 % and most")
     for what, values in (
         ("longer than a second between two weighings shown", waiting.stalls),
-        ("age of a weighing when the next one takes its place", waiting.ages),
+        ("age of a weighing when it is shown", waiting.ages),
+        ("age of a weighing when the next one takes its place", waiting.replaced),
     ):
-        low, high, most = np.percentile(values, [50.0, 99.0, 100.0])
-        print(f"{what}, median, 99 % and most{low:8.2f} s {high:.2f} s {most:.2f} s")
+        if values:
+            low, high, most = np.percentile(values, [50.0, 99.0, 100.0])
+            print(f"  {what:<52}{low:8.2f} s {high:.2f} s {most:.2f} s")
 
 
 def sample_by_sample(car: wb.Vehicle, drive: Drive, span: float = 300.0) -> None:
@@ -180,13 +184,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=0.0)
     parser.add_argument("--bus", type=float, default=4.0, help="rate of the bus [Hz]")
+    parser.add_argument(
+        "--watch", type=float, default=12.0, help="twice so long in real time [min]"
+    )
     parser.add_argument("--scenario", default="car", help="such as car-short")
     asked = parser.parse_args()
     known, mass = made(61, asked.scenario, asked.bus)
     car = wb.calibrate(known, mass=mass)
     drive, _ = made(62, asked.scenario, asked.bus)
     print(f"load of the machine{os.getloadavg()[0]:8.1f}")
-    by_wall_clock(car, drive)
+    watched = drive.between(drive.start, drive.start + 60.0 * asked.watch)
+    for aside in (False, True):
+        by_wall_clock(car, watched, aside=aside)
     replayed(car, drive)
     replayed(car, drive)
     on_the_way(car, drive)

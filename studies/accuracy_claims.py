@@ -541,7 +541,7 @@ def tell_data_sheet(done: Rows) -> str:
     rows = [row for _, part in done for row in part]
     lines = [
         "| vehicle | torque read | drives | RMS % | mean % | 95th % | worst % | within 5 % "
-        "| intervals that hold | standard deviation told % |",
+        "| intervals that hold | standard deviation reported % |",
         "|---" * 10 + "|",
     ]
     for kind in (*dict.fromkeys(r.kind for r in rows), "all"):
@@ -634,7 +634,7 @@ def tell_cruise(done: Rows) -> str:
     rows = [row for _, part in done for row in part]
     lines = [
         "| recorded | drives | refused as bad data | not_excited | weighed, interval holds "
-        "| weighed, interval does not | std told %, least to largest "
+        "| weighed, interval does not | std reported %, least to largest "
         "| errors of what was weighed % |",
         "|---" * 8 + "|",
     ]

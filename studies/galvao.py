@@ -2,8 +2,10 @@
 
 Run from the checkout: ``python studies/galvao.py``. Recorded drives lie in
 ``../shared/data`` and are not part of the project; without them their table says so.
-``python studies/galvao.py tuning`` prints the transfer error that set the interval, ``alone`` makes
-all but the table of speed and torque anew, which takes an hour, and ``torque`` that table alone.
+``python studies/galvao.py tuning`` prints the transfer error that set the interval. ``alone`` makes
+all but the tables of speed and torque anew, which take an hour and a half, ``torque`` those alone,
+and names of their parts (``own``, ``second``, ``sheets``, ``levels``, ``electric``, ``recorded``)
+these parts.
 """
 
 from __future__ import annotations
@@ -435,25 +437,39 @@ def figure(done: paper.Reproduction) -> None:
     plt.close(drawn)
 
 
-TORQUE = ("<!-- torque -->", "<!-- /torque -->")
+TORQUE = ("own", "second", "sheets", "levels", "electric", "recorded")
+"""Parts of the study of speed and recorded torque."""
 
 
-def between(page: str) -> str:
-    """Return what a page has between the marks of the table of speed and torque."""
-    return page.split(TORQUE[0])[1].split(TORQUE[1])[0] if TORQUE[0] in page else "\n"
+def marks(name: str) -> tuple[str, str]:
+    """Return what stands before and after the table of a part."""
+    return f"<!-- torque {name} -->\n", f"<!-- /torque {name} -->"
 
 
-def with_torque(page: str, text: str) -> str:
-    """Put a text between these marks."""
-    before, rest = page.split(TORQUE[0])
-    return f"{before}{TORQUE[0]}{text}{TORQUE[1]}{rest.split(TORQUE[1])[1]}"
+def between(page: str, name: str) -> str:
+    """Return the table of a part that a page has; nothing where it has none."""
+    begin, end = marks(name)
+    return page.split(begin)[1].split(end)[0] if begin in page else ""
 
 
-def torque_tables() -> str:
+def with_table(page: str, name: str, table: str) -> str:
+    """Put the table of a part at its place."""
+    begin, end = marks(name)
+    before, rest = page.split(begin)
+    return f"{before}{begin}{table}{end}{rest.split(end)[1]}"
+
+
+def torque_table(name: str) -> str:
     """Weigh by speed and recorded torque, and by joint without an accelerometer."""
-    made = speed_torque.parts("judging")
-    simulated = [made[name]() for name in ("own", "second", "sheets", "levels")]
-    return "\n" + "\n".join([speed_torque.HEAD, *simulated]) + f"\n\n{made['recorded']()}\n"
+    rows = speed_torque.parts("judging")[name]()
+    return f"{rows}\n" if name == "recorded" else f"{speed_torque.HEAD}\n{rows}\n"
+
+
+def renew_torque(out: Path, names: Iterable[str]) -> None:
+    """Make parts of speed and torque anew; each is written as soon as it is made."""
+    for name in names:
+        table = torque_table(name)
+        out.write_text(with_table(out.read_text(encoding="utf-8"), name, table), encoding="utf-8")
 
 
 def main() -> None:
@@ -461,9 +477,8 @@ def main() -> None:
     if asked == ["tuning"]:
         print(transfer_text(TUNING))
         return
-    if asked == ["torque"]:
-        page = with_torque(out.read_text(encoding="utf-8"), torque_tables())
-        out.write_text(page, encoding="utf-8")
+    if asked and set(asked) <= {*TORQUE, "torque"}:
+        renew_torque(out, TORQUE if "torque" in asked else asked)
         return
     done = paper.reproduce(seed=SEED)
     figure(done)
@@ -483,8 +498,12 @@ def main() -> None:
         ("bmw-i3", bmw_i3()),
     ):
         page = page.replace(f"<!-- {name} -->", text)
-    kept = between(out.read_text(encoding="utf-8")) if asked == ["alone"] else torque_tables()
-    out.write_text(with_torque(page, kept), encoding="utf-8")
+    before = out.read_text(encoding="utf-8")
+    for name in TORQUE:
+        page = with_table(page, name, between(before, name))
+    out.write_text(page, encoding="utf-8")
+    if asked != ["alone"]:
+        renew_torque(out, TORQUE)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Speed and recorded torque, no accelerometer: ``speed-torque-ekf`` beside ``joint``. Run me.
 
-    python studies/speed_torque.py [own|second|sheets|levels|recorded|logs ...] [--tuning]
+    python studies/speed_torque.py [own|second|sheets|levels|electric|recorded|logs ...] [--tuning]
 
 Each part prints its rows; ``python studies/galvao.py`` puts them all in ``galvao.md``. Every drive
 is stripped of its accelerometer first. A vehicle is calibrated for each of the two methods on three
@@ -39,6 +39,8 @@ OWN: Final = {"judging": 164_000, "tuning": 163_000}
 SECOND: Final = {"judging": 9520, "tuning": 9500}
 OWN_LEVELS: Final = {"judging": 184_000, "tuning": 163_000}
 SECOND_LEVELS: Final = {"judging": 9740, "tuning": 9500}
+OWN_ELECTRIC: Final = {"judging": range(185_000, 185_080, 20), "tuning": (163_060, 163_180)}
+SECOND_ELECTRIC: Final = {"judging": (9748, 9758), "tuning": (9508, 9518)}
 KNOWN: Final = (0.0, 0.5, 0.9)
 WEIGHED: Final = (0.0, 0.3, 0.7, 1.0)
 SECOND_WEIGHED: Final = ((0.0, "ordinary"), (0.95, "ordinary"), (0.3, "city"), (0.6, "ordinary"))
@@ -212,7 +214,8 @@ def levels(seeds: str, count: int = len(KINDS), second_count: int = 4) -> str:
         own_vehicle(OWN_LEVELS[seeds] + 20 * k, KINDS[k], by_map, blind) for k in range(count)
     ]
     second_found = [
-        second_one(SECOND_LEVELS[seeds] + k, k, mapped=True) for k in range(second_count)
+        second_one(SECOND_LEVELS[seeds] + k, SECOND_KINDS[k], mapped=True)
+        for k in range(second_count)
     ]
     return "\n".join(
         [
@@ -223,9 +226,23 @@ def levels(seeds: str, count: int = len(KINDS), second_count: int = 4) -> str:
     )
 
 
-def second_one(seed: int, k: int, *, mapped: bool = False) -> dict[str, list[Result]]:
+def electric(seeds: str) -> str:
+    """Compare on electric cars by the grade of a map, and by GNSS heights on the same drives."""
+    found = [own_vehicle(seed, "electric", by_map, by_heights) for seed in OWN_ELECTRIC[seeds]]
+    second_found = [
+        second_one(seed, "electric_car", mapped=True) for seed in SECOND_ELECTRIC[seeds]
+    ]
+    return "\n".join(
+        [
+            rows("electric cars, own simulator, grade of a map", [f[0] for f in found]),
+            rows("the same drives, GNSS heights", [f[1] for f in found]),
+            rows("electric cars, second model, grade of a map", second_found),
+        ]
+    )
+
+
+def second_one(seed: int, kind: str, *, mapped: bool = False) -> dict[str, list[Result]]:
     """Compare on one vehicle of the second model."""
-    kind = SECOND_KINDS[k % len(SECOND_KINDS)]
     made = second_vehicle(kind, seed)
     base = wb.Vehicle(name=kind, kind=CLASSES.get(kind, "car"))
     sys.stderr.write(f"{kind} {seed}\n")
@@ -241,8 +258,8 @@ def second_one(seed: int, k: int, *, mapped: bool = False) -> dict[str, list[Res
 
 def second(first: int, count: int = 10) -> str:
     """Vehicles, roads and drivers of the second model, with GNSS heights."""
-    found = [second_one(first + k, k) for k in range(count)]
     kinds = [SECOND_KINDS[k % len(SECOND_KINDS)] for k in range(count)]
+    found = [second_one(first + k, kind) for k, kind in enumerate(kinds)]
     heavy = [f for f, kind in zip(found, kinds, strict=True) if CLASSES.get(kind) in HEAVY]
     light = [f for f, kind in zip(found, kinds, strict=True) if CLASSES.get(kind) not in HEAVY]
     return "\n".join(
@@ -400,6 +417,7 @@ def parts(seeds: str) -> dict[str, Callable[[], str]]:
         "second": lambda: second(SECOND[seeds]),
         "sheets": lambda: sheets(SECOND[seeds]),
         "levels": lambda: levels(seeds),
+        "electric": lambda: electric(seeds),
         "recorded": recorded,
         "logs": logs,
     }

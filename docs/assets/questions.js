@@ -12,6 +12,16 @@
     [/\bsigmas?\b/gi, "standard deviation"],
     [/\bplug[ -]?ins?\b/gi, "plug-in own method"],
     [/\bgps\b/gi, "$& gnss"],
+    [/\btow(s|ed|ing)?\b/gi, "$& trailer"],
+    [/\b(gradients?|slopes?|inclines?)\b/gi, "$& grade"],
+    [/\btire(s?)\b/gi, "tyre$1"],
+    [/\b(iphones?|smartphones?|android)\b/gi, "$& phone"],
+    [/\bkeyboard\b/gi, "$& keys"],
+    [/\bpdf\b/gi, "$& print"],
+    [/\b(gdpr|dsgvo)\b/gi, "$& privacy"],
+    [/\bdecimal commas?\b/gi, "decimal csv semicolon"],
+    [/\b(contact|support|bugs?)\b/gi, "report fault stuck"],
+    [/\b(weight|heavy)\b/gi, "$& mass"],
     [/\breal data\b/gi, "recorded drives"],
   ];
   const common = new Set(

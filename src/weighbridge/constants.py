@@ -3,7 +3,10 @@
 from typing import Final
 
 GRAVITY: Final = 9.81
-"""Standard acceleration used throughout [m/s^2] (Jensen 2022, sec. 5.2)."""
+"""Acceleration of free fall in all models [m/s^2] (Jensen 2022, sec. 5.2)."""
+
+STANDARD_GRAVITY: Final = 9.80665
+"""What an accelerometer's unit g is [m/s^2] (CGPM 1901)."""
 
 EARTH_RADIUS: Final = 6_371_008.8
 """Mean radius of the Earth [m] (IUGG)."""

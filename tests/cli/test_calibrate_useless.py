@@ -51,3 +51,21 @@ def test_one_drive_of_several_without_a_mass_is_told_and_no_failure(car, known, 
     own = own_masses(replace(vehicle, provenance=made), [drive, read_drive(cruise)])
     assert not own.useless
     assert own.doubt.startswith("the calibration has no mass of 1 of its 2 own drives, such as cru")
+
+
+def test_a_known_mass_outside_what_the_file_weighs_is_told(car, known):
+    drive, vehicle = read_drive(known.folder), Vehicle.load(car)
+    assert own_masses(vehicle, [drive]).doubt == ""
+    heavier = replace(vehicle.provenance, masses=(1.2 * vehicle.provenance.masses[0],))
+    doubt = own_masses(replace(vehicle, provenance=heavier), [drive]).doubt
+    assert "of 1 of the calibration's 1 own drives lies outside" in doubt
+    assert "kg in place of 1896 kg): check that mass" in doubt
+
+
+def test_loads_that_change_in_a_drive_of_one_known_mass_are_told(car):
+    made = make_scenario("car-loading", payload=0.0, seed=3)
+    drive = simulate_car(replace(made, duration=1500.0)).drive
+    vehicle = Vehicle.load(car)
+    one = replace(vehicle.provenance, masses=(1580.0,))
+    doubt = own_masses(replace(vehicle, provenance=one), [drive]).doubt
+    assert "its load seems to change" in doubt

@@ -87,7 +87,13 @@ def write_foreign(folder: Path) -> None:
     rows = ["Zeit [ms];Geschwindigkeit [km/h];Motordrehzahl [1/min];Längsbeschl. [g];Höhe [m]"]
     for t in OBD_TIME:
         speed, engine = 3.6 * 1.5 * t, 30.0 / np.pi * 60.0 * t
-        cells = [f"{1000 * t:.1f}", f"{speed:.10f}", f"{engine:.10f}", f"{-1.5 / 9.81:.12f}", "500"]
+        cells = [
+            f"{1000 * t:.1f}",
+            f"{speed:.10f}",
+            f"{engine:.10f}",
+            f"{-1.5 / 9.80665:.12f}",
+            "500",
+        ]
         rows.append(";".join(cells).replace(".", ","))
     (folder / "foreign.csv").write_text("\n".join(rows) + "\n", encoding="latin-1")
     (folder / "foreign.toml").write_text(
@@ -129,7 +135,7 @@ def write_mdf(folder: Path) -> None:
         ("engine_speed_rpm", 30.0 / np.pi * truth("engine_speed", OBD_TIME), ""),
         ("MotTrq", truth("engine_torque", OBD_TIME), "Nm"),
     ]
-    imu = [(f"accel_{a}", truth(f"accel_{a}", IMU_TIME) / 9.81, "g") for a in "xyz"]
+    imu = [(f"accel_{a}", truth(f"accel_{a}", IMU_TIME) / 9.80665, "g") for a in "xyz"]
     for time, channels in ((OBD_TIME, obd), (IMU_TIME, imu)):
         file.append([MdfSignal(v, time, name=n, unit=u) for n, v, u in channels])
     file.save(folder / "log.mf4", overwrite=True)

@@ -14,7 +14,8 @@ from weighbridge.balance.averaging import WINDOW
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
 from weighbridge.live.checkpoint import VERSION
-from weighbridge.live.learning import REST, _nothing
+from weighbridge.live.learning import _nothing
+from weighbridge.live.on_the_move import REST
 from weighbridge.live.records import LATENESS
 from weighbridge.live.weighing import LiveStatus
 from weighbridge.pipeline.forward import (
@@ -365,7 +366,7 @@ def test_a_change_of_load_is_found_on_the_way(car, loaded):
     low, high = told.interval()
     assert low < made.scenario.mass + 500.0 < high
     assert high - low < 0.2 * told.mass
-    assert scale._driven_this_load < 0.7 * told.driven
+    assert scale._move.this_load < 0.7 * told.driven
 
 
 def test_a_mass_that_is_too_wide_is_not_told(weighing, setup, short):
@@ -387,10 +388,10 @@ def test_a_scale_looks_at_its_records_when_the_vehicle_stands(car, loaded):
     part = loaded.drive.between(loaded.drive.start, loaded.drive.start + 400.0)
     for block in blocks(part, even(part, 2.0)):
         scale.update_block(block)
-        if scale._driven > scale._learned_at + 62.0:
+        if scale._move.driven > scale._move.looked_at + 62.0:
             break
-    looked, end = scale._learned_at, scale.newest
-    assert scale._driven > looked + 60.0
+    looked, end = scale._move.looked_at, scale.newest
+    assert scale._move.driven > looked + 60.0
     rest = np.arange(0.1, REST + 5.0, 0.1)
     scale.update_block(
         {
@@ -398,7 +399,7 @@ def test_a_scale_looks_at_its_records_when_the_vehicle_stands(car, loaded):
             for n, s in part.signals.items()
         }
     )
-    assert scale._learned_at == scale._driven > looked
+    assert scale._move.looked_at == scale._move.driven > looked
 
 
 def test_a_withdrawn_mass_stays_withdrawn_over_a_power_cut(weighing, setup, short):

@@ -34,7 +34,7 @@ def calibrated(foreign_simulator):
 
 @pytest.mark.parametrize(
     ("names", "most"),
-    [(THREE, 0.9), (("calibration-1",), 1.1), (("brisk-calibration",), 1.1)],
+    [(THREE, 0.95), (("calibration-1",), 1.1), (("brisk-calibration",), 1.1)],
     ids=["three", "one", "brisk"],
 )
 def test_masses_of_vehicles_of_another_simulator(foreign_simulator, calibrated, names, most):

@@ -77,7 +77,7 @@ def test_a_mapping_reads_an_app_as_a_plain_table(tmp_path):
         "signals": {"longitudinal_accel": {"column": "x_acc", "unit": "g"}},
     }
     drive = read_drive(write(tmp_path / "session.csv", CHRONO), mapping)
-    assert_allclose(drive.signals["longitudinal_accel"].values, [0.0981, 0.1962])
+    assert_allclose(drive.signals["longitudinal_accel"].values, [0.0980665, 0.196133])
 
 
 # Torque Pro

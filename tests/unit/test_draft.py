@@ -489,5 +489,12 @@ def test_each_column_has_the_rate_that_reading_finds(tmp_path):
     drive = read_drive(path, mapping)
     for column, rate in zip(found.known, (2.0, 0.5), strict=True):
         signal = drive.signals[column.quantity]
-        assert column.rate == pytest.approx((len(signal) - 1) / signal.duration, rel=1e-6)
+        assert column.rate == pytest.approx(1.0 / signal.period, rel=1e-6)
         assert column.rate == pytest.approx(rate, rel=0.01)
+
+
+def test_a_gap_does_not_lower_the_rate(tmp_path):
+    """Ten values a second for two minutes, with an hour between."""
+    rows = [f"{k / 10 + 3600 * (k >= 600)},{50 + k % 9}" for k in range(1200)]
+    found = draft(written(tmp_path / "log.csv", ["Time [s],Speed [km/h]", *rows]))
+    assert found.known[0].rate == pytest.approx(10.0)

@@ -45,7 +45,7 @@ def test_empty_cells_leave_each_signal_its_own_clock(tmp_path):
     [
         ("vehicle_speed_mph", "10", "vehicle_speed", 4.4704),
         ("Vehicle_Speed_MPS", "10", "vehicle_speed", 10.0),
-        ("accel_x_g", "-1", "accel_x", -9.81),
+        ("accel_x_g", "-1", "accel_x", -9.80665),
         ("gyro_z_degps", "180", "gyro_z", np.pi),
         ("engine_torque_nm", "50", "engine_torque", 50.0),
         ("engine_torque_pct", "50", "engine_torque_fraction", 0.5),

@@ -24,7 +24,12 @@ from weighbridge.papers.jensen2022_drives import (
 from weighbridge.papers.jensen2022_gradient import gradient_road, gradient_scenario
 from weighbridge.papers.jensen2022_judged import joined, torques
 from weighbridge.papers.jensen2022_printed import calibrate_as_printed, pulling
-from weighbridge.papers.jensen2022_tables import parameters_table, passes, weights
+from weighbridge.papers.jensen2022_tables import (
+    WEIGHT_UNITS,
+    parameters_table,
+    passes,
+    weights,
+)
 from weighbridge.simulation import MIDSIZE, make_scenario, simulate_car
 
 
@@ -174,6 +179,16 @@ def test_table_6_has_the_truth_and_our_fit_beside_the_printed_ones(car):
     units = [i for i in jensen2022.ITEMS if i.paper_item.startswith("table 6, C_d A")]
     assert len(units) == 2
     assert all("truly {road_true}" in i.ours for i in units)
+    # The page of all papers prints what this table has of the paper's car.
+    printed = {i.printed for i in jensen2022.ITEMS if i.paper_item.startswith("table 6")}
+    assert printed == {
+        "0.70 m², 0.008, 0.14 kg m², 7.0 kg m²",
+        "-17.85 N m, 9.64 N m/%, 2.5e-3 N m/rpm, -1.44e-6 N m/rpm²",
+        "0.972",
+    }
+    assert [rows[f"w{k} {u}"][0] for k, u in enumerate(WEIGHT_UNITS[:4])] == [
+        "-17.85", "9.64", "2.5e-3", "-1.44e-6",
+    ]  # fmt: skip
 
 
 def test_the_motorway_is_told_by_direction():

@@ -48,7 +48,7 @@ def test_names_units_signs_and_offsets(tmp_path):
     assert_allclose(speed.time, [5.0, 5.1])
     assert_allclose(speed.values, [10.0, 20.0])
     # Factor first, then the offset in the column's unit, then to SI.
-    assert_allclose(drive.signals["longitudinal_accel"].values, [-0.5 * 9.81, 2.5 * 9.81])
+    assert_allclose(drive.signals["longitudinal_accel"].values, [-0.5 * 9.80665, 2.5 * 9.80665])
     assert_allclose(drive.signals["ambient_temperature"].values, [293.15, 294.15])
 
 

@@ -130,6 +130,44 @@ def test_names_and_units_of_an_engine_s_turns_and_of_a_polish_phone(name, quanti
     assert (found.quantity, found.unit) == (quantity, unit)
 
 
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [
+        ("04-CalcEngineLoad", "engine_load"),
+        ("0B-IntakeManiAbsPress", "intake_pressure"),
+        ("0C-EngineRPM", "engine_speed"),
+        ("0D-VehicleSpeed", "vehicle_speed"),
+        ("0E-TimingAdvance", ""),
+        ("33-AbsBaroPres", "barometric_pressure"),
+        ("track.pos.loc.lat", "latitude"),
+        ("track.pos.loc.lon", "longitude"),
+        ("track.pos.alt", "altitude"),
+        ("track.pos.sog", "gnss_speed"),
+        ("track.pos.cog", "gnss_course"),
+        ("track.pos.nsat", ""),
+        ("obd.ambiant_air_temp.value", "ambient_temperature"),
+        ("rpi.temp.cpu.value", ""),
+    ],
+)
+def test_names_of_wican_with_the_parameter_s_number_and_of_autopi(name, quantity):
+    assert recognise(name).quantity == quantity
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "quantity"),
+    [
+        ("ECM_n", "rpm", "engine_speed"),
+        ("n", "rpm", "engine_speed"),
+        ("TCU_n_Turb", "rpm", ""),
+        ("ESP_n", "rpm", ""),
+        ("n", None, ""),
+        ("Speed (km/h)", "?OBD", "vehicle_speed"),
+    ],
+)
+def test_a_letter_at_the_end_is_no_unit_where_the_log_states_one(name, unit, quantity):
+    assert recognise(name, unit).quantity == quantity
+
+
 def test_an_acceleration_without_gravity_is_none_of_the_sensor():
     assert recognise("Przyspieszenie liniowe X").quantity == ""
 

@@ -46,21 +46,31 @@ from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Timing, Vehicle
 
-LAGS: Final = (0.0, 0.1, 0.2, 0.3)
-"""Time constants of the reading's smoothing that are tried [s]. Noise of the motion makes long ones
-fit better: readings smoothed by 0.06 to 0.25 s fitted best at 0.2 to 0.45 s. Longer ones pass for
-the smoothness of a polled speed, too: with up to 1.25 s, 2 Hz without an accelerometer went from 3
-to 13 % RMS."""
+LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4)
+"""Time constants of the reading's smoothing that are tried [s]. Longer ones pass for the smoothness
+of a polled speed: with up to 1.25 s, 2 Hz without an accelerometer went from 3 to 13 % RMS."""
+
+USUAL_LAG: Final = 0.15
+"""What a reading is smoothed by, before any drive has told it [s]: a tenth of a second or two."""
+
+LAG_SPREAD: Final = 0.08
+"""Its standard deviation [s]."""
 
 DELAYS: Final = tuple(0.2 * k for k in range(-2, 7))
 """Sums of delay and lag among which the search begins [s]; it goes on beyond an end that fits
 best."""
 
+SHIFTS: Final = (-0.2, -0.1, 0.0, 0.1, 0.2)
+"""Around the sum that fits best, those tried with each lag [s]."""
+
 USUAL_DELAY: Final = 0.3
 """Sum of delay and lag where the drives do not show it [s]."""
 
-TIMING_WINDOW: Final = 1.2
+TIMING_WINDOW: Final = 0.6
 """Windows of the search [s]: shorter than those of the fit, for delay shows in what is fast."""
+
+TIMING_SAMPLES: Final = 1.2
+"""Samples of a slowly polled reading that they hold at least [-]; fewer left none at 1 Hz."""
 
 FARTHEST: Final = 5.0
 """Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
@@ -133,12 +143,11 @@ def _as_it_is(problem: Problem, why: str, weigher: Weigher) -> Fitted:
 
 def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
     """Fit all but the last scale; the second value is the covariance of the fit."""
-    middle = LAGS[len(LAGS) // 2]
-    rough = _rows(problem, USUAL_DELAY - middle, middle)
+    rough = _rows(problem, USUAL_DELAY - USUAL_LAG, USUAL_LAG)
     settings = _settings(problem, _rough_noise(problem, rough))
-    quick = replace(settings, window=TIMING_WINDOW, rounds=1)
+    quick = replace(settings, window=_timing_window(problem), rounds=1)
     quick = replace(quick, torque_noise=_noise(problem, rough, quick))
-    delay, lag, identified, search = find_timing(_Misfits(problem, quick, middle))
+    delay, lag, identified, search = find_timing(_Misfits(problem, quick))
 
     check_delay(problem, delay)
     timing = Timing(torque_delay=delay, torque_lag=lag)
@@ -205,12 +214,18 @@ def _rows(problem: Problem, delay: float, lag: float) -> tuple[DelayedRows, ...]
     return tuple(r.rows(delay, lag) for r in problem.recordings)
 
 
+def _timing_window(problem: Problem) -> float:
+    """Length of the windows in which delay and lag are searched [s]."""
+    periods = [r.source.carrier(r.drive).period for r in problem.recordings]
+    return max(TIMING_WINDOW, TIMING_SAMPLES * max(periods))
+
+
 def _drive_rows(problem: Problem, rows: Sequence[DelayedRows]) -> list[DriveRows]:
     """See rows as the fit reads them."""
     return [
         DriveRows(
             table=part.table,
-            regressor=recording.reading,
+            regressor=part.reading,
             engine_speed=part.engine_speed,
             usable=part.usable,
             mass=recording.mass,
@@ -295,15 +310,13 @@ class _Misfits:
     Attributes
     ----------
     problem, settings
-    lag : of the balances that tell brakes and overrun [s]
     """
 
     problem: Problem
     settings: FitSettings
-    lag: float
 
     def __call__(self, pairs: Sequence[tuple[float, float]]) -> Floats:
-        drives = [list(r.search(pairs, self.lag)) for r in self.problem.recordings]
+        drives = [list(r.search(pairs, LAGS[-1], USUAL_LAG)) for r in self.problem.recordings]
         shared = [np.logical_and.reduce([rows.usable for rows in tried]) for tried in drives]
         misfits = []
         for k in range(len(pairs)):
@@ -341,22 +354,27 @@ def find_timing(
     identified : whether the drives show them
     search : what was tried of their sum, and the standard deviation of the delay
     """
-    middle = LAGS[len(LAGS) // 2]
     totals = np.array(DELAYS)
-    scores = misfits([(float(t) - middle, middle) for t in totals])
+    scores = misfits([(float(t) - USUAL_LAG, USUAL_LAG) for t in totals])
     while int(np.argmin(scores)) in (0, totals.size - 1):
         more = beyond(totals, scores, DELAYS[1] - DELAYS[0], FARTHEST_DELAY)
         if not more.size:
             break
         totals = np.sort(np.concatenate([totals, more]))
-        scores = misfits([(float(t) - middle, middle) for t in totals])
+        scores = misfits([(float(t) - USUAL_LAG, USUAL_LAG) for t in totals])
     # At the ends both sides have little in common, and little to disagree about.
     lowest = [k for k in range(1, totals.size - 1) if scores[k] <= min(scores[k - 1 : k + 2])]
     coarse = scores
     total = float(totals[min(lowest, key=lambda k: scores[k])]) if lowest else USUAL_DELAY
 
-    pairs = [(total - x + shift, x) for x in LAGS for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
-    delay, lag = pairs[int(np.argmin(misfits(pairs)))]
+    tried = total + np.array(SHIFTS)
+    pairs = [(float(t) - lag, lag) for lag in LAGS for t in tried]
+    by_lag = misfits(pairs).reshape(len(LAGS), len(SHIFTS))
+    lowest_at = [_lowest(tried, each) for each in by_lag]
+    lags = np.array(LAGS)
+    unusual = 0.5 * np.square(UNMODELLED * (lags - USUAL_LAG) / LAG_SPREAD)
+    lag, _ = _lowest(lags, np.array([misfit for _, misfit in lowest_at]) + unusual)
+    delay = float(np.interp(lag, LAGS, [where for where, _ in lowest_at])) - lag
     delays = np.asarray(delay + 0.03 * np.arange(-4, 5), dtype=np.float64)
     scores = misfits([(float(d), lag) for d in delays])
     best = int(np.clip(np.argmin(scores), 1, delays.size - 2))
@@ -366,6 +384,19 @@ def find_timing(
         delay=totals, misfit=coarse - coarse.min(), std=_delay_std(delays[around], scores[around])
     )
     return delay, lag, bool(lowest), search
+
+
+def _lowest(x: Floats, y: Floats) -> tuple[float, float]:
+    """Lowest point of values on an even grid, between its points by a parabola."""
+    near = int(np.argmin(y))
+    if near in (0, x.size - 1):
+        return float(x[near]), float(y[near])
+    around = slice(near - 1, near + 2)
+    at = vertex(x[around], y[around])
+    low, middle, high = y[around]
+    part = (at - float(x[near])) / float(x[1] - x[0])
+    bend = 0.5 * (low - 2.0 * middle + high)
+    return at, float(middle + 0.5 * (high - low) * part + bend * part**2)
 
 
 def _delay_std(delays: Floats, misfits: Floats) -> float | None:

@@ -16,6 +16,7 @@ from weighbridge.balance.instants import (
     read_instants,
 )
 from weighbridge.balance.table import ForceTable
+from weighbridge.kernels.first_order import first_order
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import air_density
@@ -27,6 +28,9 @@ ANCHORS: Final = 0.4
 """Delays so far apart have a whole balance each [s]; those between take over what it says of
 brakes, overrun and cornering, which last longer than half of it."""
 
+FORGOTTEN: Final = 2.0
+"""Time constants after which a lag has forgotten what came before [-]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DelayedRows:
@@ -35,11 +39,13 @@ class DelayedRows:
     Attributes
     ----------
     table : (n,) rows; no vehicle is fitted yet, so its torque and traction are NaN
+    reading : (n,) of the torque source, smoothed as the motion is
     engine_speed : (n,) [rad/s]
     usable : (n,) rows that a fit may take
     """
 
     table: ForceTable
+    reading: Floats
     engine_speed: Floats
     usable: Bools
 
@@ -112,24 +118,44 @@ class Recording:
         balance = self.balance(delay, lag)
         table, engine_speed = balance.table, balance.table.engine_speed
         return DelayedRows(
-            table=table, engine_speed=engine_speed, usable=self._complete(table, engine_speed)
+            table=table,
+            reading=self.reading,
+            engine_speed=engine_speed,
+            usable=self._complete(table, engine_speed),
         )
 
+    def delayed(self, delay: float) -> DelayedRows:
+        """Return rows at a delay [s], for a search: what tells of brakes is not read anew."""
+        return self._moved(self._anchor(delay, 0.0), self.motion, delay)
+
     def search(
-        self, pairs: Sequence[tuple[float, float]], anchor_lag: float
+        self, pairs: Sequence[tuple[float, float]], longest: float, anchor_lag: float
     ) -> Iterator[DelayedRows]:
-        """Return rows at many delays and lags: only motion, engine speed and gear are read anew.
+        """Return rows at many delays and lags, all with the same noise of the motion.
+
+        A lag takes noise out of the motion, and a longer one, which takes more, would seem to fit
+        better. So the motion is passed through the longest lag whichever is tried, and the
+        reading, which has been through the tried one, through what is left:
+        ``(1 + L s) / (1 + L_0 s)``, a mean of the reading and of that behind the longest lag.
+        Rows soon after such as are not usable are left out: the lag still knows of those.
 
         Parameters
         ----------
-        pairs : delays and lags [s]
+        pairs : delays and lags up to ``longest`` [s]
+        longest : of the lags tried [s]
         anchor_lag : lag of the balances that tell brakes and overrun [s]
         """
-        motion, last = self.motion, 0.0
+        motion = lagged_motion(self.motion, longest)
+        late = first_order(self.source.carrier(self.drive).time, self.reading, longest)
+        moved: dict[float, DelayedRows] = {}
         for delay, lag in pairs:
-            if lag != last:
-                motion, last = lagged_motion(self.motion, lag), lag
-            yield self._moved(self._anchor(delay, anchor_lag), motion, delay)
+            if delay not in moved:
+                rows = self._moved(self._anchor(delay, anchor_lag), motion, delay)
+                settled = since(rows.table.time, ~rows.usable) > FORGOTTEN * longest
+                moved[delay] = replace(rows, usable=rows.usable & settled)
+            share = lag / longest
+            reading = share * self.reading + (1.0 - share) * late
+            yield replace(moved[delay], reading=reading)
 
     def _anchor(self, delay: float, lag: float) -> ForceBalance:
         """Return the balance at the nearest anchor of a delay [s]."""
@@ -155,7 +181,9 @@ class Recording:
         engine_speed = at.columns["engine_speed"]
         usable = self._complete(table, engine_speed) & ~at.changing & ~at.slipping
         usable &= at.known & (table.speed >= SLOWEST_GEARED)
-        return DelayedRows(table=table, engine_speed=engine_speed, usable=usable)
+        return DelayedRows(
+            table=table, reading=self.reading, engine_speed=engine_speed, usable=usable
+        )
 
     def _complete(self, table: ForceTable, engine_speed: Floats) -> Bools:
         """Rows that nothing speaks against and that have all numbers."""
@@ -167,3 +195,15 @@ class Recording:
             & np.isfinite(self.reading)
             & np.isfinite(engine_speed)
         )
+
+
+def since(time: Floats, marked: Bools) -> Floats:
+    """Time since the last marked row, or since the first row (n,) [s].
+
+    Parameters
+    ----------
+    time : (n,) rising [s]
+    marked : (n,)
+    """
+    last = np.maximum.accumulate(np.where(marked, np.arange(time.size), 0))
+    return np.asarray(time - time[last])

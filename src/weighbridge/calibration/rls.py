@@ -124,7 +124,7 @@ class _Search:
     def misfit(self, delay: float) -> float:
         """Robust standard deviation of the residual at a delay [N m]; NaN with too few rows."""
         if delay not in self.tried:
-            parts = [next(r.search([(delay, 0.0)], 0.0)) for r in self.problem.recordings]
+            parts = [r.delayed(delay) for r in self.problem.recordings]
             rows = torque_rows_of(self.problem, [_pulling(part) for part in parts])
             enough = rows.target.size >= 20 * rows.design.shape[1]
             self.tried[delay] = (

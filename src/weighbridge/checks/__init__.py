@@ -26,6 +26,7 @@ from weighbridge.checks.values import check_load, check_pressure, check_retarder
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.checks.witnesses import check_reading
 from weighbridge.errors import DriveError
+from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
 from weighbridge.signals.timeline import one_recording, well_formed
@@ -48,11 +49,11 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_friction,
     check_engine_speed,
     check_sign,
+    check_standstill,
     check_scales,
     check_imu,
     check_vehicle,
     check_range,
-    check_standstill,
 )
 
 
@@ -98,7 +99,7 @@ def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     clean = replace(within_ranges(drive), problems=(*earlier, *problems))
     if any(p.serious for p in problems):
         return clean
-    clean = mended(clean, vehicle)
+    clean = with_forward_accel(mended(clean, vehicle))
     # Last: what froze or dropped out is not held against a witness.
     problems = [*clean.problems[len(earlier) :], *check_reading(clean, vehicle)]
     problems.sort(key=lambda p: not p.serious)

@@ -17,6 +17,21 @@ from weighbridge.vehicle.model import Vehicle
 IN_TURN: Final = 0.1
 """Part of the samples in motion from which jumps are no cuts [-]: wheels that spin as often as a
 driver can make them jump in 0.01 of them."""
+UNITS: Final = (
+    (1.609344, "km/h to mph"),
+    (1.0 / 1.609344, "mph to km/h"),
+    (3.6, "km/h to m/s"),
+    (1.0 / 3.6, "m/s to km/h"),
+    (1.852, "km/h to knots"),
+    (1.0 / 1.852, "knots to km/h"),
+    (2.236936, "mph to m/s"),
+    (1.0 / 2.236936, "m/s to mph"),
+)
+"""Speed before over speed after a change of unit [-], and its name."""
+OF_UNIT: Final = 0.015
+"""How far from a change of unit a jump may lie, besides its resolution [-]."""
+STEADY: Final = 0.08
+"""Change of the engine's speed over a jump that only the unit of the vehicle's explains [-]."""
 
 
 def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -44,18 +59,41 @@ def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     if count := int(np.count_nonzero(cut)):
         k = int(np.argmax(np.where(cut, jump, 0.0)))
         in_turn = count > IN_TURN * max(int(np.count_nonzero(~standing)), 1)
-        why = (
-            "two sources or units take turns in it; map one of them"
-            if in_turn
-            else "a piece may be cut out of the recording there"
-        )
+        unit = "" if in_turn else _unit_changes(drive, s, k)
+        if in_turn:
+            why = "two sources or units take turns in it; map one of them"
+        elif unit:
+            why = (
+                f"engine_speed goes on, so the unit changes there from {unit}; cut the recording "
+                "there and map the unit of each part"
+            )
+        else:
+            why = "a piece may be cut out of the recording there"
         yield Problem(
             s.name,
             f"{s.name} jumps {counted(count, 'time')}, as from "
             f"{show(s.name, float(s.values[k]))} to {show(s.name, float(s.values[k + 1]))} "
             f"within {step[k]:.2g} s at {instant(s.time[k])}; {why}",
-            serious=in_turn,
+            serious=in_turn or bool(unit),
         )
+
+
+def _unit_changes(drive: Drive, s: Signal, k: int) -> str:
+    """Which change of unit the jump after sample k is, in words; empty where it is none.
+
+    A unit that changes leaves the engine's speed as it is. Where GNSS tells the speed, it judges.
+    """
+    engine = drive.get("engine_speed")
+    if engine is None or len(engine) < 2 or drive.get("gnss_speed") is not None:
+        return ""
+    before, after = np.abs(s.values[k : k + 2])
+    turned = np.abs(engine.at(s.time[k : k + 2]))
+    if min(before, after, *turned) <= 0.0 or abs(np.log(turned[1] / turned[0])) > STEADY:
+        return ""
+    moves = np.abs(np.diff(s.values))
+    resolution = float(np.min(moves[moves > 0.0]))
+    near = OF_UNIT + resolution / min(before, after)
+    return next((name for ratio, name in UNITS if abs(before / after / ratio - 1.0) < near), "")
 
 
 def _longest_time(s: Signal, mask: Bools) -> tuple[float, float]:

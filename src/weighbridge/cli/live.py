@@ -212,6 +212,7 @@ def live(
             recorder=None if record is None else _recorder(record, info),
             alerts=alerts,
             ahead=not _unwatched(replay, speed),
+            aside=replay is None,
         )
         last = _run(session, pressed, ordered)
     if ticket is not None and out is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from weighbridge.pipeline.weighing import Weighing
     from weighbridge.signals import Drive
     from weighbridge.vehicle.model import Vehicle
 
@@ -20,11 +21,13 @@ class OwnMasses:
     lines : what each drive weighs, and what `weigh` would note of it
     unweighed : drives that have no mass, with the reason, in their order
     drives : how many were weighed or not
+    outside : drives whose known mass lies outside the interval, with what it weighs, in their order
     """
 
     lines: tuple[str, ...]
     unweighed: tuple[tuple[str, str], ...]
     drives: int
+    outside: tuple[tuple[str, str], ...] = ()
 
     @property
     def useless(self) -> bool:
@@ -35,7 +38,7 @@ class OwnMasses:
     def doubt(self) -> str:
         """What is to be told of the file; empty where it weighs all of its drives."""
         if not self.unweighed:
-            return ""
+            return self._contradiction
         name, reason = self.unweighed[0]
         if not self.useless:
             return (
@@ -46,6 +49,18 @@ class OwnMasses:
         return (
             f"the calibration has no mass {which} ({reason}), so that nothing backs what it "
             "weighs: calibrate again on longer drives with starts and hills"
+        )
+
+    @property
+    def _contradiction(self) -> str:
+        """What speaks against a known mass; empty where all lie within their intervals."""
+        if not self.outside:
+            return ""
+        name, words = self.outside[0]
+        return (
+            f"the known mass of {len(self.outside)} of the calibration's {self.drives} own drives "
+            f"lies outside what the file weighs, such as {name} ({words}): check that mass, and "
+            "whether the load changed on the way; else leave the drive out"
         )
 
 
@@ -65,7 +80,7 @@ def own_masses(
 
     made = car.provenance
     lines = ["its own drives, weighed with it (they made it, so this is no proof of others):"]
-    unweighed = []
+    unweighed, outside = [], []
     for k, (drive, kg) in enumerate(zip(drives, made.masses, strict=True)):
         if progress is not None:
             progress(k, len(drives))
@@ -81,8 +96,19 @@ def own_masses(
                 f"  {drive.name}: {own.mass:.0f} kg, {100.0 * (own.mass / kg - 1.0):+.1f} % of the "
                 f"{kg:.0f} kg known (95 % between {low:+.1f} and {high:+.1f} %)"
             )
+            if not low <= 0.0 <= high:
+                outside.append((drive.name, _words(own, kg)))
         else:
             lines.append(f"  {drive.name}: no mass ({own.status}): {own.reason}")
             unweighed.append((drive.name, own.reason))
         lines += [f"    note: {text}" for text in own.warnings if text not in made.doubts]
-    return OwnMasses(tuple(lines), tuple(unweighed), len(drives))
+    return OwnMasses(tuple(lines), tuple(unweighed), len(drives), tuple(outside))
+
+
+def _words(own: Weighing, known: float) -> str:
+    """Say what a drive weighs, and the loads that it seems to have had."""
+    told = f"{own.mass:.0f} kg in place of {known:.0f} kg"
+    if not own.load_changed:
+        return told
+    loads = ", ".join(f"{part.mass:.0f}" for part in own.segments)
+    return f"{told}; its load seems to change: {loads} kg in turn"

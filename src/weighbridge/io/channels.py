@@ -23,7 +23,7 @@ from weighbridge.io.columns import (
     unit_suffix,
 )
 from weighbridge.io.draft import Draft, draft_column
-from weighbridge.io.draft_column import checked
+from weighbridge.io.draft_column import checked, usual_rate
 from weighbridge.io.frames import Frames
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import (
@@ -286,7 +286,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
     named = recognise_all([_told(c.name) for c in unnamed], units, misfits=True)
     columns = checked(
         tuple(
-            replace(draft_column(c.name, n, c.values, u), rate=_rate(c.time))
+            replace(draft_column(c.name, n, c.values, u), rate=usual_rate(c.time))
             for c, n, u in zip(unnamed, named, units, strict=True)
             if n.quantity not in known
         )
@@ -315,9 +315,3 @@ def draft_of(path: Path, found: Recording) -> Draft:
         doubts=tuple(doubts),
         read_anyway=frozenset(known),
     )
-
-
-def _rate(time: Floats) -> float:
-    """Values per second over all [Hz]; NaN where there are none."""
-    length = float(np.nanmax(time) - np.nanmin(time))
-    return (time.size - 1) / length if length > 0.0 else float("nan")

@@ -15,7 +15,7 @@ import numpy as np
 
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
-from weighbridge.io.draft_column import DraftColumn, checked
+from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, find_times, is_number
 from weighbridge.io.naming import Named, recognise_all, words_of
@@ -252,10 +252,8 @@ def _rated(column: DraftColumn, time: Floats) -> DraftColumn:
     """
     spread = spread_rows(time)
     stamps = spread[0] if spread is not None else time
-    at = stamps[column.rows & np.isfinite(stamps)] if column.rows is not None else stamps[:0]
-    length = float(at.max() - at.min()) if at.size > 1 else 0.0
-    rate = (at.size - 1) / length if length > 0.0 else float("nan")
-    return replace(column, rate=rate)
+    at = stamps[column.rows] if column.rows is not None else stamps[:0]
+    return replace(column, rate=usual_rate(at))
 
 
 def _column(raw: RawTable, name: str, found: Named, *, stated: str | None) -> DraftColumn:

@@ -10,7 +10,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.io.naming import words_of
 from weighbridge.signals import QUANTITIES
-from weighbridge.signals.signal import Bools
+from weighbridge.signals.signal import Bools, Floats
 from weighbridge.signals.units import UNITS
 
 PERCENT: Final = (-130.0, 130.0)
@@ -43,7 +43,7 @@ class DraftColumn:
     valid : signal of the same message that says whether it counts; empty for none
     unsure : whether what it is taken for is not sure: its name says more, or fits two quantities
     rows : (n,) which rows of its table have a number; None where it is not known
-    rate : values per second over all [Hz]; NaN where it is not known
+    rate : values per second, in the median: gaps do not lower it [Hz]; NaN where it is not known
     """
 
     name: str
@@ -59,6 +59,19 @@ class DraftColumn:
     unsure: bool = False
     rows: Bools | None = field(default=None, compare=False, repr=False)
     rate: float = float("nan")
+
+
+def usual_rate(time: Floats) -> float:
+    """Values per second, in the median [Hz]; NaN where fewer than two instants are known.
+
+    Parameters
+    ----------
+    time : (n,) of the values; it may begin anew [s]
+    """
+    steps = np.diff(time[np.isfinite(time)])
+    ahead = steps[steps > 0.0]
+    # Stamps are rounded: 0.02 s between them is 50 a second.
+    return round(1.0 / float(np.median(ahead)), 9) if ahead.size else float("nan")
 
 
 def checked(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:

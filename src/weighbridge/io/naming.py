@@ -43,11 +43,12 @@ _WANTED: Final = {
 
 _WITH_UNIT: Final = {
     "vehicle_speed": ("v",),
+    "engine_speed": ("n", "ecm n", "ems n", "dme n", "pcm n"),
     **{f"accel_{a}": (f"g{a}",) for a in "xyz"},
     **{f"gyro_{a}": (f"g{a}", f"rot {a}", f"gy{a}") for a in "xyz"},
 }
-"""Words that are a quantity only where the log states a unit of it: v may be volts as well, and gx
-an acceleration or a rate."""
+"""Words that are a quantity only where the log states a unit of it: v may be volts as well, n a
+force, and gx an acceleration or a rate."""
 
 _NOT: Final = {q: frozenset(spelled(words)) | words for q, words in AGAINST.items()}
 
@@ -88,6 +89,9 @@ _MARKS: Final = frozenset(("txt", "wgs84", "gear", "bool", "int", "float", "on/o
 
 _UNIT: Final = re.compile(r"[\[({<]\s*([^\])}>]{0,20}?)\s*[\])}>]")
 _PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)*$')
+_PID: Final = re.compile(r"[0-9A-Fa-f]{2}-(?=[A-Za-z])")
+"""The number of an OBD-II parameter before its name, as WiCAN writes it: 0C-EngineRPM."""
+
 _LETTERS: Final = str.maketrans({"ß": "ss", "ł": "l", "Ł": "L", "ı": "i", "ø": "o", "Ø": "O"})
 """Letters that are no letter with an accent."""
 
@@ -125,7 +129,12 @@ def words_of(name: str) -> tuple[str, ...]:
 
 
 def _piped(name: str) -> str:
-    """A name with its unit in brackets, where the log parts name, unit and range by bars."""
+    """A name with its unit in brackets, where the log parts name, unit and range by bars.
+
+    The number of an OBD-II parameter before it is left out.
+    """
+    if (number := _PID.match(name)) is not None:
+        name = name[number.end() :]
     found = _PIPED.match(name)
     return f"{found['name']} [{found['unit']}]" if found is not None else name
 
@@ -171,7 +180,8 @@ def recognise(name: str, unit: str | None = None) -> Named:
         With an empty quantity where nothing fits well enough.
     """
     stated, words = unit_of(name)
-    found = _recognised(name, words, stated or unit)
+    known = unit is not None and not unit.startswith(UNKNOWN_UNIT)
+    found = _recognised(name, words, unit if known else stated or unit)
     if not found.quantity and stated in _OTHERWISE:
         other = _recognised(name, words, _OTHERWISE[stated] or unit)
         return other if other.quantity else found

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from weighbridge.estimators.judging import STOP
-from weighbridge.live.learning import FIRST
+from weighbridge.live.on_the_move import FIRST
 from weighbridge.live.records import Records
 from weighbridge.report.text import duration
 from weighbridge.signals.catalogue import IMU_SIGNALS

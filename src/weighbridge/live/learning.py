@@ -14,18 +14,6 @@ from weighbridge.pipeline.weighing import Weighing, weigh
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle
 
-FIRST: Final = 60.0
-"""Time on the move after which a drive is looked at for the first time [s]."""
-
-GROWTH: Final = 1.5
-"""It is looked at again after so many times as much."""
-
-PERIOD: Final = 600.0
-"""At the latest it is looked at after so long on the move [s]."""
-
-REST: Final = 30.0
-"""It is looked at too when the vehicle has stood for so long [s]: most such stops end a drive."""
-
 LONGEST: Final = 2700.0
 """No more of it is kept and looked at [s]."""
 
@@ -61,6 +49,30 @@ class Learned:
     def answer(self) -> Learned:
         """Return what they tell of the mass alone, without what the stages go on from."""
         return replace(self, setup=None, state=None)
+
+
+def known_mass(
+    state: ForwardState | None, setup: ForwardSetup | None, learned: Learned | None
+) -> tuple[float, float, float, float]:
+    """Mass, its standard deviation, what no driving takes away of it, and its instant.
+
+    Parameters
+    ----------
+    state, setup : of the stages
+    learned : of all records, the last time they were looked at
+    """
+    nothing = math.nan, math.nan, 0.0, math.nan
+    if learned is not None and learned.inconsistent:
+        return nothing
+    if state is not None and setup is not None and state.joint.windows:
+        if forward.too_wide(state, setup) > 0.0:
+            return nothing
+        floor = setup.joint.systematic_std
+        mass = state.joint.mass - state.force.fuel
+        return mass, state.joint.std(setup.joint), floor, state.force.time
+    if learned is not None and math.isfinite(learned.mass):
+        return learned.mass, learned.std, learned.floor, learned.until
+    return nothing
 
 
 def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:

@@ -1,7 +1,8 @@
-"""How long a vehicle has been on the move."""
+"""How long a vehicle has been on the move, and when all records are looked at for it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -11,6 +12,74 @@ from weighbridge.signals import Drive
 
 GAP: Final = 1.0
 """Of the time between two readings of the speed no more counts [s]."""
+
+FIRST: Final = 60.0
+"""Time on the move after which a drive is looked at for the first time [s]."""
+
+GROWTH: Final = 1.5
+"""It is looked at again after so many times as much."""
+
+PERIOD: Final = 600.0
+"""At the latest it is looked at after so long on the move [s]."""
+
+REST: Final = 30.0
+"""It is looked at too when the vehicle has stood for so long [s]: most such stops end a drive."""
+
+
+@dataclass(slots=True)
+class OnTheMove:
+    """Time on the move so far, and looks at all records by it.
+
+    Attributes
+    ----------
+    driven : time on the move [s]
+    this_load : part of it with the load of now [s]
+    before : what it was when all signals were silent the last time [s]
+    looked_at, look_at : what it was at the last look, and is at the next [s]
+    stood : the vehicle has stood for so long [s]
+    """
+
+    driven: float = 0.0
+    this_load: float = 0.0
+    before: float = 0.0
+    looked_at: float = 0.0
+    look_at: float = FIRST
+    stood: float = 0.0
+
+    def go_on(self, step: float, *, moved: bool) -> None:
+        """Take a step of so long [s], in which the vehicle moved or stood."""
+        if moved:
+            self.driven += step
+            self.this_load += step
+            self.stood = 0.0
+        else:
+            self.stood += step
+
+    @property
+    def is_due(self) -> bool:
+        """Whether to look at all records now."""
+        rests = self.stood == REST and self.driven >= self.looked_at + FIRST
+        return self.driven >= self.look_at or rests
+
+    def looks(self) -> None:
+        """Take it that they are looked at now."""
+        self.looked_at = self.driven
+        self.look_at = min(self.driven * GROWTH, self.driven + PERIOD)
+
+    def begin_anew(self) -> None:
+        """Take it that nothing tells of this load yet, as after a start."""
+        self.looked_at, self.look_at = self.driven, self.driven + FIRST
+
+    @property
+    def left(self) -> float:
+        """Time on the move until the next look [s]."""
+        return max(self.look_at - self.driven, 0.0)
+
+    @property
+    def part(self) -> float:
+        """Part of the driving until the next look that is done [-]."""
+        part = (self.driven - self.looked_at) / (self.look_at - self.looked_at)
+        return min(max(part, 0.0), 1.0)
 
 
 def time_on_the_move(drive: Drive, since: float) -> float:

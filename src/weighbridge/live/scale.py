@@ -16,8 +16,9 @@ from weighbridge.live.arrival import health_of, needed_signals
 from weighbridge.live.checkpoint import packed, refuse_absurd, unpacked
 from weighbridge.live.clock import pace
 from weighbridge.live.doubts import doubts, of_before
-from weighbridge.live.learning import FIRST, GROWTH, LONGEST, PERIOD, REST, Learned, learn
-from weighbridge.live.on_the_move import moves, time_on_the_move
+from weighbridge.live.learning import LONGEST, Learned, known_mass
+from weighbridge.live.looking import Look, Step
+from weighbridge.live.on_the_move import FIRST, OnTheMove, moves
 from weighbridge.live.outlook import Outlook, outlook
 from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.source import Samples
@@ -29,13 +30,6 @@ from weighbridge.signals import Drive, DriveInfo, Floats
 from weighbridge.signals.recent import BEHIND, FEWEST_SAMPLES, STEP, first_instant, recent
 
 _LOG = logging.getLogger(__name__)
-
-FAR: Final = 3.0
-"""The mass on the way and that of all records so far contradict each other beyond so many standard
-deviations [-],"""
-
-LEAST_FAR: Final = 0.03
-"""and so much of the mass [-]."""
 
 RENEWED: Final = 60.0
 """A clock that begins anew no later after a silence belongs to it [s]."""
@@ -65,10 +59,13 @@ class LiveScale:
     Attributes
     ----------
     kept_at : pace of the clock when the state was kept that it goes on from
+    looks_aside : look at all records in a thread beside; what is shown does not wait for it
 
     Notes
     -----
-    One thread feeds a scale. A step takes milliseconds, one in which it learns a second or two.
+    One thread feeds a scale. A step takes milliseconds, one in which it looks at all records a
+    second or two. Where it looks aside, the mass is that of before until the look has ended, and
+    then the same to the last bit as that of a scale that waits; `finish` ends the thread.
     """
 
     def __init__(
@@ -94,17 +91,14 @@ class LiveScale:
         self._state: ForwardState | None = None
         self._learned: Learned | None = None
         self._next: float | None = None
-        self._driven = 0.0
-        self._driven_this_load = 0.0
-        self._driven_before = 0.0
-        self._learn_at = FIRST
-        self._learned_at = 0.0
-        self._stood = 0.0
+        self._move = OnTheMove()
         self._since = self._kept_from = -math.inf
         self._tared: float | None = None
         self._anew = -math.inf
         self._kept_to = math.nan
         self.kept_at = 1.0
+        self.looks_aside = False
+        self._looking: Look | None = None
         self._came: tuple[str, ...] = ()
         self._needed = needed_signals(self.vehicle, ())
 
@@ -156,9 +150,18 @@ class LiveScale:
         """
         if not math.isfinite(self._records.newest):
             return
-        self._advance(self._records.newest)
-        if self._learns and self._driven > max(self._learned_at, FIRST) and self._next is not None:
+        try:
+            self._advance(self._records.newest)
+        finally:
+            self._take(wait=True)
+        move = self._move
+        if self._learns and move.driven > max(move.looked_at, FIRST) and self._next is not None:
             self._learn(self._records.drive("live", self.info), self._next - self._every)
+            self._take(wait=True)
+
+    def __del__(self) -> None:
+        if (look := getattr(self, "_looking", None)) is not None:
+            look.end()
 
     def checkpoint(self) -> str:
         """Return all that the scale goes on from, for `restore`, as text."""
@@ -166,8 +169,8 @@ class LiveScale:
             "setup": self._setup,
             "state": self._state,
             "next": self._next,
-            "driven": self._driven,
-            "driven_this_load": self._driven_this_load,
+            "driven": self._move.driven,
+            "driven_this_load": self._move.this_load,
             "since": self._since,
             "tared": self._tared,
             "learns": self._learns,
@@ -203,7 +206,7 @@ class LiveScale:
             )
             scale._setup, scale._state = content["setup"], content["state"]
             scale._next, scale._learned = content["next"], content["learned"]
-            scale._driven, scale._driven_this_load = content["driven"], content["driven_this_load"]
+            scale._move = OnTheMove(content["driven"], content["driven_this_load"])
             scale._since, scale._tared = content["since"], content["tared"]
             scale._learns, scale.kept_at = content["learns"], content["pace"]
             scale._records.add_block(content["samples"])
@@ -213,8 +216,7 @@ class LiveScale:
                 scale._kept_from = scale._next - scale._every
         except (KeyError, TypeError, AttributeError) as error:
             raise ConfigError(f"the checkpoint is not used: {error}") from None
-        scale._learned_at = scale._driven
-        scale._learn_at = scale._driven + FIRST
+        scale._move.begin_anew()
         refuse_absurd(scale._state, scale._setup)
         return scale
 
@@ -254,14 +256,15 @@ class LiveScale:
 
         What the records have told of sensors and noise stays, and so does a contradiction.
         """
+        self._take(wait=True)
         if self._state is not None:
             self._state = forward.unloaded(self._state)
         if self._learned is not None and not self._learned.inconsistent:
             self._learned = None
         self._forget(self._records.newest)
-        self._driven_this_load = 0.0
+        self._move.this_load = 0.0
         self._since = self._records.newest
-        self._learned_at, self._learn_at = self._driven, self._driven + FIRST
+        self._move.begin_anew()
 
     def renew(self) -> None:
         """Tell that the clock of a device has begun anew, as of one that was turned on again.
@@ -272,10 +275,9 @@ class LiveScale:
         records = self._records
         if not records.newest - records.resumed < RENEWED:
             return
+        self._take(wait=True)
         self._learned = None
-        self._driven = self._driven_this_load = self._learned_at = self._stood = 0.0
-        self._driven_before = 0.0
-        self._learn_at = FIRST
+        self._move = OnTheMove()
         self._since = self._kept_from = self._anew = records.resumed
         if self._learns:
             self._setup = self._state = None
@@ -298,8 +300,9 @@ class LiveScale:
         ahead : for showing: a mass that is `weighbridge.pipeline.forward.HURRY` and the lateness
             younger, and costs a step of the stages
         """
+        self._take()
         state = self._ahead() if ahead else self._state
-        mass, std, floor, at = self._mass(state)
+        mass, std, floor, at = known_mass(state, self._setup, self._learned)
         health = self._health(silence)
         found = self._outlook(mass, std, floor, health, state)
         newest = self._records.newest
@@ -315,7 +318,7 @@ class LiveScale:
             tare=self.vehicle.tare,
             gross=self.vehicle.gross,
             tared=self._tared,
-            driven=self._driven,
+            driven=self._move.driven,
             progress=found.progress,
             reach=found.reach,
             minutes_to_5=found.minutes_to_5,
@@ -330,7 +333,7 @@ class LiveScale:
     def _doubts(self, mass: float) -> tuple[str, ...]:
         return doubts(
             self._records,
-            driven=self._driven,
+            driven=self._move.driven,
             anew=self._anew,
             driven_since=self._driven_since(),
             goes_on=self._is_of_before(mass),
@@ -339,7 +342,7 @@ class LiveScale:
     def _driven_since(self) -> float:
         """Time on the move since all signals were silent the last time [s]."""
         waits = self._next is not None and self._records.resumed >= self._next - self._every
-        return 0.0 if waits else self._driven - self._driven_before
+        return 0.0 if waits else self._move.driven - self._move.before
 
     def _is_of_before(self, mass: float) -> bool:
         """Whether a mass is of a load that was there before all signals were silent."""
@@ -353,22 +356,6 @@ class LiveScale:
         seen = records.so_far("live", self.info, BEHIND + self._every, FEWEST_SAMPLES)
         return forward.looked_ahead(state, seen, records.newest, setup)
 
-    def _mass(self, state: ForwardState | None) -> tuple[float, float, float, float]:
-        """Mass, its standard deviation, what no driving takes away of it, and its instant."""
-        learned, setup = self._learned, self._setup
-        nothing = math.nan, math.nan, 0.0, math.nan
-        if learned is not None and learned.inconsistent:
-            return nothing
-        if state is not None and setup is not None and state.joint.windows:
-            if forward.too_wide(state, self._setup) > 0.0:
-                return nothing
-            floor = setup.joint.systematic_std
-            mass = state.joint.mass - state.force.fuel
-            return mass, state.joint.std(setup.joint), floor, state.force.time
-        if learned is not None and math.isfinite(learned.mass):
-            return learned.mass, learned.std, learned.floor, learned.until
-        return nothing
-
     def _goes_on(self) -> bool:
         """Whether the mass is that of the forward stages, which each second of driving makes."""
         state = self._state
@@ -379,8 +366,7 @@ class LiveScale:
         """Part of the driving until the next look that is done [-]; NaN where nothing waits."""
         if not self._learns or (self._goes_on() and forward.too_wide(state, self._setup) == 0.0):
             return math.nan
-        part = (self._driven - self._learned_at) / (self._learn_at - self._learned_at)
-        return min(max(part, 0.0), 1.0)
+        return 1.0 if self._looking is not None else self._move.part
 
     def _outlook(
         self,
@@ -396,27 +382,32 @@ class LiveScale:
         silent = [s.name for s in health if s.needed and not s.fresh]
         reason = learned.reason if learned is not None else ""
         if reason and self._learns:
-            left = max(self._learn_at - self._driven, 0.0)
-            reason += f"; looked at again after {left:.0f} s more on the move"
+            left = self._to_look()
+            when = f"after {left:.0f} s more on the move" if left else "now"
+            reason += f"; looked at again {when}"
         if wide := forward.too_wide(state, self._setup):
             reason = (
                 "what was driven since the load may have changed leaves "
                 f"{196.0 * wide:.0f} % to both sides"
             )
         waits = self._learns and not self._goes_on()
-        since = self._driven - self._learned_at if waits else 0.0
+        since = self._move.driven - self._move.looked_at if waits else 0.0
         return outlook(
             mass,
             std,
             floor,
-            driven=self._driven_this_load - since,
+            driven=self._move.this_load - since,
             reason=reason,
             silent=silent,
             first=FIRST,
             unproved=self._unproved(mass),
             since=since,
-            wait=max(self._learn_at - self._driven, 0.0) if waits else 0.0,
+            wait=self._to_look() if waits else 0.0,
         )
+
+    def _to_look(self) -> float:
+        """Time on the move until the next look [s]; 0 while one goes on."""
+        return 0.0 if self._looking is not None else self._move.left
 
     def _unproved(self, mass: float) -> str:
         if self.newest == self._kept_to:
@@ -427,6 +418,7 @@ class LiveScale:
 
     def _advance(self, until: float | None = None) -> None:
         """Take the steps that the samples so far complete."""
+        self._take()
         end = self._records.watermark if until is None else until
         if self._next is None:
             oldest = self._records.oldest
@@ -448,19 +440,18 @@ class LiveScale:
     def _step(self, until: float) -> None:
         drive = self._records.drive("live", self.info)
         seen = recent(drive, until, self._every)
-        moved = self._every if moves(seen, until) else 0.0
+        moved = moves(seen, until)
         if until - self._every <= self._records.resumed < until:
-            self._driven_before = self._driven
-        self._driven += moved
-        self._driven_this_load += moved
-        self._stood = 0.0 if moved else self._stood + self._every
+            self._move.before = self._move.driven
+        self._move.go_on(self._every, moved=moved)
         if self._setup is not None and self._state is not None:
             self._state, _ = forward.step(self._state, seen, until, self._setup)
+        if self._looking is not None:
+            self._looking.steps.append(Step(until, seen, self._every if moved else 0.0))
         keep = BEHIND + 2.0 * self._every
         if self._learns:
             keep += LONGEST
-            rests = self._stood == REST and self._driven >= self._learned_at + FIRST
-            if self._driven >= self._learn_at or rests:
+            if self._move.is_due:
                 self._learn(drive, until)
         self._forget(until - keep)
 
@@ -469,28 +460,33 @@ class LiveScale:
         self._records.forget(before, FEWEST_SAMPLES)
 
     def _learn(self, drive: Drive, until: float) -> None:
-        """Look at all that is kept, and go on from it where it tells more than is known."""
-        self._learned_at = self._driven
-        self._learn_at = min(self._driven * GROWTH, self._driven + PERIOD)
-        # Slow signals are kept for longer; others would seem to begin late beside them.
-        kept = drive.between(self._kept_from, math.inf) if self._kept_from > -math.inf else drive
-        learned = learn(kept, self.vehicle, until, self._every)
-        _LOG.info("looked at %.0f s: %.0f kg %s", drive.duration, learned.mass, learned.reason)
-        mass, std, _, _ = self._mass(self._state)
-        self._learned = learned
+        """Look at all that is kept."""
+        self._take(wait=True)
+        self._move.looks()
+        mass, std, _, _ = known_mass(self._state, self._setup, self._learned)
+        self._looking = Look(
+            drive=drive, kept_from=self._kept_from, until=until, step=self._every,
+            mass=mass, std=std,
+        )  # fmt: skip
+        self._looking.begin(self.vehicle, aside=self.looks_aside)
+        self._take(wait=not self.looks_aside)
+
+    def _take(self, *, wait: bool = False) -> None:
+        """Go on from what a look has found, where it tells more than is known."""
+        look = self._looking
+        if look is None or (look.goes_on and not wait):
+            return
+        self._looking = None
+        self._learned = learned = look.found()
+        _LOG.info("looked at %.0f s: %.0f kg %s", look.drive.duration, learned.mass, learned.reason)
         if learned.inconsistent or math.isnan(learned.mass):
             return
-        far = abs(learned.mass - mass) > max(
-            FAR * math.hypot(std, learned.std), LEAST_FAR * learned.mass
-        )
-        # Where the records hold all of this load, nothing is known beside them.
-        whole = self._kept_from <= max(self._since, learned.since)
-        if math.isnan(mass) or far or whole or learned.std <= 1.05 * std or self._setup is None:
-            self._setup, self._state = learned.setup, learned.state
-        if learned.since > max(drive.start, self._since):
+        if self._setup is None or look.tells_more(self._since):
+            self._setup, self._state = learned.setup, look.state()
+        if learned.since > max(look.drive.start, self._since):
             # The load has changed on the way.
             self._since = learned.since
-            self._driven_this_load = time_on_the_move(drive, learned.since)
+            self._move.this_load = look.driven_since(learned.since)
 
     def _health(self, silence: float) -> tuple[SignalHealth, ...]:
         came = self._records.names()

@@ -44,6 +44,8 @@ class Session:
     alerts : limits that are watched, by the settled mass
     orders : looked at between samples: what a person asks for, at the terminal or by a file
     ahead : show the provisional mass, which is younger; see `LiveScale.weighing`
+    aside : go on showing it while the scale looks at all records, as a vehicle does not wait; what
+        is shown at an instant then hangs on how fast the machine is
     """
 
     feed: Feed
@@ -55,6 +57,7 @@ class Session:
     alerts: Sequence[Alert] = ()
     orders: Callable[[LiveScale], None] | None = None
     ahead: bool = True
+    aside: bool = False
     _shown: float = field(default=-float("inf"), init=False)
     _looked: float = field(default=-float("inf"), init=False)
     _renewed: int = field(default=0, init=False)
@@ -62,6 +65,7 @@ class Session:
 
     def run(self, stop: Event) -> LiveWeighing:
         """Weigh until the sources end or ``stop`` is set; return the last weighing."""
+        self.scale.looks_aside = self.aside
         try:
             while not stop.is_set() and not self.feed.ended:
                 for samples in self.feed.read(WAIT):
@@ -81,9 +85,11 @@ class Session:
                 if self.recorder is not None:
                     self.recorder.tick()
         finally:
-            if self.recorder is not None:
-                self.recorder.close()
-            self.scale.finish()
+            try:
+                if self.recorder is not None:
+                    self.recorder.close()
+            finally:
+                self.scale.finish()
             if self.keeper is not None:
                 self.keeper.write(self.scale)
         self._show(due=True, ahead=False)

@@ -11,6 +11,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.catalogue import IMU_SIGNALS
 
 GRADE_BAND: Final = 0.08
 """Grade is what differs between accelerometer and speed below this [Hz]."""
@@ -67,6 +68,8 @@ def longitudinal_motion(drive: Drive, *, rate: float = 20.0) -> Motion:
     accel = read - GRAVITY * np.sin(grade)
     nowhere = np.full(time.size, np.nan)
     notes = [f"accelerometer offset {offset:+.3f} m/s^2 taken off, from the energy balance"]
+    if drive.has(*IMU_SIGNALS[:3]) and not drive.has(*IMU_SIGNALS):
+        notes.append("no gyroscope: the accelerometer counts only along the vehicle")
     if not offset_known:
         notes.append("no altitude: the drive is taken to end as high as it began")
     residual = (read - lowpass(read, rate, 0.5))[valid]

@@ -7,12 +7,17 @@ from typing import Final
 import numpy as np
 
 from weighbridge.papers.du2025_bus import LOADS
-from weighbridge.papers.du2025_claims import CLAIMS, paper_work, work
+from weighbridge.papers.du2025_claims import (
+    CLAIMS,
+    mean_seconds,
+    paper_seconds,
+    paper_work,
+    work,
+)
 from weighbridge.papers.du2025_methods import (
     BAND,
     METHODS,
     PAPER_RMSE,
-    PAPER_TIME,
     PRINTED_ROLLING,
 )
 from weighbridge.papers.du2025_results import Reproduction, cell
@@ -102,8 +107,7 @@ def _order(kind: str, means: Floats, *, like: bool) -> Comparison:
 
 def _seconds(done: Reproduction) -> tuple[Comparison, ...]:
     """Compare processor time; another computer."""
-    seconds = np.array([np.mean([d.seconds[m] for d in done.drives]) for m in METHODS])
-    theirs = np.mean([PAPER_TIME[load] for load in LOADS], axis=0)
+    seconds, theirs = mean_seconds(done.drives), paper_seconds()
     said, so = work(done.drives)
     return (
         Comparison("computing time of a drive, " + ", ".join(METHODS),

@@ -57,6 +57,9 @@ _FILTERS: Final = (
          "settings, the first mass ± 1 kg: at no, half and full load", "299 / 389 / 275 kg",
          "f = 0.0005: {printed_unit_start}; f = 0.005: {tenfold_unit_start}; f of the tyres: "
          "{tyres_unit_start}", True),
+    Item("secs. 3.3, 4.2: starts", "estimators/robust_rls.py, estimators/ekf.py: start_mass", True,
+         "the least squares start from 0 kg, the Kalman filter from their first estimate; which is "
+         "first is not told (first_information)", "", "", True),
     Item("eq. 34", f"{_BLEND}: step", False, "blend=speed is as printed; by default the share "
          "follows how well each filter foretold the forces", "", "", True),
 )  # fmt: skip

@@ -57,6 +57,8 @@ ITEMS: Final = (
          "is in the mass", "errors 0.0069 / 0.33 / 0.0025 %", "{mixed torque errors}", False),
     Item("table 1, torque recorded (eq. 13), grade of a map", _TORQUE, False, f"{_RECORDED}; the "
          "true grade is known", "errors 0.0069 / 0.33 / 0.0025 %", "{torque errors}", False),
+    Item("eq. 13, torque recorded, electric cars, grade of a map", _TORQUE, False, "the motor's "
+         "torque; 24 drives of six cars, their figures in studies/galvao.md", "", "", False),
     Item("speed alone: upper bound of the mass", "`weighbridge bound`, `wb.mass_bound`", False,
          "no mass: the three tests by the engine's full power, grade of a map", "", "{bounds}",
          False),

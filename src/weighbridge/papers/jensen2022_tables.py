@@ -29,6 +29,18 @@ from weighbridge.vehicle.model import Vehicle
 PAPER_R_SQUARED: Final = 0.972
 """Of the torque fit (Table 6)."""
 
+PAPER_ROAD: Final = ("0.70", "0.008", "0.14", "7.0")
+"""C_d A, C_r, I_e and I_w in `ROAD_UNITS`, as Table 6 prints them."""
+
+PAPER_WEIGHTS: Final = ("-17.85", "9.64", "2.5e-3", "-1.44e-6")
+"""w0 to w3 in `WEIGHT_UNITS`, as Table 6 prints them."""
+
+ROAD: Final = ("C_d A", "C_r", "I_e", "I_w")
+"""Names of the road parameters."""
+
+ROAD_UNITS: Final = ("m²", "", "kg m²", "kg m²")
+"""Of the road parameters; C_r has none."""
+
 WEIGHT_UNITS: Final = ("N m", "N m/%", "N m/rpm", "N m/rpm²", "N m/rpm³", "N m/rpm⁴")
 """Of the coefficients of eq. 49: load in percent, engine speed in rpm."""
 
@@ -373,8 +385,8 @@ def _road(car: Vehicle) -> str:
 
 
 def _road_values(values: tuple[float, float, float, float]) -> str:
-    drag, rolling, engine, wheels = values
-    return f"{drag:.2f} m², {rolling:.4f}, {engine:.2f} kg m², {wheels:.1f} kg m²"
+    forms = (".2f", ".4f", ".2f", ".1f")
+    return with_units([f"{x:{form}}" for x, form in zip(values, forms, strict=True)], ROAD_UNITS)
 
 
 def _fitted(car: Vehicle) -> tuple[float, float, float, float]:
@@ -400,21 +412,14 @@ def parameters_table(done: Reproduction) -> Table:
     ]
     fits = (_fitted(done.printed_car.vehicle), _fitted(done.car), _truth())
     rows = [
-        (name, theirs, *(f"{fit[k]:{form}}" for fit in fits))
-        for k, (name, theirs, form) in enumerate(
-            (
-                ("C_d A m²", "0.70", ".3f"),
-                ("C_r", "0.008", ".4f"),
-                ("I_e kg m²", "0.14", ".3f"),
-                ("I_w kg m²", "7.0", ".1f"),
-            )
+        (f"{name} {unit}".strip(), theirs, *(f"{fit[k]:{form}}" for fit in fits))
+        for k, (name, unit, theirs, form) in enumerate(
+            zip(ROAD, ROAD_UNITS, PAPER_ROAD, (".3f", ".4f", ".3f", ".1f"), strict=True)
         )
     ]
     rows += [
         (f"w{k} {unit}", theirs, found[0][k], found[1][k], "")
-        for k, (unit, theirs) in enumerate(
-            zip(WEIGHT_UNITS, ("-17.85", "9.64", "2.5e-3", "-1.44e-6"), strict=False)
-        )
+        for k, (unit, theirs) in enumerate(zip(WEIGHT_UNITS, PAPER_WEIGHTS, strict=False))
         if all(k < len(each) for each in found)
     ]
     rows.append(
@@ -436,8 +441,12 @@ def _in_papers_units(car: Vehicle) -> list[float]:
 
 def weights(car: Vehicle) -> str:
     """w0 to w3 of eq. 49 in the paper's units: load in percent, engine speed in rpm."""
-    both = zip(_in_papers_units(car), WEIGHT_UNITS, strict=False)
-    return ", ".join(f"{w:.3g} {unit}" for w, unit in both)
+    return with_units([f"{w:.3g}" for w in _in_papers_units(car)], WEIGHT_UNITS)
+
+
+def with_units(values: Sequence[str], units: Sequence[str]) -> str:
+    """Write values with their units, one after another."""
+    return ", ".join(f"{value} {unit}".strip() for value, unit in zip(values, units, strict=False))
 
 
 def _furthest(values: Floats) -> float:

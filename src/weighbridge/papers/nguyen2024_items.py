@@ -56,6 +56,8 @@ ITEMS: Final = (
     _rule("sec. 4: road, start, changes", "`papers/nguyen2024.py`", "speed (60 km/h), end (20 s) "
           "and P(0) are not printed: chosen; `--set speed=, start=, change_times=`",
           as_printed=False),
+    _rule("sec. 4: w, v", _RIDE, "read as standard deviations of accelerations and of single "
+          "samples; `--set shake=, body_noise=`"),
     _rule("sec. 4: Q, R", "`--set process_densities=, noise_densities=`", "five of the six numbers "
           "of Q are printed; in reproduce `printed_process`, `printed_noise`"),
     Item("table 2, MAPE, as printed", f"{_FILTER}, `printed`", True, _STILL, _TABLE_2,

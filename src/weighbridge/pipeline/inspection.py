@@ -166,14 +166,14 @@ def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Ins
     order = list(QUANTITIES)
     signals = sorted(drive.signals.values(), key=lambda s: order.index(s.name))
     mended = mend_drive(drive, vehicle)
-    problems = mended.problems
+    problems, along = mended.problems, mended.get("longitudinal_accel")
     if not any(p.serious for p in problems):
         problems += _by_battery(mended, vehicle)
     return Inspection(
         drive=drive,
         signals=tuple(describe(s) for s in signals),
         problems=tuple(sorted(dict.fromkeys(problems), key=lambda p: not p.serious)),
-        ways=_ways(drive, vehicle),
+        ways=_ways(drive if along is None else drive.with_signals(along), vehicle),
     )
 
 

@@ -122,9 +122,9 @@ def beyond_class(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
 
 
 def below_tare(vehicle: Vehicle, result: MassTrack) -> tuple[str, ...]:
-    """Say in a sentence whether a mass is below the empty one; nothing if not."""
+    """Say in a sentence whether a mass is below the empty one; nothing if not by its std."""
     tare = vehicle.tare
-    if tare is None or result.status is not Status.CONVERGED or result.mass >= tare:
+    if tare is None or result.status is not Status.CONVERGED or result.mass + result.std > tare:
         return ()
     if result.mass + 2 * result.std > tare:
         return (

@@ -238,7 +238,7 @@ def weigh_balance(
         refused, doubt = of_another(vehicle, joined)
         change = largest(joined.filter_input) if joined.filter_input is not None else None
         if change is not None and change.sure:
-            status, reason = Status.INCONSISTENT, change.text
+            status, reason = Status.INCONSISTENT, change.refusal(balance.motion.source)
         elif refused:
             status, reason = Status.INCONSISTENT, doubt
         elif why := bent(joined.bend, drive, vehicle) or contradicted(result, joined):

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.constants import GRAVITY
+from weighbridge.constants import STANDARD_GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.signals.signal import Floats
 
@@ -44,8 +44,8 @@ UNITS: Final[dict[str, Unit]] = {
     "mph": Unit("m/s", 0.44704),
     "kn": Unit("m/s", 1852.0 / 3600.0),
     "mps2": Unit("m/s^2", 1.0),
-    "g": Unit("m/s^2", GRAVITY),
-    "mg": Unit("m/s^2", 1e-3 * GRAVITY),
+    "g": Unit("m/s^2", STANDARD_GRAVITY),
+    "mg": Unit("m/s^2", 1e-3 * STANDARD_GRAVITY),
     "radps": Unit("rad/s", 1.0),
     "degps": Unit("rad/s", math.pi / 180.0),
     "mdegps": Unit("rad/s", 1e-3 * math.pi / 180.0),

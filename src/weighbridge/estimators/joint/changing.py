@@ -10,6 +10,7 @@ import numpy as np
 from weighbridge.estimators.joint.load_stops import loadable
 from weighbridge.estimators.joint.problem import FilterInput
 from weighbridge.kernels import disturbance
+from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import Floats
 from weighbridge.signals.instants import instant, span
 
@@ -50,6 +51,14 @@ AS_WELL: Final = 0.0
 """Gain of likelihood of a change of scale over the changes of load found, from which it may be the
 one as well as the other [-]."""
 
+ALIKE_BY_SPEED: Final[dict[MotionSource, str]] = {
+    "speed_grade": "; no accelerometer tells the motion here, and errors of the heights or of the "
+    "torque's calibration may look alike: record one, and calibrate with it",
+    "speed": "; no grade and no height was recorded here, and hills look alike: record the height, "
+    "and calibrate with it",
+}
+"""What is added to a change of the torque's scale that speed alone shows, by what is beside it."""
+
 QUICK: Final = 60.0
 """Where every stop with a change of load was longer, somebody loaded [s]."""
 
@@ -62,7 +71,8 @@ class ScaleChange:
     ----------
     start, end : of the change; the same for a step [s]
     change, std : of the scale, relative to before, and its standard deviation [-]
-    gain : logarithm of the likelihood over that of no such change [-]
+    gain : logarithm of the likelihood over that of no such change, loads at stops allowed [-]
+    over_one : the same over that of the loads that were found alone, mostly one [-]
     """
 
     start: float
@@ -70,6 +80,7 @@ class ScaleChange:
     change: float
     std: float
     gain: float
+    over_one: float = 0.0
 
     @property
     def sure(self) -> bool:
@@ -79,9 +90,20 @@ class ScaleChange:
     @property
     def doubt(self) -> str:
         """What may be wrong, in a sentence, where a change is likely and not sure; else empty."""
-        if not self._large or not DOUBTFUL < self.gain <= SURE:
+        if not self._large or self.sure:
             return ""
-        return f"perhaps {self.text}; the mass may be wrong by as much"
+        if self.gain > DOUBTFUL:
+            return f"perhaps {self.text}; the mass may be wrong by as much"
+        if self.over_one <= SURE:
+            return ""
+        return (
+            f"perhaps the load changed at a stop that was not taken for one, or {self.text}; the "
+            "mass may be wrong by as much"
+        )
+
+    def refusal(self, motion: MotionSource) -> str:
+        """What is wrong where it is sure, and what looks alike by that source of the motion."""
+        return self.text + ALIKE_BY_SPEED.get(motion, "")
 
     @property
     def _large(self) -> bool:
@@ -187,7 +209,7 @@ def largest(given: FilterInput) -> ScaleChange | None:
                 best = ScaleChange(begin, until, change, std, likelihood - same)
     if best is None or not best.sure:
         return best
-    return replace(best, gain=best.gain + same - _with_stops(given, same))
+    return replace(best, gain=best.gain + same - _with_stops(given, same), over_one=best.gain)
 
 
 def in_place_of_loads(given: FilterInput) -> NoLoad | None:

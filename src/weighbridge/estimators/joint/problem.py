@@ -18,6 +18,12 @@ UNMODELLED: Final = 1.6
 """Errors of the mass over what the filter says of them [-]: simulated drives of one
 calibration scatter so around their mean, after five minutes as after an hour."""
 
+_TRIED: Final = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, -1.0]])
+"""Logarithms of the levels that the search for the likeliest starts from [-]."""
+
+_CLOSE: Final = 0.03
+"""It ends where they, and the logarithm of the likelihood, differ by less [-]."""
+
 
 def first_state(
     std: Floats, slow: float, time: float, settings: JointSettings
@@ -107,7 +113,10 @@ class Problem:
             state, *_ = self.changes(float(fast), float(slow))
             return float(-state.same.log_likelihood + 0.5 * np.sum(level**2))
 
-        found = minimize(misfit, np.zeros(2), method="Nelder-Mead", options={"maxiter": 40})
+        found = minimize(
+            misfit, _TRIED[0], method="Nelder-Mead",
+            options={"initial_simplex": _TRIED, "xatol": _CLOSE, "fatol": _CLOSE},
+        )  # fmt: skip
         fast, slow = np.exp(found.x)
         return float(fast), float(slow)
 

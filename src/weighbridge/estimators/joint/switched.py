@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from weighbridge.balance.law import accessory_column
 from weighbridge.balance.table import ForceTable
@@ -39,6 +39,13 @@ CALMER: Final = (1.0, 0.5)
 
 HOPELESS: Final = -25.0
 """A logarithm of the likelihood that is so much worse in all of these ends the search."""
+
+SMALL: Final = -1.5
+"""A search that comes to so small a power, in standard deviations, and gains nothing by it ends:
+switches that were shown ended at -0.8 or more [-]."""
+
+CLOSE: Final = 0.05
+"""A search ends where what is sought, and the logarithm of the likelihood, differ by less [-]."""
 
 SURE: Final = 6.0
 """Gain of the logarithm of the likelihood, prior included, that shows a switch: 50 drives of a
@@ -113,9 +120,14 @@ def find_switched(
     if without - scores[best] < HOPELESS:
         return None
     corners = tried[best] + np.vstack((np.zeros(3), np.diag([0.2, -0.3, 0.4])))
+
+    def stop_where_small(intermediate_result: OptimizeResult) -> None:
+        if intermediate_result.x[2] < SMALL and without - intermediate_result.fun < SURE:
+            raise StopIteration
+
     found = minimize(
-        misfit, tried[best], method="Nelder-Mead",
-        options={"maxiter": 40, "initial_simplex": corners},
+        misfit, tried[best], method="Nelder-Mead", callback=stop_where_small,
+        options={"initial_simplex": corners, "xatol": CLOSE, "fatol": CLOSE},
     )  # fmt: skip
     gain = without - float(found.fun)
     if gain < SURE:
