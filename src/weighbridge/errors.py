@@ -30,6 +30,10 @@ class DriveError(WeighbridgeError):
     """A drive cannot be read, or its data cannot be right."""
 
 
+class LostError(DriveError):
+    """The navigation filter ended far from what it began with, or refused most fixes."""
+
+
 class SourceError(WeighbridgeError):
     """A device or interface that samples come from is gone, silent or not what it should be."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 from weighbridge.kernels import ins
 from weighbridge.kernels.ins_model import (
     ERRORS,
+    ROWS,
     SHOWN,
     Rows,
     Samples,
@@ -105,6 +107,21 @@ def _fold(
     )
     ins.run(x, cov, samples, setup.rot_bs, setup.noise, rows, states, grade_std)
     return State(x, cov.reshape(ERRORS, ERRORS))
+
+
+def misfit(state: State, block: Block, setup: Setup) -> float:
+    """Return minus twice the log-likelihood of the measurements of a block, but for a constant.
+
+    A row beyond the gate is not refused, but counts as one at the gate that is less sure: a
+    refused row would cost nothing.
+    """
+    count = block.nodes.size
+    rows = new_rows(max(count, 2))
+    open_gate = replace(setup, noise=setup.noise._replace(patience=0.0))
+    _fold(state, block, open_gate, rows, np.empty((count, SHOWN)), np.empty(count))
+    used = np.arange(ROWS) < rows.row_count[:, None]
+    innovation, var = rows.innovation[used], rows.innovation_var[used]
+    return float(np.sum(innovation**2 / var + np.log(var)))
 
 
 def run_smoothed(state: State, block: Block, setup: Setup) -> tuple[State, Nodes]:

@@ -10,17 +10,20 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 
 from weighbridge.constants import GRAVITY
+from weighbridge.errors import LostError
 from weighbridge.kernels.ins_model import (
     BA,
     E_PITCH0,
     E_SCALE,
     E_SQUAT,
     E_YAW0,
+    LOST_GNSS,
     MEASUREMENTS,
     PITCH0,
     SCALE,
     SQUAT,
     YAW0,
+    Z_N,
     P,
     Q,
     V,
@@ -47,6 +50,12 @@ _SQUAT_TIME: Final = 60.0
 
 _SCALE_FOUND: Final = 0.02
 """Below this standard deviation the drive has shown the scale of its speed [-]."""
+
+_FAILED: Final = 5.0
+"""A speed's scale found so many standard deviations from its prior is that of a lost filter [-]."""
+
+_REFUSED: Final = 0.5
+"""A larger part of fixes refused is that of a lost filter, or of another drive's fixes [-]."""
 
 _STANDS: Final = 0.02
 """Slower is standing [m/s]."""
@@ -104,12 +113,19 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
 
     Without `NavigationSettings.smooth` the states are those of the forward pass, the constants
     those at its end.
+
+    Raises
+    ------
+    LostError
+        The filter failed.
     """
     fold = run_smoothed if setup.settings.smooth else run
+    fixed = np.isfinite(found.block.z[:, Z_N])
     state, nodes = fold(setup.start, found.block, setup)
     found.block = found.block._replace(z=np.empty((0, MEASUREMENTS)))
     end = nodes.states[-1].copy() if setup.settings.smooth else state.x
     end_std = np.sqrt(np.maximum(np.diag(state.cov), 0.0))
+    _check_found(float(state.x[SCALE]), nodes, fixed, setup)
     time = found.grid.time
     pose = pose_at(time, nodes)
     shown = _shows_squat(nodes, end_std, setup)
@@ -156,6 +172,32 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
         mounting_std=mounting_std,
         notes=_notes(setup, shown or known),
     )
+
+
+def _check_found(scale: float, nodes: Nodes, fixed: Bools, setup: Setup) -> None:
+    """Refuse a motion whose filter failed.
+
+    Parameters
+    ----------
+    scale : of the speed, at the end of the forward pass [-]
+    nodes : what the filter found
+    fixed : (m,) nodes with a fix
+    setup : of the drive
+    """
+    if setup.origin is None:
+        return
+    off = abs(scale - 1.0) / setup.settings.speed_scale_std
+    if off > _FAILED:
+        raise LostError(
+            f"positions make the vehicle speed {scale:.2f} times the true one, {off:.0f} standard "
+            "deviations from what is usual: the motion could not be found from these positions"
+        )
+    refused = nodes.states[fixed, LOST_GNSS] > 0.0
+    if refused.size and np.mean(refused) > _REFUSED:
+        raise LostError(
+            f"{100.0 * np.mean(refused):.0f} % of the positions fit neither speed nor inertial "
+            "sensor: the motion could not be found from these positions"
+        )
 
 
 def laid_out(pose: Pose, setup: Setup, *, places: bool = True, **rows: object) -> Motion:

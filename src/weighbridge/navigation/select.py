@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
 
-from weighbridge.errors import DriveError
+from weighbridge.errors import DriveError, LostError
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.settings import RATE, NavigationSettings
@@ -16,6 +17,9 @@ from weighbridge.vehicle.model import Vehicle
 
 if TYPE_CHECKING:
     from weighbridge.navigation.identify.setup import Setup
+
+_OF_FIXES: Final = ("latitude", "longitude", "gnss_speed", "gnss_course")
+"""Signals that go with positions which fit no motion."""
 
 
 def find_motion(drive: Drive, vehicle: Vehicle | None = None) -> Motion:
@@ -42,15 +46,14 @@ def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motio
     """
     has_speed = drive.has("vehicle_speed") or drive.has("gnss_speed")
     if drive.has(*IMU_SIGNALS) and (has_speed or drive.has("latitude", "longitude")):
-        from weighbridge.navigation.identify.rounds import navigate
-
-        mounting = vehicle.mounting if vehicle is not None else None
-        sources = read_sources(drive)
-        known = scaled_for_navigation(drive, vehicle, positions=sources.fixes is not None)
-        if known is not drive:
-            sources = read_sources(known)
-        setup, motion = navigate(sources, mounting, NavigationSettings(), RATE)
-        return motion, setup
+        try:
+            return _inertial(drive, vehicle)
+        except LostError as lost:
+            if not drive.has("vehicle_speed"):
+                raise DriveError(f"{drive.name}: {lost}; check the clock of GNSS") from None
+            motion, setup = _inertial(drive.without(*_OF_FIXES), vehicle)
+            note = f"{lost}; they were left out"
+            return replace(motion, notes=(note, *motion.notes)), setup
     if drive.has("longitudinal_accel", "vehicle_speed"):
         return longitudinal_motion(true_speed(drive, vehicle)), None
     if has_speed:
@@ -58,6 +61,19 @@ def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motio
     raise DriveError(
         f"{drive.name}: no vehicle_speed and no GNSS; without a speed no vehicle can be weighed"
     )
+
+
+def _inertial(drive: Drive, vehicle: Vehicle | None) -> tuple[Motion, Setup]:
+    """Find the motion by inertial navigation; see `identify_motion`."""
+    from weighbridge.navigation.identify.rounds import navigate
+
+    mounting = vehicle.mounting if vehicle is not None else None
+    sources = read_sources(drive)
+    known = scaled_for_navigation(drive, vehicle, positions=sources.fixes is not None)
+    if known is not drive:
+        sources = read_sources(known)
+    setup, motion = navigate(sources, mounting, NavigationSettings(), RATE)
+    return motion, setup
 
 
 def without_accelerometer(drive: Drive) -> Drive:

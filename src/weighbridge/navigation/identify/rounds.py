@@ -32,7 +32,7 @@ from weighbridge.navigation.identify.remounting import (
     unsure,
 )
 from weighbridge.navigation.identify.setup import Setup, scaled
-from weighbridge.navigation.identify.start import Begin, first_state, restarted
+from weighbridge.navigation.identify.start import Begin, first_state, restarted, with_heading
 from weighbridge.navigation.layout import Found, smoothed_motion
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.rows import (
@@ -228,25 +228,20 @@ def _identified(
     found = Found(Block(imu.time, imu.accel, imu.gyro, nodes, z), grid, reference, fixes)
     del z
     free_scale = sources.wheel is not None and fixes is not None
+    begin = Begin(
+        grid.time,
+        grid.values[:, :3] @ aligned.rot_bs.T,
+        grid.values[:, 3:] @ aligned.rot_bs.T,
+        interpolated(reference, grid.time, 3.0),
+        np.interp(grid.time, node_time, still) > 1.9,
+    )
     setup = Setup(
         settings=settings,
         rate=rate,
         rot_bs=aligned.rot_bs,
         clocks=clocks,
         noise=settings.noise(),
-        start=first_state(
-            Begin(
-                grid.time,
-                grid.values[:, :3] @ aligned.rot_bs.T,
-                grid.values[:, 3:] @ aligned.rot_bs.T,
-                interpolated(reference, grid.time, 3.0),
-                np.interp(grid.time, node_time, still) > 1.9,
-            ),
-            aligned,
-            fixes,
-            settings,
-            free_scale,
-        ),
+        start=first_state(begin, aligned, fixes, settings, free_scale),
         given=aligned.given,
         changes=mounted.changes,
         moved_time=moved_time,
@@ -259,6 +254,13 @@ def _identified(
         has_wheel=sources.wheel is not None,
         notes=mounted.notes,
     )
+    if fixes is not None:
+        way = np.cumsum(np.nan_to_num(begin.speed)) * float(grid.time[1] - grid.time[0])
+        due = replace(fixes, time=fix_times)
+        start = with_heading(
+            setup.start, found.block, setup, np.interp(node_time, grid.time, way), due
+        )
+        setup = replace(setup, start=start)
     cut = int(np.searchsorted(node_time, float(sources.imu.time[0]) + _FIRST_PASS)) + 1
     end, _ = run(setup.start, found.block.part(0, int(nodes[min(nodes.size, cut) - 1]) + 1), setup)
     rot_bs, start = restarted(setup.rot_bs, setup.start, end)
