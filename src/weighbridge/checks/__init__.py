@@ -29,6 +29,7 @@ from weighbridge.errors import DriveError
 from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
+from weighbridge.signals.held import without_repeats
 from weighbridge.signals.timeline import one_recording, well_formed
 from weighbridge.vehicle.model import Vehicle
 
@@ -83,6 +84,7 @@ def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     found = tuple(check_overlap(drive, vehicle))
     if any(p.serious for p in found):
         return drive.with_problems(*found)
+    drive = without_repeats(drive)
     drive = with_half_digits(without_spikes(without_strays(drive, vehicle)))
     # Before rows are left out: a pause is one of the recording.
     found = (*found, *check_pauses(drive, vehicle))

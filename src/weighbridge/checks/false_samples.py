@@ -1,7 +1,7 @@
-"""Samples of torque or load that no engine makes: dropouts, full scale, and repeats.
+"""Samples of torque or load that no engine makes: dropouts and full scale.
 
 A reading that falls to zero for one sample and returns is no torque, unless the gear changes
-there. A reading that a slow source renews is true when it changes, and late until the next.
+there.
 """
 
 from __future__ import annotations
@@ -50,12 +50,6 @@ BESIDE: Final = 0.1
 
 PILED: Final = 0.005
 """Part of the samples that repeat the highest reading where it is cut off [-]."""
-
-SLOW: Final = 0.4
-"""Renewed at longer times, a reading is late enough to matter [s]."""
-
-REPEATS: Final = 3
-"""Samples from one renewal to the next, at least."""
 
 
 def isolated(drive: Drive, name: str) -> Bools:
@@ -107,36 +101,6 @@ def _same_gear(drive: Drive, before: Floats, after: Floats) -> Bools:
             engine.at(before) / speed.at(before)
         )
     return np.asarray(~(np.abs(change) > SAME_GEAR))
-
-
-def repeated(signal: Signal) -> tuple[Bools, float]:
-    """Mark samples that repeat an older reading of a source that is renewed slowly.
-
-    Parameters
-    ----------
-    signal
-
-    Returns
-    -------
-    repeats : (n,)
-    period : of the renewal [s]; 0 where every sample may be new
-    """
-    nothing = np.zeros(len(signal), dtype=bool)
-    if len(signal) < 200:
-        return nothing, 0.0
-    runs = runs_of(signal)
-    if runs.first.size < 50:
-        return nothing, 0.0
-    # A reading that is renewed with every sample changes from one to the next somewhere.
-    usual = float(np.percentile(runs.length[1:-1], 5.0))
-    period = float(np.percentile(np.diff(signal.time[runs.first]), 25.0))
-    if usual < REPEATS or period < SLOW:
-        return nothing, 0.0
-    since = signal.time - np.repeat(signal.time[runs.first], runs.length)
-    # In the middle between two stamps a renewal that changes nothing is not missed.
-    number = np.floor(since / period + 0.5 * signal.period / period).astype(np.int64)
-    new = np.concatenate(([True], (number[1:] != number[:-1]) | (since[1:] == 0.0)))
-    return np.asarray(~new), period
 
 
 def piled(signal: Signal, *, lowest: bool = False) -> Bools:

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.false_samples import clipped, isolated, piled, repeated
+from weighbridge.checks.false_samples import clipped, isolated, piled
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.signals import Bools, Drive, Problem, Signal
@@ -23,9 +23,8 @@ ENDS: Final = 60.0
 def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     """Return the drive without samples of torque, engine and vehicle speed that are false.
 
-    Left out are values that freeze, isolated dropouts, and repeats of a torque that is renewed
-    slowly. Each is told as a problem. Signals that a person vouches for
-    (``drive.info.trusted``) stay as they are.
+    Left out are values that freeze, and isolated dropouts. Each makes a problem. Signals that a
+    person vouches for (``drive.info.trusted``) stay as they are.
 
     Parameters
     ----------
@@ -72,16 +71,6 @@ def _without_false(drive: Drive, name: str) -> Drive:
                 f"{np.count_nonzero(marked)} of {len(signal)} samples of {name} fall to zero or "
                 "to the end of its range and return at once, in one gear, as no engine does: "
                 "they are left out; check the connection",
-            )
-        )
-        signal = drive.signals[name]
-    repeats, period = repeated(signal)
-    if repeats.any():
-        drive = drive.with_signals(_without(signal, repeats)).with_problems(
-            Problem(
-                name,
-                f"{name} is sampled every {signal.period:.3g} s and renewed every {period:.2g} s "
-                "only: the repeats are left out; poll it as fast as it is renewed",
             )
         )
     return drive
