@@ -1,0 +1,292 @@
+"""The pairs of drive and vehicle: what is weighed with what, and in which slice it counts."""
+
+from __future__ import annotations
+
+import tempfile
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import fault_subjects
+import numpy as np
+from fault_cases import Case, all_cases, injected, through_files, vehicle_of
+from fault_cases import pairs as pairs_of_faults
+from studies.corpus.subjects import MADE, READ, SHARED, Subject, absent, subject
+
+import weighbridge as wb
+from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.model import Vehicle
+
+IMU: Final = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
+GNSS: Final = (
+    "latitude", "longitude", "altitude", "gnss_speed", "gnss_course", "hdop", "gnss_accuracy",
+)  # fmt: skip
+PAIRED: Final = 60
+"""Pairs of faults that are drawn."""
+
+CUT: Final = 300.0
+"""Length of a cut [s]."""
+
+
+class Made(NamedTuple):
+    """What is weighed: a drive, by a vehicle file, and its true mass [kg] (NaN if unknown)."""
+
+    drive: Drive
+    vehicle: Vehicle
+    true: float
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A drive and a vehicle.
+
+    Attributes
+    ----------
+    id : unique; it stays when pairs are added
+    slice : that it counts in
+    of : name of the subject it is made from; empty for what is read from files
+    equipment : of the calibration; empty where the vehicle is not calibrated
+    make : from the subject and its vehicle file
+    sound : the drive is undamaged: it must be weighed
+    reference : pair whose problems are no news here; empty without
+    """
+
+    id: str
+    slice: str
+    of: str
+    equipment: str
+    make: Callable[[Subject, Vehicle], Made]
+    sound: bool
+    reference: str = ""
+
+
+# --- equipment -----------------------------------------------------------------------------------
+
+
+def every(drive: Drive, names: tuple[str, ...], period: float) -> Drive:
+    """Keep of signals the samples nearest to an even clock: sampling without a filter."""
+    kept = []
+    for name in names:
+        s = drive.get(name)
+        if s is None or s.period >= period:
+            continue
+        wanted = np.arange(s.time[0], s.time[-1], period)
+        at = np.unique(np.minimum(np.searchsorted(s.time, wanted), s.time.size - 1))
+        kept.append(Signal(name, s.time[at], s.values[at]))
+    return drive.with_signals(*kept)
+
+
+def polled(drive: Drive, period: float) -> Drive:
+    """Thin all that is neither inertial sensor nor GNSS."""
+    return every(drive, tuple(n for n in drive.signals if n not in (*IMU, *GNSS)), period)
+
+
+def one_axis(drive: Drive) -> Drive:
+    """Leave one accelerometer along the vehicle, at 50 Hz."""
+    along = drive.signals["accel_x"]
+    rest = drive.without(*IMU).with_signals(Signal("longitudinal_accel", along.time, along.values))
+    return every(rest, ("longitudinal_accel",), 0.02)
+
+
+EQUIPMENT: Final[dict[str, Callable[[Drive], Drive]]] = {
+    "full": lambda d: d,
+    "no GNSS": lambda d: d.without(*GNSS),
+    "fixes every 5 s": lambda d: every(d, GNSS, 5.0),
+    "IMU 50 Hz, OBD 1 Hz": lambda d: polled(every(d, IMU, 0.02), 1.0),
+    "IMU 20 Hz": lambda d: every(d, IMU, 0.05),
+    "IMU 10 Hz": lambda d: every(d, IMU, 0.1),
+    "one axis": one_axis,
+    "no IMU": lambda d: d.without(*IMU),
+    "no IMU, OBD 1 Hz": lambda d: polled(d.without(*IMU), 1.0),
+}
+OF_TRUCK: Final = ("no IMU", "no IMU, OBD 1 Hz")
+"""What a recording without an inertial sensor can be thinned to."""
+
+
+def calibrated(of: str, equipment: str) -> Vehicle:
+    """Calibrate a subject with its known drives, seen through an equipment."""
+    one = subject(of)
+    seen = EQUIPMENT[equipment]
+    return wb.calibrate(
+        [seen(drive) for drive, _ in one.known], [mass for _, mass in one.known], vehicle=one.base
+    )
+
+
+# --- how pairs are made --------------------------------------------------------------------------
+
+
+def _seen(one: Subject, vehicle: Vehicle, *, drive: str, equipment: str) -> Made:
+    recorded, true = one.drives[drive]
+    return Made(EQUIPMENT[equipment](recorded), vehicle, true)
+
+
+def _cut(one: Subject, vehicle: Vehicle, *, drive: str, part: float, equipment: str) -> Made:
+    recorded, true = one.drives[drive]
+    begin = recorded.start + part * max(recorded.duration - CUT, 0.0)
+    return Made(EQUIPMENT[equipment](recorded.between(begin, begin + CUT)), vehicle, true)
+
+
+def _faulty(one: Subject, vehicle: Vehicle, *, case: Case) -> Made:
+    drive, true = one.drives["drive"]
+    assert one.base is not None
+    assert one.limits is not None
+    assert one.other is not None
+    known_of = replace(one.base, tare=one.limits[0], gross=one.limits[1])
+    damaged = fault_subjects.Subject(
+        name=case.vehicle, vehicle=vehicle, drive=drive, mean=one.mean, final=true,
+        known=tuple(d for d, _ in one.known), masses=tuple(m for _, m in one.known),
+        known_of=known_of, other=one.other, undamaged={}, stds={}, warnings=frozenset(),
+    )  # fmt: skip
+    made = injected(case, damaged)
+    with tempfile.TemporaryDirectory() as home:
+        if through_files(case, made, Path(home) / "drive"):
+            made = wb.read_drive(Path(home) / "drive")
+    return Made(made, vehicle_of(case, damaged), true)
+
+
+def _by_papers(one: Subject, _: Vehicle, *, drive: str, equipment: str) -> Made:
+    assert one.papers is not None
+    recorded, true = one.drives[drive]
+    return Made(EQUIPMENT[equipment](recorded), one.papers, true)
+
+
+def _uneven(
+    one: Subject, vehicle: Vehicle, *, drive: str, white: float, wander: float, papers: bool
+) -> Made:
+    """Add noise to the heights: white, and wandering over 120 s [m]."""
+    recorded, true = one.drives[drive]
+    height = recorded.signals["altitude"]
+    rng = np.random.default_rng(zlib.crc32(f"{recorded.name} {white} {wander}".encode()))
+    step = rng.standard_normal(height.time.size)
+    slow = np.zeros(height.time.size)
+    keep = np.exp(-np.diff(height.time) / 120.0)
+    slow[0] = step[0]
+    for k, share in enumerate(keep, 1):
+        slow[k] = share * slow[k - 1] + np.sqrt(1.0 - share**2) * step[k]
+    noise = white * rng.standard_normal(height.time.size) + wander * slow
+    seen = EQUIPMENT["no IMU"](recorded).with_signals(
+        Signal("altitude", height.time, height.values + noise)
+    )
+    if papers:
+        assert one.papers is not None
+        vehicle = one.papers
+    return Made(seen, vehicle, true)
+
+
+def _recorded(_: Subject | None, __: Vehicle | None, *, drive: Path, vehicle: Path) -> Made:
+    read = wb.read_drive(drive, mapping=vehicle.parent / "mapping.toml")
+    return Made(read, Vehicle.load(vehicle), float("nan"))
+
+
+# --- the list ------------------------------------------------------------------------------------
+
+
+def _of_equipment() -> Iterator[Pair]:
+    for of in (*MADE, *READ):
+        truck = of == "foreign truck"
+        names = ["drive"] if of.startswith("own") else ["ordinary", "motorway"]
+        if of.startswith("foreign"):
+            names = (
+                [f"drive{k}" for k in range(5)] if truck else [f"drive-{k}" for k in (1, 2, 3, 4)]
+            )
+        origin = "foreign" if of.startswith("foreign") else "sound"
+        heavy = " (truck)" if of.split()[-1] in ("truck", "semi", "electric_bus") else ""
+        for equipment in OF_TRUCK if truck else EQUIPMENT:
+            for name in names:
+                make = partial(_seen, drive=name, equipment=equipment)
+                yield Pair(
+                    f"{of}/{name}/{equipment}", f"{origin}: {equipment}{heavy}", of, equipment,
+                    make, sound=True,
+                )  # fmt: skip
+
+
+def _cuts() -> Iterator[Pair]:
+    for of in MADE:
+        names = ["drive"] if of.startswith("own") else ["ordinary", "motorway"]
+        for name in names:
+            for part in (0.1, 0.3, 0.5, 0.7, 0.9):
+                for equipment in ("full", "no GNSS") if part in (0.3, 0.7) else ("full",):
+                    make = partial(_cut, drive=name, part=part, equipment=equipment)
+                    yield Pair(
+                        f"{of}/{name} from {part:.0%}/{equipment}", f"cut of 300 s: {equipment}",
+                        of, equipment, make, sound=True,
+                    )  # fmt: skip
+
+
+def _faults() -> Iterator[Pair]:
+    for case in (*all_cases(), *pairs_of_faults(PAIRED, 9470)):
+        if case.vehicle == "long":
+            continue
+        of = f"own {case.vehicle}"
+        sound = case.harmless and not any(f.stage == "calibration" for f, _ in case.faults)
+        yield Pair(
+            f"{of}/{case.damage}", f"fault: {case.group}", of, "full",
+            partial(_faulty, case=case), sound=sound, reference=f"{of}/undamaged@0",
+        )  # fmt: skip
+
+
+def _heights() -> Iterator[Pair]:
+    for of, names in (
+        ("second truck", ("ordinary", "motorway")),
+        ("second semi", ("ordinary", "motorway")),
+    ):
+        for name in names:
+            yield Pair(
+                f"{of}/{name}/by data sheet", "data sheet: no IMU (truck)", of, "",
+                partial(_by_papers, drive=name, equipment="no IMU"), sound=True,
+            )  # fmt: skip
+            for white, wander in ((0.4, 0.0), (0.0, 1.0), (0.4, 2.2)):
+                for papers in (False, True):
+                    way = "by data sheet" if papers else "calibrated"
+                    yield Pair(
+                        f"{of}/{name}/heights {white}+{wander} m/{way}",
+                        f"noise of heights: {way}", of, "" if papers else "no IMU",
+                        partial(_uneven, drive=name, white=white, wander=wander, papers=papers),
+                        sound=True,
+                    )  # fmt: skip
+    for k in range(5):
+        yield Pair(
+            f"foreign truck/drive{k}/by data sheet", "foreign: by data sheet (truck)",
+            "foreign truck", "", partial(_by_papers, drive=f"drive{k}", equipment="no IMU"),
+            sound=True,
+        )  # fmt: skip
+
+
+def _recordings() -> Iterator[Pair]:
+    """Recordings, whose mass nobody weighed: a change shows, an error does not."""
+    home = SHARED / "data" / "bmw-i3"
+    example = Path(__file__).parents[2] / "examples" / "bmw-i3"
+    for path in sorted(home.glob("*.csv")):
+        yield Pair(
+            f"bmw-i3/{path.stem}", "recorded", "", "",
+            partial(_recorded, drive=path, vehicle=example / "vehicle.toml"), sound=False,
+        )  # fmt: skip
+
+
+def all_pairs() -> list[Pair]:
+    """List all pairs, in an order that stays."""
+    return [*_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings()]
+
+
+OF_CI: Final = ("own car", "own electric", "second van", "second truck")
+"""Subjects of the part that CI weighs: few, for they have to be made."""
+
+
+def part(name: str) -> list[Pair]:
+    """Return the pairs of a part: ``all``, ``ci`` (150) or ``quick`` (30), and their references."""
+    pairs = all_pairs()
+    if name == "all":
+        return pairs
+    of, count = (OF_CI, 150) if name == "ci" else (OF_CI[:2], 30)
+    there = [p for p in pairs if p.of in of and p.equipment in ("full", "no IMU", "no GNSS", "")]
+    order = sorted(there, key=lambda p: zlib.crc32(p.id.encode()))
+    chosen = {p.id for p in order[:count]} | {p.reference for p in order[:count]}
+    return [p for p in pairs if p.id in chosen]
+
+
+def unavailable(pair: Pair) -> str:
+    """Say why a pair cannot be made here; empty where it can."""
+    return absent(pair.of) if pair.of else ""
