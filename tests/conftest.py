@@ -2,14 +2,22 @@
 
 import contextlib
 import ctypes
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+
+# Before Numba is imported: compiled kernels are shared by all checkouts with the same sources.
+os.environ.setdefault(
+    "NUMBA_CACHE_DIR",
+    str(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "weighbridge"),
+)
 
 import numpy as np
 import pytest
 
 import weighbridge as wb
+from tests.order import longest_first
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.simulation import make_scenario, simulate_car
@@ -20,6 +28,11 @@ CHROMIUM = next(
 )
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest files, so that no worker ends with one."""
+    longest_first(items)
 
 
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
