@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
-from tests.order import longest_first
+from tests.order import guards, is_long, longest_first
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.simulation import make_scenario, simulate_car
@@ -30,8 +30,22 @@ CHROMIUM = next(
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest files, so that no worker ends with one."""
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option for tests that are left out otherwise."""
+    parser.addoption("--long", action="store_true", help="run the tests of tests/long.toml too")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave long tests out, unless asked for or named; begin with the longest files."""
+    listed, long = guards(), []
+    for item in items:
+        if is_long(item.nodeid.removeprefix("tests/"), listed):
+            item.add_marker("long")
+            long.append(item)
+    wanted = config.option.long or "long" in config.option.markexpr
+    if long and not wanted and not any("::" in arg for arg in config.args):
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if item not in set(long)]
     longest_first(items)
 
 

@@ -1,4 +1,6 @@
-"""How long each file of tests takes: long files start first, and `.ci/quick` takes what fits.
+"""Which tests run first, and which only when asked for.
+
+Long files start first, and `.ci/quick` takes what fits. Tests of `long.toml` run with ``--long``.
 
 ``pytest --junitxml=build/tests.xml`` and then ``python -m tests.order build/tests.xml`` write
 the list again.
@@ -6,12 +8,14 @@ the list again.
 
 import csv
 import sys
+import tomllib
 from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[1]
 LIST = ROOT / "tests" / "order.csv"
+LONG = ROOT / "tests" / "long.toml"
 UNKNOWN = 10.0
 """Taken for a file that is not on the list [s]."""
 
@@ -26,6 +30,20 @@ def longest_first(items: list) -> None:
     """Put the tests of long files first; within a file the order stays."""
     known = seconds()
     items.sort(key=lambda item: -known.get(item.path.relative_to(ROOT).as_posix(), UNKNOWN))
+
+
+def guards() -> dict[str, str]:
+    """Return the long tests, each with the quicker one that notices the same faults."""
+    return {
+        test: entry["guard"]
+        for entry in tomllib.loads(LONG.read_text(encoding="utf-8"))["long"]
+        for test in entry["tests"]
+    }
+
+
+def is_long(name: str, listed: dict[str, str]) -> bool:
+    """Tell whether a test is on the list, by itself or with all its parameters."""
+    return name in listed or name.partition("[")[0] in listed
 
 
 def write(results: Path) -> None:
