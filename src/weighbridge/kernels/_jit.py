@@ -38,7 +38,11 @@ class _ByContent(UserProvidedCacheLocator):
 
 
 class _Place(CompileResultCacheImpl):
-    _locator_classes = (_ByContent, *CompileResultCacheImpl._locator_classes)
+    """As numba places a kernel, but for a named folder."""
+
+    def __init__(self, function):
+        self._locator_classes = [_ByContent, *CompileResultCacheImpl._locator_classes]
+        super().__init__(function)
 
 
 class _Files(IndexDataCacheFile):
