@@ -111,14 +111,14 @@ MUTANTS = (
         "half = float(ndtri(0.5 * (1.0 + level))) * self.std",
         "half = 0.5 * float(ndtri(0.5 * (1.0 + level))) * self.std",
         "an interval halved",
-        ("tests/live/test_alerts.py", "tests/live/test_faults.py"),
+        ("tests/live/test_alerts.py",),
     ),
     Mutant(
         "fleet/travel.py",
         "return np.asarray(found[found[:, 1] - found[:, 0] >= SHORTEST])",
         "return np.asarray(found[found[:, 1] - found[:, 0] >= SHORTEST][1:])",
         "a row dropped",
-        ("tests/fleet/test_figures.py", "tests/fleet/test_learning.py"),
+        ("tests/fleet/test_travel.py",),
     ),
     Mutant(
         "kernels/rts.py",
