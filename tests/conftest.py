@@ -17,11 +17,15 @@ import numpy as np
 import pytest
 
 import weighbridge as wb
+from tests.drives import keep_drives
 from tests.order import guards, is_long, longest_first
+from weighbridge import simulation
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import make_scenario
 from weighbridge.simulation.simulate import SimulatedDrive
+
+keep_drives(Path(os.environ["NUMBA_CACHE_DIR"]))
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -60,7 +64,7 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
 @pytest.fixture(scope="session")
 def short_drive() -> SimulatedDrive:
     """Return a short drive of a petrol car with 120 kg on board."""
-    return simulate_car(make_scenario("car-short", payload=120.0, seed=61))
+    return simulation.simulate_car(make_scenario("car-short", payload=120.0, seed=61))
 
 
 @pytest.fixture(scope="session")
