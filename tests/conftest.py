@@ -2,24 +2,55 @@
 
 import contextlib
 import ctypes
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+
+# Before Numba is imported: compiled kernels are shared by all checkouts with the same sources.
+os.environ.setdefault(
+    "NUMBA_CACHE_DIR",
+    str(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "weighbridge"),
+)
 
 import numpy as np
 import pytest
 
 import weighbridge as wb
+from tests.drives import keep_drives
+from tests.order import guards, is_long, longest_first
+from weighbridge import simulation
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import make_scenario
 from weighbridge.simulation.simulate import SimulatedDrive
+
+keep_drives(Path(os.environ["NUMBA_CACHE_DIR"]))
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option for tests that are left out otherwise."""
+    parser.addoption("--long", action="store_true", help="run the tests of tests/long.toml too")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave long tests out, unless asked for or named; begin with the longest files."""
+    listed, long = guards(), []
+    for item in items:
+        if is_long(item.nodeid.removeprefix("tests/"), listed):
+            item.add_marker("long")
+            long.append(item)
+    wanted = config.option.long or "long" in config.option.markexpr
+    if long and not wanted and not any("::" in arg for arg in config.args):
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if item not in set(long)]
+    longest_first(items)
 
 
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
@@ -33,7 +64,7 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
 @pytest.fixture(scope="session")
 def short_drive() -> SimulatedDrive:
     """Return a short drive of a petrol car with 120 kg on board."""
-    return simulate_car(make_scenario("car-short", payload=120.0, seed=61))
+    return simulation.simulate_car(make_scenario("car-short", payload=120.0, seed=61))
 
 
 @pytest.fixture(scope="session")

@@ -28,6 +28,13 @@ def test_an_alert_begins_once_and_ends_once():
     assert "above 3500 kg" in events[0][1].text
 
 
+def test_the_interval_is_that_of_the_normal_distribution():
+    exact = NormalDist(3000.0, 50.0)
+    low, high = weighing(3000.0).interval(0.9)
+    assert low == pytest.approx(exact.inv_cdf(0.05))
+    assert high == pytest.approx(exact.inv_cdf(0.95))
+
+
 def test_below_is_the_other_side():
     alert = Alert(2500.0, above=False)
     assert alert.look(weighing(2450.0)) is None

@@ -1,10 +1,12 @@
 """Masses of a calibration that contradict each other, or that nothing backs."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from weighbridge.calibration import doubted_masses as module
 from weighbridge.calibration.doubted_masses import contradicting, tared, unbacked_scale, with_doubts
 from weighbridge.errors import DriveError
 from weighbridge.vehicle.model import TorqueModel, Vehicle
@@ -36,6 +38,28 @@ def test_what_scatters_is_no_contradiction():
 def test_a_drive_that_was_not_weighed_is_left_out():
     ratios = np.array([0.99, np.nan, 1.01])
     assert contradicting(NAMES, MASSES, ratios, STDS) == []
+
+
+def test_burnt_fuel_is_not_on_board_any_more(monkeypatch):
+    burnt = (50.0, 100.0, 400.0)
+    balances = [
+        SimpleNamespace(motion=None, table=SimpleNamespace(fuel_burnt=np.array([0.0, kg])))
+        for kg in burnt
+    ]
+    weighed = iter(np.subtract(MASSES, burnt))
+    monkeypatch.setattr(
+        module.joint,
+        "estimate",
+        lambda *_, **__: SimpleNamespace(mass=next(weighed), bound_std=5.0),
+    )
+    monkeypatch.setattr(module, "doubted_gains", lambda *_: [])
+    vehicle = SimpleNamespace(
+        provenance=SimpleNamespace(drives=NAMES, fit=SimpleNamespace(refined=True)), gross=None
+    )
+    found = []
+    monkeypatch.setattr(module, "contradicting", lambda *given: found.append(given) or [])
+    assert module.doubted_masses(vehicle, balances, MASSES) == []
+    np.testing.assert_allclose(found[0][2], 1.0)
 
 
 def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():

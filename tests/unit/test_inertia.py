@@ -10,7 +10,12 @@ from numpy.testing import assert_allclose
 from tests.unit.test_report import unpacked
 
 from weighbridge.errors import ConfigError, DriveError
-from weighbridge.inertia.filter import InertiaFilter, RideSamples, run_filter
+from weighbridge.inertia.filter import (
+    InertiaFilter,
+    RideSamples,
+    inverse_interval,
+    run_filter,
+)
 from weighbridge.inertia.integration import integration_std
 from weighbridge.inertia.load_changes import jumps
 from weighbridge.inertia.ride_checks import ride_samples
@@ -68,6 +73,17 @@ def test_ride_gives_the_three_parameters(made, found):
     assert_allclose(found.values, true, rtol=0.02)
     assert np.all((low < true) & (true < high))
     assert found.converged_at < 2.0
+
+
+def test_an_interval_holds_as_much_as_it_says():
+    """Of inverses of normal values, counted; and without an upper end where zero is among them."""
+    rng = np.random.default_rng(5)
+    alpha = rng.normal(1.0, 0.1, 100_000)
+    low, high = inverse_interval(np.array([1500.0]), np.ones(1), np.array([0.1]), 0.9)
+    assert np.mean(1500.0 / alpha < low) == pytest.approx(0.05, abs=0.003)
+    assert np.mean(1500.0 / alpha > high) == pytest.approx(0.05, abs=0.003)
+    _, high = inverse_interval(np.array([1500.0]), np.ones(1), np.array([0.7]), 0.9)
+    assert np.isinf(high)
 
 
 def test_axle_loads_balance_about_the_centre_of_gravity(found):

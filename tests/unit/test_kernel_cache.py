@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from numba.core.caching import IndexDataCacheFile
+
 import weighbridge
+from weighbridge.kernels import _jit
 
 SOURCE = Path(weighbridge.__file__).parent
 CALL = """
@@ -31,9 +34,9 @@ def outer(x):
 """
 
 
-def test_an_edit_of_a_called_kernel_is_noticed(tmp_path, monkeypatch):
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    package = tmp_path / "weighbridge"
+def install(folder):
+    """Write a package of two kernels, one of which calls the other; return how it is run."""
+    package = folder / "weighbridge"
     kernels = package / "kernels"
     kernels.mkdir(parents=True)
     for name in (
@@ -49,14 +52,48 @@ def test_an_edit_of_a_called_kernel_is_noticed(tmp_path, monkeypatch):
     def run(factor):
         (kernels / "called.py").write_text(CALLED.format(factor=factor))
         ran = subprocess.run(
-            [sys.executable, "-c", CALL, tmp_path], capture_output=True, text=True, check=True
+            [sys.executable, "-c", CALL, folder], capture_output=True, text=True, check=True
         )
         value, hits = ran.stdout.split()
         return float(value), int(hits)
 
+    return run
+
+
+def test_an_edit_of_a_called_kernel_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    run = install(tmp_path)
     assert run(2.0) == (7.0, 0)
     assert run(2.0) == (7.0, 1)
     assert run(5.0) == (16.0, 0)
+
+
+def test_installations_of_the_same_sources_share_a_named_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
+    checkout, wheel = install(tmp_path / "checkout"), install(tmp_path / "wheel")
+    assert checkout(2.0) == (7.0, 0)
+    assert wheel(2.0) == (7.0, 1)
+    assert wheel(5.0) == (16.0, 0)
+    # What the other sources need is still there.
+    assert checkout(2.0) == (7.0, 1)
+
+
+def test_processes_that_save_at_once_do_not_mix_signatures(tmp_path, monkeypatch):
+    """The second process reads the index before the first has written it."""
+
+    def files():
+        return _jit._Files(str(tmp_path), "kernel", "stamp")
+
+    files().save("for floats", "code for floats")
+    with monkeypatch.context() as patch:
+        patch.setattr(IndexDataCacheFile, "_load_index", lambda self: {})
+        files().save("for integers", "code for integers")
+    assert files().load("for integers") == "code for integers"
+    # It is lost and compiled again; it is never the code of the other.
+    assert files().load("for floats") is None
+    files().save("for floats", "code for floats")
+    assert files().load("for floats") == "code for floats"
+    assert files().load("for integers") == "code for integers"
 
 
 def test_every_kernel_lies_where_the_digest_looks():

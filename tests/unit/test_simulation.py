@@ -34,10 +34,10 @@ from weighbridge.simulation import (
     random_car,
     random_habits,
     random_vehicle,
-    simulate_car,
     usual_polling,
 )
 from weighbridge.simulation.route import _turn
+from weighbridge.simulation.simulate import simulate_car
 
 
 def short(seed=5, duration=80.0, **changes):

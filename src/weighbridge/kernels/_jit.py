@@ -4,8 +4,14 @@ import contextlib
 import hashlib
 from pathlib import Path
 
+import numba
 from numba import njit
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    UserProvidedCacheLocator,
+)
 
 
 def _sources() -> str:
@@ -22,12 +28,48 @@ SOURCES = _sources()
 notices edits of a function's own file, and not of those it calls."""
 
 
+class _ByContent(UserProvidedCacheLocator):
+    """Folder in NUMBA_CACHE_DIR named by the sources: a checkout and a wheel share it."""
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file):
+        """Return the name of the folder, whatever the path of the file."""
+        return f"weighbridge_{SOURCES[:16]}_numba_{numba.__version__}"
+
+
+class _Place(CompileResultCacheImpl):
+    """As numba places a kernel, but for a named folder."""
+
+    def __init__(self, function):
+        self._locator_classes = [_ByContent, *CompileResultCacheImpl._locator_classes]
+        super().__init__(function)
+
+
+class _Files(IndexDataCacheFile):
+    """Files of one kernel, which several processes may write at once.
+
+    Numba numbers compiled signatures. Two processes that save at once would give two signatures
+    one number, and the index would lead to the wrong code. Here a digest names the file.
+    """
+
+    def save(self, key, data):
+        """Save a compiled kernel; what is lost beside another process is compiled again."""
+        overloads = self._load_index()
+        if key not in overloads:
+            digest = hashlib.sha256(self._dump(key)).digest()
+            overloads[key] = self._data_name(int.from_bytes(digest[:8], "big"))
+        self._save_data(overloads[key], data)
+        self._save_index(overloads)
+
+
 class _Cache(FunctionCache):
     """Disk cache whose damage, or a full disk, costs a compilation and no more."""
 
+    _impl_class = _Place
+
     def __init__(self, function):
         super().__init__(function)
-        self._cache_file = IndexDataCacheFile(
+        self._cache_file = _Files(
             cache_path=self._cache_path,
             filename_base=self._impl.filename_base,
             source_stamp=SOURCES,

@@ -1,0 +1,66 @@
+"""Which tests run first, and which only when asked for.
+
+Long files start first, and `.ci/quick` takes what fits. Tests of `long.toml` run with ``--long``.
+
+``pytest --junitxml=build/tests.xml`` and then ``python -m tests.order build/tests.xml`` write
+the list again.
+"""
+
+import csv
+import sys
+import tomllib
+from collections import Counter
+from pathlib import Path
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).resolve().parents[1]
+LIST = ROOT / "tests" / "order.csv"
+LONG = ROOT / "tests" / "long.toml"
+UNKNOWN = 10.0
+"""Taken for a file that is not on the list [s]."""
+
+
+def seconds() -> dict[str, float]:
+    """Return the seconds of each file on the list, by its path in the checkout."""
+    with LIST.open(encoding="utf-8", newline="") as file:
+        return {row["file"]: float(row["seconds"]) for row in csv.DictReader(file)}
+
+
+def longest_first(items: list) -> None:
+    """Put the tests of long files first; within a file the order stays."""
+    known = seconds()
+    items.sort(key=lambda item: -known.get(item.path.relative_to(ROOT).as_posix(), UNKNOWN))
+
+
+def guards() -> dict[str, str]:
+    """Return the long tests, each with the quicker one that notices the same faults."""
+    return {
+        test: entry["guard"]
+        for entry in tomllib.loads(LONG.read_text(encoding="utf-8"))["long"]
+        for test in entry["tests"]
+    }
+
+
+def is_long(name: str, listed: dict[str, str]) -> bool:
+    """Tell whether a test is on the list, by itself or with all its parameters."""
+    return name in listed or name.partition("[")[0] in listed
+
+
+def write(results: Path) -> None:
+    """Write the list from a junit file of a run of all tests."""
+    taken: Counter[str] = Counter()
+    for case in ElementTree.parse(results).iter("testcase"):
+        parts = case.attrib["classname"].split(".")
+        # A class of tests is the last part of some names.
+        while parts and not (path := ROOT.joinpath(*parts).with_suffix(".py")).is_file():
+            parts.pop()
+        if parts:
+            taken[path.relative_to(ROOT).as_posix()] += float(case.attrib["time"])
+    with LIST.open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["file", "seconds"])
+        rows.writerows([name, f"{taken[name]:.1f}"] for name in sorted(taken))
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]))
