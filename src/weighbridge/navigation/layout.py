@@ -26,6 +26,7 @@ from weighbridge.kernels.ins_model import (
     V,
 )
 from weighbridge.kernels.rotation import euler_to_matrix, matrix_to_euler, quaternions_to_euler
+from weighbridge.messages import Problem
 from weighbridge.navigation.aiding import Fixes
 from weighbridge.navigation.even import Even
 from weighbridge.navigation.filter import Block, Nodes, run, run_smoothed
@@ -339,16 +340,13 @@ def mounting_of(turn: Floats, end_std: Floats, setup: Setup) -> tuple[Angles, An
     )
 
 
-def _notes(setup: Setup, squat_known: bool) -> tuple[str, ...]:
+def _notes(setup: Setup, squat_known: bool) -> tuple[Problem, ...]:
     """Say what the drive does not show, after the notes of the setup."""
     notes = list(setup.notes)
     if setup.origin is None:
-        notes.append(
-            "without GNSS the heading is unknown, the speed's scale is taken as 1 and the grade "
-            "may be off by a constant"
-        )
+        notes.append(Problem.of("gnss.none"))
     elif not setup.has_height:
-        notes.append("without GNSS height the grade may be off by a constant")
+        notes.append(Problem.of("gnss.no_height"))
     if not squat_known:
-        notes.append("the drive does not show the squat: pitch of the body is taken as grade")
+        notes.append(Problem.of("motion.no_squat"))
     return tuple(dict.fromkeys(notes))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from weighbridge.errors import DriveError
+from weighbridge.messages import refused
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.settings import RATE, NavigationSettings
@@ -55,9 +55,7 @@ def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motio
         return longitudinal_motion(true_speed(drive, vehicle)), None
     if has_speed:
         return speed_motion(true_speed(drive, vehicle)), None
-    raise DriveError(
-        f"{drive.name}: no vehicle_speed and no GNSS; without a speed no vehicle can be weighed"
-    )
+    raise refused("speed.missing", drive=drive.name)
 
 
 def without_accelerometer(drive: Drive) -> Drive:
