@@ -13,7 +13,7 @@ from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from website import links, notebooks, reference
+from website import links, messages, notebooks, reference
 
 _DISPLAY = re.compile(r'<div class="arithmatex">\\\[(.*?)\\\]</div>', re.DOTALL)
 _INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
@@ -43,6 +43,7 @@ def on_files(files: Files, config: Any) -> Files:
     made: dict[str, str] = {
         **reference.python_pages(),
         "reference/commands.md": reference.commands_page(),
+        "reference/messages.md": messages.messages_page(),
         "licence.md": "# Licence\n\n" + (links.HOME / "LICENSE").read_text(encoding="utf-8"),
         **{
             f"downloads/{page.stem}.ipynb": notebooks.notebook(page)

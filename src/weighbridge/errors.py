@@ -5,6 +5,8 @@ offending value and the remedy. Poor data is not an exception but a result
 (`weighbridge.Status`).
 """
 
+from typing import Any
+
 from weighbridge.visible import cut
 
 
@@ -12,7 +14,13 @@ class WeighbridgeError(Exception):
     """Base of all errors that a caller can correct; the command line exits with 2.
 
     Its text is cut to what a screen shows: what it quotes of a file may be endless.
+
+    Attributes
+    ----------
+    problem : the `weighbridge.Problem` that it says, if the catalogue of messages has it; else None
     """
+
+    problem: Any = None
 
     def __init__(self, text: str = "") -> None:
         super().__init__(cut(text))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
+from tests.noted import noted
 from typer.testing import CliRunner
 
 from weighbridge.cli.inspect import inspect
@@ -105,11 +106,11 @@ def test_brackets_stay_in_tables_of_several_drives():
 
     why = "state it under [torque] of the vehicle file"
     car = Vehicle()
-    none = without_mass(Drive("run[a]", {}), car, "rls", why)
+    none = without_mass(Drive("run[a]", {}), car, "rls", noted(why))
     assert none.status is Status.MISSING_SIGNALS
     console = Console(width=160)
     with console.capture() as shown:
-        console.print(result_table([none.row], [("logs[b]", why)], car))
+        console.print(result_table([none.row], [("logs[b]", noted(why))], car))
         console.print(method_table((none,)))
     text = shown.get()
     assert text.count("under [torque] of") == 3
@@ -228,14 +229,14 @@ def test_the_torque_in_percent_goes_into_the_next_command(percent_drive):
 def test_warnings_of_several_drives_are_a_few_lines():
     from weighbridge.cli.weigh import result_table, warning_lines
     from weighbridge.pipeline.weighing import without_mass
-    from weighbridge.signals import Drive
+    from weighbridge.signals import Drive, Problem
     from weighbridge.vehicle.known import Known, describe
 
     def day(k, *warnings):
         parted = f"day holds 2 drives, parted by pauses; this is drive {k}"
         name = f"day part {k} of 2"
-        told = (parted, "heights", *warnings)
-        return without_mass(Drive(name, {}), truck, "joint", "why", told).row
+        told = (Problem("file.part", parted), *map(noted, ("heights", *warnings)))
+        return without_mass(Drive(name, {}), truck, "joint", noted("why"), told).row
 
     truck = describe(Known(kind="truck", torque="percent")).vehicle
     drives = [day(1), day(2, "a", "b", "c", "d", "e")]
@@ -246,4 +247,4 @@ def test_warnings_of_several_drives_are_a_few_lines():
     ]
     assert warning_lines([]) == []
     assert "never calibrated" in result_table(drives, [], truck).title
-    assert result_table([], [("day", "why")], truck).title is None
+    assert result_table([], [("day", noted("why"))], truck).title is None

@@ -12,7 +12,7 @@ from weighbridge.live.weighing import LiveStatus, LiveWeighing
 
 def weighing(mass, std=50.0, status=LiveStatus.WEIGHED):
     return LiveWeighing(
-        vehicle="van", time=1.0, age=0.0, status=status, reason="", mass=mass, std=std,
+        vehicle="van", time=1.0, age=0.0, status=status, refusal=None, mass=mass, std=std,
         tare=2000.0, gross=3500.0, tared=None, driven=600.0, progress=1.0, minutes_to_5=0.0,
         minutes_to_2=0.0, advice="",
     )  # fmt: skip

@@ -40,7 +40,7 @@ def test_after_all_devices_began_anew_a_new_drive_is_weighed(car, loaded):
     assert heard.scale.newest == pytest.approx(HOST + 122.0, abs=0.1)
     assert records.start >= HOST + 110.0
     assert told.driven < 10.0
-    assert [n for n in told.notes if "a sensor began anew" in n and "e+" not in n]
+    assert [n for n in told.problems if n.id == "live.anew" and "e+" not in n]
     assert not [n for n in told.notes if "jumped" in n]
     # The sensor's stamps are where its lines came, to a tick.
     for name in ("accel_x", "vehicle_speed"):
@@ -125,7 +125,7 @@ def test_after_a_clock_was_set_back_the_mass_is_that_of_before_until_it_is_prove
     said = [n for w in told for n in w.notes if "for a time that nobody knows" in n]
     assert said
     assert "e+" not in said[0]
-    assert all(sum("the clock of the samples jumped once" in n for n in w.notes) == 1 for w in told)
+    assert all(sum(n.id == "live.clock_jumps" for n in w.problems) == 1 for w in told)
 
 
 @pytest.mark.slow

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterator
 
+from tests.noted import noted
+
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
 
 NAMES = (
@@ -30,7 +32,7 @@ def weighing(time: float = 300.0, **changed: object) -> LiveWeighing:
         "time": time,
         "age": 1.0,
         "status": LiveStatus.WEIGHED,
-        "reason": "",
+        "refusal": None,
         "mass": 2100.0,
         "std": 25.0,
         "tare": 1800.0,
@@ -42,7 +44,7 @@ def weighing(time: float = 300.0, **changed: object) -> LiveWeighing:
         "minutes_to_2": 3.0,
         "advice": "Speed up firmly from a stop, in second or third gear.",
         "signals": health(),
-        "notes": (),
+        "problems": (),
     }
     return LiveWeighing(**{**values, **changed})  # type: ignore[arg-type]
 
@@ -54,7 +56,7 @@ def drive(seconds: int = 600, begin: float = 0.0) -> Iterator[LiveWeighing]:
             yield weighing(
                 begin + k,
                 status=LiveStatus.LEARNING,
-                reason="The vehicle has hardly moved.",
+                refusal=noted("The vehicle has hardly moved."),
                 mass=math.nan,
                 std=math.nan,
                 progress=k / 600.0,
@@ -68,7 +70,7 @@ def drive(seconds: int = 600, begin: float = 0.0) -> Iterator[LiveWeighing]:
         yield weighing(
             begin + k,
             status=LiveStatus.LEARNING if learnt else LiveStatus.WEIGHED,
-            reason="The interval is wider than 5 %." if learnt else "",
+            refusal=noted("The interval is wider than 5 %.") if learnt else None,
             mass=mass,
             std=std,
             progress=min(1.0, 0.02 * mass / (1.96 * std)),

@@ -99,12 +99,12 @@ def test_fd_frames_and_lines_that_are_none(tmp_path, sent):
     log = read_gvret(path, None, None)
     assert log.frames.length[-1] == 64
     assert_array_equal(log.frames.data[-1], np.arange(64))
-    assert "left out 1 of 7 lines" in log.problems[0].text
+    assert log.problems[0].id == "file.lines_left_out"
     path = tmp_path / "log.crtd"
     path.write_text(crtd(sent[:5]) + "1600000100.0 1R11 12 0 1\n1600000100.0 1R29 FFFFFFFF 00\n")
     log = read_crtd(path, None, None)
     assert len(log.frames) == 5
-    assert "left out 2 of 7 lines" in log.problems[0].text
+    assert log.problems[0].id == "file.lines_left_out"
 
 
 @pytest.mark.parametrize("name", WRITTEN)

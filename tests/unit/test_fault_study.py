@@ -19,9 +19,10 @@ from fault_cases import Case, all_cases, injected, pairs, run_case, subset, tell
 from fault_kinds import FAULTS, Fault
 from fault_subjects import METHODS, build
 from fault_workers import done_apart
+from tests.noted import noted
 
 from weighbridge.io import read_drive
-from weighbridge.signals import Problem, Signal
+from weighbridge.signals import Signal
 
 needs_compiler = pytest.mark.skipif(
     numba.config.DISABLE_JIT, reason="half a million steps need compiled code"
@@ -47,7 +48,7 @@ def untouched(drive, severity, rng):
 
 
 def named(drive, severity, rng):
-    return drive.with_problems(Problem("", "the sensor has gone soft"))
+    return drive.with_problems(noted("the sensor has gone soft"))
 
 
 def without_speed(drive, severity, rng):

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.calibration.problem import find_gears
@@ -105,7 +106,7 @@ def test_a_stepless_gearbox_is_refused():
 
 def test_too_short_a_drive_says_so():
     time = np.arange(20) * 0.25
-    with pytest.raises(DriveError, match="longer drive"):
+    with refused("gear.few_samples"):
         detect_gearings(time, np.full(20, 200.0), np.full(20, 10.0))
 
 

@@ -3,12 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
+from tests.noted import noted
 
 import weighbridge as wb
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import to_frames, write_drive
 from weighbridge.pipeline.given import as_drives
-from weighbridge.signals import Drive, Problem, Signal
+from weighbridge.signals import Drive, Signal
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +146,7 @@ def test_names_and_problems_cannot_act_on_terminal_or_page():
     drive = Drive(
         name="<b>\x1b[31m",
         signals={"vehicle_speed": Signal("vehicle_speed", np.zeros(1), np.ones(1))},
-        problems=(Problem("", "note"), Problem("", "<script>bad</script>", serious=True)),
+        problems=(noted("note"), noted("<script>bad</script>", serious=True)),
     )
     assert "\x1b" not in repr(drive)
     assert "2 problems, 1 serious: <script>" in repr(drive)

@@ -73,5 +73,7 @@ def test_a_torque_that_is_renewed_slowly_is_reported(short_drive):
         "engine_load", time, load.at(load.time[0] + np.floor((time - time[0]) / 0.9) * 0.9)
     )
     drive = mend_drive(short_drive.drive.with_signals(fast))
-    assert any("renewed every 0.9 s" in p.text for p in drive.problems)
+    (found,) = (p for p in drive.problems if p.id == "range.repeats")
+    assert found.signal == "engine_load"
+    assert found.values["renewed"] == pytest.approx(0.9, abs=0.02)
     assert drive.signals["engine_load"].period == pytest.approx(0.9, abs=0.02)

@@ -9,6 +9,7 @@ import threading
 from importlib.resources import files
 
 import pytest
+from tests.noted import noted
 from tests.unit.made_weighings import drive, weighing
 
 from weighbridge.errors import ConfigError
@@ -276,7 +277,7 @@ def test_two_hours_of_replay_do_not_let_the_page_grow(page, browser):
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 def test_names_that_are_markup_are_shown_as_text(page, browser):
-    page.show(weighing(vehicle="<img src=x onerror=alert(1)>", notes=("<b>bold</b>",)))
+    page.show(weighing(vehicle="<img src=x onerror=alert(1)>", problems=(noted("<b>bold</b>"),)))
     tab = browser.new_page()
     tab.goto(page.name)
     tab.wait_for_selector("#notes li")

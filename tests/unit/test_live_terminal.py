@@ -7,6 +7,7 @@ import math
 
 import pytest
 from rich.console import Console
+from tests.noted import noted
 from tests.unit.made_weighings import NAMES, drive, health, weighing
 
 from weighbridge.live.outputs.terminal import PlainLines, TerminalView, lines, terminal
@@ -34,8 +35,8 @@ def test_the_view_tells_mass_interval_payload_share_and_what_is_needed():
 def test_the_view_never_leaves_the_terminal(width, height):
     told = weighing(
         status=LiveStatus.INCONSISTENT,
-        reason="The drive says two masses that contradict each other, so none is told. " * 3,
-        notes=("A note that is longer than a line of any terminal that this is shown on. " * 4,),
+        refusal=noted("The drive says two masses that contradict each other. " * 4),
+        problems=(noted("A note that is longer than a line of any terminal it is on. " * 4),),
         signals=health(silent=("gnss_speed", "vehicle_speed")),
     )
     found = lines(told, width, height)
@@ -173,8 +174,8 @@ def test_the_last_view_leaves_room_for_what_is_said_after_it(width, height):
     console = Console(file=out, force_terminal=True, width=width, height=height)
     view = TerminalView(console)
     for count in range(20):
-        notes = tuple(f"Note {k} of a drive that has many." for k in range(count))
-        view.show(weighing(notes=notes))
+        notes = tuple(noted(f"Note {k} of a drive that has many.") for k in range(count))
+        view.show(weighing(problems=notes))
     view.close()
     last = out.getvalue().rsplit("\x1b[2K", 1)[-1]
     assert weighing().vehicle in last

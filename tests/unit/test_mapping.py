@@ -130,7 +130,7 @@ def test_absent_column_is_refused_unless_optional_or_in_another_file(tmp_path):
     (problem,) = read_drive(log, mapping).problems
     assert problem.signal == "throttle"
     assert "log.csv: column 'vv' for throttle is not there" in problem.text
-    assert "or set optional = true" in problem.text
+    assert problem.id == "file.column_missing"
     assert problem.serious
     other = write(tmp_path / "later.csv", "t,v,vv\n2,36,10\n3,72,20\n")
     assert [p.serious for p in read_drive([log, other], mapping).problems] == [False]

@@ -14,7 +14,7 @@ from weighbridge.live.outputs.words import remaining_text
 
 def told(mass, std, floor):
     """What JSON and words say of a mass."""
-    found = outlook(mass, std, floor, driven=300.0, reason="", silent=(), first=60.0)
+    found = outlook(mass, std, floor, driven=300.0, reason=None, silent=(), first=60.0)
     said = {k: v for k, v in asdict(found).items() if k not in ("status", "reason", "advice")}
     made = weighing(mass=mass, std=std, **said)
     return json.loads(json_line(made)), made
@@ -62,7 +62,7 @@ def test_what_hours_of_driving_leave_is_the_outlook(noise, floor, driven):
 
     found = outlook(
         mass, math.hypot(noise, floor * mass), floor,
-        driven=driven, reason="", silent=(), first=60.0,
+        driven=driven, reason=None, silent=(), first=60.0,
     )  # fmt: skip
     assert found.reach == pytest.approx(half(4.5 * 3600.0), rel=1e-4)
     if math.isinf(found.minutes_to_2):
@@ -74,7 +74,7 @@ def test_what_hours_of_driving_leave_is_the_outlook(noise, floor, driven):
 
 def test_minutes_of_a_mass_that_waits_for_a_look_fall_with_the_driving():
     def minutes(since, wait):
-        given = {"driven": 300.0, "reason": "", "silent": (), "first": 60.0}
+        given = {"driven": 300.0, "reason": None, "silent": (), "first": 60.0}
         return outlook(2000.0, 60.0, 0.005, **given, since=since, wait=wait).minutes_to_2
 
     at_look = minutes(0.0, 150.0)

@@ -40,7 +40,7 @@ def test_a_moved_sensor_is_found_anew(made, degrees):
         turned.append(Signal(f"{kind}_x", x.time, c * x.values - s * y.values))
         turned.append(Signal(f"{kind}_y", x.time, s * x.values + c * y.values))
     motion = inertial_motion(drive.with_signals(*turned), known)
-    assert any("was moved" in note for note in motion.notes)
+    assert any(note.id == "imu.moved" for note in motion.notes)
     error = np.interp(motion.time, plain.time, plain.specific_force) - motion.specific_force
     assert np.sqrt(np.mean(error[plain.speed[: error.size] > 2.0] ** 2)) < 0.05
 

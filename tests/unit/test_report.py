@@ -12,6 +12,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import noted
 
 from weighbridge.balance import ForceBalance, ForceTable, Reason
 from weighbridge.errors import ConfigError
@@ -138,7 +139,7 @@ def make_weighing(
         bound_std=2.0,
         converged_at=200.0,
         status=status,
-        reason=why,
+        reason=noted(why) if why else None,
         segments=(
             Segment(start=50.0, end=500.0, mass=1490.0, std=20.0),
             Segment(start=500.0, end=1800.0, mass=float("nan"), std=float("nan")),
@@ -149,9 +150,9 @@ def make_weighing(
         vehicle=VEHICLE,
         method="rls",
         status=status,
-        reason=why,
+        refusal=noted(why) if why else None,
         result=result,
-        warnings=("the torque delay was found from this drive",),
+        problems=(noted("the torque delay was found from this drive"),),
     )
 
 
@@ -261,9 +262,9 @@ def test_names_are_escaped_everywhere(tmp_path):
     weighing = replace(
         weighing,
         vehicle=replace(VEHICLE, name=evil),
-        warnings=(evil,),
+        problems=(noted(evil),),
         status=Status.NOT_EXCITED,
-        reason=evil,
+        refusal=noted(evil),
     )
     plain = Elements(written(tmp_path, [make_weighing()] * 2))
     page = Elements(written(tmp_path, [weighing] * 2, title=evil))
@@ -324,7 +325,7 @@ def test_page_without_mass_says_why_and_names_none(tmp_path, status):
 
 def test_page_of_a_drive_that_lacks_signals(tmp_path):
     weighing = replace(
-        make_weighing(), status=Status.MISSING_SIGNALS, reason="no engine_load", result=None
+        make_weighing(), status=Status.MISSING_SIGNALS, refusal=noted("no engine_load"), result=None
     )
     html = written(tmp_path, [weighing])
     page = Elements(html)

@@ -128,7 +128,7 @@ def driven(
         vehicle=CAR,
         method="joint",
         status=track.status,
-        reason=track.reason,
+        refusal=track.reason,
         result=track,
     )
 

@@ -10,7 +10,9 @@ from weighbridge.signals import Drive, Problem, Signal
 
 def test_a_clock_that_left_one_row_is_told_by_its_cause():
     signals = {name: Signal(name, np.zeros(1), np.zeros(1)) for name in NEEDED}
-    reversed_clock = Problem("ride.csv", "the clock runs backwards; 99 of 100 rows were left out")
+    reversed_clock = Problem.of(
+        "clock.backwards", source="ride.csv", back="1 s", at="2 s", lost=99, rows=100
+    )
     drive = Drive(name="back", signals=signals, problems=(reversed_clock,))
     with pytest.raises(DriveError, match=r"one row of the ride .* the clock runs backwards"):
         ride_samples(drive)

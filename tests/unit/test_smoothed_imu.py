@@ -63,14 +63,14 @@ def test_with_heights_a_smoothed_sensor_is_left_out_and_the_rest_weighs(drive):
     assert not any(p.serious for p in found.problems)
     assert not set(found.signals) & set(IMU_SIGNALS)
     assert {"vehicle_speed", "altitude"} <= set(found.signals)
-    (said,) = (p.text for p in found.problems if "was smoothed" in p.text)
+    (said,) = (p.text for p in found.problems if p.id == "imu.smoothed_out")
     assert "accelerometer and gyroscope were left out" in said
     assert said.endswith("record it unfiltered")
 
 
 def test_without_heights_or_where_a_person_vouches_nothing_is_left_out(drive):
     flat = mend_drive(smoothed(drive.without("altitude"), 3.0))
-    assert any(p.serious and "was smoothed" in p.text for p in flat.problems)
+    assert any(p.serious and p.id == "imu.smoothed_out" for p in flat.problems)
     vouched = replace(drive, info=replace(drive.info, trusted=IMU_SIGNALS))
     kept = mend_drive(smoothed(vouched, 3.0))
     assert set(IMU_SIGNALS) <= set(kept.signals)

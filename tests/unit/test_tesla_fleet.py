@@ -97,7 +97,7 @@ def test_of_a_location_only_the_position_is_a_quantity(tmp_path):
     assert drive.has("vehicle_speed", "latitude", "longitude")
     assert "foo" not in drive.signals
     # A channel that the mapping takes is not told as one that is ignored.
-    ignored = " ".join(p.text for p in drive.problems if "not known and ignored" in p.text)
+    ignored = " ".join(p.text for p in drive.problems if p.id == "file.unknown")
     assert "'Location.foo'" in ignored
     assert "VehicleSpeed" not in ignored
 

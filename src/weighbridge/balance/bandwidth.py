@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance
+from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
 
@@ -54,8 +55,8 @@ def smoothed_torque(
     *,
     beside: Floats | float = 0.0,
     noise: Callable[[float], float] = lambda _: 0.0,
-) -> str:
-    """Say that quick changes of the force lack in the torque, in a sentence; empty if not.
+) -> Problem | None:
+    """Say that quick changes of the force lack in the torque, None if not.
 
     Means of the rows before and after an instant are compared, over a short and a long time: what
     the force changes by for each change of the specific force is the mass, over both. A torque that
@@ -75,38 +76,36 @@ def smoothed_torque(
     """
     table = balance.table
     if balance.motion.source != "inertial" or table.time.size < FEWEST_ROWS:
-        return ""
+        return None
     if not float(np.median(np.diff(table.time))) <= LONGEST_PERIOD:
-        return ""
+        return None
     force = force_on_mass(table, vehicle) - beside
     use = table.usable & np.isfinite(force) & np.isfinite(table.specific_force)
     slow = None
     for span in SLOW:
         slow = slow or _slopes(table.time, use, force, table.specific_force, span, noise(span))
     if slow is None:
-        return ""
+        return None
     for span in FAST:
         fast = _slopes(table.time, use, force, table.specific_force, span, noise(span))
         if fast is not None and (said := _lacking(fast, slow, span, vehicle)):
             return said
-    return ""
+    return None
 
 
 def _lacking(
     fast: tuple[Floats, Floats], slow: tuple[Floats, Floats], span: float, vehicle: Vehicle
-) -> str:
-    """Say that changes of force over ``span`` [s] are less than slow ones tell; empty if not."""
+) -> Problem | None:
+    """Say that changes of force over ``span`` [s] are less than slow ones show; None if not."""
     if min(np.count_nonzero(fast[1]), np.count_nonzero(slow[1])) < FEWEST_BLOCKS:
-        return ""
+        return None
     ratio, std = _ratio(fast, slow)
     if not ratio + SURE * std < SMOOTHED:
-        return ""
+        return None
     quick, lasting = float(fast[0].sum() / fast[1].sum()), float(slow[0].sum() / slow[1].sum())
     name = vehicle.torque.of_source.name
-    return (
-        f"quick changes of the force, within {2.0 * span:g} s, are those of {max(quick, 0.0):.0f} "
-        f"kg, and slow ones those of {lasting:.0f} kg: the torque ({name}) was smoothed, or the "
-        "accelerometer is noisy; record both unfiltered"
+    return Problem.of(
+        "torque.smoothed", within=2.0 * span, quick=max(quick, 0.0), slow=lasting, source=name
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from weighbridge.balance.gear_fit import FEWEST_RATIOS, held_ratios
 from weighbridge.balance.table import ForceBalance
+from weighbridge.messages import Problem
 from weighbridge.vehicle.model import Vehicle
 
 LEAST: Final = 0.01
@@ -29,7 +30,7 @@ FITS: Final = 0.8
 """Part of the ratios that lie on the gearings of the tyres found [-]."""
 
 
-def on_its_tyres(balance: ForceBalance, vehicle: Vehicle) -> tuple[Vehicle, str]:
+def on_its_tyres(balance: ForceBalance, vehicle: Vehicle) -> tuple[Vehicle, Problem | None]:
     """Give a vehicle the gearings of the tyres that it rolls on.
 
     Larger tyres make the indicated speed fall against that of GNSS, and engine over true speed
@@ -42,23 +43,23 @@ def on_its_tyres(balance: ForceBalance, vehicle: Vehicle) -> tuple[Vehicle, str]
     Returns
     -------
     vehicle : itself where its tyres are those of the calibration, or nothing tells
-    note : what was found, a sentence; empty if nothing
+    note : what was found; None if nothing
     """
     motion, line = balance.motion, vehicle.driveline
     shown = motion.speed_scale or 0.0
     # Positions of two drives put together can make a scale that is no scale.
     if shown <= 0.0 or not line.gearings or not vehicle.provenance.torque_fitted:
-        return vehicle, ""
+        return vehicle, None
     _, ratio = held_ratios(balance)
     change = float(np.log(shown / line.speed_scale))
     std = motion.speed_scale_std or 0.0
     if ratio.size < FEWEST_RATIOS or not max(LEAST, 3.0 * std) < abs(change) < MOST:
-        return vehicle, ""
+        return vehicle, None
     off = ratio[:, None] - change - np.log(np.array(line.gearings))
     off = off[np.arange(ratio.size), np.abs(off).argmin(axis=1)]
     on = np.abs(off) < NEAR
     if np.mean(on) < FITS or abs(float(np.median(off))) > AGREES:
-        return vehicle, ""
+        return vehicle, None
     change += float(np.median(off[on]))
     scale = float(np.exp(change))
     found = replace(
@@ -67,8 +68,6 @@ def on_its_tyres(balance: ForceBalance, vehicle: Vehicle) -> tuple[Vehicle, str]
         wheel_radius=line.wheel_radius / scale,
     )
     size = "larger" if scale < 1.0 else "smaller"
-    return replace(vehicle, driveline=found), (
-        f"its tyres are {100.0 * abs(1.0 / scale - 1.0):.1f} % {size} around than in the "
-        "calibration, by GNSS and by its gears: the force at the wheels was corrected by that; "
-        "calibrate on these tyres if they stay"
+    return replace(vehicle, driveline=found), Problem.of(
+        "tyres.changed", share=100.0 * abs(1.0 / scale - 1.0), size=size
     )

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Signal
 
 FINE: Final = 0.025
@@ -42,11 +43,8 @@ def coarse_std(source: Signal, usable: Bools) -> float:
     return ROUNDING * step / mean
 
 
-def coarse_note(std: float) -> tuple[str, ...]:
-    """Say in a sentence what the steps leave open; nothing where it is little."""
+def coarse_note(std: float) -> tuple[Problem, ...]:
+    """Say what the steps leave open; nothing where it is little."""
     if std <= LEAST:
         return ()
-    return (
-        f"the torque or load was recorded in coarse steps, which leave {100.0 * std:.0f} % of the "
-        "mass open, as standard deviation; log it as finely as it is sent",
-    )
+    return (Problem.of("torque.coarse", share=100.0 * std),)

@@ -23,6 +23,7 @@ from weighbridge.balance.witness import (
     ranges_of,
     rows_of,
 )
+from weighbridge.messages import phrase
 from weighbridge.signals import Drive
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
 
@@ -356,7 +357,6 @@ def accepted_scales(
 def difference(finding: Finding) -> str:
     """How the reading differs from what the witness tells, in words."""
     if finding.scaled:
-        return f"{finding.scale:.2f} times as much"
-    return (
-        f"{100.0 * abs(finding.offset):.0f} % of its range {'more' if finding.sign > 0 else 'less'}"
-    )
+        return phrase("as_much", scale=finding.scale)
+    which = "range_more" if finding.sign > 0 else "range_less"
+    return phrase(which, share=100.0 * abs(finding.offset))

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.table import ForceBalance
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 from weighbridge.signals.instants import span
 from weighbridge.vehicle.gear import steady
@@ -50,15 +51,15 @@ def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     return _share(ratio, vehicle)
 
 
-def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> str:
-    """Say which part of a recording, before or after a pause, is another vehicle's; empty if none.
+def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
+    """Say which part of a recording, before or after a pause, is another vehicle's; None if none.
 
     Parameters
     ----------
     balance, vehicle
     """
     if not vehicle.driveline.gearings:
-        return ""
+        return None
     time, ratio = held_ratios(balance)
     rows = balance.table.time
     begins = rows[1:][np.diff(rows) > PAUSE]
@@ -70,12 +71,15 @@ def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> str:
         share = _share(ratio[part], vehicle)
         if share < ENOUGH:
             begin, end = float(time[part][0]), float(time[part][-1])
-            return (
-                f"from {span(begin, end)}, beside a pause of the recording, only "
-                f"{100.0 * share:.0f} % of the steady ratios of engine to vehicle speed lie at a "
-                f"gearing of {vehicle.name}: another vehicle's trip; cut the recording there"
+            return Problem.of(
+                "vehicle.foreign_part",
+                start=begin,
+                end=end,
+                span=span(begin, end),
+                share=100.0 * share,
+                vehicle=vehicle.name,
             )
-    return ""
+    return None
 
 
 def _share(ratio: Floats, vehicle: Vehicle) -> float:

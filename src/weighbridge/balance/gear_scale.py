@@ -12,6 +12,7 @@ import numpy as np
 
 from weighbridge.balance.gear_fit import FEWEST_RATIOS, held_ratios
 from weighbridge.balance.table import ForceBalance
+from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
 from weighbridge.signals.instants import span
 from weighbridge.vehicle.model import Vehicle
@@ -49,8 +50,8 @@ LEAST: Final = 0.1
 """Part of the ratios that a gear, or what is off, must have [-]."""
 
 
-def scale_contradiction(balance: ForceBalance, vehicle: Vehicle) -> str:
-    """Say by what engine over vehicle speed is off the gearings, in a sentence; empty if not.
+def scale_contradiction(balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
+    """Say by what engine over vehicle speed is off the gearings, None if not.
 
     Parameters
     ----------
@@ -58,47 +59,39 @@ def scale_contradiction(balance: ForceBalance, vehicle: Vehicle) -> str:
     """
     gearings = np.log(np.array(vehicle.driveline.gearings))
     if gearings.size < 2:
-        return ""
+        return None
     time, ratio = held_ratios(balance)
     if time.size < FEWEST_RATIOS:
-        return ""
+        return None
     scale, share, own = _best(ratio, gearings)
     if share > FITS and share > own + BETTER:
-        return (
-            f"engine over vehicle speed is {scale:.2f} times what the gearings of {vehicle.name} "
-            f"need: so {100.0 * share:.0f} % of the steady ratios lie on them, and "
-            f"{100.0 * own:.0f} % as recorded; check the units of both speeds"
+        return Problem.of(
+            "gear.scale", scale=scale, vehicle=vehicle.name, share=100.0 * share, own=100.0 * own
         )
     return _changing(time, ratio, gearings, vehicle.name)
 
 
-def _changing(time: Floats, ratio: Floats, gearings: Floats, name: str) -> str:
-    """Say where a part of the drive is off the gearings by one scale; empty where none is."""
+def _changing(time: Floats, ratio: Floats, gearings: Floats, name: str) -> Problem | None:
+    """Say where a part of the drive is off the gearings by one scale; None where none is."""
     _, number = np.unique(time // PART, return_inverse=True)
     count = np.bincount(number)
     on = np.bincount(number, weights=_on(ratio, gearings, 2.0 * NEAR))
     off = ((count >= FEWEST_OF_PART) & (on < OFF * count))[number]
     if np.count_nonzero(off) < max(LEAST * off.size, FEWEST_RATIOS):
-        return ""
+        return None
     scale, share, own = _best(ratio[off], gearings)
     # A gear that the file lacks is off, too; a scale moves several.
     moved = ratio[off] - np.log(scale)
     nearest = np.argmin(np.abs(moved[:, None] - gearings), axis=1)
     gears = np.count_nonzero(np.bincount(nearest) > LEAST * moved.size)
     if share <= FITS or gears < 2:
-        return ""
+        return None
     begin, end = float(time[off][0]), float(time[off][-1])
     if own > share - BETTER:
         # No other unit: a speed that drifts by some percent.
-        return (
-            f"from {span(begin, end)} the motion is some percent faster or slower than engine "
-            f"speed and the gearings of {name} say, and elsewhere it is not: the inertial sensor "
-            "or the vehicle speed fails there or shortly before; cut the recording there"
-        )
-    return (
-        f"from {span(begin, end)} engine over vehicle speed is {scale:.2f} times what the "
-        f"gearings of {name} need, and elsewhere it is right: the unit of one of the speeds "
-        "changes; cut the recording there"
+        return Problem.of("gear.drift", start=begin, end=end, span=span(begin, end), vehicle=name)
+    return Problem.of(
+        "gear.unit_changes", start=begin, end=end, span=span(begin, end), scale=scale, vehicle=name
     )
 
 

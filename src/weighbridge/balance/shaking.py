@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.messages import Problem
 from weighbridge.navigation.identify.gain import changes_of_speed
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive, Floats
@@ -37,8 +38,8 @@ SURE: Final = 3.6
 """Standard deviations by which a band is off at least [-]: 3.9 and more against 3.0 at most."""
 
 
-def shaken(drive: Drive, motion: Motion) -> str:
-    """Say that vibration shifts the accelerometer in a band of engine speed; empty if not so.
+def shaken(drive: Drive, motion: Motion) -> Problem | None:
+    """Say that vibration shifts the accelerometer in a band of engine speed; None if not so.
 
     Vibration that a holder's resonance makes one-sided reads as acceleration or as grade. The
     speed does not know of it, so that the two part where the engine speed is in the band.
@@ -50,25 +51,25 @@ def shaken(drive: Drive, motion: Motion) -> str:
     """
     speed, engine = drive.get("vehicle_speed"), drive.get("engine_speed")
     if motion.mounting is None or speed is None or engine is None:
-        return ""
+        return None
     if min(len(speed), len(engine)) < 2:
-        return ""
+        return None
     pairs = changes_of_speed(motion, speed, SPAN)
     if pairs is None:
-        return ""
+        return None
     time, force, shown = pairs
     revs = engine.at(time)
     known = np.isfinite(revs) & (engine.age(time) < 0.5 * SPAN)
     apart = SPAN / float(np.median(np.diff(time))) if time.size > 1 else math.inf
     time, force, shown, revs = time[known], force[known], shown[known], revs[known]
     if revs.size < FEWEST * BANDS * apart or np.ptp(revs) <= 0.0:
-        return ""
+        return None
     rows = np.column_stack([np.interp(time - shift, time, force) for shift in SHIFTS])
     off = rows @ np.linalg.lstsq(rows, shown, rcond=None)[0] - shown
     return _told((off - float(np.mean(off))) / SPAN, revs, apart)
 
 
-def _told(off: Floats, revs: Floats, apart: float) -> str:
+def _told(off: Floats, revs: Floats, apart: float) -> Problem | None:
     """Judge the differences (n,) [m/s^2] by engine speed (n,) [rad/s]."""
     edges = np.percentile(revs, np.linspace(0.0, 100.0, BANDS + 1))
     band = np.clip(np.searchsorted(edges, revs) - 1, 0, BANDS - 1)
@@ -80,11 +81,7 @@ def _told(off: Floats, revs: Floats, apart: float) -> str:
     explained = float(np.mean(mean[band] ** 2) / np.mean(off**2))
     size = float(np.sqrt(np.mean(mean**2)))
     if size < LEAST or explained < EXPLAINED or float(np.max(sureness)) < SURE:
-        return ""
+        return None
     worst = int(np.argmax(np.abs(mean)))
     rpm = float(np.median(revs[band == worst])) / UNITS["rpm"].factor
-    return (
-        f"accelerometer and speed differ with the engine speed, by {abs(mean[worst]):.2f} m/s^2 "
-        f"about {rpm:.0f} rpm: vibration shifts the accelerometer there, as in a holder that "
-        "rings, and the mass would be wrong; fix the sensor to the body and record again"
-    )
+    return Problem.of("imu.shaken", off=abs(mean[worst]), rpm=rpm)

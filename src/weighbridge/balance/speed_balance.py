@@ -10,8 +10,9 @@ import numpy as np
 
 from weighbridge.balance.table import ForceBalance, ForceTable, Reason
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge.errors import ConfigError
 from weighbridge.kernels import speed_ekf as kernel
+from weighbridge.messages import Problem, refused
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Bools, Drive, Floats
@@ -63,9 +64,8 @@ def speed_motion_of(drive: Drive, vehicle: Vehicle, length: float) -> Motion:
     chosen = next((name for name in SPEEDS if drive.has(name)), SPEEDS[0])
     speed = drive.get(chosen)
     if speed is not None and speed.period > 0.5 * length:
-        raise DriveError(
-            f"{drive.name}: {chosen} comes every {speed.period:.3g} s, and a mean over "
-            f"{length:g} s needs two values; record it more often"
+        raise refused(
+            "speed.slow", drive=drive.name, speed=chosen, period=speed.period, length=length
         )
     alone = drive.without(*(name for name in drive.signals if name != chosen))
     motion = find_motion(alone, vehicle)
@@ -75,7 +75,7 @@ def speed_motion_of(drive: Drive, vehicle: Vehicle, length: float) -> Motion:
         specific_force=nowhere,
         grade=nowhere,
         pitch=nowhere,
-        notes=("speed alone: torque by the vehicle file's speed model, grade unknown",),
+        notes=(Problem.of("speed.alone"),),
     )
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from weighbridge.balance.coarse import coarse_note
 from weighbridge.balance.filled import Fill
 from weighbridge.balance.foot_setup import FootSetup
+from weighbridge.messages import Problem
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.air import Air, dynamic_pressure
@@ -63,18 +64,6 @@ REASON_TEXT: Final[dict[Reason, str]] = {
     Reason.CORNERING: "cornering hard",
 }
 """Every reason as tables and reports print it."""
-
-BRAKE_HIDDEN: Final = (
-    "nothing tells when the brake is on: there is no brake switch and no accelerator position, "
-    "and the torque source never rests on the lowest reading of a dragged engine; light "
-    "braking then counts as load, and the mass may be some percent off; record brake switch or "
-    "accelerator position"
-)
-
-SWITCH_DEAD: Final = (
-    "the brake switch is off in much of the hard braking: it is not connected, late or of another "
-    "drive, and is not used; check brake_switch, or leave its column out"
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,7 +211,7 @@ class ForceBalance:
     fuel_flow: Floats | None = None
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What is doubted, one sentence each."""
-        noted = ((BRAKE_HIDDEN, self.brake_hidden), (SWITCH_DEAD, self.switch_dead))
-        return tuple(text for text, so in noted if so) + coarse_note(self.coarse_std)
+    def notes(self) -> tuple[Problem, ...]:
+        """What is uncertain."""
+        ids = (("brake.hidden", self.brake_hidden), ("brake.switch_dead", self.switch_dead))
+        return tuple(Problem.of(id) for id, so in ids if so) + coarse_note(self.coarse_std)

@@ -16,6 +16,7 @@ from weighbridge.balance.force_balance import force_balance
 from weighbridge.balance.law import drag_force
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.errors import DriveError
+from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.signals.interpolation import interpolate
@@ -103,7 +104,7 @@ def _best(force: Floats, moved: Floats) -> float:
 
 def steadied(
     drive: Drive, vehicle: Vehicle, motion: Motion, delay: float
-) -> tuple[Drive, tuple[str, ...], ForceBalance | None]:
+) -> tuple[Drive, tuple[Problem, ...], ForceBalance | None]:
     """Move the stamps of a torque that drifts, so that it stays as late as it began.
 
     Parameters
@@ -114,7 +115,7 @@ def steadied(
     Returns
     -------
     drive : as it was where nothing drifts
-    notes : what was moved, one sentence
+    notes : what was moved
     balance : of that drive and delay, for whoever needs it next; None where it was not worked out
 
     Raises
@@ -141,22 +142,16 @@ def steadied(
     after = force_lags(balance.table, vehicle, motion)
     if after.lag.size >= FEWEST_PARTS and np.ptp(_median_of_three(after.lag)) > WANDERS:
         raise _wanders(drive, carrier, before)
-    grows = "later and later" if slope > 0.0 else "earlier and earlier"
-    note = (
-        f"{carrier.name} comes {grows} against the motion, by {abs(slope) * reach:.1f} s over "
-        f"{reach:.0f} s, as by a queue that fills or a clock of its own; its stamps were "
-        "moved back"
+    grows = phrase("later_and_later" if slope > 0.0 else "earlier_and_earlier")
+    note = Problem.of(
+        "torque.late_drift", carrier.name, grows=grows, change=abs(slope) * reach, reach=reach
     )
     return mended, (note,), balance
 
 
 def _wanders(drive: Drive, carrier: Signal, found: ForceLags) -> DriveError:
     low, high = float(found.lag.min()), float(found.lag.max())
-    return DriveError(
-        f"{drive.name}: {carrier.name} is late against the motion by {low:+.1f} to {high:+.1f} s "
-        "in turn, and a mass from it would be wrong; stamp each value when it is received, or cut "
-        "the recording where the lag stays the same"
-    )
+    return refused("torque.late_wanders", carrier.name, drive=drive.name, low=low, high=high)
 
 
 def _line(found: ForceLags) -> tuple[float, float]:

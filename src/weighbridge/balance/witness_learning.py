@@ -22,6 +22,7 @@ from weighbridge.balance.witness import (
     robust_fit,
     rows_of,
 )
+from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
 from weighbridge.vehicle.torque import source_of
@@ -62,7 +63,7 @@ of a petrol car (load by intake pressure, relations learnt on three others) had 
 
 def learn_witnesses(
     drives: Sequence[Drive], vehicle: Vehicle
-) -> tuple[tuple[WitnessRelation, ...], tuple[str, ...]]:
+) -> tuple[tuple[WitnessRelation, ...], tuple[Problem, ...]]:
     """Learn from drives of known mass how the torque's reading goes with its witnesses.
 
     Parameters
@@ -73,7 +74,7 @@ def learn_witnesses(
     Returns
     -------
     relations : of the witnesses that every drive has and that explain the reading well
-    doubts : drives that contradict each other, one sentence for each witness
+    doubts : drives that contradict each other, one for each witness
     """
     relations, doubts = [], []
     for witness in WITNESSES:
@@ -83,7 +84,7 @@ def learn_witnesses(
             continue
         airs = [air_of(drive, drive.start, drive.end) for drive in drives]
         doubt = contradiction(drives, rows, airs, witness, vehicle)
-        if doubt:
+        if doubt is not None:
             doubts.append(doubt)
             continue
         if (relation := learn(rows, airs, witness)) is not None:
@@ -126,8 +127,8 @@ def contradiction(
     airs: Sequence[tuple[float, float]],
     witness: Witness,
     vehicle: Vehicle,
-) -> str:
-    """Say in a sentence which drives of a calibration contradict each other; nothing if none.
+) -> Problem | None:
+    """Say which drives of a calibration contradict each other; None if none.
 
     Parameters
     ----------
@@ -148,13 +149,15 @@ def contradiction(
             finding = judged(part, relation, accepted, (-np.inf, np.inf))
             if finding is not None and finding.verdict == "serious":
                 reading = source_of(vehicle).signals[0]
-                return (
-                    f"{drives[i].name} and {drives[j].name} contradict each other: for the same "
-                    f"{witness.signal} {reading} reads {difference(finding)} in the "
-                    "second: one of the two signals is wrong in one of them; check units and "
-                    "scales, and calibrate without the drive that is wrong"
+                return Problem.of(
+                    "calibration.drives_contradict",
+                    first=drives[i].name,
+                    second=drives[j].name,
+                    witness=witness.signal,
+                    reading=reading,
+                    by=difference(finding),
                 )
-    return ""
+    return None
 
 
 def learn(

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from weighbridge.balance import ForceBalance
 from weighbridge.calibration.doubted_motion import doubted_gains
-from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
+from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
@@ -21,12 +21,6 @@ DOUBTED: Final = 0.06
 """A drive that weighs so much more or less than the others by the file made of all is told [-]: of
 nine simulated vehicles the farthest of three drives was 0.03 off, with one mass of three 20 % off
 0.21 to 0.32."""
-
-_BOTH_MISSING: Final = (
-    "state tare_kg and gross_kg under [vehicle] of --vehicle, or --tare, so that they can be "
-    "checked"
-)
-_GROSS_MISSING: Final = "state gross_kg under [vehicle] of --vehicle, so that they can be checked"
 
 SURE: Final = 0.12
 """The same above which there is no calibration [-]."""
@@ -40,8 +34,8 @@ OVER: Final = 1.02
 
 def doubted_masses(
     vehicle: Vehicle, balances: Sequence[ForceBalance], masses: Sequence[float]
-) -> list[str]:
-    """Say which masses of a calibration are doubtful, or motions, one sentence each.
+) -> list[Problem]:
+    """Say which masses of a calibration are doubtful, or motions.
 
     Parameters
     ----------
@@ -56,8 +50,7 @@ def doubted_masses(
     """
     names, gross = vehicle.provenance.drives, vehicle.gross
     contradictions = [
-        f"{name} has {kg:.0f} kg by the calibration, above the permitted mass of {gross:.0f} kg: "
-        "if that was not so, every mass is too heavy by as much; weigh it again"
+        Problem.of("calibration.above_gross", drive=name, mass=kg, gross=gross)
         for name, kg in zip(names, masses, strict=True)
         if gross is not None and kg > OVER * gross
     ]
@@ -72,14 +65,14 @@ def doubted_masses(
     return contradictions + contradicting(names, masses, ratios, stds)
 
 
-def refuse_too_heavy(vehicle: Vehicle, masses: Sequence[float], doubts: Sequence[str]) -> None:
+def refuse_too_heavy(vehicle: Vehicle, masses: Sequence[float], doubts: Sequence[Problem]) -> None:
     """Refuse masses that are too heavy by two signs: the permitted mass, and what the drives show.
 
     Parameters
     ----------
     vehicle : calibrated
     masses : it was calibrated with [kg]
-    doubts : sentences that say that the masses are too heavy; a single sign is told and kept
+    doubts : that say that the masses are too heavy; a single sign is told and kept
 
     Raises
     ------
@@ -90,16 +83,14 @@ def refuse_too_heavy(vehicle: Vehicle, masses: Sequence[float], doubts: Sequence
     if gross is None or not doubts or max(masses) <= OVER * gross:
         return
     name = vehicle.provenance.drives[int(np.argmax(masses))]
-    raise DriveError(
-        f"{name} has {max(masses):.0f} kg by the calibration, above the permitted mass of "
-        f"{gross:.0f} kg, and {doubts[0]}; weigh it again, or correct gross_kg under [vehicle] of "
-        "--vehicle"
+    raise refused(
+        "calibration.too_heavy", drive=name, mass=max(masses), gross=gross, doubt=doubts[0].text
     )
 
 
 def contradicting(
     names: Sequence[str], masses: Sequence[float], ratios: Floats, stds: Floats
-) -> list[str]:
+) -> list[Problem]:
     """Say which drive weighs otherwise than the others, by the file that was made of all.
 
     Parameters
@@ -129,17 +120,18 @@ def contradicting(
     if abs(off[worst]) <= DOUBTED:
         return []
     # Of two it may be either.
-    which = "its mass, or another's," if known.size > 2 else "one of the two masses"
-    text = (
-        f"{names[worst]} weighs {100.0 * off[worst]:+.0f} % against its {masses[worst]:.0f} kg "
-        f"where the others weigh right, by the file made of all: {which} is wrong, or its torque"
-    )
+    found: dict[str, Any] = {
+        "drive": names[worst],
+        "off": 100.0 * off[worst],
+        "mass": masses[worst],
+        "which": phrase("mass_of_several" if known.size > 2 else "mass_of_two"),
+    }
     if abs(off[worst]) > SURE:
-        raise DriveError(f"{text}; correct the mass, or leave the drive out")
-    return [f"{text}, so that every mass may be off by a part of that; weigh it again"]
+        raise refused("calibration.contradicts", **found)
+    return [Problem.of("calibration.may_contradict", **found)]
 
 
-def unbacked_scale(vehicle: Vehicle) -> list[str]:
+def unbacked_scale(vehicle: Vehicle) -> list[Problem]:
     """Ask for tare and permitted mass where nothing else backs the masses of a calibration.
 
     A torque in N m or percent has a scale of its own. What a load or an air flow is worth is told
@@ -148,19 +140,22 @@ def unbacked_scale(vehicle: Vehicle) -> list[str]:
     if source_of(vehicle).signed or vehicle.tare is not None or vehicle.gross is not None:
         return []
     return [
-        f"the masses given alone say what {source_of(vehicle).title} is worth, and a wrong one "
-        f"makes every mass wrong by as much: {_BOTH_MISSING}"
+        Problem.of(
+            "calibration.unbacked",
+            source=source_of(vehicle).title,
+            missing=phrase("masses_missing"),
+        )
     ]
 
 
 def tared(vehicle: Vehicle, tare: float) -> Vehicle:
     """Give a calibrated vehicle its mass without payload [kg]: its note no longer asks for it."""
     made = vehicle.provenance
-    notes = made.notes and made.notes.replace(_BOTH_MISSING, _GROSS_MISSING)
+    notes = made.notes and made.notes.replace(phrase("masses_missing"), phrase("gross_missing"))
     return replace(vehicle, tare=tare, provenance=replace(made, notes=notes))
 
 
-def with_doubts(vehicle: Vehicle, doubts: Sequence[str]) -> Vehicle:
+def with_doubts(vehicle: Vehicle, doubts: Sequence[Problem]) -> Vehicle:
     """Keep in the vehicle file what is to be told of its masses at each weighing."""
     made = vehicle.provenance
-    return replace(vehicle, provenance=replace(made, doubts=tuple(doubts)))
+    return replace(vehicle, provenance=replace(made, doubts=tuple(d.line for d in doubts)))

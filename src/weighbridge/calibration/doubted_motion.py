@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.messages import Problem
 from weighbridge.navigation.motion import Motion
 
 OPEN: Final = 1.0
@@ -20,7 +21,7 @@ def gain_std(motions: Iterable[Motion]) -> float:
     return OPEN * float(np.mean([abs((m.doubted_gain or 1.0) - 1.0) for m in motions]))
 
 
-def doubted_gains(names: Sequence[str], motions: Sequence[Motion]) -> list[str]:
+def doubted_gains(names: Sequence[str], motions: Sequence[Motion]) -> list[Problem]:
     """Say in which drives of a calibration speed and accelerometer do not go together.
 
     Parameters
@@ -29,11 +30,7 @@ def doubted_gains(names: Sequence[str], motions: Sequence[Motion]) -> list[str]:
     """
     std = 100.0 * gain_std(motions)
     return [
-        f"in {name}, of the calibration, the accelerometer reads {motion.doubted_gain:.3f} times "
-        "what the speed changes by along the vehicle, and gravity does not show it: the scale of "
-        "that axis was off, or the lean of the body is not known so well; for it "
-        f"{std:.1f} % of every mass, as standard deviation, are in the interval; calibrate again, "
-        "with another sensor if you can"
+        Problem.of("calibration.gain", drive=name, gain=motion.doubted_gain, std=std)
         for name, motion in zip(names, motions, strict=True)
         if motion.doubted_gain is not None
     ]

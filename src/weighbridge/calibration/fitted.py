@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
@@ -13,14 +12,12 @@ from weighbridge.balance.force_balance import dragged_reading
 from weighbridge.balance.law import drag_force, mass_column, rotating_mass
 from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows, Recording
-from weighbridge.errors import DriveError
+from weighbridge.messages import Problem as Message
+from weighbridge.messages import refused
 from weighbridge.results.calibration import DelaySearch, FittedRows
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import EARLIEST_TORQUE, LATEST_TORQUE, DraggedReading, Vehicle
 from weighbridge.vehicle.torque import parameters, rows_of
-
-NOT_TOLD: Final = "the drives do not show how late the torque is"
-"""What is noted where the search for the delay ends at its end."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,16 +30,19 @@ class Fitted:
     rows : of each drive
     search : of the delay
     held : names of the road parameters that lie on a bound
+    notes : what is uncertain in the fit
     """
 
     vehicle: Vehicle
     rows: tuple[DelayedRows, ...]
     search: DelaySearch
     held: tuple[str, ...] = ()
+    notes: tuple[Message, ...] = ()
 
 
-def noted(vehicle: Vehicle, note: str) -> Vehicle:
+def noted(vehicle: Vehicle, message: Message) -> Vehicle:
     """Add a note for readers of the vehicle file, once."""
+    note = message.text
     notes = vehicle.provenance.notes
     if notes is not None and note in notes:
         return vehicle
@@ -62,12 +62,15 @@ def check_delay(problem: Problem, delay: float) -> None:
         return
     signal = problem.source.signals[0]
     side = "early" if delay < 0.0 else "late"
-    raise DriveError(
-        f"{problem.names}: {signal} fits the motion best where its stamps are {abs(delay):.1f} s "
-        f"{side}, and one logger stamps from {-EARLIEST_TORQUE:g} s early to "
-        f"{LATEST_TORQUE:g} s late: it is on another clock, or says nothing of the torque; add "
-        f"{-delay:+.1f} s to its time_s (offset_s in the mapping), or calibrate with another "
-        "--torque"
+    raise refused(
+        "calibration.torque_clock",
+        drives=problem.names,
+        reading=signal,
+        delay=abs(delay),
+        side=side,
+        earliest=-EARLIEST_TORQUE,
+        latest=LATEST_TORQUE,
+        by=-delay,
     )
 
 

@@ -12,7 +12,6 @@ from weighbridge.balance.braking import retarder_untold
 from weighbridge.balance.delay import FARTHEST as FARTHEST_DELAY
 from weighbridge.balance.delay import beyond, vertex
 from weighbridge.calibration.fitted import (
-    NOT_TOLD,
     Fitted,
     check_delay,
     fitted_rows,
@@ -38,10 +37,11 @@ from weighbridge.calibration.self_weighing import (
     Weigher,
     self_weighed,
 )
-from weighbridge.errors import DriveError
 from weighbridge.estimators import joint
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.joint.switched import Switched
+from weighbridge.messages import Problem as Message
+from weighbridge.messages import phrase, refused
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Timing, Vehicle
@@ -108,10 +108,8 @@ def _fit(problem: Problem, weigher: Weigher) -> Fitted:
     except _NoRoadLoad as strange:
         if problem.by_speed:
             # The torque of eq. 48 is worse still: noise of the motion and hills draw it.
-            raise DriveError(
-                f"without an accelerometer {strange}: hills, braking or a wrong mass pass for "
-                f"resistance; check the masses, and calibrate on more or longer drives, or with "
-                f"{_would_help(problem)}"
+            raise refused(
+                "calibration.strange_road", strange=strange, help=_would_help(problem)
             ) from None
         return _as_it_is(problem, str(strange), weigher)
     return replace(fitted, vehicle=self_weighed(problem, fitted.vehicle, cov, weigher))
@@ -120,13 +118,13 @@ def _fit(problem: Problem, weigher: Weigher) -> Fitted:
 def _would_help(problem: Problem) -> str:
     """Name the signals that tell hills and braking from resistance and that the drives lack."""
     drives = [recording.drive for recording in problem.recordings]
-    lacked = ["an inertial sensor"]
+    lacked = [phrase("an_inertial_sensor")]
     if any(not (d.has("altitude") or d.has("grade")) for d in drives):
-        lacked.append("GNSS heights")
+        lacked.append(phrase("gnss_heights"))
     if any(not d.has("brake_switch") for d in drives):
-        lacked.append("a brake switch")
+        lacked.append(phrase("a_brake_switch"))
     if any(retarder_untold(d, problem.base) for d in drives):
-        lacked.append("the torque of its retarder (retarder_torque)")
+        lacked.append(phrase("retarder_torque"))
     return " or ".join(lacked)
 
 
@@ -137,8 +135,9 @@ class _NoRoadLoad(Exception):
 def _as_it_is(problem: Problem, why: str, weigher: Weigher) -> Fitted:
     """Fit by eq. 48, and scale the torque alone."""
     fitted = fit_rls(problem)
-    vehicle = noted(fitted.vehicle, f"scaled, not fitted anew: {why}")
-    return replace(fitted, vehicle=self_weighed(problem, vehicle, None, weigher))
+    note = Message.of("calibration.scaled", why=why)
+    vehicle = self_weighed(problem, noted(fitted.vehicle, note), None, weigher)
+    return replace(fitted, vehicle=vehicle, notes=(*fitted.notes, note))
 
 
 def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
@@ -172,10 +171,11 @@ def _likeliest(problem: Problem) -> tuple[Fitted, Floats]:
         timing=replace(timing, torque_delay_std=search.std),
         provenance=Provenance(masses=tuple(problem.masses)),
     )
-    if not identified:
-        vehicle = noted(vehicle, NOT_TOLD)
+    notes = () if identified else (Message.of("calibration.delay_unknown"),)
+    for note in notes:
+        vehicle = noted(vehicle, note)
     held = ("drag_area",) if found.road[0] <= 0.0 else ()
-    return Fitted(vehicle=vehicle, rows=rows, search=search, held=held), found.cov
+    return Fitted(vehicle=vehicle, rows=rows, search=search, held=held, notes=notes), found.cov
 
 
 def _refuse_strange(
@@ -186,8 +186,9 @@ def _refuse_strange(
     mean, std = settings.prior
     if np.any(np.abs(found.road - mean)[:2] > FARTHEST * std[:2]):
         raise _NoRoadLoad(
-            f"the drives make its drag area {found.road[0]:.1f} m^2 and its rolling coefficient "
-            f"{found.road[1]:.3f}, which no {problem.draft.kind} has"
+            phrase(
+                "strange_road", area=found.road[0], rolling=found.road[1], kind=problem.draft.kind
+            )
         )
 
 

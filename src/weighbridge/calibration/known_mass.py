@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from weighbridge.balance import ForceBalance
 from weighbridge.constants import PETROL_HEATING_VALUE
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge.errors import ConfigError
+from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Drive
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import scale_std, usual_efficiency
@@ -103,7 +104,7 @@ def scale_by_mass(vehicle: Vehicle) -> float:
     return slope / usual_efficiency(vehicle)[0]
 
 
-def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
+def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> Problem | None:
     """Compare the scale that a calibration gives a torque in N m or percent with a data sheet's.
 
     Parameters
@@ -114,7 +115,7 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
 
     Returns
     -------
-    What is doubted, one sentence; empty where nothing is
+    What is uncertain; None where nothing is
 
     Raises
     ------
@@ -123,24 +124,24 @@ def scale_doubt(vehicle: Vehicle, masses: list[float], names: str) -> str:
     """
     ratio, std = scale_by_mass(vehicle), scale_std(vehicle)
     if abs(ratio - 1.0) <= DOUBTFUL * std:
-        return ""
+        return None
     listed = " and ".join(f"{kg:.0f}" for kg in masses)
     likely = " and ".join(f"{kg / ratio:.0f}" for kg in masses)
-    text = (
-        f"with {listed} kg the torque of {names} would read {1.0 / ratio:.2f} of what it is; by "
-        f"data sheets, which are good to {200.0 * std:.0f} %, {likely} kg are plausible"
-    )
+    found: dict[str, Any] = {
+        "masses": listed,
+        "drives": names,
+        "ratio": 1.0 / ratio,
+        "std": 200.0 * std,
+        "likely": likely,
+    }
     if abs(np.log(ratio)) > SURE:
         pounds = " and ".join(f"{kg * POUND:.0f}" for kg in masses)
-        hint = f" (the same number of pounds is {pounds} kg)" if 1.9 < ratio < 2.5 else ""
-        raise DriveError(
-            f"{text}{hint}; give the mass in kg, and check gearings, wheel radius and the "
-            "torque's unit"
-        )
-    return f"{text}: check the mass"
+        hint = phrase("as_pounds", pounds=pounds) if 1.9 < ratio < 2.5 else ""
+        raise refused("calibration.scale_wrong", **found, hint=hint)
+    return Problem.of("calibration.scale", **found)
 
 
-def fuel_doubt(drive: Drive, balance: ForceBalance, kg: float) -> str:
+def fuel_doubt(drive: Drive, balance: ForceBalance, kg: float) -> Problem | None:
     """Compare the work that a mass makes of the torque with the fuel that was burnt for it.
 
     Parameters
@@ -150,11 +151,11 @@ def fuel_doubt(drive: Drive, balance: ForceBalance, kg: float) -> str:
 
     Returns
     -------
-    One sentence; empty where the work is possible, or no fuel was recorded
+    What is wrong; None where the work is possible, or no fuel was recorded
     """
     by_rate = drive.has("fuel_rate")
     if not (by_rate or (drive.has("mass_air_flow") and drive.has("lambda_1"))):
-        return ""
+        return None
     best = BEST_DIESEL if by_rate else BEST_PETROL
     table = balance.table
     power = np.maximum(np.nan_to_num(table.traction_force * table.speed), 0.0)
@@ -162,15 +163,17 @@ def fuel_doubt(drive: Drive, balance: ForceBalance, kg: float) -> str:
     work = float(np.sum(span * 0.5 * (power[1:] + power[:-1])))
     energy = PETROL_HEATING_VALUE * float(table.fuel_burnt[-1])
     if not energy > 0.0 or work <= best * energy:
-        return ""
-    return (
-        f"with {kg:.0f} kg {drive.name} would have made {100.0 * work / energy:.0f} % of its fuel "
-        f"into work at the wheels, which no engine does ({kg:.0f} lb are {kg * POUND:.0f} kg): "
-        "check the mass, and the units of air flow and fuel rate"
+        return None
+    return Problem.of(
+        "calibration.fuel",
+        mass=kg,
+        drive=drive.name,
+        share=100.0 * work / energy,
+        pounds=kg * POUND,
     )
 
 
-def drag_doubt(vehicle: Vehicle, masses: list[float]) -> str:
+def drag_doubt(vehicle: Vehicle, masses: list[float]) -> Problem | None:
     """Compare the air drag that a scale by mass alone gives a vehicle with that of its class.
 
     Parameters
@@ -180,17 +183,22 @@ def drag_doubt(vehicle: Vehicle, masses: list[float]) -> str:
 
     Returns
     -------
-    One sentence; empty where the drag is usual, or the torque has a scale of its own
+    What is wrong; None where the drag is usual, or the torque has a scale of its own
     """
     if source_of(vehicle).signed:
-        return ""
+        return None
     (usual, std), area = vehicle.of_class.drag_area, vehicle.road.drag_area.value
     if abs(area - usual) <= DRAG_FAR * std:
-        return ""
+        return None
     listed = " and ".join(f"{kg:.0f}" for kg in masses)
     heavy = "heavy" if area > usual else "light"
-    return (
-        f"with {listed} kg {vehicle.name} has a drag area of {area:.2f} m², and a {vehicle.kind} "
-        f"has {usual:g} ± {std:g}: if the mass given is too {heavy}, every mass is so by as much; "
-        "check the mass and the class"
+    return Problem.of(
+        "calibration.drag",
+        masses=listed,
+        vehicle=vehicle.name,
+        area=area,
+        kind=vehicle.kind,
+        usual=usual,
+        std=std,
+        word=heavy,
     )

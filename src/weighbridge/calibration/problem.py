@@ -16,8 +16,9 @@ from weighbridge.calibration.known_mass import check_mass
 from weighbridge.calibration.recording import Recording
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.checks import mend_drive, refuse_serious
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge.errors import ConfigError
 from weighbridge.estimators.squat import pooled, squat_at
+from weighbridge.messages import refused
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
@@ -132,12 +133,14 @@ def problem_of(
     source = TORQUE_SOURCES[settings.source] if settings.source else best_source(drives, base)
     for drive in drives:
         if missing := source.lacking(drive):
-            raise DriveError(
-                f"{drive.name}: no {' and no '.join(missing)}, "
-                f"which torque source {source.name!r} needs"
+            raise refused(
+                "calibration.no_torque",
+                drive=drive.name,
+                missing=" and no ".join(missing),
+                source=source.name,
             )
         if why := source.refusal(drive, base.driveline.driven):
-            raise DriveError(f"{drive.name}: {why}")
+            raise why.at(drive.name).error()
     given, base = base.driveline, _held(base, source)
     found = []
     for drive in drives:
@@ -183,11 +186,8 @@ def _refuse_foreign_gears(recordings: Sequence[Recording]) -> None:
     for recording in recordings:
         share = share_on_gears(recording.balance(0.0), recording.draft)
         if share is not None and share < ENOUGH:
-            raise DriveError(
-                f"{recording.drive.name}: only {100.0 * share:.0f} % of the steady ratios of "
-                "engine to vehicle speed lie at a gearing of the vehicle file: its gear ratios, "
-                "final drive or wheel radius are not this vehicle's; leave the ratios out, and "
-                "the drives show them"
+            raise refused(
+                "calibration.foreign_gears", drive=recording.drive.name, share=100.0 * share
             )
 
 
@@ -246,11 +246,7 @@ def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
             )
             if reference or not source.needs_reference:
                 return source
-    raise DriveError(
-        f"{', '.join(drive.name for drive in drives)}: not every drive has engine_torque, "
-        "engine_torque_fraction, engine_load or mass_air_flow; a calibration needs "
-        "one of them and engine_speed"
-    )
+    raise refused("calibration.no_source", drives=", ".join(drive.name for drive in drives))
 
 
 def find_gears(
@@ -266,10 +262,7 @@ def find_gears(
     for drive in drives:
         signal = drive.get("engine_speed")
         if signal is None or len(signal) < 30:
-            raise DriveError(
-                f"{drive.name}: no engine_speed, so no gear can be found; give gearings in the "
-                "vehicle file"
-            )
+            raise refused("calibration.no_engine_speed", drive=drive.name)
     usual = [motion.speed_delay for motion in motions]
     found = detect_gearings(*_engine_and_speed(drives, motions, usual), idle_speed=idle_speed)
     late = [

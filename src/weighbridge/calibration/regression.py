@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 from weighbridge.balance.law import ROAD_PARAMETERS, reading_columns, road_columns
 from weighbridge.balance.table import ForceTable
 from weighbridge.constants import HUBER
-from weighbridge.errors import DriveError
+from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats
 
 BLOCK: Final = 60.0
@@ -145,10 +145,7 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
     """
     n, width = rows.design.shape
     if n < 20 * width:
-        raise DriveError(
-            f"only {n} usable samples for {width} parameters of the calibration; "
-            "drive longer, with more starts and in all gears"
-        )
+        raise refused("calibration.few_samples", count=n, parameters=width)
     scale = np.sqrt(np.mean(rows.design**2, axis=0))
     scale[scale == 0.0] = 1.0
     lower = np.concatenate([np.full(width - 4, -np.inf), low]) * scale

@@ -12,7 +12,6 @@ from weighbridge.balance.delay import best_delay, delay_std
 from weighbridge.balance.law import ROAD_PARAMETERS
 from weighbridge.calibration.doubted_motion import gain_std
 from weighbridge.calibration.fitted import (
-    NOT_TOLD,
     Fitted,
     check_delay,
     known_std,
@@ -33,10 +32,12 @@ from weighbridge.calibration.regression import (
     fit,
     join_rows,
 )
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import cold_share
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.rls import block_jackknife
+from weighbridge.messages import Problem as Message
+from weighbridge.messages import phrase, refused
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle.fits import RLS
@@ -92,26 +93,24 @@ def fit_rls(problem: Problem) -> Fitted:
         for name, is_free in zip(ROAD_PARAMETERS, free, strict=True)
         if is_free and name in fitted.at_bound
     )
-    if held:
-        vehicle = noted(vehicle, bound_note(held))
+    notes = (bound_note(held),) if held else ()
     if not found:
-        vehicle = noted(vehicle, NOT_TOLD)
+        notes = (*notes, Message.of("calibration.delay_unknown"))
+    for note in notes:
+        vehicle = noted(vehicle, note)
     return Fitted(
         vehicle=_self_weighed(problem, vehicle, fitted, held),
         rows=rows,
         search=search.result(fitted.independent_rows),
         held=held,
+        notes=notes,
     )
 
 
-def bound_note(held: Sequence[str]) -> str:
+def bound_note(held: Sequence[str]) -> Message:
     """Say what it means that parameters of the road lie on a bound."""
     these, bounds = ("these", "these bounds") if len(held) > 1 else ("this", "this bound")
-    return (
-        f"held by a bound: {', '.join(held)}: the regression could not tell {these} from the "
-        f"torque, and masses lean on {bounds}; calibrate by method joint, or on drives with more "
-        "hills, speeds and gears"
-    )
+    return Message.of("calibration.held", names=", ".join(held), these=these, bounds=bounds)
 
 
 class _Search:
@@ -228,20 +227,20 @@ def _own_masses(
 def refuse_nonsense(problem: Problem, slope: float, std: float) -> None:
     """Raise where torque does not rise with its source: nothing can be weighed by it."""
     if not slope > 3.0 * std:
-        diesel = "a diesel takes in air without a throttle: its air flow tells no torque"
+        diesel = phrase("diesel_air")
         by_air, engine = problem.source.name == "air_flow", problem.base.engine
         if by_air and engine == "diesel":
-            raise DriveError(
-                f"{problem.names}: {diesel} ({slope:.3g} ± {std:.2g} N m per unit of "
-                "mass_air_flow); log its engine load (PID 04) or torque (PID 62 and 63), and "
-                "calibrate with that --torque"
+            raise refused(
+                "calibration.diesel_air", drives=problem.names, diesel=diesel, slope=slope, std=std
             )
-        unsaid = f"; {diesel}" if by_air and engine is None else ""
-        raise DriveError(
-            f"{problem.names}: torque does not rise with its source "
-            f"{problem.source.signals[0]} ({slope:.3g} ± {std:.2g} N m per unit at the loads and "
-            "engine speeds driven); check the signal, its unit and the known mass, or calibrate "
-            f"with another --torque{unsaid}"
+        unsaid = phrase("and_that", text=diesel) if by_air and engine is None else ""
+        raise refused(
+            "calibration.no_slope",
+            drives=problem.names,
+            reading=problem.source.signals[0],
+            slope=slope,
+            std=std,
+            unsaid=unsaid,
         )
 
 

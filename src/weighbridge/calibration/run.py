@@ -32,9 +32,11 @@ from weighbridge.calibration.rls import fit_rls
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.calibration.speed import SpeedCalibration, calibrate_by_speed
 from weighbridge.checks.steps import SAME, reading_step
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge.errors import ConfigError
 from weighbridge.estimators.gate import GATE
 from weighbridge.estimators.judging import HIDDEN_BRAKE_STD
+from weighbridge.messages import Problem as Message
+from weighbridge.messages import phrase, refused
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -159,19 +161,19 @@ def run_calibration(
     )
     balances = tuple(rebalanced(problem, done))
     of_masses = _mass_doubts(done, recorded, balances, problem)
-    few = f"made from {rows.time.size} samples only; poll faster, or drive longer"
+    few = Message.of("calibration.few", samples=rows.time.size)
     doubts = [
         *of_masses,
         *doubted_masses(done, balances, problem.masses),
     ]
-    others = [
+    others: list[Message | None] = [
         *([few] if rows.time.size < FEW_SAMPLES else []),
         *_other_masses(recorded, problem.masses),
         *([unfound_gears(recorded, problem.gears.gearings.size)] if problem.gears else []),
         *doubts,
         *contradictions,
     ]
-    notes = [note for note in (*others, *unbacked_scale(done)) if note]
+    notes = [note for note in (*others, *unbacked_scale(done)) if note is not None]
     done = _with_notes(done, balances, notes)
     done = with_doubts(done, doubts)
     if problem.source.gearing is not None:
@@ -188,12 +190,13 @@ def run_calibration(
         rows=rows,
         search=fitted.search,
         held=fitted.held,
+        problems=(*fitted.notes, *_balance_notes(balances), *notes),
     )
 
 
 def _mass_doubts(
     vehicle: Vehicle, drives: Sequence[Drive], balances: Sequence[ForceBalance], problem: Problem
-) -> list[str]:
+) -> list[Message]:
     """Say what torque, drag and fuel tell against the masses; refuse those above gross as well."""
     masses = problem.masses
     scale = scale_doubt(vehicle, masses, problem.names)
@@ -201,7 +204,7 @@ def _mass_doubts(
     fuel = [doubt for one in each if (doubt := fuel_doubt(*one))]
     heavy = [scale] if scale and scale_by_mass(vehicle) > 1.0 else []
     refuse_too_heavy(vehicle, masses, [*heavy, *fuel])
-    return [doubt for doubt in (scale, drag_doubt(vehicle, masses), *fuel) if doubt]
+    return [d for d in (scale, drag_doubt(vehicle, masses), *fuel) if d is not None]
 
 
 def _unmeasured_grade(problem: Problem) -> float:
@@ -231,16 +234,20 @@ def _reading_step(drives: Sequence[Drive], problem: Problem) -> float | None:
 
 
 def _with_notes(
-    vehicle: Vehicle, balances: Sequence[ForceBalance], notes: Sequence[str]
+    vehicle: Vehicle, balances: Sequence[ForceBalance], notes: Sequence[Message]
 ) -> Vehicle:
     """Note what is doubted of a calibration's drives, and count what is hidden in them."""
-    for note in dict.fromkeys([*(n for balance in balances for n in balance.notes), *notes]):
+    for note in dict.fromkeys([*_balance_notes(balances), *notes]):
         vehicle = noted(vehicle, note)
     if not any(balance.brake_hidden for balance in balances):
         return vehicle
     made = vehicle.provenance
     std = float(np.hypot(made.mass_scale_std or 0.0, HIDDEN_BRAKE_STD))
     return replace(vehicle, provenance=replace(made, mass_scale_std=std))
+
+
+def _balance_notes(balances: Sequence[ForceBalance]) -> list[Message]:
+    return list(dict.fromkeys(note for balance in balances for note in balance.notes))
 
 
 def _refuse_useless(vehicle: Vehicle) -> None:
@@ -253,10 +260,10 @@ def _refuse_useless(vehicle: Vehicle) -> None:
     """
     made = vehicle.provenance
     if made.mass_scale_std is not None and made.mass_scale_std > GATE.widest:
-        raise DriveError(
-            f"the calibration would leave {100.0 * made.mass_scale_std:.0f} % in every mass, as "
-            f"standard deviation, with which no drive can be weighed ({made.notes or 'no notes'}); "
-            "check that every sample was recorded, and calibrate on other or longer drives"
+        raise refused(
+            "calibration.useless",
+            share=100.0 * made.mass_scale_std,
+            notes=made.notes or phrase("no_notes"),
         )
 
 
@@ -273,8 +280,8 @@ def _with_gears(vehicle: Vehicle, given: Driveline) -> Vehicle:
     return replace(vehicle, driveline=line)
 
 
-def unfound_gears(drives: Sequence[Drive], found: int) -> str:
-    """Say that gearboxes name more gears than ratios were found; empty where they do not.
+def unfound_gears(drives: Sequence[Drive], found: int) -> Message | None:
+    """Say that gearboxes name more gears than ratios were found; None where they do not.
 
     Parameters
     ----------
@@ -283,19 +290,18 @@ def unfound_gears(drives: Sequence[Drive], found: int) -> str:
     """
     told = [drive.signals["gear"].values for drive in drives if drive.has("gear")]
     if found < 2 or not told:
-        return ""
+        return None
     gears, counts = np.unique(np.round(np.concatenate(told)), return_counts=True)
     named = int(np.count_nonzero((gears >= 1.0) & (counts >= FEW_IN_GEAR)))
     if named <= found:
-        return ""
-    return f"the log names {named} gears, {found} were found; rows in the others are left out"
+        return None
+    return Message.of("calibration.gears", named=named, found=found)
 
 
-def _other_masses(drives: Sequence[Drive], masses: Sequence[float]) -> list[str]:
+def _other_masses(drives: Sequence[Drive], masses: Sequence[float]) -> list[Message]:
     """Say where a mass that was given differs from the one its drive states."""
     return [
-        f"{drive.name} states a mass of {drive.info.mass:.0f} kg and was calibrated with the "
-        f"{kg:.0f} kg given"
+        Message.of("calibration.other_mass", drive=drive.name, stated=drive.info.mass, mass=kg)
         for drive, kg in zip(drives, masses, strict=True)
         if drive.info.mass is not None and abs(kg / drive.info.mass - 1.0) > MASSES_APART
     ]

@@ -13,11 +13,11 @@ from weighbridge.balance import ForceBalance
 from weighbridge.calibration.doubted_motion import gain_std
 from weighbridge.calibration.fitted import rebalanced
 from weighbridge.calibration.problem import Problem
-from weighbridge.errors import DriveError
 from weighbridge.estimators import joint, speed_torque_ekf
 from weighbridge.estimators.considered import pinned, triangle
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.track import MassTrack
+from weighbridge.messages import refused
 from weighbridge.signals import Floats
 from weighbridge.vehicle.fits import JOINT, SPEED_TORQUE_EKF, Fit
 from weighbridge.vehicle.model import Vehicle
@@ -104,9 +104,7 @@ def self_weighed(
                 stds.append(track.bound_std / left)
                 moved.append(track.sensitivity / left)
         if not ratios:
-            raise DriveError(
-                "the drives of the calibration cannot be weighed: drive longer, with more starts"
-            )
+            raise refused("calibration.not_weighable")
         weight = 1.0 / np.square(stds)
         return (
             float(np.average(ratios, weights=weight)),

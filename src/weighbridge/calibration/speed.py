@@ -17,7 +17,8 @@ from weighbridge.calibration.speed_fit import (
     SpeedRows,
     fit_speed_model,
 )
-from weighbridge.errors import DriveError
+from weighbridge.messages import Problem as Message
+from weighbridge.messages import refused
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Drive
 from weighbridge.vehicle.fits import SPEED_EKF
@@ -60,14 +61,22 @@ class SpeedCalibration:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is doubtful in the fit, one sentence each."""
+        """Texts of the `problems`."""
+        return tuple(p.text for p in self.problems)
+
+    @property
+    def problems(self) -> tuple[Message, ...]:
+        """What is uncertain in the fit."""
         if self.fit.r_squared >= POOR:
             return ()
         names = ", ".join(rows.name for rows in self.rows)
         return (
-            f"{names}: the speed model explains {100.0 * self.fit.r_squared:.0f} % of the changes "
-            f"of speed, where a road without traffic gives more than {100.0 * POOR:.0f} %: the "
-            "grade is wrong or comes late, or traffic made the speed; calibrate on another drive",
+            Message.of(
+                "calibration.speed_poor",
+                drives=names,
+                share=100.0 * self.fit.r_squared,
+                least=100.0 * POOR,
+            ),
         )
 
 
@@ -95,15 +104,10 @@ def speed_rows(drive: Drive, vehicle: Vehicle, mass: float, sample_time: float) 
         There is too little speed, or nothing tells the grade.
     """
     if not any(drive.has(name) for name in SPEEDS):
-        raise DriveError(
-            f"{drive.name}: no {' and no '.join(SPEEDS)}, of which the speed model needs one"
-        )
+        raise refused("calibration.no_speed", drive=drive.name, missing=" and no ".join(SPEEDS))
     graded = find_motion(drive, vehicle)
     if graded.source == "speed":
-        raise DriveError(
-            f"{drive.name}: nothing tells the grade, which a calibration for speed-ekf needs; "
-            "record altitude, grade or an inertial sensor with it"
-        )
+        raise refused("calibration.no_grade", drive=drive.name)
     motion = speed_motion_of(drive, vehicle, sample_time)
     seen = np.where(graded.valid, graded.grade, np.nan)
     grade = np.interp(motion.time, graded.time, seen, left=np.nan, right=np.nan)

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import DriveError
+from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import SpeedModel
 
@@ -117,17 +117,13 @@ def fit_speed_model(rows: Sequence[SpeedRows], nominal: Nominal, sample_time: fl
     design, target = np.concatenate(designs), np.concatenate(targets)
     names = ", ".join(drive.name for drive in rows)
     if target.size < FEWEST:
-        raise DriveError(
-            f"{names}: only {target.size} steps of {sample_time:g} s without brakes and stops, "
-            f"and {FEWEST} are needed; calibrate on a longer drive"
+        raise refused(
+            "calibration.few_steps", drives=names, count=target.size, step=sample_time, least=FEWEST
         )
     scale = np.sqrt(np.mean(design**2, axis=0))
     scaled = design / np.where(scale > 0.0, scale, 1.0)
     if not np.linalg.cond(scaled) < WORST_CONDITION:
-        raise DriveError(
-            f"{names}: speed and grade hardly change, so the speed model cannot be fitted; "
-            "calibrate on a drive with more of both"
-        )
+        raise refused("calibration.speed_steady", drives=names)
     c = np.linalg.lstsq(scaled, target, rcond=None)[0] / scale
     residual = target - design @ c
     return SpeedFit(

@@ -25,7 +25,6 @@ from weighbridge.checks.travel import check_sign, check_standstill
 from weighbridge.checks.values import check_load, check_pressure, check_retarder, check_stuck
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.checks.witnesses import check_reading
-from weighbridge.errors import DriveError
 from weighbridge.navigation.along import with_forward_accel
 from weighbridge.navigation.clock_drift import mend_clocks
 from weighbridge.signals import Drive, Problem
@@ -112,7 +111,7 @@ def refuse_serious(name: str, problems: Iterable[Problem]) -> None:
     """Raise `DriveError` with the first serious problem of the drive of that name."""
     for problem in problems:
         if problem.serious:
-            raise DriveError(f"{name}: {problem.text}")
+            raise problem.at(name).error()
 
 
 def check_drive(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Problem, ...]:

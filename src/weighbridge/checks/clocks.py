@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import EARTH_RADIUS
+from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.signals.cleaning import NO_DRIVE
@@ -47,42 +48,29 @@ def check_rates(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         period, name = s.period, f"{table} ({s.name})"
         slow, fast = (0.5, 5e-5) if table in ("imu", "ride") else (30.0, 5e-4)
         if slow < period < _SLOW_SENSOR and _as_long_as_speed(drive, s):
-            yield Problem(
-                "",
-                f"{name} has one sample every {period:.4g} s, over the same time as the speed; "
-                "navigation needs 0.1 s or less: record it faster, or leave accel_x..z and "
-                "gyro_x..z out to weigh by speed alone",
-                serious=True,
-            )
+            yield Problem.of("clock.slow_sensor", serious=True, table=name, period=period)
         elif period > slow or (period > 2.0 and s.duration > 2 * 86_400.0):
-            yield Problem(
-                "",
-                f"{name} has one sample every {period:.4g} s; if its time is in milliseconds, "
-                "name the column time_ms or set the unit in [time] of the mapping",
-                serious=True,
-            )
-        elif table == "imu" and (packets := _packets(s)):
-            yield Problem("", f"{name} {packets}", serious=True)
+            yield Problem.of("clock.milliseconds", serious=True, table=name, period=period)
+        elif table == "imu" and (packets := _packets(s, name)):
+            yield packets
         elif period < fast:
-            yield Problem(
-                "",
-                f"{name} has {1.0 / period:.4g} samples per second; if its time is in seconds, "
-                "name the column time_s or set the unit in [time] of the mapping",
-                serious=True,
-            )
+            yield Problem.of("clock.seconds", serious=True, table=name, rate=1.0 / period)
 
 
-def _packets(signal: Signal) -> str:
-    """Say that samples come in packets, each stamped as it arrived; empty where they do not."""
+def _packets(signal: Signal, table: str) -> Problem | None:
+    """Say that samples come in packets, each stamped as it arrived; None where they do not."""
     step = np.diff(signal.time)
     step = step[step <= _PAUSE]
     usual, between = signal.period, step > _APART * signal.period
     if usual > _NO_SENSOR or np.mean(step) < _APART * usual:
-        return ""
-    return (
-        f"comes in packets of about {1.0 / np.mean(between):.0f} samples, {1e3 * usual:.2g} ms "
-        f"apart, and every {np.median(step[between]):.2g} s a packet: all of one were stamped as "
-        "they arrived; write the sensor's own stamps"
+        return None
+    return Problem.of(
+        "clock.packets",
+        table=table,
+        samples=1.0 / np.mean(between),
+        apart=1e3 * usual,
+        every=np.median(step[between]),
+        serious=True,
     )
 
 
@@ -110,14 +98,11 @@ def check_overlap(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         shared = min(a1, b1) - max(a0, b0)
         shorter = min(a1 - a0, b1 - b0)
         if shared <= 0.1 * shorter:
-            yield Problem(
-                "",
-                f"{a} runs from {span(a0, a1)} and {b} from {span(b0, b1)}: "
-                "write both on one clock (a constant goes into offset_s in [time] of a mapping)",
-                serious=True,
+            yield Problem.of(
+                "clock.apart", serious=True, a=a, span_a=span(a0, a1), b=b, span_b=span(b0, b1)
             )
         elif shared < 0.5 * max(a1 - a0, b1 - b0):
-            yield Problem("", f"{a} and {b} were recorded together for {shared:.0f} s only")
+            yield Problem.of("clock.overlap", a=a, b=b, shared=shared)
 
 
 def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -138,16 +123,16 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             and bool(np.all(speed.age(ends) < 5.0))
             and float(np.min(np.abs(speed.at(ends)))) > 3.0
         )
-        several = f"{len(whole)} times, the longest time " if len(whole) > 1 else ""
-        why = (
-            "while the vehicle moves: the clock was set forward, or a piece of the recording is "
-            "missing"
-            if moving
-            else "as if the recording paused or its clock was set forward"
-        )
-        yield Problem(
-            "",
-            f"nothing was recorded {several}for {length:.0f} s from {instant(start)}, {why}",
+        several = phrase("times_longest", count=len(whole)) if len(whole) > 1 else ""
+        why = phrase("pause_moving") if moving else phrase("pause_standing")
+        yield Problem.of(
+            "clock.pause",
+            start=start,
+            end=start + length,
+            several=several,
+            length=length,
+            at=instant(start),
+            why=why,
         )
     for table, time in tables.items():
         own = [p for p in _pauses(time) if not any(abs(p[0] - w[0]) < _PAUSE for w in whole)]
@@ -155,23 +140,31 @@ def check_pauses(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             own = [p for p in own if not _way_agrees(drive, *p)]
         if own:
             start, length = max(own, key=lambda p: p[1])
-            several = f"{len(own)} times, the longest time " if len(own) > 1 else ""
-            harmless = "a tunnel or a car park is harmless, but " if table == "gnss" else ""
-            yield Problem(
-                "",
-                f"{table} pauses {several}for {length:.0f} s from {instant(start)} while the rest "
-                f"goes on; {harmless}if its clock was set there, cut the recording",
+            several = phrase("times_longest", count=len(own)) if len(own) > 1 else ""
+            harmless = phrase("pause_harmless") if table == "gnss" else ""
+            yield Problem.of(
+                "clock.table_pause",
+                start=start,
+                end=start + length,
+                table=table,
+                several=several,
+                length=length,
+                at=instant(start),
+                harmless=harmless,
             )
 
 
 def check_splices(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     """Tell of recordings that were put one behind another on one clock."""
     if found := find_splices(drive):
-        times = f"{len(found)} times, first" if len(found) > 1 else "once,"
-        yield Problem(
-            "",
-            f"there are {found[0].why}, {times} at {instant(found[0].end)}, as where recordings "
-            "are put one behind another: weighbridge weigh parts them, and read_drives in Python",
+        times = phrase("times_first", count=len(found)) if len(found) > 1 else "once,"
+        yield Problem.of(
+            "clock.splices",
+            start=found[0].end,
+            end=found[0].end,
+            why=found[0].why,
+            times=times,
+            at=instant(found[0].end),
         )
 
 

@@ -45,7 +45,7 @@ def with_half_digits(drive: Drive) -> Drive:
         return drive
     if step > COARSEST:
         return drive.with_problems(
-            _told(step, "too coarse to weigh by: record it with more digits, 0.1 m/s^2 or finer")
+            Problem.of("imu.digits_coarse", "accel_x", step=step, serious=True)
         )
     alike = [s for s in axes if abs(steps[s.name] / step - 1.0) < 0.01]
     moving: dict[int, Bools] = {}
@@ -56,25 +56,12 @@ def with_half_digits(drive: Drive) -> Drive:
         return drive
     if step > COARSEST_CUT:
         return drive.with_problems(
-            _told(
-                step,
-                "cut off towards zero, so that it is dead about zero: record it with more digits, "
-                "or round them",
-            )
+            Problem.of("imu.digits_dead", "accel_x", step=step, serious=True)
         )
     more = (Signal(s.name, s.time, s.values + 0.5 * step * np.sign(s.values)) for s in alike)
     return drive.with_signals(*more).with_problems(
-        Problem(
-            "accel_x",
-            f"the accelerometer is recorded in steps of {step:.2g} m/s^2, cut off towards zero: "
-            "half a step was added; round the digits, or record more of them",
-        )
+        Problem.of("imu.digits_cut", "accel_x", step=step)
     )
-
-
-def _told(step: float, why: str) -> Problem:
-    text = f"the accelerometer is recorded in steps of {step:.2g} m/s^2, {why}"
-    return Problem("accel_x", text, serious=True)
 
 
 def _step(values: Floats) -> float:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.checks.needed import show
+from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE, friction_coefficients
 from weighbridge.vehicle.model import Vehicle
@@ -28,11 +29,7 @@ def check_whole_torque(drive: Drive, vehicle: Vehicle | None) -> Iterator[Proble
     low, high = float(np.min(s.values)), float(np.max(s.values))
     whole = bool(np.all(np.abs(s.values - np.round(s.values)) < 1e-6))
     if whole and low >= -40.0 and 60.0 <= high <= 100.0 and np.unique(s.values).size > 20:
-        yield Problem(
-            s.name,
-            f"engine_torque runs from {low:.0f} to {high:.0f} in whole N m; if that is percent of "
-            "a reference torque, name the column engine_torque_pct",
-        )
+        yield Problem.of("torque.whole_percent", s.name, low=low, high=high)
 
 
 def check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -45,23 +42,25 @@ def check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     idle = _idle_torque(drive, torque)
     remedy = _friction_remedy(drive, vehicle, idle)
     if drive.has("indicated_torque_fraction"):
-        seen = f" (at most {100.0 * idle:.0f} %, its reading at idle)" if idle is not None else ""
-        yield Problem(
+        seen = phrase("idle_reading", idle=100.0 * idle) if idle is not None else ""
+        yield Problem.of(
+            "torque.indicated",
             "engine_torque_fraction",
-            f"the torque is the engine's indicated one, friction included{seen}: log its nominal "
-            f"friction (EEC3), or {remedy}",
             serious=vehicle is not None,
+            seen=seen,
+            remedy=remedy,
         )
     elif vehicle is not None and vehicle.provenance.torque_fitted:
         return
     elif idle is not None and idle > _IDLE_TORQUE:
         by_bus = drive.has("retarder_torque") or (vehicle is not None and vehicle.of_class.retarded)
-        whose = "the percent torque of J1939 (SPN 513)" if by_bus else "PID 62"
-        yield Problem(
+        whose = phrase("percent_torque") if by_bus else "PID 62"
+        yield Problem.of(
+            "torque.friction",
             "engine_torque_fraction",
-            f"warm at idle and standing the torque reads {100.0 * idle:.0f} %: friction seems to "
-            f"be in it, as {whose} may have it, beside what alternator and pumps take; a "
-            f"calibration finds it, and without one {remedy}",
+            idle=100.0 * idle,
+            whose=whose,
+            remedy=remedy,
         )
 
 
@@ -74,20 +73,13 @@ def _friction_remedy(drive: Drive, vehicle: Vehicle | None, idle: float | None) 
         full = (vehicle.torque.reference_torque if vehicle is not None else None) or 0.0
     engine = drive.get("engine_speed")
     if idle is None or not full or engine is None or not len(engine):
-        return (
-            "state it as coefficients = [-F, 1.0], F the friction in N m, under [torque] of the "
-            "vehicle file"
-        )
+        return phrase("friction_constant")
     turning = engine.values[(engine.values > _IDLE[0]) & (engine.values < _IDLE[1])]
     remedies = []
     for fuel in FRICTION_PRESSURE:
         w0, w2, w3 = friction_coefficients(idle * full, float(np.median(turning)), fuel)
-        remedies.append(f"[{-w0:.3g}, 1.0, {-w2:.3g}, {-w3:.3g}] for {fuel}")
-    return (
-        f"state it under [torque] of the vehicle file as coefficients = {' or '.join(remedies)}, "
-        "which grows with engine speed; with an automatic stand in neutral for it: in gear the "
-        "reading holds the drag of the converter as well"
-    )
+        remedies.append(phrase("friction_of_fuel", w0=-w0, w2=-w2, w3=-w3, fuel=fuel))
+    return phrase("friction_by_speed", remedies=" or ".join(remedies))
 
 
 def _idle_torque(drive: Drive, torque: Signal) -> float | None:
@@ -122,9 +114,9 @@ def check_engine_speed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Proble
     # Slower than any idle, but turning: rad/s or revolutions per second.
     highest = float(np.max(engine.values[fast]))
     if 1.0 < highest < 62.0:
-        yield Problem(
+        yield Problem.of(
+            "engine.speed_radians",
             "engine_speed",
-            f"engine_speed never exceeds {show('engine_speed', highest)} while driving faster "
-            "than 36 km/h; if it is in rad/s, name the column engine_speed_radps",
             serious=True,
+            value=show("engine_speed", highest),
         )

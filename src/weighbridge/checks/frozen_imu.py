@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import GRAVITY
+from weighbridge.messages import phrase
 from weighbridge.navigation.frozen import frozen_stretches
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -48,22 +49,27 @@ def _told(names: list[str], axis: Signal, speed: Signal | None) -> Problem:
     lengths = stretches[:, 1] - stretches[:, 0]
     total = float(lengths.sum())
     k = int(np.argmax(lengths))
-    verb = "repeats" if len(names) == 1 else "repeat"
-    since = instant(stretches[k, 0])
-    who = f"{', '.join(names)} {verb} one value"
-    if set(names) == set(IMU_SIGNALS):
-        who = "the inertial sensor repeats its values"
-    text = f"{who} for {lengths[k]:.1f} s from {since}"
-    if lengths.size > 1:
-        text += f", and in {lengths.size} stretches for {total:.1f} s in all"
     left = axis.duration - total
     too_little = left < min(_LEAST, 0.5 * axis.duration)
-    remedy = (
-        f"only {left:.0f} s are left: record it again, or leave its columns out"
-        if too_little
-        else "the inertial sensor is left out there"
+    whole = set(names) == set(IMU_SIGNALS)
+    return Problem.of(
+        "frozen.imu_all" if too_little else "frozen.imu",
+        names[0],
+        start=stretches[0, 0],
+        end=stretches[-1, 1],
+        serious=too_little,
+        who=phrase("frozen_sensor")
+        if whole
+        else phrase(
+            "frozen_axes",
+            axes=", ".join(names),
+            verb="repeats" if len(names) == 1 else "repeat",
+        ),
+        longest=lengths[k],
+        at=instant(stretches[k, 0]),
+        more=phrase("frozen_more", count=lengths.size, total=total) if lengths.size > 1 else "",
+        left=left,
     )
-    return Problem(names[0], f"{text}; {remedy}", serious=too_little)
 
 
 def check_limit(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -75,10 +81,6 @@ def check_limit(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         for limit in (float(s.values.min()), float(s.values.max())):
             share = float(np.mean(s.values == limit))
             if _AT_LIMIT < share < 0.9 and 0.5 * GRAVITY < abs(limit) < 2.0 * GRAVITY:
-                yield Problem(
-                    name,
-                    f"{name} lies at {limit:.4g} m/s^2, its extreme, in {100.0 * share:.0f} % of "
-                    "the samples: its range is too small and its mean is bent; record it with a "
-                    "range of 2 g or more",
-                    serious=True,
+                yield Problem.of(
+                    "imu.clipped", name, serious=True, limit=limit, share=100.0 * share
                 )

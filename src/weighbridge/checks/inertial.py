@@ -15,6 +15,7 @@ import numpy as np
 
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
+from weighbridge.messages import phrase
 from weighbridge.navigation.aiding import resolution
 from weighbridge.navigation.dropouts import rare_spikes
 from weighbridge.navigation.frozen import thawed
@@ -41,9 +42,6 @@ _SOME: Final = 100
 _AGAINST: Final = 0.12
 _CHANCE: Final = 2.4
 
-_BY_TILT: Final = (
-    "one axis of the inertial sensor has the wrong sign; correct it in the mapping (factor = -1)"
-)
 # A gyro of larger steps shows no tilt any more [rad/s]: rounded to 0.01 it does, cut to 0.02 not.
 _COARSE_RATE: Final = 0.015
 
@@ -96,9 +94,12 @@ def _check_parts(drive: Drive) -> Iterator[Problem]:
         if accel is None or gyro is None:
             continue
         for problem in _check_axes(part, accel, gyro):
-            text = f"from {span(round(start), round(end))} {problem.text}"
+            when = phrase("in_part", span=span(round(start), round(end)), text=problem.text)
             yield replace(
-                problem, text=f"{text}; or cut this part off" if problem.serious else text
+                problem,
+                start=float(start),
+                end=float(end),
+                text=phrase("or_cut", text=when) if problem.serious else when,
             )
             return
 
@@ -121,28 +122,22 @@ def _check_gravity(accel: tuple[Signal, Signal, Signal]) -> Iterator[Problem]:
     usual = float(np.median(norm)) if norm.size else GRAVITY
     if 8.0 < usual < 12.0:
         return
-    start = f"the accelerometer reads {usual:.3g} m/s^2 in the median, not {GRAVITY}"
     if 0.8 < usual < 1.25:
-        text = f"{start}; it seems to be in g: name its columns accel_x_g, accel_y_g, accel_z_g"
+        which = "imu.accel_in_g"
     elif 78.0 < usual < 118.0:
-        text = f"{start}; it is in m/s^2 already: name its columns accel_x_mps2 and so on"
+        which = "imu.accel_in_mps2"
     elif usual < 3.0:
-        text = f"{start}; gravity was taken out of it: record the raw accelerometer"
+        which = "imu.no_gravity"
     else:
-        text = f"{start}; check its unit and that all three axes are there"
-    yield Problem("accel_x", text, serious=True)
+        which = "imu.gravity"
+    yield Problem.of(which, "accel_x", usual=usual, gravity=GRAVITY, serious=True)
 
 
 def _check_rate(drive: Drive, gyro: tuple[Signal, Signal, Signal]) -> Iterator[Problem]:
     norm = _norm(gyro)
     high = float(np.percentile(norm, 99.9)) if norm.size else 0.0
     if high > 4.0:
-        yield Problem(
-            "gyro_x",
-            f"the gyro reads up to {high:.3g} rad/s, more than a car can turn; "
-            "it seems to be in deg/s: name its columns gyro_x_degps and so on",
-            serious=True,
-        )
+        yield Problem.of("imu.gyro_degrees", "gyro_x", serious=True, high=high)
         return
     turns = _turns(drive)
     if turns is None:
@@ -165,12 +160,7 @@ def _check_rate(drive: Drive, gyro: tuple[Signal, Signal, Signal]) -> Iterator[P
     # Positions that scatter turn as well, but not when the gyro does.
     if np.corrcoef(angle[full], np.abs(change[full]))[0, 1] < _TURN_TOGETHER:
         return
-    yield Problem(
-        "gyro_x",
-        f"the gyro turns {ratio:.3g} times as far as the GNSS course; it seems to be in {unit}: "
-        f"name its columns {said} and so on",
-        serious=True,
-    )
+    yield Problem.of("imu.gyro_unit", "gyro_x", serious=True, ratio=ratio, unit=unit, column=said)
 
 
 def _turns(drive: Drive) -> tuple[Floats, Floats] | None:
@@ -224,14 +214,10 @@ def _check_axes(
         found = _against_course(gyro, turns, bias, down)
     if found is None and speed is not None and len(speed) > 20:
         found = _against_speed(speed, at, force, rate, full, down)
-        if found is not None and found.text.endswith(_BY_TILT):
+        if found is not None and found.id == "imu.gyro_sign":
             step = max(resolution(s.values, 9) for s in gyro)
             if step > _COARSE_RATE:
-                text = (
-                    f"the gyro is recorded in steps of {step:.2g} rad/s, too coarse to tell "
-                    "whether the signs of its axes are right; record it with more digits"
-                )
-                found = Problem(found.signal, text)
+                found = Problem.of("imu.gyro_coarse", found.signal, step=step)
     if found is not None:
         yield found
 
@@ -245,13 +231,7 @@ def _not_about_vertical(rate: Floats, full: Bools, down: Floats) -> Problem | No
     upright = float(np.median(np.abs(rate[fast] @ down) / turned[fast]))
     if upright >= 0.6:
         return None
-    return Problem(
-        "gyro_z",
-        "in bends the gyro turns, but not about the accelerometer's vertical (only "
-        f"{100.0 * upright:.0f} % of the rate): their axes are not the same; map them "
-        "alike",
-        serious=True,
-    )
+    return Problem.of("imu.axes_differ", "gyro_z", serious=True, upright=100.0 * upright)
 
 
 def _against_course(
@@ -267,24 +247,13 @@ def _against_course(
         return None
     agreement = float(np.corrcoef(yaw[bend], course_rate[bend])[0, 1])
     if agreement < -0.6:
-        return Problem(
-            "gyro_z",
-            "the gyro turns against the GNSS course about the accelerometer's vertical "
-            f"(correlation {agreement:.2f}): the signs of all gyro or of all accelerometer "
-            "axes are reversed; set factor = -1 for them in the mapping",
-            serious=True,
-        )
+        return Problem.of("imu.gyro_against_course", "gyro_z", serious=True, agreement=agreement)
     size = np.linalg.norm(along - bias, axis=1)[bend]
     total = np.abs(course_rate[bend])
     upright = float(yaw[bend] @ course_rate[bend]) / float(size @ total)
     if upright >= 0.6 or not _alike(size, total):
         return None
-    return Problem(
-        "gyro_z",
-        "the gyro turns with the GNSS course, but not about the accelerometer's "
-        "vertical: their axes are not the same; map them alike",
-        serious=True,
-    )
+    return Problem.of("imu.axes_differ_course", "gyro_z", serious=True)
 
 
 def _against_speed(
@@ -308,21 +277,10 @@ def _against_speed(
     seen = min(float(np.std(centripetal)), float(np.std(lateral))) >= 0.08
     agreement = float(np.corrcoef(lateral, centripetal)[0, 1]) if seen else 0.0
     if agreement < -0.6:
-        return Problem(
-            "accel_y",
-            "in bends the lateral acceleration runs against speed times yaw rate "
-            f"(correlation {agreement:.2f}): two axes of the inertial sensor are swapped or one "
-            "has the wrong sign; correct it in the mapping (factor = -1)",
-            serious=True,
-        )
+        return Problem.of("imu.axes_swapped", "accel_y", serious=True, agreement=agreement)
     usual, crossed, pitch = _ties(force, rate, full, forward, right)
     if crossed > 0.3 and crossed > 2.5 * usual:
-        return Problem(
-            "gyro_x",
-            "the gyro rolls where the vehicle speeds up and brakes, and pitches in bends: two of "
-            "its axes are swapped; map them the other way round",
-            serious=True,
-        )
+        return Problem.of("imu.gyro_axes_swapped", "gyro_x", serious=True)
     against = -max(_AGAINST, _CHANCE / math.sqrt(max(int(np.count_nonzero(_inner(full))), 1)))
     felt = _tilt_tie(force @ forward - accel_along, rate @ right, full)
     if (0.5 * (pitch + felt) if pitch else felt) < against:
@@ -338,11 +296,7 @@ def _inner(full: Bools) -> Bools:
 
 
 def _mirrored(name: str, said: str, felt: str) -> Problem:
-    return Problem(
-        name,
-        f"the gyro says {said} where the accelerometer says {felt}: {_BY_TILT}",
-        serious=True,
-    )
+    return Problem.of("imu.gyro_sign", name, said=said, felt=felt, serious=True)
 
 
 def _tilt_tie(gravity: Floats, rate: Floats, full: Bools) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from weighbridge.checks.false_samples import clipped, isolated, piled
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.needed import needed, of_torque, show
+from weighbridge.messages import phrase
 from weighbridge.signals import Bools, Drive, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
@@ -53,12 +54,16 @@ def _without_frozen(drive: Drive, name: str, marked: Bools) -> Drive:
     begins = np.flatnonzero(marked & ~np.concatenate(([False], marked[:-1])))
     lasted = float(np.sum(np.diff(signal.time, prepend=signal.time[0])[marked]))
     often = f"{begins.size} times, " if begins.size > 1 else ""
-    text = (
-        f"{name} repeats one value while the vehicle goes on, {often}first from "
-        f"{instant(signal.time[begins[0]])}, for {lasted:.0f} s in all: its source froze, and "
-        "those rows are left out"
+    found = Problem.of(
+        "frozen.signal",
+        name,
+        start=signal.time[begins[0]],
+        end=signal.time[marked][-1],
+        often=often,
+        at=instant(signal.time[begins[0]]),
+        lasted=lasted,
     )
-    return drive.with_signals(_without(signal, marked)).with_problems(Problem(name, text))
+    return drive.with_signals(_without(signal, marked)).with_problems(found)
 
 
 def _without_false(drive: Drive, name: str) -> Drive:
@@ -66,12 +71,7 @@ def _without_false(drive: Drive, name: str) -> Drive:
     marked = isolated(drive, name)
     if marked.any():
         drive = drive.with_signals(_without(signal, marked)).with_problems(
-            Problem(
-                name,
-                f"{np.count_nonzero(marked)} of {len(signal)} samples of {name} fall to zero or "
-                "to the end of its range and return at once, in one gear, as no engine does: "
-                "they are left out; check the connection",
-            )
+            Problem.of("torque.dropouts", name, count=np.count_nonzero(marked), samples=len(signal))
         )
     return drive
 
@@ -81,7 +81,7 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
     if vehicle is None or name != vehicle.torque.of_source.signals[0]:
         return drive
     signal, model, dragged = drive.signals[name], vehicle.torque, vehicle.dragged
-    notes = []
+    notes: list[Problem] = []
     highest = np.inf
     if model.load_range is not None:
         # Of other sources the range is not that of the signal.
@@ -92,9 +92,14 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
     marked = clipped(signal, highest)
     if marked.any():
         notes.append(
-            f"{name} never exceeds {show(name, float(signal.values.max()))}, which "
-            f"{np.count_nonzero(marked)} of {len(signal)} samples read, and the calibration's went "
-            f"up to {show(name, highest)}: it is cut off there, and those rows are left out"
+            Problem.of(
+                "torque.cut_off",
+                name,
+                most=show(name, float(signal.values.max())),
+                count=np.count_nonzero(marked),
+                samples=len(signal),
+                highest=show(name, highest),
+            )
         )
     if not np.isfinite(highest) and model.of_source.signed:
         marked, more = _piled(signal, vehicle)
@@ -106,34 +111,39 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
             doubtful = signal.values <= 3.0 * dragged.scatter - min(dragged.level)
             marked = marked | doubtful
             notes.append(
-                f"{name} is never below zero, and a dragged engine read down to "
-                f"{show(name, min(dragged.level))} in the calibration: its sign is lost, and the "
-                f"{np.count_nonzero(doubtful)} samples it may concern are left out"
+                Problem.of(
+                    "torque.sign_lost",
+                    name,
+                    lowest=show(name, min(dragged.level)),
+                    count=np.count_nonzero(doubtful),
+                )
             )
     if not notes or marked.all():
         return drive
-    return drive.with_signals(_without(signal, marked)).with_problems(
-        *(Problem(name, text) for text in notes)
-    )
+    return drive.with_signals(_without(signal, marked)).with_problems(*notes)
 
 
-def _piled(signal: Signal, vehicle: Vehicle) -> tuple[Bools, list[str]]:
+def _piled(signal: Signal, vehicle: Vehicle) -> tuple[Bools, list[Problem]]:
     """Mark a torque's samples at ends at which it is cut off, and say so.
 
     At a motor's own limit they tell nothing wrong; the rest weighs without them as well. The lowest
     is looked at of motors alone: an engine that is dragged reads the same for long.
     """
-    marked, notes = np.zeros(len(signal), dtype=bool), []
+    marked, notes = np.zeros(len(signal), dtype=bool), list[Problem]()
     for lowest in (False, True)[: 1 + vehicle.driveline.single_speed]:
         found = piled(signal, lowest=lowest)
         if found.any():
             marked |= found
             end = float(signal.values[found][0])
             notes.append(
-                f"{signal.name} never {'falls below' if lowest else 'exceeds'} "
-                f"{show(signal.name, end)}, which {np.count_nonzero(found)} of "
-                f"{len(signal)} samples read: it is cut off there, or the motor is at its limit, "
-                "and those rows are left out"
+                Problem.of(
+                    "torque.at_limit",
+                    signal.name,
+                    word=phrase("falls_below") if lowest else phrase("exceeds"),
+                    limit=show(signal.name, end),
+                    count=np.count_nonzero(found),
+                    samples=len(signal),
+                )
             )
     return marked, notes
 
@@ -154,18 +164,24 @@ def _ends(drive: Drive, names: list[str]) -> list[Problem]:
         early, late = max(ends) - signal.time[-1], signal.time[0] - min(starts)
         if early > ENDS:
             notes.append(
-                Problem(
+                Problem.of(
+                    "file.ends_early",
                     name,
-                    f"{name} ends at {instant(signal.time[-1])}, {early:.0f} s before the drive: "
-                    "what comes after is not weighed by it",
+                    start=signal.time[-1],
+                    end=max(ends),
+                    at=instant(signal.time[-1]),
+                    early=early,
                 )
             )
         if late > ENDS:
             notes.append(
-                Problem(
+                Problem.of(
+                    "file.begins_late",
                     name,
-                    f"{name} begins at {instant(signal.time[0])}, {late:.0f} s after the drive: "
-                    "what comes before is not weighed by it",
+                    start=min(starts),
+                    end=signal.time[0],
+                    at=instant(signal.time[0]),
+                    late=late,
                 )
             )
     return notes

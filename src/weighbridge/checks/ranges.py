@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.checks.needed import needed, show
+from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES, Bools, Drive, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
@@ -85,7 +86,7 @@ def _cut(
     drive: Drive, s: Signal, out: Bools, *, serious: bool = False, noted: bool = True
 ) -> Drive:
     if noted:
-        drive = drive.with_problems(_problem(s, out, ", and were left out", serious=serious))
+        drive = drive.with_problems(_problem(s, out, phrase("left_out"), serious=serious))
     if out.all():
         return drive.without(s.name)
     return drive.with_signals(Signal(s.name, s.time[~out], s.values[~out]))
@@ -94,10 +95,15 @@ def _cut(
 def _problem(s: Signal, out: Bools, done: str, *, serious: bool) -> Problem:
     q = QUANTITIES[s.name]
     k = int(np.argmax(np.where(out, np.abs(s.values), -1.0)))
-    return Problem(
+    return Problem.of(
+        "range.outside",
         s.name,
-        f"{np.count_nonzero(out)} of {len(s)} values of {s.name} are outside "
-        f"{show(s.name, q.low)} to {show(s.name, q.high)}, such as "
-        f"{show(s.name, float(s.values[k]))} at {instant(s.time[k])}{done}; check its unit",
         serious=serious,
+        count=np.count_nonzero(out),
+        samples=len(s),
+        low=show(s.name, q.low),
+        high=show(s.name, q.high),
+        value=show(s.name, float(s.values[k])),
+        at=instant(s.time[k]),
+        done=done,
     )

@@ -35,8 +35,6 @@ FAST: Final = 5.0
 PART: Final = 0.2
 """Part of the driving that has to be quiet [-]."""
 
-_REMEDY: Final = "; record it unfiltered"
-
 SLOWEST: Final = 0.2
 """Samples further apart do not show the shaking [s]."""
 
@@ -55,14 +53,10 @@ def without_smoothed(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     if trusted or not (drive.has("vehicle_speed") and heights):
         return drive
     for found in check_smoothed(drive, vehicle):
-        text = found.text.removesuffix(_REMEDY)
-        return drive.without(*IMU_SIGNALS).with_problems(
-            Problem(
-                found.signal,
-                f"{text}; accelerometer and gyroscope were left out, and speed and heights weigh "
-                "less surely: record it unfiltered",
-            )
+        left_out = Problem.of(
+            "imu.smoothed_out", found.signal, start=found.start, end=found.end, **found.values
         )
+        return drive.without(*IMU_SIGNALS).with_problems(left_out)
     return drive
 
 
@@ -85,13 +79,15 @@ def check_smoothed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         return
     first, last = np.flatnonzero(quiet)[[0, -1]]
     end = min(start + BLOCK * (last + 1), drive.end)
-    yield Problem(
+    yield Problem.of(
+        "imu.smoothed",
         axes[0].name,
-        f"the accelerometer shakes by {float(np.median(shaking[quiet])):.2g} m/s^2 only within "
-        f"{SECOND:g} s as the vehicle drives, from {span(round(start + BLOCK * first), round(end))}"
-        ", and a road shakes it by 0.1 and more: it was smoothed, and quick changes of the motion "
-        f"are lost{_REMEDY}",
         serious=True,
+        start=start + BLOCK * first,
+        end=end,
+        shaking=float(np.median(shaking[quiet])),
+        within=SECOND,
+        span=span(round(start + BLOCK * first), round(end)),
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
+from weighbridge.messages import phrase
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.signals.parts import find_splices
@@ -39,12 +40,6 @@ _CONFUSIONS: Final = tuple(
 
 # A speedometer reads up to a tenth more than the wheels do.
 _TOLERANCE: Final = 0.10
-
-SETTLED: Final = (
-    "; if it is right as it is, set trusted = true for it in the mapping, or name it in trusted of "
-    "drive.toml"
-)
-"""How a person answers a doubt that only they can settle."""
 
 # Windows over which a speed is judged by itself, and how many of them must be beyond belief [s].
 _WINDOW: Final = 3.0
@@ -82,8 +77,8 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
             return
     found = _gear_ratio(drive, speed, vehicle)
     if found is not None:
-        if problem := _scale_problem("vehicle_speed", found, "the gears of the vehicle file", 0.06):
-            yield replace(problem, text=f"{problem.text}; or the vehicle file is another car's")
+        if problem := _scale_problem("vehicle_speed", found, phrase("by_gears"), 0.06):
+            yield replace(problem, text=phrase("or_another_car", text=problem.text))
         return
     ratio = _accel_ratio(drive, speed)
     if ratio is not None:
@@ -99,21 +94,17 @@ def _check_alone(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> Iterat
     """Doubt a speed that nothing else of the drive can be compared with."""
     why = _beyond_belief(drive, speed, vehicle)
     if why and (jumps := find_splices(drive)):
-        yield Problem(
+        yield Problem.of(
+            "speed.splices",
             speed.name,
-            f"{speed.name} {why}; {len(jumps)} times, first at {instant(jumps[0].end)}, the "
-            "recording jumps as several do that were put one behind another: weighbridge weigh "
-            "parts it, and so does read_drives in Python",
             serious=True,
+            why=why,
+            count=len(jumps),
+            at=instant(jumps[0].end),
         )
     elif why:
         stem = "speed" if speed.name == "gnss_speed" else speed.name
-        yield Problem(
-            speed.name,
-            f"{speed.name} {why}, as one in km/h or mph under {stem}_mps would; name the column "
-            f"by its unit, or set the unit in the mapping{SETTLED}",
-            serious=True,
-        )
+        yield Problem.of("speed.unit_doubtful", speed.name, serious=True, why=why, stem=stem)
 
 
 def _beyond_belief(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> str:
@@ -133,17 +124,14 @@ def _beyond_belief(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> str:
         return ""
     top, power, change = (float(np.sort(x)[-_WINDOWS]) for x in (mean, mean * accel, np.abs(accel)))
     if top > fastest:
-        return f"reaches {3.6 * top:.0f} km/h, faster than such vehicles go"
+        return phrase("speed_too_fast", top=3.6 * top)
     if change > _GRIP:
-        return f"changes by {change:.0f} m/s^2 for {_WINDOW:.0f} s, more than tyres hold"
+        return phrase("speed_grip", change=change, window=_WINDOW)
     if power > strongest:
-        return f"rises as if {power:.0f} W drove each kg, far more than engines give"
+        return phrase("speed_power", power=power)
     gearing = _usual_gearing(drive, speed)
     if gearing is not None and gearing < _LONGEST_GEAR:
-        return (
-            f"is fast for its engine, which turns {gearing:.1f} rad on each metre; the longest "
-            "gears have 4 and more"
-        )
+        return phrase("speed_gear", gearing=gearing)
     return ""
 
 
@@ -171,31 +159,28 @@ def _scale_problem(
     if abs(ratio - 1.0) < _TOLERANCE:
         return None
     if not ratio > 0.0:
-        return Problem(
-            name,
-            f"{name} falls where the speed from {source} rises: the two are of different drives, "
-            "or one of them is false; record them together",
-            serious=True,
-        )
+        return Problem.of("speed.against", name, serious=True, source=source)
     expected = min((c[2] for c in _CONFUSIONS), key=lambda e: abs(np.log(ratio / e)))
     stem = "speed" if name == "gnss_speed" else name
     if abs(np.log(ratio / expected)) < near:
         # Several pairs of units have one ratio: the name says which one it is.
         alike = [(s, m) for s, m, e in _CONFUSIONS if abs(np.log(e / expected)) < 0.02]
-        texts = " or ".join(f"in {m} under {stem}_{s}" for s, m in alike)
-        return Problem(
+        texts = " or ".join(
+            phrase("speed_unit_pair", unit=m, stem=stem, suffix=s) for s, m in alike
+        )
+        return Problem.of(
+            "speed.unit",
             name,
-            f"{name} is {ratio:.3f} times the speed from {source}; it seems to be {texts}: "
-            f"name the column {stem}_{alike[0][1]} or set its unit in the mapping",
             serious=True,
+            ratio=ratio,
+            source=source,
+            texts=texts,
+            stem=stem,
+            alike=alike[0][1],
         )
     if only_units or abs(ratio - 1.0) < 0.2:
         return None
-    return Problem(
-        name,
-        f"{name} is {ratio:.3f} times the speed from {source}; check the units of both",
-        serious=True,
-    )
+    return Problem.of("speed.scale", name, serious=True, ratio=ratio, source=source)
 
 
 def _position_speed(drive: Drive) -> Signal | None:
@@ -259,12 +244,7 @@ def _check_positions(drive: Drive) -> Iterator[Problem]:
             turn = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)[good]
             bearings.append(float(np.nanmedian(turn)))
     if abs(centres[0] - np.log(np.pi / 180.0)) < 0.3:
-        yield Problem(
-            "latitude",
-            f"the positions cover {np.exp(centres[0]):.4f} of the way the speed says; they seem to "
-            "be in radians: name the columns latitude_rad and longitude_rad",
-            serious=True,
-        )
+        yield Problem.of("position.radians", "latitude", serious=True, share=np.exp(centres[0]))
         return
     # Swapped, east is stretched by 1/cos(latitude): distances fit only the other way round.
     crossed = spreads[0] > 0.05 and spreads[1] < 0.4 * spreads[0]
@@ -274,12 +254,12 @@ def _check_positions(drive: Drive) -> Iterator[Problem]:
 
 
 def _swapped(lat: Signal, lon: Signal) -> Problem:
-    return Problem(
+    return Problem.of(
+        "position.swapped",
         "latitude",
-        f"latitude ({np.degrees(np.median(lat.values)):.3f}) and longitude "
-        f"({np.degrees(np.median(lon.values)):.3f}) seem to be swapped; name their columns "
-        "the other way round",
         serious=True,
+        latitude=np.degrees(np.median(lat.values)),
+        longitude=np.degrees(np.median(lon.values)),
     )
 
 
@@ -306,18 +286,9 @@ def _check_altitude(drive: Drive) -> Iterator[Problem]:
     if steep > 0.2:
         # Where an accelerometer sees the grade, the height does not make the mass.
         alone = not drive.has("longitudinal_accel") and not drive.has("accel_x", "gyro_x")
-        yield Problem(
-            "altitude",
-            f"altitude rises and falls by {100 * steep:.0f} % of the way, steeper than roads are; "
-            "if it is in feet, name the column altitude_ft",
-            serious=alone,
-        )
+        yield Problem.of("altitude.steep", "altitude", serious=alone, steep=100 * steep)
     elif ratio is not None and abs(np.log(ratio / UNITS["ft"].factor)) < 0.2:
-        yield Problem(
-            "altitude",
-            f"altitude changes {1.0 / ratio:.2f} times as much as the accelerometer says; "
-            "if it is in feet, name the column altitude_ft",
-        )
+        yield Problem.of("altitude.feet", "altitude", ratio=1.0 / ratio)
 
 
 def _grade_ratio(

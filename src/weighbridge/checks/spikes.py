@@ -72,11 +72,15 @@ def without_spikes(drive: Drive) -> Drive:
         drive = drive.with_signals(
             Signal(name, signal.time[~marked], signal.values[~marked])
         ).with_problems(
-            Problem(
+            Problem.of(
+                "range.spikes",
                 name,
-                f"{count} of {len(signal)} samples of {name} leap away and return at once, such "
-                f"as {show(name, float(signal.values[worst]))} at {instant(signal.time[worst])}: "
-                "they are left out",
+                start=signal.time[worst],
+                end=signal.time[worst],
+                count=count,
+                samples=len(signal),
+                value=show(name, float(signal.values[worst])),
+                at=instant(signal.time[worst]),
             )
         )
     return drive

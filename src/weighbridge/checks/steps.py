@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from weighbridge.balance.disagreement import Finding
 from weighbridge.checks.needed import show
-from weighbridge.checks.speed import SETTLED
+from weighbridge.messages import phrase
 from weighbridge.navigation.aiding import resolution
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.instants import span
@@ -83,25 +83,26 @@ def check_steps(
     ratio = step / known
     part = last - first < len(signal)
     begin, end = np.round(signal.time[[first, last - 1]])
-    when = f" from {span(float(begin), float(end))}" if part else ""
-    before = f"{name} came in steps of {show(name, known)} in the calibration"
+    at: dict[str, Any] = {"start": float(begin), "end": float(end)} if part else {}
+    quoted: dict[str, Any] = {
+        "known": show(name, known),
+        "when": phrase("from_span", span=span(float(begin), float(end))) if part else "",
+    }
     if ratio < 1.0 / FARTHEST:
-        yield Problem(
-            name,
-            f"{before}, and lies between them here{when}: it was filtered, multiplied or worked "
-            "out anew after it was sent, or another source tells it, and a mass may be wrong by as "
-            "much; record it as in the calibration",
-        )
+        yield Problem.of("torque.steps_filtered", name, **at, **quoted)
     elif abs(ratio - 1.0) > SAME and ratio < FARTHEST:
         unit = _unit(ratio) if name == "engine_torque" else ""
         serious = abs(ratio - 1.0) > MATTERS and not _cleared(ratio, witnesses)
-        yield Problem(
+        yield Problem.of(
+            "torque.steps",
             name,
-            f"{before}, and comes in steps of {show(name, step)} here{when}: it was multiplied by "
-            f"{ratio:.3g} after it was sent{unit}, and a mass is wrong by about as much; correct "
-            "its unit or factor in the mapping, or calibrate with the logger in use"
-            f"{SETTLED if serious else ''}",
+            **at,
+            **quoted,
             serious=(serious or bool(unit)) and name not in drive.info.trusted,
+            step=show(name, step),
+            ratio=ratio,
+            unit=unit,
+            settled=phrase("settled") if serious else "",
         )
 
 
@@ -143,7 +144,7 @@ def _on_steps(values: Floats, step: float, fewest: int = FEWEST) -> float:
 def _unit(ratio: float) -> str:
     """Which unit a torque is in or is taken for, in words; empty where it is none."""
     if abs(ratio * POUND_FOOT - 1.0) < SAME:
-        return ", as pound-feet that are taken for N m are"
+        return phrase("as_pound_feet")
     if abs(ratio / POUND_FOOT - 1.0) < SAME:
-        return ", as N m that are taken for pound-feet are"
+        return phrase("as_newton_metres")
     return ""

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.checks.needed import show
+from weighbridge.messages import phrase
 from weighbridge.signals import Bools, Drive, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.signals.runs import marked_runs
@@ -41,17 +42,17 @@ def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
         return
     standing = np.abs(s.values) < 0.3
     if float(np.max(np.abs(s.values))) < 1.0:
-        yield Problem(
-            s.name,
-            f"the vehicle stands all the time ({s.duration:.0f} s): there is nothing to weigh by",
-        )
+        yield Problem.of("speed.stands", s.name, duration=s.duration)
         return
     length, start = _longest_time(s, standing)
     if length > 600.0:
-        yield Problem(
+        yield Problem.of(
+            "speed.standstill",
             s.name,
-            f"the vehicle stands for {length / 60.0:.0f} min from {instant(start)}; "
-            "if it was loaded there, look at the mass of each segment",
+            start=start,
+            end=start + length,
+            minutes=length / 60.0,
+            at=instant(start),
         )
     # No car brakes or accelerates at 1.5 g: a piece of the recording is missing there.
     step, jump = np.diff(s.time), np.abs(np.diff(s.values))
@@ -61,20 +62,23 @@ def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
         in_turn = count > IN_TURN * max(int(np.count_nonzero(~standing)), 1)
         unit = "" if in_turn else _unit_changes(drive, s, k)
         if in_turn:
-            why = "two sources or units take turns in it; map one of them"
+            why = phrase("jump_turns")
         elif unit:
-            why = (
-                f"engine_speed goes on, so the unit changes there from {unit}; cut the recording "
-                "there and map the unit of each part"
-            )
+            why = phrase("jump_unit", unit=unit)
         else:
-            why = "a piece may be cut out of the recording there"
-        yield Problem(
+            why = phrase("jump_cut")
+        yield Problem.of(
+            "speed.jumps",
             s.name,
-            f"{s.name} jumps {counted(count, 'time')}, as from "
-            f"{show(s.name, float(s.values[k]))} to {show(s.name, float(s.values[k + 1]))} "
-            f"within {step[k]:.2g} s at {instant(s.time[k])}; {why}",
             serious=in_turn or bool(unit),
+            start=s.time[k],
+            end=s.time[k],
+            times=counted(count, "time"),
+            before=show(s.name, float(s.values[k])),
+            after=show(s.name, float(s.values[k + 1])),
+            step=step[k],
+            at=instant(s.time[k]),
+            why=why,
         )
 
 
@@ -114,9 +118,6 @@ def check_sign(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     moving = np.abs(s.values) > 1.0
     backwards = int(np.count_nonzero(s.values[moving] < 0.0))
     if backwards > 0.5 * np.count_nonzero(moving):
-        yield Problem(
-            s.name,
-            f"vehicle_speed is negative in {backwards} of {np.count_nonzero(moving)} samples in "
-            "motion; if forward is negative there, set factor = -1 in the mapping",
-            serious=True,
+        yield Problem.of(
+            "speed.sign", s.name, serious=True, count=backwards, samples=np.count_nonzero(moving)
         )

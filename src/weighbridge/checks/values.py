@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.checks.needed import MOTION, moves, needed, of_torque, show
-from weighbridge.checks.speed import SETTLED
+from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES, Drive, Problem
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.units import UNITS
@@ -49,11 +49,8 @@ def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
                 continue
             if _along_an_axis(drive, s.name):
                 continue
-            yield Problem(
-                s.name,
-                f"{s.name} is {show(s.name, value)} all the time; its source is stuck: "
-                "leave the column out or record it again",
-                serious=s.name in made_of,
+            yield Problem.of(
+                "range.stuck", s.name, serious=s.name in made_of, value=show(s.name, value)
             )
 
 
@@ -78,12 +75,13 @@ def check_load(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         highest = float(np.max(np.abs(s.values)))
         if 0.0 < highest <= _LEAST_PERCENT and np.unique(s.values).size > 5:
             column = QUANTITIES[name].stem
-            yield Problem(
+            yield Problem.of(
+                "range.ratio",
                 name,
-                f"{name} never exceeds {100 * highest:.3g} % though the vehicle drives; it seems "
-                f"to run from 0 to {'1' if highest <= 0.0102 else f'{100 * highest:.2f}'}: name "
-                f"the column {column}_ratio or set the unit ratio in the mapping{SETTLED}",
                 serious=name in made_of,
+                highest=100 * highest,
+                full="1" if highest <= 0.0102 else f"{100 * highest:.2f}",
+                column=column,
             )
 
 
@@ -94,12 +92,8 @@ def check_retarder(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         return
     if float(np.min(s.values)) < 0.0 or float(np.max(s.values)) < _RETARDS:
         return
-    yield Problem(
-        s.name,
-        f"retarder_torque goes up to {show(s.name, float(np.max(s.values)))} and never below 0, "
-        "but SPN 520 counts braking negative: write factor = -1 under [signals.retarder_torque] of "
-        f"the mapping, or leave the column out{SETTLED}",
-        serious=True,
+    yield Problem.of(
+        "retarder.sign", s.name, serious=True, value=show(s.name, float(np.max(s.values)))
     )
 
 
@@ -121,13 +115,10 @@ def check_pressure(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
         None,
     )
     remedy = (
-        f"it seems to be in {swapped[1]} under {swapped[0]}: name the column {q.stem}_{swapped[1]}"
+        phrase("pressure_unit", unit=swapped[1], said=swapped[0], column=q.stem)
         if swapped
-        else "check its unit, or leave the column out"
+        else phrase("pressure_check")
     )
-    yield Problem(
-        s.name,
-        f"barometric_pressure is {show(s.name, usual)} in the median, which is no air pressure; "
-        f"{remedy}",
-        serious=True,
+    yield Problem.of(
+        "range.pressure", s.name, serious=True, value=show(s.name, usual), remedy=remedy
     )

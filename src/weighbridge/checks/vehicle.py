@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
+from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.instants import instant
 from weighbridge.vehicle.gear import detect_gearings, effective_gearing, steady
@@ -50,48 +51,40 @@ def _check_reference(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
     if len(reported) < 2:
         told, known = reported[0][0] if reported else None, model.told_reference_torque
         if told and known and abs(told / known - 1.0) > SAME_REFERENCE:
-            yield Problem(
+            yield Problem.of(
+                "torque.reference_changed",
                 reference.name,
-                f"reference_torque is {told:.0f} N m, and was {known:.0f} N m in the calibration: "
-                "it is a constant of an engine, and a mass would be wrong by as much if the "
-                "percentages are of the same torque as before; correct it where it is wrong, "
-                "calibrate again where the engine is another or mapped anew, or name "
-                "reference_torque in trusted of drive.toml where it is right",
                 serious=model.of_source.needs_reference,
+                now=told,
+                known=known,
             )
         stated = model.reference_torque if known is None else None
         if told and stated and abs(told / stated - 1.0) > SAME_REFERENCE:
-            yield Problem(
-                reference.name,
-                f"reference_torque is {told:.0f} N m in the drive, which was taken, and "
-                f"{stated:.0f} N m in the vehicle file: the vehicle file is another vehicle's, or "
-                "reference_torque_nm under [torque] is wrong",
-            )
+            yield Problem.of("torque.reference_file", reference.name, now=told, stated=stated)
         return
     values = np.array([value for value, _ in reported])
     nearest = np.argmin(np.abs(reference.values[:, None] - values[None, :]), axis=1)
     once = bool(np.count_nonzero(np.diff(nearest)) < len(reported))
-    which = " and ".join(f"{value:.0f} N m from {instant(time)}" for value, time in reported)
-    said = (
-        f"reference_torque is {which}{'' if once else ', in turn'}: it is a constant of an engine"
+    which = " and ".join(
+        phrase("reference_from", value=value, at=instant(time)) for value, time in reported
     )
+    said = phrase("reference_is" if once else "reference_in_turn", which=which)
     unknown = not model.stated
     of_reference = model.of_source.needs_reference
     if (unknown or of_reference) and model.reference_torque is not None:
-        yield Problem(
-            reference.name,
-            f"{said}; the {model.reference_torque:.0f} N m of the vehicle file were taken all the "
-            "time; split the recording if it holds two vehicles",
+        yield Problem.of(
+            "torque.references_taken", reference.name, said=said, taken=model.reference_torque
         )
         return
-    guess = "so these are two vehicles" if once else "so one is not of the engine that is weighed"
-    split = "split the recording where it changes, or " if once else ""
-    yield Problem(
+    guess = phrase("two_vehicles") if once else phrase("one_not_of_engine")
+    split = phrase("split_or") if once else ""
+    yield Problem.of(
+        "torque.references",
         reference.name,
-        f"{said}, {guess}; {split}state the right one as reference_torque_nm under [torque] of "
-        "the vehicle file",
-        # In turn it says nothing of two vehicles, and only percent torque needs it.
         serious=once or unknown or of_reference,
+        said=said,
+        guess=guess,
+        split=split,
     )
 
 
@@ -120,11 +113,14 @@ def _check_gears(drive: Drive) -> Iterator[Problem]:
         own = (_on(gearing[parts[0]], before), _on(gearing[parts[1]], after))
         foreign = (_on(gearing[parts[0]], after), _on(gearing[parts[1]], before))
         if min(own) > _OWN and max(foreign) < _FOREIGN:
-            yield Problem(
+            yield Problem.of(
+                "vehicle.two",
                 "engine_speed",
-                f"the gears change at {instant(cut)}: {100.0 * own[0]:.0f} % of the samples before "
-                f"lie on gears of their own and {100.0 * foreign[0]:.0f} % on those after, as with "
-                "two vehicles in one recording; split it there if so",
+                start=cut,
+                end=drive.end,
+                at=instant(cut),
+                own=100.0 * own[0],
+                foreign=100.0 * foreign[0],
             )
             return
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from weighbridge.balance.disagreement import DOUBTFUL, Finding, difference, find
 from weighbridge.balance.witness import BY_SIGNAL
 from weighbridge.checks.frozen import frozen
 from weighbridge.checks.steps import check_steps
+from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.instants import instant
 from weighbridge.vehicle.model import Vehicle
@@ -75,11 +77,7 @@ def check_witnesses(
     worst = max(off, key=lambda f: (f.verdict == "serious", abs(f.scale - 1.0)))
     together = [f for f in off if (f.blur > 0.0, f.sign) == (worst.blur > 0.0, worst.sign)]
     serious = (altered or worst.verdict == "serious") and reading not in drive.info.trusted
-    return (
-        Problem(
-            reading, _reading_off(reading, vehicle, worst, together, len(off)), serious=serious
-        ),
-    )
+    return (_reading_off(reading, vehicle, worst, together, len(off), serious=serious),)
 
 
 def _thawed(drive: Drive, vehicle: Vehicle) -> Drive:
@@ -100,50 +98,80 @@ def _outvoted(off: Sequence[Finding]) -> bool:
 
 
 def _reading_off(
-    reading: str, vehicle: Vehicle, worst: Finding, together: Sequence[Finding], many: int
-) -> str:
+    reading: str,
+    vehicle: Vehicle,
+    worst: Finding,
+    together: Sequence[Finding],
+    many: int,
+    *,
+    serious: bool,
+) -> Problem:
     """Say by how much the reading is off, by which witnesses, and what to do."""
     names = " and ".join(f.signal for f in together)
-    if worst.before:
-        source = f"from {instant(worst.start)} on against before"
-    else:
-        source = f"by the calibration of {vehicle.name}{_when(worst)}"
+    at = _span(worst)
     if worst.blur > 0.0:
-        return (
-            f"{reading} follows {names} with a time constant of {worst.blur:.2g} s, as it did not "
-            f"in the calibration of {vehicle.name}: something smooths the load or torque; record "
-            "it as the vehicle sends it"
+        return Problem.of(
+            "torque.blurred",
+            reading,
+            **at,
+            serious=serious,
+            witnesses=names,
+            blur=worst.blur,
+            vehicle=vehicle.name,
         )
+    turning = any(BY_SIGNAL[f.signal].per_turn for f in together)
     if len(together) > 1:
-        which = f"{reading} is wrong"
+        which = phrase("reading_wrong", reading=reading)
     elif many > 1:
-        which = "they do not agree with each other either, and one of them is wrong"
+        which = phrase("one_witness_wrong")
     else:
-        which = "one of the two is wrong"
-    if any(BY_SIGNAL[f.signal].per_turn for f in together):
-        which = which.replace("of the two is wrong", "of the two, or engine_speed, is wrong")
-    two = " (or the recording is of two vehicles)" if _part(worst) else ""
-    tells = (
-        f"{'as' if worst.scaled else 'than'} {names} {'tells' if len(together) == 1 else 'tell'}"
-    )
-    return (
-        f"{reading} reads {difference(worst)} {tells} {source}: {which}, and a mass from it is off "
-        f"by as much{two}; check the unit and scale of {reading} in the log and its mapping, or "
-        "calibrate again"
+        which = phrase("one_of_three_wrong" if turning else "one_of_two_wrong")
+    if worst.before:
+        source = phrase("against_before", at=instant(worst.start))
+    else:
+        source = phrase("by_calibration", vehicle=vehicle.name, when=_when(worst))
+    return Problem.of(
+        "torque.witness",
+        reading,
+        **at,
+        serious=serious,
+        by=difference(worst),
+        scale=worst.scale,
+        than="as" if worst.scaled else "than",
+        witnesses=names,
+        verb="shows" if len(together) == 1 else "show",
+        source=source,
+        which=which,
+        two=phrase("or_two_vehicles") if _part(worst) else "",
     )
 
 
 def _witness_off(reading: str, finding: Finding, agree: Sequence[str]) -> Problem:
     if finding.blur > 0.0:
-        how = f"{reading} follows it with a time constant of {finding.blur:.2g} s"
+        how = phrase("follows_it", reading=reading, blur=finding.blur)
     else:
-        than = "as" if finding.scaled else "than"
-        how = f"{reading} reads {difference(finding)} {than} it tells{_when(finding)}"
-    return Problem(
+        how = phrase(
+            "reads_than_it",
+            reading=reading,
+            by=difference(finding),
+            than="as" if finding.scaled else "than",
+            when=_when(finding),
+        )
+    return Problem.of(
+        "witness.off",
         finding.signal,
-        f"{finding.signal} is off: {how}, and {' and '.join(agree)} "
-        f"{'agrees' if len(agree) == 1 else 'agree'} with {reading}; nothing is taken from it",
+        **_span(finding),
+        how=how,
+        agree=" and ".join(agree),
+        verb="agrees" if len(agree) == 1 else "agree",
+        reading=reading,
     )
+
+
+def _span(finding: Finding) -> dict[str, Any]:
+    """Where in the drive a witness is off [s]; nothing where all the time."""
+    edges = {"start": finding.start, "end": finding.end}
+    return {name: edge for name, edge in edges.items() if np.isfinite(edge)}
 
 
 def _part(finding: Finding) -> bool:
@@ -153,5 +181,5 @@ def _part(finding: Finding) -> bool:
 def _when(finding: Finding) -> str:
     """In which part of the drive, in words."""
     if np.isfinite(finding.start):
-        return f" from {instant(finding.start)} on"
-    return f" until {instant(finding.end)}" if np.isfinite(finding.end) else ""
+        return phrase("from_on", at=instant(finding.start))
+    return phrase("until", at=instant(finding.end)) if np.isfinite(finding.end) else ""

@@ -173,15 +173,15 @@ def calibrate(
             bar.begin("weighing by it", len(recorded))
             own = own_masses(car, recorded, bar.within)
             notes += own.lines
-            if own.doubt:
-                car = with_doubts(car, (*car.provenance.doubts, own.doubt))
+            if own.doubt is not None:
+                car = with_doubts(car, (*car.provenance.problems, own.doubt))
         car.save(output)
     console().print(found)
     for line in notes:
         say(line)
     say_written(output)
-    if own is not None and own.doubt:
-        complain(f"weighbridge: {output}: {own.doubt}")
+    if own is not None and own.doubt is not None:
+        complain(f"weighbridge: {output}: {own.doubt.text}")
         if own.useless:
             raise typer.Exit(1)
 

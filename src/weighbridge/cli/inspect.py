@@ -16,6 +16,7 @@ from weighbridge.cli.options import (
     chosen_mapping,
     load_parts,
 )
+from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import console, say, shown
 
 if TYPE_CHECKING:
@@ -46,6 +47,12 @@ def inspect(
     every_way: Annotated[
         bool, typer.Option("--all", help="Also list the methods for which signals are missing.")
     ] = False,
+    json_path: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--json", help="Write one JSON object per drive to a file, or - for standard output."
+        ),
+    ] = None,
     whole: Whole = False,
 ) -> None:
     """Show what a drive holds: signals, rates, gaps, problems, possible methods.
@@ -60,17 +67,23 @@ def inspect(
 
     car = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = chosen_mapping(car, vehicle, mapping)
+    refuse_results(inputs(drives, vehicle, chosen, dbc), asked_for(json=json_path))
     screen = console(highlight=False)
     if not screen.is_terminal:
         screen.width = _WIDTH
+    lines: list[str] = []
     for path in drives:
         parts = load_parts(path, chosen, dbc, whole=whole)
         found = [inspect_drive(drive, car) for drive in parts]
+        lines += [one.to_json() for one in found]
+        if json_path == "-":
+            continue
         for one in found:
             _show(screen, one, every_way)
         best = next((one for one in found if _weighable(one)), found[0])
         for line in _next(best, path, len(parts), _Given(car, vehicle, mapping, dbc, whole)):
             say(line)
+    write_json(json_path, "\n".join(lines))
 
 
 class _Given(NamedTuple):

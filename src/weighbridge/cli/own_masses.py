@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from weighbridge.messages import Problem
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.weighing import Weighing
@@ -35,32 +37,35 @@ class OwnMasses:
         return len(self.unweighed) == self.drives
 
     @property
-    def doubt(self) -> str:
-        """What is to be told of the file; empty where it weighs all of its drives."""
+    def doubt(self) -> Problem | None:
+        """What is to be said of the file; None where it weighs all of its drives."""
         if not self.unweighed:
             return self._contradiction
         name, reason = self.unweighed[0]
+        about: dict[str, Any] = {"drive": name, "reason": reason}
         if not self.useless:
-            return (
-                f"the calibration has no mass of {len(self.unweighed)} of its {self.drives} own "
-                f"drives, such as {name} ({reason}): leave it out, or record it again"
+            return Problem.of(
+                "calibration.some_unweighed",
+                **about,
+                count=len(self.unweighed),
+                drives=self.drives,
             )
-        which = f"of its own drive {name}" if self.drives == 1 else "of any of its own drives"
-        return (
-            f"the calibration has no mass {which} ({reason}), so that nothing backs what it "
-            "weighs: calibrate again on longer drives with starts and hills"
-        )
+        alone = self.drives == 1
+        which = "calibration.own_unweighed" if alone else "calibration.all_unweighed"
+        return Problem.of(which, **about)
 
     @property
-    def _contradiction(self) -> str:
-        """What speaks against a known mass; empty where all lie within their intervals."""
+    def _contradiction(self) -> Problem | None:
+        """What speaks against a known mass; None where all lie within their intervals."""
         if not self.outside:
-            return ""
+            return None
         name, words = self.outside[0]
-        return (
-            f"the known mass of {len(self.outside)} of the calibration's {self.drives} own drives "
-            f"lies outside what the file weighs, such as {name} ({words}): check that mass, and "
-            "whether the load changed on the way; else leave the drive out"
+        return Problem.of(
+            "calibration.outside",
+            count=len(self.outside),
+            drives=self.drives,
+            drive=name,
+            words=words,
         )
 
 
@@ -101,7 +106,7 @@ def own_masses(
         else:
             lines.append(f"  {drive.name}: no mass ({own.status}): {own.reason}")
             unweighed.append((drive.name, own.reason))
-        lines += [f"    note: {text}" for text in own.warnings if text not in made.doubts]
+        lines += [f"    note: {p.text}" for p in own.problems if p.line not in made.doubts]
     return OwnMasses(tuple(lines), tuple(unweighed), len(drives), tuple(outside))
 
 

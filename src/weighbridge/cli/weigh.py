@@ -22,6 +22,7 @@ from weighbridge.cli.progress import Bar, progress
 from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import console, say, say_notes, shown
 from weighbridge.cli.verbosity import say_written
+from weighbridge.messages import Problem
 from weighbridge.whole import is_stream
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def weigh(
         given = partial(load_parts, mapping=chosen, dbc=dbc, whole=whole)
         whole_wanted = compare or report is not None or track is not None
         rows: list[WeighingRow] = []
-        failed: list[tuple[str, str]] = []
+        failed: list[tuple[str, Problem]] = []
         weighed: list[Weighing] = []
         for found in _weighed(drives, given, car, method, settings, bar, alone=track is not None):
             if isinstance(found, tuple):
@@ -180,7 +181,7 @@ def _weighed(
     bar: Bar,
     *,
     alone: bool,
-) -> Iterator[Weighing | tuple[str, str]]:
+) -> Iterator[Weighing | tuple[str, Problem]]:
     """Weigh every drive of the recordings, one by one; of one that cannot be, its name and why.
 
     ``given`` reads the drives of a recording, and ``alone`` refuses one of several.
@@ -195,7 +196,7 @@ def _weighed(
         except WeighbridgeError as error:
             if len(drives) == 1:
                 raise
-            yield path.name, str(error)
+            yield path.name, Problem.from_error(error)
             continue
         if alone and len(parts) > 1:
             raise ConfigError(
@@ -209,7 +210,7 @@ def _weighed(
             except WeighbridgeError as error:
                 if len(drives) == len(parts) == 1:
                     raise
-                yield drive.name if len(parts) > 1 else path.name, str(error)
+                yield drive.name if len(parts) > 1 else path.name, Problem.from_error(error)
 
 
 def _tell_written(paths: list[str | Path | None], *, beside_json: bool) -> None:
@@ -219,7 +220,7 @@ def _tell_written(paths: list[str | Path | None], *, beside_json: bool) -> None:
             say_written(path, aside=beside_json)
 
 
-def _failure(name: str, why: str, car: Vehicle, method: str) -> str:
+def _failure(name: str, why: Problem, car: Vehicle, method: str) -> str:
     """Write the JSON object of a drive that could not be read, with the fields of the others."""
     from weighbridge.results.row import unread_row
     from weighbridge.visible import visible
@@ -229,7 +230,7 @@ def _failure(name: str, why: str, car: Vehicle, method: str) -> str:
 
 def _show(
     rows: list[WeighingRow],
-    failed: list[tuple[str, str]],
+    failed: list[tuple[str, Problem]],
     compared: list[tuple[Weighing, ...]],
     car: Vehicle,
 ) -> None:
@@ -343,25 +344,24 @@ def warning_lines(rows: list[WeighingRow]) -> list[str]:
     shared = set.intersection(*(set(r.warnings) for r in rows)) if len(rows) > 1 else set()
     lines = [f"every drive: {text}" for text in dict.fromkeys(rows[0].warnings) if text in shared]
     for row in rows:
-        parted = f"{row.drive.rsplit(' part ', 1)[0]} holds "
-        own = [t for t in row.warnings if t not in shared and not t.startswith(parted)]
+        own = [p.text for p in row.problems if p.text not in shared and p.id != "file.part"]
         lines += [f"{row.drive}: {text}" for text in own[:_NOTED]]
         if len(own) > _NOTED:
             lines.append(f"{row.drive}: {len(own) - _NOTED} more, told by --json")
     return lines
 
 
-def reason_lines(rows: list[WeighingRow], failed: list[tuple[str, str]]) -> list[str]:
+def reason_lines(rows: list[WeighingRow], failed: list[tuple[str, Problem]]) -> list[str]:
     """Say why drives have no mass, for a table that has no room for it."""
     without = [r for r in rows if r.status != "converged"]
     return [f"{r.drive}: no mass ({r.status}): {r.reason}" for r in without] + [
-        why if name in why else f"{name}: {why}" for name, why in failed
+        why.text if name in why.text else f"{name}: {why.text}" for name, why in failed
     ]
 
 
 def result_table(
     rows: list[WeighingRow],
-    failed: list[tuple[str, str]],
+    failed: list[tuple[str, Problem]],
     car: Vehicle,
     *,
     narrow: bool = False,
@@ -386,6 +386,6 @@ def result_table(
         cells = (*minutes[: len(times)], *_numbers(row), _outcome(row, narrow=narrow))
         table.add_row(shown(row.drive), *cells)
     for name, why in failed:
-        outcome = "unreadable" if narrow else shown(f"unreadable: {why}")
+        outcome = "unreadable" if narrow else shown(f"unreadable: {why.text}")
         table.add_row(shown(name), *[""] * (len(times) + 4), outcome)
     return table

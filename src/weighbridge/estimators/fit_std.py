@@ -22,6 +22,7 @@ from weighbridge.estimators.joint.slow_errors import (
 from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.estimators.noisy_motion import row_noise_std, too_noisy
 from weighbridge.estimators.track import Status
+from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.model import Vehicle
 
@@ -146,7 +147,7 @@ class Judged(NamedTuple):
     degrees_of_freedom: float
     systematic_std: float
     status: Status
-    reason: str
+    reason: Problem | None
 
 
 def judged(

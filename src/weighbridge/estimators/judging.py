@@ -16,6 +16,7 @@ from weighbridge.balance.averaging import windows
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.gate import GATE, GateSettings
 from weighbridge.estimators.track import MassTrack, Segment, Status
+from weighbridge.messages import Problem, phrase
 from weighbridge.navigation.motion import BY_SPEED, Motion, MotionSource
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.data_sheet import scale_std
@@ -194,7 +195,7 @@ class Evidence:
         return float(np.std(cut.mean(self.phi))) if cut.count.size else 0.0
 
 
-def judge(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
+def judge(found: Evidence, vehicle: Vehicle) -> tuple[Status, Problem | None]:
     """Say whether the rows carry a mass, and why not: the same gate for every method.
 
     A mass needs rows (count, stretches and time of them), an interval that is narrow enough,
@@ -204,10 +205,10 @@ def judge(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
         status, reason = check(found, vehicle)
         if status is not Status.CONVERGED:
             return status, reason
-    return Status.CONVERGED, ""
+    return Status.CONVERGED, None
 
 
-_PASSED: Final = (Status.CONVERGED, "")
+_PASSED: Final = (Status.CONVERGED, None)
 
 
 def _most_of_the_others(table: ForceTable, used: Bools) -> str:
@@ -217,22 +218,24 @@ def _most_of_the_others(table: ForceTable, used: Bools) -> str:
     if reasons.size and share.max() >= alone:
         return Reason(int(reasons[np.argmax(share)])).text
     apart = float(np.median(np.diff(table.time))) if table.time.size > 1 else 0.0
-    slow = f", for torque comes every {apart:.2g} s: record it every second or faster"
+    slow = phrase("slow_torque", period=apart)
     return Reason.TOO_SHORT.text + (slow if apart > SLOW_TORQUE else "")
 
 
-def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, str]:
+def _enough_rows(found: Evidence, _: Vehicle) -> tuple[Status, Problem | None]:
     table, count = found.table, int(np.count_nonzero(found.used))
     if count >= found.gate.fewest_rows and found.blocks >= found.gate.fewest_blocks:
         return _PASSED
     most = _most_of_the_others(table, found.used)
-    return Status.NOT_EXCITED, (
-        f"only {count} usable samples, in {found.blocks} stretch(es) of time; "
-        + (found.slow_speed or f"most of the others: {most}")
+    return Status.NOT_EXCITED, Problem.of(
+        "motion.few_rows",
+        count=count,
+        stretches=found.blocks,
+        cause=found.slow_speed or phrase("most_of_others", most=most),
     )
 
 
-def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
+def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, Problem | None]:
     mass, half_width = found.mass, found.half_width
     narrow = np.isfinite(half_width) and half_width <= 1.96 * found.gate.widest * abs(mass)
     if narrow and found.drive_std <= found.gate.widest_of_drive * abs(mass):
@@ -240,85 +243,74 @@ def _narrow_enough(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
     low, high = vehicle.of_class.mass_range
     if mass + half_width < low or mass - half_width > high:
         return _possible(found, vehicle)
-    cause = found.slow_speed or "more starts and hills are needed"
+    cause = found.slow_speed or phrase("more_starts")
     if not found.slow_speed and found.used_time < found.gate.least_time:
-        cause = (
-            f"only {found.used_time:.0f} s of the drive could be used: drive longer, with starts "
-            "and hills"
-        )
+        cause = phrase("drive_longer", used=found.used_time)
     elif not found.slow_speed and found.systematic_std > found.drive_std:
-        cause = (
-            f"{100.0 * found.systematic_std / abs(mass):.0f} % of it is left open by the vehicle "
-            "file and the equipment, whatever the drive: calibrate again"
-        )
-    return Status.NOT_EXCITED, (
-        f"the drive says {mass:.0f} kg, {max(mass - half_width, 0.0):.0f} to "
-        f"{mass + half_width:.0f} kg with 95 % probability, which is no weighing; {cause}"
+        cause = phrase("left_open", share=100.0 * found.systematic_std / abs(mass))
+    return Status.NOT_EXCITED, Problem.of(
+        "motion.wide",
+        mass=mass,
+        low=max(mass - half_width, 0.0),
+        high=mass + half_width,
+        cause=cause,
     )
 
 
-def _possible(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
+def _possible(found: Evidence, vehicle: Vehicle) -> tuple[Status, Problem | None]:
     low, high = vehicle.of_class.mass_range
     if low < found.mass < high:
         return _PASSED
-    return Status.INCONSISTENT, (
-        f"the estimate is {found.mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "
-        f"{high:.0f} kg; check the vehicle file's class and gearings and the torque's sign "
-        "and scale"
+    return Status.INCONSISTENT, Problem.of(
+        "mass.impossible", mass=found.mass, kind=vehicle.kind, low=low, high=high
     )
 
 
-def _long_enough(found: Evidence, _: Vehicle) -> tuple[Status, str]:
+def _long_enough(found: Evidence, _: Vehicle) -> tuple[Status, Problem | None]:
     least = found.gate.least_time
     if found.used_time >= least:
         return _PASSED
-    return Status.NOT_EXCITED, (
-        f"only {found.used_time:.0f} s of the drive could be used, and {least:.0f} s are "
-        "needed: wind, grade and torque errors last as long; "
-        + (found.slow_speed or "drive longer")
+    return Status.NOT_EXCITED, Problem.of(
+        "motion.short",
+        used=found.used_time,
+        least=least,
+        cause=found.slow_speed or phrase("only_longer"),
     )
 
 
-def _excited(found: Evidence, _: Vehicle) -> tuple[Status, str]:
+def _excited(found: Evidence, _: Vehicle) -> tuple[Status, Problem | None]:
     spread, least = found.spread, found.gate.least_spread
     if spread >= least:
         return _PASSED
     if found.slow_speed:
-        return Status.NOT_EXCITED, (
-            f"the rows used vary the specific force by only {spread:.3f} m/s^2, and the mass needs "
-            f"{least:.3f}; {found.slow_speed}"
+        return Status.NOT_EXCITED, Problem.of(
+            "motion.slow_speed", spread=spread, least=least, cause=found.slow_speed
         )
-    return Status.NOT_EXCITED, (
-        f"acceleration and hills vary the specific force by only {spread:.3f} m/s^2, as a cruise "
-        f"on the flat does, and the mass needs {least:.3f}; more starts and hills are needed"
-    )
+    return Status.NOT_EXCITED, Problem.of("motion.not_excited", spread=spread, least=least)
 
 
-def _plausible(found: Evidence, vehicle: Vehicle) -> tuple[Status, str]:
+def _plausible(found: Evidence, vehicle: Vehicle) -> tuple[Status, Problem | None]:
     """Whether most of the interval lies between the empty mass and the heaviest load."""
     mass, std = found.mass, found.std
     lightest = vehicle.tare or min(vehicle.provenance.masses, default=None)
     if lightest is not None and mass - std > vehicle.of_class.heaviest * lightest:
-        return Status.INCONSISTENT, (
-            f"the estimate is {mass:.0f} kg, more than {vehicle.of_class.heaviest:g} times the "
-            f"{lightest:.0f} kg of the empty {vehicle.kind}; check that the vehicle file is this "
-            "vehicle's, and the unit and scale of the torque or load"
+        return Status.INCONSISTENT, Problem.of(
+            "mass.too_heavy",
+            mass=mass,
+            times=vehicle.of_class.heaviest,
+            lightest=lightest,
+            kind=vehicle.kind,
         )
     gross = vehicle.gross
     if lightest is None and gross is not None and mass - 2.0 * std > TOWING * gross:
-        return Status.INCONSISTENT, (
-            f"the estimate is {mass:.0f} kg, {mass / gross:.1f} times the permitted {gross:.0f} kg "
-            f"of the {vehicle.kind}, which neither load nor a trailer explains; check that the "
-            "vehicle file is this vehicle's, and the unit and scale of the torque or load"
+        return Status.INCONSISTENT, Problem.of(
+            "mass.above_gross", mass=mass, times=mass / gross, gross=gross, kind=vehicle.kind
         )
     if vehicle.tare is None:
         return _PASSED
     emptied = vehicle.tare - vehicle.of_class.emptied
     if mass + std < LIGHTEST * vehicle.tare or mass + 2.0 * std < emptied:
-        return Status.INCONSISTENT, (
-            f"the estimate is {mass:.0f} kg, less than the tare of {vehicle.tare:.0f} kg; "
-            "check that the vehicle file is this vehicle's, and the torque's scale"
-        )
+        return Status.INCONSISTENT, Problem.of("mass.below_tare", mass=mass, tare=vehicle.tare)
     return _PASSED
 
 

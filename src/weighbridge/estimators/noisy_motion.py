@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.balance.table import ForceTable
+from weighbridge.messages import Problem
 from weighbridge.navigation.motion import noise_level
 from weighbridge.signals import Bools, Floats
 
@@ -70,11 +71,8 @@ def row_noise_std(table: ForceTable, phi: Floats, used: Bools, share: float) -> 
     return std if std > LEAST else 0.0
 
 
-def too_noisy(std: float) -> str:
-    """Say in a sentence that the motion is too noisy for such a method; empty if not."""
+def too_noisy(std: float) -> Problem | None:
+    """Say that the motion is too noisy for such a method; None if not."""
     if std <= MOST:
-        return ""
-    return (
-        f"the accelerometer is so noisy, or shaken, that it moves a mass of this method by some "
-        f"{100.0 * min(std, 1.0):.0f} %; fix the sensor to the body, or weigh by joint"
-    )
+        return None
+    return Problem.of("imu.too_noisy", share=100.0 * min(std, 1.0))

@@ -17,6 +17,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import converged_at
 from weighbridge.estimators.track import MassTrack, Status
 from weighbridge.kernels import speed_ekf as kernel
+from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
 
@@ -231,28 +232,21 @@ def estimate(
 
 def _judge(
     vehicle: Vehicle, count: int, mass: float, std: float, share: float
-) -> tuple[Status, str]:
+) -> tuple[Status, Problem | None]:
     model = model_of(vehicle)
     if count < FEWEST:
-        return Status.NOT_EXCITED, (
-            f"only {count} usable samples of {model.sample_time:g} s, and {FEWEST} are needed: "
-            "drive longer, faster than walking pace and without braking"
+        return Status.NOT_EXCITED, Problem.of(
+            "speed.few_samples", count=count, period=model.sample_time, least=FEWEST
         )
     low, high = vehicle.of_class.mass_range
     if not low < mass < high:
-        return Status.INCONSISTENT, (
-            f"the estimate is {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "
-            f"{high:.0f} kg; calibrate again with --method speed-ekf"
+        return Status.INCONSISTENT, Problem.of(
+            "speed.impossible", mass=mass, kind=vehicle.kind, low=low, high=high
         )
     if share > LARGEST_SHARE:
-        return Status.NOT_EXCITED, (
-            f"the estimate of {mass:.0f} kg follows the mass that the filter was started from "
-            f"({model.mass:.0f} kg, of the calibration) by {100.0 * share:.0f} %: speed alone "
-            "does not show the mass here; record torque or engine load"
+        return Status.NOT_EXCITED, Problem.of(
+            "speed.no_mass", mass=mass, first=model.mass, share=100.0 * share
         )
     if not std <= 0.15 * mass:
-        return Status.NOT_EXCITED, (
-            f"speed alone says {mass:.0f} kg give or take {std:.0f} kg, which is no weighing; "
-            "record torque or engine load"
-        )
-    return Status.CONVERGED, ""
+        return Status.NOT_EXCITED, Problem.of("speed.wide", mass=mass, std=std)
+    return Status.CONVERGED, None

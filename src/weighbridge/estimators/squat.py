@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.law import squat_column
 from weighbridge.constants import GRAVITY
+from weighbridge.messages import Problem, phrase
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.classes import VehicleClass
@@ -128,16 +129,12 @@ def of_vehicle(motion: Motion, vehicle: Vehicle) -> Motion:
     sureness = abs(off) / float(np.hypot(own_std, mounting.squat_std or 0.0))
     if sureness < DOUBTED:
         return with_squat(motion, mounting.squat, LOADED_STD)
-    leans = (
-        f"the sensor leans by {np.degrees(motion.squat):.2f}° per m/s² as the vehicle accelerates, "
-        f"in the calibration by {np.degrees(mounting.squat):.2f}°: its holder gives way in one of "
-        "the two, or the springs are others"
-    )
+    leans = phrase("leans", now=np.degrees(motion.squat), then=np.degrees(mounting.squat))
     if sureness < ANOTHER:
         doubted = with_squat(motion, mounting.squat, 0.5 * abs(motion.squat - mounting.squat))
-        note = f"perhaps {leans}; the interval allows for it"
+        note = Problem.of("imu.lean_doubtful", leans=leans)
         return replace(doubted, notes=(*motion.notes, note))
-    note = f"{leans}; what this drive shows was taken. Fix the sensor to the body"
+    note = Problem.of("imu.lean", leans=leans)
     return replace(motion, squat_std=own_std, own_squat=True, notes=(*motion.notes, note))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.balance import ForceBalance, Reason
+from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class MassTrack:
     bound_std : Cramér-Rao bound of this drive [kg]
     converged_at : when the running mass stays within 5 % of the final answer
         for good [s]; NaN if never
-    status : and ``reason`` in a sentence where it is not converged
+    status : and ``reason``, None where it is converged
     segments : mass between stops
     sensitivity : (k,) how far one unit of each parameter of the calibration moves the mass
         [kg per unit]; None where a method does not say
@@ -90,7 +91,7 @@ class MassTrack:
     bound_std: float
     converged_at: float
     status: Status
-    reason: str
+    reason: Problem | None
     segments: tuple[Segment, ...]
     systematic_std: float = math.nan
     sensitivity: Floats | None = None

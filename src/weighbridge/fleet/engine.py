@@ -16,6 +16,7 @@ from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.fleet.job import THERE, TRIES, Job, Receipt, fail_job, weigh_job
 from weighbridge.fleet.schema import FAILED, UNREAD
 from weighbridge.fleet.warm import compiled_once
+from weighbridge.messages import Problem
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -265,7 +266,7 @@ class _Run:
                 self._told()
             if not again:
                 return
-        self.count.add(fail_job(job, f"{WORKER_DIED}, or take the recording in pieces"))
+        self.count.add(fail_job(job, Problem.of("fleet.worker_died", tries=TRIES)))
 
     def _told(self) -> None:
         if self._tell is not None:

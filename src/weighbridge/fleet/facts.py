@@ -13,6 +13,7 @@ from weighbridge.estimators import Segment, Status
 from weighbridge.fleet.schema import CHECKS
 from weighbridge.fleet.spans import Span, spans_of
 from weighbridge.fleet.travel import Travel
+from weighbridge.messages import Problem
 from weighbridge.pipeline.weighing import Weighing
 from weighbridge.results.row import WeighingRow
 from weighbridge.vehicle.model import Vehicle
@@ -41,9 +42,11 @@ def answer(row: WeighingRow) -> dict[str, Any]:
         "method": row.method,
         "status": str(row.status),
         "reason": row.reason,
+        "reason_id": row.reason_id,
         "low95_kg": _number(row.interval[0]),
         "high95_kg": _number(row.interval[1]),
         "warnings": list(row.warnings),
+        "problem_ids": [p.id for p in row.problems],
         **{column: _number(getattr(row, field)) for column, field in _NUMBERS.items()},
         "segments": [
             {
@@ -61,17 +64,18 @@ def answer(row: WeighingRow) -> dict[str, Any]:
 def weighing_row(drive: Mapping[str, Any], segments: Sequence[Mapping[str, Any]]) -> WeighingRow:
     """Return what `weigh` says from a row of a drive and its segments, in their order.
 
-    Spans without a segment of `weigh` are left out.
+    Spans without a segment of `weigh` are left out. Signals and spans of problems are not kept.
     """
+    ids = drive["problem_ids"] or [None] * len(drive["warnings"])
     return WeighingRow(
         drive=drive["drive"],
         vehicle=drive["vehicle"],
         start=drive["start"],
         method=drive["method"],
         status=Status(drive["status"]),
-        reason=drive["reason"],
+        refusal=_problem(drive["reason_id"], drive["reason"]) if drive["reason"] else None,
         interval=(_float(drive["low95_kg"]), _float(drive["high95_kg"])),
-        warnings=tuple(drive["warnings"]),
+        problems=tuple(map(_problem, ids, drive["warnings"])),
         segments=tuple(
             Segment(
                 start=s["start_s"],
@@ -85,6 +89,11 @@ def weighing_row(drive: Mapping[str, Any], segments: Sequence[Mapping[str, Any]]
         load_changed=bool(drive["load_changed"]),
         **{field: _float(drive[column]) for column, field in _NUMBERS.items()},
     )
+
+
+def _problem(id: str | None, text: str) -> Problem:
+    """Return a message; one of a store of before has no id of its own."""
+    return Problem.of("fleet.before", note=text) if id is None else Problem(id, text)
 
 
 def row_of(weighed: Weighing) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import socket
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +21,7 @@ from weighbridge.fleet.keys import content_digest, text_digest
 from weighbridge.fleet.schema import FAILED, FORMAT_VERSION, UNREAD, WEIGHED
 from weighbridge.fleet.store import part_path, write_part
 from weighbridge.fleet.vehicles import Assigned
+from weighbridge.messages import Problem
 from weighbridge.signals import Drive
 from weighbridge.version import VERSION
 
@@ -111,22 +112,23 @@ def weigh_job(job: Job) -> Receipt:
         except Exception as error:
             if isinstance(error, WeighbridgeError) and not _of_the_machine(error):
                 key = key or failed_key(job)
-                rows = [_row(job, UNREAD, str(error))]
+                rows = [_row(job, UNREAD, Problem.from_error(error))]
                 break
             key = failed_key(job)
-            rows = [_row(job, FAILED, f"failed {tries} times: {named_error(error)}")]
+            failed = Problem.of("fleet.failed", tries=tries, error=named_error(error))
+            rows = [_row(job, FAILED, failed)]
             if tries < TRIES:
                 time.sleep(_PAUSE * tries)
     return _written(job, key, rows, tries, begin)
 
 
-def fail_job(job: Job, reason: str) -> Receipt:
+def fail_job(job: Job, reason: Problem) -> Receipt:
     """Write the row of a recording that no worker could finish.
 
     Parameters
     ----------
     job
-    reason : why, one sentence
+    reason : why
     """
     begin = time.perf_counter()
     return _written(job, failed_key(job), [_row(job, FAILED, reason)], TRIES, begin)
@@ -202,8 +204,6 @@ def drives_of(
 
 def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
     """Weigh each drive of a recording, as the command ``weigh`` does."""
-    from dataclasses import replace
-
     from weighbridge.fleet.facts import row_of
     from weighbridge.pipeline.weighing import weigh
 
@@ -219,11 +219,15 @@ def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
         try:
             vehicle = job.assigned.as_vehicle(drive)
             weighed = weigh(drive, vehicle, job.method, settings=job.settings or None)
-            row = _row(job, WEIGHED, "") | row_of(weighed)
+            row = _row(job, WEIGHED) | row_of(weighed)
         except WeighbridgeError as error:
-            row = _row(job, UNREAD, str(error)) | {"drive": drive.name, **_begin(drive.began)}
-        if job.assigned.note:
-            row["warnings"] = [job.assigned.note, *row["warnings"]]
+            row = _row(job, UNREAD, Problem.from_error(error)) | {
+                "drive": drive.name,
+                **_begin(drive.began),
+            }
+        if (note := job.assigned.note) is not None:
+            row["warnings"] = [note.text, *row["warnings"]]
+            row["problem_ids"] = [note.id, *row["problem_ids"]]
         rows.append(row)
     return rows
 
@@ -234,7 +238,7 @@ def _begin(began: str | None) -> dict[str, Any]:
     return {"start": began, "date": datetime.fromisoformat(began).astimezone(UTC).date()}
 
 
-def _row(job: Job, outcome: str, reason: str) -> dict[str, Any]:
+def _row(job: Job, outcome: str, reason: Problem | None = None) -> dict[str, Any]:
     """Return the row of a drive that has no answer (yet)."""
     from weighbridge.fleet.facts import answer, of_vehicle
     from weighbridge.results.row import unread_row
@@ -245,7 +249,9 @@ def _row(job: Job, outcome: str, reason: str) -> dict[str, Any]:
     name = path.name if len(job.recording.paths) == 1 else path.stem
     vehicle = assigned.vehicle
     called = vehicle.name if vehicle is not None else assigned.id or assigned.kind
-    row = answer(unread_row(visible(name), called, job.method, visible(reason)))
+    if reason is not None:
+        reason = replace(reason, text=visible(reason.text))
+    row = answer(unread_row(visible(name), called, job.method, reason))
     return {
         **row,
         **_begin(job.recording.start),

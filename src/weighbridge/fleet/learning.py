@@ -19,6 +19,7 @@ from weighbridge.fleet.job import TRIES, drives_of, local_paths, named_error
 from weighbridge.fleet.learnt import COLUMNS, LEARNT, SURE
 from weighbridge.fleet.tickets import read_tickets, ticketed
 from weighbridge.fleet.vehicles import Assigned, Vehicles
+from weighbridge.messages import Problem
 from weighbridge.pipeline.given import mapping_beside
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Vehicle
@@ -344,7 +345,8 @@ def with_drift(refined: Vehicle, change: Drift, times: Sequence[datetime]) -> Ve
     made = refined.provenance
     left = math.hypot(made.mass_scale_std or 0.0, std)
     wider = replace(refined, provenance=replace(made, mass_scale_std=left))
-    return noted(wider, f"{_drift_text(DRIFTS[0], change)}: learn anew as new tickets come")
+    drifts = _drift_text(DRIFTS[0], change)
+    return noted(wider, Problem.of("calibration.drifts", drifts=drifts))
 
 
 def drift(times: Sequence[datetime], values: Floats) -> Drift:

@@ -11,8 +11,11 @@ from typing import Final, NamedTuple
 
 import polars as pl
 
-FORMAT_VERSION: Final = 2
+FORMAT_VERSION: Final = 3
 """Version of the tables; part of every key, so that another one weighs anew."""
+
+READABLE: Final = (2, FORMAT_VERSION)
+"""Versions that can be read: the tables of 2 lack ids of messages."""
 
 UNKNOWN_DATE: Final = "__HIVE_DEFAULT_PARTITION__"
 """Partition of drives without a date, as Hive names it: readers take it for null."""
@@ -57,6 +60,7 @@ DRIVES: Final[dict[str, Column]] = {
     "method": Column(_TEXT, "estimator"),
     "status": Column(_TEXT, "converged, not_excited, inconsistent or missing_signals"),
     "reason": Column(_TEXT, "why there is no mass; empty where there is"),
+    "reason_id": Column(_TEXT, "id of that message; null where there is a mass"),
     "mass_kg": Column(_NUMBER, "mass"),
     "std_kg": Column(_NUMBER, "its standard deviation"),
     "low95_kg": Column(_NUMBER, "lower end of the 95 % interval"),
@@ -66,7 +70,10 @@ DRIVES: Final[dict[str, Column]] = {
     "used_s": Column(_NUMBER, "time of the rows that the mass is made of"),
     "converged_at_s": Column(_NUMBER, "from the start until the mass stays at the result"),
     "bound_std_kg": Column(_NUMBER, "Cramér-Rao bound of the drive"),
-    "warnings": Column(pl.List(pl.String()), "what was mended or doubted, one sentence each"),
+    "warnings": Column(
+        pl.List(pl.String()), "what was corrected or is uncertain, one sentence each"
+    ),
+    "problem_ids": Column(pl.List(pl.String()), "ids of these messages, in their order"),
     "load_changed": Column(pl.Boolean(), "segments are loads told apart"),
     "unweighed_s": Column(_NUMBER, "time of its segments without a usable force"),
     "freedom": Column(_NUMBER, "degrees of freedom of the mass (Student's t); infinite is normal"),

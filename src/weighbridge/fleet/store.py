@@ -31,6 +31,7 @@ from weighbridge.fleet.schema import (
     FAILED,
     FORMAT_VERSION,
     PART,
+    READABLE,
     UNKNOWN_DATE,
     drives_of,
     segments_of,
@@ -104,7 +105,7 @@ def read_parts(paths: Sequence[Path]) -> pl.DataFrame:
             continue
         with _whole(path):
             frames.append(pl.read_ipc(io.BytesIO(data)))
-    return pl.concat(frames) if frames else pl.DataFrame(schema=PART)
+    return pl.concat([pl.DataFrame(schema=PART), *frames], how="diagonal")
 
 
 class Results:
@@ -113,10 +114,12 @@ class Results:
     Parameters
     ----------
     folder : as of `opened` or `begun`
+    version : of its tables
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, version: int = FORMAT_VERSION) -> None:
         self.folder = folder
+        self.version = version
 
     @classmethod
     def opened(cls, folder: Path) -> Results:
@@ -135,12 +138,9 @@ class Results:
             version = json.loads((folder / MARK).read_text(encoding="utf-8")).get("format_version")
         except (OSError, ValueError, AttributeError) as error:
             raise ConfigError(f"{folder / MARK} cannot be read: {error}") from None
-        if version != FORMAT_VERSION:
-            raise ConfigError(
-                f"{folder}: results of format {version}, and this program writes {FORMAT_VERSION}; "
-                "name another folder"
-            )
-        return cls(folder)
+        if version not in READABLE:
+            raise _of_version(folder, version)
+        return cls(folder, version)
 
     @classmethod
     def begun(cls, folder: Path) -> Results:
@@ -152,7 +152,10 @@ class Results:
             The folder holds something else, or cannot be written to.
         """
         if is_results(folder):
-            return cls.opened(folder)
+            found = cls.opened(folder)
+            if found.version != FORMAT_VERSION:
+                raise _of_version(folder, found.version)
+            return found
         try:
             folder.mkdir(parents=True, exist_ok=True)
             there = [f.name for f in folder.iterdir() if not f.name.endswith(UNFINISHED)]
@@ -288,6 +291,13 @@ class Results:
         except (OSError, ValueError):
             return {}
         return found if isinstance(found, dict) else {}
+
+
+def _of_version(folder: Path, version: object) -> ConfigError:
+    return ConfigError(
+        f"{folder}: results of format {version}, and this program writes {FORMAT_VERSION}; "
+        "name another folder"
+    )
 
 
 def check_end(path: Path) -> None:

@@ -12,6 +12,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.fleet.keys import file_digest, text_digest
 from weighbridge.io.dbc import dbc_path, with_path
 from weighbridge.io.mapping import load_mapping, named_dbcs
+from weighbridge.messages import Problem, phrase
 from weighbridge.pipeline.given import mapping_of
 from weighbridge.signals import Drive
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
@@ -60,15 +61,14 @@ class Assigned:
         return describe(known).vehicle
 
     @property
-    def note(self) -> str:
-        """Say that no file was found; empty where one was."""
+    def note(self) -> Problem | None:
+        """Say that no file was found; None where one was."""
         if self.vehicle is not None:
-            return ""
-        whose = f"vehicle {self.id}" if self.id is not None else "this drive"
-        return (
-            f"there is no vehicle file for {whose}: the data sheet of a {self.kind} stands in, and "
-            "the mass is rough"
+            return None
+        whose = (
+            phrase("vehicle_called", id=self.id) if self.id is not None else phrase("this_drive")
         )
+        return Problem.of("vehicle.no_file", whose=whose, kind=self.kind)
 
 
 class _MappingFile(NamedTuple):

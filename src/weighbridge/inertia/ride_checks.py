@@ -98,23 +98,24 @@ def check_signals(drive: Drive) -> Iterator[Problem]:
         s, q = drive.signals[name], QUANTITIES[name]
         outside = int(np.count_nonzero((s.values < q.low) | (s.values > q.high)))
         if outside > 0.01 * len(s):
-            yield Problem(
+            yield Problem.of(
+                "ride.unit",
                 name,
-                f"{outside} of {len(s)} values of {name} are outside {q.low:g} to {q.high:g} "
-                f"{q.suffix}, such as {float(s.values[np.argmax(np.abs(s.values))]):.4g}; check "
-                "the unit at the end of the column's name",
                 serious=True,
+                count=outside,
+                samples=len(s),
+                low=q.low,
+                high=q.high,
+                unit=q.suffix,
+                value=float(s.values[np.argmax(np.abs(s.values))]),
             )
     kinds = {
         "suspension travel": TRAVELS, "suspension rate": RATES, "velocity of the body": VELOCITIES
     }  # fmt: skip
     dead = [kind for kind, names in kinds.items() if _still(drive, names)]
     for kind in dead if len(dead) < len(kinds) else ():
-        yield Problem(
-            kinds[kind][0],
-            f"every {kind} repeats one value all through the ride while others move: "
-            f"{', '.join(kinds[kind])}; nothing was measured there: mend the sensors or the logger",
-            serious=True,
+        yield Problem.of(
+            "ride.all_frozen", kinds[kind][0], serious=True, kind=kind, names=", ".join(kinds[kind])
         )
     for names in kinds.values():
         frozen = {name: _longest_still(drive, name) for name in names}
@@ -124,12 +125,7 @@ def check_signals(drive: Drive) -> Iterator[Problem]:
         for name, length in frozen.items():
             share = length / max(drive.signals[name].duration, 1e-9)
             if length > FROZEN:
-                yield Problem(
-                    name,
-                    f"{name} repeats one value for {length:.1f} s while others move; its sensor "
-                    "or suspension is stuck: mend it, or cut that part off",
-                    serious=share > 0.2,
-                )
+                yield Problem.of("ride.frozen", name, serious=share > 0.2, length=length)
 
 
 def nothing_moves(drive: Drive) -> bool:
@@ -158,50 +154,22 @@ def check_response(found: Response) -> Iterator[Problem]:
         travel, rate = TRAVELS[k], RATES[k]
         best = int(np.argmax(np.nan_to_num(row)))
         if best != k and row[best] > 0.9 and row[k] < 0.8:
-            yield Problem(
-                travel,
-                f"{travel} goes with {RATES[best]}, not with {rate}: columns are swapped; name "
-                "them by their wheels",
-                serious=True,
-            )
+            yield Problem.of("ride.swapped", travel, serious=True, other=RATES[best], rate=rate)
         elif slope < 0.0 and row[k] < -0.5:
-            yield Problem(
-                rate,
-                f"{rate} falls where {travel} rises: both are positive in extension; turn a sign "
-                "(factor = -1 in the mapping)",
-                serious=True,
-            )
+            yield Problem.of("ride.rate_sign", rate, serious=True, travel=travel)
         elif row[k] > 0.5 and not 0.5 < slope < 2.0:
-            yield Problem(
-                rate,
-                f"{travel} changes {slope:.3g} times as fast as {rate} says; check their units",
-                serious=True,
-            )
+            yield Problem.of("ride.rate_scale", rate, serious=True, travel=travel, slope=slope)
         elif row[k] > 0.5 and not (slope <= 1.1 and slope / row[k] ** 2 >= 0.9):
             # Noise of the rate alone lowers the slope, by the square of the correlation.
-            yield Problem(
-                rate,
-                f"{travel} of wheel {wheel} changes {slope:.2f} times as fast as {rate} says: one "
-                "of the two is scaled wrongly",
-            )
+            yield Problem.of("ride.rate_wheel", rate, travel=travel, wheel=wheel, slope=slope)
     turned = _turned(found)
     if turned.all():
-        yield Problem(
-            TRAVELS[0],
-            "the body accelerates against its springs on every axis: suspension travel and rate "
-            "are positive in extension; turn their signs (factor = -1 in the mapping)",
-            serious=True,
-        )
+        yield Problem.of("ride.springs_sign", TRAVELS[0], serious=True)
         return
     says = ("upwards", "with the right side down", "with the nose up")
     for name, wrong, positive in zip(VELOCITIES, turned, says, strict=True):
         if wrong:
-            yield Problem(
-                name,
-                f"{name} runs against the forces of the suspension: it is positive {positive}; "
-                "turn its sign (factor = -1 in the mapping)",
-                serious=True,
-            )
+            yield Problem.of("ride.force_sign", name, serious=True, positive=positive)
     yield from _units(found)
 
 
@@ -211,12 +179,13 @@ def _units(found: Response) -> Iterator[Problem]:
     with np.errstate(invalid="ignore"):
         far = sure & ((found.slope > UNIT) | (found.slope < 1.0 / UNIT))
     if far.all():
-        yield Problem(
+        yield Problem.of(
+            "ride.springs_scale",
             TRAVELS[0],
-            f"the body moves {found.slope[0]:.3g}, {found.slope[1]:.3g} and {found.slope[2]:.3g} "
-            "times (heave, roll, pitch) as the vehicle file's springs and dampers would move it; "
-            "check the units of suspension travel and rate, and those of the [ride] section",
             serious=True,
+            heave=found.slope[0],
+            roll=found.slope[1],
+            pitch=found.slope[2],
         )
         return
     for k, name in enumerate(VELOCITIES):
@@ -228,11 +197,8 @@ def _units(found: Response) -> Iterator[Problem]:
             likely = "it seems to be in degrees per second; "
         elif unit == "radps":
             likely = "it seems to be in radians per second, and read as degrees; "
-        yield Problem(
-            name,
-            f"{name} changes {slope:.3g} times as fast as the suspension's forces make it: "
-            f"{likely}check the unit at the end of the column's name (read as {unit})",
-            serious=True,
+        yield Problem.of(
+            "ride.force_scale", name, serious=True, slope=slope, likely=likely, unit=unit
         )
 
 

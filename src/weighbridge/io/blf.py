@@ -70,10 +70,8 @@ def read_blf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     left = _decode(bytes(batch), parts)
     if damaged or left.strip(b"\0")[:4] == b"LOBJ":
         log.problems.append(
-            Problem(
-                "",
-                f"{path.name} is damaged or was cut off; "
-                f"{counted(sum(map(len, parts)), 'frame')} could be read",
+            Problem.of(
+                "file.damaged", file=path.name, frames=counted(sum(map(len, parts)), "frame")
             )
         )
     if not parts:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge.errors import ConfigError
 from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffix
 from weighbridge.io.dbc import Database, Found, find_signal, is_readable, message_frames, physical
 from weighbridge.io.frames import Frames
 from weighbridge.io.j1939 import decode_j1939, is_j1939
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.obd import decode_obd
+from weighbridge.messages import phrase
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.tomlfile import Faults
@@ -77,7 +78,7 @@ def decode(
     if databases:
         used |= _databases(frames, name, mapping, databases, done)
     elif mapping is not None:
-        hint = "; without a DBC nothing in frames has a name: give it with --dbc"
+        hint = phrase("without_dbc")
         done.lacking += [
             lacking(f"{name}: in its frames", s, mapping.source, hint)
             for s in mapping.signals
@@ -103,7 +104,7 @@ def decode(
     if not used.all():
         done.contents.append(f"not known: {_counts(frames, ~used)}")
     if not done.signals:
-        raise DriveError(_nothing(frames, name, mapping, databases, done, obd.contents))
+        raise _nothing(frames, name, mapping, databases, done, obd.contents).error()
     return done
 
 
@@ -129,11 +130,7 @@ def _add(
         if other is not None:
             few, many = sorted((len(s), len(other)))
             done.problems.append(
-                Problem(
-                    s.name,
-                    f"{name}: {s.name} is there by {kind} and otherwise; the {few} values of one "
-                    f"were left out for the {many} of the other",
-                )
+                Problem.of("bus.twice", s.name, file=name, kind=kind, few=few, many=many)
             )
 
 
@@ -143,7 +140,9 @@ def _counts(frames: Frames, which: Bools | None = None) -> str:
     total = sum(n for _, n in counts)
     shown = ", ".join(f"CAN {c} {i:X} ({n})" for (c, i, _), n in counts[:_NAMED])
     more = (
-        f" and {counted(len(counts) - _NAMED, 'more identifier')}" if len(counts) > _NAMED else ""
+        phrase("more_identifiers", more=counted(len(counts) - _NAMED, "more identifier"))
+        if len(counts) > _NAMED
+        else ""
     )
     return f"{counted(total, 'frame')}: {shown}{more}"
 
@@ -155,31 +154,19 @@ def _nothing(
     databases: Sequence[Database],
     done: Decoded,
     diagnosis: Sequence[str],
-) -> str:
+) -> Problem:
     """Say why the traffic gave no signal; ``diagnosis`` is what OBD-II told nevertheless."""
-    names = " and ".join(d.path.name for d in databases)
     if not len(frames):
-        return f"{name} holds no CAN frames; record it again"
-    seen = f"{name} holds {_counts(frames)}"
+        return Problem.of("bus.no_frames", file=name)
+    about: dict[str, Any] = {"file": name, "frames": _counts(frames)}
     if not databases:
         if diagnosis:
-            return f"{seen}; {diagnosis[0]}: let the logger ask for current data (service 01)"
-        if mapping is not None:
-            return (
-                f"{seen}; they are neither OBD-II answers nor J1939, and the mapping names "
-                "signals of a DBC: give it with --dbc"
-            )
-        return (
-            f"{seen}; they are neither OBD-II answers nor J1939: "
-            "give the vehicle's DBC with --dbc and name its signals in a mapping, which "
-            "weighbridge map LOG --dbc FILE -o map.toml drafts"
-        )
+            return Problem.of("bus.diagnosis_only", **about, diagnosis=diagnosis[0])
+        return Problem.of("bus.unknown" if mapping is None else "bus.needs_dbc", **about)
     if mapping is not None and (why := [*done.problems, *done.lacking]):
-        return f"{seen}; {why[0].text}"
-    return (
-        f"{seen}; {names} gives no signal for them: name its signals in a mapping, or name "
-        "the DBC that goes with the log"
-    )
+        return Problem.of("bus.nothing_mapped", **about, why=why[0].text)
+    names = " and ".join(d.path.name for d in databases)
+    return Problem.of("bus.no_signal", **about, databases=names)
 
 
 def _databases(
@@ -193,7 +180,7 @@ def _databases(
     used = np.zeros(len(frames), dtype=bool)
     carried = [message_frames(frames, d) for d in databases]
     done.problems += [
-        Problem("", f"{name}: {_absent(frames, d)}")
+        Problem.of("bus.absent", file=name, why=_absent(frames, d))
         for d, found in zip(databases, carried, strict=True)
         if not found
     ]
@@ -213,10 +200,13 @@ def _databases(
             short := found_signal.frames.size - at.size
         ) and found_signal.signal.multiplexer_ids is None:
             done.problems.append(
-                Problem(
+                Problem.of(
+                    "bus.short_frames",
                     quantity,
-                    f"{name}: {short} of {found_signal.frames.size} frames of "
-                    f"{found_signal.message.name} are shorter than its DBC says and were left out",
+                    file=name,
+                    count=short,
+                    frames=found_signal.frames.size,
+                    message=found_signal.message.name,
                 )
             )
         if mapped is not None:
@@ -226,7 +216,7 @@ def _databases(
         taken.setdefault(found_signal.message.name, []).append(quantity)
         if at.size == 0:
             done.problems.append(
-                Problem(quantity, f"{name}: {found_signal.signal.name} has no value in any frame")
+                Problem.of("bus.no_value", quantity, file=name, name=found_signal.signal.name)
             )
             continue
         values = to_si(values, suffix) if suffix else values
@@ -249,11 +239,8 @@ def _databases(
                 used[found[m]] = True
     if mapping is None and any(carried) and not wanted:
         done.problems.append(
-            Problem(
-                "",
-                f"{name}: no signal of {' and '.join(d.path.name for d in databases)} has a "
-                "canonical name; name those wanted in a mapping, such as "
-                '[signals.vehicle_speed] column = "Speed"',
+            Problem.of(
+                "bus.no_names", file=name, databases=" and ".join(d.path.name for d in databases)
             )
         )
     return used
@@ -262,15 +249,15 @@ def _databases(
 def _absent(frames: Frames, database: Database) -> str:
     """Say that no frame is a message of a database; name the buses that carry them."""
     known = counted(len(database.messages), "message")
-    none = f"none of the {known} of {database.path.name} is in the log"
+    none = phrase("none_in_log", messages=known, database=database.path.name)
     if database.channel is None:
-        return f"{none}; it may be the DBC of another vehicle"
+        return phrase("of_another_vehicle", none=none)
     anywhere = message_frames(frames, replace(database, channel=None))
     buses = {int(c) for at in anywhere.values() for c in np.unique(frames.channel[at])}
     if not buses:
-        return f"{none}; it may be the DBC of another vehicle"
+        return phrase("of_another_vehicle", none=none)
     remedy = " or ".join(f"{b}:{database.path.name}" for b in sorted(buses))
-    return f"{none} on bus {database.channel}; they are on another: give it as {remedy}"
+    return phrase("on_other_bus", none=none, bus=database.channel, remedy=remedy)
 
 
 def _why_absent(frames: Frames, signal: MappedSignal, databases: Sequence[Database]) -> str:
@@ -280,12 +267,12 @@ def _why_absent(frames: Frames, signal: MappedSignal, databases: Sequence[Databa
         known = find_signal(signal.column, [d], [everything])
         if known:
             why = (
-                f"message {known[0].message.name} of {d.path.name} is not in the log"
+                phrase("message_not_in_log", message=known[0].message.name, database=d.path.name)
                 if message_frames(frames, d)
                 else _absent(frames, d)
             )
             return f" ({why})"
-    return "; check the name in the DBC"
+    return phrase("check_dbc_name")
 
 
 Wanted = dict[str, tuple[Found, str, MappedSignal | None]]
@@ -349,12 +336,15 @@ def _one_bus(frames: Frames, name: str, found: Found, done: Decoded) -> Found:
     if buses.size < 2:
         return found
     best = int(buses[np.argmax(counts)])
-    text = (
-        f"{name}: {found.message.name} is on buses {', '.join(map(str, buses.tolist()))}; "
-        f"that of bus {best} was taken; give the DBC as {best}:FILE to settle it"
+    several = Problem.of(
+        "bus.several_buses",
+        file=name,
+        message=found.message.name,
+        buses=", ".join(map(str, buses.tolist())),
+        bus=best,
     )
-    if all(p.text != text for p in done.problems):
-        done.problems.append(Problem("", text))
+    if several not in done.problems:
+        done.problems.append(several)
     return Found(found.message, found.signal, found.frames[frames.channel[found.frames] == best])
 
 
@@ -372,10 +362,13 @@ def _one_sender(
         return values, at
     best = senders[np.argmax(counts)]
     done.problems.append(
-        Problem(
-            "",
-            f"{name}: {senders.size} senders give {found.signal.name}; that of {best:X} "
-            f"({counts.max()} values) was taken",
+        Problem.of(
+            "bus.several_senders",
+            file=name,
+            senders=senders.size,
+            name=found.signal.name,
+            sender=best,
+            values=counts.max(),
         )
     )
     mine = frames.id[at] == best
@@ -404,10 +397,14 @@ def valid_values(
     good = np.isin(at, where[raw != 0.0])
     lost = int(at.size - np.count_nonzero(good))
     if lost:
-        text = (
-            f"{name}: {lost} of {at.size} frames of {found.message.name} are marked invalid by "
-            f"{mapped.valid} and were left out"
+        left_out = Problem.of(
+            "bus.invalid",
+            file=name,
+            count=lost,
+            frames=at.size,
+            message=found.message.name,
+            valid=mapped.valid,
         )
-        if all(p.text != text for p in done.problems):
-            done.problems.append(Problem("", text))
+        if left_out not in done.problems:
+            done.problems.append(left_out)
     return values[good], at[good]

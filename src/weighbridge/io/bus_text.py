@@ -170,9 +170,8 @@ def _log(path: Path, frames: Frames, strange: int, lines: int) -> Log:
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH), frames=frames)
     if strange:
         log.problems.append(
-            Problem(
-                "",
-                f"{path.name}: left out {strange} of {counted(lines, 'line')}, which hold no frame",
+            Problem.of(
+                "file.lines_left_out", file=path.name, count=strange, lines=counted(lines, "line")
             )
         )
     return log

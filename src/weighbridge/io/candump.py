@@ -48,9 +48,8 @@ def read_candump(path: Path, table: str | None, mapping: TableMapping | None) ->
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
     if strange:
         log.problems.append(
-            Problem(
-                "",
-                f"{path.name}: left out {strange} of {counted(lines, 'line')}, which hold no frame",
+            Problem.of(
+                "file.lines_left_out", file=path.name, count=strange, lines=counted(lines, "line")
             )
         )
     return log

@@ -138,10 +138,11 @@ def _log(path: Path, parts: list[Frames], strange: int) -> Log:
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
     if strange:
         log.problems.append(
-            Problem(
-                "",
-                f"{path.name}: left out {strange} of "
-                f"{counted(strange + len(frames), 'line')} with frames, damaged",
+            Problem.of(
+                "file.frames_damaged",
+                file=path.name,
+                count=strange,
+                lines=counted(strange + len(frames), "line"),
             )
         )
     return log
@@ -238,10 +239,11 @@ def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) ->
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
     if strange:
         log.problems.append(
-            Problem(
-                "",
-                f"{path.name}: left out {strange} of {counted(len(rows), 'line')}, which hold no "
-                "frame",
+            Problem.of(
+                "file.lines_left_out",
+                file=path.name,
+                count=strange,
+                lines=counted(len(rows), "line"),
             )
         )
     return log

@@ -85,7 +85,7 @@ class Recording:
     time : what a mapping has to call the time; empty where the format has a clock of its own
     time_unit : suffix of that time's unit, where the log does not state it
     time_format : how that time is written, as a mapping tells it; empty for numbers
-    notes : what was left out or is not sure, one sentence each
+    notes : what was left out or is not sure; a reader of another package may give sentences
     frames : raw bus traffic beside the channels
     """
 
@@ -96,7 +96,7 @@ class Recording:
     time: str = ""
     time_unit: str = ""
     time_format: str = ""
-    notes: list[str] = field(default_factory=list)
+    notes: list[Problem | str] = field(default_factory=list)
     frames: Frames | None = None
 
 
@@ -104,6 +104,10 @@ Opener = Callable[[Path, TimeColumn], Recording]
 """Reads a file, given what a mapping says of its time."""
 
 _Wanted = dict[str, tuple[Channel, str, MappedSignal | None]]
+
+
+def _noted(note: Problem | str) -> Problem:
+    return note if isinstance(note, Problem) else Problem.of("plugin.note", note=note)
 
 
 def check_unpacked(path: Path, size: int) -> None:
@@ -170,7 +174,7 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
         of_day=found.of_day,
         frames=found.frames,
     )
-    log.problems += [Problem("", f"{path.name}: {note}") for note in found.notes]
+    log.problems += [_noted(note).at(path.name) for note in found.notes]
     wanted = _mapped(log, found, mapping) if mapping is not None and mapping.signals else {}
     # What a mapping names and is no channel may be a signal of the frames.
     named = {s.name for s in mapping.signals} if mapping and found.frames is not None else set()
@@ -193,7 +197,7 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
     for time, columns in clocks.values():
         if time.size == 0:
             names = ", ".join(n for n, _ in columns)
-            log.problems.append(Problem("", f"{path.name}: {names} has no samples"))
+            log.problems.append(Problem.of("file.no_samples", file=path.name, names=names))
             continue
         signals, problems = clean_columns(time + offset if offset else time, columns, path.name)
         log.signals += signals
@@ -250,7 +254,7 @@ def _known(log: Log, found: Recording, table: str | None, taken: set[str]) -> _W
             unknown.append(channel.name)
     if wanted and unknown:
         log.problems.append(
-            Problem("", f"{log.path.name}: not known and ignored: {column_list(unknown, 6)}")
+            Problem.of("file.unknown", file=log.path.name, columns=column_list(unknown, 6))
         )
     return wanted
 
@@ -301,7 +305,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
     # Channels that stand for a name alone have no instants of their own.
     told = [c for c in channels if c.quantity or np.isfinite(c.values).any()] or channels
     ends = [(float(np.nanmin(c.time)), float(np.nanmax(c.time))) for c in told]
-    doubts = [*found.notes]
+    doubts = [_noted(note).text for note in found.notes]
     doubts += [
         f"{n!r} is there {k} times; the longest is taken" for n, k in counted.items() if k > 1
     ]

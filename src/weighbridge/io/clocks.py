@@ -12,6 +12,7 @@ import numpy as np
 from weighbridge.constants import EARTH_RADIUS
 from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
+from weighbridge.messages import phrase, refused
 from weighbridge.signals import Bools, Floats, Problem, Signal
 from weighbridge.signals.alignment import Alignment, align
 
@@ -33,8 +34,6 @@ _LATENESS: Final = 0.3
 # Zones are whole or half hours from UTC [s]; so much of the shorter recording lies in the other.
 _ZONE: Final = 1800.0
 _SHARED: Final = 0.7
-
-_REMEDY: Final = "give offset_s under [time] of the file's table in a mapping"
 
 
 def settle_clocks(logs: Sequence[Log]) -> list[Problem]:
@@ -69,11 +68,11 @@ def settle_clocks(logs: Sequence[Log]) -> list[Problem]:
     if dated and len(dated) < len(fixed):
         counted = [log for log in fixed if not log.absolute]
         of_day = all(log.of_day for log in counted)
-        how = "times of day without a date" if of_day else "seconds"
-        why = f"{_names(dated)} has dates and {_names(counted)} counts {how}"
+        how = phrase("without_date") if of_day else "seconds"
+        why = phrase("dates_and_counts", dated=_names(dated), counted=_names(counted), how=how)
         problems.append(_onto_day(dated, counted, why) if of_day else _move(dated, counted, why))
     for log in moved:
-        problems.append(_move(fixed, [log], f"{log.path.name} is to be aligned"))
+        problems.append(_move(fixed, [log], phrase("to_be_aligned", file=log.path.name)))
         fixed.append(log)
     problems += _apart(logs)
     problems += _doubts(logs)
@@ -104,12 +103,12 @@ def _apart(logs: Sequence[Log]) -> list[Problem]:
     fixed = list(groups[0])
     problems = []
     for group in groups[1:]:
-        why = f"{_names(group)} and {_names(fixed)} share no time"
+        why = phrase("share_no_time", group=_names(group), fixed=_names(fixed))
         try:
             problems.append(_move(fixed, group, why))
         except DriveError as e:
             # What each file holds can still be looked at, though not weighed.
-            problems.append(Problem("", str(e), serious=True))
+            problems.append(Problem.from_error(e))
             continue
         fixed += group
     return problems
@@ -129,12 +128,13 @@ def _doubts(logs: Sequence[Log]) -> list[Problem]:
             apart = abs(found.offset) - 5.0 * found.std
             if apart > 2.0 * _LATENESS:
                 problems.append(
-                    Problem(
-                        "",
-                        f"the clocks of {other.path.name} and {log.path.name} seem to be "
-                        f"{_told(found)} apart, by {what}; set align = true under [time] of its "
-                        "table in a mapping to move it",
+                    Problem.of(
+                        "clock.align_offered",
                         serious=apart > _LATE,
+                        first=other.path.name,
+                        second=log.path.name,
+                        apart=_told(found),
+                        what=what,
                     )
                 )
     return problems
@@ -143,19 +143,20 @@ def _doubts(logs: Sequence[Log]) -> list[Problem]:
 def _move(fixed: Sequence[Log], group: Sequence[Log], why: str) -> Problem:
     found, what = _offset(fixed, group)
     if found is None:
-        raise DriveError(
-            f"{why}, and they have no speed, yaw rate or engine speed in common to align them by; "
-            f"{_REMEDY}"
-        )
+        raise refused("clock.nothing_shared", why=why)
     if not found.found:
-        raise DriveError(f"{why}, and {what} cannot align them: {found.refusal}; {_REMEDY}")
+        raise refused("clock.not_aligned", why=why, what=what, refusal=found.refusal)
     for log in group:
         shift_clock(log, found.offset)
         log.absolute = fixed[0].absolute
-    return Problem(
-        "",
-        f"{_names(group)}: the clock was moved by {_told(found)} onto that of {_names(fixed)}, by "
-        f"{what} (correlation {abs(found.correlation):.3f} over {found.overlap:.0f} s)",
+    return Problem.of(
+        "clock.aligned",
+        group=_names(group),
+        offset=_told(found),
+        fixed=_names(fixed),
+        what=what,
+        correlation=abs(found.correlation),
+        overlap=found.overlap,
     )
 
 
@@ -177,7 +178,12 @@ def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem
         if not shared_motion.found or not any(log.placed for log in counted):
             return _move(dated, counted, why)
         zone = _ZONE * round(shared_motion.offset / _ZONE)
-        return _put(counted, zone, dated, f"{why}, which by {what} are {_told(shared_motion)} off")
+        return _put(
+            counted,
+            zone,
+            dated,
+            phrase("off_by_motion", why=why, what=what, offset=_told(shared_motion)),
+        )
     (a0, a1), (b0, b1) = _span(dated), _span(counted)
     shorter = min(a1 - a0, b1 - b0)
     first = _ZONE * math.floor((a0 - b1) / _ZONE)
@@ -185,10 +191,10 @@ def _onto_day(dated: Sequence[Log], counted: Sequence[Log], why: str) -> Problem
     shared = np.minimum(a1, b1 + offsets) - np.maximum(a0, b0 + offsets)
     fits = shared >= _SHARED * shorter
     if np.count_nonzero(fits) != 1:
-        many = "at several half hours" if fits.any() else "at no half hour"
-        raise DriveError(f"{why}, which overlap {many} of the day for certain; {_REMEDY}")
+        many = phrase("several_half_hours" if fits.any() else "no_half_hour")
+        raise refused("clock.day_ambiguous", why=why, many=many)
     offset = float(offsets[int(np.argmax(fits))])
-    return _put(counted, offset, dated, f"{why}, which overlap nowhere else")
+    return _put(counted, offset, dated, phrase("overlap_once", why=why))
 
 
 def _put(counted: Sequence[Log], offset: float, dated: Sequence[Log], why: str) -> Problem:
@@ -198,12 +204,7 @@ def _put(counted: Sequence[Log], offset: float, dated: Sequence[Log], why: str) 
         log.absolute = True
     day = dt.datetime.fromtimestamp(_span(dated)[0], dt.UTC)
     zone = math.remainder(-offset, 86_400.0) / 3600.0
-    return Problem(
-        "",
-        f"{why}: they were put on {day:%Y-%m-%d}, {zone:+.1f} h from UTC; if the clocks differ, by "
-        "tenths of a second even, set align = true or offset_s under [time] of the file's table in "
-        "a mapping",
-    )
+    return Problem.of("clock.day_found", why=why, day=day, zone=zone)
 
 
 def _offset(fixed: Sequence[Log], group: Sequence[Log]) -> tuple[Alignment | None, str]:
@@ -225,7 +226,9 @@ def _offset(fixed: Sequence[Log], group: Sequence[Log]) -> tuple[Alignment | Non
     for other, second in good[1:]:
         reach = _LATE + 4.0 * (best.std + other.std)
         if abs(other.offset - best.offset) > reach:
-            text = f"{what} says {_told(best)} and {second} {_told(other)}"
+            text = phrase(
+                "two_offsets", what=what, offset=_told(best), second=second, other=_told(other)
+            )
             return (
                 Alignment(best.offset, best.std, best.correlation, 1.0, best.overlap, text),
                 what,
@@ -241,9 +244,12 @@ def _told(found: Alignment) -> str:
     digits = 3 if found.std < 0.1 else 2
     fit = f"{max(found.std, 10.0**-digits):.{digits}f}"
     clocks = math.hypot(found.std, _LATENESS)
-    return (
-        f"{found.offset:+.{digits}f} s (± {clocks:.1f} s, of which ± {fit} s by the fit and "
-        f"± {_LATENESS:g} s for how late a sensor may be)"
+    return phrase(
+        "offset_with_std",
+        offset=f"{found.offset:+.{digits}f}",
+        clocks=clocks,
+        fit=fit,
+        late=_LATENESS,
     )
 
 

@@ -14,6 +14,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.naming import is_time, unit_of, words_of
 from weighbridge.io.phrases import TIME_WORDS
 from weighbridge.io.table import RawTable, column_list, since_1970, time_seconds
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 from weighbridge.signals.units import UNITS
 
@@ -227,17 +228,17 @@ def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime |
         unit = stated
     else:
         unit, doubt = guessed_time_unit(name, known)
-        doubts += [doubt] if doubt else []
+        doubts += [doubt.text] if doubt is not None else []
     seconds = values * UNITS[unit].factor
     return DraftTime(name, index, unit, "", seconds, doubts, guessed=bool(doubts))
 
 
-def guessed_time_unit(name: str, values: Floats) -> tuple[str, str]:
+def guessed_time_unit(name: str, values: Floats) -> tuple[str, Problem | None]:
     """Unit of a time in numbers, by its size and its steps, and a doubt."""
     usual = float(np.median(np.abs(values)))
     for least, unit in _EPOCHS:
         if usual >= least:
-            return unit, ""
+            return unit, None
     step = np.diff(values)
     step = step[step > 0.0]
     usual_step = float(np.median(step)) if step.size else 1.0
@@ -246,10 +247,10 @@ def guessed_time_unit(name: str, values: Floats) -> tuple[str, str]:
         for unit in ("ms", "us", "ns"):
             low, high = _USUAL_STEP
             if low <= usual_step * UNITS[unit].factor <= high:
-                return unit, (
-                    f"time {name!r} states no unit; its steps of {usual_step:g} are taken as {unit}"
+                return unit, Problem.of(
+                    "clock.unit_by_steps", name=name, steps=usual_step, unit=unit
                 )
-    return "s", f"time {name!r} states no unit; taken as seconds, {usual_step:g} s from row to row"
+    return "s", Problem.of("clock.unit_unknown", name=name, steps=usual_step)
 
 
 def _text_time(raw: RawTable, index: int, texts: Sequence[str]) -> DraftTime | None:
@@ -261,10 +262,10 @@ def _text_time(raw: RawTable, index: int, texts: Sequence[str]) -> DraftTime | N
         seconds, _, _ = time_seconds(raw, index, 1.0, form)
     except DriveError:
         return None
-    return DraftTime(name, index, "", form, seconds, doubts)
+    return DraftTime(name, index, "", form, seconds, [doubt.text for doubt in doubts])
 
 
-def text_time_format(texts: Sequence[str]) -> tuple[str, list[str]]:
+def text_time_format(texts: Sequence[str]) -> tuple[str, list[Problem]]:
     """Find how times are written, as ``format`` of a mapping names it.
 
     Parameters
@@ -274,7 +275,7 @@ def text_time_format(texts: Sequence[str]) -> tuple[str, list[str]]:
     Returns
     -------
     format : empty where they are no times, or numbers
-    doubts : what is not sure, one sentence each
+    doubts : what is not sure
     """
     if not texts:
         return "", []
@@ -285,7 +286,7 @@ def text_time_format(texts: Sequence[str]) -> tuple[str, list[str]]:
     fits = [f for f in DATE_FORMATS if _fits(texts, f)]
     doubts = []
     if len(fits) > 1 and {f[:5] for f in fits} >= {"%d/%m", "%m/%d"}:
-        doubts.append(f"{texts[0]!r} is read with the day before the month")
+        doubts.append(Problem.of("clock.day_first", time=texts[0]))
     return (fits[0] if fits else ""), doubts
 
 

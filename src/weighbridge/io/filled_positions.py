@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES, Bools, Floats, Ints, Problem, Signal
 
 SHORTEST: Final = 0.005
@@ -61,16 +62,16 @@ def true_fixes(signals: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[P
     steps = np.diff(stamps)
     period = float(np.median(steps))
     gaps = steps[steps > GAP * period]
-    more = (
-        f"; filled gaps, the longest of {gaps.max():.0f} s, are left out as well"
-        if gaps.size
-        else ""
+    more = phrase("filled_gaps", longest=gaps.max()) if gaps.size else ""
+    text = Problem.of(
+        "position.filled",
+        "latitude",
+        positions=time.size,
+        fixes=stamps.size,
+        period=period,
+        more=more,
     )
-    text = (
-        f"the {time.size} positions lie on straight lines between {stamps.size} fixes, one every "
-        f"{period:.2g} s, as a table on one clock fills them in: only the fixes are taken{more}"
-    )
-    return found, [Problem("latitude", text)]
+    return found, [text]
 
 
 def fix_rows(time: Floats, position: Floats) -> Ints | None:

@@ -150,8 +150,8 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
     if not finite.all():
         frames = frames.select(finite)
         problems.append(
-            Problem(
-                "", f"{source}: left out {counted(int((~finite).sum()), 'frame')} without a time"
+            Problem.of(
+                "clock.frames_without", source=source, frames=counted(int((~finite).sum()), "frame")
             )
         )
         time = frames.time
@@ -167,7 +167,7 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
             if wrap is not None:
                 shift[k + 1 :] += wrap
                 at = instant(float(time[k]))
-                problems.append(Problem("", f"{source}: the clock wraps around at {at}; mended"))
+                problems.append(Problem.of("clock.wrapped", source=source, at=at))
             else:
                 cuts.append(int(k) + 1)
         time = time + shift
@@ -178,20 +178,20 @@ def settle_clock(frames: Frames, source: str) -> tuple[Frames, list[Problem]]:
             best = int(np.argmax(lengths))
             kept = slice(edges[best], edges[best + 1])
             problems.append(
-                Problem(
-                    "",
-                    f"{source}: the clock jumps {counted(len(cuts), 'time')} (first from "
-                    f"{instant(float(time[cuts[0] - 1]))} to {instant(float(time[cuts[0]]))}); "
-                    f"{time.size - int(lengths[best])} of {time.size} frames outside the longest "
-                    "part were left out; split the log there to read the others",
+                Problem.of(
+                    "clock.frames_jump",
+                    source=source,
+                    times=counted(len(cuts), "time"),
+                    before=instant(float(time[cuts[0] - 1])),
+                    after=instant(float(time[cuts[0]])),
+                    count=time.size - int(lengths[best]),
+                    frames=time.size,
                 )
             )
             frames = frames.select(kept)
             time = frames.time
     elif breaks.size:
-        problems.append(
-            Problem("", f"{source}: the time stamps are in no order; frames were sorted by them")
-        )
+        problems.append(Problem.of("clock.frames_sorted", source=source))
     if np.all(time[1:] >= time[:-1]):
         return frames, problems
     return frames.select(np.argsort(time, kind="stable")), problems

@@ -65,10 +65,10 @@ def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         raise DriveError(f"{path} has {what}; export the recording itself, not a planned route")
     log = Log(path, absolute=True)
     if salvaged:
-        log.problems.append(Problem("", f"{path.name}: {salvaged}"))
+        log.problems.append(Problem.of("file.points_break_off", file=path.name))
     if len(rows) < len(points):
         log.problems.append(
-            Problem("", f"{path.name}: {len(points) - len(rows)} track points have no time")
+            Problem.of("clock.points_without", file=path.name, count=len(points) - len(rows))
         )
     cells = np.array(rows, dtype=np.float64)
     cells[np.abs(cells[:, 1]) > 90.0, 1] = math.nan
@@ -84,7 +84,7 @@ def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     return log
 
 
-def _text(data: bytes) -> tuple[str, str]:
+def _text(data: bytes) -> tuple[str, bool]:
     """Decode, and close a file that broke off after a whole track point."""
     try:
         text = data.decode("utf-8-sig")
@@ -92,12 +92,9 @@ def _text(data: bytes) -> tuple[str, str]:
         text = data.decode("latin-1")
     text = text.replace("\x00", "")
     if "</gpx>" in text or "</trkpt>" not in text:
-        return text, ""
+        return text, False
     end = text.rindex("</trkpt>") + len("</trkpt>")
-    return (
-        text[:end] + "</trkseg></trk></gpx>",
-        "the file breaks off; the points up to there were read",
-    )
+    return text[:end] + "</trkseg></trk></gpx>", True
 
 
 def _row(point: Any) -> tuple[float, ...]:

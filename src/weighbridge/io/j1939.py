@@ -221,9 +221,11 @@ def decode_j1939(frames: Frames, name: str = "J1939") -> J1939:
     _tell_weights(reader)
     if summary.incomplete:
         reader.note(
-            "",
-            f"left out {counted(summary.incomplete, 'multi-packet message')} of the engine "
-            "configuration with parts missing",
+            Problem.of(
+                "bus.packets_lost",
+                "reference_torque",
+                messages=counted(summary.incomplete, "multi-packet message"),
+            )
         )
     return J1939(found_signals, summary)
 
@@ -242,8 +244,8 @@ class _Reader:
             buses, counts = np.unique(engine.channel, return_counts=True)
             self.bus = int(buses[np.argmax(counts)])
 
-    def note(self, signal: str, text: str, *, serious: bool = False) -> None:
-        self.summary.problems.append(Problem(signal, f"{self.name}: {text}", serious))
+    def note(self, problem: Problem) -> None:
+        self.summary.problems.append(problem.at(self.name))
 
     def senders(self, spn: Spn) -> list[tuple[int, Floats, Floats]]:
         """Address, stamps and values of each that sends valid values.
@@ -354,11 +356,7 @@ def _net_torque(reader: _Reader) -> list[Signal]:
     friction = reader.best("friction_torque")
     reader.summary.sources.pop("friction_torque", None)
     if friction is None:
-        reader.note(
-            "engine_torque_fraction",
-            "no nominal friction torque (EEC3, PGN 65247): the torque is the engine's indicated "
-            "one, friction included; log EEC3 as well, or state the friction in the vehicle file",
-        )
+        reader.note(Problem.of("torque.friction_unknown", "engine_torque_fraction"))
         return [
             Signal(name, actual.time, actual.values)
             for name in ("engine_torque_fraction", "indicated_torque_fraction")
@@ -374,9 +372,13 @@ def _net_torque(reader: _Reader) -> list[Signal]:
     near = friction.age(actual.time) <= FRICTION_AGE
     if not near.all():
         reader.note(
-            "engine_torque_fraction",
-            f"{int(np.count_nonzero(~near))} of {near.size} values of engine torque have no "
-            f"friction torque within {FRICTION_AGE:g} s and were left out",
+            Problem.of(
+                "torque.friction_apart",
+                "engine_torque_fraction",
+                count=int(np.count_nonzero(~near)),
+                values=near.size,
+                age=FRICTION_AGE,
+            )
         )
     if not near.any():
         return []
@@ -401,10 +403,9 @@ def _check_buses(reader: _Reader) -> None:
         apart = np.abs(values[other] / np.maximum(here, 1.0) - 1.0)[running]
         if float(np.median(apart)) > 0.1:
             reader.note(
-                "engine_speed",
-                f"buses {reader.bus} and {bus} hear engines that turn at different speeds: two "
-                "vehicles in one log; log one of them alone",
-                serious=True,
+                Problem.of(
+                    "bus.two_vehicles", "engine_speed", bus=reader.bus, other=bus, serious=True
+                )
             )
 
 
@@ -425,11 +426,7 @@ def _check_distance(reader: _Reader, signals: list[Signal]) -> None:
     driven = float(np.sum((middle * step)[inside & (step < 1.0)]))
     if way < 500.0 or driven <= 0.0 or abs(driven / way - 1.0) < 0.1:
         return
-    reader.note(
-        "vehicle_speed",
-        f"the speed adds up to {driven:.0f} m and the odometer (VDHR) to {way:.0f} m; "
-        "there are gaps in the log, or one of them is not what it seems",
-    )
+    reader.note(Problem.of("speed.odometer", "vehicle_speed", driven=driven, way=way))
 
 
 def _tell_weights(reader: _Reader) -> None:
@@ -438,11 +435,7 @@ def _tell_weights(reader: _Reader) -> None:
     reader.summary.sources.pop("combination_weight", None)
     if gross is not None:
         reader.summary.extras["combination_weight"] = gross
-        reader.note(
-            "",
-            f"the vehicle itself reports a gross combination weight of "
-            f"{float(np.median(gross.values)):.0f} kg (CVW)",
-        )
+        reader.note(Problem.of("mass.reported", mass=float(np.median(gross.values))))
     part = reader.parts.get(VW)
     if part is None or not len(part):
         return
@@ -453,4 +446,4 @@ def _tell_weights(reader: _Reader) -> None:
         total = sum(
             float(np.median(weight[good & (axle == a)])) for a in np.unique(axle[good]).tolist()
         )
-        reader.note("", f"the vehicle itself reports axle weights of {total:.0f} kg in all (VW)")
+        reader.note(Problem.of("mass.axles_reported", mass=total))

@@ -14,6 +14,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.draft_text import HEAD_LINES, text_format
 from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import cells, head
+from weighbridge.messages import phrase
 from weighbridge.signals import Problem
 
 _FEWEST: Final = 2
@@ -35,12 +36,8 @@ def left_out(folder: Path, files: Sequence[Path], mapping: str) -> Iterator[Prob
     for path in files:
         if not _looks_like_a_log(path):
             continue
-        why = f"no pattern of {mapping} fits it" if mapping else "its columns have names of its own"
-        yield Problem(
-            "",
-            f"{path.name} was not read, for {why}; if it is of this drive, describe all files "
-            f"together: weighbridge map {shlex.quote(str(folder))} -o map.toml",
-        )
+        why = phrase("no_pattern_fits", mapping=mapping) if mapping else phrase("names_of_its_own")
+        yield Problem.of("file.not_read", file=path.name, why=why, folder=shlex.quote(str(folder)))
 
 
 def _looks_like_a_log(path: Path) -> bool:

@@ -30,6 +30,7 @@ from weighbridge.io.table import (
     time_seconds,
     unwrapped,
 )
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 from weighbridge.signals.units import UNITS, from_si, to_si
 
@@ -116,7 +117,7 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
     numeric = [valued, *(k for k in map(partial(_place, names), _PLACES.values()) if k is not None)]
     thousands = _have_thousands([raw.column(k) for k in numeric])
     if thousands:
-        found.notes.append("commas in its numbers part thousands")
+        found.notes.append(Problem.of("file.thousands"))
     table = pl.DataFrame(
         {
             "time": seconds,
@@ -131,7 +132,7 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
     if known.height == 0:
         raise DriveError(f"{path} has no row with a time, a name and a number; record it again")
     if (lost := table.height - known.height) > 0:
-        found.notes.append(f"left out {lost} of {table.height} rows without a time or a number")
+        found.notes.append(Problem.of("file.rows_left_out", count=lost, rows=table.height))
     if known["name"].n_unique() > MOST_COLUMNS:
         raise DriveError(f"{path} has {known['name'].n_unique()} names, {MOST_COLUMNS} at most")
     for (name,), rows in known.partition_by("name", as_dict=True, maintain_order=True).items():
@@ -140,7 +141,7 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
     return found
 
 
-def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[str]) -> Channel:
+def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[Problem | str]) -> Channel:
     """Values of one name, all in the unit that most of its rows state.
 
     A unit that stands in one row alone and does not convert is damage; the row is left out.
@@ -163,7 +164,7 @@ def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[str]) -> Cha
             values[here] = from_si(to_si(values[here], suffix), common)
         elif count == 1:
             kept &= ~here
-            notes.append(f"left out a row of {name!r} with the unit {other!r}")
+            notes.append(Problem.of("file.row_unit", name=name, unit=other))
         else:
             raise DriveError(
                 f"{path}: {name!r} is in {unit!r} and in {other!r}, which do not convert into one "

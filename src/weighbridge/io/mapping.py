@@ -427,11 +427,14 @@ def lacking(where: str, signal: MappedSignal, source: str, hint: str = "") -> Pr
     source : the mapping
     hint : what may be meant, from a semicolon on
     """
-    return Problem(
+    return Problem.of(
+        "file.column_missing",
         signal.name,
-        f"{where} {signal.column!r} for {signal.name} is not there{hint}; correct column under "
-        f"signals.{signal.name} of {source}, or set optional = true there",
         serious=True,
+        where=where,
+        column=signal.column,
+        hint=hint,
+        source=source,
     )
 
 

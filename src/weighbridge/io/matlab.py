@@ -19,6 +19,7 @@ from weighbridge.io.channels import Recording, check_unpacked
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line, quietly
 from weighbridge.io.trees import Leaf, Tree, recording_of, unit_beside
+from weighbridge.messages import Problem
 
 # Structures within structures.
 _DEEPEST: Final = 20
@@ -67,10 +68,7 @@ def open_mat(path: Path, time: TimeColumn) -> Recording:
         raise _damaged(path, e) from None
     found = recording_of(path, _tree(held, 0), time)
     if not found.channels:
-        found.notes.append(
-            "tables, timetables and timeseries are objects that only MATLAB reads: save their "
-            "columns as arrays"
-        )
+        found.notes.append(Problem.of("file.matlab_objects"))
     return found
 
 

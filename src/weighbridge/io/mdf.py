@@ -38,6 +38,7 @@ from weighbridge.io.mdf_check import check_links, guard, settle
 from weighbridge.io.mdf_salvage import Salvaged, salvage
 from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import column_list
+from weighbridge.messages import phrase
 from weighbridge.signals import DriveInfo, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.tomlfile import Faults
@@ -65,7 +66,7 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     with _file(path) as (file, saved):
         log = _read(file, path, table, mapping)
     if saved is not None:
-        log.problems.insert(0, Problem("", _told(log, saved)))
+        log.problems.insert(0, _told(log, saved))
     return log
 
 
@@ -84,7 +85,7 @@ def recording_of(path: Path) -> Recording:
         channels = {n: p for n, p in every.items() if not n.startswith(_BUS_PREFIXES)}
         found = Recording([], start=_start(file))
         if saved is not None:
-            found.notes.append("the file ends early; what could be read of it counts")
+            found.notes.append(Problem.of("file.cut_off"))
         found.frames = _frames(file, path) if raw_bus else None
         places = [_longest(file, places) for places in channels.values()]
         units = [_unit_text(file, place) for place in places]
@@ -139,15 +140,19 @@ def _file(path: Path) -> Iterator[tuple[Any, Salvaged | None]]:
             yield file, saved
 
 
-def _told(log: Log, saved: Salvaged) -> str:
+def _told(log: Log, saved: Salvaged) -> Problem:
     """Say what was salvaged of a file that was cut off."""
     clocks = [s.time for s in log.signals if len(s)]
     clocks += [log.frames.time] if log.frames is not None and len(log.frames) else []
     span = max((float(c[-1]) for c in clocks), default=0.0) - min(
         (float(c[0]) for c in clocks), default=0.0
     )
-    counted = f"{saved.kept} of {saved.told} records" if saved.told else "what is left"
-    return f"{log.path.name} ends early: {counted} could be read, {span:.0f} s; copy it again"
+    counted = (
+        phrase("kept_records", kept=saved.kept, records=saved.told)
+        if saved.told
+        else phrase("what_is_left")
+    )
+    return Problem.of("file.ends_short", file=log.path.name, kept=counted, length=span)
 
 
 def _open(opener: Any, path: Path, saved: Salvaged | None, folder: str) -> Any:
@@ -214,7 +219,7 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
         group = place[0]
         time, values = _samples(file, path, place)
         if values is None:
-            log.problems.append(Problem(name, f"{path.name}: {name} is no number and was ignored"))
+            log.problems.append(Problem.of("file.no_number", name, file=path.name))
             continue
         if signal is not None and (signal.factor != 1.0 or signal.offset != 0.0):
             values = values * signal.factor + signal.offset
@@ -223,7 +228,7 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
     for group, columns in clocks.items():
         if times[group].size == 0:
             names = ", ".join(n for n, _ in columns)
-            log.problems.append(Problem("", f"{path.name}: {names} has no samples"))
+            log.problems.append(Problem.of("file.no_samples", file=path.name, names=names))
             continue
         signals, problems = clean_columns(times[group], columns, path.name)
         log.signals += signals
@@ -325,11 +330,7 @@ def _mapped(
 def _note_choice(log: Log, name: str, places: list[_Place]) -> None:
     if len(places) > 1:
         log.problems.append(
-            Problem(
-                "",
-                f"{log.path.name}: channel {name!r} is there {len(places)} times; "
-                "the one with the most samples was taken",
-            )
+            Problem.of("file.channel_twice", file=log.path.name, name=name, count=len(places))
         )
 
 

@@ -28,6 +28,7 @@ from weighbridge.io.channels import Channel, Recording, check_unpacked
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line
 from weighbridge.io.table import column_list, since_1970
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
 IMU: Final = "sensor_msgs/msg/Imu"
@@ -241,7 +242,9 @@ def _recording(
                 # Definitions that cannot be parsed raise errors of many kinds.
                 except Exception:
                     topics[key] = None
-                    found.notes.append(f"topic {column_list([name])} cannot be decoded")
+                    found.notes.append(
+                        Problem.of("file.topic_undecoded", topic=column_list([name]))
+                    )
             topic = topics[key]
             if topic is None:
                 continue
@@ -263,9 +266,9 @@ def _recording(
             "copy it again"
         )
     if reason:
-        found.notes.append(f"the file breaks off ({reason}); the messages up to there were read")
+        found.notes.append(Problem.of("file.breaks_off", reason=reason))
     if damaged:
-        found.notes.append(f"{damaged} messages do not fit their definition and were left out")
+        found.notes.append(Problem.of("file.messages_damaged", count=damaged))
     _channels(held, found)
     return found
 
@@ -276,9 +279,7 @@ def _channels(topics: list[_Topic], found: Recording) -> None:
         first.setdefault("fix" if topic.kind in (FIX, FOXGLOVE_FIX) else topic.kind, topic)
     others = [t.name for t in topics if t.kind in _KNOWN and t not in first.values()]
     if others:
-        found.notes.append(
-            f"of several sensors the one with the most messages is taken, not {column_list(others)}"
-        )
+        found.notes.append(Problem.of("file.several_sensors", others=column_list(others)))
     clocks = [_clock(t, found) for t in topics]
     found.absolute = all(since_1970(c) for c in clocks)
     for topic, clock in zip(topics, clocks, strict=True):
@@ -312,8 +313,7 @@ def _clock(topic: _Topic, found: Recording) -> Floats:
         return stamps
     if np.isfinite(stamps).any():
         found.notes.append(
-            f"stamps of {column_list([topic.name])} are not all within {_NEAR:g} s of the "
-            "recorder's clock; its messages count when they were recorded"
+            Problem.of("file.stamps_apart", topic=column_list([topic.name]), near=_NEAR)
         )
     return logged
 

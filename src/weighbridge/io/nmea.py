@@ -20,6 +20,7 @@ from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.table import unwrapped
+from weighbridge.messages import phrase
 from weighbridge.signals import Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
@@ -175,14 +176,16 @@ def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
         else:
             position.add(stamp, said.place)
         if b"*" not in found.group()[-5:]:
-            lost["taken without a checksum"] += 1
+            lost[phrase("no_checksum")] += 1
     if not clocks:
         raise DriveError(_nothing(path, data, lost))
     time, log.absolute = _time(np.array(clocks), np.array(days))
     if mapping:
         time = time + mapping.time.offset
     for reason, count in lost.items():
-        log.problems.append(Problem("", f"{path.name}: {count} NMEA sentences {reason}"))
+        log.problems.append(
+            Problem.of("file.sentences", file=path.name, count=count, reason=reason)
+        )
     known = position if position.stamps else minimum
     speeds, unit = (motion, "kn") if motion.stamps else (velocity, "kmh")
     for rows, units in (

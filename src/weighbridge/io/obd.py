@@ -254,10 +254,11 @@ def decode_obd(frames: Frames, name: str = "OBD-II") -> Obd:
         _read_messages(messages, sender)
         if messages.broken:
             found.problems.append(
-                Problem(
-                    "",
-                    f"{name}: left out {counted(messages.broken, 'answer')} of {sender.name} with "
-                    "frames missing",
+                Problem.of(
+                    "bus.answers_lost",
+                    file=name,
+                    answers=counted(messages.broken, "answer"),
+                    sender=sender.name,
                 )
             )
         if sender.counts or sender.refused or sender.other:
@@ -382,38 +383,22 @@ def _tell(senders: list[_Sender], name: str, found: Obd) -> None:
         found.contents.append(f"{s.name}, OBD-II answers: {'; '.join(parts)}")
         if s.cut:
             found.problems.append(
-                Problem(
-                    "",
-                    f"{name}: {counted(s.cut, 'answer')} of {s.name} cut off or with a parameter "
-                    "of unknown length; what stood before it was read",
+                Problem.of(
+                    "bus.answers_cut", file=name, answers=counted(s.cut, "answer"), sender=s.name
                 )
             )
         if rescaled := [q for q in s.rescaled if q in s.values]:
             found.problems.append(
-                Problem(
-                    "",
-                    f"{name}: {s.name} states full scales of its own (PID 4F or 50) for "
-                    f"{', '.join(rescaled)}, which were read with the usual ones; compare with "
-                    "what an idle or full throttle should show",
-                )
+                Problem.of("bus.full_scales", file=name, sender=s.name, names=", ".join(rescaled))
             )
         if s.supported > 1:
             found.problems.append(
-                Problem(
-                    "",
-                    f"{name}: {s.name} lists its parameters in {s.supported} ways, as control "
-                    "units of two vehicles would; split the log where the vehicle changes",
-                )
+                Problem.of("bus.two_lists", file=name, sender=s.name, ways=s.supported)
             )
     vins = set().union(*(s.vins for s in senders))
     if len(vins) > 1:
         found.problems.append(
-            Problem(
-                "",
-                f"{name}: the answers name {len(vins)} vehicles; split the log where the "
-                "vehicle changes",
-                serious=True,
-            )
+            Problem.of("vehicle.several_vins", serious=True, file=name, vehicles=len(vins))
         )
 
 
@@ -444,11 +429,15 @@ def _choose(senders: list[_Sender], name: str, found: Obd, start: float) -> None
             alone = _in_silence(signal, time)
             pair = (other.name, best.name)
             if quantity in _APART and _differ(signal, time, values, _APART[quantity]):
-                text = (
-                    f"{name}: {best.name} and {other.name} say different {quantity}, as two "
-                    "vehicles would; keep the frames of one vehicle"
+                text = Problem.of(
+                    "vehicle.two_units",
+                    quantity,
+                    serious=True,
+                    file=name,
+                    first=best.name,
+                    second=other.name,
                 )
-                found.problems.append(Problem(quantity, text, serious=True))
+                found.problems.append(text)
             elif np.count_nonzero(alone) >= _FILLED:
                 when = time[alone]
                 span = (quantity, float(when[0]) - start, float(when[-1]) - start)
@@ -464,18 +453,23 @@ def _choose(senders: list[_Sender], name: str, found: Obd, start: float) -> None
     for (other_name, best_name), spans in filled.items():
         first, last = min(s[1] for s in spans), max(s[2] for s in spans)
         found.problems.append(
-            Problem(
-                "",
-                f"{name}: {best_name} does not answer all the time, and {other_name} does from "
-                f"{first:.0f} to {last:.0f} s into the log; {', '.join(s[0] for s in spans)} of "
-                "both were put together as of one vehicle: split the log there if they are two",
+            Problem.of(
+                "bus.filled_in",
+                file=name,
+                best=best_name,
+                other=other_name,
+                first=first,
+                last=last,
+                names=", ".join(s[0] for s in spans),
             )
         )
     for (other_name, best_name), quantities in left_out.items():
         found.problems.append(
-            Problem(
-                "",
-                f"{name}: what {best_name} answers as well was left out of {other_name}: "
-                f"{', '.join(quantities)}",
+            Problem.of(
+                "bus.answered_twice",
+                file=name,
+                best=best_name,
+                other=other_name,
+                names=", ".join(quantities),
             )
         )

@@ -23,6 +23,7 @@ from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.frames import EXTENDED_MASK, Frames
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.quiet import first_line
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
 _BZIP2: Final = b"BZh"
@@ -139,9 +140,9 @@ def open_openpilot(path: Path, time: TimeColumn) -> Recording:
             "the rlog"
         )
     if reason:
-        found.notes.append(f"the file breaks off ({reason}); the events up to there were read")
+        found.notes.append(Problem.of("file.breaks_off", reason=reason))
     if strange:
-        found.notes.append(f"{strange} of {count} events are not known or damaged")
+        found.notes.append(Problem.of("file.events_damaged", count=strange, events=count))
     return found
 
 

@@ -77,16 +77,18 @@ def read_parts(folder: Path, table: str) -> Log:
             with quietly():
                 frames.append(_read(path))
         except (*PARSE_ERRORS, OSError) as error:
-            told = f"{folder.name}/{path.name} is not readable ({first_line(error)})"
-            problems.append(Problem("", f"{told}; the rest of the table was read"))
+            told = Problem.of(
+                "file.part_damaged", file=folder.name, part=path.name, error=first_line(error)
+            )
+            problems.append(told)
     if not frames:
         raise DriveError(f"{folder}: no part of the table is readable; remove the folder")
     frame = in_order(frames)
     names = tuple(frame.columns)
     frame.columns = [str(k) for k in range(len(names))]
     log = read_canonical(RawTable(folder, names, frame), table)
-    text = f"{folder.name}: the recording was cut off; up to its last minute is missing"
-    log.problems += [*problems, Problem("", text)]
+    text = Problem.of("file.recording_cut", file=folder.name)
+    log.problems += [*problems, text]
     return log
 
 

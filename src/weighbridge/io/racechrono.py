@@ -65,7 +65,7 @@ def read_racechrono(path: Path, table: str | None, mapping: TableMapping | None)
     sources = [c.strip().strip('"') for c in lines[top + 2].split(",")]
     raw = read_text(path, TextFormat(separator=",", skip_rows=top, skip_after_header=2))
     log = Log(path, absolute=True)
-    log.problems += [Problem("", f"{path.name}: {note}") for note in raw.notes]
+    log.problems += [note.at(path.name) for note in raw.notes]
     time, _ = raw.numbers(0)
     columns, taken = [], set[str]()
     ignored = []
@@ -79,21 +79,25 @@ def read_racechrono(path: Path, table: str | None, mapping: TableMapping | None)
         wanted = UNITS[QUANTITIES[quantity].suffix].dimension
         if suffix is None or UNITS[suffix].dimension != wanted:
             log.problems.append(
-                Problem(
+                Problem.of(
+                    "file.unknown_unit",
                     quantity,
-                    f"{path.name}: {name} is in {units[k] if k < len(units) else ''!r}, "
-                    "which is no unit known for it, and was ignored",
+                    file=path.name,
+                    name=name,
+                    unit=units[k] if k < len(units) else "",
                 )
             )
             continue
         values, notes = raw.numbers(k)
-        log.problems += [Problem(quantity, f"{path.name}: {note}") for note in notes]
+        log.problems += [note.at(path.name, quantity) for note in notes]
         taken.add(quantity)
         columns.append((quantity, to_si(values, suffix)))
     if not columns:
         raise DriveError(f"{path} has no column that is known; it has {column_list(raw.names)}")
     if ignored:
-        log.problems.append(Problem("", f"{path.name}: ignored columns {column_list(ignored)}"))
+        log.problems.append(
+            Problem.of("file.ignored", file=path.name, columns=column_list(ignored))
+        )
     log.signals, problems = clean_columns(time, columns, path.name)
     log.problems += problems
     return log

@@ -449,18 +449,14 @@ def _decode_frames(
     except DriveError as error:
         if not known:
             raise
-        first.problems.append(Problem("", str(error)))
+        first.problems.append(replace(Problem.from_error(error), serious=False))
         return ()
     first.problems += found.problems
     first.lacking += found.lacking
     for signal in found.signals.values():
         if signal.name in known:
             first.problems.append(
-                Problem(
-                    signal.name,
-                    f"{name}: {signal.name} of the frames ({len(signal)} values) was left out: "
-                    "another table of the drive has it",
-                )
+                Problem.of("bus.of_another_table", signal.name, file=name, values=len(signal))
             )
         else:
             first.signals.append(signal)

@@ -28,6 +28,7 @@ from weighbridge.io.quiet import PARSE_ERRORS
 from weighbridge.io.read import joined_drive
 from weighbridge.io.table import RawTable, column_list
 from weighbridge.io.tabular import read_canonical, read_mapped
+from weighbridge.messages import Problem
 from weighbridge.signals import Drive, DriveInfo
 from weighbridge.signals.catalogue import TABLES, TIME_COLUMN
 
@@ -149,7 +150,7 @@ def _raw(name: str, frame: Any, *, mapped: bool) -> RawTable:
         raise ConfigError(
             f"{name}: a data frame of pandas or polars is expected, got {type_name(frame)}"
         )
-    notes: list[str] = []
+    notes: list[Problem] = []
     if not isinstance(frame, pl.DataFrame):
         dates = frame.index.dtype.kind == "M"
         if dates or frame.index.name is not None:
@@ -167,7 +168,7 @@ def _raw(name: str, frame: Any, *, mapped: bool) -> RawTable:
         if repeated:
             raise ConfigError(f"{name}: two columns are called {repeated[0]!r}; rename one")
         frame, left_out = _converted(frame)
-        notes += [f"columns of no plain numbers, left out: {column_list(left_out)}"] * bool(
+        notes += [Problem.of("file.no_plain_numbers", columns=column_list(left_out))] * bool(
             left_out
         )
     names = tuple(frame.columns)

@@ -61,10 +61,11 @@ def settle_repeats(logs: Sequence[Log]) -> list[Problem]:
             kept, other = (a, b) if _better(a, b, table) else (b, a)
             other.signals = [s for s in other.signals if s.name not in names]
             problems.append(
-                Problem(
-                    "",
-                    f"{kept.path.name} and {other.path.name} both hold {', '.join(names)} of one "
-                    f"drive, as speed or position shows; what {kept.path.name} has is taken",
+                Problem.of(
+                    "file.repeated",
+                    first=kept.path.name,
+                    second=other.path.name,
+                    names=", ".join(names),
                 )
             )
     return problems

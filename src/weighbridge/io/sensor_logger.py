@@ -53,16 +53,10 @@ def read_sensor_logger(path: Path, table: str | None, mapping: TableMapping | No
     known = _FILES.get(path.stem.lower())
     if known is None:
         if path.stem.lower() == "accelerometer":
-            log.problems.append(
-                Problem(
-                    "",
-                    f"{path.name} has gravity taken off and was ignored; record Total "
-                    "Acceleration too (on Android)",
-                )
-            )
+            log.problems.append(Problem.of("file.no_gravity", file=path.name))
         return log
     raw = read_text(path, TextFormat(separator=","))
-    log.problems += [Problem("", f"{path.name}: {note}") for note in raw.notes]
+    log.problems += [note.at(path.name) for note in raw.notes]
     time, _ = raw.numbers(0)
     columns = []
     for column, quantity, unit, positive in known:
@@ -70,7 +64,7 @@ def read_sensor_logger(path: Path, table: str | None, mapping: TableMapping | No
         if index is None:
             continue
         values, notes = raw.numbers(index)
-        log.problems += [Problem(quantity, f"{path.name}: {note}") for note in notes]
+        log.problems += [note.at(path.name, quantity) for note in notes]
         if positive:
             values = np.where(values < 0.0, np.nan, values)
         if np.isfinite(values).any():

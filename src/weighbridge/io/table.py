@@ -16,6 +16,7 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
 SEPARATORS: Final = (",", ";", "\t", "|")
@@ -89,7 +90,7 @@ class RawTable:
     separator: str = ""
     missing: frozenset[str] = frozenset(MISSING)
     decimal: str = "."
-    notes: list[str] = field(default_factory=list)
+    notes: list[Problem] = field(default_factory=list)
     plain: dict[int, tuple[Floats, int]] = field(default_factory=dict)
 
     @property
@@ -116,7 +117,7 @@ class RawTable:
         if len(self.plain) > 1:
             self.plain.pop(index, None)
 
-    def numbers(self, index: int) -> tuple[Floats, list[str]]:
+    def numbers(self, index: int) -> tuple[Floats, list[Problem]]:
         """Read a column as numbers.
 
         Returns
@@ -133,7 +134,7 @@ class RawTable:
         if index in self.plain:
             values, nans = self.plain[index]
             return values, _nan_notes(nans, values.size, name)
-        series, notes = _plain_text(self.column(index)), []
+        series, notes = _plain_text(self.column(index)), list[Problem]()
         if series.dtype == pl.String:
             text = series.str.strip_chars()
             if self.decimal == ",":
@@ -156,8 +157,14 @@ class RawTable:
                         f"(row {row}), not numbers; {remedy}"
                     )
                 notes.append(
-                    f"{bad} of {filled} cells of {name!r} are no numbers, such as {example!r} "
-                    f"in row {row}, and were left out"
+                    Problem.of(
+                        "file.cells_text",
+                        count=bad,
+                        filled=filled,
+                        name=name,
+                        example=example,
+                        row=row,
+                    )
                 )
             series = numbers
         elif series.dtype.is_temporal() or series.dtype.is_nested() or series.dtype == pl.Binary:
@@ -175,8 +182,8 @@ class RawTable:
         return np.asarray(values, dtype=np.float64), notes
 
 
-def _nan_notes(nans: int, cells: int, name: str) -> list[str]:
-    return [f"{nans} of {cells} cells of {name!r} are NaN and were left out"] if nans else []
+def _nan_notes(nans: int, cells: int, name: str) -> list[Problem]:
+    return [Problem.of("file.cells_nan", count=nans, cells=cells, name=name)] if nans else []
 
 
 def _plain_text(series: pl.Series) -> pl.Series:
@@ -221,7 +228,7 @@ def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
     return RawTable(path, names, frame, separator, missing, fmt.decimal, notes)
 
 
-def _decode(path: Path, fmt: TextFormat) -> tuple[str, list[str]]:
+def _decode(path: Path, fmt: TextFormat) -> tuple[str, list[Problem]]:
     return _decoded(path, path.read_bytes(), fmt)
 
 
@@ -252,7 +259,7 @@ def cells(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in found]
 
 
-def _decoded(path: Path, data: bytes, fmt: TextFormat) -> tuple[str, list[str]]:
+def _decoded(path: Path, data: bytes, fmt: TextFormat) -> tuple[str, list[Problem]]:
     if data[:4] in (b"PAR1", b"MDF ", b"UnFi"):
         raise DriveError(f"{path} is not a text table; give it its own suffix (.parquet, .mf4)")
     if fmt.encoding is not None:
@@ -267,7 +274,7 @@ def _decoded(path: Path, data: bytes, fmt: TextFormat) -> tuple[str, list[str]]:
         return data.decode("utf-16", errors="replace"), []
     notes = []
     if b"\x00" in data:
-        notes.append(f"{data.count(0)} zero bytes, as a broken-off recording leaves, were ignored")
+        notes.append(Problem.of("file.zero_bytes", count=data.count(0)))
         data = data.replace(b"\x00", b"")
     try:
         return data.decode("utf-8-sig"), notes
@@ -291,7 +298,7 @@ def _after_line(text: str, count: int) -> str:
 
 
 def _parse(
-    path: Path, body: str, columns: int, separator: str, decimal: str, notes: list[str]
+    path: Path, body: str, columns: int, separator: str, decimal: str, notes: list[Problem]
 ) -> pl.DataFrame:
     names = [str(i) for i in range(columns)]
     # With a header of its own, the width does not hang on the first row.
@@ -299,7 +306,7 @@ def _parse(
     # A quote that is never closed would swallow the rest of the file.
     quote = '"' if data.count(b'"') % 2 == 0 else None
     if quote is None:
-        notes.append("a quote is never closed; quotes were taken as text")
+        notes.append(Problem.of("file.open_quote"))
 
     def parse(dtype: type[pl.DataType]) -> pl.DataFrame:
         with quietly():
@@ -325,7 +332,7 @@ def _parse(
 
 def time_seconds(
     table: RawTable, index: int, unit_factor: float, time_format: str | None
-) -> tuple[Floats, bool, list[str]]:
+) -> tuple[Floats, bool, list[Problem]]:
     """Read the time column.
 
     Parameters
@@ -379,7 +386,7 @@ def time_seconds(
             f"{table.path}: time {example!r} in column {table.names[index]!r} is not in the "
             f"format {time_format!r}; set format in [time] of the mapping"
         )
-    notes = [f"{lost} time stamps could not be read and their rows were left out"] if lost else []
+    notes = [Problem.of("file.stamps_unreadable", count=lost)] if lost else []
     return seconds, absolute, notes
 
 

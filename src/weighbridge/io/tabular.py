@@ -69,7 +69,7 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
         There is no time, or no canonical column.
     """
     log = Log(raw.path)
-    log.problems += [Problem("", f"{raw.path.name}: {note}") for note in raw.notes]
+    log.problems += [note.at(raw.path.name) for note in raw.notes]
     time_index = next((i for i, n in enumerate(raw.names) if time_unit(n)), None)
     wanted: dict[str, tuple[int, str]] = {}
     unknown: list[str] = []
@@ -85,9 +85,8 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
         elif found[0].name in wanted:
             first = raw.names[wanted[found[0].name][0]]
             log.problems.append(
-                Problem(
-                    found[0].name,
-                    f"{raw.path.name}: column {name!r} says the same as {first!r} and was ignored",
+                Problem.of(
+                    "file.column_twice", found[0].name, file=raw.path.name, name=name, first=first
                 )
             )
         else:
@@ -101,14 +100,16 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
             raw.path,
         )
     if unknown:
-        log.problems.append(Problem("", f"{raw.path.name}: {_unknown_text(unknown)}"))
+        log.problems.append(
+            Problem.of("file.unknown", file=raw.path.name, columns=_unknown_text(unknown))
+        )
     unit = UNITS[time_unit(raw.names[time_index]) or "s"]
     time, log.absolute, notes = time_seconds(raw, time_index, unit.factor, None)
-    log.problems += [Problem("", f"{raw.path.name}: {note}") for note in notes]
+    log.problems += [note.at(raw.path.name) for note in notes]
     columns = []
     for name, (i, suffix) in wanted.items():
         values, notes = raw.numbers(i)
-        log.problems += [Problem(name, f"{raw.path.name}: {note}") for note in notes]
+        log.problems += [note.at(raw.path.name, name) for note in notes]
         columns.append((name, to_si(values, suffix) if suffix else values))
         del values
         raw.release(i)
@@ -132,7 +133,7 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
         A unit is missing or impossible.
     """
     log = Log(raw.path)
-    log.problems += [Problem("", f"{raw.path.name}: {note}") for note in raw.notes]
+    log.problems += [note.at(raw.path.name) for note in raw.notes]
     places = {}
     for s in mapping.signals:
         index = raw.index(s.column)
@@ -150,14 +151,14 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
     time, notes = _mapped_time(raw, mapping, log)
     if mapping.time.offset:
         time = time + mapping.time.offset
-    log.problems += [Problem("", f"{raw.path.name}: {note}") for note in notes]
+    log.problems += [note.at(raw.path.name) for note in notes]
     columns = []
     faults = Faults()
     for s in mapping.signals:
         if s.name not in places:
             continue
         values, notes = raw.numbers(places[s.name])
-        log.problems += [Problem(s.name, f"{raw.path.name}: {note}") for note in notes]
+        log.problems += [note.at(raw.path.name, s.name) for note in notes]
         if s.factor != 1.0 or s.offset != 0.0:
             values = values * s.factor + s.offset
         with faults.gathered():
@@ -168,7 +169,7 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
     return log
 
 
-def _mapped_time(raw: RawTable, mapping: TableMapping, log: Log) -> tuple[Floats, list[str]]:
+def _mapped_time(raw: RawTable, mapping: TableMapping, log: Log) -> tuple[Floats, list[Problem]]:
     """Read the time that a mapping names [s], and what was odd; tell the log of its kind.
 
     Raises
@@ -206,7 +207,7 @@ def _mapped_time(raw: RawTable, mapping: TableMapping, log: Log) -> tuple[Floats
 
 def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floats]]) -> None:
     if raw.rows == 0:
-        log.problems.append(Problem("", f"{raw.path.name} has a header and no rows"))
+        log.problems.append(Problem.of("file.no_rows", file=raw.path.name))
         return
     told = list(log.problems)
     signals, problems = clean_columns(time, columns, raw.path.name)
@@ -295,4 +296,4 @@ def _unknown_text(names: list[str]) -> str:
         near = near_column(name) or _column_named(name)
         parts.append(f"{name!r} (did you mean {near}?)" if near else f"{name!r}")
     more = f" and {len(names) - 6} more" if len(names) > 6 else ""
-    return f"not known and ignored: {', '.join(parts)}{more}"
+    return f"{', '.join(parts)}{more}"

@@ -17,7 +17,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.table import TextFormat, column_list, read_text
-from weighbridge.signals import Floats, Problem
+from weighbridge.signals import Floats
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
 
@@ -49,14 +49,14 @@ def read_track_mode(path: Path, table: str | None, mapping: TableMapping | None)
     """
     raw = read_text(path, TextFormat(separator=","))
     log = Log(path)
-    log.problems += [Problem("", f"{path.name}: {note}") for note in raw.notes]
+    log.problems += [note.at(path.name) for note in raw.notes]
     columns: list[tuple[str, Floats]] = []
     for k, name in enumerate(raw.names):
         known = _KNOWN.get(name.strip().lower())
         if known is None:
             continue
         values, notes = raw.numbers(k)
-        log.problems += [Problem(known[0], f"{path.name}: {note}") for note in notes]
+        log.problems += [note.at(path.name, known[0]) for note in notes]
         columns.append((known[0], to_si(values, known[1])))
     if not columns:
         raise DriveError(f"{path} has no column that is known; it has {column_list(raw.names)}")

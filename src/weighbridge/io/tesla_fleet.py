@@ -22,6 +22,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.table import MOST_COLUMNS
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
 _BEGIN: Final = re.compile(rb'(?:\xef\xbb\xbf)?\s*\[?\s*\{\s*"data"\s*:\s*\[\s*\{\s*"key"\s*:')
@@ -70,7 +71,7 @@ def open_fleet_telemetry(path: Path, time: TimeColumn) -> Recording:
             f"{path} holds records of {len(vehicles)} vehicles; a drive is of one: split it"
         )
     if strange:
-        found.notes.append(f"{strange} lines hold no record of vehicle data and were left out")
+        found.notes.append(Problem.of("file.records_left_out", count=strange))
     parsed = pl.Series(stamps).str.to_datetime(time_zone="UTC", time_unit="us", strict=False)
     seconds = np.array(parsed.cast(pl.Int64).cast(pl.Float64).fill_null(np.nan)) * 1e-6
     clocks: dict[bytes, Floats] = {}

@@ -20,6 +20,7 @@ from weighbridge.io.draft_time import guessed_time_unit
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.naming import is_time, unit_of
 from weighbridge.io.table import column_list, since_1970
+from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 from weighbridge.signals.units import UNITS
 
@@ -106,7 +107,7 @@ def recording_of(path: Path, tree: Tree, time: TimeColumn) -> Recording:
         found.time_unit = best.unit if found.time and best.unit else ""
         found.absolute = all(c.absolute for c in clocks)
     if clockless:
-        found.notes.append(f"no time of the same length for {column_list(clockless, 6)}")
+        found.notes.append(Problem.of("file.clockless", names=column_list(clockless, 6)))
     return found
 
 
@@ -172,7 +173,7 @@ def _clock(place: str, leaf: Leaf, time: TimeColumn, found: Recording) -> _Clock
     unit = time.unit or (stated if stated and UNITS[stated].dimension == "s" else None)
     if unit is None:
         unit, doubt = guessed_time_unit(name, known)
-        found.notes += [doubt] if doubt else []
+        found.notes += [doubt] if doubt is not None else []
     seconds = numbers * UNITS[unit].factor
     return _Clock(place, seconds, since_1970(seconds), unit)
 

@@ -87,10 +87,12 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         fixed = (sats % _BRAKE) >= _SATELLITES
         if not fixed.all():
             log.problems.append(
-                Problem(
-                    "",
-                    f"{path.name}: {int(np.count_nonzero(~fixed))} of {fixed.size} rows have "
-                    f"fewer than {_SATELLITES} satellites; their positions were left out",
+                Problem.of(
+                    "position.few_satellites",
+                    file=path.name,
+                    count=int(np.count_nonzero(~fixed)),
+                    rows=fixed.size,
+                    satellites=_SATELLITES,
                 )
             )
         # Without a wire to the brake the flag is never set, and says nothing.
@@ -110,7 +112,9 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     take("heading", "gnss_course", "deg")
     take("velocity", "gnss_speed", _speed_unit(log, sections.get("header", []), names, mapping))
     if ignored := [n for n in names if n not in used]:
-        log.problems.append(Problem("", f"{path.name}: ignored columns {column_list(ignored)}"))
+        log.problems.append(
+            Problem.of("file.ignored", file=path.name, columns=column_list(ignored))
+        )
     log.signals, problems = clean_columns(time, columns, path.name)
     log.problems += problems
     return log
@@ -164,7 +168,7 @@ def _cells(log: Log, lines: list[str], width: int) -> Floats:
         raise DriveError(f"{log.path} has no row of {width} values under [data]; record it again")
     if lost := len(lines) - len(rows):
         log.problems.append(
-            Problem("", f"{log.path.name}: {lost} of {len(lines)} rows are cut off or too long")
+            Problem.of("file.rows_cut", file=log.path.name, count=lost, rows=len(lines))
         )
     flat = pl.Series([cell for row in rows for cell in row], dtype=pl.String)
     if not flat.str.contains(".", literal=True).any():
@@ -210,12 +214,12 @@ def _speed_unit(log: Log, titles: list[str], names: list[str], mapping: TableMap
     unit = _SPEED_UNITS.get(title.removeprefix("velocity").strip(" ()[]"))
     if unit is None:
         log.problems.append(
-            Problem(
+            Problem.of(
+                "speed.unit_missing",
                 "gnss_speed",
-                f"{log.path.name}: no unit of the velocity under [header] "
-                f"({title or 'no title'!r}); it was taken as km/h: "
-                "write 'velocity kmh' there, or give gnss_speed its unit in a mapping",
                 serious=True,
+                file=log.path.name,
+                title=title or "no title",
             )
         )
         return "kmh"

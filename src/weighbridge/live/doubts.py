@@ -8,6 +8,7 @@ from typing import Final
 from weighbridge.estimators.judging import STOP
 from weighbridge.live.on_the_move import FIRST
 from weighbridge.live.records import Records
+from weighbridge.messages import Problem, phrase
 from weighbridge.report.text import duration
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.instants import instant
@@ -16,32 +17,39 @@ PROVED: Final = 120.0
 """A mass of before a silence is proved by so long on the move [s]: another load shows in less."""
 
 
-def of_before(records: Records, *, driven_since: float, goes_on: bool) -> str:
-    """Say that a mass is of before a silence, and not yet of what was driven since; empty if not.
+def of_before(
+    records: Records, *, driven_since: float, goes_on: bool, ask: bool = False
+) -> Problem | None:
+    """Say that a mass is of before a silence, and not yet of what was driven since; None if not.
 
     Parameters
     ----------
     records
     driven_since : time on the move since all signals were silent the last time [s]
     goes_on : whether the mass is still that of before
+    ask : ask to be told where the load has changed
     """
     if not (goes_on and records.silence >= STOP and driven_since < PROVED):
-        return ""
+        return None
     silence = (
-        f"for {duration(records.silence)}"
+        phrase("for_time", time=duration(records.silence))
         if math.isfinite(records.silence)
-        else "for a time that nobody knows"
+        else phrase("for_unknown_time")
     )
-    return (
-        f"nothing came {silence} until {instant(records.resumed)}: the load "
-        f"may have changed, and a mass takes {PROVED:.0f} s on the move"
+    return Problem.of(
+        "live.load_unknown" if ask else "live.of_before",
+        start=records.resumed,
+        end=records.resumed,
+        silence=silence,
+        at=instant(records.resumed),
+        proved=PROVED,
     )
 
 
 def doubts(
     records: Records, *, driven: float, anew: float, driven_since: float, goes_on: bool
-) -> tuple[str, ...]:
-    """Tell what is doubted.
+) -> tuple[Problem, ...]:
+    """Say what is uncertain.
 
     Parameters
     ----------
@@ -52,20 +60,14 @@ def doubts(
     driven_since : time on the move since all signals were silent the last time [s]
     goes_on : whether the mass is still that of before
     """
-    told = []
+    found = []
     if math.isfinite(anew):
-        told.append(
-            f"all signals were silent until {instant(anew)} and a sensor began anew: "
-            "weighed from there as a new drive"
-        )
-    elif why := of_before(records, driven_since=driven_since, goes_on=goes_on):
-        told.append(f"{why}; where it has changed, say so (l)")
+        found.append(Problem.of("live.anew", start=anew, end=anew, at=instant(anew)))
+    elif why := of_before(records, driven_since=driven_since, goes_on=goes_on, ask=True):
+        found.append(why)
     if driven >= FIRST and set(IMU_SIGNALS).isdisjoint(records.names()):
-        told.append(
-            "no inertial sensor comes: without one a mass is some 3 % light with GNSS heights "
-            "and 10 % without, by a vehicle file that was made with one"
-        )
+        found.append(Problem.of("live.no_inertial"))
     if jumps := records.jumps:
-        times = "once" if jumps == 1 else f"{jumps} times, in all"
-        told.append(f"the clock of the samples jumped {times} by {records.offset:.0f} s")
-    return tuple(told)
+        times = phrase("once") if jumps == 1 else phrase("times_in_all", count=jumps)
+        found.append(Problem.of("live.clock_jumps", times=times, by=records.offset))
+    return tuple(found)

@@ -8,6 +8,7 @@ from typing import Final
 
 from weighbridge.errors import WeighbridgeError
 from weighbridge.estimators import Status
+from weighbridge.messages import Problem
 from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.pipeline.weighing import Weighing, weigh
@@ -31,8 +32,8 @@ class Learned:
     mass, std : of these records as a whole [kg]; NaN where they carry none
     floor : part of ``std`` that no driving takes away, relative to the mass [-]
     inconsistent : the records contradict themselves or the vehicle file
-    reason : why there is no mass; empty where there is one
-    notes : what was found or doubted
+    refusal : why there is no mass; None where there is one
+    problems : what was found and what is uncertain
     """
 
     until: float
@@ -43,8 +44,8 @@ class Learned:
     std: float
     floor: float
     inconsistent: bool
-    reason: str
-    notes: tuple[str, ...]
+    refusal: Problem | None
+    problems: tuple[Problem, ...]
 
     def answer(self) -> Learned:
         """Return what they tell of the mass alone, without what the stages go on from."""
@@ -88,11 +89,13 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
     try:
         weighing = weigh(drive, vehicle)
     except WeighbridgeError as error:
-        return _nothing(until, str(error), inconsistent=True)
+        return _nothing(until, Problem.from_error(error), inconsistent=True)
     inconsistent = weighing.status is Status.INCONSISTENT
     if weighing.result is None or not math.isfinite(weighing.mass):
-        return _nothing(until, weighing.reason, inconsistent=inconsistent, notes=weighing.warnings)
-    setup, state, notes = _set_up(weighing, drive, until, step)
+        return _nothing(
+            until, weighing.refusal, inconsistent=inconsistent, problems=weighing.problems
+        )
+    setup, state, problems = _set_up(weighing, drive, until, step)
     return Learned(
         until=until,
         since=weighing.segments[-1].start if weighing.load_changed else drive.start,
@@ -102,14 +105,14 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
         std=weighing.std,
         floor=_floor(weighing),
         inconsistent=False,
-        reason="",
-        notes=notes,
+        refusal=None,
+        problems=problems,
     )
 
 
 def _set_up(
     weighing: Weighing, drive: Drive, until: float, step: float
-) -> tuple[ForwardSetup | None, ForwardState | None, tuple[str, ...]]:
+) -> tuple[ForwardSetup | None, ForwardState | None, tuple[Problem, ...]]:
     """Set up the stages; all records so far are one step of theirs.
 
     The records are as they came: what the checks of the weighing left out or moved is in them.
@@ -117,8 +120,8 @@ def _set_up(
     try:
         setup = forward.identify_forward(weighing, step)
     except WeighbridgeError as error:
-        return None, None, (*weighing.warnings, str(error))
-    return setup, forward.resume(weighing, drive, until, setup), weighing.warnings
+        return None, None, (*weighing.problems, Problem.from_error(error))
+    return setup, forward.resume(weighing, drive, until, setup), weighing.problems
 
 
 def _floor(weighing: Weighing) -> float:
@@ -129,8 +132,8 @@ def _floor(weighing: Weighing) -> float:
 
 
 def _nothing(
-    until: float, reason: str, *, inconsistent: bool,
-    notes: tuple[str, ...] = (),
+    until: float, refusal: Problem | None, *, inconsistent: bool,
+    problems: tuple[Problem, ...] = (),
 ) -> Learned:  # fmt: skip
     return Learned(
         until=until,
@@ -141,6 +144,6 @@ def _nothing(
         std=math.nan,
         floor=0.0,
         inconsistent=inconsistent,
-        reason=reason,
-        notes=notes,
+        refusal=refusal,
+        problems=problems,
     )

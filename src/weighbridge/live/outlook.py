@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from scipy.special import ndtri
 
 from weighbridge.live.weighing import LiveStatus
+from weighbridge.messages import Problem
 
 GOOD, BETTER = 0.05, 0.02
 """Half widths of the 95 % interval over the mass that are asked for [-]."""
@@ -34,7 +35,7 @@ class Outlook:
     """What a mass is worth and still needs; see `weighbridge.live.weighing.LiveWeighing`."""
 
     status: LiveStatus
-    reason: str = ""
+    reason: Problem | None = None
     progress: float = 0.0
     reach: float = math.nan
     minutes_to_5: float = math.nan
@@ -48,10 +49,10 @@ def outlook(
     floor: float,
     *,
     driven: float,
-    reason: str,
+    reason: Problem | None,
     silent: Sequence[str],
     first: float,
-    unproved: str = "",
+    unproved: Problem | None = None,
     since: float = 0.0,
     wait: float = 0.0,
 ) -> Outlook:
@@ -64,22 +65,19 @@ def outlook(
     mass, std : [kg]; NaN where there is none
     floor : part of ``std`` that no driving takes away, relative to the mass [-]
     driven : time on the move that the mass was made from, or what was looked at [s]
-    reason : why there is none
+    reason : why there is none; None where nothing says
     silent : signals that are needed and do not come
     first : time on the move before which nothing is weighed [s]
-    unproved : why the mass is not yet one of what is driven now; empty where it is
+    unproved : why the mass is not yet one of what is driven now; None where it is
     since : time on the move since then, which no look has seen yet [s]
     wait : time on the move until it will [s]
     """
-    missing = f"{', '.join(silent)} {'does' if len(silent) == 1 else 'do'} not come"
     if math.isnan(mass):
-        if not reason:
-            reason = (
-                f"driven {driven + since:.0f} s; the first mass takes {first:.0f} s on the move"
-            )
+        if reason is None:
+            reason = Problem.of("live.first_mass", driven=driven + since, first=first)
         return Outlook(
             status=LiveStatus.LEARNING,
-            reason=f"{missing}; {reason}" if silent else reason,
+            reason=_missing(silent, reason) if silent else reason,
             advice=ADVICE,
         )
     half = _REACH * std / mass
@@ -89,10 +87,10 @@ def outlook(
     )
     good = half <= GOOD
     if not good:
-        reason = f"within {100.0 * half:.1f} % so far"
-        reason = f"{missing}; {reason}" if silent else reason
+        reason = Problem.of("live.wide", share=100.0 * half)
+        reason = _missing(silent, reason) if silent else reason
     elif silent:
-        reason = missing
+        reason = _missing(silent)
     else:
         reason = unproved
     return Outlook(
@@ -104,6 +102,13 @@ def outlook(
         minutes_to_2=to_better,
         advice=_advice(to_good, to_better),
     )
+
+
+def _missing(silent: Sequence[str], beside: Problem | None = None) -> Problem:
+    """Say that signals do not come, before what is to be said beside."""
+    verb = "does" if len(silent) == 1 else "do"
+    found = Problem.of("live.silent", silent[0], names=", ".join(silent), verb=verb)
+    return found if beside is None else replace(found, text=f"{found.text}; {beside.text}")
 
 
 def _advice(to_good: float, to_better: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -23,6 +24,7 @@ from weighbridge.live.outlook import Outlook, outlook
 from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.source import Samples
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
+from weighbridge.messages import Problem, phrase
 from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.pipeline.given import GivenVehicle, as_vehicle
@@ -312,7 +314,7 @@ class LiveScale:
             time=at,
             age=newest + silence - at if math.isfinite(at) else math.nan,
             status=found.status,
-            reason=found.reason,
+            refusal=found.reason,
             mass=mass,
             std=std,
             tare=self.vehicle.tare,
@@ -327,10 +329,10 @@ class LiveScale:
             look=self._look(state),
             provisional=state is not self._state,
             signals=health,
-            notes=(*self._doubts(mass), *(learned.notes if learned is not None else ())),
+            problems=(*self._doubts(mass), *(learned.problems if learned is not None else ())),
         )
 
-    def _doubts(self, mass: float) -> tuple[str, ...]:
+    def _doubts(self, mass: float) -> tuple[Problem, ...]:
         return doubts(
             self._records,
             driven=self._move.driven,
@@ -378,18 +380,15 @@ class LiveScale:
     ) -> Outlook:
         learned = self._learned
         if learned is not None and learned.inconsistent:
-            return Outlook(status=LiveStatus.INCONSISTENT, reason=learned.reason)
+            return Outlook(status=LiveStatus.INCONSISTENT, reason=learned.refusal)
         silent = [s.name for s in health if s.needed and not s.fresh]
-        reason = learned.reason if learned is not None else ""
-        if reason and self._learns:
+        reason = learned.refusal if learned is not None else None
+        if reason is not None and self._learns:
             left = self._to_look()
-            when = f"after {left:.0f} s more on the move" if left else "now"
-            reason += f"; looked at again {when}"
+            again = phrase("looked_at_after", left=left) if left else phrase("looked_at_now")
+            reason = replace(reason, text=f"{reason.text}; {again}")
         if wide := forward.too_wide(state, self._setup):
-            reason = (
-                "what was driven since the load may have changed leaves "
-                f"{196.0 * wide:.0f} % to both sides"
-            )
+            reason = Problem.of("live.too_wide", share=196.0 * wide)
         waits = self._learns and not self._goes_on()
         since = self._move.driven - self._move.looked_at if waits else 0.0
         return outlook(
@@ -409,9 +408,9 @@ class LiveScale:
         """Time on the move until the next look [s]; 0 while one goes on."""
         return 0.0 if self._looking is not None else self._move.left
 
-    def _unproved(self, mass: float) -> str:
+    def _unproved(self, mass: float) -> Problem | None:
         if self.newest == self._kept_to:
-            return "no sample has come since the state was kept"
+            return Problem.of("live.no_sample")
         return of_before(
             self._records, driven_since=self._driven_since(), goes_on=self._is_of_before(mass)
         )
@@ -478,7 +477,8 @@ class LiveScale:
             return
         self._looking = None
         self._learned = learned = look.found()
-        _LOG.info("looked at %.0f s: %.0f kg %s", look.drive.duration, learned.mass, learned.reason)
+        why = "" if learned.refusal is None else learned.refusal.text
+        _LOG.info("looked at %.0f s: %.0f kg %s", look.drive.duration, learned.mass, why)
         if learned.inconsistent or math.isnan(learned.mass):
             return
         if self._setup is None or look.tells_more(self._since):

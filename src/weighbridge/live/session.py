@@ -19,6 +19,7 @@ from weighbridge.live.outputs import Outputs
 from weighbridge.live.recorder import Recorder
 from weighbridge.live.scale import LiveScale
 from weighbridge.live.weighing import LiveWeighing
+from weighbridge.messages import Problem
 from weighbridge.visible import cut, visible
 
 _LOG = logging.getLogger(__name__)
@@ -106,15 +107,17 @@ class Session:
             event = alert.look(settled)
             if event is not None:
                 _LOG.warning("%s", event.text)
-        active = [alert.text for alert in self.alerts if alert.active]
+        active = [Problem.of("live.alert", alert=a.text) for a in self.alerts if a.active]
         states = tuple(alert.state(settled) for alert in self.alerts)
         lost = [
-            trouble_text(s.name, s.error) for s in self.feed.states() if s.error and not s.ended
+            Problem.of("live.source", trouble=trouble_text(s.name, s.error))
+            for s in self.feed.states()
+            if s.error and not s.ended
         ]
         told = (*active, *lost, *self._doubts())
         ahead = ahead and self.ahead
         weighing = self.scale.weighing(silence, ahead=True) if ahead else settled
-        self.outputs.show(replace(weighing, alerts=states, notes=(*told, *weighing.notes)))
+        self.outputs.show(replace(weighing, alerts=states, problems=(*told, *weighing.problems)))
 
     def _renew(self) -> None:
         """Tell the scale of a device that was turned on again."""
@@ -131,9 +134,9 @@ class Session:
         silence = now() - then
         return silence if silence > SILENT else 0.0
 
-    def _doubts(self) -> list[str]:
-        problem = "" if self.recorder is None else self.recorder.problem
-        return [problem] if problem else []
+    def _doubts(self) -> list[Problem]:
+        trouble = "" if self.recorder is None else self.recorder.problem
+        return [Problem.of("live.not_recorded", trouble=trouble)] if trouble else []
 
 
 def order(scale: LiveScale, word: str) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from scipy.special import ndtr, ndtri
 
 from weighbridge.arguments import check_number
+from weighbridge.messages import Problem
 from weighbridge.results.writing import check_level
 
 Side = Literal["above", "below"]
@@ -80,7 +81,7 @@ class LiveWeighing:
     age : time from that instant to the newest sample [s]
     status : ``learning`` until the mass is within 5 % with 95 % probability, ``weighed``, or
         ``inconsistent`` where the drive contradicts itself or the vehicle file
-    reason : why the status is not ``weighed``; empty if it is
+    refusal : why the status is not ``weighed``; None if it is
     mass, std : [kg]; NaN where there is none
     tare, gross : of the vehicle file [kg]; None where it does not say
     tared : mass that the user has tared [kg]; None for ``tare``
@@ -97,14 +98,14 @@ class LiveWeighing:
         anew from the settled state
     alerts : limits that are watched, by the settled mass
     signals : health of each
-    notes : what was found or doubted, one sentence each
+    problems : what was found and what is uncertain
     """
 
     vehicle: str
     time: float
     age: float
     status: LiveStatus
-    reason: str
+    refusal: Problem | None
     mass: float
     std: float
     tare: float | None
@@ -120,7 +121,22 @@ class LiveWeighing:
     provisional: bool = False
     alerts: tuple[AlertState, ...] = ()
     signals: tuple[SignalHealth, ...] = ()
-    notes: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """Why the status is not ``weighed``, one sentence; empty if it is."""
+        return "" if self.refusal is None else self.refusal.text
+
+    @property
+    def reason_id(self) -> str | None:
+        """Id of that sentence; None if the status is ``weighed``."""
+        return None if self.refusal is None else self.refusal.id
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Texts of the `problems`."""
+        return tuple(p.text for p in self.problems)
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Interval that holds the mass with probability ``level``, between 0 and 1 [kg]."""
@@ -164,6 +180,7 @@ class LiveWeighing:
             "age_s": _known(self.age),
             "status": str(self.status),
             "reason": self.reason,
+            "reason_id": self.reason_id,
             "mass_kg": _known(self.mass),
             "std_kg": _known(self.std),
             "interval95_kg": None if math.isnan(low) else [low, high],
@@ -201,6 +218,7 @@ class LiveWeighing:
                 }
                 for s in self.signals
             ],
+            "problems": [p.to_dict() for p in self.problems],
             "notes": list(self.notes),
         }
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from weighbridge.errors import DriveError
 from weighbridge.kernels.lowpass import lowpass_resample
+from weighbridge.messages import refused
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.dropouts import false_rows, repeated_rows
 from weighbridge.navigation.frozen import thawed
@@ -86,7 +86,7 @@ def read_imu(drive: Drive) -> Imu:
     """
     missing = drive.missing(IMU_SIGNALS)
     if missing:
-        raise DriveError(f"{drive.name}: inertial navigation lacks {', '.join(missing)}")
+        raise refused("imu.missing", drive=drive.name, missing=", ".join(missing))
     drive = thawed(drive, IMU_SIGNALS)
     signals = [drive.signals[n] for n in IMU_SIGNALS]
     start = max(float(s.time[0]) if len(s) else np.inf for s in signals)
@@ -99,10 +99,7 @@ def read_imu(drive: Drive) -> Imu:
             usual = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
             keep &= s.age(clock) <= 2.0 * max(usual, s.period)
     if keep.sum() < _FEWEST:
-        raise DriveError(
-            f"{drive.name}: accel and gyro have only {int(keep.sum())} samples in common: "
-            "check their time stamps"
-        )
+        raise refused("imu.few_shared", drive=drive.name, count=int(keep.sum()))
     whole = bool(keep.all())
     # Kernels are compiled for arrays that can be written to and lie in one piece.
     time = np.require(clock if whole else clock[keep], requirements=("C", "W"))
@@ -125,17 +122,13 @@ def read_imu(drive: Drive) -> Imu:
         imu = _kept(imu, ~repeated, float(np.median(np.diff(own))))
         moving = moving[~repeated]
     if imu.period > _SLOWEST:
-        raise DriveError(
-            f"{drive.name}: inertial samples come every {imu.period:.2f} s; navigation needs "
-            "0.1 s or less: leave accel_x..z and gyro_x..z out to weigh by speed alone"
-        )
+        raise refused("imu.slow", drive=drive.name, period=imu.period)
     false = false_rows(imu.accel, imu.gyro, moving, imu.period)
     if not false.any() or time[-1] - time[0] < _BRIEF:
         return imu
     if np.count_nonzero(~false) < _FEWEST:
-        raise DriveError(
-            f"{drive.name}: {np.count_nonzero(false)} of {false.size} inertial samples are zeros, "
-            "spikes or at a limit of the sensor: record accel_x..z and gyro_x..z again"
+        raise refused(
+            "imu.many_false", drive=drive.name, count=np.count_nonzero(false), samples=false.size
         )
     return replace(_kept(imu, ~false, imu.period), false=float(np.mean(false)))
 

@@ -78,11 +78,8 @@ def with_forward_accel(drive: Drive) -> Drive:
         return drive
     ahead, shift = _direction(compared)
     if not _holds(compared, ahead, shift):
-        text = (
-            "the accelerometer is not used: there is no gyroscope beside it, and no direction of "
-            "it follows the speed for the whole drive; fix it to the body, or record a gyroscope"
-        )
-        return drive.with_problems(Problem("accel_x", text))
+        unused = Problem.of("imu.no_direction", "accel_x")
+        return drive.with_problems(unused)
     time = drive.signals[AXES[0]].time
     read = sum(w * resample(drive.signals[n], time) for n, w in zip(AXES, ahead, strict=True))
     return drive.with_signals(Signal("longitudinal_accel", time, np.asarray(read)))

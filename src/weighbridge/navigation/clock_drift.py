@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.messages import phrase
 from weighbridge.navigation.aiding import read_fixes, speed_from_fixes
 from weighbridge.navigation.clock_lag import (
     Integrated,
@@ -119,7 +120,7 @@ def mend_clocks(drive: Drive) -> Drive:
         drive, mended = mended, _round(mended)
     if all(mended.get(name) is drive.get(name) for name in ("vehicle_speed", "accel_x")):
         return mended
-    return mended.with_problems(_hopeless("obd", "what was tried does not bring them together"))
+    return mended.with_problems(_hopeless("obd", phrase("clocks_tried")))
 
 
 def _round(drive: Drive) -> Drive:
@@ -187,13 +188,7 @@ def _lags(force: Integrated, speed: Signal) -> Lags:
 def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     """Say how a table is to be moved, that it cannot be, or None where its clock is sound."""
     if table == "obd" and lags.pieces >= _ENOUGH and _strangers(lags):
-        return Problem(
-            "",
-            f"vehicle speed and accelerometer agree in {lags.lag.size} of {lags.pieces} pieces of "
-            "the drive, each at a lag of its own: a clock jumps or runs fast all the time, or one "
-            "of the two is wrong; record both by one clock",
-            serious=True,
-        )
+        return Problem.of("clock.erratic", serious=True, found=lags.lag.size, pieces=lags.pieces)
     if lags.lag.size < _FEWEST:
         return None
     lone = _lone(lags.lag)
@@ -213,14 +208,14 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
         return None
     if lags.lag.size < _SHOWN * lags.pieces:
         # What does not fit of the fixes, the filter leaves out.
-        return _hopeless(table, "most of the drive does not show it") if table == "obd" else None
+        return _hopeless(table, phrase("clocks_hidden")) if table == "obd" else None
     # In a piece of a clock that drifts fast the lag is less sure; the next round sees to the rest.
     more = _BLUR * abs(slope)
     follows = float(np.mean(np.abs(lag - fit) < _NEAR + more)) >= _FOLLOWS
     if follows and np.ptp(_median_of_three(lag - fit)) <= allowed + 2.0 * more:
         slope = slope if drifts else 0.0
         knots = time[[0, -1]]
-        text = f"drifts by {1e6 * slope:+.0f} ppm" if drifts else ""
+        text = phrase("clock_drifts", slope=1e6 * slope) if drifts else ""
         return _Path(knots, float(np.mean(fit)) + slope * (knots - time.mean()), slope, (), text)
     return _broken(time, lag, table)
 
@@ -269,21 +264,16 @@ def _broken(time: Floats, lag: Floats, table: str) -> _Path | Problem | None:
     level = np.concatenate([_median_of_three(lag[p]) for p in parts])
     follows = np.count_nonzero(np.abs(lag - level) < _NEAR) + np.count_nonzero(blended)
     if len(cuts) > _MOST_STEPS or follows < _FOLLOWS * blended.size:
-        return _hopeless(table, "it jumps about") if table == "obd" else None
-    text = "is late by " + f"{float(level.min()):.2f} to {float(level.max()):.2f} s in turn"
+        return _hopeless(table, phrase("clocks_jump")) if table == "obd" else None
+    text = phrase("clock_late", least=float(level.min()), most=float(level.max()))
     if cuts:
         several = ", ".join(f"{s:+.2f} s" for s in sizes)
-        text = f"jumps by {several}"
+        text = phrase("clock_jumps", several=several)
     return _Path(time, level, 0.0, tuple(cuts), text)
 
 
 def _hopeless(table: str, why: str) -> Problem:
-    return Problem(
-        "",
-        f"the clocks of {table} and imu run apart, by speed and acceleration, and {why}: record "
-        "both by one clock, or cut the recording where they agree",
-        serious=True,
-    )
+    return Problem.of("clock.hopeless", serious=True, table=table, why=why)
 
 
 def _left_out(drive: Drive, lost: tuple[tuple[float, float], ...]) -> Drive:
@@ -295,21 +285,15 @@ def _left_out(drive: Drive, lost: tuple[tuple[float, float], ...]) -> Drive:
     first, last = drive.start, drive.end
     text = " and ".join(span(round(max(a, first)), round(min(b, last))) for a, b in lost)
     agree = _speeds_agree(drive, lost)
-    said = f"from {text} vehicle speed does not fit the accelerometer at any lag of its clock; "
+    edges: dict[str, Any] = {"start": max(lost[0][0], first), "end": min(lost[-1][1], last)}
     if agree is not None:
-        said += (
-            "the samples of imu were left out there, for GNSS agrees with the vehicle speed"
-            if agree
-            else "the rows of obd were left out there"
-        )
-        return _moved(drive, "imu" if agree else "obd", lambda t: t, lost).with_problems(
-            Problem("", said)
+        left, which = ("imu", "clock.no_lag_imu") if agree else ("obd", "clock.no_lag_obd")
+        return _moved(drive, left, lambda t: t, lost).with_problems(
+            Problem.of(which, spans=text, **edges)
         )
     for table in ("obd", "imu"):
         drive = _moved(drive, table, lambda t: t, lost)
-    return drive.with_problems(
-        Problem("", said + "without GNSS either may be wrong, and both were left out there")
-    )
+    return drive.with_problems(Problem.of("clock.no_lag", spans=text, **edges))
 
 
 def _speeds_agree(drive: Drive, when: tuple[tuple[float, float], ...]) -> bool | None:
@@ -427,13 +411,12 @@ def _moved(
 def _note(table: str, other: str, path: _Path, level: float) -> Problem:
     most = path.lag - level
     far = float(most[int(np.argmax(np.abs(most)))])
-    what = path.text or f"is {far:+.2f} s off"
-    left_out = ""
-    if path.cuts:
-        at = ", ".join(instant(round(0.5 * (a + b))) for a, b in path.cuts)
-        left_out = f"; rows about the step at {at} were left out"
-    return Problem(
-        "",
-        f"the clock of {table} {what} against that of {other}, by speed and acceleration; they "
-        f"were brought together (by up to {abs(far):.2f} s){left_out}",
+    at = ", ".join(instant(round(0.5 * (a + b))) for a, b in path.cuts)
+    return Problem.of(
+        "clock.moved",
+        table=table,
+        what=path.text or phrase("clock_off", far=far),
+        other=other,
+        most=abs(far),
+        left_out=phrase("about_step", at=at) if path.cuts else "",
     )

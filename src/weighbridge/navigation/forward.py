@@ -21,6 +21,7 @@ from weighbridge.kernels.ins_model import (
     Z_STILL,
 )
 from weighbridge.kernels.rotation import euler_to_matrix
+from weighbridge.messages import refused
 from weighbridge.navigation.aiding import Imu, read_fixes, read_imu, speed_from_fixes
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.even import Even, evenly
@@ -276,7 +277,7 @@ def forward_motion(drive: Drive, setup: Setup) -> Motion:
         if rows is not None:
             parts.append(rows)
     if not parts:
-        raise DriveError(f"{drive.name}: no second of it has inertial samples; nothing is known")
+        raise refused("imu.nothing", drive=drive.name)
     return joined(parts)
 
 

@@ -29,6 +29,7 @@ from weighbridge.kernels.ins_model import (
     V,
 )
 from weighbridge.kernels.rotation import euler_to_matrix, matrix_to_euler, quaternions_to_euler
+from weighbridge.messages import Problem
 from weighbridge.navigation.aiding import Fixes
 from weighbridge.navigation.even import Even
 from weighbridge.navigation.filter import Block, Nodes, run, run_smoothed
@@ -188,16 +189,11 @@ def _check_found(scale: float, nodes: Nodes, fixed: Bools, setup: Setup) -> None
         return
     off = abs(scale - 1.0) / setup.settings.speed_scale_std
     if off > _FAILED:
-        raise LostError(
-            f"positions make the vehicle speed {scale:.2f} times the true one, {off:.0f} standard "
-            "deviations from what is usual: the motion could not be found from these positions"
-        )
+        raise Problem.of("gnss.scale", "latitude", scale=scale, off=off).error(LostError)
     refused = nodes.states[fixed, LOST_GNSS] > 0.0
     if refused.size and np.mean(refused) > _REFUSED:
-        raise LostError(
-            f"{100.0 * np.mean(refused):.0f} % of the positions fit neither speed nor inertial "
-            "sensor: the motion could not be found from these positions"
-        )
+        part = 100.0 * float(np.mean(refused))
+        raise Problem.of("gnss.contradicts", "latitude", part=part).error(LostError)
 
 
 def laid_out(pose: Pose, setup: Setup, *, places: bool = True, **rows: object) -> Motion:
@@ -381,16 +377,13 @@ def mounting_of(turn: Floats, end_std: Floats, setup: Setup) -> tuple[Angles, An
     )
 
 
-def _notes(setup: Setup, squat_known: bool) -> tuple[str, ...]:
+def _notes(setup: Setup, squat_known: bool) -> tuple[Problem, ...]:
     """Say what the drive does not show, after the notes of the setup."""
     notes = list(setup.notes)
     if setup.origin is None:
-        notes.append(
-            "without GNSS the heading is unknown, the speed's scale is taken as 1 and the grade "
-            "may be off by a constant"
-        )
+        notes.append(Problem.of("gnss.none"))
     elif not setup.has_height:
-        notes.append("without GNSS height the grade may be off by a constant")
+        notes.append(Problem.of("gnss.no_height"))
     if not squat_known:
-        notes.append("the drive does not show the squat: pitch of the body is taken as grade")
+        notes.append(Problem.of("motion.no_squat"))
     return tuple(dict.fromkeys(notes))

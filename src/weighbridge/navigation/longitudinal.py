@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import DriveError
+from weighbridge.messages import Problem, refused
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
@@ -41,15 +41,12 @@ def longitudinal_motion(drive: Drive, *, rate: float = 20.0) -> Motion:
     """
     missing = drive.missing(["longitudinal_accel", "vehicle_speed"])
     if missing:
-        raise DriveError(f"{drive.name}: no {' and no '.join(missing)}")
+        raise refused("motion.missing", drive=drive.name, missing=" and no ".join(missing))
     force, speed = drive.signals["longitudinal_accel"], drive.signals["vehicle_speed"]
     start, end = max(force.time[0], speed.time[0]), min(force.time[-1], speed.time[-1])
     rate = min(rate, 1.0 / force.period)
     if not end - start > 20.0:
-        raise DriveError(
-            f"{drive.name}: longitudinal_accel and vehicle_speed overlap for "
-            f"{max(end - start, 0.0):.0f} s only; at least 20 s are needed"
-        )
+        raise refused("motion.overlap", drive=drive.name, overlap=max(end - start, 0.0))
     time = start + np.arange(int((end - start) * rate)) / rate
     valid = (force.age(time) < LONGEST_GAP) & (speed.age(time) < LONGEST_GAP)
     read = lowpass(resample(force, time), rate, 0.25 * rate)
@@ -67,11 +64,11 @@ def longitudinal_motion(drive: Drive, *, rate: float = 20.0) -> Motion:
     grade = np.arcsin(np.clip(slope / GRAVITY, -0.5, 0.5))
     accel = read - GRAVITY * np.sin(grade)
     nowhere = np.full(time.size, np.nan)
-    notes = [f"accelerometer offset {offset:+.3f} m/s^2 taken off, from the energy balance"]
+    notes = [Problem.of("motion.offset", "longitudinal_accel", offset=offset)]
     if drive.has(*IMU_SIGNALS[:3]) and not drive.has(*IMU_SIGNALS):
-        notes.append("no gyroscope: the accelerometer counts only along the vehicle")
+        notes.append(Problem.of("motion.no_gyro"))
     if not offset_known:
-        notes.append("no altitude: the drive is taken to end as high as it began")
+        notes.append(Problem.of("motion.no_altitude"))
     residual = (read - lowpass(read, rate, 0.5))[valid]
     return Motion(
         source="longitudinal_accel",

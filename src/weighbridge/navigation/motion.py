@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from weighbridge.constants import GRAVITY
+from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Bools, Floats, Ints, Signal
 
 MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
@@ -67,12 +68,8 @@ class RecordedSpeed:
         if self.period <= SLOW:
             return ""
         rate = 1.0 / self.period
-        steps = f" in steps of {3.6 * self.step:.1f} km/h" if self.step > 0.0 else ""
-        return (
-            f"without an accelerometer the acceleration comes from a speed of {rate:.2g} values "
-            f"per second{steps}, which is too slow: log the speed 3 times per second or more, "
-            "or an inertial sensor (a phone's) beside it"
-        )
+        steps = phrase("in_steps", step=3.6 * self.step) if self.step > 0.0 else ""
+        return phrase("slow_speed", rate=rate, steps=steps)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +113,7 @@ class Motion:
         was left as it is, for it may be the accelerometer's scale or an error of the squat [-]
     measured_speed : samples of the speed that all of this was made from, true scale; None where an
         accelerometer was there as well
-    notes : sentences on what was found and what was doubtful
+    notes : what was found and what is uncertain
     """
 
     source: MotionSource
@@ -147,7 +144,7 @@ class Motion:
     specific_force_scale_std: float = 0.0
     doubted_gain: float | None = None
     measured_speed: Signal | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Problem, ...] = ()
 
     @property
     def recorded_speed(self) -> RecordedSpeed | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from weighbridge.errors import DriveError, LostError
+from weighbridge.errors import LostError
+from weighbridge.messages import Problem, refused
 from weighbridge.navigation.longitudinal import longitudinal_motion
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.settings import RATE, NavigationSettings
@@ -50,17 +51,15 @@ def identify_motion(drive: Drive, vehicle: Vehicle | None = None) -> tuple[Motio
             return _inertial(drive, vehicle)
         except LostError as lost:
             if not drive.has("vehicle_speed"):
-                raise DriveError(f"{drive.name}: {lost}; check the clock of GNSS") from None
+                raise
             motion, setup = _inertial(drive.without(*_OF_FIXES), vehicle)
-            note = f"{lost}; they were left out"
-            return replace(motion, notes=(note, *motion.notes)), setup
+            left_out = Problem.from_error(lost)
+            return replace(motion, notes=(replace(left_out, serious=False), *motion.notes)), setup
     if drive.has("longitudinal_accel", "vehicle_speed"):
         return longitudinal_motion(true_speed(drive, vehicle)), None
     if has_speed:
         return speed_motion(true_speed(drive, vehicle)), None
-    raise DriveError(
-        f"{drive.name}: no vehicle_speed and no GNSS; without a speed no vehicle can be weighed"
-    )
+    raise refused("speed.missing", drive=drive.name)
 
 
 def _inertial(drive: Drive, vehicle: Vehicle | None) -> tuple[Motion, Setup]:

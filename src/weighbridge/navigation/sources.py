@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from weighbridge.errors import DriveError
+from weighbridge.messages import refused
 from weighbridge.navigation.aiding import Fixes, Imu, read_fixes, read_imu, speed_from_fixes
 from weighbridge.signals import Drive, Signal
 
@@ -53,10 +53,7 @@ def read_sources(drive: Drive) -> Sources:
     if reference is None and fixes is not None:
         reference = speed_from_fixes(fixes)
     if reference is None or len(reference) < _FEWEST:
-        raise DriveError(
-            f"{drive.name}: inertial navigation lacks vehicle_speed, gnss_speed or latitude and "
-            "longitude: with the inertial sensor alone the motion drifts away"
-        )
+        raise refused("motion.drifts", drive=drive.name)
     return Sources(drive, imu, fixes, wheel, reference)
 
 

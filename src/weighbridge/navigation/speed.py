@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import DriveError
+from weighbridge.messages import Problem, refused
 from weighbridge.navigation.longitudinal import LONGEST_GAP, resample
 from weighbridge.navigation.motion import Motion, MotionSource
 from weighbridge.navigation.smoothing import GRADE_STD, smooth_grade, smooth_height, smooth_speed
@@ -39,17 +39,12 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
     """
     speed = drive.speed
     if speed is None or len(speed) < 20:
-        raise DriveError(
-            f"{drive.name}: no vehicle_speed and no gnss_speed of at least 20 samples; "
-            "without a speed no vehicle can be weighed"
-        )
+        raise refused("speed.few", drive=drive.name)
     start, end = float(speed.time[0]), float(speed.time[-1])
     rate = min(rate, 4.0 / speed.period)
     time = start + np.arange(int((end - start) * rate)) / rate
     if end - start < SHORTEST or time.size < 32:
-        raise DriveError(
-            f"{drive.name}: only {end - start:.0f} s of speed; at least {SHORTEST:.0f} s are needed"
-        )
+        raise refused("speed.short", drive=drive.name, length=end - start, least=SHORTEST)
     valid = speed.age(time) < max(LONGEST_GAP, 2.5 * speed.period)
     v, accel, speed_std, accel_std = smooth_speed(speed, time)
     distance = np.cumsum(np.where(valid, v, 0.0)) / rate
@@ -80,7 +75,7 @@ def speed_motion(drive: Drive, *, rate: float = 10.0) -> Motion:
 
 def _grade(
     drive: Drive, time: Floats, distance: Floats
-) -> tuple[Floats, Floats, Floats | None, MotionSource, tuple[str, ...]]:
+) -> tuple[Floats, Floats, Floats | None, MotionSource, tuple[Problem, ...]]:
     """Find grade, its standard deviation, and height where there is one."""
     measured, altitude = drive.get("grade"), drive.get("altitude")
     known = (
@@ -93,8 +88,8 @@ def _grade(
         grade, std = smooth_grade(measured, time, distance)
         return grade, std, height, "speed_grade", ()
     if altitude is None or height is None or distance[-1] < SHORTEST_WAY:
-        note = "no grade and no altitude: the road is taken as level"
+        note = Problem.of("motion.level")
         return np.zeros(time.size), np.full(time.size, GRADE_STD), height, "speed", (note,)
     height, slope, std = smooth_height(altitude, time, distance)
     grade = np.arcsin(np.clip(slope, -0.3, 0.3))
-    return grade, std, height, "speed_grade", ("grade from altitude over distance",)
+    return grade, std, height, "speed_grade", (Problem.of("motion.grade_by_height"),)

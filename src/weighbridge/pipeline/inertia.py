@@ -48,6 +48,7 @@ from weighbridge.inertia.suspension import (
     response,
     static_mass,
 )
+from weighbridge.messages import Problem, phrase
 from weighbridge.pipeline.given import (
     GivenDrive,
     GivenVehicle,
@@ -147,58 +148,51 @@ def _estimate(
             "and axle distances, as in examples/ride-truck/vehicle.toml"
         )
 
-    def nothing(status: Status, reason: str, warnings: tuple[str, ...] = ()) -> Inertia:
+    def nothing(status: Status, refusal: Problem, problems: tuple[Problem, ...] = ()) -> Inertia:
         return Inertia(
-            drive=drive, vehicle=vehicle, method=chosen, status=status, reason=reason, track=None,
-            suspension=None, model_std=np.zeros(3), segments=(), warnings=warnings,
+            drive=drive, vehicle=vehicle, method=chosen, status=status, refusal=refusal, track=None,
+            suspension=None, model_std=np.zeros(3), segments=(), problems=problems,
         )  # fmt: skip
 
     if lacking := drive.missing(NEEDED):
         listed = ", ".join(lacking)
-        return nothing(
-            Status.MISSING_SIGNALS, f"the drive has no {listed}, which a ride is made of"
-        )
+        return nothing(Status.MISSING_SIGNALS, Problem.of("ride.missing", missing=listed))
     only = ride_of(drive)
     if nothing_moves(only):
         return nothing(
             Status.NOT_EXCITED,
-            "every signal of the ride repeats one value: the vehicle stood, or nothing was "
-            "measured; drive at 20 km/h or more while recording",
+            Problem.of("ride.still"),
         )
     mended = mend_drive(only)
-    problems = [*mended.problems, *check_signals(only)]
-    refuse_serious(drive.name, problems)
+    found = [*mended.problems, *check_signals(only)]
+    refuse_serious(drive.name, found)
     samples = ride_samples(mended)
     seen = response(samples, ride)
-    problems += check_response(seen) if seen is not None else ()
-    refuse_serious(drive.name, problems)
-    warnings = tuple(dict.fromkeys(p.text for p in problems))
+    found += check_response(seen) if seen is not None else ()
+    refuse_serious(drive.name, found)
+    problems = tuple(dict.fromkeys(found))
     if settings is not None and (own := differences(settings)):
-        warnings += (f"{chosen} was run with {own}, not with its defaults",)
+        problems += (Problem.of("method.settings", method=chosen, own=own),)
     if not samples.period <= LONGEST_PERIOD:
         return nothing(
             Status.NOT_EXCITED,
-            f"the ride is sampled {1.0 / samples.period:.3g} times per second, and axles hop 10 to "
-            "15 times: record it at 100 Hz or more",
-            warnings,
+            Problem.of("ride.slow", rate=1.0 / samples.period),
+            problems,
         )
     if samples.duration < LEAST or seen is None:
         return nothing(
             Status.NOT_EXCITED,
-            f"the ride lasts {samples.duration:.3g} s, and without {LEAST:.0f} s in one piece the "
-            f"signs and units of its signals cannot be checked: record {SHORTEST:.0f} s or more",
-            warnings,
+            Problem.of("ride.short", duration=samples.duration, least=LEAST, needed=SHORTEST),
+            problems,
         )
     track = estimate(samples, ride, chosen, settings)
     if not np.ptp(track.alpha, axis=0).any():
         return nothing(
             Status.NOT_EXCITED,
-            f"the filter {chosen} never moves: the covariance of velocities and parameters that it "
-            "starts with, zero, stays zero, and the vehicle file's parameters come back; use "
-            f"{DEFAULT_METHOD}",
-            warnings,
+            Problem.of("ride.filter_stuck", method=chosen, other=DEFAULT_METHOD),
+            problems,
         )
-    return _judged(drive, vehicle, ride, samples, track, seen.slope, warnings)
+    return _judged(drive, vehicle, ride, samples, track, seen.slope, problems)
 
 
 def _judged(
@@ -208,7 +202,7 @@ def _judged(
     samples: RideSamples,
     track: InertiaTrack,
     average: Floats,
-    warnings: tuple[str, ...],
+    problems: tuple[Problem, ...],
 ) -> Inertia:
     """Say what the estimate is worth; ``average`` is that of alpha over the whole ride."""
     believed = jumps(track)
@@ -216,19 +210,15 @@ def _judged(
     changes = load_changes(track, believed)
     check = _check(samples, ride, track, changes, average, bool(trouble))
     if check is None and not trouble and track.noise_factor > 1.0:
-        trouble = (
-            f"the ride fits as if the suspension signals had {track.noise_factor:.2g} times the "
-            "noise of the vehicle file, and is too short to tell noise from wrong springs and "
-            f"dampers: record more than {SHORTEST:.0f} s of one load"
-        )
+        trouble = Problem.of("ride.noisy_short", factor=track.noise_factor, needed=SHORTEST)
     common = UNKNOWN_FORCE_STD if ride.force_std is None else ride.force_std
     noisy = attenuation(samples, ride, track.noise_factor, np.asarray(track.alpha[-1]))
     std = np.hypot(np.hypot(common, noisy), integration_std(samples, ride))
     # Each with what it does to the interval, which is said where there is one.
-    doubts: list[tuple[str, str]] = []
+    doubts: list[tuple[Problem, str]] = []
     if check is not None and check.off.any():
         std = np.hypot(std, float(np.max(np.abs(check.factor - 1.0))))
-        doubts.append((_told(check), "the interval is widened"))
+        doubts.append((Problem.of("ride.parts", parts=_parts(check)), phrase("interval_widened")))
     last = samples.between(changes[-1] if changes else -math.inf)
     carried, carried_std = static_mass(last, ride, GRAVITY)
     found = float(track.parameters[-1, 0])
@@ -237,50 +227,50 @@ def _judged(
     ):
         # Were it the stiffness, the inertias would be as wrong as the mass.
         std = np.hypot(std, abs(carried / found - 1.0))
-        note = (
-            f"at rest the springs carry {carried:.0f} kg, in motion the sprung mass is "
-            f"{found:.0f} kg: a travel sensor is offset, zero_mass_kg is not the mass with which "
-            "they read zero, or the stiffness is wrong"
-        )
-        doubts.append((note, "the interval holds both"))
-    status, reason = _status(vehicle, track, check, trouble, [text for text, _ in doubts], std)
+        note = Problem.of("ride.rest_and_motion", carried=carried, found=found)
+        doubts.append((note, phrase("interval_holds_both")))
+    status, refusal = _status(vehicle, track, check, trouble, [doubt for doubt, _ in doubts], std)
     weighed = status is Status.CONVERGED
-    warnings += _limits(samples, ride, track, check, weighed)
-    warnings += tuple(f"{text}; {effect}" if weighed else text for text, effect in doubts)
-    warnings += _tilt_notes(last, ride)
+    problems += _limits(samples, ride, track, check, weighed)
+    problems += tuple(
+        replace(p, text=f"{p.text}; {effect}") if weighed else p for p, effect in doubts
+    )
+    problems += _tilt_notes(last, ride)
     result = Inertia(
         drive=drive,
         vehicle=vehicle,
         method=track.method,
         status=status,
-        reason=reason,
+        refusal=refusal,
         track=track,
         suspension=check,
         model_std=std,
         segments=_segments(track, changes, std),
-        warnings=warnings,
+        problems=problems,
     )
     unknown = [
         AXES[k] for k in (1, 2) if status is Status.CONVERGED and math.isnan(result.values[k])
     ]
     if unknown:
-        note = f"the ride says too little about the {' and the '.join(unknown)}"
-        return _with_warning(result, note)
+        note = Problem.of("ride.axis_unknown", axes=" and the ".join(unknown))
+        return _with_problem(result, note)
     if vehicle.gross is not None and result.mass > vehicle.gross:
         sure = "surely" if result.mass - 2.0 * result.std > vehicle.gross else "perhaps"
-        return _with_warning(result, f"{sure} above the permitted mass of {vehicle.gross:.0f} kg")
+        return _with_problem(
+            result, Problem.of("mass.above_permitted", sure=sure, gross=vehicle.gross)
+        )
     return result
 
 
-def _trouble(track: InertiaTrack, changes: tuple[float, ...]) -> str:
+def _trouble(track: InertiaTrack, changes: tuple[float, ...]) -> Problem | None:
     """Say what no vehicle does, in the hypotheses that the filter came to believe."""
     pushed = float(np.mean(track.pushed.any(axis=1)))
     note = ""
     if len(changes) > max(3.0, 0.1 * float(track.time[-1] - track.time[0])):
-        note = f"the load seems to change {len(changes)} times"
+        note = phrase("load_flickers", count=len(changes))
     elif pushed > MOSTLY_CALM:
-        note = f"the vehicle seems to brake or turn {100.0 * pushed:.0f} % of the time"
-    return note and f"{note}: springs, dampers or sensors are not those of the vehicle file"
+        note = phrase("pushed_often", share=100.0 * pushed)
+    return Problem.of("ride.trouble", note=note) if note else None
 
 
 def _check(
@@ -318,105 +308,85 @@ def _limits(
     track: InertiaTrack,
     check: SuspensionCheck | None,
     weighed: bool,
-) -> tuple[str, ...]:
+) -> tuple[Problem, ...]:
     """Say what limits the result: the vehicle file, noise, the logger, a short ride."""
-    note = []
+    note: list[Problem] = []
     if ride.force_std is None and weighed:
-        note.append(
-            "the vehicle file does not say how sure its springs and dampers are (force_std): "
-            f"{100.0 * UNKNOWN_FORCE_STD:.0f} % is in the interval"
-        )
+        note.append(Problem.of("ride.force_std_unknown", share=100.0 * UNKNOWN_FORCE_STD))
     if track.noise_factor > 1.0:
         note.append(
-            f"the ride fits as if the suspension signals had {track.noise_factor:.2g} times the "
-            "noise of the vehicle file: the sensors are noisier, or springs and dampers are not "
-            f"the file's{'; the interval is widened' if weighed else ''}"
+            Problem.of(
+                "ride.noise",
+                factor=track.noise_factor,
+                widened=phrase("and_widened") if weighed else "",
+            )
         )
     if samples.period > HOPPING:
-        note.append(
-            f"sampled at {1.0 / samples.period:.0f} Hz, axles that hop are hardly seen; "
-            "200 Hz or more is better"
-        )
+        note.append(Problem.of("ride.hops", rate=1.0 / samples.period))
     if check is None:
-        note.append(
-            f"springs and dampers could not be checked one by one, which takes {SHORTEST:.0f} s "
-            "of one load: a broken one would not be told"
-        )
+        note.append(Problem.of("ride.unchecked", needed=SHORTEST))
     return tuple(note)
 
 
-def _tilt_notes(samples: RideSamples, ride: Ride) -> tuple[str, ...]:
+def _tilt_notes(samples: RideSamples, ride: Ride) -> tuple[Problem, ...]:
     """Tell where front and rear springs contradict each other about how the body leans."""
     front, rear, std = body_tilt(samples, ride)
     if abs(front - rear) > max(TILT, TILT_PART * max(abs(front), abs(rear)), 4.0 * std):
-        return (
-            f"on average the body leans by {1e3 * front:.0f} mrad to the right over the front axle "
-            f"and by {1e3 * rear:.0f} mrad over the rear axle: a travel sensor is offset; the "
-            "parameters do not suffer from it",
-        )
+        return (Problem.of("ride.tilt", front=1000.0 * front, rear=1000.0 * rear),)
     return ()
 
 
-def _with_warning(result: Inertia, text: str) -> Inertia:
-    return replace(result, warnings=(*result.warnings, text))
+def _with_problem(result: Inertia, problem: Problem) -> Inertia:
+    return replace(result, problems=(*result.problems, problem))
 
 
-def _told(check: SuspensionCheck) -> str:
+def _parts(check: SuspensionCheck) -> str:
     """Name the parts that act otherwise than the vehicle file says."""
     order = np.argsort(-check.off, kind="stable")[:4]
     named = [f"{PARTS[k]} {check.factor[k]:.2f}" for k in order if check.off[k] > 0.0]
-    return (
-        f"against the others these act otherwise than the vehicle file says: {', '.join(named)} "
-        "times its value; check springs, dampers and their sensors"
-    )
+    return ", ".join(named)
 
 
 def _status(
     vehicle: Vehicle,
     track: InertiaTrack,
     check: SuspensionCheck | None,
-    trouble: str,
-    doubts: list[str],
+    trouble: Problem | None,
+    doubts: list[Problem],
     std: Floats,
-) -> tuple[Status, str]:
+) -> tuple[Status, Problem | None]:
     """Say whether the ride carries a mass, and why not."""
     mass, by_filter = float(track.parameters[-1, 0]), float(track.alpha_std[-1, 0])
     by_filter /= float(track.alpha[-1, 0])
     if check is not None and float(np.max(check.off)) > WRONG_PART:
         k = int(np.argmax(check.off))
-        return Status.INCONSISTENT, (
-            f"the {PARTS[k]} acts {check.factor[k]:.2f} times as the vehicle file says: it is "
-            "locked, broken or another one, or its sensor is wrong"
+        return Status.INCONSISTENT, Problem.of(
+            "ride.part_wrong", part=PARTS[k], factor=check.factor[k]
         )
     if check is not None and float(np.max(check.misfit)) > WRONG_SHARE:
         k = int(np.argmax(check.misfit))
-        return Status.INCONSISTENT, (
-            "springs and dampers of the vehicle file do not fit the ride: others explain "
-            f"{100.0 * check.misfit[k]:.0f} % more of the {('heave', 'roll', 'pitch')[k]}; "
-            f"{_told(check)}"
+        return Status.INCONSISTENT, Problem.of(
+            "ride.misfit",
+            share=100.0 * check.misfit[k],
+            axis=("heave", "roll", "pitch")[k],
+            parts=_parts(check),
         )
     if trouble:
         return Status.INCONSISTENT, trouble
     if not by_filter <= TOO_WIDE:
-        return Status.NOT_EXCITED, (
-            f"the ride says {mass:.0f} kg give or take {100.0 * by_filter:.0f} %, which is no "
-            "weighing; a longer or rougher road, or quieter sensors, would help"
-        )
+        return Status.NOT_EXCITED, Problem.of("ride.wide", mass=mass, share=100.0 * by_filter)
     if not math.hypot(by_filter, float(std[0])) <= TOO_WIDE:
         return Status.INCONSISTENT, (
             doubts[0]
             if doubts
-            else f"the sprung mass seems to be {mass:.0f} kg, but noise of the suspension signals "
-            f"may shift it by {100.0 * float(std[0]):.0f} %: a rougher road or quieter sensors "
-            "would help"
+            else Problem.of("ride.noise_shifts", mass=mass, share=100.0 * float(std[0]))
         )
     low, high = vehicle.of_class.mass_range
     if not low < mass < high:
-        return Status.INCONSISTENT, (
-            f"the sprung mass is {mass:.0f} kg, and a {vehicle.kind} has between {low:.0f} and "
-            f"{high:.0f} kg; check the class and the [ride] section of the vehicle file"
+        return Status.INCONSISTENT, Problem.of(
+            "ride.impossible", mass=mass, kind=vehicle.kind, low=low, high=high
         )
-    return Status.CONVERGED, ""
+    return Status.CONVERGED, None
 
 
 def _segments(

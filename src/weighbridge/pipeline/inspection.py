@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from weighbridge.pipeline.given import (
     home_of,
     mapping_of,
 )
+from weighbridge.results.writing import number
 from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.shown import in_html, in_lines, plural
@@ -27,6 +29,7 @@ from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import find_power_balance
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
+from weighbridge.visible import visible_json
 
 GAP_PERIODS: Final = 5.0
 """A gap is a step of the clock longer than this many median periods."""
@@ -147,6 +150,44 @@ class Inspection:
             f"{plural(len(self.problems), 'problem')}{first}",
         )
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return what ``inspect --json`` prints: numbers, None where unknown."""
+        return {
+            "drive": self.drive.name,
+            "duration_s": number(self.drive.duration),
+            "signals": [
+                {
+                    "name": s.name,
+                    "unit": s.unit,
+                    "samples": s.count,
+                    "start_s": number(s.start),
+                    "end_s": number(s.end),
+                    "rate_hz": number(s.rate),
+                    "gaps": s.gaps,
+                    "longest_gap_s": number(s.longest_gap),
+                    "lowest": number(s.low),
+                    "highest": number(s.high),
+                }
+                for s in self.signals
+            ],
+            "problems": [p.to_dict() | {"serious": p.serious} for p in self.problems],
+            "ways": [
+                {
+                    "motion": w.motion,
+                    "torque": w.torque,
+                    "possible": w.possible,
+                    "chosen": w.chosen,
+                    "lacks": list(w.needs),
+                    "expected": w.accuracy,
+                }
+                for w in self.ways
+            ],
+        }
+
+    def to_json(self) -> str:
+        """Return `to_dict` as one line of JSON."""
+        return visible_json(json.dumps(self.to_dict(), ensure_ascii=False))
+
 
 def inspect_drive(drive: GivenDrive, vehicle: GivenVehicle | None = None) -> Inspection:
     """Describe the signals of a drive, its problems, and the ways to weigh by it.
@@ -182,7 +223,7 @@ def _by_battery(drive: Drive, vehicle: Vehicle | None) -> tuple[Problem, ...]:
     if vehicle is None or not vehicle.driveline.single_speed:
         return ()
     found = find_power_balance(drive, vehicle)
-    return (Problem("battery_current", found.text),) if found is not None else ()
+    return (found.problem,) if found is not None else ()
 
 
 def describe(signal: Signal) -> SignalReport:

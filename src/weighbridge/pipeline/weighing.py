@@ -25,7 +25,7 @@ from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.shaking import shaken
 from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.balance.torque_drift import steadied
-from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
+from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.estimators import ESTIMATORS, MassTrack, Status, joint
 from weighbridge.estimators.joint.bend import bent
 from weighbridge.estimators.joint.changing import in_place_of_loads, largest
@@ -34,6 +34,7 @@ from weighbridge.estimators.joint.foreign import of_another
 from weighbridge.estimators.joint.slow_errors import motion_variance
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
+from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import identify_motion, without_accelerometer
 from weighbridge.pipeline.given import (
@@ -167,27 +168,27 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
 
     ``settings`` are those of the estimator; its defaults when None.
     """
-    warnings = tuple(p.text for p in drive.problems)
+    problems = drive.problems
     alone = ESTIMATORS[method].speed_alone
     seen = without_accelerometer(drive) if ESTIMATORS[method].by_speed else drive
     if not alone:
         vehicle = as_read(vehicle)
     lacking = no_speed(drive) if alone else what_is_missing(drive, vehicle)
     if lacking:
-        return without_mass(drive, vehicle, method, lacking, warnings)
+        return without_mass(drive, vehicle, method, lacking, problems)
     if alone:
         balance = speed_balance(drive, vehicle)
-        warnings += balance.motion.notes + beside_speed(drive)
+        problems += balance.motion.notes + beside_speed(drive)
     else:
         vehicle, found = by_power(seen, vehicle)
         balance, notes = torque_balance(seen, vehicle)
         vehicle, tyres = on_its_tyres(balance, vehicle)
-        if tyres:
+        if tyres is not None:
             balance, notes = torque_balance(seen, vehicle)
             notes = (tyres, *notes)
-        warnings += found + notes + vehicle.provenance.doubts
-        warnings += fitted_for_another(vehicle, method)
-    return weigh_balance(drive, vehicle, method, balance, warnings, settings=settings)
+        problems += found + notes + vehicle.provenance.problems
+        problems += fitted_for_another(vehicle, method)
+    return weigh_balance(drive, vehicle, method, balance, problems, settings=settings)
 
 
 def weigh_balance(
@@ -195,7 +196,7 @@ def weigh_balance(
     vehicle: Vehicle,
     method: str,
     balance: ForceBalance,
-    warnings: tuple[str, ...] = (),
+    problems: tuple[Problem, ...] = (),
     joined: MassTrack | None = None,
     settings: Any = None,
 ) -> Weighing:
@@ -205,25 +206,21 @@ def weigh_balance(
     ----------
     drive, vehicle, method : as of `weigh`
     balance : forces and motion
-    warnings : what is known of the drive
+    problems : what is known of the drive
     joined : what ``joint`` makes of the balance, which judges the other methods; None to find it
     settings : of the estimator; its defaults when None
     """
     estimator = ESTIMATORS[method]
     result = estimator.track(balance, vehicle, settings)
     if settings is not None and (own := differences(settings)):
-        warnings += (f"{method} was run with {own}, not with its defaults",)
+        problems += (Problem.of("method.settings", method=method, own=own),)
     if not estimator.speed_alone:
-        warnings += uncalibrated(vehicle, result)
+        problems += uncalibrated(vehicle, result)
     status, reason = result.status, result.reason
     share = None if estimator.speed_alone else share_on_gears(balance, vehicle)
     if share is not None and share < ENOUGH:
         status = Status.INCONSISTENT
-        reason = (
-            f"only {100.0 * share:.0f} % of the steady ratios of engine to vehicle speed lie at a "
-            f"gearing of {vehicle.name}: the vehicle file is another vehicle's, or its gearings "
-            "are wrong; calibrate this vehicle"
-        )
+        reason = Problem.of("gear.foreign", share=100.0 * share, vehicle=vehicle.name)
     elif not estimator.speed_alone and (
         why := scale_contradiction(balance, vehicle)
         or foreign_part(balance, vehicle)
@@ -247,22 +244,22 @@ def weigh_balance(
             possible = result.possible_change
             given = joined.filter_input
             no_load = in_place_of_loads(given) if given is not None else None
-            doubts = (
+            doubts: tuple[Problem | None, ...] = (
                 doubt,
-                change.doubt if change is not None else "",
-                no_load.doubt if no_load is not None else "",
-                possible.note if possible is not None else "",
+                change.doubt if change is not None else None,
+                no_load.doubt if no_load is not None else None,
+                possible.note if possible is not None else None,
             )
-            warnings += tuple(d for d in doubts if d)
+            problems += tuple(d for d in doubts if d is not None)
     return Weighing(
         drive=drive,
         vehicle=vehicle,
         method=method,
         status=status,
-        reason=reason,
+        refusal=reason,
         result=result,
-        warnings=(
-            *warnings,
+        problems=(
+            *problems,
             *overload(vehicle, result),
             *beyond_class(vehicle, result),
             *below_tare(vehicle, result),
@@ -272,10 +269,10 @@ def weigh_balance(
     )
 
 
-def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> str:
+def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> Problem | None:
     """Say that the torque was smoothed, unless a person vouches for it."""
     if set(source_of(vehicle).found(drive)) & set(drive.info.trusted):
-        return ""
+        return None
     balance, found = track.balance, track.switched
     return smoothed_torque(
         balance,
@@ -286,7 +283,7 @@ def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> str:
 
 
 def without_mass(
-    drive: Drive, vehicle: Vehicle, method: str, reason: str, warnings: tuple[str, ...] = ()
+    drive: Drive, vehicle: Vehicle, method: str, reason: Problem, problems: tuple[Problem, ...] = ()
 ) -> Weighing:
     """Say why a method could not be tried."""
     return Weighing(
@@ -294,9 +291,9 @@ def without_mass(
         vehicle=vehicle,
         method=method,
         status=Status.MISSING_SIGNALS,
-        reason=reason,
+        refusal=reason,
         result=None,
-        warnings=warnings,
+        problems=problems,
     )
 
 
@@ -330,10 +327,10 @@ def _by(weighing: Weighing, method: str, joined: MassTrack | None) -> Weighing:
     try:
         if done is None or _another_balance(weighing, method):
             return weigh_checked(drive, vehicle, method)
-        warnings = fitted_for_another(vehicle, method)
-        return weigh_balance(drive, vehicle, method, done.balance, warnings, joined)
+        notes = fitted_for_another(vehicle, method)
+        return weigh_balance(drive, vehicle, method, done.balance, notes, joined)
     except WeighbridgeError as error:
-        return without_mass(drive, vehicle, method, str(error))
+        return without_mass(drive, vehicle, method, Problem.from_error(error))
 
 
 def _another_balance(weighing: Weighing, method: str) -> bool:
@@ -347,13 +344,13 @@ def _another_balance(weighing: Weighing, method: str) -> bool:
     return len(without_accelerometer(drive).signals) < len(drive.signals)
 
 
-def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[str, ...]]:
+def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[Problem, ...]]:
     """Balance measured or modelled torque against the best motion the drive allows.
 
     Returns
     -------
     balance
-    notes : what was found or doubted, one sentence each
+    notes : what was found and what is uncertain
 
     Raises
     ------
@@ -368,32 +365,22 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
     if delay is None:
         delay = estimate_torque_delay(drive, vehicle, motion, begun)
         if math.isfinite(delay):
-            notes += (f"torque delay {delay:+.2f} s found from this drive",)
+            notes += (Problem.of("torque.delay_found", delay=delay),)
         else:
             delay = 0.0
-            notes += ("the drive does not show how late its torque is; taken as 0 s",)
+            notes += (Problem.of("torque.delay_unknown"),)
     elif vehicle.provenance.torque_fitted:
         later = _other_clock(drive, vehicle, motion, delay, begun)
         if later:
             delay += later
-            notes += (
-                f"torque is {_later(later)} against the motion than in the calibration; "
-                "its clock was moved by that",
-            )
+            notes += (Problem.of("torque.clock_moved", later=_later(later)),)
     if begun is None or begun.delay != delay:
         begun = force_balance(drive, vehicle, motion, delay=delay)
     balance = replace(begun, navigation=navigation)
     if turned_torque(balance, vehicle):
-        raise DriveError(
-            f"{drive.name}: its torque runs against the motion it makes: its sign was turned; set "
-            "factor = -1 for it in the mapping"
-        )
+        raise refused("torque.sign", drive=drive.name)
     if behind := far_shift(balance, vehicle):
-        raise DriveError(
-            f"{drive.name}: its torque lies {_later(-behind)} than the motion it makes, though "
-            "speed and accelerometer were put together: the clock of the speed or of the torque "
-            "alone is off, and the mass would be wrong; record all signals of the bus by one clock"
-        )
+        raise refused("torque.clock_alone", drive=drive.name, later=_later(-behind))
     return balance, notes + other_equipment(vehicle, motion) + balance.notes
 
 
@@ -412,13 +399,9 @@ def _other_clock(
     # As late as the speed beside it: the whole table is, and the shift brings all of it back.
     of_table = motion.speed_delay > CLOCKS_APART and abs(motion.speed_delay - later) < ONE_TABLE
     if abs(later) > CLOCKS_APART and not of_table:
-        raise DriveError(
-            f"{drive.name}: its torque lies {_later(later)} against the motion than in "
-            "the calibration, so that the clocks of its tables differ, "
-            "and the mass would be wrong; give offset_s, or align = true, under [time] in a mapping"
-        )
+        raise refused("clock.torque_apart", drive=drive.name, later=_later(later))
     return later
 
 
 def _later(by: float) -> str:
-    return f"{abs(by):.1f} s {'later' if by > 0.0 else 'earlier'}"
+    return phrase("later" if by > 0.0 else "earlier", by=abs(by))

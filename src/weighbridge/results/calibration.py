@@ -9,7 +9,7 @@ import numpy as np
 
 from weighbridge.balance import ForceBalance
 from weighbridge.constants import HUBER
-from weighbridge.signals import Floats, Ints
+from weighbridge.signals import Floats, Ints, Problem
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.gear import GearDetection
 from weighbridge.vehicle.model import Vehicle
@@ -83,6 +83,7 @@ class Calibration:
     rows : of the fit, by the calibrated vehicle
     search : of the delay of the torque
     held : names of the road parameters that lie on a bound
+    problems : what is uncertain in the calibration
     """
 
     vehicle: Vehicle
@@ -91,6 +92,12 @@ class Calibration:
     rows: FittedRows
     search: DelaySearch
     held: tuple[str, ...]
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Texts of the `problems`."""
+        return tuple(p.text for p in self.problems)
 
     @property
     def figures(self) -> list[Figure]:

@@ -14,7 +14,7 @@ from weighbridge.estimators.track import Status
 from weighbridge.inertia.filter import InertiaTrack, Method, inverse_interval
 from weighbridge.inertia.suspension import SuspensionCheck
 from weighbridge.results.writing import check_level, number, write_track
-from weighbridge.signals import Drive, Floats
+from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.vehicle.model import Ride, Vehicle
 from weighbridge.visible import visible_json
 
@@ -58,26 +58,41 @@ class InertiaResult:
     drive, vehicle : what it was made from
     method : name of the filter
     status : `Status`
-    reason : why there is no mass, one sentence; empty where there is
+    refusal : why there is no mass; None where there is
     track : the filter's parameters over time; None where nothing could be estimated
     suspension : each spring and damper against the vehicle file; None where the ride is
         too short to tell
     model_std : (3,) relative standard deviation beside the filter's: of the vehicle
         file, of what does not fit, and of noise [-]
     segments : parameters between changes of load
-    warnings : what was mended or doubted, one sentence each
+    problems : what was corrected or is uncertain
     """
 
     drive: Drive
     vehicle: Vehicle
     method: Method
     status: Status
-    reason: str
+    refusal: Problem | None
     track: InertiaTrack | None
     suspension: SuspensionCheck | None
     model_std: Floats
     segments: tuple[LoadSegment, ...]
-    warnings: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """Why there is no mass, one sentence; empty where there is."""
+        return "" if self.refusal is None else self.refusal.text
+
+    @property
+    def reason_id(self) -> str | None:
+        """Id of that sentence; None where there is a mass."""
+        return None if self.refusal is None else self.refusal.id
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Texts of the `problems`."""
+        return tuple(p.text for p in self.problems)
 
     @property
     def ride(self) -> Ride:
@@ -213,6 +228,7 @@ class InertiaResult:
             "method": self.method,
             "status": str(self.status),
             "reason": self.reason,
+            "reason_id": self.reason_id,
             **parts,
             "mass_kg": number(self.mass),
             "std_kg": number(self.std),
@@ -238,6 +254,7 @@ class InertiaResult:
                 }
                 for s in (self.segments if self.status is Status.CONVERGED else ())
             ],
+            "problems": [p.to_dict() for p in self.problems],
             "warnings": list(self.warnings),
         }
 

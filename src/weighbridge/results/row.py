@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from weighbridge.estimators import Segment, Status
+from weighbridge.messages import Problem
 from weighbridge.results.writing import number
 from weighbridge.visible import visible_json
 
@@ -21,7 +22,7 @@ class WeighingRow:
     drive, vehicle : names
     start : wall-clock time at which the drive begins, ISO 8601 in UTC; None where it has no date
     method : name of the estimator
-    status, reason, warnings, segments : as of `MassResult`
+    status, refusal, problems, segments : as of `MassResult`
     mass, std : [kg]; NaN where there is no mass
     interval : holds the mass with 95 % probability [kg]
     payload : mass minus the vehicle's tare [kg]; NaN where either is unknown
@@ -34,7 +35,7 @@ class WeighingRow:
     vehicle: str
     method: str
     status: Status
-    reason: str
+    refusal: Problem | None = None
     start: str | None = None
     mass: float = math.nan
     std: float = math.nan
@@ -45,8 +46,23 @@ class WeighingRow:
     converged_at: float = math.nan
     bound_std: float = math.nan
     segments: tuple[Segment, ...] = ()
-    warnings: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
     load_changed: bool = False
+
+    @property
+    def reason(self) -> str:
+        """Why there is no mass, one sentence; empty where there is."""
+        return "" if self.refusal is None else self.refusal.text
+
+    @property
+    def reason_id(self) -> str | None:
+        """Id of that sentence; None where there is a mass."""
+        return None if self.refusal is None else self.refusal.id
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Texts of the `problems`."""
+        return tuple(p.text for p in self.problems)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``weigh --json`` prints: numbers, None where there is no mass."""
@@ -57,6 +73,7 @@ class WeighingRow:
             "method": self.method,
             "status": str(self.status),
             "reason": self.reason,
+            "reason_id": self.reason_id,
             "mass_kg": number(self.mass),
             "std_kg": number(self.std),
             "interval95_kg": [number(bound) for bound in self.interval],
@@ -74,6 +91,7 @@ class WeighingRow:
                 }
                 for s in self.segments
             ],
+            "problems": [p.to_dict() for p in self.problems],
             "warnings": list(self.warnings),
         }
 
@@ -82,8 +100,12 @@ class WeighingRow:
         return visible_json(json.dumps(self.to_dict(), ensure_ascii=False))
 
 
-def unread_row(drive: str, vehicle: str, method: str, reason: str) -> WeighingRow:
+def unread_row(drive: str, vehicle: str, method: str, refusal: Problem | None) -> WeighingRow:
     """Return the row of a drive that could not be used at all."""
     return WeighingRow(
-        drive=drive, vehicle=vehicle, method=method, status=Status.INCONSISTENT, reason=reason
+        drive=drive,
+        vehicle=vehicle,
+        method=method,
+        status=Status.INCONSISTENT,
+        refusal=refusal,
     )

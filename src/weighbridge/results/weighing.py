@@ -14,7 +14,7 @@ from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status
 from weighbridge.results.row import WeighingRow
 from weighbridge.results.writing import check_level, write_track
-from weighbridge.signals import Drive
+from weighbridge.signals import Drive, Problem
 from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.vehicle.model import Vehicle
 
@@ -47,9 +47,9 @@ class MassResult:
     drive, vehicle : what it was made from
     method : name of the estimator
     status : `Status`
-    reason : why there is no mass, one sentence; empty where there is
+    refusal : why there is no mass; None where there is
     result : the estimator's track; None where nothing could be estimated
-    warnings : what was mended or doubted, one sentence each
+    problems : what was corrected or is uncertain
     settings : of the estimator; None for its defaults
     """
 
@@ -57,9 +57,9 @@ class MassResult:
     vehicle: Vehicle
     method: str
     status: Status
-    reason: str
+    refusal: Problem | None
     result: MassTrack | None
-    warnings: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
     settings: object | None = None
 
     def __repr__(self) -> str:
@@ -79,6 +79,21 @@ class MassResult:
         used = f"{self.used_time:.0f} of {self.drive.duration:.0f} s used"
         doubts = plural(len(self.warnings), "warning")
         return head, mass, f"{used}; {doubts}{': ' + self.warnings[0] if self.warnings else ''}"
+
+    @property
+    def reason(self) -> str:
+        """Why there is no mass, one sentence; empty where there is."""
+        return "" if self.refusal is None else self.refusal.text
+
+    @property
+    def reason_id(self) -> str | None:
+        """Id of that sentence; None where there is a mass."""
+        return None if self.refusal is None else self.refusal.id
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Texts of the `problems`."""
+        return tuple(p.text for p in self.problems)
 
     @property
     def estimator(self) -> Estimator:
@@ -176,7 +191,7 @@ class MassResult:
             start=self.drive.began,
             method=self.method,
             status=self.status,
-            reason=self.reason,
+            refusal=self.refusal,
             mass=self.mass,
             std=self.std,
             interval=self.interval(0.95),
@@ -186,7 +201,7 @@ class MassResult:
             converged_at=self.converged_at,
             bound_std=self.result.bound_std if self.result else math.nan,
             segments=self.segments,
-            warnings=self.warnings,
+            problems=self.problems,
             load_changed=self.load_changed,
         )
 

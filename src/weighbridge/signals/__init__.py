@@ -1,7 +1,8 @@
 """Signals, drives and their units: the words everything else is said in."""
 
+from weighbridge.messages import Problem
 from weighbridge.signals.catalogue import QUANTITIES, Quantity
-from weighbridge.signals.drive import Drive, DriveInfo, Problem
+from weighbridge.signals.drive import Drive, DriveInfo
 from weighbridge.signals.signal import Bools, Floats, Ints, Signal
 
 __all__ = [

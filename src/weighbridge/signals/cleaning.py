@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from weighbridge.signals.drive import Problem
+from weighbridge.messages import Problem
 from weighbridge.signals.instants import instant
 from weighbridge.signals.signal import Bools, Floats, Signal
 
@@ -177,16 +177,16 @@ def clean_clock(time: Floats, source: str) -> Clock:
 
     problems = []
     if missing := int(time.size - np.count_nonzero(finite)):
-        problems.append(
-            Problem("", f"{source}: {missing} of {time.size} rows have no time and were left out")
-        )
+        problems.append(Problem.of("clock.no_time", source=source, missing=missing, rows=time.size))
     stray = _strays(time[finite])
     if count := int(np.count_nonzero(stray)):
         problems.append(
-            Problem(
-                "",
-                f"{source}: {count} of {time.size} time stamps lie hours from those around them, "
-                f"such as {time[finite][stray][0]:.6g} s; their rows were left out",
+            Problem.of(
+                "clock.stray",
+                source=source,
+                count=count,
+                rows=time.size,
+                first=time[finite][stray][0],
             )
         )
         finite[finite] = ~stray
@@ -198,22 +198,18 @@ def clean_clock(time: Floats, source: str) -> Clock:
     keep[finite] = good
     lost = int(present.size - np.count_nonzero(good))
     if repeated:
-        problems.append(
-            Problem(
-                "",
-                f"{source}: {repeated} of {time.size} time stamps repeat the one before; "
-                "of such rows the first value of each column was kept",
-            )
-        )
+        problems.append(Problem.of("clock.repeated", source=source, count=repeated, rows=time.size))
     if lost > repeated:
         at = int(np.argmin(step))
         back = f"{-step[at]:.6g} s" if step[at] < 0.0 else "0 s"
         problems.append(
-            Problem(
-                "",
-                f"{source}: the clock runs backwards (by up to {back}, at {instant(present[at])}); "
-                f"{lost - repeated} of {time.size} rows were left out; "
-                "split the file there if it holds two recordings",
+            Problem.of(
+                "clock.backwards",
+                source=source,
+                back=back,
+                at=instant(present[at]),
+                lost=lost - repeated,
+                rows=time.size,
             )
         )
     return Clock(time[keep], keep, tuple(problems))
@@ -324,17 +320,11 @@ def clean_columns(
         order, by = np.argsort(time, kind="stable"), f"sorted by {name}, not by time"
     if order is not None:
         time, columns = time[order], [(name, raw[order]) for name, raw in columns]
-        problems.append(Problem("", f"{source}: the rows are {by}; they were sorted"))
+        problems.append(Problem.of("clock.sorted", source=source, by=by))
     coarse = spread_rows(time)
     if coarse is not None:
         time, step = coarse
-        problems.append(
-            Problem(
-                "",
-                f"{source}: time stamps come in steps of {step:g} s and several rows share one; "
-                "they were spread evenly over the step",
-            )
-        )
+        problems.append(Problem.of("clock.coarse", source=source, step=step))
     columns = _first_present(time, columns)
     clock = clean_clock(time, source)
     problems += clock.problems
@@ -349,14 +339,12 @@ def clean_columns(
             continue
         if infinite := int(np.count_nonzero(np.isinf(values))):
             problems.append(
-                Problem(
-                    name,
-                    f"{source}: {infinite} of {values.size} values of {name} are infinite "
-                    "and were left out",
+                Problem.of(
+                    "file.infinite", name, source=source, count=infinite, samples=values.size
                 )
             )
         if not finite.any():
-            problems.append(Problem(name, f"{source}: {name} has no value in any row"))
+            problems.append(Problem.of("file.empty_column", name, source=source))
             continue
         if mask is None or not np.array_equal(mask, finite):
             mask, masked_time = finite, clock.time[finite]

@@ -9,15 +9,14 @@ from typing import Final
 
 from weighbridge.arguments import (
     check_all,
-    check_flag,
     check_number,
     check_text,
     check_texts,
     check_type,
 )
+from weighbridge.messages import Problem
 from weighbridge.signals.shown import at_rate, in_html, in_lines, plural
 from weighbridge.signals.signal import Signal
-from weighbridge.visible import cut
 
 _NUMBERS: Final = (
     "mass",
@@ -62,30 +61,6 @@ class DriveInfo:
         for name in _NUMBERS:
             check_number(name, getattr(self, name), optional=True)
         check_texts("trusted", self.trusted)
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """A fault of a drive that was mended, or that the user must correct.
-
-    Attributes
-    ----------
-    signal : name of the signal, or empty for the whole drive
-    text : one sentence with the value and the remedy
-    serious : a mass could be wrong because of it, so `weigh` refuses the drive
-
-    The text is cut to what a screen shows: what it quotes of a file may be endless.
-    """
-
-    signal: str
-    text: str
-    serious: bool = False
-
-    def __post_init__(self) -> None:
-        check_text("signal of a problem", self.signal)
-        check_text("text of a problem", self.text)
-        check_flag("serious", self.serious)
-        object.__setattr__(self, "text", cut(self.text))
 
 
 @dataclass(frozen=True, slots=True, repr=False)

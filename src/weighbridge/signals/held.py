@@ -6,8 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.messages import Problem
 from weighbridge.signals.catalogue import QUANTITIES
-from weighbridge.signals.drive import Drive, Problem
+from weighbridge.signals.drive import Drive
 from weighbridge.signals.signal import Bools, Floats, Signal
 
 FIXES: Final = "gnss"
@@ -82,8 +83,8 @@ def without_repeats(drive: Drive) -> Drive:
         table = QUANTITIES[name].table
         if len(signal) < 2 or table == ELSEWHERE or name in drive.info.trusted:
             continue
-        clock = signal.time[[0, -1]].tobytes() if table == FIXES else name.encode()
-        together.setdefault((clock, len(signal)), []).append(signal)
+        shared = signal.time[[0, -1]].tobytes() if table == FIXES else name.encode()
+        together.setdefault((shared, len(signal)), []).append(signal)
     kept: list[Signal] = []
     problems: list[Problem] = []
     for signals in together.values():
@@ -98,12 +99,8 @@ def without_repeats(drive: Drive) -> Drive:
         clock = time[new]
         kept += [Signal(s.name, clock, s.values[new]) for s in signals]
         if period > _SLOW and len(signals) == 1:
-            name, usual = signals[0].name, signals[0].period
+            name = signals[0].name
             problems.append(
-                Problem(
-                    name,
-                    f"{name} is sampled every {usual:.3g} s and renewed every {period:.2g} s "
-                    "only: the repeats are left out; poll it as fast as it is renewed",
-                )
+                Problem.of("range.repeats", name, period=signals[0].period, renewed=period)
             )
     return drive.with_signals(*kept).with_problems(*problems) if kept else drive

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.constants import EARTH_RADIUS
-from weighbridge.signals.drive import Drive, Problem
+from weighbridge.messages import Problem
+from weighbridge.signals.drive import Drive
 from weighbridge.signals.instants import span
 from weighbridge.signals.signal import Floats, Signal
 
@@ -111,10 +112,16 @@ def numbered(name: str, parts: Sequence[Drive], why: str, idle: int = 0) -> tupl
     left = f"; {idle} part(s) in which the vehicle hardly moves are left out" if idle else ""
     return tuple(
         replace(part, name=f"{name} part {k} of {len(parts)}").with_problems(
-            Problem(
-                "",
-                f"{name} holds {len(parts)} drives, parted by {why}; this is drive {k}, from "
-                f"{span(round(part.start), round(part.end))}{left}",
+            Problem.of(
+                "file.part",
+                start=part.start,
+                end=part.end,
+                name=name,
+                parts=len(parts),
+                why=why,
+                k=k,
+                span=span(round(part.start), round(part.end)),
+                left=left,
             )
         )
         for k, part in enumerate(parts, start=1)

@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.messages import Problem
 from weighbridge.signals.catalogue import QUANTITIES
 from weighbridge.signals.cleaning import NO_DRIVE, clean_columns
-from weighbridge.signals.drive import Drive, Problem
+from weighbridge.signals.drive import Drive
 from weighbridge.signals.instants import instant
 from weighbridge.signals.signal import Floats, Signal
 
@@ -230,10 +231,8 @@ def _told(
         k = min(moved)
         at = _end(parts[k])
         problems.append(
-            Problem(
-                "",
-                f"the clock jumps by {_start(parts[k + 1]) - at:.6g} s after {instant(at)} while "
-                "the vehicle moves on; the parts were joined there",
+            Problem.of(
+                "clock.jump_joined", start=at, end=at, by=_start(parts[k + 1]) - at, at=instant(at)
             )
         )
     lost: dict[str, int] = {}
@@ -247,11 +246,15 @@ def _told(
         side = "after" if k == best else "before"
         rows = " and ".join(f"{n} of {table}" for table, n in lost.items())
         problems.append(
-            Problem(
-                "",
-                f"the clock jumps by {beyond - at:.6g} s after {instant(at)}; the part of "
-                f"{end - start:.0f} s {side} that was taken and the other rows ({rows}) were "
-                "left out: correct their time stamps, or cut the recording there",
+            Problem.of(
+                "clock.jump_cut",
+                start=start,
+                end=end,
+                by=beyond - at,
+                at=instant(at),
+                length=end - start,
+                side=side,
+                rows=rows,
             )
         )
     return problems

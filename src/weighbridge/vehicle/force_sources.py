@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.torque_source import MOTOR_BETWEEN_STD, REPORTED, TorqueConstants
 
@@ -69,31 +70,25 @@ def _fresh(signal: Signal, time: Floats) -> Floats:
     return np.where(signal.age(time) <= OLDEST * signal.period, signal.at(time), np.nan)
 
 
-def _unmeasured(drive: Drive, driven: str | None) -> str:
-    """Say which driven wheels were not measured, in a sentence; empty where all were."""
+def _unmeasured(drive: Drive, driven: str | None) -> Problem | None:
+    """Say which driven wheels were not measured, None where all were."""
     if drive.has("wheel_torque"):
-        return ""
+        return None
     measured = [axle for axle in _AXLES if _measured_of(drive, axle)]
     if len(measured) == len(_AXLES) or measured == [driven]:
-        return ""
+        return None
     if not measured:
         single = [n for parts in _AXLES.values() for n in parts if drive.has(n)]
-        return (
-            f"{' and '.join(single)} alone: the torque of the other wheel of the axle is not "
-            "known, so there is no absolute mass; record both"
-        )
+        return Problem.of("torque.one_wheel", names=" and ".join(single))
     axle = measured[0]
     other = "rear" if axle == "front" else "front"
     if driven is None:
-        return (
-            f"only the torque of the {axle} axle was recorded, and the vehicle file does not say "
-            f"whether the {other} one is driven, so there is no absolute mass; state driven = "
-            f'"{axle}" under [driveline] if it is not, or record wheel_torque_{other} too'
-        )
-    return (
-        f"only the torque of the {axle} axle was recorded, and "
-        f"{'both axles are' if driven == 'all' else f'the {other} axle is'} driven: what the "
-        f"others push is not known, so there is no absolute mass; record wheel_torque_{other} too"
+        return Problem.of("torque.driven_unknown", axle=axle, other=other)
+    return Problem.of(
+        "torque.other_axle",
+        axle=axle,
+        driven=phrase("both_axles") if driven == "all" else phrase("one_axle", axle=other),
+        other=other,
     )
 
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from scipy.signal import find_peaks
 
-from weighbridge.errors import DriveError
+from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats, Ints
 
 LOWEST_GEARING: Final = 3.0
@@ -136,24 +136,15 @@ def detect_gearings(
     )
     kept = usable & steady(time, gearing, width + 0.5 * speed_step / np.maximum(speed, 1.0))
     if np.count_nonzero(kept) < 30:
-        raise DriveError(
-            f"no gear ratio can be found: only {np.count_nonzero(kept)} samples with a steady "
-            "ratio of engine to vehicle speed; record a longer drive with several gears"
-        )
+        raise refused("gear.few_samples", count=np.count_nonzero(kept))
     blur = np.hypot(width, 0.29 * speed_step / speed[kept])
     grid, density = ratio_density(gearing[kept], width / blur, width=width)
     peaks = _standing_out(grid, density, width, most)
     if peaks.size == 0:
-        raise DriveError(
-            "no gear ratio stands out from engine over vehicle speed: the drive is too short, "
-            "or the gearbox is stepless"
-        )
+        raise refused("gear.none")
     near = np.abs(np.log(gearing[kept][:, None] / grid[peaks])).min(axis=1) < 2.0 * width
     if np.mean(near) < MOSTLY_IN_GEAR:
-        raise DriveError(
-            f"only {100.0 * np.mean(near):.0f} % of the samples lie at a gear ratio that stands "
-            "out: the gearbox is stepless, or engine and vehicle speed do not belong together"
-        )
+        raise refused("gear.unclear", share=100.0 * np.mean(near))
     values, stds, counts = [], [], []
     for centre in grid[peaks]:
         refined, std, count = _refine(gearing[kept], speed[kept], centre, width, speed_step)

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.data_sheet import by_data_sheet, torque_std
 from weighbridge.vehicle.force_sources import SLOWEST_POWER
@@ -88,19 +89,32 @@ class PowerBalance:
         return -LEAST_LOSS - 2.0 * self.noise_std <= loss <= HIGHEST_LOSS
 
     @property
-    def text(self) -> str:
-        """What was found, one sentence."""
-        found = (
-            f"battery power: of what changes within a minute the motor gives "
-            f"{100.0 * self.driving:.1f} % driving, and {100.0 * self.recuperating:.1f} % comes "
-            "back recuperating"
+    def problem(self) -> Problem:
+        """What was found."""
+        return Problem.of(
+            "battery.scale" if self.possible else "battery.impossible",
+            "battery_current",
+            **self._found,
         )
-        if not self.possible:
-            return (
-                f"{found}, which no motor's losses explain: battery voltage or current, motor "
-                "torque or gearing are wrong, and nothing is taken from it"
-            )
-        return f"{found}, so the torque reads {self.scale:.3f} ± {self.std:.3f} of what it is"
+
+    def weighed(self, scale: float, std: float, *, unusual: bool) -> Problem:
+        """Say what was found, and the scale with the data sheet by which the torque is divided."""
+        return Problem.of(
+            "battery.unusual" if unusual else "battery.divided",
+            "battery_current",
+            **self._found,
+            with_sheet=scale,
+            with_sheet_std=std,
+        )
+
+    @property
+    def _found(self) -> dict[str, Any]:
+        return {
+            "driving": 100.0 * self.driving,
+            "recuperating": 100.0 * self.recuperating,
+            "scale": self.scale,
+            "std": self.std,
+        }
 
 
 def find_power_balance(drive: Drive, vehicle: Vehicle) -> PowerBalance | None:
@@ -158,7 +172,7 @@ def find_power_balance(drive: Drive, vehicle: Vehicle) -> PowerBalance | None:
     )
 
 
-def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
+def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[Problem, ...]]:
     """Narrow the scale of a data sheet's torque by the power of the battery.
 
     The torque is divided by the mean of its scale by battery and by data sheet, each
@@ -169,7 +183,7 @@ def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
     -------
     vehicle : as it was where nothing was found, the torque was calibrated, or the vehicle file
         says how sure its masses or its torque are
-    notes : what was found, one sentence each
+    notes : what was found
     """
     stated = vehicle.provenance.mass_scale_std, vehicle.torque.scale_std
     electric = by_data_sheet(vehicle) and vehicle.driveline.single_speed
@@ -177,15 +191,14 @@ def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
         return vehicle, ()
     found = find_power_balance(drive, vehicle)
     if found is None or not found.possible:
-        return vehicle, (found.text,) if found else ()
+        return vehicle, (found.problem,) if found else ()
     usual = torque_std(vehicle)
     weight = usual**2 / (usual**2 + found.std**2)
     scale = 1.0 + weight * (found.scale - 1.0)
     std = math.sqrt(weight) * found.std
-    note = f"{found.text}; with the data sheet {scale:.3f} ± {{:.3f}}, by which it is divided"
-    if abs(found.scale - 1.0) > CONTRADICTION * math.hypot(usual, found.std):
+    unusual = abs(found.scale - 1.0) > CONTRADICTION * math.hypot(usual, found.std)
+    if unusual:
         std = math.hypot(std, found.scale - scale)
-        note += "; a motor's torque is seldom so far off: check gearing, radius and battery current"
     offset, slope, *powers = vehicle.torque.coefficients or (0.0, 1.0)
     model = replace(
         vehicle.torque,
@@ -193,7 +206,7 @@ def by_power(drive: Drive, vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
         coefficient_stds=(),
         scale_std=std,
     )
-    return replace(vehicle, torque=model), (note.format(std),)
+    return replace(vehicle, torque=model), (found.weighed(scale, std, unusual=unusual),)
 
 
 def _rows(drive: Drive, vehicle: Vehicle) -> tuple[Floats, Floats, Floats, Bools] | None:

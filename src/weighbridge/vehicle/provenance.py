@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from weighbridge.errors import ConfigError
+from weighbridge.messages import Problem
 from weighbridge.vehicle.fits import FITS, Fit
 from weighbridge.vehicle.possible import MASSES, not_negative, within
 
@@ -34,7 +35,8 @@ class Provenance:
         rolling coefficient, engine and wheel inertia; empty where it is not known
     dbc : DBC files that the drives were read with and no mapping names, seen from the file's folder
     notes : free text
-    doubts : of the masses of the calibration, told at each weighing
+    doubts : findings about the masses of the calibration, repeated at each weighing: each the
+        id of its message, a colon and its text
     """
 
     drives: tuple[str, ...] = ()
@@ -68,6 +70,11 @@ class Provenance:
         if self.method is not None and self.method not in FITS:
             *most, last = FITS
             raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """Return ``doubts`` as messages; those of files of before have no id of their own."""
+        return tuple(Problem.from_line(line) for line in self.doubts)
 
     @property
     def fit(self) -> Fit | None:

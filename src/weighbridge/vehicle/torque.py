@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from weighbridge.errors import DriveError
+from weighbridge.messages import refused
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TorqueSource
@@ -55,9 +55,12 @@ def source_signal(drive: Drive, vehicle: Vehicle) -> Signal:
     source = source_of(vehicle)
     missing = source.lacking(drive)
     if missing:
-        raise DriveError(
-            f"{drive.name}: no {' and no '.join(missing)}, which torque source {source.name!r} of "
-            f"vehicle {vehicle.name!r} needs; record it, or use a vehicle file with another source"
+        raise refused(
+            "torque.missing",
+            drive=drive.name,
+            missing=" and no ".join(missing),
+            source=source.name,
+            vehicle=vehicle.name,
         )
     return source.carrier(drive)
 

@@ -9,6 +9,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats, Signal
 
 
@@ -50,8 +51,8 @@ class TorqueTerms:
     knot: float
 
 
-def _no_refusal(drive: Drive, driven: str | None) -> str:
-    return ""
+def _no_refusal(drive: Drive, driven: str | None) -> Problem | None:
+    return None
 
 
 def _no_floor(values: Floats) -> float:
@@ -77,7 +78,7 @@ class TorqueSource:
     efficiency : slope of wheel force over reading where nothing was calibrated, and its standard
         deviation [-]; None for that of the driveline
     by_radius : the force hangs on the rolling radius
-    refusal : says in a sentence why a drive has no mass by it, of a vehicle whose driven axles are
+    refusal : says why a drive has no mass by it, of a vehicle whose driven axles are
         "front", "rear", "all" or unknown; empty where it has one
     reading : what torque is proportional to [N m], or a share where ``needs_map``
     signed : the reading is a torque as the vehicle computed it, which tells what a dragged engine
@@ -113,7 +114,7 @@ class TorqueSource:
     before_motor: bool = False
     efficiency: tuple[float, float] | None = None
     by_radius: bool = True
-    refusal: Callable[[Drive, str | None], str] = _no_refusal
+    refusal: Callable[[Drive, str | None], Problem | None] = _no_refusal
     reading: Reading
     signed: bool
     needs_map: bool = False

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.constants import PETROL_HEATING_VALUE, PETROL_STOICHIOMETRIC_RATIO
-from weighbridge.errors import DriveError
+from weighbridge.messages import refused
 from weighbridge.registry import Registry
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.vehicle.force_sources import (
@@ -106,10 +106,7 @@ def _reference(drive: Drive, time: Floats, model: TorqueConstants) -> Floats:
             last = np.searchsorted(reference.time, time, side="right") - 1
             return np.asarray(reference.values[np.maximum(last, 0)])
     if model.reference_torque is None:
-        raise DriveError(
-            f"{drive.name}: percent torque without a reference torque; give "
-            "reference_torque_nm in the drive or under [torque] in the vehicle file"
-        )
+        raise refused("torque.no_reference", drive=drive.name)
     return np.full(time.size, model.reference_torque)
 
 

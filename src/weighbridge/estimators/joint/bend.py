@@ -16,6 +16,7 @@ from weighbridge.balance.law import traction_gain
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput
 from weighbridge.kernels import disturbance
+from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
@@ -102,8 +103,8 @@ def torque_bend(given: FilterInput, force: Floats, knee: float) -> TorqueBend:
     return TorqueBend(float(state.x[count]), std, knee)
 
 
-def bent(bend: TorqueBend | None, drive: Drive, vehicle: Vehicle) -> str:
-    """Say that the torque bends otherwise than in the calibration, in a sentence; empty if not.
+def bent(bend: TorqueBend | None, drive: Drive, vehicle: Vehicle) -> Problem | None:
+    """Say that the torque bends otherwise than in the calibration, None if not.
 
     Only a refined fit has found the bends that the reading always has. A torque that a person
     vouches for is not doubted.
@@ -115,16 +116,13 @@ def bent(bend: TorqueBend | None, drive: Drive, vehicle: Vehicle) -> str:
     """
     fit, source = vehicle.provenance.fit, source_of(vehicle)
     if bend is None or fit is None or not fit.refined:
-        return ""
+        return None
     if set(source.found(drive)) & set(drive.info.trusted):
-        return ""
+        return None
     least = BENT if bend.part > 0.0 else TOO_MUCH
     if abs(bend.part) <= max(least, SURE * bend.std):
-        return ""
+        return None
     less = "less" if bend.part > 0.0 else "more"
-    return (
-        f"above {bend.knee:.0f} N m {source.title} tells {100.0 * abs(bend.part):.0f} % {less} of "
-        "the torque than below, otherwise than in the calibration: another motor or an assist, a "
-        "new map of the engine, values that are held, or a speed or accelerometer that is filtered "
-        "or bent; record what was calibrated, or calibrate again"
+    return Problem.of(
+        "torque.bent", knee=bend.knee, source=source.title, share=100.0 * abs(bend.part), less=less
     )

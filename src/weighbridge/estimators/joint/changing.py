@@ -10,6 +10,7 @@ import numpy as np
 from weighbridge.estimators.joint.load_stops import loadable
 from weighbridge.estimators.joint.problem import FilterInput
 from weighbridge.kernels import disturbance
+from weighbridge.messages import Problem, phrase
 from weighbridge.navigation.motion import MotionSource
 from weighbridge.signals import Floats
 from weighbridge.signals.instants import instant, span
@@ -52,12 +53,10 @@ AS_WELL: Final = 0.0
 one as well as the other [-]."""
 
 ALIKE_BY_SPEED: Final[dict[MotionSource, str]] = {
-    "speed_grade": "; no accelerometer tells the motion here, and errors of the heights or of the "
-    "torque's calibration may look alike: record one, and calibrate with it",
-    "speed": "; no grade and no height was recorded here, and hills look alike: record the height, "
-    "and calibrate with it",
+    "speed_grade": "load.change_by_heights",
+    "speed": "load.change_by_speed",
 }
-"""What is added to a change of the torque's scale that speed alone shows, by what is beside it."""
+"""What looks alike where speed alone shows a change of the torque's scale, by what is beside it."""
 
 QUICK: Final = 60.0
 """Where every stop with a change of load was longer, somebody loaded [s]."""
@@ -88,41 +87,29 @@ class ScaleChange:
         return self._large and self.gain > SURE
 
     @property
-    def doubt(self) -> str:
-        """What may be wrong, in a sentence, where a change is likely and not sure; else empty."""
+    def doubt(self) -> Problem | None:
+        """What may be wrong where a change is likely and not sure; else None."""
         if not self._large or self.sure:
-            return ""
+            return None
         if self.gain > DOUBTFUL:
-            return f"perhaps {self.text}; the mass may be wrong by as much"
-        if self.over_one <= SURE:
-            return ""
-        return (
-            f"perhaps the load changed at a stop that was not taken for one, or {self.text}; the "
-            "mass may be wrong by as much"
-        )
+            return self._found("load.change_doubtful")
+        return self._found("load.change_or_stop") if self.over_one > SURE else None
 
-    def refusal(self, motion: MotionSource) -> str:
+    def refusal(self, motion: MotionSource) -> Problem:
         """What is wrong where it is sure, and what looks alike by that source of the motion."""
-        return self.text + ALIKE_BY_SPEED.get(motion, "")
+        return self._found(ALIKE_BY_SPEED.get(motion, "load.change_moving"))
 
     @property
     def _large(self) -> bool:
         return abs(self.change) > max(LEAST, SIGNIFICANT * self.std)
 
-    @property
-    def text(self) -> str:
-        """What is wrong, in a sentence."""
+    def _found(self, id: str) -> Problem:
         when = (
-            f"at {instant(self.start)}"
+            phrase("at_instant", at=instant(self.start))
             if self.end == self.start
-            else f"from {span(self.start, self.end)}"
+            else phrase("from_to", span=span(self.start, self.end))
         )
-        return (
-            f"the mass changes by {100.0 * self.change:+.0f} % about {when} while the vehicle "
-            "drives, where no load can change: the torque or load that was recorded, the speed or "
-            "the accelerometer is wrong before or after it; cut the recording there, and weigh the "
-            "part that is right"
-        )
+        return Problem.of(id, start=self.start, end=self.end, change=100.0 * self.change, when=when)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,19 +134,22 @@ class NoLoad:
     stood: float
 
     @property
-    def doubt(self) -> str:
-        """What may be wrong, in a sentence; empty where it was loading."""
+    def doubt(self) -> Problem | None:
+        """What may be wrong; None where it was loading."""
         if self.gain < AS_WELL or self.stood > QUICK:
-            return ""
+            return None
         if abs(self.change) <= max(LEAST, SIGNIFICANT * self.std):
-            return ""
-        size = f"{100.0 * abs(self.change):.0f} % {'less' if self.change < 0.0 else 'more'}"
-        how = "goes evenly to" if self.ramp else "is"
-        return (
-            f"from {span(round(self.start), round(self.end))} the mass {how} {size}: by loads that "
-            f"changed in stops, of {self.stood:.0f} s the shortest, or because the torque or load "
-            "that was recorded tells as much of it; the drive fits either; if no load was changed, "
-            "the mass may be wrong by as much: cut the recording there"
+            return None
+        size = phrase("less" if self.change < 0.0 else "more", share=100.0 * abs(self.change))
+        how = phrase("goes_evenly") if self.ramp else "is"
+        return Problem.of(
+            "load.scale_or_load",
+            start=self.start,
+            end=self.end,
+            span=span(round(self.start), round(self.end)),
+            how=how,
+            size=size,
+            stood=self.stood,
         )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from weighbridge.estimators.joint.slow_errors import NAMES, prior_std
 from weighbridge.estimators.track import MassTrack
+from weighbridge.messages import Problem
 from weighbridge.vehicle.model import Vehicle
 
 FARTHEST: Final = 8.0
@@ -40,8 +41,8 @@ def stretched(track: MassTrack, vehicle: Vehicle) -> float:
     return float(np.hypot(resistance, drag))
 
 
-def of_another(vehicle: Vehicle, track: MassTrack) -> tuple[bool, str]:
-    """Say why the vehicle file is another vehicle's, in a sentence; nothing if it may be its own.
+def of_another(vehicle: Vehicle, track: MassTrack) -> tuple[bool, Problem | None]:
+    """Say why the vehicle file is another vehicle's; nothing if it may be its own.
 
     Only files of a refined fit can tell: a data sheet leaves more open, and fits
     for others put their road load elsewhere.
@@ -54,16 +55,12 @@ def of_another(vehicle: Vehicle, track: MassTrack) -> tuple[bool, str]:
     Returns
     -------
     refused : whether there is no mass for it
-    doubt : one sentence; empty where nothing is doubted
+    doubt : None where nothing is uncertain
     """
     fit = vehicle.provenance.fit
     if fit is None or not fit.refined:
-        return False, ""
+        return False, None
     far = stretched(track, vehicle)
     if far <= DOUBTFUL:
-        return False, ""
-    return far > FARTHEST, (
-        f"the drive takes resistance and air drag {far:.1f} standard deviations from those of "
-        f"{vehicle.name}: the vehicle file is another vehicle's, or much has changed since it was "
-        "calibrated; calibrate this vehicle"
-    )
+        return False, None
+    return far > FARTHEST, Problem.of("vehicle.foreign", far=far, vehicle=vehicle.name)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput, load_params
 from weighbridge.estimators.joint.settings import JointSettings
 from weighbridge.kernels import disturbance
+from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Floats
 from weighbridge.signals.instants import instant
 
@@ -46,22 +47,33 @@ class PossibleChange:
     difference: float = math.nan
 
     @property
-    def note(self) -> str:
-        """What may be, in a sentence; empty where it is improbable."""
+    def note(self) -> Problem | None:
+        """What may be; None where it is improbable."""
         told = []
+        at = []
         if self.probability >= WORTH_TELLING:
+            at.append(self.time)
             told.append(
-                f"with a probability of {100.0 * self.probability:.0f} % the load changed at a "
-                f"stop, most likely before {instant(float(round(self.time)))}: the mass would be "
-                f"{abs(self.difference):.0f} kg {'more' if self.difference > 0.0 else 'less'} than "
-                "without"
+                phrase(
+                    "load_may_have_changed",
+                    share=100.0 * self.probability,
+                    at=instant(float(round(self.time))),
+                    size=abs(self.difference),
+                    word="more" if self.difference > 0.0 else "less",
+                )
             )
         if self.none >= WORTH_TELLING:
+            at.append(self.doubtful_time)
             told.append(
-                f"with a probability of {100.0 * self.none:.0f} % the load did not change before "
-                f"{instant(float(round(self.doubtful_time)))}, where a change was found"
+                phrase(
+                    "load_may_not_have_changed",
+                    share=100.0 * self.none,
+                    at=instant(float(round(self.doubtful_time))),
+                )
             )
-        return f"{'; '.join(told)}; mass and interval allow for it" if told else ""
+        if not told:
+            return None
+        return Problem.of("load.possible", start=min(at), end=max(at), told="; ".join(told))
 
 
 class Averaged(NamedTuple):

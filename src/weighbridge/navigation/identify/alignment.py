@@ -10,8 +10,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import DriveError
 from weighbridge.kernels.rotation import euler_to_matrix
+from weighbridge.messages import Problem, refused
 from weighbridge.navigation.aiding import Fixes, interpolated, resample, speed_from_fixes
 from weighbridge.navigation.even import Even, coarsely
 from weighbridge.navigation.identify.mounting import (
@@ -69,13 +69,13 @@ class Alignment:
 
 def align(
     fine: Even, reference: Signal, mounting: Mounting | None
-) -> tuple[Alignment, tuple[str, ...]]:
+) -> tuple[Alignment, tuple[Problem, ...]]:
     """Find how the sensor sits and how late the speed is, from a whole drive.
 
     Returns
     -------
     alignment
-    notes : sentences on what was not found
+    notes : what was not found
 
     Raises
     ------
@@ -83,7 +83,7 @@ def align(
         The drive is too quiet, or units or axes do not fit together.
     """
     coarse_imu = coarsely(fine, COARSE_PERIOD)
-    found, notes = _prior(mounting), []
+    found, notes = _prior(mounting), list[Problem]()
     coarse = None
     for _ in range(2):
         shifted = undelayed(reference, found.speed_delay)
@@ -95,7 +95,7 @@ def align(
             coarse = None
         if coarse is not None:
             found, moved = _merged(found, coarse)
-            if moved:
+            if moved is not None:
                 notes.append(moved)
         forward = fine.values[:, :3] @ found.rot_bs[0]
         delay, std = estimate_speed_delay(fine.time, forward, reference)
@@ -104,7 +104,7 @@ def align(
         nod = _nod(coarse_imu, coarse, undelayed(reference, found.speed_delay))
         _check_speed_unit(coarse, reference, nod)
     if found.speed_delay == 0.0:
-        notes.append("the drive does not show how late its vehicle speed is; taken as 0 s")
+        notes.append(Problem.of("speed.delay_unknown", "vehicle_speed"))
     return found, tuple(notes)
 
 
@@ -125,20 +125,17 @@ def _coarse(imu: Even, speed: Signal) -> CoarseMounting:
     return coarse_mounting(imu.values[:, :3], imu.values[:, 3:], at, COARSE_PERIOD, at < 0.05)
 
 
-def _merged(found: Alignment, coarse: CoarseMounting) -> tuple[Alignment, str]:
+def _merged(found: Alignment, coarse: CoarseMounting) -> tuple[Alignment, Problem | None]:
     """Take the coarse mounting where none is known, or where it is surely another one."""
     bias = coarse.yaw_rate_bias
     own = Alignment(coarse.rot_bs, coarse.tilt_std, coarse.yaw_std, bias, found.speed_delay, None)
     if found.given is None:
-        return own, ""
+        return own, None
     angle = math.acos(np.clip(0.5 * (np.trace(found.rot_bs @ coarse.rot_bs.T) - 1.0), -1, 1))
     unsure = math.hypot(coarse.yaw_std, coarse.tilt_std, found.tilt_std, found.yaw_std)
     if angle <= max(MOST_MOVED, _MOVED_SURE * unsure):
-        return replace(found, yaw_rate_bias=bias), ""
-    return own, (
-        f"the sensor sits {math.degrees(angle):.0f} deg from the mounting given: "
-        "it was moved, and its mounting is found from this drive alone"
-    )
+        return replace(found, yaw_rate_bias=bias), None
+    return own, Problem.of("imu.mounting_moved", angle=math.degrees(angle))
 
 
 def _nod(imu: Even, coarse: CoarseMounting, speed: Signal) -> float:
@@ -171,15 +168,13 @@ def _check_speed_unit(coarse: CoarseMounting, reference: Signal, nod: float) -> 
         return
     felt = GRAVITY * nod / (coarse.forward_gain - 1.0)
     if _NODS[0] < felt < _NODS[1]:
-        raise DriveError(
-            f"the inertial sensor turns by {math.degrees(abs(nod)):.1f} deg per m/s^2 as the "
-            f"vehicle accelerates, and reads {coarse.forward_gain:.2f} of what {reference.name} "
-            "changes by: its holder gives way; fix the sensor to the body and record again"
+        raise refused(
+            "imu.mount_loose",
+            nod=math.degrees(abs(nod)),
+            gain=coarse.forward_gain,
+            speed=reference.name,
         )
-    raise DriveError(
-        f"{reference.name} changes by {1.0 / coarse.forward_gain:.2f} of what the "
-        "accelerometer shows: set its unit (kmh, mph or mps) in the mapping"
-    )
+    raise refused("speed.unit_of_accel", speed=reference.name, ratio=1.0 / coarse.forward_gain)
 
 
 def gnss_delay(drive: Drive, fine: Even, fixes: Fixes | None, rot_bs: Floats) -> float:

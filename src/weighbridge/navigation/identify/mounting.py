@@ -11,6 +11,7 @@ import numpy as np
 
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
+from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Bools, Floats
 
 _LOG = logging.getLogger(__name__)
@@ -78,10 +79,7 @@ def coarse_mounting(
     """
     ok = np.isfinite(accel).all(axis=1) & np.isfinite(gyro).all(axis=1)
     if ok.sum() < 10:
-        raise DriveError(
-            f"accel_x..z and gyro_x..z overlap for only {ok.sum() * period:.0f} s: "
-            "check their time stamps"
-        )
+        raise refused("imu.overlap", overlap=ok.sum() * period)
     gravity = np.median(accel[ok], axis=0)
     _check_gravity(float(np.linalg.norm(np.mean(accel[ok], axis=0))))
     down = -gravity / np.linalg.norm(gravity)
@@ -103,9 +101,8 @@ def coarse_mounting(
     axis = w1 * forward + w2 * np.cross(right, down)
     yaw_std = 1.0 / math.sqrt(w1 + w2)
     if yaw_std > 0.3 or np.linalg.norm(axis) / (w1 + w2) < 3.0 * yaw_std:
-        raise TooLittleMotionError(
-            "the drive holds too little acceleration to find the sensor's forward axis "
-            f"(uncertain by {math.degrees(yaw_std):.0f} deg): give the mounting in the vehicle file"
+        raise Problem.of("motion.no_forward", serious=True, std=math.degrees(yaw_std)).error(
+            TooLittleMotionError
         )
     axis /= np.linalg.norm(axis)
     rot = np.vstack([axis, np.cross(down, axis), down])
@@ -143,9 +140,8 @@ def _moving_rows(
         & (v > 1.0)
     )
     if rows.sum() * period < 8.0:
-        raise TooLittleMotionError(
-            f"the vehicle moves for only {rows.sum() * period:.0f} s, too little to find how "
-            "the inertial sensor is mounted: give the mounting in the vehicle file"
+        raise Problem.of("motion.too_little", serious=True, moving=rows.sum() * period).error(
+            TooLittleMotionError
         )
     return smooth_accel[rows], smooth_gyro[rows], rate[rows], v[rows]
 
@@ -199,11 +195,8 @@ def _most_gain(force: Floats, rate: Floats, weight: Floats) -> float:
 def _check_gravity(size: float) -> None:
     """Refuse accelerometers that do not read gravity."""
     if not 0.8 * GRAVITY < size < 1.2 * GRAVITY:
-        hint = "; it looks like g" if 0.8 < size < 1.2 else ""
-        raise DriveError(
-            f"accel_x..z read {size:.3g} m/s^2 on average where gravity is 9.81{hint}: "
-            "set their unit in the mapping"
-        )
+        hint = phrase("looks_like_g") if 0.8 < size < 1.2 else ""
+        raise refused("imu.gravity_mean", size=size, hint=hint)
 
 
 def _check_axes(forward: Floats, right: Floats, down: Floats, std: Floats) -> None:
@@ -213,13 +206,7 @@ def _check_axes(forward: Floats, right: Floats, down: Floats, std: Floats) -> No
         return
     along = float(np.cross(down, forward) @ right) / float(np.linalg.norm(forward))
     if along < -0.5 * size:
-        raise DriveError(
-            "the inertial axes look swapped or mirrored: turning to one side reads as force to "
-            "the other (accel_x..z against gyro_x..z): set axis signs in the mapping"
-        )
+        raise refused("imu.axes_mirrored")
     # Banked bends take much of the lateral force away, and a body that rolls adds to it.
     if not 0.2 < size < 5.0:
-        raise DriveError(
-            f"gyro_x..z read {1.0 / size:.3g} times the yaw rate that lateral force and speed "
-            "show: set their unit (radps or degps) in the mapping"
-        )
+        raise refused("imu.gyro_scale", ratio=1.0 / size)

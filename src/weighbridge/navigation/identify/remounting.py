@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.constants import GRAVITY
+from weighbridge.messages import Problem, phrase
 from weighbridge.navigation.even import Even
 from weighbridge.navigation.identify.steps import SIDE, Step, fitted
 from weighbridge.signals import Bools, Floats, Signal
@@ -189,18 +190,18 @@ def openings(time: Floats, changes: Sequence[Change]) -> tuple[Floats, Floats]:
     return instants[order][within], variances[order][within]
 
 
-def remounting_notes(changes: Sequence[Change], start: float, end: float) -> list[str]:
+def remounting_notes(changes: Sequence[Change], start: float, end: float) -> list[Problem]:
     """Say in sentences what changed when in a drive from ``start`` to ``end`` [s]."""
     texts = []
     for change in sorted(changes, key=lambda c: c.start):
         size = f"{math.degrees(abs(change.angle)):.1f} deg"
         if change.slow:
             first, last = max(change.start, start), min(change.end, end)
-            when = f"slowly from {span(round(first), round(last))}"
+            when = phrase("slowly_from", span=span(round(first), round(last)))
         else:
-            when = f"at {instant(round(0.5 * (change.start + change.end)))}"
+            when = phrase("at_instant", at=instant(round(0.5 * (change.start + change.end))))
         texts.append(
-            f"the sensor was moved by {size} {when}: its mounting is found anew from there"
+            Problem.of("imu.moved", start=change.start, end=change.end, size=size, when=when)
         )
     return texts
 

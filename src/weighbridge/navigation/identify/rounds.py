@@ -11,6 +11,7 @@ import numpy as np
 
 from weighbridge.kernels.ins_model import Z_STILL
 from weighbridge.kernels.rotation import euler_to_matrix
+from weighbridge.messages import Problem, phrase
 from weighbridge.navigation.aiding import Imu, interpolated
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.even import Even, coarsely, evenly
@@ -126,14 +127,9 @@ def _doubted(setup: Setup, motion: Motion, gain: Gain) -> tuple[Setup, Motion]:
     """Tell of a gain that may be the sensor's scale or the squat, and widen by a part of it."""
     mean = float(np.mean(gain.value))
     alone = setup.origin is None
-    tyres = ", or the tyres (or the speed's unit) are not those of the calibration" if alone else ""
+    tyres = phrase("or_tyres") if alone else ""
     std = (_OPEN_TYRES if alone else _OPEN) * gain.off
-    note = (
-        f"the accelerometer reads {mean:.3f} times what the speed changes by along the vehicle, "
-        "and gravity does not show it: the scale of that axis is off, or the lean of the body is "
-        f"not known so well{tyres}; {100.0 * std:.1f} % of the mass, as standard deviation, "
-        "are in the interval for it"
-    )
+    note = Problem.of("imu.gain_unsure", gain=mean, tyres=tyres, std=100.0 * std)
     notes = (*motion.notes, note)
     return (
         replace(setup, scale_std=std, notes=notes),
@@ -141,17 +137,18 @@ def _doubted(setup: Setup, motion: Motion, gain: Gain) -> tuple[Setup, Motion]:
     )
 
 
-def _scale_note(setup: Setup, sources: Sources) -> str:
+def _scale_note(setup: Setup, sources: Sources) -> Problem:
     """Say how far the accelerometer's scale was off."""
     gain = np.ones(sources.imu.time.size)
     for part in setup.gains:
         gain = gain * part.at(sources.imu.time)
     low, high = float(np.min(gain)), float(np.max(gain))
-    size = f"{high:.3f}" if high - low < 0.005 else f"{gain[0]:.3f} to {gain[-1]:.3f}"
-    return (
-        f"the accelerometer reads {size} times what the speed changes by along the vehicle: its "
-        "scale is off, and was corrected"
+    size = (
+        f"{high:.3f}"
+        if high - low < 0.005
+        else phrase("gain_from_to", first=gain[0], last=gain[-1])
     )
+    return Problem.of("imu.scale_corrected", gain=size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +159,7 @@ class _Mounted:
     fine: Even
     aligned: Alignment
     changes: tuple[Change, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Problem, ...]
 
 
 def _mounted(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Mounted:
@@ -171,12 +168,9 @@ def _mounted(sources: Sources, mounting: Mounting | None, scale: _Scale) -> _Mou
     Samples during which it may or may not have been moved are left out.
     """
     imu = sources.imu
-    notes: tuple[str, ...] = ()
+    notes: tuple[Problem, ...] = ()
     if imu.false > _FALSE_TOLD:
-        notes = (
-            f"{100.0 * imu.false:.1f} % of the inertial samples are zeros, spikes or at a limit "
-            "of the sensor, and were left out",
-        )
+        notes = (Problem.of("imu.false_samples", share=100.0 * imu.false),)
     if scale.axis is not None:
         accel = scaled(imu.time, imu.accel[:], scale.gains, scale.axis)
         imu = replace(imu, accel=Axes.of(accel))

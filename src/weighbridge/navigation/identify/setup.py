@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from weighbridge.kernels.ins_model import Noise
+from weighbridge.messages import Problem
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.identify.gain import Gain
 from weighbridge.navigation.identify.remounting import Change, unsure
@@ -41,7 +42,7 @@ class Setup:
     has_wheel : the vehicle speed is that of the wheels
     use_squat : the drive shows the squat, or it was given: it is taken out of the grade
     specific_force_std : noise level of the specific force, of one row of the motion [m/s^2]
-    notes : sentences on what was found and what was doubtful
+    notes : what was found and what is uncertain
     """
 
     settings: NavigationSettings
@@ -62,7 +63,7 @@ class Setup:
     has_wheel: bool = True
     use_squat: bool = False
     specific_force_std: float = 0.1
-    notes: tuple[str, ...] = ()
+    notes: tuple[Problem, ...] = ()
 
     @property
     def speed_delay(self) -> float:

@@ -1,0 +1,178 @@
+"""Every sentence about data, by its id: what was found, what it does to the mass, what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.resources import files
+from typing import Any, Final, TypeVar
+
+from weighbridge.arguments import check_flag, check_number, check_text
+from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
+from weighbridge.visible import cut
+
+_Error = TypeVar("_Error", bound=DriveError)
+
+_ID: Final = re.compile(r"[a-z]+\.[a-z0-9_]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A finding about a drive: a fault that was corrected, a note beside a mass, or a refusal.
+
+    Attributes
+    ----------
+    id : of the message, such as ``clock.step``; the first word is the area
+    text : one sentence with the value and the remedy
+    signal : name of the signal, or empty for the whole drive
+    start, end : where in the drive [s]; None for all of it
+    serious : a mass could be wrong because of it, so `weigh` refuses the drive
+    values : what the sentence quotes, by name
+
+    The text is cut to what a screen shows: what it quotes of a file may be endless.
+    """
+
+    id: str
+    text: str
+    signal: str = ""
+    start: float | None = None
+    end: float | None = None
+    serious: bool = False
+    values: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        check_text("id of a problem", self.id)
+        check_text("text of a problem", self.text)
+        check_text("signal of a problem", self.signal)
+        check_number("start of a problem", self.start, optional=True)
+        check_number("end of a problem", self.end, optional=True)
+        check_flag("serious", self.serious)
+        if _ID.fullmatch(self.id) is None:
+            raise ConfigError(
+                f"id of a problem must be an area and a name, such as clock.step, got {self.id!r}"
+            )
+        object.__setattr__(self, "text", cut(self.text))
+
+    @classmethod
+    def of(
+        cls,
+        id: str,
+        signal: str = "",
+        /,
+        *,
+        start: float | None = None,
+        end: float | None = None,
+        serious: bool = False,
+        **values: Any,
+    ) -> Problem:
+        """Return the message of the catalogue, with these values in it.
+
+        Parameters
+        ----------
+        id, signal, start, end, serious : as of the class
+        values : what the sentence quotes, by the names that the catalogue uses
+        """
+        named = {"signal": signal, "start": start, "end": end, **values}
+        message = catalogue()[id]
+        parts = (message[part] for part in PARTS if part in message)
+        text = "; ".join(part.format_map(named) for part in parts)
+        return cls(id, text, signal, _rounded(start), _rounded(end), bool(serious), _plain(values))
+
+    @classmethod
+    def from_error(cls, error: Exception) -> Problem:
+        """Return the message of an error that ends a weighing."""
+        known = error.problem if isinstance(error, WeighbridgeError) else None
+        if isinstance(known, Problem):
+            return replace(known, serious=True)
+        return cls.of("file.unusable", error=str(error), serious=True)
+
+    def error(self, kind: type[_Error] = DriveError) -> _Error:  # type: ignore[assignment]
+        """Return it as the error that ends a weighing, of a kind of `DriveError`."""
+        error = kind(self.text)
+        error.problem = self
+        return error
+
+    def at(self, source: str, signal: str = "") -> Problem:
+        """Return the message with the file it is about before it."""
+        return replace(self, text=f"{source}: {self.text}", signal=signal or self.signal)
+
+    @property
+    def line(self) -> str:
+        """Return it as a vehicle file keeps it: id, colon, text."""
+        return f"{self.id}: {self.text}"
+
+    @classmethod
+    def from_line(cls, line: str) -> Problem:
+        """Return what `line` gave; a text without an id is of a file of before."""
+        id, colon, text = line.partition(": ")
+        if colon and id in catalogue():
+            return cls(id, text)
+        return cls.of("calibration.doubt", doubt=line)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        return {
+            "id": self.id,
+            "signal": self.signal,
+            "from_s": self.start,
+            "to_s": self.end,
+            "text": self.text,
+        }
+
+    @classmethod
+    def from_dict(cls, record: Mapping[str, Any]) -> Problem:
+        """Return what `to_dict` wrote."""
+        return cls(
+            record["id"],
+            record["text"],
+            record["signal"],
+            record["from_s"],
+            record["to_s"],
+        )
+
+
+PARTS: Final = ("text", "effect", "remedy")
+"""Parts of a message: what was found, what it does to the mass, what to do."""
+
+
+def refused(id: str, signal: str = "", /, **values: Any) -> DriveError:
+    """Return the error of a drive that cannot be weighed, with a message of the catalogue."""
+    return Problem.of(id, signal, serious=True, **values).error()
+
+
+def phrase(name: str, /, **values: Any) -> str:
+    """Return a part of a sentence, which several messages may share, with these values in it."""
+    return _phrases()[name].format_map(values)
+
+
+@cache
+def catalogue() -> dict[str, dict[str, str]]:
+    """Return the messages by id, as ``messages.toml`` has them: each with its `PARTS`."""
+    areas = {area: names for area, names in _read().items() if area != "phrase"}
+    return {
+        f"{area}.{name}": parts for area, names in areas.items() for name, parts in names.items()
+    }
+
+
+@cache
+def _phrases() -> dict[str, str]:
+    return dict(_read()["phrase"])
+
+
+@cache
+def _read() -> dict[str, Any]:
+    # Read when the first message is needed: most drives need none.
+    import tomllib
+
+    return tomllib.loads(files("weighbridge").joinpath("messages.toml").read_text(encoding="utf-8"))
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values without numbers of NumPy, which no record should keep."""
+    return {k: v.item() if hasattr(v, "item") else v for k, v in values.items()}
+
+
+def _rounded(time: float | None) -> float | None:
+    return None if time is None else round(float(time), 6)
