@@ -48,7 +48,7 @@ def even(drive, length):
     return np.append(np.arange(drive.start, drive.end, length), drive.end + 1.0)
 
 
-@settings(max_examples=5, deadline=None, phases=[Phase.explicit, Phase.generate])
+@settings(max_examples=2, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(
     lengths=st.lists(st.floats(0.4, 40.0), min_size=1, max_size=12),
     late=st.sampled_from([0.0, 0.3, 0.9]),

@@ -38,7 +38,7 @@ def three():
     return galvao.weigh_three(1234)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def done(three):
     fitted, drives, tests = three
     masses = np.linspace(1092.0, 1492.0, 9)

@@ -20,7 +20,7 @@ from tests.unit.test_weighing import weighing as weighed_by_rls
 
 from weighbridge.balance import Reason
 from weighbridge.pipeline.weighing import compare
-from weighbridge.report.calibration_panels import GEAR_COLOURS
+from weighbridge.report.calibration_panels import GEAR_COLOURS, sequence_panel
 from weighbridge.report.document import packed
 from weighbridge.report.maps import positions, track_map
 from weighbridge.report.mass_section import fit_panel, mass_panel
@@ -50,6 +50,13 @@ def test_a_method_that_does_not_fit_is_marked_in_table_and_figure(tmp_path):
     drawn = {t.name for p in residual_section(w, [w, other]).panels if p.figure
              for t in p.figure.data}  # fmt: skip
     assert "ekf" not in drawn
+
+
+def test_torques_of_a_calibration_are_drawn_over_minutes():
+    made = make_calibration(make_weighing())
+    figure = sequence_panel(made).figure
+    last = max(np.nanmax(np.asarray(trace.x, float)) for trace in figure.data)
+    assert last == pytest.approx(made.rows.time[-1] / 60.0, rel=0.02)
 
 
 def test_methods_that_differ_by_less_than_both_intervals_fit():
