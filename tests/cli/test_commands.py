@@ -300,7 +300,7 @@ def test_data_sheet_without_gearings_is_told_to_be_uncalibrated(weighbridge, tmp
     assert ran.code == 0
     result = json.loads(ran.out)
     assert result["mass_kg"] == pytest.approx(1900.0, rel=0.15)
-    assert any("not made by a calibration" in w for w in result["warnings"])
+    assert any(p["id"] == "vehicle.uncalibrated_std" for p in result["problems"])
 
 
 def test_a_fleet_is_simulated_once(weighbridge, tmp_path):

@@ -144,9 +144,9 @@ def test_what_lies_on_a_bound_is_told_with_what_it_means():
     )
     done = run_calibration(made.drive, settings=CalibrationSettings(method="rls"))
     assert "drag_area" in done.held
-    notes = done.vehicle.provenance.notes
-    assert f"held by a bound: {', '.join(done.held)}: the regression could not tell" in notes
-    assert "calibrate by method joint" in notes
+    held = next(p for p in done.problems if p.id == "calibration.held")
+    assert held.values["names"] == ", ".join(done.held)
+    assert held.text in done.vehicle.provenance.notes
 
 
 def test_straight_regression_has_no_curvature(empty):

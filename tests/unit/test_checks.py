@@ -138,8 +138,7 @@ def test_drive_in_one_gear_and_stepless_gearbox(sane):
 
 
 def test_accelerometer_in_g(sane):
-    problem = only(scaled(sane, **dict.fromkeys(ACCEL, 1 / 9.81)))
-    assert "it seems to be in g: name its columns accel_x_g" in problem.text
+    assert only(scaled(sane, **dict.fromkeys(ACCEL, 1 / 9.81))).id == "imu.accel_in_g"
 
 
 def test_accelerometer_in_metres_under_g(sane):
@@ -180,8 +179,8 @@ def test_a_gyro_that_stays_at_zero_is_stuck(sane):
 def test_a_speed_that_runs_against_the_positions_is_of_another_drive(sane):
     speed = sane.signals["vehicle_speed"]
     other = Signal(speed.name, speed.time, -0.05 * speed.values)
-    texts = [p.text for p in serious(sane.with_signals(other).without("gnss_speed"))]
-    assert any("the two are of different drives" in text for text in texts)
+    found = serious(sane.with_signals(other).without("gnss_speed"))
+    assert any(p.id == "speed.against" for p in found)
 
 
 def test_slow_gyro_in_degrees_is_seen_against_the_course():
@@ -193,7 +192,8 @@ def test_slow_gyro_in_degrees_is_seen_against_the_course():
 
 
 def test_gyro_in_radians_under_degrees(sane):
-    assert "in rad/s" in only(scaled(sane, **dict.fromkeys(GYRO, np.pi / 180))).text
+    found = only(scaled(sane, **dict.fromkeys(GYRO, np.pi / 180)))
+    assert (found.id, found.values["unit"]) == ("imu.gyro_unit", "rad/s")
 
 
 MPH_UNDER_KMH = 0.621371
@@ -429,7 +429,7 @@ def test_kilometres_an_hour_under_metres_a_second(top, accel, engine, words):
 def test_trucks_are_judged_by_what_trucks_do():
     fast = rolling(50.0, 0.5)
     assert serious(fast, CAR) == []
-    assert "faster than such vehicles go" in only(fast, replace(CAR, kind="truck")).text
+    assert only(fast, replace(CAR, kind="truck")).id == "speed.unit_doubtful"
 
 
 def test_a_speed_over_ground_alone_is_judged_too():
@@ -452,11 +452,11 @@ def test_axes_of_the_accelerometer_alone_swapped(sane):
     swapped = renamed(sane, accel_x="accel_y", accel_y="accel_x")
     assert only(swapped).id == "imu.axes_swapped"
     upright = renamed(sane, accel_z="accel_y", accel_y="accel_z")
-    assert "not about the accelerometer's vertical" in only(upright).text
+    assert only(upright).id == "imu.axes_differ"
 
 
 def test_one_axis_with_the_wrong_sign(sane):
-    assert "wrong sign" in only(scaled(sane, accel_y=-1.0).without(*GNSS)).text
+    assert only(scaled(sane, accel_y=-1.0).without(*GNSS)).id == "imu.axes_swapped"
 
 
 def quiet_motorway(seed):
@@ -483,7 +483,7 @@ def test_accelerometer_that_reads_gravity_instead_of_specific_force(sane):
 
 
 def test_speed_counted_backwards(sane):
-    assert "set factor = -1" in only(scaled(sane, vehicle_speed=-1.0).without(*GNSS)).text
+    assert only(scaled(sane, vehicle_speed=-1.0).without(*GNSS)).id == "imu.axes_swapped"
 
 
 # Stuck, standing, apart
@@ -493,8 +493,8 @@ def test_speed_counted_backwards(sane):
 def test_constant_signal(sane, name):
     s = sane.signals[name]
     stuck = replace(s, values=np.full(len(s), s.values[0]))
-    texts = [p.text for p in serious(sane.with_signals(stuck)) if p.signal == name]
-    assert any("all the time; its source is stuck" in t for t in texts)
+    found = [p for p in serious(sane.with_signals(stuck)) if p.signal == name]
+    assert any(p.id == "range.stuck" for p in found)
 
 
 def test_a_road_due_north_is_no_stuck_longitude():
@@ -536,12 +536,15 @@ def test_sensor_that_froze_on_the_way(sane):
     (note,) = check_drive(sane.with_signals(replace(s, values=values)))
     assert not note.serious
     assert note.id == "frozen.imu"
+    assert note.values["at"] == "20 s"
+    assert f"{note.values['longest']:.1f}" == "10.0"
     values[1000:20000] = values[1000]
     (note,) = check_drive(sane.with_signals(replace(s, values=values)))
-    assert note.id == "frozen.imu_all"
+    assert note.id == "frozen.imu"
+    assert f"{note.values['longest']:.1f}" == "380.0"
     values[1000:] = values[1000]
     found = serious(sane.with_signals(replace(s, values=values)))
-    assert any("s are left: record it again" in p.text for p in found)
+    assert any(p.id == "frozen.imu_all" for p in found)
 
 
 def test_an_hour_of_standstill_is_a_note():
@@ -561,6 +564,7 @@ def test_an_hour_of_standstill_is_a_note():
     (note,) = check_drive(still)
     assert not note.serious
     assert note.id == "speed.stands"
+    assert f"{note.values['duration']:.0f}" == "3600"
 
 
 def test_a_long_stop_and_a_cut_are_notes():
@@ -570,7 +574,9 @@ def test_a_long_stop_and_a_cut_are_notes():
     notes = check_drive(Drive("d", {"vehicle_speed": Signal("vehicle_speed", t, v)}))
     assert [n.serious for n in notes] == [False, False]
     assert notes[0].id == "speed.standstill"
-    assert "a piece may be cut out" in notes[1].text
+    assert notes[0].values["at"] == "500 s"
+    assert f"{notes[0].values['minutes']:.0f}" == "17"
+    assert notes[1].id == "speed.jumps"
 
 
 def test_values_out_of_range(sane):
@@ -579,7 +585,9 @@ def test_values_out_of_range(sane):
     few[5] = 200.0
     many[::20] = 200.0
     (note,) = [
-        p for p in check_drive(sane.with_signals(replace(s, values=few))) if "1 of" in p.text
+        p
+        for p in check_drive(sane.with_signals(replace(s, values=few)))
+        if p.values.get("count") == 1
     ]
     assert not note.serious
     assert "such as 720 kmh at 1.3 s" in note.text
@@ -600,7 +608,9 @@ def test_clock_that_jumps_a_day(sane):
     settled = mend_drive(Drive("d", {s.name: replace(s, time=time)}))
     assert not any(p.serious for p in settled.problems)
     assert settled.duration < 1000.0
-    assert "jumps by 1e+09 s" in settled.problems[0].text
+    assert settled.problems[0].id == "clock.jump_cut"
+    assert f"{settled.problems[0].values['by']:.6g}" == "1e+09"
+    assert settled.problems[0].values["rows"] == "10 of obd"
     assert settled.problems[0].id == "clock.jump_cut"
 
 
@@ -616,7 +626,7 @@ def test_clock_set_forward_by_less_than_a_day_is_a_note(sane, by):
     (note,) = check_drive(shifted(sane, sane.signals, 400.0, by), CAR)
     assert not note.serious
     assert f"nothing was recorded for {by:.0f} s from 400 s, while the vehicle moves" in note.text
-    assert "the clock was set forward" in note.text
+    assert note.id == "clock.pause"
 
 
 def test_pauses_while_the_vehicle_stands_are_told_once():
@@ -642,7 +652,9 @@ def test_one_table_that_pauses_is_told(sane):
         Drive("made", {s.name: s for s in (*kept, sane.signals["accel_x"])}), CAR
     )
     assert note.id == "clock.table_pause"
-    assert "a tunnel or a car park is harmless" in note.text
+    assert note.values["at"] == "299 s"
+    assert f"{note.values['length']:.0f}" == "122"
+    assert note.id == "clock.table_pause"
 
 
 def test_a_clock_of_gnss_that_was_set_forward_is_no_tunnel(sane):
@@ -752,7 +764,7 @@ def retarded(sign, trusted=()):
 
 def test_a_retarder_that_counts_braking_positive_is_refused_until_it_is_turned():
     assert only(retarded(1.0)).signal == "retarder_torque"
-    assert "factor = -1" in only(retarded(1.0)).text
+    assert only(retarded(1.0)).id == "retarder.sign"
     assert serious(retarded(-1.0)) == []
     assert serious(retarded(1.0, trusted=["retarder_torque"])) == []
     assert serious(retarded(0.0)) == []

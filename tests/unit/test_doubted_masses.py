@@ -6,6 +6,7 @@ import numpy as np
 from tests.noted import refused
 
 from weighbridge.calibration.doubted_masses import contradicting, tared, unbacked_scale, with_doubts
+from weighbridge.messages import phrase
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 
 NAMES, MASSES = ("a", "b", "c"), (1600.0, 1800.0, 2000.0)
@@ -23,9 +24,10 @@ def test_a_mass_far_off_the_others_ends_the_calibration():
 
 
 def test_a_mass_somewhat_off_is_told():
-    (text,) = contradicting(NAMES, MASSES, np.array([0.975, 1.05, 0.975]), STDS)
-    assert "b weighs" in text
-    assert "its mass, or another's, is wrong" in text
+    (found,) = contradicting(NAMES, MASSES, np.array([0.975, 1.05, 0.975]), STDS)
+    assert found.id == "calibration.may_contradict"
+    assert found.values["drive"] == "b"
+    assert found.values["which"] == phrase("mass_of_several")
 
 
 def test_what_scatters_is_no_contradiction():
@@ -39,8 +41,9 @@ def test_a_drive_that_was_not_weighed_is_left_out():
 
 def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():
     loads = Vehicle(torque=TorqueModel(source="load", coefficients=(0.0, 250.0)))
-    (text,) = unbacked_scale(loads)
-    assert "tare_kg and gross_kg" in text
+    (found,) = unbacked_scale(loads)
+    assert found.id == "calibration.unbacked"
+    text = found.text
     noted = replace(loads, provenance=replace(loads.provenance, notes=f"made of one drive; {text}"))
     car = tared(noted, 1500.0)
     assert car.tare == 1500.0

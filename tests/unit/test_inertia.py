@@ -91,7 +91,7 @@ def test_settings_by_name_are_those_of_the_filter(made):
     given = {"process_densities": [1.0] * 6, "noise_densities": [5e-5, 5e-4, 5e-4]}
     told = estimate_inertia(made.drive, CAR, "extended", settings=given)
     usual = estimate_inertia(made.drive, CAR, "extended")
-    assert any("was run with process_densities" in text for text in told.warnings)
+    assert any(text.id == "method.settings" for text in told.problems)
     # A density of 1 kg²/s lets the mass move by a kilogram in a second.
     off = [abs(w.track.parameters[-1, 0] / made.inertias[-1, 0] - 1.0) for w in (told, usual)]
     assert off[0] > 0.03 > 1.5 * off[1]
@@ -277,6 +277,7 @@ def test_slow_recording_is_no_ride(made):
     told = estimate_inertia(replace(made.drive, signals=slow), CAR)
     assert told.status == "not_excited"
     assert told.reason_id == "ride.slow"
+    assert f"{told.refusal.values['rate']:.3g}" == "25"
 
 
 def test_signals_on_other_clocks_and_gaps_are_taken(made):
@@ -369,7 +370,7 @@ def test_one_offset_sensor_is_told_by_the_lean(made, found):
     told = estimate_inertia(ride.drive, replace(CAR, ride=replace(RIDE, zero_mass=None)))
     assert_allclose(told.values, found.values, rtol=1e-3)
     assert len(told.warnings) == 1
-    assert "a travel sensor is offset" in told.warnings[0]
+    assert told.problems[0].id == "ride.tilt"
 
 
 def test_soft_springs_are_told_and_widen_the_interval():
@@ -393,7 +394,7 @@ def test_noisy_sensors_are_told():
     ride = simulated(sensors=replace(SENSORS, travel_noise=2e-3, rate_noise=5e-2))
     told = estimate_inertia(ride.drive, CAR)
     assert told.track.noise_factor >= 4.0
-    assert any("times the noise" in w for w in told.warnings)
+    assert any(w.id == "ride.noise" for w in told.problems)
 
 
 def test_overload_is_told(made):

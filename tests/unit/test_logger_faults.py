@@ -81,4 +81,4 @@ def test_a_speed_of_one_row_breaks_nothing(made, car):
     weighing = wb.weigh(
         made.drive.with_signals(replace(s, time=s.time[-1:], values=s.values[-1:])), car
     )
-    assert any("vehicle_speed begins" in warning for warning in weighing.warnings)
+    assert any(warning.id == "file.begins_late" for warning in weighing.problems)

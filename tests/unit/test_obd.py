@@ -129,6 +129,8 @@ def test_answers_that_change_from_11_to_29_bits_are_read_on():
     assert_allclose(value(found, "vehicle_speed"), np.repeat([50.0, 60.0], [120, 90]))
     (problem,) = found.problems
     assert problem.id == "bus.filled_in"
+    assert f"{problem.values['first']:.0f}" == "60"
+    assert f"{problem.values['last']:.0f}" == "104"
     assert problem.id == "bus.filled_in"
     assert found.used.all()
 
@@ -172,7 +174,8 @@ def test_identification_numbers_are_counted_and_never_kept():
     assert found.problems == []
     found = decode_obd(answers([vin[0], *speed, vin[1], *speed]))
     assert found.problems[0].serious
-    assert "2 vehicles" in found.problems[0].text
+    assert found.problems[0].id == "vehicle.several_vins"
+    assert found.problems[0].values["vehicles"] == 2
     assert "WVWZZZ" not in repr(found)
 
 
@@ -180,7 +183,7 @@ def test_two_vehicles_at_once_are_a_serious_doubt():
     one = answers([bytes([0x41, 0x0D, 50])] * 30)
     two = answers([bytes([0x41, 0x0D, 90])] * 20, channel=2, start=0.1)
     found = decode_obd(join_frames([one, two]))
-    assert any(p.serious and "two vehicles" in p.text for p in found.problems)
+    assert any(p.serious and p.id == "bus.two_vehicles" for p in found.problems)
 
 
 def test_other_services_alone_are_no_obd_drive():

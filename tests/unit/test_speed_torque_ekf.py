@@ -221,7 +221,7 @@ def test_calibration_takes_a_constant_bias_out():
     found = wb.weigh(off[2], car, METHOD)
     assert found.status == "converged", found.reason
     assert found.mass == pytest.approx(MASS + 150.0, rel=0.04)
-    assert not any("was calibrated for" in text for text in found.warnings)
+    assert not any(p.id == "vehicle.fitted_for" for p in found.problems)
 
 
 def test_without_a_calibration_both_jacobians_widen_the_interval():

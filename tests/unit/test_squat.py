@@ -222,7 +222,7 @@ def test_the_own_squat_of_a_drive_is_not_put_back(weighed):
     car, weighing = weighed
     own = of_vehicle(moved(0.012), calibrated(car, K))
     assert (own.squat, own.own_squat) == (0.012, True)
-    assert "in the calibration by 0.23°" in own.notes[-1]
+    assert own.notes[-1].id == "imu.lean"
     balance = replace(weighing.result.balance, motion=own)
     assert residual_squat(balance, calibrated(car, K), 1500.0).squat == 0.0
 

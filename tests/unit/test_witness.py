@@ -180,6 +180,7 @@ def test_a_moderate_disagreement_with_a_reading_altered_on_the_way_gives_no_mass
     known = replace(ALONE, torque=replace(ALONE.torque, reading_step=step))
     steps, witness = check_reading(made, known)
     assert steps.id == "torque.steps"
+    assert f"{steps.values['ratio']:.3g}" == "0.93"
     assert steps.serious
     assert witness.serious
     assert not any(p.serious for p in check_reading(sent, known))
@@ -197,7 +198,7 @@ def test_a_small_change_in_the_drive_is_told_against_what_was_before():
     made = changed(drive(20), "engine_load", lambda t, x: np.where(t < MIDDLE, 1.03, 0.97) * x)
     (problem,) = check_witnesses(made, ALONE)
     assert not problem.serious
-    assert "on against before" in problem.text
+    assert problem.id == "torque.witness"
 
 
 def test_two_witnesses_say_that_the_reading_is_wrong():
