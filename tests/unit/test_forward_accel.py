@@ -113,7 +113,7 @@ def test_a_torque_that_changes_its_scale_is_refused_or_told_by_speed():
     drive, _ = simulated("car", 742, 260.0, 1200.0)
     drive = drive.without(*AXES)
     refused = wb.weigh(weakened(drive, 0.5, 400.0), by_speed)
-    assert "no accelerometer tells the motion here" in refused.reason
+    assert refused.reason_id == "load.change_by_heights"
     assert np.isnan(refused.mass)
     change = changing.ScaleChange(900.0, 900.0, 0.2, 0.01, 20.0)
     assert "hills look alike: record the height" in change.refusal("speed")

@@ -111,7 +111,10 @@ def test_eleven_and_twenty_nine_bits_and_several_units():
     assert [c.split(",")[0] for c in found.contents] == [
         "CAN 1 7E8", "CAN 1 18DAF110", "CAN 1 18DAF118",
     ]  # fmt: skip
-    assert "left out of CAN 1 18DAF118: vehicle_speed (3 for 6)" in (found.problems[0].text)
+    assert (found.problems[0].id, found.problems[0].values["names"]) == (
+        "bus.answered_twice",
+        "vehicle_speed (3 for 6)",
+    )
 
 
 def drive_answers(seconds, identifier, start, speed=50):
@@ -140,7 +143,10 @@ def test_answers_in_both_lengths_at_once_are_taken_once():
         join_frames([drive_answers(60, 0x7E8, 0.0), drive_answers(60, 0x18DAF110, 0.1)])
     )
     assert [len(s) for s in found.signals] == [120, 120]
-    assert "left out of CAN 1 18DAF110" in found.problems[0].text
+    assert (found.problems[0].id, found.problems[0].values["other"]) == (
+        "bus.answered_twice",
+        "CAN 1 18DAF110",
+    )
 
 
 def test_what_is_asked_seldom_of_two_units_is_no_silence():
@@ -158,13 +164,19 @@ def test_missing_parts_cost_that_answer_only():
     keep[3] = False
     found = decode_obd(frames.select(keep))
     assert_allclose(found.signals[0].time, [0.0, 1.0, 1.5, 2.0])
-    assert "left out 1 answer of CAN 1 7E8 with frames missing" in found.problems[0].text
+    assert (found.problems[0].id, found.problems[0].values["answers"]) == (
+        "bus.answers_lost",
+        "1 answer",
+    )
 
 
 def test_cut_answer_gives_what_stood_before():
     found = decode_obd(answers([bytes.fromhex("41 0D 32 0C 1A")] * 3))
     assert [s.name for s in found.signals] == ["vehicle_speed"]
-    assert "3 answers of CAN 1 7E8 cut off" in found.problems[0].text
+    assert (found.problems[0].id, found.problems[0].values["answers"]) == (
+        "bus.answers_cut",
+        "3 answers",
+    )
 
 
 def test_identification_numbers_are_counted_and_never_kept():
