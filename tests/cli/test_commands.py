@@ -124,7 +124,7 @@ def test_a_calibration_weighs_its_own_drives(weighbridge, car, known):
     percent = 100.0 * (weighed["mass_kg"] / 1580.0 - 1.0)
     assert f"{known.folder.name}: {weighed['mass_kg']:.0f} kg, {percent:+.1f} % of the 1580" in told
     assert [n.removeprefix("    note: ") for n in notes] == weighed["warnings"]
-    assert own.doubt == ""
+    assert own.doubt is None
 
 
 def test_what_weigh_would_note_of_a_drive_of_a_calibration_is_told(car, known):

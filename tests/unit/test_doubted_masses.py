@@ -6,7 +6,7 @@ import numpy as np
 from tests.noted import refused
 
 from weighbridge.calibration.doubted_masses import contradicting, tared, unbacked_scale, with_doubts
-from weighbridge.messages import phrase
+from weighbridge.messages import Problem, phrase
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 
 NAMES, MASSES = ("a", "b", "c"), (1600.0, 1800.0, 2000.0)
@@ -56,5 +56,6 @@ def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():
 
 def test_doubts_survive_the_vehicle_file(tmp_path):
     path = tmp_path / "car.toml"
-    with_doubts(Vehicle(), ["a weighs +8 % against its 1600 kg"]).save(path)
-    assert Vehicle.load(path).provenance.doubts == ("a weighs +8 % against its 1600 kg",)
+    doubt = Problem.of("calibration.above_gross", drive="a", mass=1600.0, gross=1500.0)
+    with_doubts(Vehicle(), [doubt]).save(path)
+    assert Vehicle.load(path).provenance.problems == (doubt,)

@@ -47,11 +47,7 @@ def test_clock_set_back_keeps_the_longest_part():
     frames, problems = settle_clock(make(time), "x.log")
     assert_array_equal(frames.time, np.arange(30.0) + 500.0)
     assert problems[0].id == "clock.frames_jump"
-    assert problems[0].values["count"] == 5
-    assert problems[0].values["frames"] == 35
-    assert problems[0].values["count"] == 10
-    assert problems[0].values["frames"] == 40
-    assert problems[0].values["before"] == "4 s"
+    assert (problems[0].values["count"], problems[0].values["frames"]) == (10, 40)
 
 
 def test_clock_set_forward_keeps_the_longest_part():
@@ -59,6 +55,7 @@ def test_clock_set_forward_keeps_the_longest_part():
     frames, problems = settle_clock(make(time), "x.log")
     assert frames.time[0] == 1.6e9
     assert problems[0].id == "clock.frames_jump"
+    assert (problems[0].values["count"], problems[0].values["frames"]) == (5, 35)
     # A clock that counts from 1970 is told as a time of day.
     assert problems[0].id == "clock.frames_jump"
     assert "e+09" not in problems[0].text

@@ -195,7 +195,7 @@ def test_two_vehicles_at_once_are_a_serious_doubt():
     one = answers([bytes([0x41, 0x0D, 50])] * 30)
     two = answers([bytes([0x41, 0x0D, 90])] * 20, channel=2, start=0.1)
     found = decode_obd(join_frames([one, two]))
-    assert any(p.serious and p.id == "bus.two_vehicles" for p in found.problems)
+    assert any(p.serious and p.id == "vehicle.two_units" for p in found.problems)
 
 
 def test_other_services_alone_are_no_obd_drive():

@@ -3,7 +3,6 @@
 import json
 import math
 import pickle
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -209,8 +208,8 @@ def test_the_spread_that_a_warning_quotes_is_in_the_interval(method):
         car = replace(CAR, torque=replace(CAR.torque, scale_std=scale))
         w = weigh(recorded, car, method)
         [said] = [text for text in w.problems if text.id == "vehicle.uncalibrated_std"]
-        quoted = re.search(r"([\d.]+) % of the mass", said)
-        found.append((float(quoted[1]), 100.0 * w.result.std / w.result.mass))
+        quoted = round(said.values["share"], 1)
+        found.append((quoted, 100.0 * w.result.std / w.result.mass))
     (low, exact), (high, open_) = found
     assert low < exact
     assert high < open_
