@@ -50,10 +50,10 @@ def test_a_speed_that_is_late_is_none(drive, lag):
     speed = drive.signals["vehicle_speed"]
     share = min(speed.period / lag, 1.0)
     late, _ = lfilter([share], [1.0, share - 1.0], speed.values, zi=[0.0])
-    assert told(drive.with_signals(Signal(speed.name, speed.time, late))) == ""
+    assert told(drive.with_signals(Signal(speed.name, speed.time, late))) is None
 
 
 def test_a_speed_in_steps_of_5_kmh_is_none(drive):
     speed = drive.signals["vehicle_speed"]
     coarse = np.floor(speed.values * 3.6 / 5.0) * 5.0 / 3.6
-    assert told(drive.with_signals(Signal(speed.name, speed.time, coarse))) == ""
+    assert told(drive.with_signals(Signal(speed.name, speed.time, coarse))) is None
