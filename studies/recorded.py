@@ -128,7 +128,8 @@ def bmw_i3() -> str:
         other = wb.weigh(drive, car, method="rls").mass
         own = UNMODELLED * w.result.bound_std
         power = find_power_balance(drive, car)
-        offset = next(n.split()[2] for n in w.warnings if n.startswith("accelerometer offset"))
+        found = next(p.values["offset"] for p in w.problems if p.id == "motion.offset")
+        offset = f"{found:+.3f}"
         rows.append((name, when, load, w.mass, own, other))
         reach.append(196.0 * w.std / w.mass)
         lines.append(

@@ -9,7 +9,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any, Final, TypeVar
 
-from weighbridge.arguments import check_flag, check_number, check_text
+from weighbridge.arguments import check_flag, check_number, check_text, check_type
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.visible import cut
 
@@ -49,6 +49,7 @@ class Problem:
         check_number("start of a problem", self.start, optional=True)
         check_number("end of a problem", self.end, optional=True)
         check_flag("serious", self.serious)
+        check_type("values of a problem", self.values, Mapping, "a dictionary of values by name")
         if _ID.fullmatch(self.id) is None:
             raise ConfigError(
                 f"id of a problem must be an area and a name, such as clock.step, got {self.id!r}"

@@ -146,8 +146,8 @@ def test_a_vehicle_without_a_file_is_one_of_its_class(shelf, path):
     found = shelf.of((path,))
     assert (found.file, found.kind) == (None, "truck")
     assert found.as_vehicle(Drive("empty", {})).kind == "truck"
-    assert "no vehicle file" in found.note
-    assert shelf.of((path,), "van99", "bus").note.startswith("there is no vehicle file for vehicle")
+    assert found.note.id == "vehicle.no_file"
+    assert shelf.of((path,), "van99", "bus").note.id == "vehicle.no_file"
     assert shelf.of((path,), "van99", "bus").kind == "bus"
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import weighbridge as wb
 from tests.fleet.fleets import compared, real_fleet, tiny_drive, tiny_fleet
+from tests.noted import noted
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.facts import weighing_row
 from weighbridge.fleet.inputs import recordings
@@ -145,8 +146,8 @@ def test_a_drive_that_is_gone_is_tried_three_times(tmp_path):
     receipt = weigh_job(job)
     (row,) = rows(job, receipt).to_dicts()
     assert (row["outcome"], row["tries"]) == ("failed", 3)
-    assert "failed 3 times" in row["reason"]
-    assert fail_job(job, "its worker died").key == receipt.key
+    assert row["reason_id"] == "fleet.failed"
+    assert fail_job(job, noted("its worker died")).key == receipt.key
     (tmp_path / "away").rename(place)
     assert weigh_job(job).outcome == "weighed"
 
@@ -159,7 +160,7 @@ def test_a_vehicle_without_a_file_is_weighed_as_its_class_and_says_so(
     (job,) = jobs(tmp_path, drives, cars)
     (row,) = rows(job, weigh_job(job)).to_dicts()
     assert (row["vehicle_file"], row["vehicle_id"], row["vehicle_class"]) == (None, "car", "car")
-    assert "data sheet" in row["warnings"][0]
+    assert row["problem_ids"][0] == "vehicle.no_file"
 
 
 def test_a_begin_that_the_table_of_drives_gives(tmp_path):

@@ -224,3 +224,16 @@ def test_one_run_at_a_time(results):
         with pytest.raises(ConfigError, match="another run"), other.locked():
             pass
     assert not other.running
+
+
+def test_results_of_version_2_are_read_and_not_written_to(results):
+    write_part(results.folder, "aa", [row("aa")])
+    results.gather()
+    (file,) = results.table_files("drives")
+    pl.read_parquet(file).drop("reason_id", "problem_ids").write_parquet(file)
+    mark = results.folder / store_module.MARK
+    mark.write_text('{"format_version": 2}\n')
+    (found,) = read_drives(results.folder).collect().to_dicts()
+    assert (found["key"], found["reason_id"], found["problem_ids"]) == ("aa", None, None)
+    with pytest.raises(ConfigError, match="results of format 2"):
+        Results.begun(results.folder)

@@ -40,7 +40,7 @@ def test_battery_power_narrows_the_interval(trip, car):
     told = wb.weigh(drive, car)
     signals = {n: s for n, s in drive.signals.items() if not n.startswith("battery")}
     blind = wb.weigh(replace(drive, signals=signals), car)
-    assert any("battery power" in n for n in told.warnings)
+    assert any(n.id == "battery.divided" for n in told.problems)
     low, high = told.interval(0.95)
     assert (high - low) / 2.0 < 0.08 * told.mass
     assert told.std < 0.85 * blind.std

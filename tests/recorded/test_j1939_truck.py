@@ -101,7 +101,7 @@ def test_what_was_and_was_not_decoded_is_counted(truck, decoded):
 def test_thirty_seconds_give_no_mass_but_a_reason(truck):
     weighing = wb.weigh(wb.read_drive(truck), wb.Vehicle.load(EXAMPLE / "vehicle.toml"), "rls")
     assert weighing.status == "not_excited"
-    assert "usable samples" in weighing.reason
+    assert weighing.reason_id == "motion.few_rows"
     assert np.isnan(weighing.mass)
 
 

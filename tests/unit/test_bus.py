@@ -30,6 +30,8 @@ def test_of_two_protocols_the_fuller_one_stays(answers, broadcasts, expected):
     assert_allclose(done.signals["vehicle_speed"].values, expected / 3.6)
     assert len(done.signals["vehicle_speed"]) == 100
     assert done.problems[-1].id == "bus.twice"
+    assert done.problems[-1].values["few"] == 20
+    assert done.problems[-1].values["many"] == 100
 
 
 def test_message_on_two_buses_is_taken_from_one(tmp_path):
@@ -40,6 +42,7 @@ def test_message_on_two_buses_is_taken_from_one(tmp_path):
     done = decode(join_frames([one, two]), "x.log", mapping, load_dbcs([path]))
     assert_allclose(done.signals["vehicle_speed"].values, 10.0)
     assert done.problems[0].id == "bus.several_buses"
+    assert done.problems[0].values["bus"] == 1
     done = decode(join_frames([one, two]), "x.log", mapping, load_dbcs([f"2:{path}"]))
     assert_allclose(done.signals["vehicle_speed"].values, 20.0)
 

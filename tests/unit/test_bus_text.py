@@ -100,11 +100,15 @@ def test_fd_frames_and_lines_that_are_none(tmp_path, sent):
     assert log.frames.length[-1] == 64
     assert_array_equal(log.frames.data[-1], np.arange(64))
     assert log.problems[0].id == "file.lines_left_out"
+    assert log.problems[0].values["count"] == 1
+    assert log.problems[0].values["lines"] == "7 lines"
     path = tmp_path / "log.crtd"
     path.write_text(crtd(sent[:5]) + "1600000100.0 1R11 12 0 1\n1600000100.0 1R29 FFFFFFFF 00\n")
     log = read_crtd(path, None, None)
     assert len(log.frames) == 5
     assert log.problems[0].id == "file.lines_left_out"
+    assert log.problems[0].values["count"] == 2
+    assert log.problems[0].values["lines"] == "7 lines"
 
 
 @pytest.mark.parametrize("name", WRITTEN)

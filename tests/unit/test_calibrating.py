@@ -144,9 +144,9 @@ def test_what_lies_on_a_bound_is_told_with_what_it_means():
     )
     done = run_calibration(made.drive, settings=CalibrationSettings(method="rls"))
     assert "drag_area" in done.held
-    notes = done.vehicle.provenance.notes
-    assert f"held by a bound: {', '.join(done.held)}: the regression could not tell" in notes
-    assert "calibrate by method joint" in notes
+    held = next(p for p in done.problems if p.id == "calibration.held")
+    assert held.values["names"] == ", ".join(done.held)
+    assert held.text in done.vehicle.provenance.notes
 
 
 def test_straight_regression_has_no_curvature(empty):
@@ -197,10 +197,12 @@ def test_gears_that_are_named_and_not_found_are_told(empty):
     time = np.arange(100.0)
     gears = np.where(time < 2, 9, 1 + np.arange(100) % 8)
     drive = empty.drive.with_signals(Signal("gear", time, gears.astype(float)))
-    assert unfound_gears([drive, drive], 8) == unfound_gears([drive], 8) == ""
+    assert unfound_gears([drive, drive], 8) is None
+    assert unfound_gears([drive], 8) is None
     said = unfound_gears([drive], 7)
-    assert said == "the log names 8 gears, 7 were found; rows in the others are left out"
-    assert unfound_gears([empty.drive.without("gear")], 3) == ""
+    assert said.id == "calibration.gears"
+    assert (said.values["named"], said.values["found"]) == (8, 7)
+    assert unfound_gears([empty.drive.without("gear")], 3) is None
 
 
 def test_percent_of_a_reference_torque(empty):

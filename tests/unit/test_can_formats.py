@@ -84,6 +84,8 @@ def test_candump_as_shown_on_a_terminal(tmp_path):
     assert_array_equal(log.frames.channel, [0, 7])
     assert not log.absolute
     assert log.problems[0].id == "file.lines_left_out"
+    assert log.problems[0].values["count"] == 1
+    assert log.problems[0].values["lines"] == "5 lines"
 
 
 def test_every_spelling_of_candump(tmp_path):
@@ -263,7 +265,9 @@ def test_one_damaged_line_does_not_cost_those_behind_it(tmp_path):
         path.write_text(head + "".join(line.format(k, b) for k, b in enumerate(bytes_)))
         drive = read_drive(path)
         assert_allclose(drive.signals["vehicle_speed"].values * 3.6, [16, 32, 48, 64])
-        assert drive.problems[0].id == "file.lines_left_out"
+        assert drive.problems[0].id == "file.frames_damaged"
+        assert drive.problems[0].values["count"] == 1
+        assert drive.problems[0].values["lines"] == "5 lines"
 
 
 def test_fd_frames_of_mf4(tmp_path):

@@ -10,6 +10,7 @@ from weighbridge.estimators.joint.changing import in_place_of_loads, largest
 from weighbridge.estimators.joint.problem import FilterInput
 from weighbridge.estimators.joint.slow_errors import filter_params
 from weighbridge.kernels import disturbance
+from weighbridge.messages import phrase
 
 pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="runs the filter many times")
 
@@ -76,15 +77,16 @@ def test_a_scale_between_two_stops_is_told_where_loads_would_pass_for_it():
     assert found.gain > 5.0
     assert found.change == pytest.approx(-0.15, abs=0.03)
     assert found.start == pytest.approx(402.0)
-    assert "the mass is 16 % less: by loads" in found.doubt
+    assert found.doubt.id == "load.scale_or_load"
+    assert found.doubt.values["size"] == phrase("less", share=16.0)
 
 
 def test_a_load_is_none_of_the_torque():
     found = in_place_of_loads(stopping(load=-0.15))
     assert found.gain < -5.0
-    assert found.doubt == ""
+    assert found.doubt is None
 
 
 def test_where_somebody_had_the_time_to_load_nothing_is_told():
-    assert in_place_of_loads(stopping(scale=0.85, stood=90.0)).doubt == ""
+    assert in_place_of_loads(stopping(scale=0.85, stood=90.0)).doubt is None
     assert in_place_of_loads(truck()) is None

@@ -57,7 +57,8 @@ def test_digits_that_are_cut_off_get_half_a_step(drive, step):
     cut = to_digits(drive, ACCEL, step, np.trunc)
     mended = with_half_digits(cut)
     (problem,) = mended.problems
-    assert f"steps of {step:.2g} m/s^2, cut off towards zero: half a step" in problem.text
+    assert problem.id == "imu.digits_cut"
+    assert problem.values["step"] == pytest.approx(step, rel=0.01)
     assert not problem.serious
     was, now = mean_slope(cut, drive), mean_slope(mended, drive)
     assert abs(now - 1.0) < 0.4 * abs(was - 1.0)
@@ -65,18 +66,18 @@ def test_digits_that_are_cut_off_get_half_a_step(drive, step):
 
 
 @pytest.mark.parametrize(
-    ("step", "how", "text"),
+    ("step", "how", "id"),
     [
-        (0.15, np.trunc, "dead about zero"),
-        (0.2, np.trunc, "dead about zero"),
-        (0.5, np.trunc, "too coarse"),
-        (0.5, np.round, "too coarse"),
+        (0.15, np.trunc, "imu.digits_dead"),
+        (0.2, np.trunc, "imu.digits_dead"),
+        (0.5, np.trunc, "imu.digits_coarse"),
+        (0.5, np.round, "imu.digits_coarse"),
     ],
 )
-def test_digits_that_nothing_mends_are_refused(drive, step, how, text):
+def test_digits_that_nothing_mends_are_refused(drive, step, how, id):
     found = mend_drive(to_digits(drive, ACCEL, step, how)).problems[0]
     assert found.serious
-    assert text in found.text
+    assert found.id == id
 
 
 @pytest.mark.parametrize("how", [np.trunc, np.round])
@@ -89,7 +90,7 @@ def test_a_mirrored_gyro_with_all_digits_is_still_refused():
     made = simulate_car(replace(make_scenario("car", seed=88), duration=900.0)).drive
     nod = made.signals["gyro_y"]
     mirrored = made.with_signals(Signal(nod.name, nod.time, -nod.values))
-    assert any("has the wrong sign" in p.text for p in mend_drive(mirrored).problems if p.serious)
+    assert any(p.id == "imu.gyro_sign" for p in mend_drive(mirrored).problems if p.serious)
 
 
 def test_an_inertial_sensor_averaged_to_a_second_is_slow_and_not_in_milliseconds(drive):

@@ -8,6 +8,7 @@ from tests.noted import refused
 
 from weighbridge.calibration import doubted_masses as module
 from weighbridge.calibration.doubted_masses import contradicting, tared, unbacked_scale, with_doubts
+from weighbridge.messages import Problem, phrase
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 
 NAMES, MASSES = ("a", "b", "c"), (1600.0, 1800.0, 2000.0)
@@ -25,9 +26,10 @@ def test_a_mass_far_off_the_others_ends_the_calibration():
 
 
 def test_a_mass_somewhat_off_is_told():
-    (text,) = contradicting(NAMES, MASSES, np.array([0.975, 1.05, 0.975]), STDS)
-    assert "b weighs" in text
-    assert "its mass, or another's, is wrong" in text
+    (found,) = contradicting(NAMES, MASSES, np.array([0.975, 1.05, 0.975]), STDS)
+    assert found.id == "calibration.may_contradict"
+    assert found.values["drive"] == "b"
+    assert found.values["which"] == phrase("mass_of_several")
 
 
 def test_what_scatters_is_no_contradiction():
@@ -63,8 +65,9 @@ def test_burnt_fuel_is_not_on_board_any_more(monkeypatch):
 
 def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():
     loads = Vehicle(torque=TorqueModel(source="load", coefficients=(0.0, 250.0)))
-    (text,) = unbacked_scale(loads)
-    assert "tare_kg and gross_kg" in text
+    (found,) = unbacked_scale(loads)
+    assert found.id == "calibration.unbacked"
+    text = found.text
     noted = replace(loads, provenance=replace(loads.provenance, notes=f"made of one drive; {text}"))
     car = tared(noted, 1500.0)
     assert car.tare == 1500.0
@@ -77,5 +80,6 @@ def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():
 
 def test_doubts_survive_the_vehicle_file(tmp_path):
     path = tmp_path / "car.toml"
-    with_doubts(Vehicle(), ["a weighs +8 % against its 1600 kg"]).save(path)
-    assert Vehicle.load(path).provenance.doubts == ("a weighs +8 % against its 1600 kg",)
+    doubt = Problem.of("calibration.above_gross", drive="a", mass=1600.0, gross=1500.0)
+    with_doubts(Vehicle(), [doubt]).save(path)
+    assert Vehicle.load(path).provenance.problems == (doubt,)

@@ -6,6 +6,7 @@ import pytest
 from numba import config
 
 import weighbridge as wb
+from weighbridge.messages import Problem
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
 
@@ -35,9 +36,9 @@ def test_a_scale_of_the_calibration_alone_is_told_and_in_the_interval(made, gain
     mass = made.scenario.mass
     car = calibrated(made, scaled(made.drive, gain))
     (doubt,) = car.provenance.doubts
-    assert "the accelerometer reads" in doubt
+    assert doubt.startswith("calibration.gain: ")
     weighed = wb.weigh(made.drive, car)
-    assert doubt in weighed.warnings
+    assert Problem.from_line(doubt) in weighed.problems
     assert abs(weighed.mass / mass - 1.0) > 0.02
     low, high = weighed.interval(0.95)
     assert low < mass < high

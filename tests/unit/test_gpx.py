@@ -65,6 +65,7 @@ def test_segments_are_one_drive_and_points_without_time_are_told(tmp_path):
     found = drive(tmp_path, gpx(point(0), point(1), bare, point(30), segments=2))
     assert_array_equal(found.signals["latitude"].time, [0.0, 1.0, 30.0])
     assert found.problems[0].id == "clock.points_without"
+    assert found.problems[0].values["count"] == 1
 
 
 def test_zone_of_the_time_counts(tmp_path):
@@ -77,7 +78,7 @@ def test_a_file_that_breaks_off_is_salvaged(tmp_path):
     text = gpx(*(point(k) for k in range(20)))
     found = drive(tmp_path, text[: int(0.7 * len(text))])
     assert 10 <= len(found.signals["latitude"]) < 20
-    assert "breaks off" in found.problems[0].text
+    assert found.problems[0].id == "file.points_break_off"
 
 
 def test_latin_1_text(tmp_path):

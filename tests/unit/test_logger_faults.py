@@ -9,6 +9,7 @@ from tests.noted import refused
 import weighbridge as wb
 from weighbridge.checks import check_drive, mend_drive
 from weighbridge.errors import DriveError
+from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import MIDSIZE, Scenario, Sensors, jensen_route, simulate_car
 
@@ -48,7 +49,7 @@ def test_wheels_that_spin_now_and_then_are_no_two_sources(made):
     spinning = of_speed(
         made.drive, lambda t, v: np.where((t % 300.0 < 3.0) & (v > 9.0), 1.7 * v, v)
     )
-    found = [p for p in check_drive(spinning) if "vehicle_speed jumps" in p.text]
+    found = [p for p in check_drive(spinning) if p.id == "speed.jumps"]
     assert [p.serious for p in found] == [False]
 
 
@@ -65,7 +66,7 @@ def test_packets_stamped_as_they_arrive_are_refused_by_their_cause(made, car):
 
 def test_a_sensor_recorded_in_turns_comes_in_no_packets(made):
     turns = with_inertial(made.drive, lambda t: np.where(t % 40.0 < 3.0, t, np.nan))
-    assert not any("packets" in p.text for p in mend_drive(turns).problems)
+    assert not any(p.id == "clock.packets" for p in mend_drive(turns).problems)
 
 
 def test_a_torque_polled_every_four_seconds_is_told_so(made, car):
@@ -73,7 +74,8 @@ def test_a_torque_polled_every_four_seconds_is_told_so(made, car):
     sparse = made.drive.with_signals(replace(s, time=s.time[::16], values=s.values[::16]))
     weighing = wb.weigh(sparse, car)
     assert weighing.status == "not_excited"
-    assert "too short a stretch, for torque comes every 4 s: record it" in weighing.reason
+    assert weighing.reason_id == "motion.few_rows"
+    assert phrase("slow_torque", period=4.0) in weighing.refusal.values["cause"]
 
 
 def test_a_speed_of_one_row_breaks_nothing(made, car):
@@ -81,4 +83,4 @@ def test_a_speed_of_one_row_breaks_nothing(made, car):
     weighing = wb.weigh(
         made.drive.with_signals(replace(s, time=s.time[-1:], values=s.values[-1:])), car
     )
-    assert any("vehicle_speed begins" in warning for warning in weighing.warnings)
+    assert any(warning.id == "file.begins_late" for warning in weighing.problems)

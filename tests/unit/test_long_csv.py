@@ -48,7 +48,8 @@ def test_from_a_log_of_car_scanner_to_signals(tmp_path):
     assert_allclose(drive.signals["engine_load"].values, 0.4)
     assert_allclose(np.degrees(drive.signals["latitude"].values), 45.0 + 1e-4 * np.arange(2, 10))
     assert_allclose(np.diff(drive.signals["latitude"].time), 2.0)
-    assert "left out 20 of 80 rows" in " ".join(p.text for p in drive.problems)
+    (found,) = [p for p in drive.problems if p.id == "file.rows_left_out"]
+    assert (found.values["count"], found.values["rows"]) == (20, 80)
 
 
 @pytest.mark.parametrize("kind", ["polars", "pandas", "categories"])

@@ -111,7 +111,10 @@ def test_eleven_and_twenty_nine_bits_and_several_units():
     assert [c.split(",")[0] for c in found.contents] == [
         "CAN 1 7E8", "CAN 1 18DAF110", "CAN 1 18DAF118",
     ]  # fmt: skip
-    assert "left out of CAN 1 18DAF118: vehicle_speed (3 for 6)" in (found.problems[0].text)
+    assert (found.problems[0].id, found.problems[0].values["names"]) == (
+        "bus.answered_twice",
+        "vehicle_speed (3 for 6)",
+    )
 
 
 def drive_answers(seconds, identifier, start, speed=50):
@@ -129,6 +132,8 @@ def test_answers_that_change_from_11_to_29_bits_are_read_on():
     assert_allclose(value(found, "vehicle_speed"), np.repeat([50.0, 60.0], [120, 90]))
     (problem,) = found.problems
     assert problem.id == "bus.filled_in"
+    assert f"{problem.values['first']:.0f}" == "60"
+    assert f"{problem.values['last']:.0f}" == "104"
     assert problem.id == "bus.filled_in"
     assert found.used.all()
 
@@ -138,7 +143,10 @@ def test_answers_in_both_lengths_at_once_are_taken_once():
         join_frames([drive_answers(60, 0x7E8, 0.0), drive_answers(60, 0x18DAF110, 0.1)])
     )
     assert [len(s) for s in found.signals] == [120, 120]
-    assert "left out of CAN 1 18DAF110" in found.problems[0].text
+    assert (found.problems[0].id, found.problems[0].values["other"]) == (
+        "bus.answered_twice",
+        "CAN 1 18DAF110",
+    )
 
 
 def test_what_is_asked_seldom_of_two_units_is_no_silence():
@@ -156,13 +164,19 @@ def test_missing_parts_cost_that_answer_only():
     keep[3] = False
     found = decode_obd(frames.select(keep))
     assert_allclose(found.signals[0].time, [0.0, 1.0, 1.5, 2.0])
-    assert "left out 1 answer of CAN 1 7E8 with frames missing" in found.problems[0].text
+    assert (found.problems[0].id, found.problems[0].values["answers"]) == (
+        "bus.answers_lost",
+        "1 answer",
+    )
 
 
 def test_cut_answer_gives_what_stood_before():
     found = decode_obd(answers([bytes.fromhex("41 0D 32 0C 1A")] * 3))
     assert [s.name for s in found.signals] == ["vehicle_speed"]
-    assert "3 answers of CAN 1 7E8 cut off" in found.problems[0].text
+    assert (found.problems[0].id, found.problems[0].values["answers"]) == (
+        "bus.answers_cut",
+        "3 answers",
+    )
 
 
 def test_identification_numbers_are_counted_and_never_kept():
@@ -172,7 +186,8 @@ def test_identification_numbers_are_counted_and_never_kept():
     assert found.problems == []
     found = decode_obd(answers([vin[0], *speed, vin[1], *speed]))
     assert found.problems[0].serious
-    assert "2 vehicles" in found.problems[0].text
+    assert found.problems[0].id == "vehicle.several_vins"
+    assert found.problems[0].values["vehicles"] == 2
     assert "WVWZZZ" not in repr(found)
 
 
@@ -180,7 +195,7 @@ def test_two_vehicles_at_once_are_a_serious_doubt():
     one = answers([bytes([0x41, 0x0D, 50])] * 30)
     two = answers([bytes([0x41, 0x0D, 90])] * 20, channel=2, start=0.1)
     found = decode_obd(join_frames([one, two]))
-    assert any(p.serious and "two vehicles" in p.text for p in found.problems)
+    assert any(p.serious and p.id == "vehicle.two_units" for p in found.problems)
 
 
 def test_other_services_alone_are_no_obd_drive():

@@ -94,8 +94,7 @@ def test_a_torque_ten_percent_off_is_weighed_right(made):
     assert abs(told.mass / mass - 1.0) < 0.4 * abs(without.mass / mass - 1.0)
     low, high = told.interval(0.95)
     assert low < mass < high
-    note = next(n for n in told.warnings if "battery power" in n)
-    assert "seldom so far off" in note
+    assert any(n.id == "battery.unusual" for n in told.problems)
 
 
 def test_the_interval_narrows_and_the_torque_moves_within_it(made):
@@ -119,11 +118,11 @@ def test_a_current_of_something_else_is_not_believed(made):
     wild = drive.with_signals(replace(other, values=np.abs(np.nan_to_num(shaft))))
     same, notes = by_power(wild, car)
     assert same == car
-    assert all("nothing is taken from it" in n for n in notes)
+    assert all(n.id == "battery.impossible" for n in notes)
     assert find_power_balance(made.drive, car) is None
     # Half the current: far from any data sheet, so the doubt is left in the interval.
     doubted, notes = by_power(electrified(made, power=0.5), car)
-    assert "seldom so far off" in notes[0]
+    assert notes[0].id == "battery.unusual"
     assert doubted.torque.scale_std > 10.0 * TORQUE_SOURCES["measured"].motor_scale_std
 
 
@@ -140,9 +139,9 @@ def test_what_was_calibrated_or_stated_is_left_alone(made):
 def test_inspect_tells_it(made):
     drive = electrified(made, reads=0.99)
     found = inspect_drive(drive, sheet())
-    assert any("battery power" in p.text and not p.serious for p in found.problems)
-    assert not any("battery power" in p.text for p in inspect_drive(drive).problems)
-    assert not any("battery power" in p.text for p in inspect_drive(made.drive, sheet()).problems)
+    assert any(p.id == "battery.divided" and not p.serious for p in found.problems)
+    assert not any(p.id == "battery.divided" for p in inspect_drive(drive).problems)
+    assert not any(p.id == "battery.divided" for p in inspect_drive(made.drive, sheet()).problems)
 
 
 def test_one_second_and_polled_late_is_enough(made):

@@ -84,7 +84,7 @@ def test_parts_are_written_on_the_way_and_read_as_a_drive(tmp_path):
     drive = read_drive(tmp_path / "drive")
     assert_holds(drive, 100)
     assert drive.duration > 85.0
-    assert ["cut off" in p.text for p in drive.problems] == [True, True]
+    assert [p.id for p in drive.problems] == ["file.recording_cut"] * 2
     assert not any(p.serious for p in drive.problems)
     recorder.close()
 
@@ -324,7 +324,9 @@ def test_a_part_that_is_no_table_is_left_out_and_told(tmp_path):
     recorder._writer.submit(int).result()
     part_files(tmp_path / "drive" / "imu.parts")[1].write_bytes(b"PAR1 torn")
     drive = read_drive(tmp_path / "drive")
-    assert any("imu.parts/000002.parquet is not readable" in p.text for p in drive.problems)
+    assert any(
+        p.id == "file.part_damaged" and p.values["part"] == "000002.parquet" for p in drive.problems
+    )
     assert len(drive.signals["accel_x"]) < len(drive.signals["vehicle_speed"]) * 25
     recorder._problem = "left"
     recorder.close()

@@ -182,7 +182,7 @@ def test_a_start_that_is_forgotten_gives_a_mass_with_its_interval(car, monkeypat
     monkeypatch.setattr("weighbridge.estimators.speed_ekf.start_share", lambda *_: 0.1)
     doubtful = wb.weigh(drive(2), car, method="speed-ekf")
     assert doubtful.status == "not_excited"
-    assert "give or take" in doubtful.reason
+    assert doubtful.reason_id == "speed.wide"
     sure = replace(car, speed_model=replace(car.speed_model, scale_std=0.1))
     weighed = wb.weigh(drive(2), sure, method="speed-ekf")
     low, high = weighed.interval(0.95)
@@ -194,6 +194,7 @@ def test_short_drive_and_no_speed_are_told(car):
     short = wb.weigh(drive(3, seconds=120.0), car, method="speed-ekf")
     assert short.status == "not_excited"
     assert short.reason_id == "speed.few_samples"
+    assert f"{short.refusal.values['period']:g}" == "7"
     without = wb.weigh(drive(3).without("vehicle_speed"), car, method="speed-ekf")
     assert without.status == "missing_signals"
     assert without.reason_id == "speed.few"

@@ -215,14 +215,15 @@ def test_a_squat_that_may_be_another_is_in_the_interval(weighed):
     held = of_vehicle(moved(0.007), calibrated(car, K))
     assert held.squat == K
     assert held.squat_std == pytest.approx(0.0015)
-    assert "perhaps the sensor leans by 0.40°" in held.notes[-1]
+    assert held.notes[-1].id == "imu.lean_doubtful"
+    assert "0.40°" in held.notes[-1].values["leans"]
 
 
 def test_the_own_squat_of_a_drive_is_not_put_back(weighed):
     car, weighing = weighed
     own = of_vehicle(moved(0.012), calibrated(car, K))
     assert (own.squat, own.own_squat) == (0.012, True)
-    assert "in the calibration by 0.23°" in own.notes[-1]
+    assert own.notes[-1].id == "imu.lean"
     balance = replace(weighing.result.balance, motion=own)
     assert residual_squat(balance, calibrated(car, K), 1500.0).squat == 0.0
 
@@ -248,7 +249,7 @@ def test_a_holder_that_swings_is_told_and_the_mass_is_right(weighed):
     car, _ = weighed
     made = simulate_car(Scenario(name="holder", car=MIDSIZE, route=short_route(), seed=73))
     found = wb.weigh(swinging(made, np.radians(0.7)), car)
-    assert any("holder" in w for w in found.warnings)
+    assert any(p.id in ("imu.lean", "imu.lean_doubtful") for p in found.problems)
     low, high = found.interval(0.95)
     assert low < made.scenario.mass < high
 

@@ -86,6 +86,9 @@ def test_rows_without_satellites_have_no_position(tmp_path):
     found = drive(tmp_path, vbo(row("120000.00", sats="128"), row("120001.00")))
     assert len(found.signals["latitude"]) == 1
     assert found.problems[0].id == "position.few_satellites"
+    assert found.problems[0].values["count"] == 1
+    assert found.problems[0].values["rows"] == 2
+    assert found.problems[0].values["satellites"] == 3
 
 
 def test_clock_runs_over_midnight_and_takes_the_nearest_day(tmp_path):
@@ -117,6 +120,8 @@ def test_cut_row_and_text_cell(tmp_path):
     assert len(found.signals["latitude"]) == 2
     assert len(found.signals["altitude"]) == 1
     assert found.problems[0].id == "file.rows_cut"
+    assert found.problems[0].values["count"] == 1
+    assert found.problems[0].values["rows"] == 3
 
 
 def test_accelerations_of_the_speed_are_no_specific_force(tmp_path):

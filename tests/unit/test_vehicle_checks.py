@@ -9,6 +9,7 @@ from weighbridge import CalibrationSettings, calibrate
 from weighbridge.checks import check_drive
 from weighbridge.checks.vehicle import check_vehicle
 from weighbridge.errors import DriveError
+from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Driveline, Provenance, TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -83,8 +84,10 @@ def test_reference_torque_that_changes():
     values = np.where(time < 500.0, 250.0, 400.0)
     (problem,) = check_vehicle(one.with_signals(Signal("reference_torque", time, values)), None)
     assert problem.serious
-    assert "250 N m from 0 s and 400 N m from 500 s" in problem.text
-    assert problem.id == "torque.references_taken"
+    assert problem.id == "torque.references"
+    for value, at in ((250.0, "0 s"), (400.0, "500 s")):
+        assert phrase("reference_from", value=value, at=at) in problem.values["said"]
+    assert problem.values["split"]
     values[:] = 250.0
     values[7] = 65.0  # a frame that was disturbed
     assert told(one.with_signals(Signal("reference_torque", time, values))) == []
@@ -100,8 +103,9 @@ def test_two_reference_torques_in_turn_are_both_told_and_settled_by_the_vehicle_
     for vehicle, expected in ((None, True), (lacking, True), (stated, False), (load, False)):
         (problem,) = check_vehicle(found, vehicle)
         assert problem.serious is expected
-        assert "1500 N m from 0 s and 2100 N m from 5 s, in turn" in problem.text
-        assert "1800" not in problem.text
+        told = (("0 s", 1500.0), ("5 s", 2100.0))
+        which = " and ".join(phrase("reference_from", value=v, at=at) for at, v in told)
+        assert problem.values["said"] == phrase("reference_in_turn", which=which)
     known = Vehicle(torque=TorqueModel(reference_torque=2100.0))  # before its calibration
     assert [p.serious for p in check_vehicle(found, known)] == [False]
     (problem,) = check_vehicle(found, None)
@@ -128,6 +132,8 @@ def test_a_reference_torque_that_is_not_that_of_the_calibration():
     (problem,) = problems("percent", 2100.0)
     assert problem.serious
     assert problem.id == "torque.reference_changed"
+    assert f"{problem.values['now']:.0f}" == "2415"
+    assert f"{problem.values['known']:.0f}" == "2100"
     assert [p.serious for p in problems("measured", 2100.0)] == [False]
     assert list(problems("percent", 2400.0)) == list(problems("percent", None)) == []
 
@@ -177,7 +183,8 @@ def friction(found, vehicle=None):
 def test_friction_in_the_torque_shows_at_idle():
     for vehicle in (None, car(), car(coefficients=(0.0, 1.0))):
         (problem,) = friction(idling(0.07), vehicle)
-        assert "reads 7 %" in problem.text
+        assert problem.id == "torque.friction"
+        assert f"{problem.values['idle']:.0f}" == "7"
         assert not problem.serious
     assert friction(idling(0.07), car(coefficients=(-14.0, 1.0))) == []
     assert friction(idling(0.07), car("measured")) == []
@@ -191,9 +198,8 @@ def test_friction_is_told_by_the_bus_it_is_of_and_not_after_a_calibration():
     truck = replace(car(), kind="truck")
     for drive, vehicle in ((made, truck), (idling(0.07, retarder_torque=-0.1), None)):
         (problem,) = friction(drive, vehicle)
-        assert "J1939 (SPN 513)" in problem.text
-        assert "PID 62" not in problem.text
         assert problem.id == "torque.friction"
+        assert problem.values["whose"] == phrase("percent_torque")
     fitted = Provenance(masses=(1500.0,), method="joint")
     assert fitted.torque_fitted
     assert friction(made, replace(truck, provenance=fitted)) == []
@@ -203,7 +209,7 @@ def test_indicated_torque_is_refused_until_its_friction_is_stated():
     found = idling(0.10, indicated_torque_fraction=0.1)
     (problem,) = friction(found, car())
     assert problem.serious
-    assert "at most 10 %" in problem.text
+    assert problem.id == "torque.indicated"
     assert "coefficients" in problem.text
     assert [p.serious for p in friction(found)] == [False]
     assert friction(found, car(coefficients=(-25.0, 1.0))) == []
