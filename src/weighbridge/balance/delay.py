@@ -37,10 +37,6 @@ drives of five vehicles it differed by 0.05 s at most. Masses are 0.2 % light at
 ELSEWHERE: Final = 1.5
 """Motion later or earlier than its torque by so much is another clock [s]."""
 
-AGAINST: Final = -0.5
-"""Correlation of force and motion below which the torque has the other sign [-]: pieces of
-simulated drives had 0.89 to 1.00, see `weighbridge.balance.torque_drift.AGREES`."""
-
 _SOUGHT: Final = 30.0
 """Farthest that such a clock is looked for [s]: as far as clocks of tables are put together."""
 
@@ -240,16 +236,6 @@ def far_shift(balance: ForceBalance, vehicle: Vehicle) -> float:
     near = float(misfit[np.abs(shifts) < ELSEWHERE].min())
     far = abs(shifts[best]) >= ELSEWHERE and misfit[best] < _CLEARER * near
     return float(shifts[best]) if far else 0.0
-
-
-def turned_torque(balance: ForceBalance, vehicle: Vehicle) -> bool:
-    """Tell whether the torque runs against the motion it makes: its sign was turned."""
-    table = balance.table
-    force = force_on_mass(table, vehicle)
-    rows = table.usable & np.isfinite(force) & np.isfinite(table.specific_force)
-    if np.count_nonzero(rows) < 100:
-        return False
-    return correlation(force[rows], table.specific_force[rows]) < AGAINST
 
 
 def _thinned(time: Floats) -> int:

@@ -13,7 +13,12 @@ from typing import Final
 
 from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates, check_splices
 from weighbridge.checks.digits import with_half_digits
-from weighbridge.checks.engine import check_engine_speed, check_friction, check_whole_torque
+from weighbridge.checks.engine import (
+    check_engine_speed,
+    check_friction,
+    check_torque_sign,
+    check_whole_torque,
+)
 from weighbridge.checks.frozen_imu import check_frozen, check_limit
 from weighbridge.checks.inertial import check_imu
 from weighbridge.checks.mending import mended
@@ -46,6 +51,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_pressure,
     check_retarder,
     check_whole_torque,
+    check_torque_sign,
     check_friction,
     check_engine_speed,
     check_sign,

@@ -7,9 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.checks.needed import show
+from weighbridge.checks import windows
+from weighbridge.checks.needed import needed, of_torque, show
 from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem, Signal
+from weighbridge.signals.correlation import correlation
 from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE, friction_coefficients
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
@@ -19,6 +21,15 @@ _IDLE: Final = (45.0, 135.0)
 _WARM: Final = 343.0
 # Torque at idle that alternator and pumps do not take [part of the reference torque].
 _IDLE_TORQUE: Final = 0.03
+
+# Signals of the battery have signs of their own.
+_OF_BATTERY: Final = ("battery_current", "battery_power", "battery_voltage")
+# Torque and gain of speed are compared over windows of so long [s], where it is so fast [m/s].
+_SIGN_WINDOW: Final = 1.0
+_SIGN_SPEED: Final = 2.0
+_SIGN_FEWEST: Final = 30
+# Correlation below which the torque has the other sign: -0.9 in a reversed one.
+_AGAINST: Final = -0.5
 
 
 def check_whole_torque(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
@@ -30,6 +41,27 @@ def check_whole_torque(drive: Drive, vehicle: Vehicle | None) -> Iterator[Proble
     whole = bool(np.all(np.abs(s.values - np.round(s.values)) < 1e-6))
     if whole and low >= -40.0 and 60.0 <= high <= 100.0 and np.unique(s.values).size > 20:
         yield Problem.of("torque.whole_percent", s.name, low=low, high=high)
+
+
+def check_torque_sign(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find a torque that runs against the motion it makes: its sign was turned."""
+    speed = drive.speed
+    if speed is None or len(speed) < 20:
+        return
+    for name in sorted(needed(drive, vehicle) & of_torque()):
+        s = drive.get(name)
+        if s is None or len(s) < 20 or float(np.min(s.values)) >= 0.0 or name in _OF_BATTERY:
+            continue
+        at = windows.edges(
+            max(s.time[0], speed.time[0]), min(s.time[-1], speed.time[-1]), _SIGN_WINDOW
+        )
+        force, full = windows.means(s, at)
+        gained = np.diff(speed.at(at))
+        moving = full & (speed.age(at[1:]) < 1.0) & (speed.at(at[1:]) > _SIGN_SPEED)
+        if np.count_nonzero(moving) < _SIGN_FEWEST:
+            continue
+        if correlation(force[moving], gained[moving]) < _AGAINST:
+            yield Problem.of("torque.sign", name, serious=True)
 
 
 def check_friction(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
