@@ -271,8 +271,9 @@ def all_pairs() -> list[Pair]:
     return [*_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings()]
 
 
-OF_CI: Final = ("own car", "own electric", "second van", "second truck")
-"""Subjects of the part that CI weighs: few, for they have to be made."""
+OF_CI: Final = ("own car", "own electric")
+SEEN_IN_CI: Final = ("full", "no IMU")
+"""Subjects and equipment of the part that CI weighs: few, for each has to be made."""
 
 
 def part(name: str) -> list[Pair]:
@@ -280,11 +281,13 @@ def part(name: str) -> list[Pair]:
     pairs = all_pairs()
     if name == "all":
         return pairs
-    of, count = (OF_CI, 150) if name == "ci" else (OF_CI[:2], 30)
-    there = [p for p in pairs if p.of in of and p.equipment in ("full", "no IMU", "no GNSS", "")]
+    there = [p for p in pairs if p.of in OF_CI and p.equipment in SEEN_IN_CI]
+    if name == "quick":
+        there = [p for p in there if p.of == OF_CI[0] and p.equipment == "full"]
     order = sorted(there, key=lambda p: zlib.crc32(p.id.encode()))
-    chosen = {p.id for p in order[:count]} | {p.reference for p in order[:count]}
-    return [p for p in pairs if p.id in chosen]
+    chosen = order[: 150 if name == "ci" else 30]
+    wanted = {p.id for p in chosen} | {p.reference for p in chosen}
+    return [p for p in pairs if p.id in wanted]
 
 
 def unavailable(pair: Pair) -> str:

@@ -1,4 +1,4 @@
-"""Weigh pairs in two processes."""
+"""Weigh pairs, in several processes."""
 
 from __future__ import annotations
 
@@ -96,21 +96,23 @@ def _runs(pairs: Iterable[Pair]) -> Iterator[list[Pair]]:
             yield run[k : k + TOGETHER]
 
 
-def _shared_out(work: Callable[[Any], Any], jobs: Sequence[Any]) -> list[Any]:
-    with ProcessPoolExecutor(WORKERS, mp_context=multiprocessing.get_context("fork")) as pool:
+def _shared_out(work: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -> list[Any]:
+    if workers == 1:
+        return [work(job) for job in jobs]
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("fork")) as pool:
         return list(pool.map(work, jobs))
 
 
-def run(pairs: Sequence[Pair]) -> pl.DataFrame:
-    """Calibrate and weigh; rows are in the order of the pairs."""
-    _shared_out(_prepare, sorted({p.of for p in pairs if p.of}))
+def run(pairs: Sequence[Pair], workers: int = WORKERS) -> pl.DataFrame:
+    """Calibrate and weigh in so many processes; rows are in the order of the pairs."""
+    _shared_out(_prepare, sorted({p.of for p in pairs if p.of}), workers)
     wanted = sorted({(p.of, p.equipment) for p in pairs if p.equipment})
-    vehicles = dict(zip(wanted, _shared_out(_calibrate, wanted), strict=True))
+    vehicles = dict(zip(wanted, _shared_out(_calibrate, wanted, workers), strict=True))
     jobs = [
         (some, {k: v for k, v in vehicles.items() if k[0] == some[0].of}) for some in _runs(pairs)
     ]
     order = {p.id: k for k, p in enumerate(pairs)}
-    rows = [row for part in _shared_out(_weigh_all, jobs) for row in part]
+    rows = [row for part in _shared_out(_weigh_all, jobs, workers) for row in part]
     rows.sort(key=lambda row: order[row.id])
     return pl.DataFrame(rows, schema=SCHEMA, orient="row")
 

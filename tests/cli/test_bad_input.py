@@ -165,7 +165,7 @@ def test_accelerometer_reversed(weigh, loaded, changed, gone):
         low, high = told["interval95_kg"]
         assert low < loaded.mass < high
         assert abs(told["mass_kg"] / loaded.mass - 1.0) < 0.08
-        assert any(p["id"] == "torque.clock_moved" for p in told["problems"])
+        assert any(p["id"] == "imu.mounting_moved" for p in told["problems"])
     else:
         assert ran.code in (1, 2)
 

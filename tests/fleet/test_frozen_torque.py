@@ -76,7 +76,9 @@ def test_from_the_stop_after_the_freeze_on_there_is_no_mass(frozen, loading, ins
     assert rest["distance_km"] > 0.3
     assert row["unweighed_s"] == pytest.approx(rest["duration_s"])
     assert segments["weighed_s"].to_list() == pytest.approx([row["used_s"], 0.0], abs=1.0)
-    assert repr(weighing_row(row, segments.to_dicts())) == repr(told.row)
+    # A row of the store keeps ids and texts of the problems.
+    kept = tuple(wb.Problem(p.id, p.text) for p in told.row.problems)
+    assert repr(weighing_row(row, segments.to_dicts())) == repr(replace(told.row, problems=kept))
 
 
 def test_what_was_not_weighed_is_in_no_sum_and_is_known_by_no_ticket(frozen):

@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from weighbridge.messages import Problem
-
 if TYPE_CHECKING:
+    from weighbridge.messages import Problem
     from weighbridge.pipeline.weighing import Weighing
     from weighbridge.signals import Drive
     from weighbridge.vehicle.model import Vehicle
@@ -39,6 +38,8 @@ class OwnMasses:
     @property
     def doubt(self) -> Problem | None:
         """What is to be said of the file; None where it weighs all of its drives."""
+        from weighbridge.messages import Problem
+
         if not self.unweighed:
             return self._contradiction
         name, reason = self.unweighed[0]
@@ -57,6 +58,8 @@ class OwnMasses:
     @property
     def _contradiction(self) -> Problem | None:
         """What speaks against a known mass; None where all lie within their intervals."""
+        from weighbridge.messages import Problem
+
         if not self.outside:
             return None
         name, words = self.outside[0]

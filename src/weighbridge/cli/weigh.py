@@ -22,13 +22,13 @@ from weighbridge.cli.progress import Bar, progress
 from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import console, say, say_notes, shown
 from weighbridge.cli.verbosity import say_written
-from weighbridge.messages import Problem
 from weighbridge.whole import is_stream
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from weighbridge.messages import Problem
     from weighbridge.pipeline.weighing import Weighing
     from weighbridge.results.row import WeighingRow
     from weighbridge.signals import Drive
@@ -187,6 +187,7 @@ def _weighed(
     ``given`` reads the drives of a recording, and ``alone`` refuses one of several.
     """
     from weighbridge.errors import ConfigError, WeighbridgeError
+    from weighbridge.messages import Problem
     from weighbridge.pipeline.weighing import weigh as weigh_drive
 
     for path in drives:
