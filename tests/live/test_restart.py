@@ -40,7 +40,7 @@ def test_after_all_devices_began_anew_a_new_drive_is_weighed(car, loaded):
     assert heard.scale.newest == pytest.approx(HOST + 122.0, abs=0.1)
     assert records.start >= HOST + 110.0
     assert told.driven < 10.0
-    assert [n for n in told.problems if n.id == "live.anew" and "e+" not in n]
+    assert [n for n in told.problems if n.id == "live.anew" and "e+" not in n.text]
     assert not [n for n in told.notes if "jumped" in n]
     # The sensor's stamps are where its lines came, to a tick.
     for name in ("accel_x", "vehicle_speed"):

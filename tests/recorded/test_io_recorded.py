@@ -143,7 +143,7 @@ def test_inertial_drive_raises_no_alarm(hills):
         (0.621371, ("gnss_speed",), "speed.unit"),
         (np.pi / 180, ("latitude", "longitude"), "position.radians"),
         (-1.0, ("accel_x", "accel_y", "accel_z"), "imu.gyro_against_course"),
-        (-1.0, ("accel_x",), "imu.gyro_sign"),
+        (-1.0, ("accel_x",), "imu.axes_swapped"),
     ],
 )
 def test_wrong_units_and_signs_are_found_on_it(hills, factor, names, id):

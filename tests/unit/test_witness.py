@@ -323,8 +323,11 @@ def test_calibration_drives_that_contradict_each_other_are_told():
     found, doubts = learn_witnesses([*KNOWN[:2], off], CAR)
     assert found == ()
     assert len(doubts) == 3
-    assert "drive 1 and drive 4 contradict each other" in doubts[0]
-    assert "same mass_air_flow engine_load reads 0.80 times as much in the second" in doubts[0]
+    assert doubts[0].id == "calibration.drives_contradict"
+    values = doubts[0].values
+    assert (values["first"], values["second"]) == ("drive 1", "drive 4")
+    assert (values["witness"], values["reading"]) == ("mass_air_flow", "engine_load")
+    assert "0.80" in values["by"]
 
 
 def electric_drive(seed, heating=0.0, read=1.0):

@@ -30,7 +30,7 @@ from weighbridge.calibration.inverse import (
 )
 from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows
-from weighbridge.calibration.rls import fit_rls, refuse_nonsense
+from weighbridge.calibration.rls import fit_rls, refuse_diesel_air, refuse_nonsense
 from weighbridge.calibration.self_weighing import (
     BY_JOINT,
     BY_SPEED_TORQUE,
@@ -71,6 +71,9 @@ TIMING_WINDOW: Final = 0.6
 
 TIMING_SAMPLES: Final = 1.2
 """Samples of a slowly polled reading that they hold at least [-]; fewer left none at 1 Hz."""
+
+MOST: Final = np.array([19.0, 0.09, np.inf, np.inf])
+"""Drag area [m^2], rolling coefficient [-] and inertias that a vehicle file can hold, about."""
 
 FARTHEST: Final = 5.0
 """Standard deviations of its class by which a fitted road load may be off [-]: farther ones were
@@ -182,9 +185,11 @@ def _refuse_strange(
     problem: Problem, found: InverseFit, rows: Sequence[DelayedRows], settings: FitSettings
 ) -> None:
     """Refuse a torque that falls with its reading, and a road load that no vehicle has."""
-    refuse_nonsense(problem, *_driven_slope(problem, found, rows))
+    slope = _driven_slope(problem, found, rows)
+    refuse_nonsense(problem, *slope)
     mean, std = settings.prior
     if np.any(np.abs(found.road - mean)[:2] > FARTHEST * std[:2]):
+        refuse_diesel_air(problem, *slope)
         raise _NoRoadLoad(
             phrase(
                 "strange_road", area=found.road[0], rolling=found.road[1], kind=problem.draft.kind
@@ -413,7 +418,8 @@ def _with(draft: Vehicle, found: InverseFit, settings: FitSettings) -> Vehicle:
     straight = bent - 2 * settings.curved
     values = [float(w) for w in found.coefficients]
     stds = [float(s) for s in found.stds]
-    road = np.maximum(found.road, 0.0)
+    # A quick fit, whose road load nobody keeps, may go beyond what a vehicle file can hold.
+    road = np.clip(found.road, 0.0, MOST)
     return replace(
         draft,
         torque=replace(

@@ -227,13 +227,9 @@ def _own_masses(
 def refuse_nonsense(problem: Problem, slope: float, std: float) -> None:
     """Raise where torque does not rise with its source: nothing can be weighed by it."""
     if not slope > 3.0 * std:
-        diesel = phrase("diesel_air")
-        by_air, engine = problem.source.name == "air_flow", problem.base.engine
-        if by_air and engine == "diesel":
-            raise refused(
-                "calibration.diesel_air", drives=problem.names, diesel=diesel, slope=slope, std=std
-            )
-        unsaid = phrase("and_that", text=diesel) if by_air and engine is None else ""
+        refuse_diesel_air(problem, slope, std)
+        by_air = problem.source.name == "air_flow" and problem.base.engine is None
+        unsaid = phrase("and_that", text=phrase("diesel_air")) if by_air else ""
         raise refused(
             "calibration.no_slope",
             drives=problem.names,
@@ -241,6 +237,18 @@ def refuse_nonsense(problem: Problem, slope: float, std: float) -> None:
             slope=slope,
             std=std,
             unsaid=unsaid,
+        )
+
+
+def refuse_diesel_air(problem: Problem, slope: float, std: float) -> None:
+    """Name the cause of a fit that no vehicle has: a diesel's air flow is no torque."""
+    if problem.source.name == "air_flow" and problem.base.engine == "diesel":
+        raise refused(
+            "calibration.diesel_air",
+            drives=problem.names,
+            diesel=phrase("diesel_air"),
+            slope=slope,
+            std=std,
         )
 
 
