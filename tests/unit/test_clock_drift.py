@@ -109,7 +109,7 @@ def test_the_lag_of_each_piece_is_found_to_hundredths(made):
 def test_clocks_that_part_are_brought_together(made, car, mass, tables, change):
     told = wb.weigh(retimed(made.drive, tables, change), car)
     assert told.mass == pytest.approx(mass, rel=0.01)
-    assert any(p.id == "clock.moved" for p in told.problems)
+    assert any(p.id in ("clock.moved", "torque.clock_moved") for p in told.problems)
 
 
 def test_an_inertial_clock_of_its_own_is_the_one_that_is_moved(made):
@@ -175,7 +175,7 @@ def test_an_inertial_sensor_that_froze_is_left_out_and_not_the_bus(made, car, ma
     told = wb.weigh(frozen, car)
     assert told.mass == pytest.approx(mass, rel=0.02)
     (note,) = [w for w in told.problems if w.id == "frozen.imu"]
-    assert note.startswith("the inertial sensor repeats its values for 300.0 s from 500")
+    assert note.end - note.start == pytest.approx(300.0, abs=1.0)
     assert not any("obd" in w or "leans" in w for w in told.warnings)
 
 

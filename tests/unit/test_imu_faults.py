@@ -112,7 +112,8 @@ def test_a_sensor_moved_on_the_way_is_found_anew(any_vehicle, axis, degrees):
     drive, plain = any_vehicle
     motion = inertial_motion(turned(drive, axis, degrees), known(plain))
     (note,) = [n for n in motion.notes if n.id == "imu.moved"]
-    assert float(note.split(" deg")[0].split()[-1]) == pytest.approx(abs(degrees), abs=4.0)
+    size = float(note.values["size"].split()[0])
+    assert size == pytest.approx(abs(degrees), abs=4.0)
     assert abs(halves_apart(motion, plain)) < 0.03
     slope, _ = force_slope(motion, plain)
     assert slope == pytest.approx(1.0, abs=0.03)

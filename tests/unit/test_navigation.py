@@ -203,7 +203,7 @@ def test_speed_in_a_wrong_unit_is_refused(hills, factor):
     s = drive.signals["vehicle_speed"]
     wrong = drive.with_signals(Signal("vehicle_speed", s.time, s.values * factor))
     # a speed wrong by much also makes the gyro look wrong: either sentence names a unit
-    with refused("imu.gravity_mean"):
+    with refused("speed.unit_of_accel"):
         inertial_motion(wrong)
 
 
@@ -218,7 +218,7 @@ def test_wrong_units_are_refused_with_a_known_mounting_too(hills):
 def test_known_mounting_serves_a_short_drive():
     drive, truth = simulate(duration=45.0)
     short = drive.between(0.0, 17.0)
-    with refused("motion.no_forward"):
+    with refused("motion.too_little"):
         inertial_motion(short)
     m = inertial_motion(short, Mounting(std=(0.005, 0.005, 0.01)))
     assert m.squat is None

@@ -40,7 +40,7 @@ def test_a_moved_sensor_is_found_anew(made, degrees):
         turned.append(Signal(f"{kind}_x", x.time, c * x.values - s * y.values))
         turned.append(Signal(f"{kind}_y", x.time, s * x.values + c * y.values))
     motion = inertial_motion(drive.with_signals(*turned), known)
-    assert any(note.id == "imu.moved" for note in motion.notes)
+    assert any(note.id == "imu.mounting_moved" for note in motion.notes)
     error = np.interp(motion.time, plain.time, plain.specific_force) - motion.specific_force
     assert np.sqrt(np.mean(error[plain.speed[: error.size] > 2.0] ** 2)) < 0.05
 
@@ -115,4 +115,4 @@ def test_a_note_tells_the_instant_by_the_drives_clock(begin, told):
     creep = Change(1, begin + 300.0, begin + 900.0, axis, 0.1, True)
     notes = remounting_notes([creep, step], begin, begin + 600.0)
     for note, words in zip(notes, told, strict=True):
-        assert re.search(words, note), note
+        assert re.search(words, note.text), note

@@ -197,7 +197,7 @@ def test_short_drive_and_no_speed_are_told(car):
     assert f"{short.refusal.values['period']:g}" == "7"
     without = wb.weigh(drive(3).without("vehicle_speed"), car, method="speed-ekf")
     assert without.status == "missing_signals"
-    assert without.reason_id == "speed.few"
+    assert without.reason_id == "speed.none_of"
 
 
 def test_speed_that_comes_too_rarely_is_told(car):
@@ -213,7 +213,7 @@ def test_vehicle_without_a_model_is_refused():
 @pytest.mark.parametrize(
     ("made", "words"),
     [
-        (drive(1, graded=False), "nothing tells the grade"),
+        (drive(1, graded=False), "shows the grade"),
         (drive(1).without("vehicle_speed"), "no vehicle_speed and no gnss_speed"),
         (drive(1, seconds=180.0), "and 40 are needed"),
     ],

@@ -41,7 +41,7 @@ def test_acceleration_on_the_level():
     assert_allclose(motion.accel[k], np.interp(motion.time, TIME, ACCEL)[k], atol=0.02)
     assert_allclose(motion.specific_force, motion.accel)
     assert_allclose(motion.distance[k], np.interp(motion.time, TIME, DISTANCE)[k], atol=5.0)
-    assert motion.notes == ("no grade and no altitude: the road is taken as level",)
+    assert [note.id for note in motion.notes] == ["motion.level"]
 
 
 def test_grade_from_height_over_distance():

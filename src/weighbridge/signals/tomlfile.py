@@ -58,6 +58,8 @@ _DEEPEST: Final = 100
 # Letters of a word that may be a known one written wrong.
 _LONGEST_WORD: Final = 100
 
+# So many unknown keys are named; a screen shows no more.
+_SAID: Final = 20
 # Texts that stand in brackets in a message.
 _SHOWN: Final = 40
 
@@ -266,10 +268,11 @@ class Section:
     def done(self) -> None:
         """Refuse keys that nobody asked for, all of them at once."""
         faults = Faults(self.error)
-        for key in self.data:
-            if key not in self._known:
-                with faults.gathered():
-                    self.fail(key, f"is not known{suggestion(key, dict.fromkeys(self._known))}")
+        known = dict.fromkeys(self._known)
+        unknown = [key for key in self.data if key not in known]
+        for key in unknown[:_SAID]:
+            with faults.gathered():
+                self.fail(key, f"is not known{suggestion(key, known)}")
         faults.refuse()
 
 
