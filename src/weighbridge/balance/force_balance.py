@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
@@ -30,7 +30,14 @@ from weighbridge.signals.recent import looking
 from weighbridge.vehicle.air import Air, air_density, dynamic_pressure, identify_air
 from weighbridge.vehicle.fuel import Burnt, fuel_burnt, fuel_flow, full_load_torque
 from weighbridge.vehicle.model import DraggedReading, Vehicle
-from weighbridge.vehicle.torque import Torque, engine_torque, source_of, source_signal
+from weighbridge.vehicle.torque import (
+    EXPONENT_STEP,
+    Torque,
+    engine_torque,
+    in_air,
+    source_of,
+    source_signal,
+)
 
 ROUGH_NOISE: Final = 0.03
 """Noise of a torque of which the vehicle file says none, over the highest of the drive [-]."""
@@ -122,6 +129,7 @@ def force_balance(
             engine_delay=read.instants.engine_delay,
             air=read.air,
             full_torque=read.full_torque,
+            air_std=read.air_std,
             torque_noise=_torque_noise(vehicle, table),
             fill=fill,
             periods=drive.periods,
@@ -133,6 +141,7 @@ def force_balance(
         switch_dead=brakes.switch_dead,
         retarder_untold=retarder_untold(drive, vehicle),
         coarse_std=coarse_std(source, reason == Reason.USED),
+        air_std=setup.air_std,
         setup=setup,
         delay=delay,
         lagged=lagged if forward else None,
@@ -163,7 +172,7 @@ class _Read:
     table : (n,) rows, without reasons and noise
     torque : of the rows
     instants : motion, engine speed and gear
-    air, full_torque : of `ForceSetup`
+    air, full_torque, air_std : of `ForceSetup`
     fuel_flow : of the rows (n,) [kg/s]
     """
 
@@ -173,6 +182,7 @@ class _Read:
     air: Air
     full_torque: float
     fuel_flow: Floats
+    air_std: float
 
 
 def _read(
@@ -191,9 +201,17 @@ def _read(
     at = read_instants(drive, vehicle, lagged, recorded, delay, *known, ahead=ahead)
     engine_speed, gearing, altitude = at.columns["engine_speed"], at.columns["gearing"], at.altitude
     period = setup.foot.period if setup is not None else None
-    torque = engine_torque(drive, vehicle, engine_speed, recorded, period=period, ahead=ahead)
-    full = setup.full_torque if setup is not None else full_load_torque(torque.torque)
     air = setup.air if setup is not None else identify_air(drive, altitude)
+
+    def torque_of(more: float) -> Torque:
+        exponent = vehicle.torque.in_thin_air[0] + more
+        share = in_air(vehicle.torque.charge, exponent, air, altitude)
+        return engine_torque(
+            drive, vehicle, engine_speed, recorded, share=share, period=period, ahead=ahead
+        )
+
+    torque = torque_of(0.0)
+    full = setup.full_torque if setup is not None else full_load_torque(torque.torque)
     flow = fuel_flow(drive, vehicle, recorded, torque.torque, engine_speed, full)
     burnt = since.burnt if since is not None else None
     table = ForceTable(
@@ -212,7 +230,21 @@ def _read(
         air=air,
         full_torque=full,
         fuel_flow=flow,
+        air_std=_air_std(vehicle, torque_of) if setup is None and air.known else 0.0,
     )
+
+
+def _air_std(vehicle: Vehicle, torque_of: Callable[[float], Torque]) -> float:
+    """What the air leaves open of the torque, which reads other air than in the calibration [-]."""
+    _, std = vehicle.torque.in_thin_air
+    if vehicle.torque.charge is None or std == 0.0:
+        return 0.0
+    now, then = (torque_of(more).torque for more in (0.0, EXPONENT_STEP))
+    known = np.isfinite(now) & np.isfinite(then) & (now > 0.0)
+    size = float(now[known] @ now[known])
+    if size == 0.0:
+        return 0.0
+    return std * abs(float(now[known] @ (then - now)[known])) / size / EXPONENT_STEP
 
 
 def _reasons(read: _Read, brakes: Brakes, without: Bools, turning: Bools) -> NDArray[np.uint8]:

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 MOVING: Final = 0.5
 """Slower a vehicle stands [m/s]."""
 
+UNKNOWN_AIR: Final = 0.02
+"""What the air leaves open of the torque is told from here on [-]."""
+
 
 class Reason(IntEnum):
     """Why a sample is not usable; 0 where it is."""
@@ -152,6 +155,7 @@ class ForceSetup:
     gears : number of the vehicle file's gear by what the gearbox tells
     engine_delay : lateness of the engine speed [s]
     air : temperature and pressure
+    air_std : what the air leaves open of the torque [-]
     full_torque : torque of the engine that the drive hardly exceeds [N m]
     torque_noise : of one torque [N m]
     fill : how readings that a logger filled in would look; None where they cannot be told
@@ -163,6 +167,7 @@ class ForceSetup:
     gears: Mapping[int, int]
     engine_delay: float
     air: Air
+    air_std: float
     full_torque: float
     torque_noise: float
     fill: Fill | None
@@ -191,6 +196,7 @@ class ForceBalance:
     switch_dead : the brake switch contradicts the motion and is not used
     retarder_untold : a retarder may slow the vehicle that the drive does not tell of
     coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
+    air_std : what other air than that of the calibration leaves open, relative to the torque [-]
     setup : what a whole drive tells of its force side; None but for stages that go forward
     delay : lateness of the torque, which is off its instants [s]
     navigation : what the motion was found by; None where it was not from an inertial sensor
@@ -204,6 +210,7 @@ class ForceBalance:
     switch_dead: bool = False
     retarder_untold: bool = False
     coarse_std: float = 0.0
+    air_std: float = 0.0
     setup: ForceSetup | None = None
     delay: float = 0.0
     navigation: Setup | None = None
@@ -214,4 +221,7 @@ class ForceBalance:
     def notes(self) -> tuple[Problem, ...]:
         """What is uncertain."""
         ids = (("brake.hidden", self.brake_hidden), ("brake.switch_dead", self.switch_dead))
-        return tuple(Problem.of(id) for id, so in ids if so) + coarse_note(self.coarse_std)
+        notes = [Problem.of(id) for id, so in ids if so]
+        if self.air_std > UNKNOWN_AIR:
+            notes.append(Problem.of("torque.air", share=100.0 * self.air_std))
+        return (*notes, *coarse_note(self.coarse_std))

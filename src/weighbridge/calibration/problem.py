@@ -22,6 +22,7 @@ from weighbridge.messages import refused
 from weighbridge.navigation.motion import BY_SPEED, Motion, with_squat
 from weighbridge.navigation.select import find_motion, without_accelerometer
 from weighbridge.signals import Drive, Floats
+from weighbridge.vehicle.air import identify_air
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.classes import VehicleClass
 from weighbridge.vehicle.engine_delay import find_engine_delay
@@ -175,6 +176,17 @@ def problem_of(
     )
 
 
+def _charge(drives: Sequence[Drive], motions: Sequence[Motion]) -> float | None:
+    """Mean charge of an engine in the air of the drives [-]; None where it is not known of each."""
+    charges = []
+    for drive, motion in zip(drives, motions, strict=True):
+        air = identify_air(drive, motion.altitude)
+        if not air.known:
+            return None
+        charges.append(np.mean(np.log(air.charge(motion.altitude))))
+    return float(np.exp(np.mean(charges)))
+
+
 def _refuse_foreign_gears(recordings: Sequence[Recording]) -> None:
     """Refuse gears that were given and are not those of the drives, as `weigh` would.
 
@@ -219,6 +231,7 @@ def _draft(
         source="measured" if source.needs_map else source.name,
         reference_torque=base.torque.reference_torque,
         engine_efficiency=base.torque.engine_efficiency,
+        charge=_charge(drives, motions) if source.charge_exponent[0] else None,
     )
     # A floor is told in the unit of its reading, and a witness is one of it.
     same = base.torque.source == source.name

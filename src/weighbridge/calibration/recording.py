@@ -19,9 +19,9 @@ from weighbridge.balance.table import ForceTable
 from weighbridge.kernels.first_order import first_order
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Bools, Drive, Floats, Signal
-from weighbridge.vehicle.air import air_density
+from weighbridge.vehicle.air import air_density, identify_air
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import DRAGGED_TIME, averaged
+from weighbridge.vehicle.torque import DRAGGED_TIME, averaged, in_air
 from weighbridge.vehicle.torque_sources import TorqueSource
 
 ANCHORS: Final = 0.4
@@ -59,7 +59,7 @@ class Recording:
     drive, motion
     mass : known, as the drive begins [kg]
     draft : vehicle with gears and source, without a torque model
-    reading : (n,) of the torque source at its stamps
+    reading : (n,) of the torque source at its stamps, in the air of the calibration
     floor : reading below which the engine may be dragged; minus infinity where none is
     driven : (n,) where the reading is above that of a dragged engine
     source : of the torque
@@ -84,7 +84,10 @@ class Recording:
     ) -> Recording:
         """See a drive by its torque source."""
         stamps = source.carrier(drive).time
-        reading = source.reading(drive, stamps, draft.torque)
+        altitude = np.interp(stamps, motion.time, motion.altitude)
+        exponent = replace(draft.torque, source=source.name, coefficients=(0.0, 1.0)).in_thin_air[0]
+        share = in_air(draft.torque.charge, exponent, identify_air(drive, altitude), altitude)
+        reading = share * source.reading(drive, stamps, draft.torque)
         floor = source.floor(reading)
         period = float(np.median(np.diff(stamps)))
         return cls(

@@ -291,6 +291,9 @@ def _fitted_torque(fitted: TorqueFit, problem: Problem) -> TorqueModel:
         curvature=tuple(values[straight:]),
         curvature_stds=tuple(stds[straight:]),
         noise=fitted.residual_std,
+        charge=problem.draft.torque.charge,
+        charge_exponent=problem.draft.torque.charge_exponent,
+        charge_exponent_std=problem.draft.torque.charge_exponent_std,
     )
 
 

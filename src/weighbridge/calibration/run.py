@@ -13,6 +13,7 @@ import numpy as np
 from weighbridge.arguments import check_type
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.witness_learning import learn_witnesses
+from weighbridge.calibration.charge import in_their_air
 from weighbridge.calibration.doubted_masses import (
     doubted_masses,
     refuse_too_heavy,
@@ -135,6 +136,8 @@ def run_calibration(
         raise ConfigError(f"method {settings.method} has no torque fit; use run_speed_calibration")
     problem = problem_of(drives, mass, vehicle, settings, progress=lambda k, n: tell(k, 3 * n))
     fitted = FITTERS[settings.method](problem)
+    if (seen := in_their_air(problem, fitted.vehicle)) is not None:
+        problem, fitted = seen, FITTERS[settings.method](seen)
     tell(5, 9)
     rows = fitted_rows(fitted.vehicle, problem, fitted.rows)
     recorded = [r.drive for r in problem.recordings]

@@ -16,6 +16,7 @@ from weighbridge.calibration.problem import Problem
 from weighbridge.estimators import joint, speed_torque_ekf
 from weighbridge.estimators.considered import pinned, triangle
 from weighbridge.estimators.joint.problem import UNMODELLED
+from weighbridge.estimators.judging import USUAL_SLOPE
 from weighbridge.estimators.track import MassTrack
 from weighbridge.messages import refused
 from weighbridge.signals import Floats
@@ -27,10 +28,6 @@ TRANSFER_STD: Final = (0.002, 0.003)
 drive of the calibration anew. Simulated, sixteen vehicles, calibrated by one or three
 ordinary drives, six others weighed with each; sensors whose scale is 0.3 % off from drive
 to drive are most of it."""
-
-USUAL_SLOPE: Final = 1.2
-"""Relative change of a mass per relative change of its torque [-]: what road loads take is not
-scaled."""
 
 SLOPES: Final = (0.8, 2.5)
 """The same at least and at most [-]."""

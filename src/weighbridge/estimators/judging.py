@@ -51,6 +51,10 @@ TOWING: Final = 2.5
 """A mass over the permitted one that neither an overload nor a trailer explains [-]: a truck of
 18 t draws 40 t, a van of 3.5 t as much again."""
 
+USUAL_SLOPE: Final = 1.2
+"""Relative change of a mass per relative change of its torque [-]: what road loads take is not
+scaled."""
+
 LIGHTEST: Final = 0.95
 """Least mass of an empty vehicle over its tare [-]: tank and driver's seat may be empty."""
 
@@ -94,7 +98,7 @@ def calibration_std(balance: ForceBalance, vehicle: Vehicle) -> float:
     hidden = HIDDEN_BRAKE_STD if balance.brake_hidden else 0.0
     motion = balance.motion
     moved = math.hypot(MOTION_STD[motion.source], motion.specific_force_scale_std)
-    return math.hypot(scale, moved, hidden, balance.coarse_std)
+    return math.hypot(scale, moved, hidden, balance.coarse_std, USUAL_SLOPE * balance.air_std)
 
 
 def lacks_accelerometer(vehicle: Vehicle, motion: Motion) -> bool:

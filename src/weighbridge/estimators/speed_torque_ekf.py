@@ -25,6 +25,7 @@ from weighbridge.estimators.joint.confounded import inertia_relative_std
 from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.judging import (
     HIDDEN_BRAKE_STD,
+    USUAL_SLOPE,
     Evidence,
     converged_at,
     grade_apart,
@@ -425,6 +426,7 @@ def systematic_std(balance: ForceBalance, vehicle: Vehicle) -> float:
         GRADE_STD * grade_apart(vehicle, balance.motion),
         HIDDEN_BRAKE_STD if balance.brake_hidden else 0.0,
         balance.coarse_std,
+        USUAL_SLOPE * balance.air_std,
     )
 
 

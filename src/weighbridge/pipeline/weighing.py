@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from weighbridge.arguments import check_flag, check_path, check_text, check_type
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
+from weighbridge.balance.charge import in_this_air
 from weighbridge.balance.circumference import on_its_tyres
 from weighbridge.balance.delay import (
     clock_shift,
@@ -179,7 +180,7 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
         balance = speed_balance(drive, vehicle)
         problems += balance.motion.notes + beside_speed(drive)
     else:
-        vehicle, found = by_power(seen, vehicle)
+        vehicle, found = by_power(seen, in_this_air(seen, vehicle))
         balance, notes = torque_balance(seen, vehicle)
         vehicle, tyres = on_its_tyres(balance, vehicle)
         if tyres is not None:

@@ -1,8 +1,9 @@
-"""Density and pressure of the air a vehicle drives through."""
+"""Density and pressure of the air a vehicle drives through, and breathes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -16,6 +17,12 @@ from weighbridge.constants import (
 from weighbridge.signals import Drive, Floats
 
 _EXPONENT = GRAVITY / (GAS_CONSTANT_DRY_AIR * TEMPERATURE_LAPSE)
+
+CHARGE_TEMPERATURE: Final = 298.0
+"""At which the calculated load of SAE J1979 takes the highest charge [K]."""
+
+FEWEST_AT_REST: Final = 3
+"""Samples of the manifold before the engine turns that show the pressure of the air."""
 
 
 def standard_pressure(altitude: Floats) -> Floats:
@@ -32,15 +39,33 @@ class Air:
     ----------
     temperature : [K]
     pressure_ratio : pressure over that of the standard atmosphere [-]
+    known : a pressure or a height was known; else it is that of sea level
     """
 
     temperature: float
     pressure_ratio: float
+    known: bool = True
 
     def density(self, altitude: Floats) -> Floats:
         """Density [kg/m^3] at altitudes (n,) [m]; where they are NaN, at sea level."""
         pressure = standard_pressure(_height(altitude)) * self.pressure_ratio
         return np.asarray(pressure / (GAS_CONSTANT_DRY_AIR * self.temperature))
+
+    def charge(self, altitude: Floats) -> Floats:
+        """Highest charge of an engine without a turbo over that at 101.325 kPa and 298 K (n,) [-].
+
+        Parameters
+        ----------
+        altitude : (n,) [m]
+
+        References
+        ----------
+        Calculated load, PID 04 of SAE J1979: the air flow is divided by its highest at that engine
+        speed, times the pressure over 101.3 kPa and the root of 298 K over the temperature.
+        """
+        pressure = standard_pressure(_height(altitude)) * self.pressure_ratio
+        heat = np.sqrt(CHARGE_TEMPERATURE / self.temperature)
+        return np.asarray(pressure / STANDARD_PRESSURE * heat)
 
 
 def identify_air(drive: Drive, altitude: Floats) -> Air:
@@ -63,12 +88,23 @@ def identify_air(drive: Drive, altitude: Floats) -> Air:
     known = drive.info.barometric_pressure
     if barometer is not None and len(barometer):
         known = float(np.median(barometer.values))
+    if known is None:
+        known = _at_rest(drive)
     ratio = 1.0
     if known is not None:
         ratio = known / float(np.median(standard_pressure(height)))
     if temperature is None:
         temperature = STANDARD_TEMPERATURE - TEMPERATURE_LAPSE * float(np.median(height))
-    return Air(temperature, ratio)
+    return Air(temperature, ratio, known is not None or bool(np.isfinite(altitude).any()))
+
+
+def _at_rest(drive: Drive) -> float | None:
+    """Pressure in the manifold before the engine turns [Pa]: that of the air; None without."""
+    manifold, turning = drive.get("intake_pressure"), drive.get("engine_speed")
+    if manifold is None or turning is None or not len(turning):
+        return None
+    rest = manifold.values[turning.at(manifold.time) == 0.0]
+    return float(np.median(rest)) if rest.size >= FEWEST_AT_REST else None
 
 
 def air_density(drive: Drive, altitude: Floats) -> Floats:
@@ -88,4 +124,6 @@ def dynamic_pressure(density: Floats | float, air_speed: Floats) -> Floats:
 
 
 def _height(altitude: Floats) -> Floats:
-    return np.where(np.isfinite(altitude), altitude, 0.0)
+    """Altitudes (n,), their median where they are unknown; sea level where all are [m]."""
+    known = np.isfinite(altitude)
+    return np.where(known, altitude, np.median(altitude[known]) if known.any() else 0.0)

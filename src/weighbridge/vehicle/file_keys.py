@@ -161,6 +161,13 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "rpm",
                 pair=True,
             ),
+            Key(
+                "charge",
+                "charge",
+                "air that a full cylinder took in the calibration, over 101.3 kPa and 298 K",
+            ),
+            Key("charge_exponent", "charge_exponent", "torque at one load grows with its power"),
+            Key("charge_exponent_std", "charge_exponent_std", "its standard deviation"),
         ),
     ),
     "road_load": (

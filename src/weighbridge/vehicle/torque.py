@@ -11,6 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from weighbridge.messages import refused
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.vehicle.air import Air
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TorqueSource
 
@@ -19,6 +20,10 @@ DRAGGED_TIME: Final = 0.5
 
 JITTER: Final = 0.1
 """By how much stamps may miss the ends of a window, over their period [-]."""
+
+
+EXPONENT_STEP: Final = 0.1
+"""Change of the charge's power by which its effect is told [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +217,7 @@ def engine_torque(
     engine_speed: Floats,
     time: Floats,
     *,
+    share: Floats | float = 1.0,
     period: float | None = None,
     ahead: float = math.inf,
 ) -> Torque:
@@ -221,6 +227,7 @@ def engine_torque(
     ----------
     engine_speed : (n,) at the same stamps [rad/s]; may be NaN for measured torque
     time : (n,) [s]
+    share : what a reading stands for in this air, (n,) of `in_air` [-]
     period : between readings; that of the drive when None [s]
     ahead : how far past a reading others may tell of it [s]
 
@@ -232,7 +239,7 @@ def engine_torque(
     model = vehicle.torque
     period = source_signal(drive, vehicle).period if period is None else period
     source = source_of(vehicle)
-    x = source.reading(drive, time, model)
+    x = share * source.reading(drive, time, model)
     nowhere = np.zeros(time.size, dtype=bool)
     if source.signed:
         torque = _by_map(model, x, engine_speed)
@@ -245,6 +252,23 @@ def engine_torque(
     slow, fast = model.speed_range or (-math.inf, math.inf)
     extrapolated = (dragged > high) | (engine_speed < slow) | (engine_speed > fast)
     return Torque(time, torque, extrapolated, dragged < low)
+
+
+def in_air(charge: float | None, exponent: float, air: Air, altitude: Floats) -> Floats | float:
+    """What a reading stands for in this air, over what it does in that of the calibration [-].
+
+    Parameters
+    ----------
+    charge, exponent : of `TorqueModel`
+    air, altitude : of the drive, at its rows (n,) [m]
+
+    Returns
+    -------
+    (n,), or 1 where the reading does not change with the air, or one of the two is not known
+    """
+    if charge is None or not air.known or exponent == 0.0:
+        return 1.0
+    return np.asarray((air.charge(altitude) / charge) ** exponent)
 
 
 def _by_map(model: TorqueModel, reading: Floats, engine_speed: Floats) -> Floats:

@@ -46,6 +46,10 @@ class TorqueModel:
         [-]; None for that of a data sheet
     load_range, speed_range : what the regression has seen; outside, torque is
         extrapolated and the sample left out ([-], [rad/s])
+    charge : highest charge of an engine in the air of the calibration, see
+        `weighbridge.vehicle.air.Air.charge` [-]; None where it is not known
+    charge_exponent, charge_exponent_std : power of that charge with which the torque at one
+        reading grows [-]; None for what is usual of the source
     """
 
     source: str | None = None
@@ -63,6 +67,9 @@ class TorqueModel:
     scale_std: float | None = None
     load_range: tuple[float, float] | None = None
     speed_range: tuple[float, float] | None = None
+    charge: float | None = None
+    charge_exponent: float | None = None
+    charge_exponent_std: float | None = None
 
     def __post_init__(self) -> None:
         if self.source is not None and self.source not in TORQUE_SOURCES:
@@ -100,6 +107,9 @@ class TorqueModel:
         within("noise", self.noise, 1e-15, 1e6, "N m")
         not_negative("scale_std", self.scale_std)
         within("scale_std", self.scale_std, 0.0, 10.0)
+        within("charge", self.charge, 0.2, 2.0)
+        within("charge_exponent", self.charge_exponent, -3.0, 3.0)
+        within("charge_exponent_std", self.charge_exponent_std, 0.0, 3.0)
         if not 0.0 < self.engine_efficiency <= 1.0:
             raise ConfigError(f"engine_efficiency must be in (0, 1], got {self.engine_efficiency}")
         within("engine_efficiency", self.engine_efficiency, 0.01, 1.0)
@@ -108,6 +118,15 @@ class TorqueModel:
     def of_source(self) -> TorqueSource:
         """What its source is: that of a measured torque where none is stated."""
         return TORQUE_SOURCES[self.source or MEASURED]
+
+    @property
+    def in_thin_air(self) -> tuple[float, float]:
+        """Power of the charge with which the torque grows, and its standard deviation [-]."""
+        usual, std = self.of_source.charge_exponent
+        if self.charge_exponent is None or std == 0.0:
+            return usual, std
+        known = self.charge_exponent_std
+        return self.charge_exponent, std if known is None else known
 
     @property
     def stated(self) -> bool:

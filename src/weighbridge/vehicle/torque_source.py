@@ -103,6 +103,8 @@ class TorqueSource:
     cold_torque_std : of the friction torque of the cold in the reading, over the highest torque [-]
     expected : what the source adds to the expected error of a mass [%]
     limit : what limits it, where ``expected`` is not 0
+    charge_exponent : power of the highest charge, `weighbridge.vehicle.air.Air.charge`, with which
+        the torque at one reading grows, and its standard deviation [-]
     """
 
     name: str
@@ -134,6 +136,7 @@ class TorqueSource:
     cold_torque_std: float
     expected: float = 0.0
     limit: str = ""
+    charge_exponent: tuple[float, float] = (0.0, 0.0)
 
     def between(self, *, single_speed: bool) -> float:
         """Scatter of masses from drive to drive by the reading, relative [-].

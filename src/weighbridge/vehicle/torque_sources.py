@@ -176,6 +176,9 @@ _LOAD: Final = ROUGH(
     axis="Engine load [%]",
     axis_suffix="pct",
     transfer_std=0.010,
+    # 1 as SAE J1979 defines it, 0 where boost makes up for thin air, or nothing reckons with it:
+    # evenly between the two.
+    charge_exponent=(0.5, 0.29),
 )
 
 _AIR_FLOW: Final = ROUGH(

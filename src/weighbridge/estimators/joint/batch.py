@@ -321,6 +321,7 @@ def _track(
         _systematic_std(balance, vehicle, mass),
         unseen_std(asked.stood, vehicle.of_class.boarding_std) if by_speed else 0.0,
         asked.body.relative_std,
+        _air_std(balance, problem, solved, cut) / max(mass, 1.0),
         inertia_relative_std(vehicle, mass, table.accel, phi, used),
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         shape_std(_moved(problem, solved, cut.mean(bends)), mass),
@@ -370,6 +371,14 @@ def _moved(problem: Problem, solved: _Solved, columns: Floats) -> Floats:
         columns, problem.time, problem.rows, solved.noise, solved.added, solved.taken,
         solved.start, solved.params,
     )  # fmt: skip
+
+
+def _air_std(balance: ForceBalance, problem: Problem, solved: _Solved, cut: Windows) -> float:
+    """Standard deviation of the mass by what the air leaves open of the torque [kg]."""
+    if balance.air_std == 0.0:
+        return 0.0
+    column = cut.mean(np.nan_to_num(balance.table.traction_force))
+    return balance.air_std * abs(float(_moved(problem, solved, column[:, None])[0]))
 
 
 def _sizes(
