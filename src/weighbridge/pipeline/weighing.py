@@ -373,7 +373,7 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
         later = _other_clock(drive, vehicle, motion, delay, begun)
         if later:
             delay += later
-            notes += (Problem.of("torque.clock_moved", later=_later(later)),)
+            notes += (Problem.of("torque.clock_moved", later=_later(later), by=later),)
     if begun is None or begun.delay != delay:
         begun = force_balance(drive, vehicle, motion, delay=delay)
     balance = replace(begun, navigation=navigation)
