@@ -147,6 +147,19 @@ def test_a_held_speed_that_catches_up_is_no_splice():
     assert not find_splices(drive)
 
 
+@pytest.mark.parametrize(("higher", "found"), [(0.0, False), (18.0, True)])
+def test_a_step_of_speed_and_height_at_once_is_a_splice(higher, found):
+    time = np.arange(0.0, 600.0, 0.25)
+    # In whole km/h, and the same for seconds before: by itself the step may be an honest one.
+    speed = np.round(np.where(time < 300.0, 100.0, 74.0) + 3.0 * np.sin(0.02 * (time - 300.0)))
+    second = np.floor(time)
+    height = 40.0 + 5.0 * np.sin(0.02 * second) + np.where(time < 300.0, 0.0, higher)
+    signals = {"vehicle_speed": Signal("vehicle_speed", time, speed / 3.6)}
+    signals["altitude"] = Signal("altitude", time, height)
+    cuts = find_splices(wb.Drive("d", signals))
+    assert [c.begin for c in cuts] == ([300.0] if found else [])
+
+
 def test_speed_that_freezes_or_drops_out_is_no_splice(trips):
     speed = trips[0].signals["vehicle_speed"]
     top = int(np.argmax(speed.values))

@@ -44,6 +44,8 @@ _FALLS: Final = 2.0 / 3.0  # engine or ground speed after a splice over that bef
 _FASTEST: Final = 100.0  # between two positions [m/s]
 _FAR: Final = 300.0  # beside that [m]
 _BEYOND: Final = 1.2  # of the way that a speed tells, which may be off [-]
+_HIGHER: Final = 8.0  # of the altitude, beside what a road rises in that way [m]
+_STEEPEST: Final = 0.15  # rise of a road over its length [-]
 _COOLED: Final = 10.0  # of the coolant: the engine was parked [K]
 _RARELY: Final = 10.0  # period of signals that are sent now and then [s]
 
@@ -137,6 +139,9 @@ def find_splices(drive: Drive) -> list[Cut]:
     speed = drive.speed
     if speed is not None and len(speed) > 2 * _AROUND:
         found += _speed_jumps(speed)
+        height = drive.get("altitude")
+        if height is not None and len(height) > 2 * _AROUND:
+            found += _leaps(speed, height)
         found += _starts_anew(speed, _witnesses(drive, speed))
     lat, lon = drive.get("latitude"), drive.get("longitude")
     if lat is not None and lon is not None and len(lat) > 2 * _AROUND:
@@ -172,14 +177,43 @@ def _speed_jumps(speed: Signal) -> list[Cut]:
     return _told(time, places[stays], "jumps of the speed")
 
 
+def _leaps(speed: Signal, height: Signal) -> list[Cut]:
+    """Find steps of the speed at which the height steps too, as no road does.
+
+    A speed that stayed the same for some samples may be old, and its step an honest one. Where the
+    height leaps at that instant it is not.
+    """
+    time, size = speed.time, np.abs(speed.values)
+    step = np.diff(time)
+    change = np.abs(np.diff(speed.values))
+    hardest = np.where(size[1:] > size[:-1], _FASTER, _SLOWER)
+    since = _since_new(height)
+    found = []
+    for k in np.flatnonzero((step < _NEAR) & (change > _STEP + hardest * step)):
+        a = int(np.searchsorted(height.time, time[k], side="right")) - 1
+        b = int(np.searchsorted(height.time, time[k + 1]))
+        if not _AROUND <= a < b < len(height) - _AROUND:
+            continue
+        lasted = float(height.time[b] - since[a])
+        rise = abs(float(height.values[b] - height.values[a]))
+        stays = abs(float(_rise(*_windows(height.values, np.array([a])))[0])) > 0.6 * rise
+        road = _STEEPEST * lasted * float(np.max(size[k : k + 2]))
+        if lasted < _NEAR and stays and rise > _HIGHER + road:
+            found.append(k)
+    return _told(time, np.array(found, dtype=np.intp), "jumps of speed and height")
+
+
 def _possible(speed: Signal) -> Floats:
     """Largest step to each sample from the one before that tyres can make (n - 1,) [m/s]."""
     time, size = speed.time, np.abs(speed.values)
-    # A value that is held is as old as its first sample.
-    new = np.concatenate(([True], np.diff(speed.values) != 0.0))
-    since = time[np.maximum.accumulate(np.where(new, np.arange(new.size), 0))]
     hardest = np.where(size[1:] > size[:-1], _FASTER, _SLOWER)
-    return np.asarray(_STEP + hardest * (time[1:] - since[:-1]))
+    return np.asarray(_STEP + hardest * (time[1:] - _since_new(speed)[:-1]))
+
+
+def _since_new(signal: Signal) -> Floats:
+    """Instant from which on each value has been the same (n,) [s]: it may be as old as that."""
+    new = np.concatenate(([True], np.diff(signal.values) != 0.0))
+    return signal.time[np.maximum.accumulate(np.where(new, np.arange(new.size), 0))]
 
 
 def _witnesses(drive: Drive, speed: Signal) -> list[Signal]:
