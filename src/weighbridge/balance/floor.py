@@ -95,6 +95,22 @@ class Floor:
             scatter=max(self.scatter, other.scatter),
         )
 
+    def cut(self, reading: Floats) -> Floor:
+        """Rise to the lowest reading of a drive where many samples rest on just that value.
+
+        A reading that cannot go lower says nothing there, as on the floor of a dragged engine.
+
+        Parameters
+        ----------
+        reading : (n,) while driving; NaN where unknown
+        """
+        known = reading[np.isfinite(reading)]
+        if not known.size:
+            return self
+        lowest = float(np.min(known))
+        rests = np.mean(known <= lowest) >= SHARE
+        return replace(self, level=np.maximum(self.level, lowest)) if rests else self
+
     def raised(self, above: Floats) -> Floor:
         """Rise to what the engine reads where the motion shows that it is dragged.
 

@@ -129,10 +129,12 @@ def identify_foot(
         level = floor.reading(turning)
         asked = _asked(source, level, floor.span, torque)
         if not single:
-            reach = _reach(floor, (source.values - level)[slowing])
             if vehicle.dragged is not None:
-                reach = max(reach, vehicle.dragged.reach)
-            least = _least(source, level, reach, torque)
+                known, reach = Floor.of_vehicle(vehicle.dragged), vehicle.dragged.reach
+            else:
+                known, reach = floor, _reach(floor, (source.values - level)[slowing])
+            dragged = np.maximum(known.reading(turning) + reach, level)
+            least = _least(source, level, reach, dragged, torque)
     return FootSetup(
         period=source.period,
         by_motion=by_motion,
@@ -214,8 +216,13 @@ def _driven(drive: Drive, source: Signal) -> Floats:
 
 
 def _slowing(recorded: Floats, need: Floats) -> Bools:
-    """Where the motion slows so long that no foot is on the accelerator (n,)."""
-    return ~near(recorded, ~(need < -SLOWING), recorded, SETTLED)
+    """Where the motion slows so long that no foot is on the accelerator (n,).
+
+    The readings to both sides tell of the time between, however far apart they are.
+    """
+    slows = np.concatenate(([False], need < -SLOWING, [False]))
+    beside = slows[:-2] & slows[2:]
+    return beside & ~near(recorded, ~(need < -SLOWING), recorded, SETTLED)
 
 
 def _floor(vehicle: Vehicle, driven: Floats, turning: Floats, slowing: Bools) -> Floor | None:
@@ -227,7 +234,7 @@ def _floor(vehicle: Vehicle, driven: Floats, turning: Floats, slowing: Bools) ->
     floor = find_floor(driven, turning)
     if vehicle.dragged is not None:
         learnt = Floor.of_vehicle(vehicle.dragged)
-        floor = learnt if floor is None else learnt.lifted(floor)
+        floor = learnt.cut(driven) if floor is None else learnt.cut(driven).lifted(floor)
         floor = floor.raised((driven - floor.at(np.nan_to_num(turning)))[slowing])
     return floor
 
@@ -247,13 +254,16 @@ def _reach(floor: Floor, above: Floats) -> float:
     return shown if shown > BEYOND * floor.scatter else 0.0
 
 
-def _least(source: Signal, level: Floats, reach: float, torque: Floats) -> float | None:
+def _least(
+    source: Signal, level: Floats, reach: float, dragged: Floats, torque: Floats
+) -> float | None:
     """Torque below which a reading off its floor may be a dragged engine's [N m].
 
     Parameters
     ----------
     source, level : reading and its floor (n,)
     reach : how far above it the reading of a dragged engine goes
+    dragged : (n,) highest reading of a dragged engine
     torque : (n,) that the motion takes [N m]
     """
     if not reach > 0.0:
@@ -264,7 +274,7 @@ def _least(source: Signal, level: Floats, reach: float, torque: Floats) -> float
     slope, offset = np.polyfit(source.values[clear], torque[clear], 1)
     if not slope > 0.0:
         return None
-    return float(offset) + float(slope) * (float(np.median(level)) + reach)
+    return float(offset) + float(slope) * float(np.median(dragged))
 
 
 def _asked(source: Signal, level: Floats, span: float, torque: Floats) -> Asked | None:

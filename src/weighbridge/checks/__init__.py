@@ -16,6 +16,7 @@ from weighbridge.checks.digits import with_half_digits
 from weighbridge.checks.engine import (
     check_engine_speed,
     check_friction,
+    check_idle,
     check_torque_sign,
     check_whole_torque,
 )
@@ -54,6 +55,7 @@ _CHECKS: Final[tuple[_Check, ...]] = (
     check_torque_sign,
     check_friction,
     check_engine_speed,
+    check_idle,
     check_sign,
     check_standstill,
     check_scales,

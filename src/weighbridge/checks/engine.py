@@ -19,6 +19,11 @@ from weighbridge.vehicle.torque import source_of
 # Engine speeds of an idle [rad/s], and coolant of an engine that is warm [K].
 _IDLE: Final = (45.0, 135.0)
 _WARM: Final = 343.0
+# Idle over that of the calibration, between these: a cold engine has 1.5 at most [-].
+_IDLES: Final = (0.6, 1.7)
+# Slower than this part of its idle an engine does not run [-]; samples that show its idle.
+_TURNING: Final = 0.3
+_IDLE_FEWEST: Final = 20
 # Torque at idle that alternator and pumps do not take [part of the reference torque].
 _IDLE_TORQUE: Final = 0.03
 
@@ -133,6 +138,32 @@ def _idle_torque(drive: Drive, torque: Signal) -> float | None:
         return None
     # Fans, air conditioning and a gearbox in gear come and go.
     return float(np.percentile(torque.values[idle], 10.0))
+
+
+def check_idle(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
+    """Find an engine speed by another factor than in the calibration: the engine idles elsewhere.
+
+    The ratios of a gearbox may look the same at twice the speed.
+    """
+    known = vehicle.driveline.idle_speed if vehicle is not None else 0.0
+    engine, speed = drive.get("engine_speed"), drive.speed
+    if not known > 0.0 or engine is None or speed is None or not (len(engine) and len(speed)):
+        return
+    standing = (np.abs(speed.at(engine.time)) < 0.3) & (engine.values > _TURNING * known)
+    if np.count_nonzero(standing) < _IDLE_FEWEST:
+        return
+    # Of a foot on the accelerator, and of a cold engine, it is the rest that counts.
+    idle = float(np.percentile(engine.values[standing], 10.0))
+    low, high = _IDLES
+    if not low < idle / known < high:
+        yield Problem.of(
+            "engine.idle",
+            engine.name,
+            serious=True,
+            idle=show(engine.name, idle),
+            known=show(engine.name, known),
+            factor=idle / known,
+        )
 
 
 def check_engine_speed(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
