@@ -163,7 +163,7 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
         specific_force=force,
         grade=grade,
         valid=valid,
-        specific_force_std=noise_level(force[valid]),
+        specific_force_std=_noise(found.block.time, time, force[valid]),
         grade_std=np.hypot(grade_std, floor),
         speed_scale=float(end[SCALE]) if found_scale else None,
         speed_scale_std=float(end_std[E_SCALE]) if found_scale else None,
@@ -173,6 +173,15 @@ def smoothed_motion(found: Found, setup: Setup) -> Motion:
         mounting_std=mounting_std,
         notes=_notes(setup, shown or known),
     )
+
+
+def _noise(sampled: Floats, time: Floats, force: Floats) -> float:
+    """Noise level of the specific force (n,), by samples as far apart as the sensor's own [m/s^2].
+
+    Between the samples of a slow sensor the even clock ``time`` shows lines, and no noise.
+    """
+    period = float(np.median(np.diff(sampled))) / float(time[1] - time[0])
+    return noise_level(force[:: max(1, round(period))])
 
 
 def _check_found(scale: float, nodes: Nodes, fixed: Bools, setup: Setup) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import highest_torque
-from weighbridge.balance.law import accessory_column
+from weighbridge.balance.law import accessory_column, traction_gain
 from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
 from weighbridge.estimators.joint.bend import KNEE, above_knee, torque_bend
@@ -309,12 +309,15 @@ def _track(
     mass, bound = float(smoothed[-1] - burnt[-1]), float(np.sqrt(solved.var[-1, 0]))
     columns = force_columns(balance, vehicle, float(smoothed[-1]))
     moved = _moved(problem, solved, cut.mean(columns))
+    torque_of = np.nan_to_num(table.torque)
     torque = cut.mean(table.torque)
     bends = shape_columns(table, vehicle, float(np.max(torque)))
     knee = KNEE * float(np.quantile(torque, 0.995))
     bend = None
     if balance.motion.source not in BY_SPEED:
-        bend = torque_bend(given, cut.mean(above_knee(table, vehicle, knee)), knee)
+        gain = np.nan_to_num(traction_gain(vehicle, torque_of, np.nan_to_num(table.gearing)))
+        above = above_knee(torque_of, gain, knee)
+        bend = torque_bend(given, cut.mean(above), cut.mean(gain), knee)
     phi = asked.rows[:, 0]
     by_speed = balance.motion.source in BY_SPEED
     systematic = math.hypot(

@@ -12,8 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.law import traction_gain
-from weighbridge.balance.table import ForceTable
 from weighbridge.estimators.joint.problem import UNMODELLED, FilterInput
 from weighbridge.kernels import disturbance
 from weighbridge.messages import Problem
@@ -46,7 +44,8 @@ class TorqueBend:
 
     Attributes
     ----------
-    part : of the torque above it that the reading does not tell [-]; negative where it tells more
+    part : of the torque above it that the reading does not tell, at least [-]; negative where it
+        tells more
     std : its standard deviation [-]
     knee : [N m] at the engine or motor
     """
@@ -56,27 +55,46 @@ class TorqueBend:
     knee: float
 
 
-def above_knee(table: ForceTable, vehicle: Vehicle, knee: float) -> Floats:
+def above_knee(torque: Floats, gain: Floats, knee: float) -> Floats:
     """Force at the wheels of the torque above a knee (n,) [N].
 
     Parameters
     ----------
-    table, vehicle
+    torque : (n,) [N m]
+    gain : (n,) traction force over torque [1/m]
     knee : [N m]
     """
-    torque = np.nan_to_num(table.torque)
-    gain = np.nan_to_num(traction_gain(vehicle, torque, np.nan_to_num(table.gearing)))
     return np.asarray(gain * np.maximum(0.0, torque - knee))
 
 
-def torque_bend(given: FilterInput, force: Floats, knee: float) -> TorqueBend:
-    """Estimate the bend as one more state of the filter, beside mass and slow errors.
+def torque_bend(given: FilterInput, force: Floats, gain: Floats, knee: float) -> TorqueBend:
+    """Estimate the bend beside mass and slow errors, by what torque and motion both show.
+
+    Noise of the motion, or torque that is sampled seldom, makes a bend where rows are high by the
+    torque; noise of the torque makes the opposite one where they are high by the motion. The truth
+    lies between the two.
 
     Parameters
     ----------
     given : what the filter was given
-    force : (m,) means of `above_knee` over the windows [N]
+    force : (m,) means of `above_knee` over the windows, by the torque [N]
+    gain : (m,) traction force over torque [1/m]
     knee : [N m]
+
+    References
+    ----------
+    Bounds by regression in both directions: Frisch, Statistical Confluence Analysis, 1934;
+    Klepper and Leamer, Econometrica 52, 1984.
+    """
+    by_motion = np.maximum(0.0, given.traction - gain * knee)
+    one, other = _along(given, force, knee), _along(given, by_motion, knee)
+    if one.part * other.part <= 0.0:
+        return TorqueBend(0.0, max(one.std, other.std), knee)
+    return min(one, other, key=lambda bend: abs(bend.part))
+
+
+def _along(given: FilterInput, force: Floats, knee: float) -> TorqueBend:
+    """Estimate the bend as one more state of the filter.
 
     References
     ----------
