@@ -70,7 +70,8 @@ def weigh(pair: Pair, vehicle: Vehicle | str | None) -> Row:
             true = _rounded(made.true)
             w = wb.weigh(made.drive, made.vehicle)
     except WeighbridgeError as refused:
-        return Row(*found, true, None, None, "error", type(refused).__name__)
+        why = refused.problem.id if refused.problem is not None else type(refused).__name__
+        return Row(*found, true, None, None, "error", why)
     except Exception as broken:
         return Row(*found, true, None, None, "traceback", type(broken).__name__)
     ids = sorted({p.id for p in w.problems} | ({w.reason_id} if w.reason_id else set()))

@@ -142,11 +142,21 @@ def force_balance(
         retarder_untold=retarder_untold(drive, vehicle),
         coarse_std=coarse_std(source, reason == Reason.USED),
         air_std=setup.air_std,
+        wheel_speed=None if forward else _wheel_speed(drive, motion, table),
         setup=setup,
         delay=delay,
         lagged=lagged if forward else None,
         fuel_flow=read.fuel_flow if forward else None,
     )
+
+
+def _wheel_speed(drive: Drive, motion: Motion, table: ForceTable) -> Floats | None:
+    """Speed of the wheels as recorded, when it was true (n,) [m/s]; None without."""
+    speed = drive.get("vehicle_speed")
+    if speed is None or len(speed) < 2:
+        return None
+    late = table.time + motion.speed_delay
+    return np.where(speed.age(late) <= 2.0 * speed.period, np.abs(speed.at(late)), np.nan)
 
 
 def force_rows(

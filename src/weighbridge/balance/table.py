@@ -196,6 +196,8 @@ class ForceBalance:
     switch_dead : the brake switch contradicts the motion and is not used
     retarder_untold : a retarder may slow the vehicle that the drive does not tell of
     coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
+    wheel_speed : (n,) speed of the wheels as recorded, at the instants of the rows [m/s]; None for
+        stages that go forward, and without one
     air_std : what other air than that of the calibration leaves open, relative to the torque [-]
     setup : what a whole drive tells of its force side; None but for stages that go forward
     delay : lateness of the torque, which is off its instants [s]
@@ -211,6 +213,7 @@ class ForceBalance:
     retarder_untold: bool = False
     coarse_std: float = 0.0
     air_std: float = 0.0
+    wheel_speed: Floats | None = None
     setup: ForceSetup | None = None
     delay: float = 0.0
     navigation: Setup | None = None

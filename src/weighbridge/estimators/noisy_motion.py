@@ -6,18 +6,97 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.balance.table import ForceTable
+from weighbridge.balance.averaging import Windows
+from weighbridge.balance.law import force_on_mass
+from weighbridge.balance.table import ForceBalance, ForceTable
+from weighbridge.estimators.joint.slow_errors import MOTION_WINDOW_STD, motion_variance
 from weighbridge.messages import Problem
-from weighbridge.navigation.motion import noise_level
+from weighbridge.navigation.motion import BY_SPEED, noise_level
 from weighbridge.signals import Bools, Floats
+from weighbridge.vehicle.model import Vehicle
 
-LEVEL_STD: Final = 0.5
-"""Standard deviation of the attenuation by the motion's noise, over what is reckoned [-]:
-how the noise that a drive shows is shared between torque and motion is by typical sizes."""
+USUAL_STD: Final = 0.5
+"""Standard deviation of the variance by the noise of samples, over it [-]: what a window keeps of
+that noise is by typical sizes, see `weighbridge.estimators.joint.slow_errors.MOTION_SHARE`."""
+
+SHORTEST: Final = 1.0
+"""Windows whose rows reach less far tell no change of the speed [s]."""
+
+APART: Final = 4.0
+"""Windows further apart are not beside each other [s]."""
+
+FEWEST_PAIRS: Final = 40
+"""Fewer pairs of windows tell no noise."""
+
+PARTS: Final = 12
+"""Parts of a drive that are left out one after another for a standard deviation."""
+
+
+def learnt_noise(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> tuple[float, float]:
+    """Variance of the noise in a window's mean specific force, and its std [m^2/s^4].
+
+    Three readings tell how the motion changes from one window to the next: accelerometer, torque
+    and speed. The noise of each is its own, so what one has and shares with neither is its noise.
+    The noise of the samples is what is usual, and counts beside it.
+
+    Parameters
+    ----------
+    balance : with the speed of the wheels as recorded
+    vehicle
+    cut : windows
+
+    References
+    ----------
+    Triple collocation: Stoffelen, J. Geophys. Res. 103, 1998; a third reading as instrument:
+    Fuller, Measurement Error Models, 1987, ch. 1.4.
+    """
+    usual = motion_variance(balance.motion)
+    std = USUAL_STD * usual
+    if balance.wheel_speed is None or balance.motion.source in BY_SPEED:
+        return usual, std
+    changes = _changes(balance, vehicle, cut)
+    if changes.shape[1] < FEWEST_PAIRS:
+        return usual, std
+    accel, force, speed = changes
+    number = np.arange(accel.size) * PARTS // accel.size
+
+    def noise(sums: Floats) -> Floats:
+        own, with_force, with_speed, between = sums
+        return np.asarray(0.5 * (own - with_force * with_speed / between))
+
+    products = np.array([accel**2, accel * force, accel * speed, force * speed])
+    parts = np.array([np.bincount(number, p, PARTS) for p in products])
+    count = np.bincount(number, minlength=PARTS)
+    if not parts[3].sum() > 0.0:
+        return usual, std
+    shown = float(noise(parts.sum(axis=1) / accel.size))
+    left_out = noise((parts.sum(axis=1)[:, None] - parts) / (accel.size - count))
+    error = float(np.sqrt((PARTS - 1) / PARTS * np.sum((left_out - np.mean(left_out)) ** 2)))
+    if not (np.isfinite(error) and error > 0.0):
+        return usual, std
+    weight = std**2 / (std**2 + error**2)
+    found = usual + weight * (shown - usual)
+    return max(found, MOTION_WINDOW_STD**2), float(np.sqrt(weight) * error)
+
+
+def _changes(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> Floats:
+    """Changes from window to window of specific force, force and acceleration by speed (3, k)."""
+    table, speed = balance.table, balance.wheel_speed
+    assert speed is not None
+    last = np.cumsum(cut.count) - 1
+    first, last = cut.index[last - cut.count + 1], cut.index[last]
+    lasted = table.time[last] - table.time[first]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gained = (speed[last] - speed[first]) / lasted
+    force = np.nan_to_num(force_on_mass(table, vehicle))
+    rows = np.array([cut.mean(table.specific_force), cut.mean(force), gained])
+    told = (lasted > SHORTEST) & np.isfinite(rows).all(axis=0)
+    beside = told[1:] & told[:-1] & (np.diff(cut.mean(table.time)) < APART)
+    return np.asarray(np.diff(rows, axis=1)[:, beside])
 
 
 def attenuation(weight: Floats, variance: Floats, mass_var: Floats, begins: Bools) -> Floats:
-    """Part by which the mass of each load is too low (m,) [-], the same all along a load.
+    """By what part of it the mass of each load is too low (m,) [-], the same all along a load.
 
     Least squares of y on phi + n, weighted by W, comes out as ``phi W y / (phi W phi + n W n)``.
     Of the information in the denominator, the trace of W times the variances of n is noise:
@@ -35,8 +114,13 @@ def attenuation(weight: Floats, variance: Floats, mass_var: Floats, begins: Bool
     Fuller, Measurement Error Models, 1987, ch. 1, 2.
     """
     load = np.cumsum(begins)
-    return np.asarray(mass_var * np.bincount(load, weight * variance)[load])
+    noise = mass_var * np.bincount(load, weight * variance)[load]
+    # Where most of it is noise nothing is left to be told.
+    return np.asarray(1.0 / (1.0 - np.minimum(noise, MOSTLY)) - 1.0)
 
+
+MOSTLY: Final = 0.5
+"""Part of the information that may be noise, at most [-]."""
 
 ROW_FAST: Final = 2.0
 """Rows below this speed tell no noise [m/s]."""

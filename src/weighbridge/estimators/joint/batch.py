@@ -40,6 +40,7 @@ from weighbridge.estimators.joint.slow_errors import (
     prior_std,
     usable_rows,
     window_motion_variance,
+    with_variance,
 )
 from weighbridge.estimators.joint.switched import Switched, find_switched, without_switched
 from weighbridge.estimators.judging import (
@@ -51,7 +52,7 @@ from weighbridge.estimators.judging import (
     lacks_accelerometer,
     nothing,
 )
-from weighbridge.estimators.noisy_motion import LEVEL_STD, attenuation
+from weighbridge.estimators.noisy_motion import attenuation, learnt_noise
 from weighbridge.estimators.squat import ResidualSquat, residual_squat
 from weighbridge.estimators.torque_shape import shape_columns, shape_std
 from weighbridge.estimators.track import MassTrack, Segment
@@ -144,6 +145,8 @@ def estimate(
     row_reason[cut.index] = Reason.USED
     if cut.count.size < settings.fewest_windows:
         return nothing("joint", balance, vehicle, row_reason, int(cut.count.size), settings)
+    noise, noise_std = learnt_noise(balance, vehicle, cut)
+    balance = replace(balance, motion=with_variance(balance.motion, noise))
     rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
     asked = _ask(balance, vehicle, cut, rough, settings)
     if not load_changes:
@@ -163,7 +166,7 @@ def estimate(
             switched=found,
         )
         solved = _solve(asked)
-    return _track(balance, vehicle, cut, row_reason, asked, solved)
+    return _track(balance, vehicle, cut, row_reason, asked, solved, noise_std / noise)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -289,11 +292,14 @@ def _track(
     row_reason: NDArray[np.uint8],
     asked: _Asked,
     solved: _Solved,
+    noise_std: float,
 ) -> MassTrack:
-    """Lay out the running mass and judge the final one."""
+    """Lay out the running mass and judge the final one.
+
+    ``noise_std`` is the standard deviation of the variance of the motion's noise, over it [-].
+    """
     table, problem, time = balance.table, asked.problem, asked.problem.time
-    # More noise than usual is more likely the torque's; less is less on both sides.
-    shown = min(solved.fast, 1.0) ** 2 * motion_variance(balance.motion)
+    shown = motion_variance(balance.motion)
     low = attenuation(solved.weight, np.full(time.size, shown), solved.var[:, 0], solved.begins)
 
     left_out = np.zeros(table.time.size, dtype=bool)
@@ -328,7 +334,7 @@ def _track(
         inertia_relative_std(vehicle, mass, table.accel, phi, used),
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         shape_std(_moved(problem, solved, cut.mean(bends)), mass),
-        LEVEL_STD * float(low[-1]),
+        noise_std * float(low[-1]),
     )
     std = float(np.hypot(UNMODELLED * stds[-1], mass * systematic))
     last = np.searchsorted(time, table.time, side="right") - 1

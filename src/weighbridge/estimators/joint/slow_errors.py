@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 import numpy as np
@@ -226,6 +226,12 @@ def motion_variance(motion: Motion, length: float = WINDOW) -> float:
     if motion.source in BY_SPEED or not np.isfinite(level):
         level = UNMEASURED_NOISE
     return MOTION_WINDOW_STD**2 + (MOTION_SHARE * level) ** 2 * WINDOW / length
+
+
+def with_variance(motion: Motion, variance: float) -> Motion:
+    """Return a motion whose `motion_variance` over a window is this [m^2/s^4]."""
+    level = np.sqrt(max(variance - MOTION_WINDOW_STD**2, 0.0)) / MOTION_SHARE
+    return replace(motion, specific_force_std=float(level))
 
 
 def prior_std(
