@@ -300,7 +300,14 @@ def test_a_load_that_changes_at_stops_is_no_change_of_scale(fleet):
     assert len(found.segments) == 2
 
 
-@pytest.mark.parametrize("scale", [2.0, 1.41, 0.7])
+def test_engine_speed_of_twice_the_idle_is_refused(fleet):
+    """In a gearbox of many even steps it fits another gear as well."""
+    for kind in ("car", "truck"):
+        with refused("engine.idle"):
+            fleet.weigh(kind, with_signal(fleet.drive(kind), "engine_speed", lambda t, x: 2.0 * x))
+
+
+@pytest.mark.parametrize("scale", [1.41, 0.7])
 def test_engine_speed_a_gear_step_off_gives_no_mass(fleet, scale):
     damaged = with_signal(fleet.drive("car"), "engine_speed", lambda t, x: x * scale)
     for method in ("joint", "rls"):
