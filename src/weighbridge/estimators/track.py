@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -101,6 +101,26 @@ class MassTrack:
     bend: TorqueBend | None = None
     switched: Switched | None = None
     sizes: JointSizes | None = None
+
+    def doubted(self, share: float) -> MassTrack:
+        """Return the track with a doubt in all its masses.
+
+        Parameters
+        ----------
+        share : its standard deviation, relative to the mass [-]
+        """
+        if not share > 0.0:
+            return self
+        more = share * self.mass
+        return replace(
+            self,
+            std=float(np.hypot(self.std, more)),
+            systematic_std=float(np.hypot(self.systematic_std, more)),
+            running_std=np.hypot(self.running_std, share * self.running_mass),
+            segments=tuple(
+                replace(s, std=float(np.hypot(s.std, share * s.mass))) for s in self.segments
+            ),
+        )
 
     @property
     def time(self) -> Floats:

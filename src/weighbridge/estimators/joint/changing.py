@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -95,6 +96,11 @@ class ScaleChange:
             return self._found("load.change_doubtful")
         return self._found("load.change_or_stop") if self.over_one > SURE else None
 
+    @property
+    def doubt_std(self) -> float:
+        """What the doubt leaves open of the mass, relative [-]; 0 without one."""
+        return 0.0 if self.doubt is None else abs(self.change)
+
     def refusal(self, motion: MotionSource) -> Problem:
         """What is wrong where it is sure, and what looks alike by that source of the motion."""
         return self._found(ALIKE_BY_SPEED.get(motion, "load.change_moving"))
@@ -151,6 +157,13 @@ class NoLoad:
             size=size,
             stood=self.stood,
         )
+
+    @property
+    def doubt_std(self) -> float:
+        """What the doubt leaves open of the mass, relative [-]: either may be so; 0 without one."""
+        if self.doubt is None:
+            return 0.0
+        return abs(self.change) / math.sqrt(1.0 + math.exp(-self.gain))
 
 
 def largest(given: FilterInput) -> ScaleChange | None:
