@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -32,8 +32,22 @@ PARTS: Final = 12
 """Parts of a drive that are left out one after another for a standard deviation."""
 
 
-def learnt_noise(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> tuple[float, float]:
-    """Variance of the noise in a window's mean specific force, and its std [m^2/s^4].
+class MotionNoise(NamedTuple):
+    """Noise in the mean specific force of a window.
+
+    Attributes
+    ----------
+    variance, std : its variance and the standard deviation of that [m^2/s^4]
+    learnt : the drive shows it; else it is what is usual
+    """
+
+    variance: float
+    std: float
+    learnt: bool
+
+
+def learnt_noise(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> MotionNoise:
+    """Find the noise of the motion.
 
     Three readings tell how the motion changes from one window to the next: accelerometer, torque
     and speed. The noise of each is its own, so what one has and shares with neither is its noise.
@@ -53,10 +67,10 @@ def learnt_noise(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> tuple
     usual = motion_variance(balance.motion)
     std = USUAL_STD * usual
     if balance.wheel_speed is None or balance.motion.source in BY_SPEED:
-        return usual, std
+        return MotionNoise(usual, std, learnt=False)
     changes = _changes(balance, vehicle, cut)
     if changes.shape[1] < FEWEST_PAIRS:
-        return usual, std
+        return MotionNoise(usual, std, learnt=False)
     accel, force, speed = changes
     number = np.arange(accel.size) * PARTS // accel.size
 
@@ -68,15 +82,16 @@ def learnt_noise(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> tuple
     parts = np.array([np.bincount(number, p, PARTS) for p in products])
     count = np.bincount(number, minlength=PARTS)
     if not parts[3].sum() > 0.0:
-        return usual, std
+        return MotionNoise(usual, std, learnt=False)
     shown = float(noise(parts.sum(axis=1) / accel.size))
     left_out = noise((parts.sum(axis=1)[:, None] - parts) / (accel.size - count))
     error = float(np.sqrt((PARTS - 1) / PARTS * np.sum((left_out - np.mean(left_out)) ** 2)))
     if not (np.isfinite(error) and error > 0.0):
-        return usual, std
+        return MotionNoise(usual, std, learnt=False)
     weight = std**2 / (std**2 + error**2)
     found = usual + weight * (shown - usual)
-    return max(found, MOTION_WINDOW_STD**2), float(np.sqrt(weight) * error)
+    variance = max(found, MOTION_WINDOW_STD**2)
+    return MotionNoise(variance, float(np.sqrt(weight) * error), learnt=True)
 
 
 def _changes(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> Floats:
@@ -114,13 +129,16 @@ def attenuation(weight: Floats, variance: Floats, mass_var: Floats, begins: Bool
     Fuller, Measurement Error Models, 1987, ch. 1, 2.
     """
     load = np.cumsum(begins)
-    noise = mass_var * np.bincount(load, weight * variance)[load]
-    # Where most of it is noise nothing is left to be told.
+    return too_low(mass_var * np.bincount(load, weight * variance)[load])
+
+
+def too_low(noise: Floats) -> Floats:
+    """By what part of it a mass is too low, of whose information so much is noise (m,) [-]."""
     return np.asarray(1.0 / (1.0 - np.minimum(noise, MOSTLY)) - 1.0)
 
 
 MOSTLY: Final = 0.5
-"""Part of the information that may be noise, at most [-]."""
+"""Part of the information that counts as noise, at most [-]: beyond nothing is left to be told."""
 
 ROW_FAST: Final = 2.0
 """Rows below this speed tell no noise [m/s]."""

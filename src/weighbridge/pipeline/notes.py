@@ -32,6 +32,25 @@ def uncalibrated(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
     return (Problem.of("vehicle.uncalibrated_std", **about, efficiency=efficiency, share=share),)
 
 
+UNBACKED_STD: Final = 0.025
+"""What masses of a calibration that nothing backs leave open of a mass, relative [-]: chosen, as
+if three of a hundred were wrong by 15 %."""
+
+
+def unbacked(vehicle: Vehicle) -> tuple[Problem, ...]:
+    """Say that nothing backs the masses of a calibration; nothing where something does.
+
+    A torque in N m or percent has a scale of its own, and tare and permitted mass bound what the
+    drives weighed. What a load or an air flow is worth the masses alone say.
+    """
+    fit = vehicle.provenance.fit
+    if fit is None or not fit.torque or not vehicle.provenance.masses or source_of(vehicle).signed:
+        return ()
+    if vehicle.tare is not None or vehicle.gross is not None:
+        return ()
+    return (Problem.of("mass.unbacked", source=source_of(vehicle).title, vehicle=vehicle.name),)
+
+
 GRADES_APART: Final = 0.003
 """Grades known better or worse than in the calibration by so much are told [rad]."""
 

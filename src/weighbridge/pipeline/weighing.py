@@ -47,6 +47,7 @@ from weighbridge.pipeline.given import (
     mapping_of,
 )
 from weighbridge.pipeline.notes import (
+    UNBACKED_STD,
     below_tare,
     beside_speed,
     beyond_class,
@@ -55,6 +56,7 @@ from weighbridge.pipeline.notes import (
     no_speed,
     other_equipment,
     overload,
+    unbacked,
     uncalibrated,
     what_is_missing,
 )
@@ -195,7 +197,7 @@ def weigh_checked(drive: Drive, vehicle: Vehicle, method: str, settings: Any = N
             balance, notes = torque_balance(seen, vehicle)
             notes = (tyres, *notes)
         problems += found + notes + vehicle.provenance.problems
-        problems += fitted_for_another(vehicle, method)
+        problems += fitted_for_another(vehicle, method) + unbacked(vehicle)
     return weigh_balance(drive, vehicle, method, balance, problems, settings=settings)
 
 
@@ -264,11 +266,13 @@ def weigh_balance(
                     change.doubt_std if change is not None else 0.0,
                     no_load.doubt_std if no_load is not None else 0.0,
                     ALTERED_STD if any(p.id in ALTERED for p in problems) else 0.0,
+                    UNBACKED_STD if unbacked(vehicle) else 0.0,
                 )
             )
             if result.std > GATE.widest * result.mass:
                 status = Status.INCONSISTENT
                 reason = next((d for d in doubts[1:3] if d is not None), reason)
+                problems = tuple(p for p in problems if p is not reason)
     return Weighing(
         drive=drive,
         vehicle=vehicle,

@@ -35,7 +35,6 @@ from weighbridge.estimators.joint.slow_errors import (
     LASTING,
     SlowErrors,
     design,
-    motion_variance,
     noise_variance,
     prior_std,
     usable_rows,
@@ -52,7 +51,7 @@ from weighbridge.estimators.judging import (
     lacks_accelerometer,
     nothing,
 )
-from weighbridge.estimators.noisy_motion import attenuation, learnt_noise
+from weighbridge.estimators.noisy_motion import MotionNoise, attenuation, learnt_noise
 from weighbridge.estimators.squat import ResidualSquat, residual_squat
 from weighbridge.estimators.torque_shape import shape_columns, shape_std
 from weighbridge.estimators.track import MassTrack, Segment
@@ -145,8 +144,8 @@ def estimate(
     row_reason[cut.index] = Reason.USED
     if cut.count.size < settings.fewest_windows:
         return nothing("joint", balance, vehicle, row_reason, int(cut.count.size), settings)
-    noise, noise_std = learnt_noise(balance, vehicle, cut)
-    balance = replace(balance, motion=with_variance(balance.motion, noise))
+    noise = learnt_noise(balance, vehicle, cut)
+    balance = replace(balance, motion=with_variance(balance.motion, noise.variance))
     rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
     asked = _ask(balance, vehicle, cut, rough, settings)
     if not load_changes:
@@ -166,7 +165,7 @@ def estimate(
             switched=found,
         )
         solved = _solve(asked)
-    return _track(balance, vehicle, cut, row_reason, asked, solved, noise_std / noise)
+    return _track(balance, vehicle, cut, row_reason, asked, solved, noise)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -292,14 +291,12 @@ def _track(
     row_reason: NDArray[np.uint8],
     asked: _Asked,
     solved: _Solved,
-    noise_std: float,
+    noise: MotionNoise,
 ) -> MassTrack:
-    """Lay out the running mass and judge the final one.
-
-    ``noise_std`` is the standard deviation of the variance of the motion's noise, over it [-].
-    """
+    """Lay out the running mass and judge the final one."""
     table, problem, time = balance.table, asked.problem, asked.problem.time
-    shown = motion_variance(balance.motion)
+    # More noise than usual is more likely the torque's; less is less on both sides.
+    shown = noise.variance if noise.learnt else min(solved.fast, 1.0) ** 2 * noise.variance
     low = attenuation(solved.weight, np.full(time.size, shown), solved.var[:, 0], solved.begins)
 
     left_out = np.zeros(table.time.size, dtype=bool)
@@ -334,7 +331,7 @@ def _track(
         inertia_relative_std(vehicle, mass, table.accel, phi, used),
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         shape_std(_moved(problem, solved, cut.mean(bends)), mass),
-        noise_std * float(low[-1]),
+        noise.std / noise.variance * float(low[-1]),
     )
     std = float(np.hypot(UNMODELLED * stds[-1], mass * systematic))
     last = np.searchsorted(time, table.time, side="right") - 1

@@ -19,6 +19,7 @@ from weighbridge.estimators.joint.problem import (
 from weighbridge.estimators.joint.slow_errors import window_noise
 from weighbridge.estimators.joint.switched import doubt_variance, switch_params
 from weighbridge.estimators.judging import STOP
+from weighbridge.estimators.noisy_motion import too_low
 from weighbridge.kernels import disturbance, load_change, switched
 from weighbridge.signals import Floats
 
@@ -95,7 +96,7 @@ def resumed(given: FilterInput, setup: JointSetup, until: float) -> JointState:
     total = part.weight()
     jumps = np.flatnonzero(part.added.any(axis=1))
     before = part.first(int(jumps[-1])).weight() if jumps.size else 0.0
-    low = same.cov[0, 0] * setup.attenuating_var * (total - before)
+    low = too_low(same.cov[0, 0] * setup.attenuating_var * (total - before))
     load = load_change.initial_state(end)  # type: ignore[no-untyped-call]
     return JointState(
         load=load._replace(rows=seen),
@@ -181,7 +182,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
         at_trial = state.total
     total = state.total + weight
     # While a change is tried, the spread between both hypotheses is no noise that attenuates.
-    low = load.same.cov[0, 0] * setup.attenuating_var * (total - at_load)
+    low = too_low(load.same.cov[0, 0] * setup.attenuating_var * (total - at_load))
     return JointState(
         load=load,
         switch=switch,
