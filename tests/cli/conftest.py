@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 
 from weighbridge.cli import main
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 
 class Ran(NamedTuple):
@@ -49,7 +49,9 @@ def weighbridge(capsys, monkeypatch) -> Callable[..., Ran]:
 def _made(folder: Path, name: str, seed: int, payload: float, duration: float | None) -> Made:
     # A warm engine: a cold one needs more torque than a calibration knows of.
     scenario = make_scenario(name, payload=payload, seed=seed, without=("warm_up",))
-    made = simulate_car(replace(scenario, duration=duration))
+    # Inertial samples as often as of a phone.
+    sensors = Sensors(imu_rate=50.0)
+    made = simulate_car(replace(scenario, duration=duration, sensors=sensors))
     made.write(folder)
     return Made(folder, float(made.truth.mass.mean()))
 
@@ -57,7 +59,7 @@ def _made(folder: Path, name: str, seed: int, payload: float, duration: float | 
 @pytest.fixture(scope="session")
 def known(tmp_path_factory) -> Made:
     """Return a calibration drive with its mass in drive.toml."""
-    return _made(tmp_path_factory.mktemp("known") / "known", "car-calibration", 101, 0.0, 2400.0)
+    return _made(tmp_path_factory.mktemp("known") / "known", "car-calibration", 101, 0.0, 1500.0)
 
 
 @pytest.fixture(scope="session")
