@@ -14,36 +14,11 @@ from weighbridge.cli import main
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 
-class Ran(NamedTuple):
-    """How a command ended."""
-
-    code: int
-    out: str
-    err: str
-
-
 class Made(NamedTuple):
     """A simulated drive on disk."""
 
     folder: Path
     mass: float
-
-
-@pytest.fixture
-def weighbridge(capsys, monkeypatch) -> Callable[..., Ran]:
-    """Run the command line in this process, error handling included."""
-
-    def run(*words: object) -> Ran:
-        monkeypatch.setattr(sys, "argv", ["weighbridge", *(str(w) for w in words)])
-        capsys.readouterr()
-        code = 0
-        try:
-            main.run()
-        except SystemExit as leaving:
-            code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
-        return Ran(code, *capsys.readouterr())
-
-    return run
 
 
 def _made(folder: Path, name: str, seed: int, payload: float, duration: float | None) -> Made:

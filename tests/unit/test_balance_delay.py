@@ -9,7 +9,7 @@ import weighbridge as wb
 from weighbridge.balance.delay import FARTHEST, best_delay
 from weighbridge.calibration.joint import USUAL_DELAY, USUAL_LAG, find_timing
 from weighbridge.kernels.first_order import first_order
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 
 def test_the_lowest_point_is_found_between_grid_points():
@@ -77,6 +77,7 @@ def test_an_uneven_lag_begins_anew_where_nothing_is_known():
 @pytest.mark.parametrize("smoothing", [0.1, 0.3])
 def test_noise_of_the_motion_does_not_pass_for_a_smoothed_reading(smoothing):
     scenario = make_scenario("car-calibration", seed=88103)
-    known = simulate_car(replace(scenario, car=replace(scenario.car, load_smoothing=smoothing)))
+    smoothed = replace(scenario.car, load_smoothing=smoothing)
+    known = simulate_car(replace(scenario, car=smoothed, sensors=Sensors(imu_rate=50.0)))
     timing = wb.calibrate([known.drive], mass=float(known.truth.mass.mean())).timing
     assert timing.torque_lag == pytest.approx(smoothing, abs=0.08)
