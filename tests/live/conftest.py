@@ -9,8 +9,8 @@ from weighbridge.simulation import MIDSIZE, Scenario, Sensors, short_route, simu
 SHORT = 240.0
 """Of the drives that are fed again and again [s]."""
 
-PHONE = Sensors(imu_rate=50.0)
-"""Inertial samples as often as of a phone: a quarter of what there is to feed."""
+PHONE = Sensors(imu_rate=100.0)
+"""Inertial samples as often as of a phone: half of what there would be to feed."""
 
 
 def simulated(name, payload, seed):
