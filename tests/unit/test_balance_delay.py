@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.signal import lfilter
 
 import weighbridge as wb
 from weighbridge.balance.delay import FARTHEST, best_delay
 from weighbridge.calibration.joint import USUAL_DELAY, USUAL_LAG, find_timing
-from weighbridge.kernels.first_order import first_order
+from weighbridge.kernels.first_order import even_lag, fading, first_order
 from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 
@@ -71,6 +73,21 @@ def test_an_uneven_lag_begins_anew_where_nothing_is_known():
     values = np.array([1.0, 1.0, np.nan, 5.0, 5.0])
     out = first_order(0.1 * np.arange(5), values, 0.2)
     assert out == pytest.approx([1.0, 1.0, np.nan, 5.0, 5.0], nan_ok=True)
+
+
+@pytest.mark.parametrize("lag", [0.02, 0.3])
+def test_an_even_lag_is_the_filter_of_scipy_to_the_last_bit(lag):
+    values = np.random.default_rng(7).normal(0.0, 1e3, 500)
+    keep = float(np.exp(-1.0 / (100.0 * lag)))
+    told, _ = lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * 3.0])
+    assert_array_equal(even_lag(values, keep, 3.0), told)
+
+
+def test_what_fades_is_the_sum_of_what_came_before():
+    values, keep = np.random.default_rng(8).normal(size=40), 0.8
+    apart = np.subtract.outer(np.arange(40), np.arange(40))
+    weights = np.where(apart > 0, keep ** np.maximum(apart, 0), 0.0)
+    assert_allclose(fading(values, keep), weights @ values, atol=1e-12)
 
 
 @pytest.mark.slow
