@@ -4,8 +4,10 @@ import contextlib
 import ctypes
 import os
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 # Before Numba is imported: compiled kernels are shared by all checkouts with the same sources.
 os.environ.setdefault(
@@ -20,6 +22,7 @@ import weighbridge as wb
 from tests.drives import keep_drives
 from tests.order import guards, is_long, longest_first
 from weighbridge import simulation
+from weighbridge.cli import main
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.simulation import make_scenario
@@ -32,6 +35,14 @@ CHROMIUM = next(
 )
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+class Ran(NamedTuple):
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -88,6 +99,23 @@ def foreign_simulator(shared_data: Path) -> Path:
     if not path.is_dir():
         pytest.skip("the drives of another simulator are not here")
     return path
+
+
+@pytest.fixture
+def weighbridge(capsys, monkeypatch) -> Callable[..., Ran]:
+    """Run the command line in this process, error handling included."""
+
+    def run(*words: object) -> Ran:
+        monkeypatch.setattr(sys, "argv", ["weighbridge", *(str(w) for w in words)])
+        capsys.readouterr()
+        code = 0
+        try:
+            main.run()
+        except SystemExit as leaving:
+            code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
+        return Ran(code, *capsys.readouterr())
+
+    return run
 
 
 @pytest.fixture(scope="session")

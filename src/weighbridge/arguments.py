@@ -45,13 +45,13 @@ def check_type(name: str, given: object, kinds: type | tuple[type, ...], expecte
 
 def check_text(name: str, given: object, *, optional: bool = False) -> None:
     """Refuse what is no text; see `check_type`."""
-    if not (optional and given is None):
+    if type(given) is not str and not (optional and given is None):
         check_type(name, given, str, "a text")
 
 
 def check_number(name: str, given: object, *, optional: bool = False) -> None:
     """Refuse what is no number; see `check_type`."""
-    if optional and given is None:
+    if type(given) is float or (optional and given is None):
         return
     if isinstance(given, bool | np.bool_):
         raise ArgumentTypeError(f"{name} must be a number, got {_shown(given)}")

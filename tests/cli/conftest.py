@@ -11,15 +11,7 @@ import polars as pl
 import pytest
 
 from weighbridge.cli import main
-from weighbridge.simulation import make_scenario, simulate_car
-
-
-class Ran(NamedTuple):
-    """How a command ended."""
-
-    code: int
-    out: str
-    err: str
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 
 class Made(NamedTuple):
@@ -29,27 +21,12 @@ class Made(NamedTuple):
     mass: float
 
 
-@pytest.fixture
-def weighbridge(capsys, monkeypatch) -> Callable[..., Ran]:
-    """Run the command line in this process, error handling included."""
-
-    def run(*words: object) -> Ran:
-        monkeypatch.setattr(sys, "argv", ["weighbridge", *(str(w) for w in words)])
-        capsys.readouterr()
-        code = 0
-        try:
-            main.run()
-        except SystemExit as leaving:
-            code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
-        return Ran(code, *capsys.readouterr())
-
-    return run
-
-
 def _made(folder: Path, name: str, seed: int, payload: float, duration: float | None) -> Made:
     # A warm engine: a cold one needs more torque than a calibration knows of.
     scenario = make_scenario(name, payload=payload, seed=seed, without=("warm_up",))
-    made = simulate_car(replace(scenario, duration=duration))
+    # Inertial samples as often as of a phone.
+    sensors = Sensors(imu_rate=50.0)
+    made = simulate_car(replace(scenario, duration=duration, sensors=sensors))
     made.write(folder)
     return Made(folder, float(made.truth.mass.mean()))
 
@@ -57,7 +34,7 @@ def _made(folder: Path, name: str, seed: int, payload: float, duration: float | 
 @pytest.fixture(scope="session")
 def known(tmp_path_factory) -> Made:
     """Return a calibration drive with its mass in drive.toml."""
-    return _made(tmp_path_factory.mktemp("known") / "known", "car-calibration", 101, 0.0, 2400.0)
+    return _made(tmp_path_factory.mktemp("known") / "known", "car-calibration", 101, 0.0, 1500.0)
 
 
 @pytest.fixture(scope="session")

@@ -44,8 +44,8 @@ def outputs(drive, car, out):
 
 
 @pytest.mark.parametrize("command", ["calibrate", "json", "track", "report", "convert", "simulate"])
-def test_a_read_only_disk_is_one_sentence_and_status_2(place, known, car, command):
-    words = outputs(known.folder, car, place)[command]
+def test_a_read_only_disk_is_one_sentence_and_status_2(place, loaded, car, command):
+    words = outputs(loaded.folder, car, place)[command]
     script = (
         f"echo kept > {place}/old && mount -o remount,ro {place} && "
         f"{COMMAND} {words}; code=$?; cat {place}/*; exit $code"
@@ -60,8 +60,8 @@ def test_a_read_only_disk_is_one_sentence_and_status_2(place, known, car, comman
 
 
 @pytest.mark.parametrize("command", ["track", "report", "convert", "simulate"])
-def test_a_full_disk_keeps_what_was_there_and_leaves_no_stump(place, known, car, command):
-    words = outputs(known.folder, car, place)[command]
+def test_a_full_disk_keeps_what_was_there_and_leaves_no_stump(place, loaded, car, command):
+    words = outputs(loaded.folder, car, place)[command]
     in_folder = command in ("convert", "simulate")
     whole = "new/x" if in_folder else "x"
     forced = f"{words} --force" if in_folder else words

@@ -9,11 +9,11 @@ import numpy as np
 import polars as pl
 from tests.fleet.fleets import tiny_fleet
 
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 AXES = "xyz"
-THIN = 4
-"""Of the inertial sensor's samples each fourth is logged: 50 a second."""
+PHONE = Sensors(imu_rate=50.0)
+"""Of the inertial sensor 50 samples a second are logged."""
 
 
 def own_data(folder: Path) -> None:
@@ -53,7 +53,7 @@ def dongle_and_phone(tables: dict[str, pl.DataFrame], folder: Path) -> None:
         pl.col("engine_load_pct").alias("Calculated engine load value (%)"),
     ).write_csv(folder / "elm327.csv")
     phone = (pl.col("time_s") + 11.0).alias("Time (s)")
-    tables["imu"][::THIN].select(
+    tables["imu"].select(
         phone,
         *(pl.col(f"accel_{a}_mps2").alias(f"Acceleration {a} (m/s^2)") for a in AXES),
         *(pl.col(f"gyro_{a}_radps").alias(f"Gyroscope {a} (rad/s)") for a in AXES),
@@ -114,7 +114,7 @@ def mf4_of_a_van(tables: dict[str, pl.DataFrame], path: Path) -> None:
     file = MDF(version="4.10")
     for table, columns in named.items():
         for column, name, unit in columns:
-            rows = tables[table][:: THIN if table == "imu" else 1].drop_nulls(column)
+            rows = tables[table].drop_nulls(column)
             values = rows[column].to_numpy().astype(np.float64)
             file.append([Signal(values, rows["time_s"].to_numpy(), name=name, unit=unit)])
     file.save(path, overwrite=True)
@@ -125,7 +125,8 @@ def _tables(
     folder: Path, name: str, payload: float, seed: int, minutes: float
 ) -> dict[str, pl.DataFrame]:
     """Simulate a drive and return its tables as they are written."""
-    scenario = replace(make_scenario(name, payload=payload, seed=seed), duration=60.0 * minutes)
+    usual = make_scenario(name, payload=payload, seed=seed)
+    scenario = replace(usual, duration=60.0 * minutes, sensors=PHONE)
     place = folder / "made" / f"{name}-{seed}"
     simulate_car(scenario).write(place)
     return {n: pl.read_parquet(place / f"{n}.parquet") for n in ("obd", "imu", "gnss")}

@@ -1,7 +1,5 @@
 """The tutorials run as they stand, and say what they show."""
 
-import re
-
 import nbformat
 import pytest
 from nbclient import NotebookClient
@@ -9,19 +7,6 @@ from website import notebooks, running
 
 TUTORIALS = notebooks.tutorials()
 TOLERANCE = 0.03
-
-
-def plain(text):
-    """Text with one mark for what is not ASCII: a kernel reads a shell in pieces, and may cut a
-    letter of several bytes in two.
-    """
-    return re.sub(r"[^\x00-\x7f]+", "~", text)
-
-
-BY_KERNEL = [page for page in TUTORIALS if page.stem in ("electric", "live-replay", "own-csv")]
-"""Tutorials whose notebooks are run too: with a data frame, a replay, and files that they write.
-The others have the cells of their pages, which run.
-"""
 
 
 @pytest.mark.slow
@@ -51,9 +36,12 @@ def test_a_notebook_has_the_code_and_the_output_of_its_page(page):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", BY_KERNEL, ids=lambda p: p.stem)
-def test_a_notebook_runs_alone_and_says_what_it_shows(page, tmp_path):
-    """As a reader has it: the file in an empty folder, run by the kernel of Jupyter."""
+def test_a_notebook_runs_alone_and_says_what_it_shows(tmp_path):
+    """As a reader has it: the file in an empty folder, run by the kernel of Jupyter.
+
+    The others have the cells of their pages, which run.
+    """
+    (page,) = (page for page in TUTORIALS if page.stem == "electric")
     made = nbformat.reads(notebooks.notebook(page), as_version=4)
     shown = ["".join(o.text for o in cell.get("outputs", ())) for cell in made.cells]
     place = {"metadata": {"path": str(tmp_path)}}

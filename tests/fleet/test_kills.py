@@ -30,7 +30,7 @@ class Cluster:
         self.scheduler: subprocess.Popen | None = None
         self.address = ""
 
-    def start(self) -> str:
+    def start(self, workers: int = 2) -> str:
         if self.scheduler is None or self.scheduler.poll() is not None:
             self.stop()
             self.number += 1
@@ -46,7 +46,7 @@ class Cluster:
                     break
                 time.sleep(0.05)
             self.file = told
-        while len(self.workers) < 2:
+        while len(self.workers) < workers:
             self.workers.append(
                 self._dask(
                     "worker",
@@ -90,11 +90,14 @@ def cluster(tmp_path):
     made.stop()
 
 
-def begun(address, drives, cars, results, *more):
-    words = [str(drives), "--vehicles", str(cars), "-o", str(results), "--scheduler", address]
-    words += map(str, more)
+def words_of(address, drives, cars, results, *more):
+    words = ["fleet", drives, "--vehicles", cars, "-o", results, "--scheduler", address, *more]
+    return [str(word) for word in words]
+
+
+def begun(*words):
     return subprocess.Popen(
-        [sys.executable, "-m", "weighbridge", "fleet", *words],
+        [sys.executable, "-m", "weighbridge", *words_of(*words)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -155,7 +158,9 @@ def wait_until(process, results: Path, count: int, more: float) -> None:
     time.sleep(more)
 
 
-def test_a_scheduler_and_two_workers_started_by_hand(cluster, tmp_path, tiny):
+def test_a_scheduler_and_two_workers_started_by_hand(
+    cluster, tmp_path, tiny, scheduler, weighbridge
+):
     """One worker and the scheduler are killed, and the command given again."""
     drives, cars = tiny
     results = tmp_path / "results"
@@ -168,14 +173,15 @@ def test_a_scheduler_and_two_workers_started_by_hand(cluster, tmp_path, tiny):
     assert (process.returncode, err.count("\n")) == (2, 1), err
     assert "the scheduler is gone" in err
     assert 0 < rows_there(results) < 40
-    process = begun(cluster.start(), drives, cars, results)
-    out, err = process.communicate(timeout=120)
-    assert (process.returncode, err) == (1, ""), out
-    assert "40 drives of 3 vehicles: 0 with a mass, 40 missing_signals" in out
+    ran = weighbridge(*words_of(scheduler, drives, cars, results))
+    assert (ran.code, ran.err) == (1, ""), ran.out
+    assert "40 drives of 3 vehicles: 0 with a mass, 40 missing_signals" in ran.out
     assert rows_there(results) == 40
 
 
-def test_a_scheduler_that_dies_while_a_fleet_learns_is_told(cluster, tmp_path, monkeypatch):
+def test_a_scheduler_that_dies_while_a_fleet_learns_is_told(
+    cluster, tmp_path, monkeypatch, scheduler, weighbridge
+):
     """It is killed while a worker learns; the same command learns later."""
     drives, cars = tiny_fleet(tmp_path, 1, vehicles=1)
     under_way, fault = tmp_path / "under-way", tmp_path / "fault.py"
@@ -193,7 +199,7 @@ def test_a_scheduler_that_dies_while_a_fleet_learns_is_told(cluster, tmp_path, m
     results = tmp_path / "results"
     with monkeypatch.context() as patch:
         patch.setenv("DASK_DISTRIBUTED__WORKER__PRELOAD", str(fault))
-        process = begun(cluster.start(), drives, cars, results, *learn)
+        process = begun(cluster.start(workers=1), drives, cars, results, *learn)
     until = time.monotonic() + 120
     while not under_way.exists() and process.poll() is None and time.monotonic() < until:
         time.sleep(0.05)
@@ -202,7 +208,6 @@ def test_a_scheduler_that_dies_while_a_fleet_learns_is_told(cluster, tmp_path, m
     assert (process.returncode, err.count("\n")) == (2, 1), err
     assert "the scheduler is gone" in err
     assert not (results / "learnt.parquet").exists()
-    process = begun(cluster.start(), drives, cars, results, *learn)
-    out, err = process.communicate(timeout=120)
-    assert (process.returncode, err) == (1, ""), out
-    assert "van0: 1 drives with a ticket, not refined" in out
+    ran = weighbridge(*words_of(scheduler, drives, cars, results, *learn))
+    assert (ran.code, ran.err) == (1, ""), ran.out
+    assert "van0: 1 drives with a ticket, not refined" in ran.out

@@ -1,7 +1,6 @@
 """A fleet through a cluster: all rows, once, in whatever order and after whatever went wrong."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -218,19 +217,6 @@ def test_workers_that_do_not_end_in_time_lose_nothing(tiny, tmp_path, monkeypatc
     found = wb.fleet.weigh_drives(home.parent, cars, tmp_path / "results", workers=1).collect()
     assert found["outcome"].to_list() == ["weighed"]
     assert not late
-
-
-def test_the_python_of_the_document_runs(tiny, tmp_path, monkeypatch):
-    drives, cars = tiny
-    copy_of(drives / "van0", tmp_path / "drives" / "van0")
-    copy_of(cars, tmp_path / "vehicles")
-    document = Path(__file__).parents[2] / "docs" / "fleet.md"
-    (code,) = re.findall(r"```python\n(.*?)```", document.read_text(encoding="utf-8"), re.DOTALL)
-    monkeypatch.chdir(tmp_path)
-    names = {}
-    exec(code, names)
-    assert names["rows"].collect().height == 14
-    assert (tmp_path / "lake" / "drives" / "_delta_log").is_dir()
 
 
 def test_workers_keep_the_memory_of_their_arrays():

@@ -4,28 +4,33 @@ import pytest
 
 import weighbridge as wb
 from weighbridge.pipeline.forward import forward_weigh, identify_forward
-from weighbridge.simulation import MIDSIZE, Scenario, short_route, simulate_car
+from weighbridge.simulation import MIDSIZE, Scenario, Sensors, short_route, simulate_car
 
 SHORT = 240.0
 """Of the drives that are fed again and again [s]."""
 
+PHONE = Sensors(imu_rate=100.0)
+"""Inertial samples as often as of a phone: half of what there would be to feed."""
+
+
+def simulated(name, payload, seed):
+    """Return a drive through the town."""
+    return simulate_car(
+        Scenario(
+            name=name, car=MIDSIZE, route=short_route(), payload=payload, sensors=PHONE, seed=seed
+        )
+    )
+
 
 @pytest.fixture(scope="session")
 def car():
-    known = [
-        simulate_car(
-            Scenario(name="known", car=MIDSIZE, route=short_route(), payload=load, seed=51_001 + k)
-        )
-        for k, load in enumerate((0.0, 300.0, 100.0))
-    ]
+    known = [simulated("known", load, 51_001 + k) for k, load in enumerate((0.0, 300.0, 100.0))]
     return wb.calibrate([m.drive for m in known], mass=[m.scenario.mass for m in known])
 
 
 @pytest.fixture(scope="session")
 def loaded():
-    return simulate_car(
-        Scenario(name="loaded", car=MIDSIZE, route=short_route(), payload=250.0, seed=51_010)
-    )
+    return simulated("loaded", 250.0, 51_010)
 
 
 @pytest.fixture(scope="session")

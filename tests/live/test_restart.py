@@ -16,7 +16,7 @@ class Heard:
     """A scale that hears the senders, as a session lets it."""
 
     def __init__(self, car, senders):
-        self.scale, self.told = wb.LiveScale(car), []
+        self.scale, self.told = wb.LiveScale(car, step=1.0), []
         self._senders, self._renewed, self._due = senders, 0, 0.0
 
     def put(self, samples):

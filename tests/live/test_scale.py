@@ -9,7 +9,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import weighbridge as wb
-from tests.live.conftest import SHORT
+from tests.live.conftest import PHONE, SHORT
 from weighbridge.balance.averaging import WINDOW
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
@@ -214,7 +214,7 @@ def test_an_open_window_that_is_full_counts_as_the_whole_one(short, weighing, se
 
 
 def test_a_scale_learns_and_weighs(car, loaded, weighing):
-    scale = wb.LiveScale(car, info=loaded.drive.info)
+    scale = wb.LiveScale(car, info=loaded.drive.info, step=1.0)
     drive = loaded.drive
     statuses = []
     for block in blocks(drive, even(drive, 5.0)):
@@ -230,12 +230,12 @@ def test_a_scale_learns_and_weighs(car, loaded, weighing):
     assert low < loaded.scenario.mass < high
     assert told.progress > 0.3
     assert all(s.fresh for s in told.signals if s.needed)
-    same = wb.LiveScale(car, info=loaded.drive.info)
+    same = wb.LiveScale(car, info=loaded.drive.info, step=1.0)
     assert fed(same, drive, even(drive, 37.0)).mass == told.mass
 
 
 def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):
-    middle = short.start + 0.6 * SHORT
+    middle = short.start + 0.8 * SHORT
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
     for block in blocks(short, even(short.between(short.start, middle), 7.0)[:-1]):
         scale.update_block(block)
@@ -357,11 +357,11 @@ def test_a_change_of_load_is_found_on_the_way(car, loaded):
     route = short_route()
     made = simulate_car(
         Scenario(
-            name="more", car=MIDSIZE, route=route, payload=100.0, seed=51_011,
+            name="more", car=MIDSIZE, route=route, payload=100.0, sensors=PHONE, seed=51_011,
             loading=(Loading(distance=0.45 * route.length, duration=120.0, load=500.0),),
         )
     )  # fmt: skip
-    scale = wb.LiveScale(car, info=made.drive.info)
+    scale = wb.LiveScale(car, info=made.drive.info, step=1.0)
     told = fed(scale, made.drive, even(made.drive, 20.0))
     low, high = told.interval()
     assert low < made.scenario.mass + 500.0 < high

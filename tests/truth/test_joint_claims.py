@@ -17,6 +17,7 @@ from weighbridge.simulation import (
     MIDSIZE,
     Polling,
     Scenario,
+    Sensors,
     flat_route,
     mixed_route,
     simulate_car,
@@ -41,6 +42,7 @@ def town(seed, payload, *, length=1.0, rate=4.0, noise=0.02, roughness=1.0):
         payload=payload,
         seed=seed,
         wind_speed=4.0,
+        sensors=Sensors(imu_rate=50.0),
     )
     sizes = dict.fromkeys(("imu_noise", "imu_vibration", "roughness"), roughness)
     return replace(

@@ -13,7 +13,14 @@ from weighbridge.estimators.joint import batch
 from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.pipeline.forward import forward_weigh, identify_forward
 from weighbridge.report.slow_section import slow_section
-from weighbridge.simulation import MIDSIZE, Scenario, make_scenario, short_route, simulate_car
+from weighbridge.simulation import (
+    MIDSIZE,
+    Scenario,
+    Sensors,
+    make_scenario,
+    short_route,
+    simulate_car,
+)
 
 POWER = 2800.0
 SUMMER = 305.0
@@ -27,6 +34,7 @@ def drive(power, seed, payload=0.0):
             route=short_route(),
             ambient_temperature=SUMMER,
             payload=payload,
+            sensors=Sensors(imu_rate=50.0),
             seed=seed,
         )
     )
@@ -82,7 +90,7 @@ def test_without_an_accelerometer_hills_may_look_alike(made, car):
 
 
 def test_a_motor_has_no_such_load():
-    made = simulate_car(make_scenario("electric", seed=4104))
+    made = simulate_car(replace(make_scenario("electric", seed=4104), duration=900.0))
     file = wb.calibrate([made.drive], mass=made.scenario.mass)
     table = wb.weigh(made.drive, file).result.balance.table
     assert np.nan_to_num(table.torque).any()

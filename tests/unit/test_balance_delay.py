@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.signal import lfilter
 
 import weighbridge as wb
 from weighbridge.balance.delay import FARTHEST, best_delay
 from weighbridge.calibration.joint import USUAL_DELAY, USUAL_LAG, find_timing
-from weighbridge.kernels.first_order import first_order
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.kernels.first_order import even_lag, fading, first_order
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 
 def test_the_lowest_point_is_found_between_grid_points():
@@ -73,10 +75,26 @@ def test_an_uneven_lag_begins_anew_where_nothing_is_known():
     assert out == pytest.approx([1.0, 1.0, np.nan, 5.0, 5.0], nan_ok=True)
 
 
+@pytest.mark.parametrize("lag", [0.02, 0.3])
+def test_an_even_lag_is_the_filter_of_scipy_to_the_last_bit(lag):
+    values = np.random.default_rng(7).normal(0.0, 1e3, 500)
+    keep = float(np.exp(-1.0 / (100.0 * lag)))
+    told, _ = lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * 3.0])
+    assert_array_equal(even_lag(values, keep, 3.0), told)
+
+
+def test_what_fades_is_the_sum_of_what_came_before():
+    values, keep = np.random.default_rng(8).normal(size=40), 0.8
+    apart = np.subtract.outer(np.arange(40), np.arange(40))
+    weights = np.where(apart > 0, keep ** np.maximum(apart, 0), 0.0)
+    assert_allclose(fading(values, keep), weights @ values, atol=1e-12)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("smoothing", [0.1, 0.3])
 def test_noise_of_the_motion_does_not_pass_for_a_smoothed_reading(smoothing):
     scenario = make_scenario("car-calibration", seed=88103)
-    known = simulate_car(replace(scenario, car=replace(scenario.car, load_smoothing=smoothing)))
+    smoothed = replace(scenario.car, load_smoothing=smoothing)
+    known = simulate_car(replace(scenario, car=smoothed, sensors=Sensors(imu_rate=50.0)))
     timing = wb.calibrate([known.drive], mass=float(known.truth.mass.mean())).timing
     assert timing.torque_lag == pytest.approx(smoothing, abs=0.08)

@@ -22,7 +22,7 @@ from weighbridge.errors import ConfigError, DriveError
 from weighbridge.estimators.regression import regression
 from weighbridge.report.calibration_panels import calibration_facts
 from weighbridge.signals import Signal
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.model import Driveline, TorqueModel
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -32,9 +32,8 @@ pytestmark = pytest.mark.skipif(
 
 
 def short(seed, payload=0.0):
-    return simulate_car(
-        make_scenario("car-short", payload=payload, seed=seed, without=("warm_up",))
-    )
+    scenario = make_scenario("car-short", payload=payload, seed=seed, without=("warm_up",))
+    return simulate_car(replace(scenario, sensors=Sensors(imu_rate=50.0)))
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 
 import weighbridge as wb
 from weighbridge.signals import Signal
-from weighbridge.simulation import make_scenario, simulate_car
+from weighbridge.simulation import Sensors, make_scenario, simulate_car
 
 pytestmark = pytest.mark.skipif(
     numba.config.DISABLE_JIT, reason="whole drives take minutes without the compiler"
@@ -17,9 +17,8 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def weighed():
     """Weigh a drive whose accelerometer reads 10 % too little along the vehicle, and as it was."""
-    made = simulate_car(
-        replace(make_scenario("electric", payload=100.0, seed=977), duration=1500.0)
-    )
+    scenario = make_scenario("electric", payload=100.0, seed=977)
+    made = simulate_car(replace(scenario, duration=1500.0, sensors=Sensors(imu_rate=50.0)))
     car = wb.calibrate([made.drive], mass=float(made.truth.mass[0]))
     ahead = made.drive.signals["accel_x"]
     scaled = made.drive.with_signals(Signal(ahead.name, ahead.time, 0.9 * ahead.values))

@@ -54,7 +54,7 @@ def driven():
         drives = []
         for j, (name, load) in enumerate((("car-calibration", 0.0), ("car", 300.0))):
             scenario = make_scenario(name, payload=load, seed=810 + 10 * k + j)
-            sensors = replace(scenario.sensors, imu_rate=100.0)
+            sensors = replace(scenario.sensors, imu_rate=50.0)
             made = simulate_car(
                 replace(scenario, car=car, polling=polling, sensors=sensors, duration=1200.0)
             )

@@ -10,7 +10,7 @@ from weighbridge.calibration.known_mass import POUND, check_mass, drag_doubt, sc
 from weighbridge.errors import ConfigError
 from weighbridge.signals import Drive
 from weighbridge.signals.drive import DriveInfo
-from weighbridge.simulation import simulate_car
+from weighbridge.simulation import Sensors, simulate_car
 from weighbridge.simulation.named import make_scenario
 from weighbridge.vehicle.model import RoadLoad, TorqueModel, Vehicle
 
@@ -77,7 +77,7 @@ def test_a_mass_of_a_truck_leads_to_its_class():
 def test_a_mass_in_pounds_is_doubted_by_fuel_and_drag_and_at_each_weighing():
     """An engine load has no scale of its own: air drag and the fuel burnt are what checks it."""
     made = make_scenario("compact-calibration", seed=63)
-    known = simulate_car(replace(made, duration=1200.0))
+    known = simulate_car(replace(made, duration=1200.0, sensors=Sensors(imu_rate=50.0)))
     mass = float(known.truth.mass[0])
     bare = replace(known.drive, info=replace(known.drive.info, mass=None))
     assert wb.calibrate([bare], mass=mass).provenance.doubts == ()
@@ -109,8 +109,9 @@ def test_a_drag_area_that_no_car_has_is_told(area, source, word):
 @pytest.mark.parametrize("stated", [False, True])
 def test_masses_a_fifth_too_heavy_are_refused_by_permitted_mass_and_torque(stated):
     known = [
-        simulate_car(replace(make_scenario("electric", payload=load, seed=911), duration=900.0))
+        simulate_car(replace(scenario, duration=900.0, sensors=Sensors(imu_rate=50.0)))
         for load in (0.0, 400.0)
+        for scenario in [make_scenario("electric", payload=load, seed=911)]
     ]
     true = [float(made.truth.mass[0]) for made in known]
     base = Vehicle(kind="car", tare=true[0], gross=1.05 * true[1] if stated else None)

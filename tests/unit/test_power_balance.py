@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 import weighbridge as wb
 from weighbridge.pipeline.inspection import inspect_drive
 from weighbridge.signals import Drive, Signal
-from weighbridge.simulation import ELECTRIC, make_scenario, simulate_car
+from weighbridge.simulation import ELECTRIC, Sensors, make_scenario, simulate_car
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import scale_std
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
@@ -38,7 +38,9 @@ def sheet(car=ELECTRIC):
 
 @pytest.fixture(scope="module")
 def made():
-    scenario = replace(make_scenario("electric", seed=33), duration=1500.0)
+    scenario = replace(
+        make_scenario("electric", seed=33), duration=1500.0, sensors=Sensors(imu_rate=50.0)
+    )
     return simulate_car(scenario)
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from scipy.signal import lfilter
 
+from weighbridge.kernels.first_order import even_lag
 from weighbridge.navigation.motion import Motion, nearest_row, row_before
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
@@ -101,7 +101,7 @@ def behind(values: Floats, rate: float, lag: float, start: float | None = None) 
         return values
     keep = float(np.exp(-1.0 / (rate * lag)))
     start = values[0] if start is None else start
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * start])[0])
+    return np.asarray(even_lag(np.ascontiguousarray(values), keep, float(start)))
 
 
 def interpolate_motion(motion: Motion, time: Floats) -> dict[str, Floats]:

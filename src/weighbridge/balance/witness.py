@@ -14,9 +14,9 @@ from typing import Final, TypeAlias
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.signal import lfilter
 
 from weighbridge.errors import DriveError
+from weighbridge.kernels.first_order import even_lag
 from weighbridge.kernels.robust_line import lines_without_parts, robust_line
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.correlation import correlations
@@ -357,8 +357,8 @@ def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following
     driven = rows.time[rows.driving]
     left = np.empty((len(BLURS), len(DELAYS)))
     for i, blur in enumerate(BLURS):
-        kept = np.exp(-period / blur) if blur > 0.0 else 0.0
-        delayed, _ = lfilter([1.0 - kept], [1.0, -kept], predicted, zi=[kept * predicted[0]])
+        kept = float(np.exp(-period / blur)) if blur > 0.0 else 0.0
+        delayed = even_lag(predicted, kept, float(predicted[0]))
         moved = (interpolate(driven - delay, rows.time, delayed) for delay in DELAYS)
         left[i] = 1.0 - correlations(reading, moved) ** 2
     best = int(np.argmin(left.min(axis=1)))

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from weighbridge.balance import ForceBalance
 from weighbridge.balance.force_balance import highest_torque
@@ -22,6 +21,7 @@ from weighbridge.estimators.joint.slow_errors import (
 from weighbridge.estimators.judging import Evidence, judge
 from weighbridge.estimators.noisy_motion import row_noise_std, too_noisy
 from weighbridge.estimators.track import Status
+from weighbridge.kernels.first_order import fading
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.vehicle.model import Vehicle
@@ -205,5 +205,5 @@ def _known_road_load(vehicle: Vehicle) -> Vehicle:
 
 def _correlated(effect: Floats, keep: float) -> float:
     """Sum of ``effect_i effect_j keep^|i - j|`` over all pairs."""
-    before = lfilter([0.0, keep], [1.0, -keep], effect)
+    before = fading(effect, keep)
     return float(effect @ effect + 2.0 * (effect @ before))

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import windows
@@ -179,7 +179,7 @@ class Evidence:
     def half_width(self) -> float:
         """Half of the interval of 95 % [kg]."""
         freedom = max(self.degrees_of_freedom, 1.0)
-        return float(student.ppf(0.975, freedom)) * self.std
+        return float(stdtrit(freedom, 0.975)) * self.std
 
     @property
     def drive_std(self) -> float:

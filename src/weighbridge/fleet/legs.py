@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import polars as pl
-from scipy.stats import t as student
+from scipy.special import stdtr, stdtrit
 
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.couplings import Coupling, with_couplings
@@ -153,9 +153,9 @@ def _judged(rows: pl.DataFrame, limits: Limits) -> pl.DataFrame:
         rows[name].fill_null(float("nan")).to_numpy()
         for name in ("mass_kg", "std_kg", "permitted_kg", "freedom")
     )
-    reach = std * student.ppf(0.975, freedom)
+    reach = std * stdtrit(freedom, 0.975)
     with np.errstate(divide="ignore", invalid="ignore"):
-        overload = student.sf((permitted - mass) / std, freedom)
+        overload = stdtr(freedom, (mass - permitted) / std)
     room = pl.col("gross_kg") - pl.col("tare_kg")
     level = (
         pl.when(pl.col("overload") >= limits.alarm)

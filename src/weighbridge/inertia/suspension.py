@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.signal import butter, sosfilt
 
 from weighbridge.inertia.filter import (
     RideSamples,
@@ -123,6 +122,8 @@ def _banded(
     mean = (inputs[:-2] + 4.0 * inputs[1:-1] + inputs[2:]) / 6.0
     accel = (velocity[2:] - velocity[:-2]) / (2.0 * step)
     travel_rate = (inputs[2:, :4] - inputs[:-2, :4]) / (2.0 * step)
+    from scipy.signal import butter, sosfilt  # Slow to load.
+
     sections = butter(2, (BAND[0], high), "bandpass", fs=1.0 / step, output="sos")
     both = sosfilt(sections, np.hstack((accel, mean, travel_rate)), axis=0)
     # The filter needs a period of its lowest frequency to forget that it began, and after

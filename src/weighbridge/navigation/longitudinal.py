@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from weighbridge.constants import GRAVITY
 from weighbridge.messages import Problem, refused
@@ -101,6 +100,8 @@ def lowpass(values: Floats, rate: float, band: float) -> Floats:
     """Zero-phase second-order Butterworth below ``band`` [Hz]; as is where too short."""
     if band >= 0.45 * rate or values.size < 32:
         return values
+    from scipy.signal import butter, sosfiltfilt  # Slow to load.
+
     sos = butter(2, band, fs=rate, output="sos")
     return np.asarray(sosfiltfilt(sos, values, padlen=min(values.size - 1, int(3 * rate / band))))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -145,6 +145,7 @@ class Motion:
     doubted_gain: float | None = None
     measured_speed: Signal | None = None
     notes: tuple[Problem, ...] = ()
+    _rate: float | None = field(default=None, init=False, repr=False, compare=False)
 
     @property
     def recorded_speed(self) -> RecordedSpeed | None:
@@ -155,7 +156,11 @@ class Motion:
     @property
     def rate(self) -> float:
         """Samples per second [Hz], the same of any part of a motion."""
-        return round(1.0 / float(np.median(np.diff(self.time[:RATE_ROWS]))), RATE_DIGITS)
+        if self._rate is None:
+            rate = round(1.0 / float(np.median(np.diff(self.time[:RATE_ROWS]))), RATE_DIGITS)
+            object.__setattr__(self, "_rate", rate)
+            return rate
+        return self._rate
 
     @property
     def unmeasured_grade(self) -> float:

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from weighbridge.arguments import check_all, check_number, check_type
 from weighbridge.balance.law import rotating_mass
@@ -137,7 +136,7 @@ def mass_bound(
     start, gain, gain_std, force_work = (x[hard] for x in (start, gain, gain_std, force_work))
     most = (power * WINDOW - force_work) / gain
     std = np.hypot(power_std * power * WINDOW / gain, most * gain_std / gain)
-    bound = most + float(norm.isf(0.05 / most.size)) * std
+    bound = most + float(-ndtri(0.05 / most.size)) * std
     best = int(np.argmin(bound))
     return MassBound(
         mass=float(bound[best]),
@@ -236,7 +235,7 @@ class CoastDown:
         return self._between(self.rolling, self.rolling_std, level)
 
     def _between(self, value: float, std: float, level: float) -> tuple[float, float]:
-        half = float(student.ppf(0.5 + 0.5 * level, self.degrees_of_freedom)) * std
+        half = float(stdtrit(self.degrees_of_freedom, 0.5 + 0.5 * level)) * std
         return value - half, value + half
 
     def to_json(self, name: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 import plotly.graph_objects as go
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.report.table import Table
@@ -24,7 +24,7 @@ BROWN: Final = "#a67c52"
 """Mid tones told apart with any colour vision; after Okabe and Ito, Color Universal Design, 2008.
 Each has a contrast of 3 or more on light and dark paper (WCAG 2.2, 1.4.11)."""
 
-REACH: Final = float(norm.ppf(0.975))
+REACH: Final = float(ndtri(0.975))
 """Half of a 95 % interval over the standard deviation, where that is known [-]."""
 
 TIME_AXIS: Final = "Time since start [min]"

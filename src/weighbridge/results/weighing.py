@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from weighbridge.balance import REASON_TEXT, Reason
 from weighbridge.estimators import ESTIMATORS, Estimator, MassTrack, Segment, Status
@@ -126,7 +126,7 @@ class MassResult:
         check_level(level)
         if self.result is None or not math.isfinite(self.mass):
             return math.nan, math.nan
-        reach = float(student.ppf(0.5 + 0.5 * level, self.result.degrees_of_freedom)) * self.std
+        reach = float(stdtrit(self.result.degrees_of_freedom, 0.5 + 0.5 * level)) * self.std
         return self.mass - reach, self.mass + reach
 
     @property

@@ -50,7 +50,8 @@ def looking(drive: Drive, ahead: float, periods: Mapping[str, float]) -> Drive:
     periods : median time between samples of each signal of the whole drive [s]
     """
     seen = {
-        name: replace(s, ahead=ahead, usual=periods.get(name)) for name, s in drive.signals.items()
+        name: Signal(name, s.time, s.values, ahead, periods.get(name))
+        for name, s in drive.signals.items()
     }
     return replace(drive, signals=seen)
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats, Ints
@@ -167,6 +166,8 @@ def _standing_out(grid: Floats, density: Floats, width: float, most: int) -> Int
     A gear is such a peak, be it ever so rarely used: shifting smears samples evenly, gears pile
     them up.
     """
+    from scipy.signal import find_peaks  # Slow to load.
+
     peaks, found = find_peaks(
         density,
         prominence=max(5.0, 0.002 * density.sum() / (2.0 * width) * np.log(grid[1] / grid[0])),
