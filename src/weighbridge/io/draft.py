@@ -17,7 +17,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
 from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
 from weighbridge.io.draft_text import text_format
-from weighbridge.io.draft_time import DraftTime, find_times, is_number
+from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
 from weighbridge.io.naming import Named, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
@@ -157,6 +157,8 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
         for name, found in zip(others, named, strict=True)
     )
     columns = checked(columns)
+    times = by_motion(times, _swings(raw, columns))
+    time = times[0]
     found = Draft(
         path=path,
         text=text,
@@ -174,6 +176,16 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     if not found.known:
         raise UnknownColumnsError(_unknown(found, raw.names), timed(found, time))
     return timed(found, time)
+
+
+def _swings(raw: RawTable, columns: Sequence[DraftColumn]) -> float:
+    """Sum of the changes of a table's speed [m/s]; 0 where it has none."""
+    for quantity in ("vehicle_speed", "gnss_speed"):
+        for column in columns:
+            if column.quantity == quantity and column.unit:
+                values, _ = raw.numbers(raw.names.index(column.name))
+                return swings(to_si(values, column.unit))
+    return 0.0
 
 
 def tells_torque(*drafts: Draft) -> bool:
