@@ -114,7 +114,8 @@ def test_every_spelling_of_candump(tmp_path):
         long, bytes((1, 2)), bytes((1, 13)), long[:12], bytes.fromhex("1122334455667788"),
     ]  # fmt: skip
     assert [p.text for p in log.problems] == [
-        "spelled.log: left out 4 of 10 lines, which hold no frame"
+        "spelled.log: left out 4 of 10 lines, which hold no frame, such as line 7: "
+        "'(1436509054.2) can0 123#112'"
     ]
 
 

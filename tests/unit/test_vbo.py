@@ -121,7 +121,7 @@ def test_cut_row_and_text_cell(tmp_path):
     assert len(found.signals["altitude"]) == 1
     assert found.problems[0].id == "file.rows_cut"
     assert found.problems[0].values["count"] == 1
-    assert found.problems[0].values["rows"] == 3
+    assert found.problems[0].values["lines"] == "3 lines"
 
 
 def test_accelerations_of_the_speed_are_no_specific_force(tmp_path):

@@ -22,6 +22,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.table import column_list, unwrapped
+from weighbridge.io.understood import Lines, number_of
 from weighbridge.io.way import way_ratio
 from weighbridge.signals import Bools, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
@@ -239,9 +240,10 @@ def _cells(log: Log, lines: list[str], width: int) -> Floats:
     if not rows:
         raise DriveError(f"{log.path} has no row of {width} values under [data]; record it again")
     if lost := len(lines) - len(rows):
-        log.problems.append(
-            Problem.of("file.rows_cut", file=log.path.name, count=lost, rows=len(lines))
-        )
+        strange = next(line for line in lines if len(line.split()) != width)
+        read = Lines()
+        read.add(b"", len(lines), lost, number_of(log.path, strange))
+        log.problems += read.problems("file.rows_cut", log.path)
     flat = pl.Series([cell for row in rows for cell in row], dtype=pl.String)
     if not flat.str.contains(".", literal=True).any():
         flat = flat.str.replace(",", ".", literal=True)
