@@ -37,12 +37,14 @@ class Decoded:
     problems : what was left out
     lacking : what the mapping names, not as optional, and no frame carries
     contents : what was found, decoded and ignored, with counts, for people
+    units : suffixes of the units that the databases or the mapping declare, by signal
     """
 
     signals: dict[str, Signal] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     lacking: list[Problem] = field(default_factory=list)
     contents: list[str] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
 
 
 def decode(
@@ -232,6 +234,7 @@ def _databases(
             )
             continue
         values = to_si(values, suffix) if suffix else values
+        done.units[quantity] = suffix
         columns.setdefault(at.tobytes(), (at, []))[1].append((quantity, values))
     for at, group in columns.values():
         signals, problems = clean_columns(frames.time[at], group, name)

@@ -72,9 +72,9 @@ def read_gvret(path: Path, table: str | None, mapping: TableMapping | None) -> L
         fits = (pl.col("data").bin.size() == pl.col("length")).fill_null(False)
         frames = frames_of_table(rows.filter(fits).with_columns(time=pl.col("time") * factor))
         bad = rows.height - len(frames)
-        strange = np.flatnonzero(~rows.select(_whole() & fits).to_series()) if bad else []
+        strange = np.flatnonzero(~rows.select(_whole() & fits).to_series())
         top = 1 if head else 0
-        first = int(strange[0]) + 1 + top if len(strange) else 0
+        first = int(strange[0]) + 1 + top if strange.size else 0
         lines.add(b"\n" * top + block, rows.height, bad, first)
         parts.append(frames)
     return _log(path, in_order(parts), lines)

@@ -195,6 +195,7 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
             values = values * signal.factor + signal.offset
         time, columns = clocks.setdefault(id(channel.time), (channel.time, []))
         columns.append((name, to_si(values, suffix) if suffix else values))
+        log.units[name] = suffix
     for time, columns in clocks.values():
         if time.size == 0:
             names = ", ".join(n for n, _ in columns)
@@ -276,8 +277,9 @@ def _judged(channels: list[Channel], columns: tuple[DraftColumn, ...]) -> tuple[
     """Give speeds without a stated unit the one that the log's positions and speeds show."""
     told = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
     # What the format itself knows is compared too.
+    nan = float("nan")
     known = tuple(
-        DraftColumn(c.name, c.quantity, c.unit, True, *[float("nan")] * 3, c.values.size)
+        DraftColumn(c.name, c.quantity, c.unit, True, nan, nan, nan, c.values.size)
         for c in channels
         if c.quantity
     )

@@ -238,6 +238,7 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
             values = values * signal.factor + signal.offset
         times.setdefault(group, time + offset if offset else time)
         clocks.setdefault(group, []).append((name, to_si(values, suffix) if suffix else values))
+        log.units[name] = suffix
     for group, columns in clocks.items():
         if times[group].size == 0:
             names = ", ".join(n for n, _ in columns)

@@ -224,11 +224,11 @@ def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
     if not body.strip():
         frame = pl.DataFrame({str(i): pl.Series([], dtype=pl.Float64) for i in range(len(names))})
     else:
-        lines = Lines()
-        lines.add(b"\n" * skip, 0, 0, 0)
+        read = Lines()
+        read.add(b"\n" * skip, 0, 0, 0)
         data = body.encode(errors="replace")
-        lines.add(data, *strange_rows(data, len(names), separator))
-        notes += lines.problems("file.rows_strange", path)
+        read.add(data, *strange_rows(data, len(names), separator))
+        notes += read.problems("file.rows_strange", path)
         frame = _parse(path, data, len(names), separator, fmt.decimal, notes)
     missing = frozenset(MISSING) | {m.strip().lower() for m in fmt.missing}
     return RawTable(path, names, frame, separator, missing, fmt.decimal, notes)
