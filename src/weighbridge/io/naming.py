@@ -163,7 +163,9 @@ def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
     if len(last) > 1 and (suffix := unit_suffix(last[-1].strip("()[],;"))) is not None:
         gone = len(words_of(last[-1]))
         return suffix, words[: len(words) - gone] if gone else words
-    return None, words
+    # A name may be a unit of speed alone.
+    whole = unit_suffix(name)
+    return (whole if whole in ("mph", "kmh") else None), words
 
 
 def recognise(name: str, unit: str | None = None) -> Named:
