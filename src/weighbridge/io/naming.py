@@ -197,7 +197,7 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     whole = frozenset(spelled(words_of(name)))
     best = Named("", stated, 0.0)
     for quantity, phrases in _WANTED.items():
-        if _NOT.get(quantity, frozenset()) & whole:
+        if _NOT.get(quantity, frozenset()) & whole and whole not in phrases:
             continue
         if stated is not None and not _can_be(quantity, stated):
             continue
