@@ -293,3 +293,14 @@ def test_fd_frames_of_mf4(tmp_path):
     assert [bytes(d[:n]) for d, n in zip(frames.data, frames.length, strict=True)] == [
         bytes(m.data) for m in sent
     ]
+
+
+@pytest.mark.parametrize("name", ["drive.txt", "drive.dump"])
+@pytest.mark.parametrize(
+    "line", ["(1436509052.249713) can0 1A0#0102", " (003.5)  vcan1  18FEF100   [2]  01 02"]
+)
+def test_candump_is_known_by_its_first_line(tmp_path, name, line):
+    (tmp_path / name).write_text(f"{line}\n")
+    found = format_of(tmp_path / name)
+    assert found.read is read_candump
+    assert len(found.read(tmp_path / name, None, None).frames) == 1

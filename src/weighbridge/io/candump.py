@@ -23,6 +23,17 @@ _EPOCH_LIKE: Final = 1e8
 """Stamps above count from 1970, not from the start of the log [s]."""
 
 
+_LINE: Final = re.compile(
+    rb"(?:\xef\xbb\xbf)?\s*(?:\(\d+(?:\.\d+)?\)\s+)?\w+\s+(?:[RT]X\s+\S+\s+\S+\s+)?"
+    rb"[0-9A-Fa-f]{3,8}(?:#|\s+\[\d{1,2}\](?:\s|$))"
+)
+
+
+def is_candump(head: bytes) -> bool:
+    """Tell whether a text begins with a line of candump."""
+    return _LINE.match(head) is not None
+
+
 def read_candump(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
     """Read the frames of a candump log; see `weighbridge.io.log.Reader`.
 
