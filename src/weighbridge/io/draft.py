@@ -16,7 +16,7 @@ import numpy as np
 
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
-from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
+from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
 from weighbridge.io.draft_unit import SPEEDS, Values, unit_in_name, with_judged_units
@@ -320,6 +320,10 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     """
     if not found.quantity:
         return _nothing(name, found.misfit)
+    if is_calculated(name, found.quantity):
+        return _nothing(
+            name, f"not taken for {found.quantity}: it was calculated, from a speed or a position"
+        )
     known = values[np.isfinite(values)]
     if known.size == 0:
         return _nothing(name, f"not taken for {found.quantity}: it has no values")
