@@ -22,8 +22,8 @@ SLOWEST: Final = 3.0
 
 ALIKE: Final = 0.008
 """Root mean square of the difference of both, at most: 0.0013 of a derivative of the same speed,
-0.0055 of one of another speed in whole km/h. A road of 0.1 % or a sensor that leans by 0.06
-degrees make more [m/s^2]."""
+0.0055 of one of another speed in whole km/h; 0.029 to 0.57 of the accelerometer of a BMW i3 in 24
+trips. A road of 0.1 % or a sensor that leans by 0.06 degrees make more [m/s^2]."""
 
 
 def without_derived(drive: Drive) -> Drive:
