@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import signal
 import sys
+import threading
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+_INTERRUPTED = 130
+"""Exit status of a program that SIGINT ends, as a shell gives it."""
 
 
 def run() -> None:
@@ -12,13 +22,41 @@ def run() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Colours of its messages would end with a control character on our standard output.
     os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
+    interrupted: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        interrupted.append(number)
+        raise KeyboardInterrupt
+
+    usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if usual and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, note)
     try:
         from weighbridge.cli.main import run as run_commands
 
         run_commands()
     except KeyboardInterrupt:
-        # As a shell ends a program by SIGINT.
-        sys.exit(130)
+        _leave()
+    except SystemExit as leaving:
+        if leaving.code == _INTERRUPTED:
+            _leave()
+        raise
+    except Exception:
+        # Libraries turn an interruption inside an import into errors of their own.
+        if interrupted:
+            _leave()
+        raise
+
+
+def _leave() -> NoReturn:
+    """End with the status of an interruption: Python may have kept it, and end by the signal."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        os._exit(_INTERRUPTED)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 import typer
 from tests.noted import noted
@@ -248,3 +249,19 @@ def test_warnings_of_several_drives_are_a_few_lines():
     assert warning_lines([]) == []
     assert "never calibrated" in result_table(drives, [], truck).title
     assert result_table([], [("day", noted("why"))], truck).title is None
+
+
+def test_the_way_by_wheel_torque_is_named_where_the_driven_axles_are_all_it_lacks(
+    weighbridge, tmp_path
+):
+    time = np.arange(0.0, 400.0, 0.1)
+    speed = 12.0 + 6.0 * np.sin(time / 20.0)
+    accel = np.gradient(speed, time) + 9.81 * 0.02 * np.sin(time / 60.0)
+    rear = np.round(400.0 * accel)
+    table = {"time_s": time, "vehicle_speed_mps": speed, "longitudinal_accel_mps2": accel}
+    table |= {"wheel_torque_rl_nm": rear, "wheel_torque_rr_nm": rear}
+    pl.DataFrame(table).write_csv(tmp_path / "t.csv")
+    ran = weighbridge("inspect", tmp_path / "t.csv")
+    text = " ".join(ran.out.split())
+    assert "--torque wheel_torque --driven AXLES" in text
+    assert "engine_torque" not in text

@@ -155,3 +155,17 @@ def test_the_next_command_names_the_dbc_of_the_calibration(weighbridge, known, t
 
 def test_without_a_dbc_none_is_named(weighbridge, car):
     assert "--dbc" not in weighbridge("vehicle", "show", car).out
+
+
+def test_a_file_by_load_is_calibrated_first_whatever_else_is_known(weighbridge, tmp_path):
+    path = tmp_path / "car.toml"
+    ran = weighbridge(
+        "vehicle", "new", "--tyre", "195/65R15", "--gear-ratios", "3.6,2.0,1.3,1.0",
+        "--final-drive", 3.9, "--tare", 1300, "--torque", "load", "-o", path,
+    )  # fmt: skip
+    assert ran.code == 0
+    text = " ".join(ran.out.split())
+    assert "by engine load; a calibration finds what that is worth" in text
+    assert "next: weighbridge calibrate" in text
+    assert "weigh DRIVE" not in text
+    assert Vehicle.load(path).torque.source == "load"

@@ -179,3 +179,26 @@ def test_a_mapping_of_many_vehicles_is_read_once_and_its_content_counts(tmp_path
     (tmp_path / "map.toml").write_text(text.replace("km/h", "m/s"))
     again = [Vehicles(tmp_path).of((f"{name}.csv",)) for name in ("van1", "van2")]
     assert len({a.digest for a in (*found, *again)}) == 4
+
+
+@pytest.mark.parametrize(
+    ("folders", "vehicle"),
+    [
+        ("asset_id=TR-17/date=2026-10-08", "TR-17"),
+        ("year=2026/month=3/vehicle=B%20202", "B 202"),
+        ("date=2026-10-08/TR-17", "TR-17"),
+        ("fleet/date=2026-10-08", "fleet"),
+    ],
+)
+def test_a_partition_tells_the_vehicle_and_its_files_are_one_drive(tmp_path, folders, vehicle):
+    known = tmp_path / "vehicles"
+    known.mkdir()
+    (known / "TR-17.toml").write_text('[vehicle]\nname = "x"\nclass = "truck"\n')
+    folder = tmp_path / "lake" / folders
+    folder.mkdir(parents=True)
+    for name in ("part-0.parquet", "part-1.parquet"):
+        pl.DataFrame({"time_s": [0.0]}).write_parquet(folder / name)
+    found = list(recordings([f"{tmp_path}/lake/**"]))
+    assert Vehicles(known).of(found[0].paths).id == vehicle
+    if "=" in folder.name:
+        assert [len(one.paths) for one in found] == [2]

@@ -159,3 +159,47 @@ def test_a_fleet_weighs_anew_where_the_dbc_of_a_mapping_changed(logged, named, t
     assert before.mapping["dbc"] == [dbc.resolve().as_posix()]
     dbc.write_text(DBC.replace("(0.01,0)", "(0.02,0)"))
     assert Vehicles(cars).of(("van/trip.log",)).digest != before.digest
+
+
+def test_values_that_are_none_are_told_and_left_out(logged, tmp_path):
+    log, dbc = logged
+    dbc.write_text(DBC.replace("[0|655]", "[0|150]") + 'VAL_ 512 EngineSpeed 4396 "SNA" ;\n')
+    mapping = {
+        "signals": {
+            "vehicle_speed": {"column": "VehSpd"},
+            "engine_speed": {"column": "EngineSpeed"},
+        }
+    }
+    drive = read_drive(log, mapping, dbc)
+    told = {p.signal: p.values["count"] for p in drive.problems if p.id == "file.sentinels"}
+    assert told == {"vehicle_speed": 49, "engine_speed": 1}
+    assert drive.signals["vehicle_speed"].values.max() == pytest.approx(150.0 / 3.6)
+
+
+@pytest.mark.parametrize(
+    ("texts", "numbers"),
+    [
+        (["P", "R", "N", "1st", "2nd", "3rd", "SNA"], [0, -1, 0, 1, 2, 3, None]),
+        (["Neutral", "Gang 1", "Gang 2", "Gang 3", "Fehler"], [0, 1, 2, 3, None]),
+        (["released", "pressed", "not available"], [0, 1, None]),
+    ],
+)
+def test_numbers_behind_texts_of_an_mdf_are_read(tmp_path, texts, numbers):
+    asammdf = pytest.importorskip("asammdf")
+    raw = np.arange(300) % len(texts)
+    table = {f"val_{k}": k for k in range(len(texts))}
+    table |= {f"text_{k}": text.encode() for k, text in enumerate(texts)}
+    time = np.arange(300) / 10.0
+    name = "gear" if len(texts) > 3 else "brake_switch"
+    signals = [
+        asammdf.Signal(raw.astype("u1"), time, name=name, conversion=table),
+        asammdf.Signal(np.round(time), time, name="vehicle_speed", unit="km/h"),
+    ]
+    with asammdf.MDF() as file:
+        file.append(signals)
+        file.save(tmp_path / "t.mf4")
+    drive = read_drive(tmp_path / "t.mf4")
+    known = [numbers[k] for k in raw if numbers[k] is not None]
+    assert drive.signals[name].values.tolist() == known
+    lost = sum(numbers[k] is None for k in raw)
+    assert [p.values["count"] for p in drive.problems if p.id == "file.sentinels"] == [lost]

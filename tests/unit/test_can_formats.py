@@ -114,7 +114,8 @@ def test_every_spelling_of_candump(tmp_path):
         long, bytes((1, 2)), bytes((1, 13)), long[:12], bytes.fromhex("1122334455667788"),
     ]  # fmt: skip
     assert [p.text for p in log.problems] == [
-        "spelled.log: left out 4 of 10 lines, which hold no frame"
+        "spelled.log: left out 4 of 10 lines, which hold no frame, such as line 7: "
+        "'(1436509054.2) can0 123#112'"
     ]
 
 
@@ -292,3 +293,14 @@ def test_fd_frames_of_mf4(tmp_path):
     assert [bytes(d[:n]) for d, n in zip(frames.data, frames.length, strict=True)] == [
         bytes(m.data) for m in sent
     ]
+
+
+@pytest.mark.parametrize("name", ["drive.txt", "drive.dump"])
+@pytest.mark.parametrize(
+    "line", ["(1436509052.249713) can0 1A0#0102", " (003.5)  vcan1  18FEF100   [2]  01 02"]
+)
+def test_candump_is_known_by_its_first_line(tmp_path, name, line):
+    (tmp_path / name).write_text(f"{line}\n")
+    found = format_of(tmp_path / name)
+    assert found.read is read_candump
+    assert len(found.read(tmp_path / name, None, None).frames) == 1

@@ -19,6 +19,7 @@ from weighbridge.messages import phrase
 from weighbridge.pipeline.inspection import describe, inspect_drive, quantisation
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.signals import Drive, DriveInfo, Signal
+from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.model import Driveline, TorqueModel, Vehicle
 
 GEARINGS = (45.0, 26.0, 17.5, 13.0, 10.5)
@@ -392,6 +393,31 @@ def test_time_in_seconds_under_milliseconds(sane):
     late = {n: replace(s, time=s.time * 1e-3) for n, s in sane.signals.items()}
     problem = only(replace(sane, signals=late))
     assert problem.id == "clock.seconds"
+
+
+@pytest.mark.parametrize("said", ["kmh", "mph", "mps", "kn"])
+@pytest.mark.parametrize("meant", ["kmh", "mph", "mps", "kn"])
+def test_advice_about_a_unit_is_never_followed_by_its_opposite(sane, said, meant):
+    """Whoever declares what was advised has a right speed, or reads of a factor at once."""
+    factor = UNITS[said].factor / UNITS[meant].factor
+    if abs(np.log(factor)) < 0.2:
+        return
+    declared = replace(scaled(sane, vehicle_speed=factor), units={"vehicle_speed": said})
+    found = only(declared, CAR)
+    if found.id == "speed.unit":
+        assert found.values["alike"] == meant
+    else:
+        assert found.id == "speed.factor"
+        assert found.values["factor"] == pytest.approx(1.0 / factor, rel=0.05)
+
+
+def test_a_speed_that_fits_no_unit_is_given_a_factor(sane):
+    declared = replace(scaled(sane, vehicle_speed=1.0 / 0.447), units={"vehicle_speed": "kmh"})
+    found = only(declared, CAR)
+    assert found.id == "speed.factor"
+    assert found.values["factor"] == pytest.approx(0.447, rel=0.02)
+    alone = replace(scaled(sane.without(*ALONE), vehicle_speed=3.6), units={"vehicle_speed": "kmh"})
+    assert only(alone).id == "speed.factor_doubtful"
 
 
 ALONE = (*ACCEL, *GYRO, *GNSS)

@@ -127,3 +127,49 @@ def test_files_that_are_no_dbc_are_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"bad\.dbc (is no readable DBC|defines no message)"):
         load_dbcs([tmp_path / "bad.dbc"])
     assert load_dbcs([f"3:{write(tmp_path, 'BO_ 16 M: 8 X')}"])[0].channel == 3
+
+
+def one(tmp_path, signal, raw, *more):
+    """Values of one signal of a DBC, of these raw ones in 16 bits."""
+    path = write(tmp_path, f"BO_ 16 M: 8 X\n SG_ S : 0|16@1+ {signal} X\n", *more)
+    (database,) = load_dbcs([path])
+    frames = make(np.arange(float(len(raw))), 0x10, [int(r).to_bytes(2, "little") for r in raw])
+    carried = [message_frames(frames, database)]
+    return physical(frames, find_signal("S", [database], carried)[0])[0]
+
+
+@pytest.mark.parametrize("text", ["SNA", "Signal_not_available", "Fehler", "Init", "invalid value"])
+def test_a_value_that_is_named_none_is_none(tmp_path, text):
+    named = f'VAL_ 16 S 700 "{text}" 0 "standing" 1 "no error" ;\n'
+    values = one(tmp_path, '(0.5,0) [0|0] "km/h"', [0, 1, 700, 3], named)
+    assert_array_equal(values, [0.0, 0.5, np.nan, 1.5])
+
+
+def test_a_value_beyond_the_declared_range_is_none(tmp_path):
+    raw = [0, 200, 400, 401, 402, 65534, 65535]
+    values = one(tmp_path, '(0.5,-10) [-10|190] "rpm"', raw)
+    assert_array_equal(values, [-10.0, 90.0, 190.0, *[np.nan] * 4])
+
+
+def test_a_range_that_most_values_leave_is_not_believed(tmp_path):
+    raw = [*range(100, 200), 65535]
+    values = one(tmp_path, '(0.5,0) [0|20] "km/h"', raw)
+    assert_array_equal(values, [*(0.5 * np.arange(100, 200)), np.nan])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        'VAL_ 17 Other 1 "Open" 0 "Closed" ;\n',
+        'VAL_ 16 T 1 "a; b" ;\n',
+        "SIG_VALTYPE_ 99 Foo : 1;\n",
+        'BA_ "Unknown" 5;\n',
+    ],
+)
+def test_a_statement_about_nothing_is_left_out_and_told(tmp_path, wrong):
+    path = write(tmp_path, f'BO_ 16 M: 8 X\n SG_ S : 0|16@1+ (1,0) [0|9] "" X\n\n{wrong}')
+    (database,) = load_dbcs([path])
+    assert [m.name for m in database.messages] == ["M"]
+    (note,) = database.notes
+    assert note.id == "bus.dbc_part"
+    assert "line 7" in note.text

@@ -498,3 +498,77 @@ def test_a_gap_does_not_lower_the_rate(tmp_path):
     rows = [f"{k / 10 + 3600 * (k >= 600)},{50 + k % 9}" for k in range(1200)]
     found = draft(written(tmp_path / "log.csv", ["Time [s],Speed [km/h]", *rows]))
     assert found.known[0].rate == pytest.approx(10.0)
+
+
+MINUTES = np.arange(4 * 900) / 4.0
+
+
+def driven(folder, clocks, rows=MINUTES):
+    """Write 15 minutes of a drive in a town, four rows a second, with these clocks."""
+    speed = np.abs(50.0 * np.sin(0.05 * rows))
+    names = ",".join(["Speed (km/h)", "RPM", "Load (%)", *clocks])
+    told = zip(speed, zip(*clocks.values(), strict=True), strict=True)
+    lines = [
+        ",".join(map(str, [round(v), round(1500 + 10 * v), round(20 + v / 5, 1), *stamps]))
+        for v, stamps in told
+    ]
+    return written(folder / "town.csv", [names, *lines])
+
+
+def test_a_counter_of_minutes_is_no_clock_beside_one(tmp_path):
+    clocks = {
+        "4E-TimeSinceCodesCleared": (MINUTES // 60 + 310).astype(int),
+        "Runtime ECU": np.floor(MINUTES).astype(int) + 7,
+        "Distance": np.floor(10 * MINUTES).astype(int),
+    }
+    found = draft(driven(tmp_path, clocks))
+    assert (found.time, found.time_unit) == ("Runtime ECU", "s")
+    assert found.duration == pytest.approx(899.0)
+
+
+@pytest.mark.parametrize(
+    "name", ["Time run with MIL on", "TIME_SINCE_DTC_CLEARED", "Time since reset"]
+)
+def test_a_counter_of_minutes_alone_is_told(tmp_path, name):
+    """By its name, or by the speed that no vehicle changes so fast."""
+    found = draft(driven(tmp_path, {name: (MINUTES // 60 + 7).astype(int)}))
+    assert (found.time, found.time_unit) == (name, "min")
+    assert any("minutes" in doubt for doubt in found.doubts)
+
+
+def test_of_two_clocks_the_one_in_which_a_vehicle_moves_is_taken(tmp_path):
+    clocks = {"Time (s)": np.round(MINUTES / 100.0, 4), "Timestamp (s)": np.round(MINUTES, 2)}
+    found = draft(driven(tmp_path, clocks))
+    assert found.time == "Timestamp (s)"
+
+
+NAMES = "Time (s),Speed (km/h),RPM,Load (%),"
+BODY = [f"{t:.2f},{v:.0f},{n:.0f},{x}," for t, v, n, x in zip(T, SPEED, RPM, LOAD, strict=True)]
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        # A preamble of settings, some of them rows of numbers.
+        ["Tool,Map,Fuel,Boost,", "3/1//2,Sport,E10,1.2,", "1,2,3,4,", NAMES],
+        # Of keys and values in quotes, parted from the names by blank lines.
+        ['"Format","Logger file",,,', '"Date","05/03/2026",,,"Workbook"', '"Rate","4.0","Hz",,',
+         "", "", '"Time","Speed","RPM","Load",', '"s","km/h","rpm","%",', "", ""],
+        # One line of the session, and units in brackets.
+        ["Session 12,,,,", "time,Speed,RPM,Load,", "(sec),(km/h),(1/min),(%),"],
+        # Groups above names above units.
+        ["Monday,02,March,2026,", "A12 345,ADV,4 cyl,,", ",G1,G2,G3,", "",
+         "Marker,Group 1,Group 2,Group 3,",
+         "STAMP,Vehicle speed,Engine Speed,Engine load,", "s, km/h, /min, %,"],
+        # Longer than what is looked at first.
+        [f"Setting {k},{k},on,," for k in range(90)] + [NAMES],
+    ],
+)  # fmt: skip
+def test_a_preamble_with_the_separator_of_the_table_hides_no_header(tmp_path, head):
+    path = written(tmp_path / "log.csv", [*head, *BODY])
+    found = draft(path)
+    known = {c.quantity: c.unit for c in found.known}
+    assert known == {"vehicle_speed": "kmh", "engine_speed": "rpm", "engine_load": "pct"}
+    drive = read_drive(path, tomllib.loads(mapping_text([found])))
+    assert len(drive.signals["vehicle_speed"]) == ROWS
+    assert not [p for p in drive.problems if p.id == "file.rows_strange"]

@@ -6,11 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from tests.noted import refused
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import read_drive, read_frame
 from weighbridge.io.draft import Draft
 from weighbridge.io.formats import format_of
+from weighbridge.io.long_csv import is_long
 from weighbridge.io.mapping_text import mapping_text
 from weighbridge.io.quiet import first_line
 
@@ -210,3 +212,40 @@ def test_a_rate_is_no_clock_of_a_long_table(tmp_path):
     }
     with pytest.raises(DriveError, match="has one row for each value, so that rate_hz"):
         read_drive(tmp_path / "trip.csv", mapping)
+
+
+def telematics(path, header, names=("Road speed", "Engine speed", "Engine load"), vehicles=("T1",)):
+    """Write a long table as telematics export it: the values of one name after the other."""
+    lines = [header]
+    for k in range(120):
+        stamp = f"2026-01-05T07:{k // 60:02d}:{k % 60:02d}.500Z"
+        for name, value, unit in zip(names, (50 + k % 9, 1500 + k, 20.5), UNITS, strict=True):
+            lines.append(f"{vehicles[k % len(vehicles)]},{stamp},{name},{value},{unit}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+UNITS = ("km/h", "rpm", "%")
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "DeviceName,DateTime,DiagnosticName,Data,UnitOfMeasure",
+        "vehicle_id,timestamp,measurement,double_value,unit",
+        "Asset,Time,What,Number,Units of measure",
+    ],
+)
+def test_a_long_table_is_known_by_what_stands_in_it(tmp_path, header):
+    path = telematics(tmp_path / "status.csv", header)
+    assert is_long(path.read_bytes()[:4096])
+    found = format_of(path).draft(path)
+    units = {c.quantity: c.unit for c in found.known}
+    assert units == {"vehicle_speed": "kmh", "engine_speed": "rpm", "engine_load": "pct"}
+    assert found.duration == pytest.approx(119.0)
+
+
+def test_a_long_table_of_several_vehicles_is_refused(tmp_path):
+    path = telematics(tmp_path / "s.csv", "Device,Time,Name,Value,Unit", vehicles=("T1", "T2"))
+    with refused("file.several_vehicles"):
+        format_of(path).draft(path)

@@ -121,7 +121,7 @@ def test_cut_row_and_text_cell(tmp_path):
     assert len(found.signals["altitude"]) == 1
     assert found.problems[0].id == "file.rows_cut"
     assert found.problems[0].values["count"] == 1
-    assert found.problems[0].values["rows"] == 3
+    assert found.problems[0].values["lines"] == "3 lines"
 
 
 def test_accelerations_of_the_speed_are_no_specific_force(tmp_path):
@@ -198,3 +198,44 @@ def test_a_mapped_column_that_is_not_there_is_told(tmp_path):
     assert [p.signal for p in found.problems if p.serious] == ["engine_speed"]
     with pytest.raises(ConfigError, match=r"no unit and column 'rpm' states none"):
         can_drive(tmp_path, {"engine_speed": {"column": "rpm"}})
+
+
+def track(*, unit=1.0, east=1.0, heading=60.0, speed=20.0, rows=60, place=(-34.9, 138.6)):
+    """Rows of a drive at a constant course, one a second, its position in minutes over ``unit``."""
+    course = np.radians(heading)
+    way = speed * np.arange(rows) / 6.371e6
+    north = np.degrees(np.radians(place[0]) + way * np.cos(course))
+    lon = np.degrees(np.radians(place[1]) + way * np.sin(course) / np.cos(np.radians(place[0])))
+    return [
+        row(
+            f"12{k // 60:02d}{k % 60:02d}.00",
+            lat=f"{60.0 * a / unit:+.7f}",
+            long=f"{60.0 * east * b / unit:+.7f}",
+            velocity=f"{3.6 * speed:.3f}",
+            heading=f"{heading:.2f}",
+        )
+        for k, (a, b) in enumerate(zip(north, lon, strict=True))
+    ]
+
+
+@pytest.mark.parametrize("place", [(-34.9, 138.6), (1.3, 103.8), (0.02, 32.5), (51.5, 0.01)])
+@pytest.mark.parametrize(
+    ("unit", "east", "ids"),
+    [
+        (1.0, -1.0, []),
+        (60.0, 1.0, ["position.degrees"]),
+        (60.0, -1.0, ["position.degrees", "position.mirrored"]),
+        (1.0, 1.0, ["position.mirrored"]),
+    ],
+)
+def test_degrees_and_east_are_known_by_way_and_course(tmp_path, place, unit, east, ids):
+    found = drive(tmp_path, vbo(*track(unit=unit, east=east, place=place)))
+    assert [p.id for p in found.problems] == ids
+    assert_allclose(np.degrees(found.signals["latitude"].values[0]), place[0], atol=1e-6)
+    assert_allclose(np.degrees(found.signals["longitude"].values[0]), place[1], atol=1e-6)
+
+
+def test_degrees_are_known_by_their_size_where_the_vehicle_stands(tmp_path):
+    found = drive(tmp_path, vbo(*track(unit=60.0, speed=0.0, place=(48.1, 11.6))))
+    assert [p.id for p in found.problems] == ["position.degrees"]
+    assert_allclose(np.degrees(found.signals["latitude"].values[0]), 48.1, atol=1e-6)

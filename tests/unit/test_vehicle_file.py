@@ -373,7 +373,7 @@ def test_all_mistakes_are_told_at_once(tmp_path):
         ("[driveline]\ngear_ratios = [1, 2]\nwheel_radius_m = 0.3", 2, "must fall"),
         ("[driveline]\nspeed_scale = 2", 2, "must be in [0.8, 1.2]"),
         ("[torque]\nsource = 'magic'", 2, "load, air_flow or battery"),
-        ("[torque]\nsource = 'load'", 2, "at least two coefficients"),
+        ("[torque]\nsource = 'load'\ncoefficients = [1.0]", 3, "at least two coefficients"),
         ("[torque]\nload_range_pct = [50, 10]", 2, "the lower first"),
         ("[road_load]\ndrag_coefficient = 0.3", 2, "needs frontal_area_m2"),
         ("[road_load]\nrolling_coefficient = 0.9", 2, "must be in [0, 0.1)"),
@@ -420,3 +420,10 @@ def test_missing_file_is_told(tmp_path):
 def test_unwritable_place_is_told(tmp_path):
     with pytest.raises(ConfigError, match="cannot be written"):
         save_vehicle(Vehicle(), tmp_path / "no" / "such" / "folder.toml")
+
+
+def test_numbers_of_a_list_are_shown_as_they_were_written(tmp_path):
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path, "[torque]\nsource = 'load'\ncoefficients = [303.181]")
+    assert "Decimal" not in str(caught.value)
+    assert "[303.181]" in str(caught.value)

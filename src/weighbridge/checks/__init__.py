@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Final
 
 from weighbridge.checks.clocks import check_overlap, check_pauses, check_rates, check_splices
+from weighbridge.checks.derived import without_derived
 from weighbridge.checks.digits import with_half_digits
 from weighbridge.checks.engine import (
     check_engine_speed,
@@ -92,6 +93,7 @@ def mend_drive(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
     if any(p.serious for p in found):
         return drive.with_problems(*found)
     drive = without_repeats(drive)
+    drive = without_derived(drive)
     drive = with_half_digits(without_spikes(without_strays(drive, vehicle)))
     # Before rows are left out: a pause is one of the recording.
     found = (*found, *check_pauses(drive, vehicle))

@@ -23,6 +23,7 @@ from weighbridge.vehicle.classes import FASTEST, STRONGEST
 from weighbridge.vehicle.model import Vehicle
 
 # Unit the name says, unit the numbers are in, as they occur in practice.
+_SPEEDS: Final = ("kmh", "mph", "kn", "mps")
 _CONFUSIONS: Final = tuple(
     (said, meant, UNITS[said].factor / UNITS[meant].factor)
     for said, meant in (
@@ -60,7 +61,9 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     gnss = drive.get("gnss_speed")
     if gnss is not None and trusted is not None:
         ratio = _ratio(gnss, trusted)
-        if ratio is not None and (problem := _scale_problem("gnss_speed", ratio, "the positions")):
+        if ratio is not None and (
+            problem := _scale_problem(drive, "gnss_speed", ratio, "the positions")
+        ):
             yield problem
             gnss = None
     yield from _check_altitude(drive)
@@ -72,17 +75,17 @@ def check_scales(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     for reference, source in ((gnss, "gnss_speed"), (trusted, "the positions")):
         ratio = _ratio(speed, reference) if reference is not None else None
         if ratio is not None:
-            if problem := _scale_problem("vehicle_speed", ratio, source):
+            if problem := _scale_problem(drive, "vehicle_speed", ratio, source):
                 yield problem
             return
     found = _gear_ratio(drive, speed, vehicle)
     if found is not None:
-        if problem := _scale_problem("vehicle_speed", found, phrase("by_gears"), 0.06):
+        if problem := _scale_problem(drive, "vehicle_speed", found, phrase("by_gears"), 0.06):
             yield replace(problem, text=phrase("or_another_car", text=problem.text))
         return
     ratio = _accel_ratio(drive, speed)
     if ratio is not None:
-        problem = _scale_problem("vehicle_speed", ratio, "the acceleration", only_units=True)
+        problem = _scale_problem(drive, "vehicle_speed", ratio, "the acceleration", only_units=True)
         if problem:
             yield problem
         if problem or abs(ratio - 1.0) < 2.0 * _TOLERANCE:
@@ -104,7 +107,17 @@ def _check_alone(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> Iterat
         )
     elif why:
         stem = "speed" if speed.name == "gnss_speed" else speed.name
-        yield Problem.of("speed.unit_doubtful", speed.name, serious=True, why=why, stem=stem)
+        said = drive.units.get(speed.name, "mps")
+        smaller = [u for u in _SPEEDS if UNITS[u].factor < 0.9 * UNITS[said].factor]
+        yield Problem.of(
+            "speed.unit_doubtful" if smaller else "speed.factor_doubtful",
+            speed.name,
+            serious=True,
+            why=why,
+            stem=stem,
+            said=said,
+            smaller=" or ".join(smaller),
+        )
 
 
 def _beyond_belief(drive: Drive, speed: Signal, vehicle: Vehicle | None) -> str:
@@ -153,18 +166,22 @@ def _usual_gearing(drive: Drive, speed: Signal) -> float | None:
 
 
 def _scale_problem(
-    name: str, ratio: float, source: str, near: float = 0.08, *, only_units: bool = False
-) -> Problem | None:
+    drive: Drive, name: str, ratio: float, source: str, near: float = 0.08, *,
+    only_units: bool = False,
+) -> Problem | None:  # fmt: skip
     """Judge a speed that reads ``ratio`` times another source of it."""
     if abs(ratio - 1.0) < _TOLERANCE:
         return None
     if not ratio > 0.0:
         return Problem.of("speed.against", name, serious=True, source=source)
-    expected = min((c[2] for c in _CONFUSIONS), key=lambda e: abs(np.log(ratio / e)))
+    pairs = list(_CONFUSIONS)
+    if (said := drive.units.get(name)) is not None:
+        pairs = [(said, m, UNITS[said].factor / UNITS[m].factor) for m in _SPEEDS if m != said]
+    expected = min((c[2] for c in pairs), key=lambda e: abs(np.log(ratio / e)))
     stem = "speed" if name == "gnss_speed" else name
     if abs(np.log(ratio / expected)) < near:
         # Several pairs of units have one ratio: the name says which one it is.
-        alike = [(s, m) for s, m, e in _CONFUSIONS if abs(np.log(e / expected)) < 0.02]
+        alike = [(s, m) for s, m, e in pairs if abs(np.log(e / expected)) < 0.02]
         texts = " or ".join(
             phrase("speed_unit_pair", unit=m, stem=stem, suffix=s) for s, m in alike
         )
@@ -177,6 +194,17 @@ def _scale_problem(
             texts=texts,
             stem=stem,
             alike=alike[0][1],
+        )
+    if said is not None and any(abs(np.log(ratio / c[2])) < near for c in _CONFUSIONS):
+        # The ratio is that of two units, and none of them is the one that is declared.
+        return Problem.of(
+            "speed.factor",
+            name,
+            serious=True,
+            ratio=ratio,
+            source=source,
+            said=said,
+            factor=1.0 / ratio,
         )
     if only_units or abs(ratio - 1.0) < 0.2:
         return None

@@ -144,9 +144,11 @@ def _next(found: Inspection, path: Path, parts: int, given: _Given) -> list[str]
 
 def _what_lacks(found: Inspection, path: Path, given: _Given) -> list[str]:
     """Say how to go on where no way to weigh is open: record more, or state what 100 % are."""
-    from weighbridge.pipeline.inspection import REFERENCE_NEEDED
+    from weighbridge.pipeline.inspection import DRIVEN_NEEDED, REFERENCE_NEEDED
 
-    if found.ways[0].needs != (REFERENCE_NEEDED,):
+    if found.ways[0].needs == (DRIVEN_NEEDED,) and given.vehicle is not None:
+        return [f"next: state driven under [driveline] of {given.vehicle}, then inspect again"]
+    if found.ways[0].needs not in ((REFERENCE_NEEDED,), (DRIVEN_NEEDED,)):
         return ["next: record what the nearest way lacks, or name its column in the mapping"]
     if given.vehicle is not None:
         return [
@@ -156,6 +158,12 @@ def _what_lacks(found: Inspection, path: Path, given: _Given) -> list[str]:
     base = Path("base.toml")
     # The new file names the mapping.
     options = " ".join(given._replace(mapping=None).options(base))
+    if found.ways[0].needs == (DRIVEN_NEEDED,):
+        return [
+            f"next: {_new_vehicle(found, given, base)}, with the driven axles as AXLES: front, "
+            "rear or all",
+            f"then: weighbridge inspect {path} {options}",
+        ]
     return [
         f"next: {_new_vehicle(found, given, base)}, with the torque that 100 % are as NM",
         f"then: weighbridge inspect {path} {options}",
@@ -170,8 +178,10 @@ def _new_vehicle(found: Inspection, given: _Given, base: Path) -> str:
     words = ["weighbridge vehicle new --class", "truck" if _heavy(found) else "car"]
     if source.signed and source.name != MEASURED:
         words.append(f"--torque {source.name}")
-    if found.ways[0].needs:
+    if "reference_torque" in "".join(found.ways[0].needs):
         words.append("--reference-torque NM")
+    elif found.ways[0].needs:
+        words.append("--driven AXLES")
     words += [*given._replace(vehicle=None, dbc=None, whole=False).options(), f"-o {base}"]
     others = "bus, van" if _heavy(found) else "van, bus, truck"
     return f"{' '.join(words)} (or {others})"

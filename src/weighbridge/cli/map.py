@@ -145,6 +145,9 @@ def _say_next(drafts: list[Draft], logs: list[Path], output: Path, again: list[s
         say(f"next: {shlex.join([*again, '--rate', 'HZ'])}")
         return
     drive = logs[0] if len(drafts) == 1 else _drive(logs)
+    if drive.is_dir() and drive not in drafts[0].path.parents[:1]:
+        # A folder of partitions is no drive itself.
+        drive = drafts[0].path.parent
     if _drives_beside_each_other(drafts):
         say(f"if {drive} holds several drives, put the files of each into a folder of its own")
     words = ["weighbridge", "inspect", drive, "--mapping", output]
@@ -210,6 +213,7 @@ def _files(
     from weighbridge.errors import DriveError
     from weighbridge.io.dbc import load_dbcs
     from weighbridge.io.formats import format_of, formats, is_log, unreadable
+    from weighbridge.io.paths import partitions
 
     databases = load_dbcs(list(dbc))
 
@@ -218,6 +222,9 @@ def _files(
     for path in logs:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.is_file() and is_log(p))
+            if not inside and partitions(p.name for p in path.iterdir() if p.is_dir()):
+                # The files of a table's partitions are alike.
+                inside = sorted(p for p in path.rglob("*") if p.is_file() and is_log(p))
             drafts = ((p, _draft(p, databases, names, beside=True)) for p in inside)
             there = [(p, draft) for p, draft in drafts if draft is not None]
             if not there:

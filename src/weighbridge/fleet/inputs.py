@@ -12,6 +12,7 @@ from weighbridge.errors import DriveError
 from weighbridge.fleet import remote, table
 from weighbridge.fleet.names import is_drive_name, is_table_name
 from weighbridge.fleet.store import is_results
+from weighbridge.io.paths import partitions
 from weighbridge.signals.catalogue import TABLES
 from weighbridge.whole import PART
 
@@ -144,6 +145,12 @@ def _of(path: Path, as_drive: bool = False) -> Iterator[Recording]:
     if any(is_table_name(e.name) for e in inside):
         yield Recording((str(path),))
         return
+    if partitions([path.name]):
+        # Files of one partition are parts of one table.
+        files = [e.path for e in inside if _is_drive_file(Path(e.path))]
+        if len(files) > 1:
+            yield Recording(tuple(files))
+            inside = [e for e in inside if e.is_dir()]
     for entry in inside:
         if entry.name.startswith(".") or entry.name.endswith(PART):
             continue

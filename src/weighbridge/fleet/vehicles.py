@@ -12,6 +12,8 @@ from weighbridge.errors import ConfigError
 from weighbridge.fleet.keys import file_digest, text_digest
 from weighbridge.io.dbc import dbc_path, with_path
 from weighbridge.io.mapping import load_mapping, named_dbcs
+from weighbridge.io.naming import words_of
+from weighbridge.io.paths import partitions
 from weighbridge.messages import Problem, phrase
 from weighbridge.pipeline.given import mapping_of
 from weighbridge.signals import Drive
@@ -19,6 +21,12 @@ from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+_VEHICLE_KEYS: Final = frozenset(
+    ("vehicle", "asset", "truck", "car", "bus", "van", "vin", "device", "unit", "registration",
+     "plate", "fahrzeug")
+)  # fmt: skip
+"""Words of a partition's key that make its value the id of a vehicle."""
 
 # After its id a file's name goes on with anything but a letter or a digit: truck17_2025-06-11.
 _BEHIND: Final = re.compile(r"[^A-Za-z0-9]")
@@ -126,7 +134,8 @@ class Vehicles:
         """Return the vehicle of a recording.
 
         The id is the one given, else the name of the nearest folder that a vehicle file is named
-        after, else what the file's name begins with.
+        after, or the value of a partition such as ``vehicle=17``, else what the file's name begins
+        with.
 
         Parameters
         ----------
@@ -143,14 +152,20 @@ class Vehicles:
             found = self._known.get(given)
             return found if found is not None else self._sheet(given, kind)
         path = PurePosixPath(paths[0].replace("\\", "/"))
-        for name in (path.name, path.stem, *(p.name for p in path.parents)):
+        folders = [p.name for p in path.parents]
+        parts = partitions(folders)
+        for name in (path.name, path.stem, *folders, *parts.values()):
             if name in self._known:
                 return self._known[name]
+        for key, value in parts.items():
+            if _VEHICLE_KEYS & set(words_of(key)):
+                return self._sheet(value, kind)
         for name in (path.name, path.parent.name):
             begun = [i for i in self._known if name.startswith(i) and _BEHIND.match(name, len(i))]
             if begun:
                 return self._known[max(begun, key=len)]
-        return self._sheet(path.parent.name or None, kind)
+        named = (name for name in folders if name and not partitions([name]))
+        return self._sheet(path.parent.name and next(named, None), kind)
 
     def _read(self, path: Path) -> Assigned:
         vehicle = Vehicle.load(path)

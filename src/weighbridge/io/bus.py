@@ -37,12 +37,14 @@ class Decoded:
     problems : what was left out
     lacking : what the mapping names, not as optional, and no frame carries
     contents : what was found, decoded and ignored, with counts, for people
+    units : suffixes of the units that the databases or the mapping declare, by signal
     """
 
     signals: dict[str, Signal] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     lacking: list[Problem] = field(default_factory=list)
     contents: list[str] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
 
 
 def decode(
@@ -179,6 +181,7 @@ def _databases(
     """Decode what the mapping names, or what has canonical names; mark the frames used."""
     used = np.zeros(len(frames), dtype=bool)
     carried = [message_frames(frames, d) for d in databases]
+    done.problems += [note for d in databases for note in d.notes]
     done.problems += [
         Problem.of("bus.absent", file=name, why=_absent(frames, d))
         for d, found in zip(databases, carried, strict=True)
@@ -194,6 +197,17 @@ def _databases(
     for quantity, (found_signal, suffix, mapped) in wanted.items():
         found_signal = _one_bus(frames, name, found_signal, done)
         values, at = physical(frames, found_signal)
+        if none := int(np.count_nonzero(np.isnan(values))):
+            done.problems.append(
+                Problem.of(
+                    "file.sentinels",
+                    quantity,
+                    file=name,
+                    count=none,
+                    values=values.size,
+                    name=f"{found_signal.message.name}.{found_signal.signal.name}",
+                )
+            )
         if found_signal.message.protocol == "j1939":
             values, at = _one_sender(frames, name, found_signal, values, at, done)
         elif (
@@ -220,11 +234,30 @@ def _databases(
             )
             continue
         values = to_si(values, suffix) if suffix else values
+        done.units[quantity] = suffix
         columns.setdefault(at.tobytes(), (at, []))[1].append((quantity, values))
     for at, group in columns.values():
         signals, problems = clean_columns(frames.time[at], group, name)
         done.problems += problems
         done.signals.update({s.name: s for s in signals})
+    _tell_contents(databases, carried, taken, used, done)
+    if mapping is None and any(carried) and not wanted:
+        done.problems.append(
+            Problem.of(
+                "bus.no_names", file=name, databases=" and ".join(d.path.name for d in databases)
+            )
+        )
+    return used
+
+
+def _tell_contents(
+    databases: Sequence[Database],
+    carried: Sequence[dict[str, NDArray[np.intp]]],
+    taken: dict[str, list[str]],
+    used: Bools,
+    done: Decoded,
+) -> None:
+    """Say which messages were read and which not; mark the frames of these used."""
     for d, found in zip(databases, carried, strict=True):
         read = [f"{m} ({at.size}): {', '.join(taken[m])}" for m, at in found.items() if m in taken]
         skipped = [m for m in found if m not in taken]
@@ -237,13 +270,6 @@ def _databases(
             done.contents.append(f"{d.path.name}, not used: {told}{more}")
             for m in skipped:
                 used[found[m]] = True
-    if mapping is None and any(carried) and not wanted:
-        done.problems.append(
-            Problem.of(
-                "bus.no_names", file=name, databases=" and ".join(d.path.name for d in databases)
-            )
-        )
-    return used
 
 
 def _absent(frames: Frames, database: Database) -> str:
@@ -394,7 +420,7 @@ def valid_values(
             f"such signal; it has {', '.join(s.name for s in found.message.signals)}"
         )
     raw, where = physical(frames, Found(found.message, flag, at))
-    good = np.isin(at, where[raw != 0.0])
+    good = np.isin(at, where[np.nan_to_num(raw) != 0.0])
     lost = int(at.size - np.count_nonzero(good))
     if lost:
         left_out = Problem.of(

@@ -58,6 +58,7 @@ def draft_bus(path: Path, databases: Sequence[Database]) -> Draft:
             "vehicle or bus"
         )
     found.channels += signals
+    found.notes += [note for d in databases for note in d.notes]
     drafted = draft_of(path, found)
     flags = _flags(databases)
     columns = (replace(c, valid=flags.get(c.name.partition(".")[0], "")) for c in drafted.columns)

@@ -20,15 +20,14 @@ from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
-from weighbridge.signals import Problem
-from weighbridge.signals.words import counted
+from weighbridge.io.understood import Lines
 
 _GVRET: Final = re.compile(rb"^(?:\xef\xbb\xbf)?time ?stamp,id,extended,(?:dir,)?bus,len,d1,", re.I)
 _CRTD: Final = re.compile(rb"^\d+(?:\.\d+)? \d?(?:C[A-Z]{2}|[RT](?:11|29))\b")
 _RECORD: Final = (
     r"^(\d+(?:\.\d+)?) (\d)?[RT](11|29) ([0-9A-Fa-f]{1,8})((?: [0-9A-Fa-f]{2}){0,64})\s*$"
 )
-_FRAME: Final = r"^\S+ \d?[RT](?:11|29)\b"
+_OTHER: Final = r"^\S+ \d?C[A-Z]{2}\b"
 
 _SHORTEST: Final = 8
 _LONGEST: Final = 64
@@ -55,9 +54,10 @@ def read_gvret(path: Path, table: str | None, mapping: TableMapping | None) -> L
     """
     parts: list[Frames] = []
     names: list[str] = []
-    lines = 0
+    lines = Lines()
     factor = 1e-6
     for block in whole_lines(path):
+        head = b""
         if not names:
             head, _, block = block.partition(b"\n")
             cells = head.decode("utf-8-sig", "replace").strip().lower().split(",")
@@ -69,11 +69,15 @@ def read_gvret(path: Path, table: str | None, mapping: TableMapping | None) -> L
         rows = _gvret_rows(path, block, names, _SHORTEST)
         if (rows["length"] > _SHORTEST).any():
             rows = _gvret_rows(path, block, names, _LONGEST)
-        lines += rows.height
-        whole = rows.filter(pl.col("data").bin.size() == pl.col("length"))
-        parts.append(frames_of_table(whole.with_columns(time=pl.col("time") * factor)))
-    frames = in_order(parts)
-    return _log(path, frames, lines - len(frames), lines)
+        fits = (pl.col("data").bin.size() == pl.col("length")).fill_null(False)
+        frames = frames_of_table(rows.filter(fits).with_columns(time=pl.col("time") * factor))
+        bad = rows.height - len(frames)
+        strange = np.flatnonzero(~rows.select(_whole() & fits).to_series())
+        top = 1 if head else 0
+        first = int(strange[0]) + 1 + top if strange.size else 0
+        lines.add(b"\n" * top + block, rows.height, bad, first)
+        parts.append(frames)
+    return _log(path, in_order(parts), lines)
 
 
 def _gvret_rows(path: Path, block: bytes, names: list[str], width: int) -> pl.DataFrame:
@@ -113,26 +117,32 @@ def read_crtd(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
         No frame in it.
     """
     parts: list[Frames] = []
-    lines = 0
+    lines = Lines()
     for block in whole_lines(path):
         text = pl.Series(block.decode("utf-8", "replace").split("\n"), dtype=pl.String)
-        text = text.filter(text.str.contains(_FRAME))
-        lines += text.len()
+        # Blank lines and records of other kinds, such as remarks and events, hold no frame.
+        other = text.str.contains(_OTHER) | (text.str.strip_chars() == "")
         groups = text.str.extract_groups(_RECORD).struct.unnest()
-        parts.append(
-            frames_of_table(
-                groups.select(
-                    time=pl.col("1").cast(pl.Float64, strict=False),
-                    # The bus of version 1 of the format, which had one.
-                    channel=pl.col("2").fill_null("1").cast(pl.Int16),
-                    id=pl.col("4").str.to_integer(base=16, strict=False),
-                    extended=pl.col("3") == "29",
-                    data=pl.col("5").str.replace_all(" ", "").str.decode("hex", strict=False),
-                )
-            )
+        rows = groups.select(
+            time=pl.col("1").cast(pl.Float64, strict=False),
+            # The bus of version 1 of the format, which had one.
+            channel=pl.col("2").fill_null("1").cast(pl.Int16),
+            id=pl.col("4").str.to_integer(base=16, strict=False),
+            extended=pl.col("3") == "29",
+            data=pl.col("5").str.replace_all(" ", "").str.decode("hex", strict=False),
         )
-    frames = in_order(parts)
-    return _log(path, frames, lines - len(frames), lines)
+        frames = frames_of_table(rows)
+        total = int((~other).sum())
+        strange = np.flatnonzero(~(rows.select(_whole()).to_series() | other))
+        first = int(strange[0]) + 1 if strange.size else 0
+        lines.add(block, total, total - len(frames), first)
+        parts.append(frames)
+    return _log(path, in_order(parts), lines)
+
+
+def _whole() -> pl.Expr:
+    """Whether a row has all its cells."""
+    return pl.all_horizontal(pl.all().is_not_null())
 
 
 def frames_of_table(table: pl.DataFrame) -> Frames:
@@ -164,14 +174,10 @@ def frames_of_table(table: pl.DataFrame) -> Frames:
     )
 
 
-def _log(path: Path, frames: Frames, strange: int, lines: int) -> Log:
+def _log(path: Path, frames: Frames, lines: Lines) -> Log:
+    problems = lines.problems("file.lines_left_out", path)
     if not len(frames):
         raise DriveError(f"{path} holds no CAN frame that can be read; record it again")
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH), frames=frames)
-    if strange:
-        log.problems.append(
-            Problem.of(
-                "file.lines_left_out", file=path.name, count=strange, lines=counted(lines, "line")
-            )
-        )
+    log.problems += problems
     return log

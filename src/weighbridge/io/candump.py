@@ -14,14 +14,24 @@ from weighbridge.errors import DriveError
 from weighbridge.io.frames import Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
+from weighbridge.io.understood import Lines
 from weighbridge.kernels.frame_text import FrameRows, parse_candump
-from weighbridge.signals import Problem
-from weighbridge.signals.words import counted
 
 _BLOCK: Final = 1 << 25
 _INTERFACES: Final = 256
 _EPOCH_LIKE: Final = 1e8
 """Stamps above count from 1970, not from the start of the log [s]."""
+
+
+_LINE: Final = re.compile(
+    rb"(?:\xef\xbb\xbf)?\s*(?:\(\d+(?:\.\d+)?\)\s+)?\w+\s+(?:[RT]X\s+\S+\s+\S+\s+)?"
+    rb"[0-9A-Fa-f]{3,8}(?:#|\s+\[\d{1,2}\](?:\s|$))"
+)
+
+
+def is_candump(head: bytes) -> bool:
+    """Tell whether a text begins with a line of candump."""
+    return _LINE.match(head) is not None
 
 
 def read_candump(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -34,10 +44,10 @@ def read_candump(path: Path, table: str | None, mapping: TableMapping | None) ->
     """
     parts: list[Frames] = []
     channels: dict[str, int] = {}
-    lines = strange = 0
+    lines = Lines()
     for block in whole_lines(path):
-        frames, total, bad = _parse(block, channels)
-        lines, strange = lines + total, strange + bad
+        frames, total, bad, first = _parse(block, channels)
+        lines.add(block, total, bad, first)
         parts.append(frames)
     frames = in_order(parts)
     if not len(frames):
@@ -46,12 +56,7 @@ def read_candump(path: Path, table: str | None, mapping: TableMapping | None) ->
             "record it with candump -l, or convert it"
         )
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
-    if strange:
-        log.problems.append(
-            Problem.of(
-                "file.lines_left_out", file=path.name, count=strange, lines=counted(lines, "line")
-            )
-        )
+    log.problems += lines.problems("file.lines_left_out", path)
     return log
 
 
@@ -85,13 +90,13 @@ def filled(rows: FrameRows, count: int, start: float = 0.0) -> Frames:
     return Frames(rows[0][:count] + start, *(r[:count].copy() for r in rows[1:]))
 
 
-def _parse(block: bytes, channels: dict[str, int]) -> tuple[Frames, int, int]:
-    """Frames of a block of lines, how many lines there are, how many are no frames."""
+def _parse(block: bytes, channels: dict[str, int]) -> tuple[Frames, int, int, int]:
+    """Frames of a block of lines, how many lines there are, how many are no frames, the first."""
     text = np.frombuffer(block, np.uint8)
     buses = np.zeros((_INTERFACES, 2), np.int64)
     for width in (8, 64):
         rows = room(block, width)
-        count, lines, strange, seen, longest = parse_candump(text, rows, buses)
+        count, lines, strange, first, seen, longest = parse_candump(text, rows, buses)
         if longest <= width:
             break
     numbers = np.zeros(max(seen, 1), np.int16)
@@ -99,7 +104,7 @@ def _parse(block: bytes, channels: dict[str, int]) -> tuple[Frames, int, int]:
         name = block[start:end].decode("ascii", "replace")
         numbers[k] = channels.setdefault(name, _number(name, channels))
     frames = filled(rows, count)
-    return replace(frames, channel=numbers[frames.channel]), lines, strange
+    return replace(frames, channel=numbers[frames.channel]), lines, strange, first
 
 
 def _number(bus: str, taken: dict[str, int]) -> int:

@@ -23,9 +23,8 @@ from weighbridge.io.frames import Frames, in_order
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
+from weighbridge.io.understood import Lines
 from weighbridge.kernels.frame_text import TraceColumns, parse_asc, parse_trace
-from weighbridge.signals import Problem
-from weighbridge.signals.words import counted
 
 CSV_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 """First line of a CSV written by python-can."""
@@ -63,13 +62,21 @@ def _kinds(*words: str) -> NDArray[np.int64]:
 _RECEIVED: Final = _kinds("Rx", "Tx")
 _TYPES: Final = _kinds("DT", "FD", "FB", "FE", "BI")
 _TRACE_VERSIONS: Final[dict[str, TraceColumns]] = {
-    "1.0": TraceColumns(1, -1, -1, 2, 3, 4, False, _kinds()),
-    "1.1": TraceColumns(1, -1, 2, 3, 4, 5, False, _RECEIVED),
-    "1.3": TraceColumns(1, 2, 3, 4, 6, 7, False, _RECEIVED),
-    "2.0": TraceColumns(1, -1, 2, 3, 5, 6, True, _TYPES),
-    "2.1": TraceColumns(1, 3, 2, 4, 7, 8, True, _TYPES),
+    "1.0": TraceColumns(1, -1, -1, 2, 3, 4, False, True, 1e-3, _kinds()),
+    "1.1": TraceColumns(1, -1, 2, 3, 4, 5, False, True, 1e-3, _RECEIVED),
+    "1.3": TraceColumns(1, 2, 3, 4, 6, 7, False, True, 1e-3, _RECEIVED),
+    "2.0": TraceColumns(1, -1, 2, 3, 5, 6, True, False, 1e-3, _TYPES),
+    "2.1": TraceColumns(1, 3, 2, 4, 7, 8, True, False, 1e-3, _TYPES),
 }
 """Where the words of a line stand, by version of the file."""
+
+_TRACE_NAMES: Final = {
+    "time": ("time", "timestamp"),
+    "id": ("id", "identifier", "canid", "can-id"),
+    "length": ("dlc", "len", "length", "size"),
+    "data": ("data",),
+}
+"""Names of columns in the first line of a log that has no remarks, as CANHacker writes it."""
 
 
 def read_asc(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -83,7 +90,7 @@ def read_asc(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         No frame in it.
     """
     parts: list[Frames] = []
-    strange, start, clock = 0, 0.0, 0.0
+    lines, start, clock = Lines(), 0.0, 0.0
     decimal = relative = False
     for k, block in enumerate(whole_lines(path)):
         marks = [*_ASC_MARK.finditer(block)] if k == 0 or b"riggerblock" in block else []
@@ -97,16 +104,16 @@ def read_asc(path: Path, table: str | None, mapping: TableMapping | None) -> Log
                 relative = (mark["stamps"] or b"").lower() == b"relative"
             text = block[begin:end]
             rows = room(text, _LONGEST if b"CANFD" in text else 8)
-            count, bad, clock = parse_asc(
+            count, bad, first, clock = parse_asc(
                 np.frombuffer(text, np.uint8), rows, decimal, relative, clock
             )
-            strange += bad
+            lines.add(text, count + bad, bad, first)
             parts.append(filled(rows, count, start))
-    return _log(path, parts, strange)
+    return _log(path, parts, lines)
 
 
 def read_trc(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    """Read the frames of a PEAK TRC log; see `weighbridge.io.log.Reader`.
+    """Read the frames of a TRC log, of PEAK or of CANHacker; see `weighbridge.io.log.Reader`.
 
     Raises
     ------
@@ -114,37 +121,32 @@ def read_trc(path: Path, table: str | None, mapping: TableMapping | None) -> Log
         No frame in it, or its version is not known.
     """
     parts: list[Frames] = []
-    strange = 0
+    lines = Lines()
     columns, start = _TRACE_VERSIONS["1.0"], 0.0
     for k, block in enumerate(whole_lines(path)):
         if k == 0:
-            columns, start = _trace_head(path, block)
+            columns, start, named = _trace_head(path, block)
+            # Names of columns are no frame.
+            block = b";" + block[:named] + block[named:] if named else block
         for width in (8, _LONGEST):
             rows = room(block, width)
-            count, bad = parse_trace(np.frombuffer(block, np.uint8), rows, columns)
+            count, bad, first = parse_trace(np.frombuffer(block, np.uint8), rows, columns)
             if not bad:
                 break
-        strange += bad
+        lines.add(block, count + bad, bad, first)
         parts.append(filled(rows, count, start))
-    return _log(path, parts, strange)
+    return _log(path, parts, lines)
 
 
-def _log(path: Path, parts: list[Frames], strange: int) -> Log:
+def _log(path: Path, parts: list[Frames], lines: Lines) -> Log:
+    problems = lines.problems("file.frames_damaged", path)
     frames = in_order(parts)
     if not len(frames):
         raise DriveError(
             f"{path} holds no CAN frame that can be read; record it again, or copy it again"
         )
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
-    if strange:
-        log.problems.append(
-            Problem.of(
-                "file.frames_damaged",
-                file=path.name,
-                count=strange,
-                lines=counted(strange + len(frames), "line"),
-            )
-        )
+    log.problems += problems
     return log
 
 
@@ -167,8 +169,13 @@ def _asc_date(text: str) -> float | None:
         return None
 
 
-def _trace_head(path: Path, block: bytes) -> tuple[TraceColumns, float]:
-    """Columns and start [s since 1970] that the head of a TRC log tells."""
+def _trace_head(path: Path, block: bytes) -> tuple[TraceColumns, float, int]:
+    """Columns and start [s since 1970] that the head of a TRC log tells, and where a line of
+    names ends that is no remark.
+    """
+    first, _, below = block.lstrip().partition(b"\n")
+    if first[:1] != b";" and (named := _named_columns(first, below)) is not None:
+        return named, 0.0, block.find(b"\n") + 1
     told = {m["key"].upper(): m["value"].strip() for m in _TRACE_KEY.finditer(block)}
     version = told.get(b"FILEVERSION", b"1.0").decode("latin-1")
     if version not in _TRACE_VERSIONS:
@@ -194,7 +201,25 @@ def _trace_head(path: Path, block: bytes) -> tuple[TraceColumns, float]:
         days = math.nan
     # Days since the end of 1899.
     start = (days - 25569.0) * 86400.0
-    return columns, start if math.isfinite(start) else 0.0
+    return columns, start if math.isfinite(start) else 0.0, 0
+
+
+def _named_columns(first: bytes, below: bytes) -> TraceColumns | None:
+    """Columns of a log whose first line names them, as CANHacker's does; None where none does."""
+    names = first.decode("latin-1").lower().split()
+    places = {
+        what: next((k for k, name in enumerate(names) if name in said), -1)
+        for what, said in _TRACE_NAMES.items()
+    }
+    if min(places.values()) < 0:
+        return None
+    stamp = below.split()[places["time"]] if len(below.split()) > places["time"] else b""
+    # Milliseconds are whole; seconds have decimals.
+    unit = 1.0 if b"," in stamp or b"." in stamp else 1e-3
+    return TraceColumns(
+        places["time"], -1, -1, places["id"], places["length"], places["data"], False, False, unit,
+        _kinds(),
+    )  # fmt: skip
 
 
 def is_can_csv(head: bytes) -> bool:
@@ -233,17 +258,12 @@ def read_can_csv(path: Path, table: str | None, mapping: TableMapping | None) ->
         raise DriveError(f"{path} cannot be read ({first_line(error)}); copy it again") from None
     sent = rows.filter(~pl.col("remote")).drop("remote")
     frames = frames_of_table(sent)
-    strange = len(sent) - len(frames) + int(rows["remote"].null_count())
     if not len(frames):
         raise DriveError(f"{path} holds no CAN frame that can be read; record it again")
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
-    if strange:
-        log.problems.append(
-            Problem.of(
-                "file.lines_left_out",
-                file=path.name,
-                count=strange,
-                lines=counted(len(rows), "line"),
-            )
-        )
+    strange = len(sent) - len(frames) + int(rows["remote"].null_count())
+    lines = Lines()
+    empty = np.flatnonzero(rows.select(pl.any_horizontal(pl.all().is_null())).to_series())
+    lines.add(b"", len(rows), strange, int(empty[0]) + 2 if empty.size else 0)
+    log.problems += lines.problems("file.lines_left_out", path)
     return log

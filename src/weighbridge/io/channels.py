@@ -23,7 +23,8 @@ from weighbridge.io.columns import (
     unit_suffix,
 )
 from weighbridge.io.draft import Draft, draft_column
-from weighbridge.io.draft_column import checked, usual_rate
+from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
+from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
 from weighbridge.io.frames import Frames
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import (
@@ -194,6 +195,7 @@ def log_of(path: Path, found: Recording, table: str | None, mapping: TableMappin
             values = values * signal.factor + signal.offset
         time, columns = clocks.setdefault(id(channel.time), (channel.time, []))
         columns.append((name, to_si(values, suffix) if suffix else values))
+        log.units[name] = suffix
     for time, columns in clocks.values():
         if time.size == 0:
             names = ", ".join(n for n, _ in columns)
@@ -271,6 +273,19 @@ def _told(name: str) -> str:
     return parts[-1]
 
 
+def _judged(channels: list[Channel], columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Give speeds without a stated unit the one that the log's positions and speeds show."""
+    told = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
+    # What the format itself knows is compared too.
+    nan = float("nan")
+    known = tuple(
+        DraftColumn(c.name, c.quantity, c.unit, True, nan, nan, nan, c.values.size)
+        for c in channels
+        if c.quantity
+    )
+    return with_judged_units((*columns, *known), told)[: len(columns)]
+
+
 def draft_of(path: Path, found: Recording) -> Draft:
     """Draft the mapping of a log of channels.
 
@@ -295,6 +310,7 @@ def draft_of(path: Path, found: Recording) -> Draft:
             if n.quantity not in known
         )
     )
+    columns = _judged(channels, columns)
     if known and not any(c.quantity for c in columns):
         raise DriveError(f"{path}: what is known of it is read as it is; it needs no mapping")
     if not any(c.quantity for c in columns):

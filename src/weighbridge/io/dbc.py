@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from weighbridge.errors import ConfigError, MissingExtraError
 from weighbridge.io.frames import Frames
-from weighbridge.signals import Bools, Floats
+from weighbridge.io.labels import is_no_value
+from weighbridge.signals import Bools, Floats, Problem
 
 DbcSource = str | Path
 """A DBC file, for one bus alone where it is written ``1:file.dbc``."""
@@ -33,6 +34,27 @@ MOST_BITS: Final = 65_536
 # Characters of a library's message that help.
 _LONGEST_REASON: Final = 200
 
+# Messages and their signals; a statement about a signal of a message, up to its semicolon; and
+# statements that decoding does without, the least needed first.
+_DEFINED: Final = re.compile(
+    r"^\s*(?:BO_\s+(?P<message>\d+)\s|SG_\s+(?P<signal>\w+)\s)", re.MULTILINE
+)
+_UP_TO_END: Final = r'(?:[^";]|"[^"]*")*;'
+_ABOUT_SIGNAL: Final = re.compile(
+    r"^[ \t]*(?:VAL_|SIG_VALTYPE_)\s+(?P<message>\d+)\s+(?P<signal>\w+)\b" + _UP_TO_END,
+    re.MULTILINE,
+)
+_BESIDE: Final = tuple(
+    re.compile(rf"^[ \t]*(?:{kind})\s(?!\s*:){_UP_TO_END}", re.MULTILINE)
+    for kind in ("CM_", "SIG_GROUP_|BO_TX_BU_", "VAL_|VAL_TABLE_", r"BA_\w*")
+)
+
+# Above this part of values outside its range, a range of a database is not believed.
+_BELIEVED: Final = 0.5
+
+# Values by which a range is judged, at least.
+_FEWEST: Final = 20
+
 _CHANNEL: Final = re.compile(r"^(\d{1,3}):(.+)$")
 
 
@@ -45,11 +67,13 @@ class Database:
     path : the file
     channel : the bus it is for; None for every bus
     messages : as cantools gives them
+    notes : what of the file was left out
     """
 
     path: Path
     channel: int | None
     messages: tuple[Any, ...]
+    notes: tuple[Problem, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,17 +150,60 @@ def load_dbcs(sources: Sequence[DbcSource]) -> tuple[Database, ...]:
         except OSError as error:
             raise ConfigError(f"--dbc {path} cannot be read: {error.strerror or error}") from None
         _refuse_endless(path, text)
+        database, notes = _loaded(cantools, path, text)
+        messages = tuple(getattr(database, "messages", ()))
+        if not messages:
+            raise ConfigError(f"--dbc {path} defines no message; name another file")
+        databases.append(Database(path, channel, messages, notes))
+    return tuple(databases)
+
+
+def _loaded(cantools: Any, path: Path, text: str) -> tuple[Any, tuple[Problem, ...]]:
+    """Database of a text, and what was left out of it: statements beside messages and signals.
+
+    The library refuses a whole file for one text of a signal that is not there.
+    """
+    left_out: list[str] = []
+    reason = ""
+    for tried in (None, _of_nothing(text), *_BESIDE):
+        if tried is not None:
+            found = list(tried.finditer(text)) if isinstance(tried, re.Pattern) else tried
+            left_out += [_place_of(text, m.start(), m.group()) for m in found]
+            for m in reversed(found):
+                # Line ends stay, so that lines keep their numbers.
+                text = text[: m.start()] + "\n" * m.group().count("\n") + text[m.end() :]
+            if not found:
+                continue
         try:
             database = cantools.database.load_string(text, "dbc", strict=False)
         # The library's errors on text that is no DBC are of many kinds.
         except Exception as error:
-            reason = str(error).strip().split("\n", 1)[0][:_LONGEST_REASON]
-            raise ConfigError(f"--dbc {path} is no readable DBC ({reason})") from None
-        messages = tuple(getattr(database, "messages", ()))
-        if not messages:
-            raise ConfigError(f"--dbc {path} defines no message; name another file")
-        databases.append(Database(path, channel, messages))
-    return tuple(databases)
+            reason = reason or " ".join(str(error).split())[:_LONGEST_REASON]
+            continue
+        if not left_out:
+            return database, ()
+        note = Problem.of(
+            "bus.dbc_part", database=path.name, count=len(left_out), example=left_out[0]
+        )
+        return database, (note,)
+    raise ConfigError(f"--dbc {path} is no readable DBC ({reason})") from None
+
+
+def _of_nothing(text: str) -> list[re.Match[str]]:
+    """Statements about signals that no message of a database has."""
+    known = set()
+    message = ""
+    for found in _DEFINED.finditer(text):
+        message = found["message"] or message
+        if found["signal"]:
+            known.add((message, found["signal"]))
+    return [m for m in _ABOUT_SIGNAL.finditer(text) if (m["message"], m["signal"]) not in known]
+
+
+def _place_of(text: str, start: int, statement: str) -> str:
+    """Return a statement as a message shows it: its line and its beginning."""
+    line = text.count("\n", 0, start) + 1
+    return f"line {line}: {' '.join(statement.split()).rstrip(' ;')[:60]}"
 
 
 def _refuse_endless(path: Path, text: str) -> None:
@@ -219,7 +286,7 @@ def physical(frames: Frames, found: Found) -> tuple[Floats, NDArray[np.intp]]:
     Returns
     -------
     values : (m,) where the frame is long enough, the multiplexer selects it and,
-        in J1939, the sender has it
+        in J1939, the sender has it; NaN where the database says that it is no value
     indices : (m,) of those frames
     """
     signal, message, at = found.signal, found.message, found.frames
@@ -230,7 +297,37 @@ def physical(frames: Frames, found: Found) -> tuple[Floats, NDArray[np.intp]]:
         told = _available(raw, int(signal.length))
         raw, at = raw[told], at[told]
     scale, offset = float(signal.scale), float(signal.offset)
-    return np.asarray(raw * scale + offset, dtype=np.float64), at
+    values = np.asarray(raw * scale + offset, dtype=np.float64)
+    values[_named_no_value(raw, signal)] = np.nan
+    values[beyond(values, raw, signal)] = np.nan
+    return values, at
+
+
+def _named_no_value(raw: Floats | NDArray[np.int64], signal: Any) -> Bools:
+    """Which raw values the database names as none, such as "SNA"."""
+    named = {k: str(text) for k, text in (signal.choices or {}).items()}
+    return np.isin(raw, [k for k, text in named.items() if is_no_value(text)])
+
+
+def beyond(values: Floats, raw: Floats | NDArray[np.int64], signal: Any) -> Bools:
+    """Which values are outside the range that the database declares, where it declares one.
+
+    Where half of all are, the range is wrong, and only a raw value of ones alone is none.
+    """
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or not float(low) < float(high):
+        return np.zeros(values.size, dtype=bool)
+    slack = 0.5 * abs(float(signal.scale))
+    outside = np.asarray((values < float(low) - slack) | (values > float(high) + slack))
+    if signal.is_float:
+        full = np.zeros(values.size, dtype=bool)
+    else:
+        full = np.asarray(raw >= (1 << (int(signal.length) - bool(signal.is_signed))) - 2)
+    known = np.isfinite(values) & ~full
+    count = int(np.count_nonzero(known))
+    if count > _FEWEST and np.count_nonzero(outside & known) > _BELIEVED * count:
+        return outside & full
+    return outside
 
 
 def _available(raw: Floats | NDArray[np.int64], length: int) -> Bools:

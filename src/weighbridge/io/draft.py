@@ -6,7 +6,8 @@ Nothing is asked and nothing is guessed silently: what is doubtful is told with 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -15,9 +16,10 @@ import numpy as np
 
 from weighbridge.errors import DriveError
 from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
-from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
+from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
-from weighbridge.io.draft_time import DraftTime, find_times, is_number
+from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
+from weighbridge.io.draft_unit import SPEEDS, Values, unit_in_name, with_judged_units
 from weighbridge.io.naming import Named, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
@@ -157,6 +159,10 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
         for name, found in zip(others, named, strict=True)
     )
     columns = checked(columns)
+    times = by_motion(times, _swings(raw, columns))
+    time = times[0]
+    if time.row_rate is None:
+        columns = with_judged_units(columns, _told(raw, time, units, columns))
     found = Draft(
         path=path,
         text=text,
@@ -174,6 +180,30 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     if not found.known:
         raise UnknownColumnsError(_unknown(found, raw.names), timed(found, time))
     return timed(found, time)
+
+
+def _told(
+    raw: RawTable, time: DraftTime, units: Mapping[str, str], columns: Sequence[DraftColumn]
+) -> dict[str, Values]:
+    """Give the columns of a table that are numbers, with its clock."""
+    found = {}
+    wanted = {c.name for c in columns if c.quantity}
+    for index, name in enumerate(raw.names):
+        unit = unit_in_name(name, units.get(name))
+        if name in wanted or unit in SPEEDS:
+            with suppress(DriveError):
+                found[name] = Values(time.seconds, raw.numbers(index)[0], unit)
+    return found
+
+
+def _swings(raw: RawTable, columns: Sequence[DraftColumn]) -> float:
+    """Sum of the changes of a table's speed [m/s]; 0 where it has none."""
+    for quantity in ("vehicle_speed", "gnss_speed"):
+        for column in columns:
+            if column.quantity == quantity and column.unit:
+                values, _ = raw.numbers(raw.names.index(column.name))
+                return swings(to_si(values, column.unit))
+    return 0.0
 
 
 def tells_torque(*drafts: Draft) -> bool:
@@ -290,6 +320,10 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     """
     if not found.quantity:
         return _nothing(name, found.misfit)
+    if is_calculated(name, found.quantity):
+        return _nothing(
+            name, f"not taken for {found.quantity}: it was calculated, from a speed or a position"
+        )
     known = values[np.isfinite(values)]
     if known.size == 0:
         return _nothing(name, f"not taken for {found.quantity}: it has no values")

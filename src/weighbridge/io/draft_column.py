@@ -27,6 +27,19 @@ _TELLING: Final = frozenset(
 """Words by which a speed is known to be one of the two."""
 
 
+CALCULATED: Final = frozenset(
+    ("calc", "calculated", "derived", "computed", "derivative", "berechnet", "abgeleitet",
+     "calcule", "calculada", "calcolata")
+)  # fmt: skip
+"""Words of an acceleration that no accelerometer measured."""
+
+
+def is_calculated(name: str, quantity: str) -> bool:
+    """Whether a name says of an acceleration that it was calculated."""
+    accel = quantity == "longitudinal_accel" or quantity.startswith("accel_")
+    return accel and bool(CALCULATED & set(words_of(name)))
+
+
 @dataclass(frozen=True, slots=True)
 class DraftColumn:
     """One column of a log and what it is taken for.

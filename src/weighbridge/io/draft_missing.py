@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from weighbridge.io.draft import Draft
+from weighbridge.io.draft_column import CALCULATED
 from weighbridge.io.naming import words_of
 from weighbridge.io.table import column_list
 
@@ -38,7 +39,7 @@ _LOOKS: Final[tuple[tuple[str, tuple[str, ...], frozenset[str]], ...]] = (
 )  # fmt: skip
 """What a drive is weighed by, its quantities, and words that a column of it has in its name."""
 
-_WITHOUT_GRAVITY: Final = frozenset(("linear", "user", "free", "liniowe"))
+_WITHOUT_GRAVITY: Final = frozenset(("linear", "user", "free", "liniowe")) | CALCULATED
 """Words of an acceleration that has no gravity in it."""
 
 _SHOWN: Final = 4

@@ -4,21 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
 
 from weighbridge.io.draft import Draft
 from weighbridge.io.draft_column import DraftColumn
+from weighbridge.io.draft_unit import NEAR, SLOWEST, SPEEDS
 from weighbridge.signals.units import UNITS
-
-SPEEDS: Final = ("kmh", "mph", "mps", "kn")
-"""Units in which loggers write speeds."""
-
-NEAR: Final = 0.08
-"""A ratio of two speeds is that of two units within this part [-]: indicated speeds read up to a
-tenth too much, satellites miss the peaks."""
-
-SLOWEST: Final = 3.0
-"""Slower in the median, or in the highest, nothing is compared [m/s]."""
 
 
 def with_compared_speeds(drafts: Sequence[Draft]) -> list[Draft]:
@@ -35,15 +25,23 @@ def with_compared_speeds(drafts: Sequence[Draft]) -> list[Draft]:
     meant = _meant(speed, ground)
     if meant is None:
         return list(drafts)
+    if not speed.stated:
+        told = replace(
+            speed, unit=meant, doubt=f"states no unit; taken as {meant}, as {ground.name!r} shows"
+        )
+        return _with(drafts, speed, told)
     ratio = _si(speed.high, speed) / _si(ground.high, ground)
     doubt = (
         f"reads {ratio:.2f} times the speed of {ground.name!r}, as {meant} under {speed.unit} "
         f'would: write unit = "{meant}" for it, if {ground.name!r} is in {ground.unit}'
     )
     told = replace(speed, doubt=f"{speed.doubt}; {doubt}" if speed.doubt else doubt, unsure=True)
+    return _with(drafts, speed, told)
+
+
+def _with(drafts: Sequence[Draft], old: DraftColumn, new: DraftColumn) -> list[Draft]:
     return [
-        replace(one, columns=tuple(told if c is speed else c for c in one.columns))
-        for one in drafts
+        replace(one, columns=tuple(new if c is old else c for c in one.columns)) for one in drafts
     ]
 
 

@@ -10,12 +10,16 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import UNKNOWN_UNIT, stated_unit
+from weighbridge.io.columns import UNKNOWN_UNIT, stated_unit, unit_suffix
 from weighbridge.io.draft_time import is_clock, is_number
+from weighbridge.io.naming import is_time, recognise
 from weighbridge.io.table import SEPARATORS, TextFormat, cells, head
 
 HEAD_LINES: Final = 60
 """Lines at the beginning that tell how a text is written."""
+
+_LONG_HEAD: Final = 600
+"""Lines of a text whose first ones hold no values: a long preamble."""
 
 EVEN: Final = 0.7
 """Part of the lines that a separator cuts alike [-]."""
@@ -56,12 +60,26 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
         )
     separator = _separator(lines)
     rows = [cells(line, separator) for line in lines]
-    width = int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
+    width = _width(rows)
+    begin = _first_values(rows, width)
+    if begin == len(rows) and len(found) >= HEAD_LINES and not columns:
+        longer = head(path, _LONG_HEAD)
+        wide = [cells(line, _separator(longer[HEAD_LINES:])) for line in longer if line]
+        if len(longer) > HEAD_LINES and _first_values(wide, _width(wide)) < len(wide):
+            found, rows, width = longer, wide, _width(wide)
+            lines = [line for line in longer if line]
+            separator = _separator(longer[HEAD_LINES:])
+            begin = _first_values(rows, width)
     first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
     if first is None:
         raise DriveError(f"{path} is no table: its lines have no common separator")
     if columns:
         return _named_by_hand(path, columns, found, lines, rows, width, separator), {}
+    named = _names_above(rows, begin, width, found, lines)
+    if named:
+        best = max(named, key=lambda k: (_known_names(rows[k]), -k))
+        if first not in named or _known_names(rows[best]) > _known_names(rows[first]) + 1:
+            first = best
     # Numbers of the channels may stand above their names.
     if _of_numbers(rows[first]) and first + 1 < len(rows):
         below = rows[first + 1]
@@ -75,17 +93,67 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
     header, units = rows[first], {}
     if first + 1 < len(rows) and not any(map(is_number, rows[first + 1])):
         below = rows[first + 1]
-        stated = {n: stated_unit(c) for n, c in zip(header, below, strict=False)}
+        stated = {n: stated_unit(c) for n, c in zip(header, below, strict=False) if n}
         units = {n: u for n, u in stated.items() if u is not None}
         known = sum(not u.startswith(UNKNOWN_UNIT) for u in units.values())
-        units = units if known >= 0.3 * len(header) else {}
+        units = units if known >= 0.3 * sum(map(bool, below)) else {}
     skipped = found.index(lines[first])
-    after = _until_rows(found[skipped + 1 :], separator, width) if units else 0
+    beside = bool(units) or (bool(named) and first + 1 in named)
+    after = _until_rows(found[skipped + 1 :], separator, width) if beside else 0
     decimal = _decimal(rows[first + 1 + bool(units) :], separator)
     text = TextFormat(
         separator=separator, decimal=decimal, skip_rows=skipped, skip_after_header=after
     )
     return text, units
+
+
+def _width(rows: Sequence[Sequence[str]]) -> int:
+    """Cells of the rows of the lower half."""
+    return int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
+
+
+def _first_values(rows: Sequence[Sequence[str]], width: int) -> int:
+    """Place of the first of the rows of values that go on to the end; the end where there are none.
+
+    Lines of another form between them part nothing.
+    """
+    begin = len(rows)
+    for k in range(len(rows) - 1, -1, -1):
+        fits = abs(len(rows[k]) - width) <= 1 and width > 1
+        if fits and _of_numbers(rows[k]):
+            begin = k
+        elif fits and sum(map(bool, rows[k])) > 0.5 * width:
+            break
+    return begin
+
+
+def _names_above(
+    rows: Sequence[Sequence[str]],
+    begin: int,
+    width: int,
+    found: Sequence[str],
+    lines: Sequence[str],
+) -> range:
+    """Rows of text directly above the values, which a blank line parts from a preamble."""
+    if not 0 < begin < len(rows):
+        return range(0)
+    at = [k for k, line in enumerate(found) if line]
+    top = begin
+    while top > 0:
+        row = rows[top - 1]
+        filled = [cell for cell in row if cell]
+        units = [cell for cell in filled if unit_suffix(cell.strip("()[]")) is not None]
+        parted = top < begin and at[top] - at[top - 1] > 1
+        texts = 2 * len(filled) >= width - 1 or 2 * len(units) > len(filled)
+        if parted or not texts or abs(len(row) - width) > 1 or _of_numbers(row):
+            break
+        top -= 1
+    return range(top, begin)
+
+
+def _known_names(row: Sequence[str]) -> int:
+    """How many cells of a row are names of times or of quantities."""
+    return sum(is_time(cell) or bool(recognise(cell).quantity) for cell in row)
 
 
 def _decimal(rows: Sequence[Sequence[str]], separator: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -64,6 +64,20 @@ _TOLD_RATE: Final = re.compile(
 
 _ONE_BY_ONE: Final = 0.9
 """Part of the rows whose number follows that of the row before [-]."""
+
+_MINUTES: Final = re.compile(r"\b(run ?time|time|minutes|min)\b.*\b(cleared|clear|clr|mil)\b")
+"""Names of PID 4D and 4E, as `words_of` cuts them: whole minutes with the malfunction lamp on, and
+since trouble codes were cleared."""
+
+_FASTEST: Final = 4.0
+"""Mean of the size of a vehicle's acceleration, at most: tyres carry some 10, hardly ever used for
+long [m/s^2]."""
+
+_SWING: Final = 2.0
+"""Change of speed that is no rounding and no noise [m/s]."""
+
+_EVEN: Final = 0.05
+"""Part by which a clock may differ from another one within a minute [-]."""
 
 
 @dataclass(slots=True)
@@ -127,15 +141,102 @@ def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) ->
     ]
     if not found:
         return [_counted(raw, _told_rate(above))]
+    minutes = [t for t in found if _counts_minutes(t.column)]
+    if len(minutes) == len(found) and (other := _beside_minutes(raw, minutes[0])) is not None:
+        found.append(other)
     # The finer of several clocks; where they are alike, one that other files can share, a date.
     found.sort(
-        key=lambda t: (-round(_resolution(t.seconds), 3), not since_1970(t.seconds), t.index)
+        key=lambda t: (
+            _counts_minutes(t.column),
+            -round(_resolution(t.seconds), 3),
+            not since_1970(t.seconds),
+            t.index,
+        )
     )
-    best, *others = found
+    return found
+
+
+def _counts_minutes(name: str) -> bool:
+    """Whether a name is that of a counter of minutes of OBD-II."""
+    return _MINUTES.search(" ".join(words_of(name))) is not None
+
+
+def _beside_minutes(raw: RawTable, minutes: DraftTime) -> DraftTime | None:
+    """Find a clock of any name by a counter of minutes: in each minute it goes on by one."""
+    turns = np.flatnonzero(np.diff(minutes.seconds) > 0.0) + 1
+    if turns.size < 3:
+        return None
+    passed = np.diff(minutes.seconds[turns])
+    for index, name in enumerate(raw.names):
+        if index == minutes.index or (found := _as_time(raw, index, {})) is None:
+            continue
+        for unit in ("s", "ms", "us"):
+            factor = UNITS[unit].factor / (UNITS[found.unit].factor if found.unit else 1.0)
+            seconds = found.seconds * factor
+            steps = np.diff(seconds)
+            finest = float(np.median(steps[steps > 0.0]))
+            off = np.abs(np.diff(seconds[turns]) - passed)
+            if np.all(steps >= 0.0) and np.all(off <= 2.0 * finest + _EVEN * passed):
+                doubt = f"{name!r} is taken for the time: it goes on with {minutes.column!r}"
+                return DraftTime(name, index, unit, "", seconds, [doubt], guessed=True)
+    return None
+
+
+def swings(speed: Floats) -> float:
+    """Sum of all changes of a speed, up and down, those below rounding and noise left out [m/s].
+
+    Parameters
+    ----------
+    speed : (n,) in the order of time; NaN where there is none [m/s]
+    """
+    total = 0.0
+    known = speed[np.isfinite(speed)]
+    low = high = float(known[0]) if known.size else 0.0
+    for value in known.tolist():
+        low, high = min(low, value), max(high, value)
+        if value - low > _SWING or high - value > _SWING:
+            total += max(value - low, high - value)
+            low = high = value
+    return total
+
+
+def by_motion(times: list[DraftTime], swing: float) -> list[DraftTime]:
+    """Judge clocks by what moves in them: a vehicle's speed changes as tyres allow.
+
+    Parameters
+    ----------
+    times : those that can be the time of a table, the likeliest first
+    swing : sum of all changes of its speed, of `swings` [m/s]
+
+    Returns
+    -------
+    Those in which the vehicle moves as one can first. A guessed unit may turn into minutes.
+    """
+
+    def hurry(time: DraftTime, factor: float = 1.0) -> float:
+        known = time.seconds[np.isfinite(time.seconds)]
+        length = factor * float(known.max() - known.min()) if known.size else 0.0
+        return swing / length if length > 0.0 else 0.0
+
+    judged = []
+    for time in times:
+        if time.row_rate is not None or hurry(time) <= _FASTEST:
+            judged.append(time)
+            continue
+        doubt = (
+            f"by {time.column!r} in {time.unit or 'seconds'} the speed changes by "
+            f"{hurry(time):.0f} m/s^2 in the mean, as no vehicle's does"
+        )
+        if time.guessed and time.unit == "s" and hurry(time, 60.0) <= _FASTEST:
+            doubt += "; taken as minutes"
+            time = replace(time, unit="min", seconds=60.0 * time.seconds)
+        judged.append(replace(time, doubts=[*time.doubts, doubt]))
+    fit = [t for t in judged if t.row_rate is not None or hurry(t) <= _FASTEST]
+    best, *others = fit + [t for t in judged if not any(t is f for f in fit)]
     if others:
         names = column_list(t.column for t in others)
         best.doubts.append(f"{best.column!r} is taken for the time, not {names}")
-    return found
+    return [best, *others]
 
 
 def _counted(raw: RawTable, rate: float) -> DraftTime:
@@ -221,16 +322,25 @@ def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime |
     if known.size < 2 or known[-1] <= known[0]:
         return None
     doubts = []
+    guessed = False
     stated, _ = unit_of(name)
     if stated is None and name in units:
         stated, _ = unit_of(f"{name} [{units[name]}]")
     if stated is not None and UNITS[stated].dimension == "s":
         unit = stated
+    elif _counts_minutes(name):
+        unit = "min"
     else:
         unit, doubt = guessed_time_unit(name, known)
         doubts += [doubt.text] if doubt is not None else []
+        guessed = doubt is not None
+    if _counts_minutes(name):
+        doubts.append(
+            f"{name!r} counts whole minutes, and is no clock of the rows: record a time with each "
+            "row, or state rate_hz in [time] where the rows are even"
+        )
     seconds = values * UNITS[unit].factor
-    return DraftTime(name, index, unit, "", seconds, doubts, guessed=bool(doubts))
+    return DraftTime(name, index, unit, "", seconds, doubts, guessed=guessed)
 
 
 def guessed_time_unit(name: str, values: Floats) -> tuple[str, Problem | None]:

@@ -186,6 +186,18 @@ FORMATS: Final[tuple[Format, ...]] = (
         extra="can",
     ),
     Format(
+        name="candump text",
+        suffixes=(".txt",),
+        read=candump.read_candump,
+        begins=candump.is_candump,
+        magic=True,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
         name="OVMS CRTD",
         suffixes=(".crtd", ".log", ".txt"),
         read=bus_text.read_crtd,

@@ -31,6 +31,7 @@ class Log:
     align : whether a mapping asks to align its clock with the drive's other files
     frames : raw bus traffic, decoded once all files of a drive are read
     info : what the file knows of the drive beside its signals
+    units : suffixes of the units that signals were read in, by name
     pieces : the recordings of the file, where its clock begins anew in places; ``signals`` are
         then of the longest that rises
     """
@@ -46,6 +47,7 @@ class Log:
     align: bool = False
     frames: Frames | None = None
     info: DriveInfo | None = None
+    units: dict[str, str] = field(default_factory=dict)
     pieces: list[Log] = field(default_factory=list)
 
     @property

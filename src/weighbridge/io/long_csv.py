@@ -7,6 +7,7 @@ that of exports which public programs read; no specification is published.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -17,9 +18,9 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.columns import bracketed_unit, time_unit, unit_suffix
-from weighbridge.io.draft_time import text_time_format
+from weighbridge.io.draft_time import is_number, text_time_format
 from weighbridge.io.mapping import TimeColumn
-from weighbridge.io.naming import is_time, unit_of
+from weighbridge.io.naming import is_time, recognise, unit_of, words_of
 from weighbridge.io.table import (
     MOST_COLUMNS,
     SEPARATORS,
@@ -30,16 +31,38 @@ from weighbridge.io.table import (
     time_seconds,
     unwrapped,
 )
-from weighbridge.messages import Problem
+from weighbridge.messages import Problem, refused
 from weighbridge.signals import Floats
 from weighbridge.signals.units import UNITS, from_si, to_si
 
 _NAMES: Final = frozenset(
     ("pid", "name", "parameter", "param", "param_name", "signal", "signal_name", "channel",
-     "metric", "key", "variable", "field", "parameter name", "sensor name")
+     "metric", "key", "variable", "field", "parameter name", "sensor name", "diagnostic",
+     "diagnostic name", "measurement", "measure name", "tag", "tag name", "channel name", "sensor",
+     "signalname", "item", "messgroesse", "measurand")
 )  # fmt: skip
-_VALUES: Final = frozenset(("value", "val", "values", "wert", "valeur", "valor", "reading"))
-_UNITS: Final = frozenset(("unit", "units", "einheit", "unite", "unidad", "uom"))
+_VALUES: Final = frozenset(
+    ("value", "val", "values", "wert", "valeur", "valor", "reading", "data", "numeric value",
+     "double value", "measure value", "signal value", "messwert", "raw value")
+)  # fmt: skip
+_UNITS: Final = frozenset(
+    (
+        "unit",
+        "units",
+        "einheit",
+        "unite",
+        "unidad",
+        "uom",
+        "unit of measure",
+        "units of measure",
+        "unit name",
+        "measurement unit",
+    )
+)
+_VEHICLES: Final = frozenset(
+    ("device", "device name", "device id", "vehicle", "vehicle name", "vehicle id", "vin", "asset",
+     "asset id", "asset name", "unit id", "truck", "fahrzeug", "serial number", "registration")
+)  # fmt: skip
 _PLACES: Final = {
     "latitude": ("latitude", "lat"),
     "longitude": ("longitude", "longtitude", "lon", "lng"),
@@ -53,12 +76,41 @@ _THOUSANDS: Final = r"^[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
 _MOST: Final = 12
 
 
+# Rows by which it is known what a column of texts names, and part of the names that are known.
+_LOOKED_AT: Final = 200
+_KNOWN: Final = 0.5
+
+
 def _plain(name: str) -> str:
-    return name.strip().strip('"').strip().lower()
+    return " ".join(words_of(name.strip().strip('"').replace("_", " ")))
 
 
 def _place(names: list[str], among: frozenset[str] | tuple[str, ...]) -> int | None:
     return next((k for k, name in enumerate(names) if _plain(name) in among), None)
+
+
+def _places(names: list[str], rows: Sequence[Sequence[str]]) -> tuple[int | None, int | None]:
+    """Columns of names and of values: by what they are called, else by what stands in them."""
+    named, valued = _place(names, _NAMES), _place(names, _VALUES)
+    told = [row for row in rows if len(row) == len(names)]
+    if named is None and told:
+        named = next((k for k in range(len(names)) if _names_quantities(told, k)), None)
+    if valued is None and named is not None and told:
+        timed = _time_place(names)
+        places = [k for w in _PLACES.values() if (k := _place(names, w)) is not None]
+        free = (k for k in range(len(names)) if k not in (named, timed, *places))
+        numeric = [k for k in free if all(is_number(row[k]) for row in told)]
+        valued = numeric[0] if len(numeric) == 1 else None
+    return named, valued
+
+
+def _names_quantities(rows: Sequence[Sequence[str]], column: int) -> bool:
+    """Whether a column says again and again what a row is about."""
+    kinds = {row[column] for row in rows}
+    if not 2 <= len(kinds) <= 0.5 * len(rows) or any(map(is_number, kinds)):
+        return False
+    known = [kind for kind in kinds if recognise(kind).quantity]
+    return len(known) >= 2 and len(known) >= _KNOWN * len(kinds)
 
 
 def _time_place(names: list[str]) -> int | None:
@@ -67,17 +119,25 @@ def _time_place(names: list[str]) -> int | None:
 
 def is_long(head: bytes) -> bool:
     """Tell whether a text begins with the header of a long table."""
-    line = head.removeprefix(b"\xef\xbb\xbf").split(b"\n", 1)[0].decode("utf-8", "replace")
-    return are_long(cells(line.strip("\r "), max(SEPARATORS, key=line.count)))
+    lines = head.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace").split("\n")
+    separator = max(SEPARATORS, key=lines[0].count)
+    # The last line may be cut off.
+    rows = [cells(line.strip("\r "), separator) for line in lines[:-1] if line.strip()]
+    return bool(rows) and are_long(rows[0], rows[1:])
 
 
-def are_long(names: list[str]) -> bool:
-    """Tell whether columns are those of a long table."""
+def are_long(names: list[str], rows: Sequence[Sequence[str]] = ()) -> bool:
+    """Tell whether columns are those of a long table.
+
+    Parameters
+    ----------
+    names : of the columns
+    rows : some, by which columns are known that are called otherwise
+    """
     return (
         3 <= len(names) <= _MOST
-        and _place(names, _NAMES) is not None
-        and _place(names, _VALUES) is not None
         and _time_place(names) is not None
+        and None not in _places(names, rows)
     )
 
 
@@ -95,7 +155,7 @@ def open_long(path: Path, time: TimeColumn) -> Recording:
 
 def names_in(raw: RawTable) -> tuple[str, ...]:
     """Names that the rows of a long table have."""
-    named = _place(list(raw.names), _NAMES)
+    named, _ = _places(list(raw.names), _some(raw))
     if named is None:
         return ()
     texts = raw.column(named).cast(pl.String).str.strip_chars()
@@ -106,11 +166,12 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
     """Turn a long table that was read, as `open_long` does; errors are its."""
     path = raw.path
     names = list(raw.names)
-    named, valued = _place(names, _NAMES), _place(names, _VALUES)
+    named, valued = _places(names, _some(raw))
     if named is None or valued is None:
         raise DriveError(f"{path} has no columns of names and values; it has {column_list(names)}")
     if raw.rows == 0:
         raise DriveError(f"{path} has a header and no rows; record it again")
+    _refuse_several(raw, names)
     found = Recording([], notes=list(raw.notes))
     seconds = _seconds(raw, names, time, found)
     united = _place(names, _UNITS)
@@ -139,6 +200,31 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
         found.channels.append(_channel(path, str(name), rows, found.notes))
     found.channels += _position(raw, names, seconds, thousands)
     return found
+
+
+def _some(raw: RawTable) -> list[list[str]]:
+    """Return the first rows of a table as texts."""
+    columns = [
+        raw.column(k).head(_LOOKED_AT).cast(pl.String).fill_null("").str.strip_chars().to_list()
+        for k in range(len(raw.names))
+    ]
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _refuse_several(raw: RawTable, names: list[str]) -> None:
+    """Refuse rows of several vehicles: a drive is of one."""
+    place = _place(names, _VEHICLES)
+    if place is None:
+        return
+    vehicles = raw.column(place).cast(pl.String).drop_nulls().unique(maintain_order=True)
+    if vehicles.len() > 1:
+        raise refused(
+            "file.several_vehicles",
+            file=raw.path.name,
+            count=vehicles.len(),
+            column=names[place],
+            example=vehicles[0],
+        )
 
 
 def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[Problem | str]) -> Channel:

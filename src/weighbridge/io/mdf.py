@@ -25,6 +25,7 @@ from weighbridge.io.columns import UnitlessColumnError, parse_column, unit_suffi
 from weighbridge.io.draft import Draft
 from weighbridge.io.frames import Frames
 from weighbridge.io.info import MDF_INFO_MARK, parse_info
+from weighbridge.io.labels import physical_of
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import (
     MappedSignal,
@@ -221,10 +222,23 @@ def _read(file: Any, path: Path, table: str | None, mapping: TableMapping | None
         if values is None:
             log.problems.append(Problem.of("file.no_number", name, file=path.name))
             continue
+        channel = file.groups[group].channels[place[1]]
+        if channel.conversion is not None and (none := int(np.count_nonzero(np.isnan(values)))):
+            log.problems.append(
+                Problem.of(
+                    "file.sentinels",
+                    name,
+                    file=path.name,
+                    count=none,
+                    values=values.size,
+                    name=channel.name,
+                )
+            )
         if signal is not None and (signal.factor != 1.0 or signal.offset != 0.0):
             values = values * signal.factor + signal.offset
         times.setdefault(group, time + offset if offset else time)
         clocks.setdefault(group, []).append((name, to_si(values, suffix) if suffix else values))
+        log.units[name] = suffix
     for group, columns in clocks.items():
         if times[group].size == 0:
             names = ", ".join(n for n, _ in columns)
@@ -357,12 +371,27 @@ def _samples(file: Any, path: Path, place: _Place) -> tuple[Floats, Floats | Non
             "the file may have been cut off: copy it again"
         ) from None
     time = np.array(found.timestamps, dtype=np.float64)
-    if found.samples.ndim != 1 or found.samples.dtype.kind not in "biuf":
+    if found.samples.ndim != 1:
         return time, None
-    values = np.array(found.samples, dtype=np.float64)
+    if found.samples.dtype.kind in "SUO":
+        values = _labelled(file, place, found.samples)
+        if values is None:
+            return time, None
+    elif found.samples.dtype.kind in "biuf":
+        values = np.array(found.samples, dtype=np.float64)
+    else:
+        return time, None
     if found.invalidation_bits is not None:
         values[np.asarray(found.invalidation_bits, dtype=bool)] = np.nan
     return time, values
+
+
+def _labelled(file: Any, place: _Place, texts: np.ndarray) -> Floats | None:
+    """Numbers of a channel whose conversion gives texts; None where it records texts."""
+    raw = file.get(group=place[0], index=place[1], raw=True, ignore_invalidation_bits=True).samples
+    if raw.ndim != 1 or raw.dtype.kind not in "biuf" or raw.size != texts.size:
+        return None
+    return physical_of(raw.astype(np.float64), texts)[0]
 
 
 def _first_line(error: Exception) -> str:

@@ -163,7 +163,9 @@ def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
     if len(last) > 1 and (suffix := unit_suffix(last[-1].strip("()[],;"))) is not None:
         gone = len(words_of(last[-1]))
         return suffix, words[: len(words) - gone] if gone else words
-    return None, words
+    # A name may be a unit of speed alone.
+    whole = unit_suffix(name)
+    return (whole if whole in ("mph", "kmh") else None), words
 
 
 def recognise(name: str, unit: str | None = None) -> Named:
@@ -195,7 +197,7 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     whole = frozenset(spelled(words_of(name)))
     best = Named("", stated, 0.0)
     for quantity, phrases in _WANTED.items():
-        if _NOT.get(quantity, frozenset()) & whole:
+        if _NOT.get(quantity, frozenset()) & whole and whole not in phrases:
             continue
         if stated is not None and not _can_be(quantity, stated):
             continue

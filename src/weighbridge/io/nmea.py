@@ -20,6 +20,7 @@ from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.table import unwrapped
+from weighbridge.io.understood import Lines
 from weighbridge.messages import phrase
 from weighbridge.signals import Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
@@ -37,6 +38,8 @@ _NO_FIX: Final = frozenset((0, 6, 7, 8))
 
 
 # Fields up to the last one read: without a checksum a sentence that was cut off shows only here.
+_FIXLESS: Final = "without a fix"
+
 _FIELDS: Final = {"RMC": 9, "GGA": 9, "GNS": 9, "GST": 7, "VTG": 7}
 
 
@@ -106,7 +109,7 @@ def _read(message: Any) -> Sentence:
     clock = _clock(message)
     day = _day(message) if kind == "RMC" else math.nan
     if clock is None or not _fixed(message, kind):
-        raise UnfitSentenceError("without a fix")
+        raise UnfitSentenceError(_FIXLESS)
     if kind == "GST":
         spread = math.hypot(_number(message.std_dev_latitude), _number(message.std_dev_longitude))
         return Sentence(kind, clock, spread=spread)
@@ -155,12 +158,17 @@ def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
     clocks: list[float] = []
     days: list[float] = []
     lost: Counter[str] = Counter()
+    lines = Lines()
     for found in SENTENCE.finditer(data):
         try:
             said = read_sentence(found.group().decode("ascii").rstrip())
         except UnfitSentenceError as error:
             lost[str(error)] += 1
+            damaged = str(error) != _FIXLESS
+            first = data.count(b"\n", 0, found.start()) + 1 if damaged and not lines.first else 0
+            lines.add(b"", 1, damaged, first)
             continue
+        lines.add(b"", 1, 0, 0)
         if said.clock is None:
             if clocks:
                 velocity.add(len(clocks) - 1, said.motion)
@@ -179,6 +187,7 @@ def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
             lost[phrase("no_checksum")] += 1
     if not clocks:
         raise DriveError(_nothing(path, data, lost))
+    lines.refuse(path)
     time, log.absolute = _time(np.array(clocks), np.array(days))
     if mapping:
         time = time + mapping.time.offset

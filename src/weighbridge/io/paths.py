@@ -5,6 +5,7 @@ from __future__ import annotations
 import stat
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from urllib.parse import unquote
 
 from weighbridge.arguments import check_path, check_type, is_frame, type_name
 from weighbridge.errors import ArgumentTypeError, DriveError
@@ -40,3 +41,18 @@ def given_paths(name: str, given: Iterable[str | Path]) -> list[str | Path]:
     for one in paths:
         check_path(f"each {name}", one)
     return paths
+
+
+def partitions(names: Iterable[str]) -> dict[str, str]:
+    """Values by key of folders that are the partitions of a table, such as ``date=2026-10-08``.
+
+    Parameters
+    ----------
+    names : of folders, the nearest first
+    """
+    found: dict[str, str] = {}
+    for name in names:
+        key, equals, value = name.partition("=")
+        if equals and key.isidentifier() and value:
+            found.setdefault(key, unquote(value))
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 PHRASES: Final[dict[str, tuple[str, ...]]] = {
-    "vehicle_speed": ("v kph", "v kmh", "v mph", "v mps", "v fzg", "vfzg", "v veh", "vveh", "v vehicle", "veh v", "veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph", "kmh",
+    "vehicle_speed": ("v kph", "v kmh", "v mph", "v mps", "v fzg", "vfzg", "v veh", "vveh", "v vehicle", "veh v", "veh spd", "spd", "veh speed", "obd 2 speed", "kmph meas", "kmph", "kph", "kmh", "km h", "mph", "road speed", "engine road speed",
         "vehicle speed", "speed", "obd speed", "speed obd", "car speed", "wheel speed", "wheel based vehicle speed",
         "ground speed can", "velocity", "geschwindigkeit", "fahrgeschwindigkeit", "fahrzeuggeschwindigkeit",
         "vitesse", "vitesse vehicule", "velocidad", "velocidad vehiculo", "velocita", "velocita veicolo",

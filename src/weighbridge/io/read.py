@@ -386,7 +386,12 @@ def joined_drive(
     signals, filled = true_fixes(signals)
     problems += filled
     drive = Drive(
-        name=visible(name), signals=signals, info=info, problems=tuple(problems), contents=contents
+        name=visible(name),
+        signals=signals,
+        info=info,
+        problems=tuple(problems),
+        contents=contents,
+        units={n: u for log in logs for n, u in log.units.items() if n in signals},
     )
     _logger.info("%s: %d signals over %.0f s", name, len(signals), drive.duration)
     return drive
@@ -451,6 +456,7 @@ def _decode_frames(
             raise
         first.problems.append(replace(Problem.from_error(error), serious=False))
         return ()
+    first.units |= found.units
     first.problems += found.problems
     first.lacking += found.lacking
     for signal in found.signals.values():

@@ -150,6 +150,7 @@ class DbcStream:
                 continue
             found = Found(place.message, place.signal, at)
             physically, at = physical(frames, found)
+            physically, at = physically[np.isfinite(physically)], at[np.isfinite(physically)]
             if place.message.protocol == "j1939":
                 kept = _kept(self._chosen, quantity, frames.select(at))
                 physically, at = physically[kept], at[kept]

@@ -16,6 +16,7 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
+from weighbridge.io.understood import Lines, strange_rows
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
@@ -223,7 +224,12 @@ def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
     if not body.strip():
         frame = pl.DataFrame({str(i): pl.Series([], dtype=pl.Float64) for i in range(len(names))})
     else:
-        frame = _parse(path, body, len(names), separator, fmt.decimal, notes)
+        read = Lines()
+        read.add(b"\n" * skip, 0, 0, 0)
+        data = body.encode(errors="replace")
+        read.add(data, *strange_rows(data, len(names), separator))
+        notes += read.problems("file.rows_strange", path)
+        frame = _parse(path, data, len(names), separator, fmt.decimal, notes)
     missing = frozenset(MISSING) | {m.strip().lower() for m in fmt.missing}
     return RawTable(path, names, frame, separator, missing, fmt.decimal, notes)
 
@@ -298,11 +304,11 @@ def _after_line(text: str, count: int) -> str:
 
 
 def _parse(
-    path: Path, body: str, columns: int, separator: str, decimal: str, notes: list[Problem]
+    path: Path, body: bytes, columns: int, separator: str, decimal: str, notes: list[Problem]
 ) -> pl.DataFrame:
     names = [str(i) for i in range(columns)]
     # With a header of its own, the width does not hang on the first row.
-    data = f"{separator.join(names)}\n{body}".encode(errors="replace")
+    data = f"{separator.join(names)}\n".encode() + body
     # A quote that is never closed would swallow the rest of the file.
     quote = '"' if data.count(b'"') % 2 == 0 else None
     if quote is None:

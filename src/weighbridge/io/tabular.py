@@ -111,6 +111,7 @@ def read_canonical(raw: RawTable, table: str | None) -> Log:
         values, notes = raw.numbers(i)
         log.problems += [note.at(raw.path.name, name) for note in notes]
         columns.append((name, to_si(values, suffix) if suffix else values))
+        log.units[name] = suffix
         del values
         raw.release(i)
     _finish(log, raw, time, columns)
@@ -164,6 +165,7 @@ def read_mapped(raw: RawTable, mapping: TableMapping) -> Log:
         with faults.gathered():
             suffix = resolved_unit(s, None, mapping.source)
             columns.append((s.name, to_si(values, suffix) if suffix else values))
+            log.units[s.name] = suffix
     faults.refuse()
     _finish(log, raw, time, columns)
     return log
@@ -217,9 +219,9 @@ def _finish(log: Log, raw: RawTable, time: Floats, columns: list[tuple[str, Floa
         signals, problems = clean_columns(
             time[rows], [(name, values[rows]) for name, values in columns], raw.path.name
         )
-        log.pieces.append(
-            Log(raw.path, signals, [*told, *problems], list(log.lacking), log.absolute)
-        )
+        piece = Log(raw.path, signals, [*told, *problems], list(log.lacking), log.absolute)
+        piece.units = log.units
+        log.pieces.append(piece)
 
 
 def _no_time(raw: RawTable, known: bool) -> DriveError:

@@ -22,6 +22,7 @@ from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.table import MOST_COLUMNS
+from weighbridge.io.understood import Lines
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
@@ -51,8 +52,10 @@ def open_fleet_telemetry(path: Path, time: TimeColumn) -> Recording:
     vehicles: set[str] = set()
     found = Recording([], absolute=True)
     strange = 0
+    lines = Lines()
     for record in _records(path):
         payload = _payload(record)
+        lines.add(b"\n", 1, record is None, record is None)
         if payload is None:
             strange += 1
             continue
@@ -64,6 +67,7 @@ def open_fleet_telemetry(path: Path, time: TimeColumn) -> Recording:
             rows.setdefault(name, array("d")).append(len(stamps))
             cells.setdefault(name, array("d")).append(value)
         stamps.append(stamp)
+    lines.refuse(path)
     if not rows:
         raise DriveError(f"{path} holds no record of Fleet Telemetry with numbers; export it again")
     if len(vehicles) > 1:

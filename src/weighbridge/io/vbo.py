@@ -2,7 +2,8 @@
 
 Facts of the format from Racelogic, *VBO File Format* (support pages): the
 titles under ``[header]`` carry the units, ``[column names]`` the columns;
-latitude and longitude in minutes, north and **west** positive; time of day in
+latitude and longitude in minutes, north and **west** positive, but some other
+loggers write degrees, east positive; time of day in
 UTC as HHMMSS.ss; the number of satellites is raised by 64 while the brake
 trigger is on and by 128 with differential correction.
 """
@@ -21,7 +22,9 @@ from weighbridge.errors import DriveError
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import MappedSignal, TableMapping, lacking, resolved_unit
 from weighbridge.io.table import column_list, unwrapped
-from weighbridge.signals import Floats, Problem
+from weighbridge.io.understood import Lines, number_of
+from weighbridge.io.way import way_ratio
+from weighbridge.signals import Bools, Floats, Problem
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
 
@@ -34,6 +37,14 @@ _SPEED_UNITS: Final = {
 }  # fmt: skip
 _DAY: Final = 86_400.0
 _BRAKE: Final = 64
+
+_PLACES: Final = ("lat", "long")
+
+# Degrees, north and east positive, of minutes, north and west positive.
+_MINUTES: Final = (1.0 / 60.0, -1.0 / 60.0)
+
+# Rows in motion to east or west by which the sign of the longitude is judged.
+_COURSES: Final = 20
 
 # Fewer satellites than these give no position (Racelogic counts four for one with height).
 _SATELLITES: Final = 3
@@ -83,22 +94,10 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     taken = {name for name, _ in columns}
     fixed = np.ones(clock.size, dtype=bool)
     if "sats" in places:
-        sats = np.nan_to_num(cells[:, places["sats"]]).astype(np.int64)
-        fixed = (sats % _BRAKE) >= _SATELLITES
-        if not fixed.all():
-            log.problems.append(
-                Problem.of(
-                    "position.few_satellites",
-                    file=path.name,
-                    count=int(np.count_nonzero(~fixed)),
-                    rows=fixed.size,
-                    satellites=_SATELLITES,
-                )
-            )
+        fixed, brake = _satellites(log, cells[:, places["sats"]])
         # Without a wire to the brake the flag is never set, and says nothing.
-        brake = (sats // _BRAKE) % 2
         if brake.any() and "brake_switch" not in taken:
-            columns.append(("brake_switch", brake.astype(np.float64)))
+            columns.append(("brake_switch", brake))
 
     def take(column: str, name: str, unit: str, factor: float = 1.0) -> None:
         if column in places and name not in taken:
@@ -106,11 +105,18 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
             values = np.where(fixed, factor * cells[:, places[column]], np.nan)
             columns.append((name, to_si(values, unit)))
 
-    take("lat", "latitude", "deg", 1.0 / 60.0)
-    take("long", "longitude", "deg", -1.0 / 60.0)
+    speed_unit = _speed_unit(log, sections.get("header", []), names, mapping)
+    speed = to_si(cells[:, places["velocity"]], speed_unit) if "velocity" in places else None
+    factors = _MINUTES
+    if {"lat", "long"} <= places.keys() and not {"latitude", "longitude"} & taken:
+        latitude, longitude = (np.where(fixed, cells[:, places[c]], np.nan) for c in _PLACES)
+        course = np.radians(cells[:, places["heading"]]) if "heading" in places else None
+        factors = _degrees_of(log, time, latitude, longitude, speed, course)
+    take("lat", "latitude", "deg", factors[0])
+    take("long", "longitude", "deg", factors[1])
     take("height", "altitude", "m")
     take("heading", "gnss_course", "deg")
-    take("velocity", "gnss_speed", _speed_unit(log, sections.get("header", []), names, mapping))
+    take("velocity", "gnss_speed", speed_unit)
     if ignored := [n for n in names if n not in used]:
         log.problems.append(
             Problem.of("file.ignored", file=path.name, columns=column_list(ignored))
@@ -118,6 +124,73 @@ def read_vbo(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     log.signals, problems = clean_columns(time, columns, path.name)
     log.problems += problems
     return log
+
+
+def _satellites(log: Log, cells: Floats) -> tuple[Bools, Floats]:
+    """Which rows have enough satellites for a fix, and the brake's flag."""
+    sats = np.nan_to_num(cells).astype(np.int64)
+    fixed = np.asarray((sats % _BRAKE) >= _SATELLITES)
+    if not fixed.all():
+        log.problems.append(
+            Problem.of(
+                "position.few_satellites",
+                file=log.path.name,
+                count=int(np.count_nonzero(~fixed)),
+                rows=fixed.size,
+                satellites=_SATELLITES,
+            )
+        )
+    return fixed, ((sats // _BRAKE) % 2).astype(np.float64)
+
+
+def _degrees_of(
+    log: Log,
+    time: Floats,
+    latitude: Floats,
+    longitude: Floats,
+    speed: Floats | None,
+    course: Floats | None,
+) -> tuple[float, float]:
+    """Factors that make degrees, north and east positive, of what a log has for its positions."""
+    factors = _MINUTES
+    if _in_degrees(time, latitude, longitude, speed):
+        factors = (1.0, 1.0)
+        log.problems.append(Problem.of("position.degrees", file=log.path.name))
+    if course is not None and _mirrored(factors[0] * latitude, factors[1] * longitude, course):
+        factors = (factors[0], -factors[1])
+        east = "east" if factors[1] > 0.0 else "west"
+        log.problems.append(
+            Problem.of("position.mirrored", "longitude", file=log.path.name, positive=east)
+        )
+    return factors
+
+
+def _in_degrees(time: Floats, latitude: Floats, longitude: Floats, speed: Floats | None) -> bool:
+    """Whether positions are in degrees, not minutes: by the way they cover, else by their size.
+
+    Minutes as small as degrees are lie in the sea off Ghana.
+    """
+    north, east = np.abs(latitude), np.abs(longitude)
+    known = np.isfinite(north) & np.isfinite(east)
+    if not known.any() or np.median(north[known]) > 90.0 or np.median(east[known]) > 180.0:
+        return False
+    if speed is not None:
+        ratio = way_ratio(time, speed, time, np.radians(latitude), np.radians(longitude))
+        if ratio > 0.0:
+            return bool(ratio < 60.0**0.5)
+    return True
+
+
+def _mirrored(latitude: Floats, longitude: Floats, course: Floats) -> bool:
+    """Whether positions go west where the course is east [deg], [rad]."""
+    north = np.diff(latitude)
+    east = np.diff(longitude) * np.cos(np.radians(latitude[1:]))
+    used = np.isfinite(north + east + course[1:]) & (np.hypot(north, east) > 0.0)
+    used &= np.abs(np.sin(course[1:])) > 0.3
+    if np.count_nonzero(used) < _COURSES:
+        return False
+    agrees = np.sign(east[used]) == np.sign(np.sin(course[1:][used]))
+    return bool(np.mean(agrees) < 0.2)
 
 
 def _mapped(
@@ -167,9 +240,10 @@ def _cells(log: Log, lines: list[str], width: int) -> Floats:
     if not rows:
         raise DriveError(f"{log.path} has no row of {width} values under [data]; record it again")
     if lost := len(lines) - len(rows):
-        log.problems.append(
-            Problem.of("file.rows_cut", file=log.path.name, count=lost, rows=len(lines))
-        )
+        strange = next(line for line in lines if len(line.split()) != width)
+        read = Lines()
+        read.add(b"", len(lines), lost, number_of(log.path, strange))
+        log.problems += read.problems("file.rows_cut", log.path)
     flat = pl.Series([cell for row in rows for cell in row], dtype=pl.String)
     if not flat.str.contains(".", literal=True).any():
         flat = flat.str.replace(",", ".", literal=True)

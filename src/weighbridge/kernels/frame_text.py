@@ -21,7 +21,8 @@ class TraceColumns(NamedTuple):
 
     ``kinds`` are the first two letters, as ``256 * first + second``, of the types of lines that
     hold a data frame; empty where every line does. ``size`` is a code of data length where
-    ``coded``.
+    ``coded``. Lines begin with their number and a bracket where ``numbered``; stamps are
+    in ``unit`` [s].
     """
 
     time: int
@@ -31,6 +32,8 @@ class TraceColumns(NamedTuple):
     size: int
     data: int
     coded: bool
+    numbered: bool
+    unit: float
     kinds: np.ndarray  # (k,) int64
 
 
@@ -64,18 +67,21 @@ def parse_asc(text, rows, decimal, relative, clock):
 
     Returns
     -------
-    count, strange : int
-        Frames, and lines of frames that cannot be read.
+    count, strange, first : int
+        Frames, lines of frames that cannot be read, and the number of the first of these.
     clock : float
         Stamp of the last line [s].
     """
     starts = np.empty(MOST_WORDS, np.int64)
     ends = np.empty(MOST_WORDS, np.int64)
     base = 10 if decimal else 16
-    count = strange = 0
+    count = strange = first_strange = line = 0
     at = 0
     while at < text.size:
         words, at = _words(text, at, starts, ends)
+        line += 1
+        if strange and not first_strange:
+            first_strange = line - 1
         if words < 3:
             continue
         stamp = _real(text, starts[0], ends[0])
@@ -101,7 +107,9 @@ def parse_asc(text, rows, decimal, relative, clock):
         rows.extended[count] = extended
         rows.length[count] = size
         count += 1
-    return count, strange, clock
+    if strange and not first_strange:
+        first_strange = line
+    return count, strange, first_strange, clock
 
 
 @kernel
@@ -140,7 +148,7 @@ def _asc_places(text, starts, ends, words, base):
 
 @kernel
 def parse_trace(text, rows, columns):
-    """Read lines of a PEAK TRC log.
+    """Read lines of a TRC log.
 
     Parameters
     ----------
@@ -152,15 +160,18 @@ def parse_trace(text, rows, columns):
 
     Returns
     -------
-    count, strange : int
-        Frames, and lines of frames that cannot be read.
+    count, strange, first : int
+        Frames, lines of frames that cannot be read, and the number of the first of these.
     """
     starts = np.empty(MOST_WORDS, np.int64)
     ends = np.empty(MOST_WORDS, np.int64)
-    count = strange = 0
+    count = strange = first_strange = line = 0
     at = 0
     while at < text.size:
         words, at = _words(text, at, starts, ends)
+        line += 1
+        if strange and not first_strange:
+            first_strange = line - 1
         if words == 0 or text[starts[0]] == 59:  # ;
             continue
         if columns.kind >= 0 and words > columns.kind:
@@ -171,6 +182,9 @@ def parse_trace(text, rows, columns):
             if not np.any(columns.kinds == kind):
                 # Errors, status, remote frames.
                 continue
+        if columns.numbered and text[ends[0] - 1] != 41:  # )
+            strange += 1
+            continue
         told = words - columns.data
         if told > 0 and text[starts[columns.data]] == 82:  # RTR: a remote frame
             continue
@@ -198,13 +212,15 @@ def parse_trace(text, rows, columns):
         ):
             strange += 1
             continue
-        rows.time[count] = 1e-3 * stamp
+        rows.time[count] = columns.unit * stamp
         rows.channel[count] = min(bus, 32000)
         rows.identifier[count] = identifier & 0x1FFFFFFF
         rows.extended[count] = letters > 4
         rows.length[count] = size
         count += 1
-    return count, strange
+    if strange and not first_strange:
+        first_strange = line
+    return count, strange, first_strange
 
 
 @kernel
@@ -222,8 +238,9 @@ def parse_candump(text, rows, buses):
 
     Returns
     -------
-    count, lines, strange : int
-        Frames, lines that are not empty, and those that are no frames of any kind.
+    count, lines, strange, first : int
+        Frames, lines that are not empty, those that are no frames of any kind, and the number of
+        the first of these.
     seen : int
         Rows of ``buses`` that were filled.
     longest : int
@@ -232,10 +249,13 @@ def parse_candump(text, rows, buses):
     """
     starts = np.empty(MOST_WORDS, np.int64)
     ends = np.empty(MOST_WORDS, np.int64)
-    count = lines = strange = seen = longest = 0
+    count = lines = strange = seen = longest = first_strange = line = 0
     at = 0
     while at < text.size:
         words, at = _words(text, at, starts, ends)
+        line += 1
+        if strange and not first_strange:
+            first_strange = line - 1
         if words == 0:
             continue
         lines += 1
@@ -276,7 +296,9 @@ def parse_candump(text, rows, buses):
         rows.extended[count] = digits == 8
         rows.length[count] = size
         count += 1
-    return count, lines, strange, seen, longest
+    if strange and not first_strange:
+        first_strange = line
+    return count, lines, strange, first_strange, seen, longest
 
 
 @kernel

@@ -34,6 +34,7 @@ from weighbridge.visible import visible_json
 GAP_PERIODS: Final = 5.0
 """A gap is a step of the clock longer than this many median periods."""
 
+DRIVEN_NEEDED: Final = "the torque of every driven axle (or driven in the vehicle file)"
 REFERENCE_NEEDED: Final = "reference_torque (or reference_torque_nm in the vehicle file)"
 """What a torque in percent needs that its drive does not tell."""
 
@@ -292,9 +293,9 @@ def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:
             if torque.expected:
                 best, worst, reason = best + torque.expected, worst + torque.expected, torque.limit
             # Nobody records torque at the wheels for want of another signal.
-            rare = bool(needs) and torque.gearing is not None
+            rare = bool(needs) and torque.gearing is not None and bool(torque.lacking(drive))
             # What a vehicle file can state need not be recorded.
-            recorded = len(set(needs) - {REFERENCE_NEEDED})
+            recorded = len(set(needs) - {REFERENCE_NEEDED, DRIVEN_NEEDED})
             ways.append(
                 (
                     (bool(needs), rare, recorded, len(set(needs)), worst),
@@ -374,7 +375,7 @@ def _torque_needs(drive: Drive, torque: TorqueSource, vehicle: Vehicle | None) -
             needs.append(REFERENCE_NEEDED)
     line = vehicle.driveline if vehicle is not None else None
     if not needs and torque.refusal(drive, line.driven if line is not None else None):
-        needs.append("the torque of every driven axle (or driven in the vehicle file)")
+        needs.append(DRIVEN_NEEDED)
     fixed_gear = torque.gearing is not None or (line is not None and line.single_speed)
     if not fixed_gear and not drive.has("engine_speed") and "engine_speed" not in needs:
         needs.append("engine_speed (or the one gearing of a single-speed car in the vehicle file)")

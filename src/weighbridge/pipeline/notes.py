@@ -11,7 +11,7 @@ from weighbridge.estimators.judging import grade_apart, lacks_accelerometer
 from weighbridge.messages import Problem, phrase
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive
-from weighbridge.vehicle.data_sheet import wheel_efficiency
+from weighbridge.vehicle.data_sheet import needs_calibration, wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -166,6 +166,10 @@ def lighter_than_known(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ..
 def what_is_missing(drive: Drive, vehicle: Vehicle) -> Problem | None:
     """Say which signals a drive lacks for this vehicle; None if none."""
     source = source_of(vehicle)
+    if needs_calibration(vehicle):
+        return Problem.of(
+            "vehicle.not_calibrated", vehicle=vehicle.name, title=source.title, source=source.name
+        )
     missing = source.lacking(drive)
     if not (drive.has("vehicle_speed") or drive.has("gnss_speed")) and not drive.has("latitude"):
         missing.append("vehicle_speed")

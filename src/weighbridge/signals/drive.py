@@ -74,6 +74,7 @@ class Drive:
     info : what is known besides the signals
     problems : what was mended or is doubtful in the data
     contents : what raw bus logs hold, decoded or not, in sentences
+    units : suffixes of the units that its file or mapping declares, by signal, where they are known
     """
 
     name: str
@@ -81,6 +82,7 @@ class Drive:
     info: DriveInfo = field(default_factory=DriveInfo)
     problems: tuple[Problem, ...] = ()
     contents: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         check_text("name of a drive", self.name)
@@ -89,6 +91,7 @@ class Drive:
         check_type("info", self.info, DriveInfo, "a weighbridge.DriveInfo")
         check_all("problems", self.problems, Problem, "weighbridge.Problem")
         check_texts("contents", self.contents)
+        check_type("units", self.units, Mapping, "a dictionary of units by name")
 
     def get(self, name: str) -> Signal | None:
         """Return the signal, or None where the drive lacks it."""

@@ -137,7 +137,7 @@ class Section:
 
     def _wrong_type(self, key: str, wanted: str, value: Any) -> NoReturn:
         kind = _TYPES.get(type(value), type(value).__name__)
-        shown = f" ({_shortened(value)})" if not isinstance(value, dict) else ""
+        shown = f" ({shortened(value)})" if not isinstance(value, dict) else ""
         self.fail(key, f"must be {wanted}, not {kind}{shown}")
 
     def section(self, key: str) -> Section | None:
@@ -184,7 +184,7 @@ class Section:
         if isinstance(value, bool) or not isinstance(value, int):
             self._wrong_type(key, "a whole number", value)
         if not 0 <= value <= MOST_COUNTED:
-            self.fail(key, f"must be from 0 to {MOST_COUNTED}, got {_shortened(value)}")
+            self.fail(key, f"must be from 0 to {MOST_COUNTED}, got {shortened(value)}")
         return value
 
     def _exact(self, key: str, value: Any) -> Fraction:
@@ -198,14 +198,12 @@ class Section:
         if isinstance(value, int):
             # Bits of a number of LARGEST decimal places.
             if value.bit_length() > _LARGEST_BITS:
-                self.fail(key, f"must be below 1e{LARGEST}, got {_shortened(value)}")
+                self.fail(key, f"must be below 1e{LARGEST}, got {shortened(value)}")
             return
         if not math.isfinite(value):
             self.fail(key, f"must be a finite number, got {value}")
         if value and not SMALLEST <= Decimal(value).adjusted() < LARGEST:
-            self.fail(
-                key, f"must be 0 or from 1e{SMALLEST} to 1e{LARGEST}, got {_shortened(value)}"
-            )
+            self.fail(key, f"must be 0 or from 1e{SMALLEST} to 1e{LARGEST}, got {shortened(value)}")
         if isinstance(value, Decimal) and len(value.as_tuple().digits) > _MOST_DIGITS:
             self.fail(key, f"has {len(value.as_tuple().digits)} digits; {_MOST_DIGITS} are enough")
 
@@ -428,7 +426,11 @@ def _dots(line: str) -> int:
     return max(len(_PART_OF_KEY.findall(piece)) for piece in _NO_KEY.split(line))
 
 
-def _shortened(value: Any) -> str:
+_DECIMAL: Final = re.compile(r"Decimal\('([^']*)'\)")
+"""A number in a list, as Python writes it."""
+
+
+def shortened(value: Any) -> str:
     """Text of a value, the first of it where it is long; no list inside lists is followed."""
     if isinstance(value, int) and value.bit_length() > _LARGEST_BITS:
         return f"one of {int(value.bit_length() * math.log10(2.0)) + 1} digits"
@@ -436,4 +438,5 @@ def _shortened(value: Any) -> str:
         text = str(value)
     except RecursionError:
         return "nested too deep"
+    text = _DECIMAL.sub(r"\1", text)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} …"

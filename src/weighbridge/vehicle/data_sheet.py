@@ -80,6 +80,13 @@ def by_data_sheet(vehicle: Vehicle) -> bool:
     return source_of(vehicle).signed and not vehicle.provenance.torque_fitted
 
 
+def needs_calibration(vehicle: Vehicle) -> bool:
+    """Whether torque is made from a load or a flow, and no calibration shows what that is worth."""
+    model = vehicle.torque
+    fitted = vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None
+    return model.of_source.needs_map and not model.coefficients and not fitted
+
+
 def usual_efficiency(vehicle: Vehicle) -> tuple[float, float]:
     """Return the slope of wheel over engine torque of such a vehicle and its standard deviation."""
     line, of_source = vehicle.driveline, source_of(vehicle).efficiency

@@ -18,7 +18,7 @@ from tomlkit.items import Table
 
 from weighbridge.arguments import check_path
 from weighbridge.errors import ConfigError
-from weighbridge.signals.tomlfile import Faults, Section, read_toml
+from weighbridge.signals.tomlfile import Faults, Section, read_toml, shortened
 from weighbridge.vehicle.file_keys import SECTIONS, VEHICLE_KEYS, WITNESS_KEYS, Key
 from weighbridge.vehicle.rounding import covariance_texts, rounded_texts
 from weighbridge.vehicle.torque_model import WITNESS_TERMS, WitnessRelation
@@ -301,7 +301,7 @@ def _built(build: type[Any], section: Section, values: Mapping[str, Any]) -> Any
         ]
         if not said:
             raise ConfigError(f"{section.where()}: [{'.'.join(section.path)}] {message}") from None
-        shown = str(section.data[said[0]])
+        shown = shortened(section.data[said[0]])
         raise ConfigError(
             f"{section.where(said[0])}: {'.'.join(section.path)}.{said[0]} = {shown}: {message}"
         ) from None

@@ -14,7 +14,12 @@ from weighbridge.constants import (
     STANDARD_TEMPERATURE,
 )
 from weighbridge.signals.units import scalar_from_si
-from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std, wheel_efficiency
+from weighbridge.vehicle.data_sheet import (
+    by_data_sheet,
+    needs_calibration,
+    scale_std,
+    wheel_efficiency,
+)
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.road import Origin, Value
 from weighbridge.vehicle.torque import parameters, rows_of, source_of
@@ -58,6 +63,8 @@ def can_weigh(vehicle: Vehicle) -> bool:
     """
     if vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None:
         return True
+    if needs_calibration(vehicle):
+        return False
     if vehicle.torque.source is not None and by_data_sheet(vehicle):
         return True
     geared = bool(vehicle.driveline.gearings) or source_of(vehicle).gearing is not None
@@ -116,6 +123,8 @@ def _gears(vehicle: Vehicle) -> str:
 
 def _torque(vehicle: Vehicle) -> str:
     model = vehicle.torque
+    if needs_calibration(vehicle):
+        return f"by {source_of(vehicle).title}; a calibration finds what that is worth"
     if not can_weigh(vehicle):
         return "nothing is known of it; a calibration finds what the reading is worth"
     source = source_of(vehicle)

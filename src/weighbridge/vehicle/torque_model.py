@@ -75,7 +75,7 @@ class TorqueModel:
         if self.source is not None and self.source not in TORQUE_SOURCES:
             raise ConfigError(f"torque source must be {TORQUE_SOURCES.names}, got {self.source!r}")
         source = self.of_source
-        if source.needs_map and len(self.coefficients) < 2:
+        if source.needs_map and len(self.coefficients) == 1:
             raise ConfigError(
                 f"torque source {self.source!r} needs at least two coefficients: "
                 "run weighbridge calibrate"
