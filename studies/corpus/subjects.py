@@ -31,6 +31,7 @@ ROOT: Final = Path(__file__).parents[2]
 SHARED: Final = ROOT.parent / "shared"
 SOURCES: Final = (
     *sorted((ROOT / "src/weighbridge/simulation").glob("*.py")),
+    *sorted((ROOT / "src/weighbridge/signals").glob("*.py")),
     *sorted((ROOT / "studies/second_model").glob("*.py")),
     ROOT / "studies/accuracy_drives.py",
     ROOT / "studies/fault_subjects.py",
