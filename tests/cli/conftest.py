@@ -21,11 +21,13 @@ class Made(NamedTuple):
     mass: float
 
 
-def _made(folder: Path, name: str, seed: int, payload: float, duration: float | None) -> Made:
+def _made(
+    folder: Path, name: str, seed: int, payload: float, duration: float | None, rate: float = 50.0
+) -> Made:
     # A warm engine: a cold one needs more torque than a calibration knows of.
     scenario = make_scenario(name, payload=payload, seed=seed, without=("warm_up",))
     # Inertial samples as often as of a phone.
-    sensors = Sensors(imu_rate=50.0)
+    sensors = Sensors(imu_rate=rate)
     made = simulate_car(replace(scenario, duration=duration, sensors=sensors))
     made.write(folder)
     return Made(folder, float(made.truth.mass.mean()))
@@ -41,6 +43,13 @@ def known(tmp_path_factory) -> Made:
 def loaded(tmp_path_factory) -> Made:
     """Return a drive of the same car with 150 kg more."""
     return _made(tmp_path_factory.mktemp("loaded") / "loaded", "car-short", 102, 150.0, None)
+
+
+@pytest.fixture(scope="session")
+def often(tmp_path_factory) -> Made:
+    """Return the loaded drive with an inertial sensor of 200 Hz, which shows faults of its axes."""
+    folder = tmp_path_factory.mktemp("often") / "loaded"
+    return _made(folder, "car-short", 102, 150.0, None, rate=200.0)
 
 
 @pytest.fixture(scope="session")

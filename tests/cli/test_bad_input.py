@@ -48,6 +48,11 @@ def without_mass(ran, status, *words):
 
 
 @pytest.fixture
+def loaded(often):
+    return often
+
+
+@pytest.fixture
 def weigh(weighbridge, car):
     return lambda folder: weighbridge("weigh", folder, "--vehicle", car, "--json", "-")
 
