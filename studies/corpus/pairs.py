@@ -18,6 +18,7 @@ from studies.corpus.subjects import MADE, READ, SHARED, Subject, absent, subject
 
 import weighbridge as wb
 from weighbridge.signals import Drive, Signal
+from weighbridge.vehicle.air import standard_pressure
 from weighbridge.vehicle.model import Vehicle
 
 IMU: Final = ("accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z")
@@ -176,6 +177,52 @@ def _uneven(
     return Made(seen, vehicle, true)
 
 
+HIGHER: Final = 1600.0
+"""By how much a drive is lifted [m]."""
+
+
+def _lifted(one: Subject, vehicle: Vehicle, *, power: float, air_flow: bool) -> Made:
+    """Lift a drive: its load grows as its torque falls with a power of the charge (SAE J1979)."""
+    drive, true = one.drives["drive"]
+    ground, pressure = drive.signals["altitude"], drive.signals["barometric_pressure"]
+    fall = float(np.median(standard_pressure(ground.values + HIGHER)))
+    fall /= float(np.median(standard_pressure(ground.values)))
+    load = drive.signals["engine_load"]
+    seen = np.round(np.clip(load.values / fall**power, 0.0, 1.0) * 255.0) / 255.0
+    there = drive.with_signals(
+        Signal("altitude", ground.time, ground.values + HIGHER),
+        Signal("barometric_pressure", pressure.time, pressure.values * fall),
+        Signal("engine_load", load.time, seen),
+    )
+    return Made(there if air_flow else there.without("mass_air_flow"), vehicle, true)
+
+
+def _altered(
+    one: Subject,
+    vehicle: Vehicle,
+    *,
+    drive: str,
+    name: str,
+    change: Callable[..., np.ndarray],
+    without: tuple[str, ...] = (),
+) -> Made:
+    """Change a signal as a function of the part of the drive that is over, and of its values."""
+    recorded, true = one.drives[drive]
+    s = recorded.signals[name]
+    over = (s.time - recorded.start) / recorded.duration
+    seen = recorded.without(*without).with_signals(Signal(name, s.time, change(over, s.values)))
+    return Made(seen, vehicle, true)
+
+
+def _scaled(over: np.ndarray, x: np.ndarray, *, factor: float, since: float) -> np.ndarray:
+    return np.where(over > since, factor * x, x)
+
+
+def _bent(_: np.ndarray, x: np.ndarray, *, power: float) -> np.ndarray:
+    top = float(np.max(np.abs(x)))
+    return np.sign(x) * np.abs(x / top) ** power * top
+
+
 def _recorded(_: Subject | None, __: Vehicle | None, *, drive: Path, vehicle: Path) -> Made:
     read = wb.read_drive(drive, mapping=vehicle.parent / "mapping.toml")
     return Made(read, Vehicle.load(vehicle), float("nan"))
@@ -266,9 +313,45 @@ def _recordings() -> Iterator[Pair]:
         )  # fmt: skip
 
 
+def _strangers() -> Iterator[Pair]:
+    """Kinds of recordings that strangers made: thin air, a reading or a unit that changes."""
+    for power in (0.0, 1.0):
+        for air_flow in (False, True):
+            seen = "with" if air_flow else "without"
+            yield Pair(
+                f"own car/{HIGHER:.0f} m higher, load by power {power:g}, {seen} air flow",
+                "thin air", "own car", "full", partial(_lifted, power=power, air_flow=air_flow),
+                sound=True,
+            )  # fmt: skip
+    torque = {"own van": "engine_torque_fraction", "own truck": "engine_torque_fraction",
+              "second petrol": "engine_torque"}  # fmt: skip
+    half, more = partial(_scaled, factor=0.8, since=0.5), partial(_scaled, factor=1.15, since=0.5)
+    for of, name in torque.items():
+        drives = ("ordinary", "motorway") if of.startswith("second") else ("drive",)
+        for drive in drives:
+            for words, change in (
+                ("torque 0.8 times from the middle on", half),
+                ("torque 1.15 times from the middle on", more),
+                ("torque bent by a power of 1.2", partial(_bent, power=1.2)),
+            ):
+                make = partial(_altered, drive=drive, name=name, change=change)
+                yield Pair(
+                    f"{of}/{drive}/{words}", "fault: a reading that changes", of, "full", make,
+                    sound=False, reference=f"{of}/{drive}/full",
+                )  # fmt: skip
+            slower = partial(_scaled, factor=1.0 / 1.609344, since=0.6)
+            make = partial(_altered, drive=drive, name="vehicle_speed", change=slower, without=GNSS)
+            yield Pair(
+                f"{of}/{drive}/speed in mph from 60 % on, no GNSS", "fault: a reading that changes",
+                of, "full", make, sound=False, reference=f"{of}/{drive}/full",
+            )  # fmt: skip
+
+
 def all_pairs() -> list[Pair]:
     """List all pairs, in an order that stays."""
-    return [*_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings()]
+    return [
+        *_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings(), *_strangers(),
+    ]  # fmt: skip
 
 
 OF_CI: Final = ("own car", "own electric")
