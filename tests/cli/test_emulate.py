@@ -64,7 +64,7 @@ def test_from_an_emulated_dongle_to_a_mass(loaded, car, tmp_path):
     assert low < last["mass_kg"] < high < 1.2 * low
     assert f"{last['mass_kg']:.0f} kg" in out
     rates = {s["name"]: s["rate_hz"] for s in last["signals"]}
-    assert rates["accel_x"] > 50.0
+    assert rates["accel_x"] > 40.0
     assert rates["vehicle_speed"] > 1.0
 
 
