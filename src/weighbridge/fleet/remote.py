@@ -54,6 +54,15 @@ def drives(url: str, *, as_drive: bool) -> Iterator[str]:
     yield from (files.unstrip_protocol(path) for path in _grouped(below))
 
 
+def exists(url: str) -> bool:
+    """Tell whether something is behind a URL; true where the store cannot be asked."""
+    try:
+        files, path = _store(url)
+        return bool(files.exists(path))
+    except Exception:  # each store has errors of its own
+        return True
+
+
 def fetch(urls: Sequence[str], folder: Path) -> list[Path]:
     """Bring a recording to a folder; return its paths there.
 

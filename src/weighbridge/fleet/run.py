@@ -161,6 +161,7 @@ def run_fleet(
             with connected(how.scheduler, how.workers, how.memory) as client:
                 count = run_jobs(client, jobs, teller)
                 if how.learn is not None and how.tickets is not None:
+                    teller.settle()
                     shelf = Vehicles(vehicles, how.kind, how.mapping)
                     learn_fleet(
                         client,
@@ -209,6 +210,7 @@ def prepared(
             yield _jobs_of(chain([first], found), shelf, results, how, known, databases)
         finally:
             results.gather()
+            results.settle()
             if known is not None:
                 known.unlink(missing_ok=True)
 
@@ -254,7 +256,8 @@ def _whole_path(recording: Recording) -> Recording:
 def _known_file(results: Results) -> Path | None:
     """Write the keys that are there already for the workers; None where none is."""
     results.gather()
-    keys = results.known_keys()
+    results.settle()
+    keys = results.known_places()
     if not keys:
         return None
     from weighbridge.whole import write_whole
@@ -285,6 +288,13 @@ class _Teller:
             self._write(ended=False)
             if count.done - self._gathered >= _GATHER:
                 self._gather()
+
+    def settle(self) -> None:
+        """Wait for the gathering, and leave the rows that count."""
+        if self._gathering is not None:
+            self._gathering.result()
+        self._results.gather()
+        self._results.settle()
 
     def ended(self) -> None:
         """Wait for the gathering, and say that the run is over."""
