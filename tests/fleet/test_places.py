@@ -1,16 +1,19 @@
 """Every recording counts once for its vehicle, at the place where the last run found it."""
 
 import shutil
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 import polars as pl
 import pytest
 
 from tests.fleet.fleets import compared, copy_of, tiny_drive, tiny_fleet
-from weighbridge.fleet import read_drives, read_segments
+from weighbridge.errors import ConfigError
+from weighbridge.fleet import read_drives, read_segments, write_delta
 from weighbridge.fleet.job import weigh_job
 from weighbridge.fleet.run import FleetSettings, prepared
-from weighbridge.fleet.store import Results
+from weighbridge.fleet.schema import PART
+from weighbridge.fleet.store import Results, write_part
 
 
 def run(home: Path, *given, vehicles="vehicles", **how) -> pl.DataFrame:
@@ -179,3 +182,53 @@ def test_a_kill_before_the_tables_are_settled_is_made_good_by_the_next_run(tmp_p
     rows = run(tmp_path, "drives/van0")
     assert rows.height == 4
     assert rows["copies"].list.len().sum() == 1
+
+
+def test_delta_tables_follow_the_results(tmp_path):
+    """A lake has what counts, also of segments and of other results."""
+    deltalake = pytest.importorskip("deltalake")
+    results = {name: Results.begun(tmp_path / name) for name in ("one", "two")}
+    lake = tmp_path / "lake"
+
+    def put(name, key, content, vehicle, place, *, at):
+        day = date(2026, 5, at)
+        row = dict.fromkeys(PART) | {
+            "key": key, "part": 0, "content": content, "vehicle_id": vehicle, "date": day,
+            "source": str(tmp_path / place), "outcome": "weighed",
+            "weighed_at": datetime(2026, 5, at, tzinfo=UTC),
+            "segments": [{"segment": k, "mass_kg": 1000.0} for k in range(2)],
+        }  # fmt: skip
+        (tmp_path / place).touch()
+        write_part(results[name].folder, key, [row])
+
+    def written(name):
+        results[name].gather()
+        results[name].settle()
+        write_delta(tmp_path / name, lake)
+        found = [
+            pl.from_arrow(deltalake.DeltaTable(str(lake / table)).to_pyarrow_table())
+            for table in ("drives", "segments")
+        ]
+        assert sorted(found[1]["key"]) == sorted([*found[0]["key"]] * 2)
+        assert found[0].schema["date"] == pl.Date
+        return sorted(found[0].select("key", "vehicle_id").rows())
+
+    put("one", "a1", "a", "van1", "a", at=1)
+    put("one", "b1", "b", "van1", "b", at=1)
+    assert written("one") == [("a1", "van1"), ("b1", "van1")]
+    put("two", "c1", "c", "van1", "c", at=1)
+    assert written("two") == [("a1", "van1"), ("b1", "van1"), ("c1", "van1")]
+    (tmp_path / "a").unlink()
+    put("one", "a2", "a", "van2", "moved", at=2)
+    put("one", "b2", "b", "van1", "b", at=3)
+    for _ in range(2):
+        assert written("one") == [("a2", "van2"), ("b2", "van1"), ("c1", "van1")]
+    put("one", "b3", "b", "van3", "other", at=4)
+    written("one")
+    rows = pl.from_arrow(deltalake.DeltaTable(str(lake / "drives")).to_pyarrow_table())
+    assert rows.filter(key="b2")["also_vehicles"].to_list() == [["van3"]]
+    shutil.rmtree(lake)
+    old = read_drives(tmp_path / "one").drop("content").collect()
+    deltalake.write_deltalake(str(lake / "drives"), old)
+    with pytest.raises(ConfigError, match="another version of weighbridge"):
+        write_delta(tmp_path / "one", lake)
