@@ -1,5 +1,7 @@
 """The command ``weighbridge fleet``."""
 
+import json
+import shutil
 import threading
 
 import pytest
@@ -60,6 +62,28 @@ def test_a_run_its_status_and_a_second_run(weighbridge, fleet, address, tmp_path
     again = weighbridge("fleet", "--vehicles", cars, "-o", results, "--scheduler", address, drives)
     assert "0 recordings weighed" in again.out
     assert "6 were there already" in again.out
+
+
+def test_the_summaries_name_vehicles_without_a_file_and_copies(weighbridge, address, tmp_path):
+    drives, cars = tiny_fleet(tmp_path, 5, 5)
+    for k in range(1, 5):
+        (cars / f"van{k}.toml").unlink()
+    shutil.copytree(drives / "van0" / "trip-0000", drives / "van0" / "copy")
+    shutil.copytree(drives / "van0" / "trip-0000", drives / "van1" / "trip")
+    results, told = tmp_path / "r", tmp_path / "fleet.json"
+    words = (drives, "--vehicles", cars, "-o", results, "--scheduler", address)
+    ran = weighbridge("fleet", *words)
+    page = tmp_path / "fleet.html"
+    shown = weighbridge("fleet", "report", results, "-o", page, "--json", told)
+    for out in (ran.out, weighbridge("fleet", "status", results).out, shown.out):
+        assert "4 of 5 vehicles without a file" in out
+        assert "van1, van2, van3 and 1 more" in out
+    assert "1 copy of recordings of the same vehicle" in ran.out
+    assert "2 recordings also under another vehicle" in ran.out
+    assert "4: van1, van2, van3 and 1 more" in page.read_text()
+    without = [f"van{k}" for k in range(1, 5)]
+    found = json.loads(told.read_text())
+    assert (found["vehicles_without_file"], found["totals"]["without_file"]) == (without, 4)
 
 
 def test_a_drive_that_cannot_be_read_is_exit_status_2(weighbridge, fleet, address, tmp_path):

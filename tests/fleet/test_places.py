@@ -232,3 +232,30 @@ def test_delta_tables_follow_the_results(tmp_path):
     deltalake.write_deltalake(str(lake / "drives"), old)
     with pytest.raises(ConfigError, match="another version of weighbridge"):
         write_delta(tmp_path / "one", lake)
+
+
+def test_a_folder_without_a_file_of_the_fleet_is_refused(tmp_path):
+    _, cars = tiny_fleet(tmp_path, 6, 6)
+    (tmp_path / "wrong").mkdir()
+    shutil.copy(cars / "van0.toml", tmp_path / "wrong" / "bus.toml")
+    (tmp_path / "empty").mkdir()
+    told = (
+        r"no vehicle of the fleet has a file there: the drives are of van0, van1, van2 and 3 more"
+    )
+    with pytest.raises(ConfigError, match=rf"{told}, the files of bus; .*--class car"):
+        run(tmp_path, vehicles="wrong")
+    with pytest.raises(ConfigError, match=f"{told}, the files of none"):
+        run(tmp_path, vehicles="empty")
+    assert not (tmp_path / "results").exists()
+    assert set(run(tmp_path, vehicles="wrong", kind="van")["vehicle_class"]) == {"van"}
+
+
+def test_one_vehicle_with_a_file_or_a_class_of_a_table_is_enough(tmp_path):
+    _, cars = tiny_fleet(tmp_path, 2, 2)
+    (cars / "van0.toml").unlink()
+    rows = run(tmp_path)
+    assert rows.sort("vehicle_id")["vehicle_file"].to_list() == [None, "van1.toml"]
+    (cars / "van1.toml").unlink()
+    (tmp_path / "drives.csv").write_text("files,class\ndrives/van0/trip-0000,bus\n")
+    rows = run(tmp_path, "drives.csv").filter(vehicle_id="van0")
+    assert rows["vehicle_class"].to_list() == ["bus"]

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from itertools import islice
 from pathlib import Path
+from typing import Final
 
 from weighbridge.io.formats import is_log
 from weighbridge.io.info import FILE_NAME as INFO_NAME
 from weighbridge.io.parts import SUFFIX as PARTS
 from weighbridge.io.read import TRUTH_NAME
 from weighbridge.signals.catalogue import TABLES
+
+_SHOWN: Final = 3
+
+
+def some(names: Collection[str | None]) -> str:
+    """Return the first few names as a text, and how many more there are."""
+    first = ", ".join(name or "no name" for name in islice(names, _SHOWN))
+    more = len(names) - _SHOWN
+    return first + (f" and {more} more" if more > 0 else "")
 
 
 def is_table_name(name: str) -> bool:

@@ -14,6 +14,7 @@ from typing import Any, Final
 import polars as pl
 
 from weighbridge.fleet import remote
+from weighbridge.fleet.names import some
 from weighbridge.fleet.schema import DRIVES, FAILED
 from weighbridge.messages import Problem
 
@@ -21,7 +22,6 @@ HEAD: Final = ("key", "source", "copies", "content", "vehicle_id", "outcome", "w
 """Columns of the table of drives that decide which of its rows count."""
 
 _STATE: Final = ("source", "copies", "also_vehicles")
-_SHOWN: Final = 3  # places or vehicles that a note names
 
 FOUND: Final[dict[str, Any]] = {
     "key": pl.String(),
@@ -147,15 +147,10 @@ def _noted(keys: pl.DataFrame) -> pl.DataFrame:
     for _, _, copies, also in keys.iter_rows():
         own = []
         if also:
-            own.append(Problem.of(SHARED, vehicles=_some([v or "none" for v in also])))
+            own.append(Problem.of(SHARED, vehicles=some(also)))
         if copies:
-            own.append(Problem.of(COPIED, count=len(copies), places=_some(copies)))
+            own.append(Problem.of(COPIED, count=len(copies), places=some(copies)))
         notes.append([problem.text for problem in own])
         ids.append([problem.id for problem in own])
     texts = pl.List(pl.String())
     return keys.with_columns(pl.Series("notes", notes, texts), pl.Series("note_ids", ids, texts))
-
-
-def _some(names: list[str]) -> str:
-    more = len(names) - _SHOWN
-    return ", ".join(names[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
