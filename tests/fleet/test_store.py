@@ -58,7 +58,7 @@ def test_rows_are_the_same_before_and_after_gathering(results):
     assert [f.parent.name for f in results.table_files("drives")] == [
         "day=2026-05-01",
         "day=2026-05-02",
-        "day=__HIVE_DEFAULT_PARTITION__",
+        "day=unknown",
     ]
     assert results.known_keys() == {"aa", "bb", "cc"}
 

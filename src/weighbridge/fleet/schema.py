@@ -21,8 +21,8 @@ a text; tables of 2 lack ids of messages."""
 DAY: Final = "day"
 """Name of the partitions: no column of the tables has it, so that no reader finds two types."""
 
-UNKNOWN_DATE: Final = "__HIVE_DEFAULT_PARTITION__"
-"""Partition of drives without a date, as Hive names it: readers take it for null."""
+UNKNOWN_DATE: Final = "unknown"
+"""Partition of drives without a date. Hive's own name for null makes pandas fail."""
 
 
 PERIOD: Final = 300.0
