@@ -3,6 +3,7 @@
 import json
 import shutil
 import threading
+from importlib.util import find_spec
 
 import pytest
 from tests.fleet.fleets import tiny_fleet
@@ -129,6 +130,21 @@ def test_a_scheduler_without_a_worker_is_told(weighbridge, fleet, tmp_path, monk
         (("{drives}", "--vehicles", "{new}", "-o", "{new}"), "no such folder"),
         (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--class", "boat"), "class must be"),
         (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--workers", "0"), "1 or more"),
+        (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--memory", "lots"), "'1 GB'"),
+        (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--memory", "nan"), "'1 GB'"),
+        (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--memory", "5 kB"), "100 MB or more"),
+        *(
+            (
+                ("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--scheduler", address),
+                f"such as tcp://10.0.0.5:8786, got {address!r}",
+            )
+            for address in ("nonsense", "foo://bar:1", "tcp://10.0.0.5:x", "tcp://:1", "")
+        ),
+        pytest.param(
+            ("gs://bucket/drives/**", "--vehicles", "{cars}", "-o", "{new}"),
+            "pip install gcsfs",
+            marks=pytest.mark.skipif(find_spec("gcsfs") is not None, reason="gcsfs is installed"),
+        ),
         (("{drives}", "--vehicles", "{cars}"), "--output"),
         (("status", "{drives}"), "holds no results"),
         (("status",), "results"),
@@ -140,3 +156,4 @@ def test_a_mistake_is_one_line(weighbridge, fleet, tmp_path, words, told):
     ran = weighbridge("fleet", *(word.format(**given) for word in words))
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert told in ran.err
+    assert not (tmp_path / "new").exists()

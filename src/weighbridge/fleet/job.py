@@ -5,7 +5,6 @@ from __future__ import annotations
 import bisect
 import contextlib
 import socket
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -211,7 +210,7 @@ def local_paths(recording: Recording) -> Iterator[list[Path]]:
     if not any(remote.is_url(path) for path in recording.paths):
         yield [Path(path) for path in recording.paths]
         return
-    with tempfile.TemporaryDirectory(prefix="weighbridge-") as home:
+    with remote.home() as home:
         yield remote.fetch(recording.paths, Path(home))
 
 
@@ -243,6 +242,9 @@ def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
             vehicle = job.assigned.as_vehicle(drive)
             weighed = weigh(drive, vehicle, job.method, settings=job.settings or None)
             row = _row(job, WEIGHED) | row_of(weighed)
+            urls = job.recording.paths
+            row["reason"] = remote.by_url(row["reason"], urls)
+            row["warnings"] = [remote.by_url(text, urls) for text in row["warnings"]]
         except WeighbridgeError as error:
             row = _row(job, UNREAD, Problem.from_error(error)) | {
                 "drive": drive.name,
@@ -275,7 +277,8 @@ def _row(job: Job, outcome: str, reason: Problem | None = None) -> dict[str, Any
     vehicle = assigned.vehicle
     called = vehicle.name if vehicle is not None else assigned.id or assigned.kind
     if reason is not None:
-        reason = replace(reason, text=visible(reason.text))
+        text = remote.by_url(reason.text, job.recording.paths)
+        reason = replace(reason, text=visible(text))
     row = answer(unread_row(visible(name), called, job.method, reason))
     return {
         **row,

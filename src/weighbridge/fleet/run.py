@@ -155,8 +155,9 @@ def run_fleet(
 
     However it ends, what was weighed is in the results.
     """
-    from weighbridge.fleet.cluster import connected
+    from weighbridge.fleet.cluster import check_cluster, connected
 
+    check_cluster(how.scheduler, how.workers, how.memory)
     with prepared(given, vehicles, folder, how) as jobs:
         teller = _Teller(Results(folder), tell)
         try:
