@@ -1,6 +1,9 @@
 """The command ``weighbridge fleet``."""
 
+import json
+import shutil
 import threading
+from importlib.util import find_spec
 
 import pytest
 from tests.fleet.fleets import tiny_fleet
@@ -62,6 +65,28 @@ def test_a_run_its_status_and_a_second_run(weighbridge, fleet, address, tmp_path
     assert "6 were there already" in again.out
 
 
+def test_the_summaries_name_vehicles_without_a_file_and_copies(weighbridge, address, tmp_path):
+    drives, cars = tiny_fleet(tmp_path, 5, 5)
+    for k in range(1, 5):
+        (cars / f"van{k}.toml").unlink()
+    shutil.copytree(drives / "van0" / "trip-0000", drives / "van0" / "copy")
+    shutil.copytree(drives / "van0" / "trip-0000", drives / "van1" / "trip")
+    results, told = tmp_path / "r", tmp_path / "fleet.json"
+    words = (drives, "--vehicles", cars, "-o", results, "--scheduler", address)
+    ran = weighbridge("fleet", *words)
+    page = tmp_path / "fleet.html"
+    shown = weighbridge("fleet", "report", results, "-o", page, "--json", told)
+    for out in (ran.out, weighbridge("fleet", "status", results).out, shown.out):
+        assert "4 of 5 vehicles without a file" in out
+        assert "van1, van2, van3 and 1 more" in out
+    assert "1 copy of recordings of the same vehicle" in ran.out
+    assert "2 recordings also under another vehicle" in ran.out
+    assert "4: van1, van2, van3 and 1 more" in page.read_text()
+    without = [f"van{k}" for k in range(1, 5)]
+    found = json.loads(told.read_text())
+    assert (found["vehicles_without_file"], found["totals"]["without_file"]) == (without, 4)
+
+
 def test_a_drive_that_cannot_be_read_is_exit_status_2(weighbridge, fleet, address, tmp_path):
     _, cars = fleet
     (tmp_path / "van0").mkdir()
@@ -105,6 +130,21 @@ def test_a_scheduler_without_a_worker_is_told(weighbridge, fleet, tmp_path, monk
         (("{drives}", "--vehicles", "{new}", "-o", "{new}"), "no such folder"),
         (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--class", "boat"), "class must be"),
         (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--workers", "0"), "1 or more"),
+        (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--memory", "lots"), "'1 GB'"),
+        (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--memory", "nan"), "'1 GB'"),
+        (("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--memory", "5 kB"), "100 MB or more"),
+        *(
+            (
+                ("{drives}", "--vehicles", "{cars}", "-o", "{new}", "--scheduler", address),
+                f"such as tcp://10.0.0.5:8786, got {address!r}",
+            )
+            for address in ("nonsense", "foo://bar:1", "tcp://10.0.0.5:x", "tcp://:1", "")
+        ),
+        pytest.param(
+            ("gs://bucket/drives/**", "--vehicles", "{cars}", "-o", "{new}"),
+            "pip install gcsfs",
+            marks=pytest.mark.skipif(find_spec("gcsfs") is not None, reason="gcsfs is installed"),
+        ),
         (("{drives}", "--vehicles", "{cars}"), "--output"),
         (("status", "{drives}"), "holds no results"),
         (("status",), "results"),
@@ -116,3 +156,4 @@ def test_a_mistake_is_one_line(weighbridge, fleet, tmp_path, words, told):
     ran = weighbridge("fleet", *(word.format(**given) for word in words))
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert told in ran.err
+    assert not (tmp_path / "new").exists()

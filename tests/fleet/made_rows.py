@@ -21,7 +21,7 @@ def drive(key, vehicle="truck1", *, start="2026-05-04T06:00:00+00:00", mass=None
         "vehicle_class": "truck",
         "tare_kg": 8000.0,
         "gross_kg": 18000.0,
-        "start": start,
+        "start": None if start is None else datetime.fromisoformat(start),
         "mass_kg": mass,
         "std_kg": std,
         "systematic_std_kg": None if std is None else 0.8 * std,

@@ -90,6 +90,27 @@ def test_a_drive_that_left_the_store_is_tried_again(store, tmp_path):
     assert weigh_job(job).outcome == "weighed"
 
 
+def test_a_reason_names_the_store_and_no_path_of_this_machine(store, tmp_path):
+    import tempfile
+
+    import fsspec
+
+    from weighbridge.fleet.job import weigh_job
+    from weighbridge.fleet.run import FleetSettings, prepared
+
+    _, cars = store
+    files = fsspec.filesystem("s3")
+    files.pipe("fleet/bad/van0/trip/obd.csv", b"time_s,vehicle_speed_kmh\n")
+    files.pipe("fleet/bad/van0/lone.csv", b"no,log\n1,2\n")
+    with prepared(["s3://fleet/bad/**"], cars, tmp_path / "results", FleetSettings()) as jobs:
+        for job in jobs:
+            weigh_job(job)
+    reasons = wb.fleet.read_drives(tmp_path / "results").collect()["reason"].sort()
+    assert not any(tempfile.gettempdir() in reason for reason in reasons)
+    assert reasons.str.contains("s3://fleet/bad/van0/lone.csv", literal=True).sum() == 1
+    assert reasons.len() == 2
+
+
 def test_what_is_brought_is_what_lies_there(store, tmp_path):
     drives, _ = store
     (found,) = remote.fetch(["s3://fleet/drives/van0/trip-0000"], tmp_path)

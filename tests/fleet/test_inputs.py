@@ -5,7 +5,7 @@ from dataclasses import replace
 import polars as pl
 import pytest
 
-from tests.fleet.fleets import tiny_drive
+from tests.fleet.fleets import tiny_drive, tiny_fleet
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.fleet.inputs import Recording, recordings
 from weighbridge.fleet.store import Results
@@ -202,3 +202,14 @@ def test_a_partition_tells_the_vehicle_and_its_files_are_one_drive(tmp_path, fol
     assert Vehicles(known).of(found[0].paths).id == vehicle
     if "=" in folder.name:
         assert [len(one.paths) for one in found] == [2]
+
+
+def test_a_readme_is_no_drive_and_no_vehicle(tmp_path):
+    drives, cars = tiny_fleet(tmp_path, 2, 2)
+    for folder in (drives, drives / "van0", cars):
+        for name in ("readme.txt", "README_first.txt", "LICENSE.txt"):
+            (folder / name).write_text("Please read me")
+    (drives / "van0" / "readmeter.csv").write_text("time_s\n")
+    found = [r.source.rpartition("/")[2] for r in recordings([str(tmp_path)])]
+    assert found == ["readmeter.csv", "trip-0000", "trip-0001"]
+    assert len(Vehicles(cars)) == 2

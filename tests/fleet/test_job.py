@@ -1,6 +1,7 @@
 """One recording to its rows: as `weigh` has them, and with a reason where there is none."""
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -172,7 +173,7 @@ def test_a_begin_that_the_table_of_drives_gives(tmp_path):
     )
     (job,) = jobs(tmp_path, tmp_path / "drives.csv", cars)
     (row,) = rows(job, weigh_job(job)).to_dicts()
-    assert row["start"].startswith("2026-07-08T09:00:00")
+    assert row["start"] == datetime(2026, 7, 8, 9, tzinfo=UTC)
     assert (str(row["date"]), row["vehicle_id"]) == ("2026-07-08", "van2")
 
 

@@ -115,7 +115,7 @@ def drive_row(key, hour, *, minutes=60, vehicle="van", changed=False):
         "key": key,
         "part": 0,
         "vehicle_id": vehicle,
-        "start": begin.isoformat(),
+        "start": begin,
         "unweighed_s": 0.0,
         "duration_s": 60.0 * minutes,
         "outcome": "weighed",

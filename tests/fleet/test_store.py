@@ -56,9 +56,9 @@ def test_rows_are_the_same_before_and_after_gathering(results):
     results.gather()
     assert keys(results) == [*before, ("cc", 0)]
     assert [f.parent.name for f in results.table_files("drives")] == [
-        "date=2026-05-01",
-        "date=2026-05-02",
-        "date=__HIVE_DEFAULT_PARTITION__",
+        "day=2026-05-01",
+        "day=2026-05-02",
+        "day=unknown",
     ]
     assert results.known_keys() == {"aa", "bb", "cc"}
 
@@ -179,7 +179,7 @@ def test_a_damaged_table_is_told_and_its_date_is_weighed_again(results, table, h
     with pytest.raises(ConfigError, match="is damaged") as told:
         collected(read(results.folder), results.folder)
     assert str(hurt) in str(told.value)
-    removed = re.findall(r"\S+/date=\S+?(?=,| and )", str(told.value).partition("remove")[2])
+    removed = re.findall(r"\S+/day=\S+?(?=,| and )", str(told.value).partition("remove")[2])
     assert [Path(p).parent.name for p in removed] == ["drives", "segments"]
     for folder in removed:
         shutil.rmtree(folder)
@@ -226,14 +226,26 @@ def test_one_run_at_a_time(results):
     assert not other.running
 
 
-def test_results_of_version_2_are_read_and_not_written_to(results):
-    write_part(results.folder, "aa", [row("aa")])
+@pytest.mark.parametrize("version", [2, 3])
+def test_results_of_earlier_versions_are_read_and_not_written_to(results, version):
+    begun = datetime(2026, 5, 1, 6, 30, tzinfo=UTC)
+    write_part(results.folder, "aa", [row("aa") | {"start": begun, "vehicle_id": "van1"}])
     results.gather()
     (file,) = results.table_files("drives")
-    pl.read_parquet(file).drop("reason_id", "problem_ids").write_parquet(file)
+    lacks = ["content", "copies", "also_vehicles", *["reason_id", "problem_ids"] * (version == 2)]
+    text = pl.lit("2026-05-01T08:30:00.000+02:00").alias("start")
+    pl.read_parquet(file).drop(lacks).with_columns(text).write_parquet(file)
+    (file,) = results.table_files("segments")
+    pl.read_parquet(file).drop("vehicle_id").write_parquet(file)
+    for table in ("drives", "segments"):
+        home = results.folder / table
+        (home / "day=2026-05-01").rename(home / "date=2026-05-01")
     mark = results.folder / store_module.MARK
-    mark.write_text('{"format_version": 2}\n')
+    mark.write_text(f'{{"format_version": {version}}}\n')
     (found,) = read_drives(results.folder).collect().to_dicts()
-    assert (found["key"], found["reason_id"], found["problem_ids"]) == ("aa", None, None)
-    with pytest.raises(ConfigError, match="results of format 2"):
+    assert (found["key"], found["start"]) == ("aa", begun)
+    assert (found["reason_id"], found["problem_ids"], found["copies"]) == (None, None, [])
+    segments = read_segments(results.folder).collect()
+    assert segments["vehicle_id"].to_list() == ["van1", "van1"]
+    with pytest.raises(ConfigError, match=f"results of format {version}"):
         Results.begun(results.folder)

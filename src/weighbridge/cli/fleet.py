@@ -93,7 +93,12 @@ _Memory = Annotated[
     typer.Option("--memory", help="Memory limit of each process, such as '1 GB'."),
 ]
 _Kind = Annotated[
-    str, typer.Option("--class", help="Class of vehicles that have no file: car, van, bus, truck.")
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--class",
+        help="Class of vehicles that have no file: car, van, bus, truck; car by default. Needed "
+        "where none has one.",
+    ),
 ]
 _Learn = Annotated[
     Optional[Path],  # noqa: UP045
@@ -121,7 +126,7 @@ def run(
     scheduler: _Scheduler = None,
     workers: _Workers = None,
     memory: _Memory = None,
-    kind: _Kind = "car",
+    kind: _Kind = None,
     method: Annotated[str, typer.Option("--method", help="Estimator.")] = "joint",
     changes: _Changes = None,
     learn: _Learn = None,
@@ -205,13 +210,22 @@ def _summary(folder: Path) -> dict[str, Any]:
 
     from weighbridge.fleet.reading import collected, read_drives
 
-    rows = read_drives(folder).select("outcome", "status", "reason", "mass_kg", "vehicle_id")
+    rows = read_drives(folder).select(
+        "key", "outcome", "status", "reason", "mass_kg", "vehicle_id", "vehicle_file", "copies",
+        "also_vehicles",
+    )  # fmt: skip
     frame = collected(rows, folder)
+    has_file = pl.col("vehicle_file").is_not_null().any()
+    vehicles = frame.group_by("vehicle_id").agg(has_file=has_file)
+    recordings = frame.unique("key")
     without = frame.filter((pl.col("outcome") == "weighed") & pl.col("mass_kg").is_null())
     reasons = frame.filter(pl.col("reason") != "")["reason"].value_counts(sort=True)
     return {
         "drives": frame.height,
-        "vehicles": frame["vehicle_id"].n_unique(),
+        "vehicles": vehicles.height,
+        "without_file": vehicles.filter(~pl.col("has_file"))["vehicle_id"].sort().to_list(),
+        "copies": int(recordings["copies"].list.len().sum()),
+        "shared": recordings.filter(pl.col("also_vehicles").list.len() > 0).height,
         "masses": int(frame["mass_kg"].is_not_null().sum()),
         "unread": frame.filter(pl.col("outcome") == "unread").height,
         "failed": frame.filter(pl.col("outcome") == "failed").height,
@@ -233,8 +247,23 @@ def _say_summary(found: dict[str, Any]) -> None:
         + "".join(f", {count} {name}" for name, count in found["status"].items())
         + "".join(f", {found[name]} {name}" for name in ("unread", "failed") if found[name])
     )
+    fleet_report.say_without_file(found["without_file"], found["vehicles"])
+    if found["copies"]:
+        say(
+            f"{_count(found['copies'], 'copy', 'copies')} of recordings of the same vehicle: each "
+            "recording counts once"
+        )
+    if found["shared"]:
+        say(
+            f"{_count(found['shared'], 'recording')} also under another vehicle: counted for each, "
+            "right for one at most"
+        )
     for reason, count in found["reasons"]:
         say(f"  {count} x {reason}")
+
+
+def _count(number: int, word: str, words: str | None = None) -> str:
+    return f"{number} {word if number == 1 else words or word + 's'}"
 
 
 def _say_learnt(results: Path, learn: Path) -> None:

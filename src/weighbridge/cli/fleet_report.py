@@ -110,6 +110,7 @@ def _say_answer(found: FleetReport, alarm: float) -> None:
 
     t = found.totals
     say(f"{t['drives']} drives of {t['vehicles']} vehicles, {t['distance_km']:.0f} km")
+    say_without_file(found.without_file, t["vehicles"])
     sure = "1 leg" if t["alarms"] == 1 else f"{t['alarms']} legs"
     say(f"overloaded: {sure} at least {100 * alarm:g} % sure, {t['warnings']} likely")
     for row in found.overloads.head(_TOLD).iter_rows(named=True):
@@ -122,6 +123,17 @@ def _say_answer(found: FleetReport, alarm: float) -> None:
     more = found.overloads.height - _TOLD
     if more > 0:
         say(f"  and {more} more, surest first: -o fleet.html has all")
+
+
+def say_without_file(without: list[str | None], vehicles: int) -> None:
+    """Tell how many vehicles have no file, and the first of them."""
+    from weighbridge.fleet.names import some
+
+    if without:
+        say(
+            f"{len(without)} of {vehicles} vehicles without a file, weighed by the data sheet of "
+            f"a class, roughly: {some(without)}"
+        )
 
 
 def _say_outside(outside: pl.DataFrame) -> None:

@@ -8,11 +8,14 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 from weighbridge.errors import ConfigError, MissingExtraError
+from weighbridge.visible import visible
 
 if TYPE_CHECKING:
     from distributed import Client
 
 _CONNECT: Final = 5.0  # wait for a scheduler [s]
+
+_LEAST_MEMORY: Final = 100_000_000  # of a worker: it needs more to begin [B]
 
 _CLOSE: Final = 30.0  # wait for workers to end [s]
 
@@ -39,6 +42,67 @@ SETTINGS: Final[dict[str, Any]] = {
 """Settings of Dask for a cluster of this machine; docs/fleet.md has those of others."""
 
 
+def check_cluster(scheduler: str | None, workers: int | None, memory: str | None) -> None:
+    """Raise where a cluster cannot be; see `connected`.
+
+    Raises
+    ------
+    MissingExtraError
+        Dask is not installed.
+    ConfigError
+        The address is none, or a number is impossible.
+    """
+    try:
+        import distributed  # noqa: F401
+    except ImportError:
+        raise MissingExtraError("distributed", "fleet", "weighing a fleet") from None
+    if scheduler is not None:
+        if workers is not None or memory is not None:
+            raise ConfigError(
+                "workers and their memory are those of the scheduler's cluster; leave them out"
+            )
+        _check_address(scheduler)
+    if workers is not None and workers < 1:
+        raise ConfigError(f"workers must be 1 or more, got {workers}")
+    if memory is not None:
+        _check_memory(memory)
+
+
+def _check_address(scheduler: str) -> None:
+    """Raise what Dask tells with a traceback, after it waited for nothing."""
+    from distributed.comm.addressing import parse_address, parse_host_port
+    from distributed.comm.registry import backends
+
+    try:
+        scheme, place = parse_address(scheduler)
+        known = scheme in backends
+        if known and scheme != "inproc":
+            host, _ = parse_host_port(place)
+            known = bool(host)
+    except ValueError:
+        known = False
+    if not known:
+        raise ConfigError(
+            f"scheduler must be an address such as tcp://10.0.0.5:8786, got {visible(scheduler)!r}"
+        )
+
+
+def _check_memory(memory: str) -> None:
+    from distributed.worker_memory import parse_memory_limit
+
+    try:
+        limit = parse_memory_limit(memory, 1, logger=logging.getLogger(__name__))
+    except (ValueError, OverflowError, TypeError):
+        raise ConfigError(
+            f"memory must be a size such as '1 GB', got {visible(memory)!r}"
+        ) from None
+    if limit is not None and limit < _LEAST_MEMORY:
+        raise ConfigError(
+            f"memory must be {_LEAST_MEMORY / 1e6:.0f} MB or more, or no worker starts, got "
+            f"{visible(memory)!r}"
+        )
+
+
 @contextlib.contextmanager
 def connected(scheduler: str | None, workers: int | None, memory: str | None) -> Iterator[Client]:
     """Give a client of a cluster; one of this machine ends with the block.
@@ -56,10 +120,7 @@ def connected(scheduler: str | None, workers: int | None, memory: str | None) ->
     ConfigError
         Nobody answers at the address, or a number is impossible.
     """
-    try:
-        import distributed  # noqa: F401
-    except ImportError:
-        raise MissingExtraError("distributed", "fleet", "weighing a fleet") from None
+    check_cluster(scheduler, workers, memory)
     with _quiet():
         yield from _client(scheduler, workers, memory)
 
@@ -69,10 +130,6 @@ def _client(scheduler: str | None, workers: int | None, memory: str | None) -> I
     from distributed import Client, LocalCluster
 
     if scheduler is not None:
-        if workers is not None or memory is not None:
-            raise ConfigError(
-                "workers and their memory are those of the scheduler's cluster; leave them out"
-            )
         try:
             client = Client(scheduler, timeout=_CONNECT, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
@@ -82,8 +139,6 @@ def _client(scheduler: str | None, workers: int | None, memory: str | None) -> I
         with contextlib.closing(client):
             yield client
         return
-    if workers is not None and workers < 1:
-        raise ConfigError(f"workers must be 1 or more, got {workers}")
     with dask.config.set(SETTINGS):
         cluster = LocalCluster(
             n_workers=workers,

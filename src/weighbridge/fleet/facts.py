@@ -37,7 +37,7 @@ def answer(row: WeighingRow) -> dict[str, Any]:
     return {
         "drive": row.drive,
         "vehicle": row.vehicle,
-        "start": row.start,
+        "start": instant_of(row.start),
         "date": _date(row.start),
         "method": row.method,
         "status": str(row.status),
@@ -70,7 +70,7 @@ def weighing_row(drive: Mapping[str, Any], segments: Sequence[Mapping[str, Any]]
     return WeighingRow(
         drive=drive["drive"],
         vehicle=drive["vehicle"],
-        start=drive["start"],
+        start=_text(drive["start"]),
         method=drive["method"],
         status=Status(drive["status"]),
         refusal=_problem(drive["reason_id"], drive["reason"]) if drive["reason"] else None,
@@ -170,8 +170,21 @@ def _running(weighed: Weighing, begin: float | None, bare: Sequence[Span]) -> di
     return {"first_mass_s": max(float(came[0]) - begin, 0.0) if came.size else None, **found}
 
 
+def instant_of(start: str | None) -> datetime | None:
+    """Return a text of ISO 8601 as an instant in UTC, which is its zone where it names none."""
+    if start is None:
+        return None
+    found = datetime.fromisoformat(start)
+    return (found if found.tzinfo is not None else found.replace(tzinfo=UTC)).astimezone(UTC)
+
+
 def _date(start: str | None) -> Any:
-    return None if start is None else datetime.fromisoformat(start).astimezone(UTC).date()
+    found = instant_of(start)
+    return None if found is None else found.date()
+
+
+def _text(start: datetime | None) -> str | None:
+    return None if start is None else start.isoformat(timespec="milliseconds")
 
 
 def _number(value: float) -> float | None:

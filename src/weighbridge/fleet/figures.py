@@ -229,7 +229,8 @@ def speed_mass(
     )
     numbered = pl.int_ranges(pl.col("period_km").list.len()).alias("number")
     periods = (
-        segments.join(of, on=["key", "part"])
+        segments.drop("vehicle_id", strict=False)
+        .join(of, on=["key", "part"])
         .with_columns(numbered)
         .explode("period_km", "number")
         .drop_nulls("period_km")

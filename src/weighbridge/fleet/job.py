@@ -5,7 +5,6 @@ from __future__ import annotations
 import bisect
 import contextlib
 import socket
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,11 +18,12 @@ from weighbridge.fleet import remote
 from weighbridge.fleet.inputs import Recording
 from weighbridge.fleet.keys import content_digest, text_digest
 from weighbridge.fleet.schema import FAILED, FORMAT_VERSION, UNREAD, WEIGHED
-from weighbridge.fleet.store import part_path, write_part
+from weighbridge.fleet.store import part_path, place_of, write_found, write_part
 from weighbridge.fleet.vehicles import Assigned
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive
 from weighbridge.version import VERSION
+from weighbridge.visible import visible
 
 TRIES: Final = 3
 """How often a drive is tried where the machine fails, and not the data."""
@@ -43,7 +43,7 @@ class Job:
     dbc : databases of raw CAN logs, seen by all workers
     dbc_digest : of their content
     whole : take the recording as one drive
-    known : file of the keys that are there already; None where none is
+    known : file of the keys that are there already, each with its places; None where none is
     version, format_version : of weighbridge and of the tables, where the job was made
     """
 
@@ -101,10 +101,12 @@ def weigh_job(job: Job) -> Receipt:
     begin = time.perf_counter()
     rows: list[dict[str, Any]] = []
     key, tries = "", 1
+    content: str | None = None
     for tries in range(1, TRIES + 1):
         try:
             with local_paths(job.recording) as paths:
-                key = _key(job, content_digest(paths))
+                content = _content(job, content_digest(paths))
+                key = _key(job, content)
                 if _is_there(job, key):
                     return Receipt(key, THERE, 0, 0, time.perf_counter() - begin)
                 rows = _weighed(job, paths)
@@ -119,7 +121,13 @@ def weigh_job(job: Job) -> Receipt:
             rows = [_row(job, FAILED, failed)]
             if tries < TRIES:
                 time.sleep(_PAUSE * tries)
-    return _written(job, key, rows, tries, begin)
+    if rows[0]["outcome"] == FAILED:
+        content = None
+    elif part_path(Path(job.results), key).exists():
+        # A copy of it was weighed at the same time.
+        write_found(Path(job.results), key, visible(job.recording.source))
+        return Receipt(key, THERE, 0, 0, time.perf_counter() - begin)
+    return _written(job, key, [row | {"content": content} for row in rows], tries, begin)
 
 
 def fail_job(job: Job, reason: Problem) -> Receipt:
@@ -149,11 +157,18 @@ def failed_key(job: Job) -> str:
     return _key(job, text_digest(["no content", *job.recording.paths]))
 
 
+def _content(job: Job, digest: str) -> str:
+    """Digest of what a recording holds, and of when it began where only a table says that."""
+    start = job.recording.start
+    return digest if start is None else text_digest([digest, start])
+
+
 def _key(job: Job, content: str) -> str:
     settings = sorted((name, repr(value)) for name, value in job.settings.items())
     return text_digest(
         [
             content,
+            repr(job.assigned.id),
             job.assigned.digest,
             VERSION,
             str(FORMAT_VERSION),
@@ -167,19 +182,26 @@ def _key(job: Job, content: str) -> str:
 
 
 def _is_there(job: Job, key: str) -> bool:
-    if part_path(Path(job.results), key).exists():
-        return True
-    if job.known is None:
-        return False
-    keys = _known(job.known)
-    at = bisect.bisect_left(keys, key)
-    return at < len(keys) and keys[at] == key
+    """Tell whether a recording has its result; note the place where that is a new one."""
+    source = visible(job.recording.source)
+    if not part_path(Path(job.results), key).exists():
+        if job.known is None:
+            return False
+        keys, here = _known(job.known), place_of(key, source)
+        at = bisect.bisect_left(keys, key)
+        if at == len(keys) or not keys[at].startswith(key):
+            return False
+        at = bisect.bisect_left(keys, here)
+        if at < len(keys) and keys[at] == here:
+            return True
+    write_found(Path(job.results), key, source)
+    return True
 
 
 @lru_cache(maxsize=1)
 def _known(path: str) -> list[str]:
-    """Read the sorted keys once per run and worker."""
-    return Path(path).read_text(encoding="ascii").split()
+    """Read the sorted keys and places once per run and worker."""
+    return Path(path).read_text(encoding="ascii").splitlines()
 
 
 @contextlib.contextmanager
@@ -188,7 +210,7 @@ def local_paths(recording: Recording) -> Iterator[list[Path]]:
     if not any(remote.is_url(path) for path in recording.paths):
         yield [Path(path) for path in recording.paths]
         return
-    with tempfile.TemporaryDirectory(prefix="weighbridge-") as home:
+    with remote.home() as home:
         yield remote.fetch(recording.paths, Path(home))
 
 
@@ -220,6 +242,9 @@ def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
             vehicle = job.assigned.as_vehicle(drive)
             weighed = weigh(drive, vehicle, job.method, settings=job.settings or None)
             row = _row(job, WEIGHED) | row_of(weighed)
+            urls = job.recording.paths
+            row["reason"] = remote.by_url(row["reason"], urls)
+            row["warnings"] = [remote.by_url(text, urls) for text in row["warnings"]]
         except WeighbridgeError as error:
             row = _row(job, UNREAD, Problem.from_error(error)) | {
                 "drive": drive.name,
@@ -235,14 +260,16 @@ def _weighed(job: Job, paths: list[Path]) -> list[dict[str, Any]]:
 def _begin(began: str | None) -> dict[str, Any]:
     if began is None:
         return {}
-    return {"start": began, "date": datetime.fromisoformat(began).astimezone(UTC).date()}
+    from weighbridge.fleet.facts import instant_of
+
+    start = instant_of(began)
+    return {"start": start, "date": None if start is None else start.date()}
 
 
 def _row(job: Job, outcome: str, reason: Problem | None = None) -> dict[str, Any]:
     """Return the row of a drive that has no answer (yet)."""
     from weighbridge.fleet.facts import answer, of_vehicle
     from weighbridge.results.row import unread_row
-    from weighbridge.visible import visible
 
     assigned = job.assigned
     path = Path(job.recording.paths[0])
@@ -250,13 +277,16 @@ def _row(job: Job, outcome: str, reason: Problem | None = None) -> dict[str, Any
     vehicle = assigned.vehicle
     called = vehicle.name if vehicle is not None else assigned.id or assigned.kind
     if reason is not None:
-        reason = replace(reason, text=visible(reason.text))
+        text = remote.by_url(reason.text, job.recording.paths)
+        reason = replace(reason, text=visible(text))
     row = answer(unread_row(visible(name), called, job.method, reason))
     return {
         **row,
         **_begin(job.recording.start),
         **(of_vehicle(vehicle) if vehicle is not None else {"vehicle_class": assigned.kind}),
         "source": visible(job.recording.source),
+        "copies": [],
+        "also_vehicles": [],
         "outcome": outcome,
         "vehicle_id": assigned.id,
         "vehicle_file": assigned.file,

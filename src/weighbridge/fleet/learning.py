@@ -17,6 +17,7 @@ from weighbridge.fleet.engine import WORKER_DIED, SchedulerLost, scheduler_neede
 from weighbridge.fleet.inputs import Recording
 from weighbridge.fleet.job import TRIES, drives_of, local_paths, named_error
 from weighbridge.fleet.learnt import COLUMNS, LEARNT, SURE
+from weighbridge.fleet.remote import by_url
 from weighbridge.fleet.tickets import read_tickets, ticketed
 from weighbridge.fleet.vehicles import Assigned, Vehicles
 from weighbridge.messages import Problem
@@ -251,7 +252,10 @@ def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
             drive = _read(lesson, known)
             one = calibrate([drive], [known.known], vehicle=car)
         except (WeighbridgeError, OSError) as problem:
-            told.append(f"{Path(known.paths[0]).name} cannot be learnt from: {problem}")
+            told.append(
+                f"{Path(known.paths[0]).name} cannot be learnt from: "
+                f"{by_url(str(problem), known.paths)}"
+            )
             continue
         drives.append(drive)
         masses.append(known.known)

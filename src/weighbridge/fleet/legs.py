@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -17,7 +16,6 @@ from weighbridge.signals import Floats
 SURE: Final = 1.959964
 """Standard deviations of a change of load that is told: 95 % of a normal distribution."""
 
-_TIME: Final = pl.Datetime("us", "UTC")
 _POSITION: Final = tuple(
     f"{edge}_{axis}_deg" for edge in ("start", "end") for axis in ("latitude", "longitude")
 )
@@ -101,15 +99,14 @@ def legs(
     """
     limits = limits or Limits()
     check_limits(limits)
-    begun = drives.with_columns(instants(drives["start"]).alias("start"))
     drive_scale = pl.col("systematic_std_kg") / pl.col("mass_kg")
     kept: list[str | pl.Expr] = [*_OF_DRIVE, "start", drive_scale.alias("scale")]
     changed = pl.col("load_changed").fill_null(value=False)
     several = changed | (pl.col("unweighed_s") > 0.0).fill_null(value=False)
-    whole = begun.filter(~several).select(
+    whole = drives.filter(~several).select(
         *kept, *_OF_LEG, "duration_s", pl.lit(0, pl.Int32).alias("leg")
     )
-    of = begun.filter(several).select(
+    of = drives.filter(several).select(
         *kept, changed.alias("changed"),
         pl.col("mass_kg").alias("drive_mass"), pl.col("std_kg").alias("drive_std"),
     )  # fmt: skip
@@ -237,16 +234,6 @@ def load_changes(rows: pl.DataFrame) -> pl.DataFrame:
         "within_drive",
         kind.alias("kind"),
     )
-
-
-def instants(texts: pl.Series) -> pl.Series:
-    """Read ISO 8601 as instants, UTC where it names no zone; null stays null."""
-    found = [None if text is None else datetime.fromisoformat(text) for text in texts]
-    instants = [
-        None if t is None else (t if t.tzinfo else t.replace(tzinfo=UTC)).astimezone(UTC)
-        for t in found
-    ]
-    return pl.Series("start", instants, dtype=_TIME)
 
 
 def _seconds(value: pl.Expr) -> pl.Expr:

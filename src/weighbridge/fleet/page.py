@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import polars as pl
 
+from weighbridge.fleet.names import some
 from weighbridge.report.text import NOTHING
 from weighbridge.visible import visible
 from weighbridge.whole import write_whole
@@ -151,7 +152,8 @@ def _answer(report: FleetReport) -> str:
 def _facts(report: FleetReport) -> str:
     t = report.totals
     facts = (
-        ("vehicles", f"{t['vehicles']} ({t['without_file']} without a file)"),
+        ("vehicles", f"{t['vehicles']}"),
+        ("without a vehicle file", _without(report.without_file)),
         ("drives, legs", f"{t['drives']}, {t['legs']}"),
         ("driven", f"{_number(t['distance_km'])} km"),
         ("with a known mass", _share(t["known_share"])),
@@ -281,6 +283,11 @@ def _data(report: FleetReport) -> dict[str, Any]:
 def _cut(text: str) -> str:
     text = visible(text)
     return text if len(text) <= _LONGEST else text[:_LONGEST] + " …"
+
+
+def _without(vehicles: list[str | None]) -> str:
+    """How many vehicles have no file, and the first of them."""
+    return f"{len(vehicles)}" + (f": {_text(some(vehicles))}" if vehicles else "")
 
 
 def _text(text: str | None) -> str:

@@ -7,15 +7,17 @@ from pathlib import Path
 import polars as pl
 
 from weighbridge.arguments import check_path
+from weighbridge.fleet.places import HEAD, counted, standing
 from weighbridge.fleet.schema import DRIVES, SEGMENTS
-from weighbridge.fleet.store import TABLES, Results, check_end, read_parts
+from weighbridge.fleet.store import TABLES, Results, check_end, read_found, read_parts, timed
 
 
 def read_drives(results: str | Path) -> pl.LazyFrame:
     """Return one row per drive, as `weighbridge.fleet.schema.DRIVES` lists the columns.
 
-    Each drive is there once, also while a run writes, and after a kill. Where a recording or its
-    vehicle file was changed and weighed again, the last answer is there.
+    Each drive is there once for its vehicle, also while a run writes, and after a kill. Where a
+    recording or its vehicle file was changed and weighed again, the last answer is there. That a
+    recording was moved to another vehicle is known when the run has ended.
 
     Parameters
     ----------
@@ -27,9 +29,10 @@ def read_drives(results: str | Path) -> pl.LazyFrame:
         The folder holds no results, or a file of it was cut off.
     """
     check_path("results", results)
-    rows = _rows(Results.opened(Path(results)), "drives").select(list(DRIVES))
-    last = pl.col("weighed_at") == pl.col("weighed_at").max().over("source", "vehicle_id")
-    return rows.filter(last)
+    opened = Results.opened(Path(results))
+    rows = _rows(opened, "drives").select(list(DRIVES))
+    heads = collected(rows.select(HEAD), results)
+    return counted(rows, standing(heads, read_found(opened.folder)))
 
 
 def read_segments(results: str | Path) -> pl.LazyFrame:
@@ -45,8 +48,12 @@ def read_segments(results: str | Path) -> pl.LazyFrame:
         The folder holds no results, or a file of it was cut off.
     """
     check_path("results", results)
+    drives = read_drives(results).select("key", "part", _vehicle="vehicle_id")
     rows = _rows(Results.opened(Path(results)), "segments").select(list(SEGMENTS))
-    return rows.join(read_drives(results).select("key", "part"), on=["key", "part"], how="semi")
+    rows = rows.join(drives, on=["key", "part"], how="inner")
+    # Tables of version 3 lack it.
+    own = pl.coalesce("vehicle_id", "_vehicle").alias("vehicle_id")
+    return rows.with_columns(own).select(list(SEGMENTS))
 
 
 def collected(rows: pl.LazyFrame, results: str | Path) -> pl.DataFrame:
@@ -79,9 +86,9 @@ def _rows(results: Results, table: str) -> pl.LazyFrame:
     by: list[str] = [n for n in ("key", "part", "segment") if n in loose.columns]
     frames = [loose.lazy()]
     if files:
-        gathered = pl.scan_parquet(files, glob=False, hive_partitioning=False)
+        gathered = timed(pl.scan_parquet(files, glob=False, hive_partitioning=False))
         if loose.height:
             gathered = gathered.join(loose.lazy().select(by), on=by, how="anti")
         frames.append(gathered)
-    # Tables of version 2 lack columns.
+    # Tables of earlier versions lack columns.
     return pl.concat(frames, how="diagonal")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -12,6 +13,9 @@ from weighbridge.fleet.names import is_drive_name, is_table_name
 from weighbridge.visible import visible
 
 _URL: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
+
+
+_HOME: Final = "weighbridge-"
 
 
 def is_url(text: str) -> bool:
@@ -54,6 +58,37 @@ def drives(url: str, *, as_drive: bool) -> Iterator[str]:
     yield from (files.unstrip_protocol(path) for path in _grouped(below))
 
 
+def exists(url: str) -> bool:
+    """Tell whether something is behind a URL; true where the store cannot be asked."""
+    try:
+        files, path = _store(url)
+        return bool(files.exists(path))
+    except Exception:  # each store has errors of its own
+        return True
+
+
+def home() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder of this machine for what is brought; it goes with the block."""
+    return tempfile.TemporaryDirectory(prefix=_HOME)
+
+
+def by_url(text: str, urls: Sequence[str]) -> str:
+    """Name what was brought as the store has it: nobody finds it under its path of then.
+
+    Parameters
+    ----------
+    text : of a message
+    urls : that the message is about
+    """
+    if not is_url(urls[0]):
+        return text
+    above = _parent(urls[0].rstrip("/"))
+    folder = Path(tempfile.gettempdir())
+    for begin in {str(folder / _HOME), str(folder.resolve() / _HOME)}:
+        text = re.sub(rf"{re.escape(begin)}\w+", lambda _: above, text)
+    return text
+
+
 def fetch(urls: Sequence[str], folder: Path) -> list[Path]:
     """Bring a recording to a folder; return its paths there.
 
@@ -89,9 +124,11 @@ def _store(url: str) -> tuple[Any, str]:
     try:
         files, path = url_to_fs(url)
     except ImportError as error:
-        raise MissingExtraError(
-            error.name or "s3fs", "s3", f"reading {visible(url)} ({error})"
-        ) from None
+        package = error.name or getattr(error.__cause__, "name", None)
+        if package is None:
+            raise DriveError(f"{visible(url)} cannot be read: {error}") from None
+        extra = "s3" if package == "s3fs" else None
+        raise MissingExtraError(package, extra, f"reading {visible(url)}") from None
     except ValueError as error:
         raise DriveError(f"{url}: {error}") from None
     return files, path

@@ -57,6 +57,11 @@ class FleetReport:
     learnt: pl.DataFrame
 
     @property
+    def without_file(self) -> list[str | None]:
+        """Vehicles without a file: their masses are those of a data sheet."""
+        return self.vehicles.filter(~pl.col("has_file"))["vehicle_id"].sort().to_list()
+
+    @property
     def overloads(self) -> pl.DataFrame:
         """Legs that are told as overloaded, the surest first."""
         told = self.legs.filter(pl.col("level").is_in(["warn", "alarm"]))
@@ -67,6 +72,7 @@ class FleetReport:
         return {
             "limits": {**self.limits._asdict(), "tolerance": self.tolerance},
             "totals": self.totals,
+            "vehicles_without_file": self.without_file,
             "vehicles": _rows(self.vehicles),
             "overloads": _rows(self.overloads),
             "load_changes": _rows(self.changes),

@@ -17,6 +17,7 @@ from weighbridge.fleet.inputs import Recording, recordings, refuse_missing
 from weighbridge.fleet.job import Job
 from weighbridge.fleet.keys import file_digest, text_digest
 from weighbridge.fleet.learning import learn_fleet, refuse_output
+from weighbridge.fleet.names import some
 from weighbridge.fleet.remote import is_url, was_url
 from weighbridge.fleet.store import KEYS, Results
 from weighbridge.fleet.tickets import read_tickets
@@ -36,7 +37,7 @@ class FleetSettings:
     Attributes
     ----------
     method, settings : as of `weighbridge.weigh`
-    kind : class of vehicles without a file
+    kind : class of vehicles without a file; None for a car, if another vehicle has one
     mapping : for all logs; None for the one that each vehicle file names
     dbc : databases of raw CAN logs
     whole : take each recording as one drive
@@ -49,7 +50,7 @@ class FleetSettings:
 
     method: str = "joint"
     settings: Mapping[str, object] = field(default_factory=dict)
-    kind: str = "car"
+    kind: str | None = None
     mapping: Path | None = None
     dbc: tuple[str, ...] = ()
     whole: bool = False
@@ -80,7 +81,7 @@ def weigh_drives(
     *,
     method: str = "joint",
     settings: Mapping[str, object] | None = None,
-    kind: str = "car",
+    kind: str | None = None,
     mapping: str | Path | None = None,
     dbc: Sequence[str] = (),
     whole: bool = False,
@@ -99,7 +100,8 @@ def weigh_drives(
     vehicles : folder of vehicle files, each named after its vehicle
     results : folder that is written to; seen by all workers
     method, settings : as of `weighbridge.weigh`
-    kind : class of vehicles without a file, whose data sheet stands in
+    kind : class of vehicles without a file, whose data sheet is used; None for a car, if another
+        vehicle of the fleet has a file
     mapping : for all logs; None for the one that each vehicle file names
     dbc : databases of raw CAN logs
     whole : take each recording as one drive
@@ -153,14 +155,16 @@ def run_fleet(
 
     However it ends, what was weighed is in the results.
     """
-    from weighbridge.fleet.cluster import connected
+    from weighbridge.fleet.cluster import check_cluster, connected
 
+    check_cluster(how.scheduler, how.workers, how.memory)
     with prepared(given, vehicles, folder, how) as jobs:
         teller = _Teller(Results(folder), tell)
         try:
             with connected(how.scheduler, how.workers, how.memory) as client:
                 count = run_jobs(client, jobs, teller)
                 if how.learn is not None and how.tickets is not None:
+                    teller.settle()
                     shelf = Vehicles(vehicles, how.kind, how.mapping)
                     learn_fleet(
                         client,
@@ -197,7 +201,9 @@ def prepared(
         read_tickets(how.tickets)
     refuse_missing(given)
     found = recordings(given)
-    first = next(found)
+    found = chain([next(found)], found)
+    if how.kind is None:
+        found = _with_a_file(found, shelf, vehicles)
     if was_url(folder):
         raise ConfigError(f"{folder}: results go to a folder; mount the store, or copy them there")
     databases = _dbc_digest(how.dbc)
@@ -206,11 +212,36 @@ def prepared(
         results.clean()
         known = _known_file(results)
         try:
-            yield _jobs_of(chain([first], found), shelf, results, how, known, databases)
+            yield _jobs_of(found, shelf, results, how, known, databases)
         finally:
             results.gather()
+            results.settle()
             if known is not None:
                 known.unlink(missing_ok=True)
+
+
+def _with_a_file(found: Iterator[Recording], shelf: Vehicles, folder: Path) -> Iterator[Recording]:
+    """Raise where no vehicle of the fleet has a file, and no table says its class.
+
+    Raises
+    ------
+    ConfigError
+        So it is: the folder is another fleet's.
+    """
+    seen = []
+    names: dict[str | None, None] = {}
+    for recording in found:
+        seen.append(recording)
+        assigned = shelf.of(recording.paths, recording.vehicle, recording.kind)
+        if assigned.vehicle is not None or recording.kind is not None:
+            return chain(seen, found)
+        names[assigned.id] = None
+    files = [path.stem for path in shelf.files]
+    raise ConfigError(
+        f"{folder}: no vehicle of the fleet has a file there: the drives are of "
+        f"{some(names)}, the files of {some(files) if files else 'none'}; name the folder of their "
+        "files, or weigh all by the data sheet of a class: --class car"
+    )
 
 
 def _jobs_of(
@@ -254,7 +285,8 @@ def _whole_path(recording: Recording) -> Recording:
 def _known_file(results: Results) -> Path | None:
     """Write the keys that are there already for the workers; None where none is."""
     results.gather()
-    keys = results.known_keys()
+    results.settle()
+    keys = results.known_places()
     if not keys:
         return None
     from weighbridge.whole import write_whole
@@ -285,6 +317,13 @@ class _Teller:
             self._write(ended=False)
             if count.done - self._gathered >= _GATHER:
                 self._gather()
+
+    def settle(self) -> None:
+        """Wait for the gathering, and leave the rows that count."""
+        if self._gathering is not None:
+            self._gathering.result()
+        self._results.gather()
+        self._results.settle()
 
     def ended(self) -> None:
         """Wait for the gathering, and say that the run is over."""

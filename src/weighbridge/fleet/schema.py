@@ -11,14 +11,18 @@ from typing import Final, NamedTuple
 
 import polars as pl
 
-FORMAT_VERSION: Final = 3
+FORMAT_VERSION: Final = 4
 """Version of the tables; part of every key, so that another one weighs anew."""
 
-READABLE: Final = (2, FORMAT_VERSION)
-"""Versions that can be read: the tables of 2 lack ids of messages."""
+READABLE: Final = (2, 3, FORMAT_VERSION)
+"""Versions that can be read. Before 4, a recording was known by its content alone and ``start`` was
+a text; tables of 2 lack ids of messages."""
 
-UNKNOWN_DATE: Final = "__HIVE_DEFAULT_PARTITION__"
-"""Partition of drives without a date, as Hive names it: readers take it for null."""
+DAY: Final = "day"
+"""Name of the partitions: no column of the tables has it, so that no reader finds two types."""
+
+UNKNOWN_DATE: Final = "unknown"
+"""Partition of drives without a date. Hive's own name for null makes pandas fail."""
 
 
 PERIOD: Final = 300.0
@@ -44,10 +48,15 @@ _TIME: Final = pl.Datetime("us", "UTC")
 
 DRIVES: Final[dict[str, Column]] = {
     "key": Column(_TEXT, "digest of the recording's content, vehicle, method and version"),
+    "content": Column(_TEXT, "digest of the content, and of a begin that a table gives"),
     "part": Column(_COUNT, "which drive of its recording, from 0"),
     "parts": Column(_COUNT, "drives that its recording holds"),
-    "date": Column(pl.Date(), "day of the start in UTC; the partition"),
+    "date": Column(pl.Date(), "day of the start in UTC; the partition ``day`` has it, too"),
     "source": Column(_TEXT, "path or URL of the recording, as it was found"),
+    "copies": Column(pl.List(pl.String()), "other places of the vehicle with the same recording"),
+    "also_vehicles": Column(
+        pl.List(pl.String()), "other vehicles with the same recording: it counts for each"
+    ),
     "outcome": Column(_TEXT, "weighed, unread (bad data) or failed (three tries; tried again)"),
     "vehicle_id": Column(_TEXT, "id by which its vehicle file was found"),
     "vehicle_file": Column(_TEXT, "name of that file; null where the class's data sheet stood in"),
@@ -56,7 +65,7 @@ DRIVES: Final[dict[str, Column]] = {
     "gross_kg": Column(_NUMBER, "permitted mass, of its file"),
     "drive": Column(_TEXT, "name; from here to warnings as `weighbridge weigh` has it"),
     "vehicle": Column(_TEXT, "name in the vehicle file"),
-    "start": Column(_TEXT, "ISO 8601 in UTC"),
+    "start": Column(_TIME, "begin, in UTC"),
     "method": Column(_TEXT, "estimator"),
     "status": Column(_TEXT, "converged, not_excited, inconsistent or missing_signals"),
     "reason": Column(_TEXT, "why there is no mass; empty where there is"),
@@ -99,7 +108,8 @@ SEGMENTS: Final[dict[str, Column]] = {
     "key": Column(_TEXT, "as of the drive"),
     "part": Column(_COUNT, "as of the drive"),
     "segment": Column(_COUNT, "which segment, in order of time, from 0"),
-    "date": Column(pl.Date(), "as of the drive; the partition"),
+    "date": Column(pl.Date(), "as of the drive"),
+    "vehicle_id": Column(_TEXT, "as of the drive"),
     "start_s": Column(
         _NUMBER,
         "begin as `weigh` tells it, on the drive's clock; null where no force was usable from a "
@@ -126,7 +136,8 @@ UNREAD: Final = "unread"
 FAILED: Final = "failed"
 """Outcomes: of a drive that `weigh` answers, of one that it refuses, of one tried in vain."""
 
-_INNER: Final = tuple(name for name in SEGMENTS if name not in ("key", "part", "date"))
+_OF_DRIVE: Final = ("key", "part", "date", "vehicle_id")
+_INNER: Final = tuple(name for name in SEGMENTS if name not in _OF_DRIVE)
 
 PART: Final[dict[str, pl.DataType]] = {
     **{name: column.type for name, column in DRIVES.items()},
@@ -142,5 +153,5 @@ def drives_of(parts: pl.DataFrame) -> pl.DataFrame:
 
 def segments_of(parts: pl.DataFrame) -> pl.DataFrame:
     """Return the rows of `SEGMENTS` that part files hold."""
-    rows = parts.select("key", "part", "date", "segments").explode("segments")
+    rows = parts.select(*_OF_DRIVE, "segments").explode("segments")
     return rows.filter(pl.col("segments").is_not_null()).unnest("segments").select(list(SEGMENTS))

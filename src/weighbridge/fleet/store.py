@@ -4,12 +4,16 @@
 
     RESULTS/fleet.json                              marks the folder; format version
     RESULTS/parts/ab/abcd….arrow                    one recording each, named after its key
-    RESULTS/drives/date=2026-05-01/drives-0000.parquet
-    RESULTS/segments/date=2026-05-01/segments-0000.parquet
+    RESULTS/parts/ab/abcd…-0123….found              one place with a recording that has its result
+    RESULTS/drives/day=2026-05-01/drives-0000.parquet
+    RESULTS/segments/day=2026-05-01/segments-0000.parquet
+    RESULTS/superseded.keys                         results that were, and count no more
     RESULTS/progress.json                           how far the last run is, for `fleet status`
 
 Every file comes by one rename, so that a kill at any instant leaves whole files. A part is removed
 after its rows are in the tables; a row that is in both is the same row, by ``key`` and ``part``.
+When a run begins and when it ends, the tables are settled: they keep the rows that count, see
+`weighbridge.fleet.places`.
 """
 
 from __future__ import annotations
@@ -19,7 +23,8 @@ import io
 import json
 import os
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -27,7 +32,10 @@ from typing import Any, Final
 import polars as pl
 
 from weighbridge.errors import ConfigError
+from weighbridge.fleet.keys import text_digest
+from weighbridge.fleet.places import FOUND, HEAD, counted, is_there, standing
 from weighbridge.fleet.schema import (
+    DAY,
     FAILED,
     FORMAT_VERSION,
     PART,
@@ -45,6 +53,9 @@ PARTS: Final = "parts"
 KEYS: Final = "-known.keys"
 _LOCK: Final = ".lock"
 _SUFFIX: Final = ".arrow"
+_FOUND: Final = ".found"
+_SUPERSEDED: Final = "superseded.keys"
+_PLACE: Final = 16  # letters of the digest of a place
 
 TABLES: Final = MappingProxyType({"drives": drives_of, "segments": segments_of})
 """Tables of the results, and how they are made of parts."""
@@ -64,6 +75,41 @@ def is_results(folder: Path) -> bool:
 def part_path(folder: Path, key: str) -> Path:
     """Where the part of a key goes."""
     return folder / PARTS / key[:2] / f"{key}{_SUFFIX}"
+
+
+def place_of(key: str, source: str) -> str:
+    """Return a key with a place, as the list of known keys has it."""
+    return f"{key} {text_digest([source])[:_PLACE]}"
+
+
+def write_found(folder: Path, key: str, source: str) -> None:
+    """Note that a recording with a result was found at a place.
+
+    Raises
+    ------
+    ConfigError
+        The folder cannot be written to.
+    """
+    name = f"{place_of(key, source).replace(' ', '-')}{_FOUND}"
+    path = part_path(folder, key).with_name(name)
+    if not path.exists():
+        now = datetime.now(UTC).isoformat()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as e:
+            raise ConfigError(f"{path} cannot be written: {e.strerror or e}") from None
+        write_whole(path, json.dumps({"key": key, "place": source, "at": now}) + "\n")
+
+
+def read_found(folder: Path) -> pl.DataFrame:
+    """Return the places that `write_found` noted, columns as of `FOUND`."""
+    rows = []
+    for path in (folder / PARTS).glob(f"*/*{_FOUND}"):
+        # One that is settled meanwhile, or spoilt, is found again by the next run.
+        with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+            said = json.loads(path.read_text(encoding="utf-8"))
+            rows.append((said["key"], said["place"], datetime.fromisoformat(said["at"])))
+    return pl.DataFrame(rows, schema=FOUND, orient="row")
 
 
 def write_part(folder: Path, key: str, rows: Sequence[dict[str, Any]]) -> None:
@@ -104,8 +150,15 @@ def read_parts(paths: Sequence[Path]) -> pl.DataFrame:
         except FileNotFoundError:
             continue
         with _whole(path):
-            frames.append(pl.read_ipc(io.BytesIO(data)))
+            frames.append(timed(pl.read_ipc(io.BytesIO(data)).lazy()).collect())
     return pl.concat([pl.DataFrame(schema=PART), *frames], how="diagonal")
+
+
+def timed(rows: pl.LazyFrame) -> pl.LazyFrame:
+    """Return rows of drives with their begin as an instant; it was a text until version 3."""
+    if rows.collect_schema().get("start") != pl.String:
+        return rows
+    return rows.with_columns(pl.col("start").str.to_datetime(time_unit="us", time_zone="UTC"))
 
 
 class Results:
@@ -201,7 +254,8 @@ class Results:
 
     def table_files(self, table: str) -> list[Path]:
         """List the files of a table."""
-        return sorted((self.folder / table).glob("date=*/*.parquet"))
+        # Until version 3 partitions were named date.
+        return sorted((self.folder / table).glob("da*=*/*.parquet"))
 
     def check(self) -> None:
         """Read all tables and parts.
@@ -239,6 +293,71 @@ class Results:
             found |= set(some.filter(pl.col("outcome") != FAILED)["key"])
         return found
 
+    def known_places(self) -> set[str]:
+        """Keys that need not be weighed again, each with each of its places."""
+        return {
+            place_of(key, place)
+            for key, source, copies in self._heads()
+            .filter(pl.col("outcome") != FAILED)
+            .select("key", "source", "copies")
+            .iter_rows()
+            for place in (source, *(copies or ()))
+        }
+
+    def superseded(self) -> set[str]:
+        """Keys of results that counted once, and that no run will bring back by itself."""
+        try:
+            return set((self.folder / _SUPERSEDED).read_text(encoding="ascii").split())
+        except FileNotFoundError:
+            return set()
+        except (OSError, ValueError) as error:
+            raise ConfigError(f"{self.folder / _SUPERSEDED} cannot be read: {error}") from None
+
+    def _heads(self) -> pl.DataFrame:
+        files = self.table_files("drives")
+        empty = pl.DataFrame(schema={name: PART[name] for name in HEAD})
+        return pl.concat([empty, *(_columns(path, list(HEAD)) for path in files)])
+
+    def settle(self, there: Callable[[str], bool] = is_there) -> None:
+        """Keep the rows that count, where all parts are gathered: see `standing`.
+
+        A kill at any instant leaves what the next call settles.
+
+        Parameters
+        ----------
+        there : tells whether a place still has something
+
+        Raises
+        ------
+        ConfigError
+            The folder cannot be written to. Nothing is lost.
+        """
+        found = read_found(self.folder)
+        stand = standing(self._heads(), found, there)
+        state = ["source", "copies", "also_vehicles"]
+        dead: set[str] = set()
+        stale: list[Path] = []
+        for path in self.table_files("drives"):
+            rows = _columns(path, ["key", *state])
+            now = rows.select("key").join(stand, on="key", how="left", maintain_order="left")
+            gone = now.filter(pl.col("source").is_null())["key"]
+            dead |= set(gone)
+            was = rows.with_columns(pl.col(state[1:]).fill_null([]))
+            if gone.len() or not was.equals(now.select("key", *state)):
+                stale.append(path)
+        if dead:
+            keys = sorted(self.superseded() | dead)
+            write_whole(self.folder / _SUPERSEDED, "\n".join(keys) + "\n")
+            # Segments first: a drive that is left brings the rest here again.
+            for path in self.table_files("segments"):
+                if not dead.isdisjoint(_columns(path, ["key"])["key"]):
+                    rows = _columns(path, None)
+                    _write(path, rows.filter(~pl.col("key").is_in(dead)))
+        for path in stale:
+            _write(path, counted(_columns(path, None).lazy(), stand).collect())
+        for path in (self.folder / PARTS).glob(f"*/*{_FOUND}"):
+            path.unlink(missing_ok=True)
+
     def gather(self) -> None:
         """Bring the rows of all parts into the tables, and remove the parts.
 
@@ -259,7 +378,7 @@ class Results:
 
     def _add(self, table: str, day: Any, rows: pl.DataFrame) -> None:
         """Add to the last file of a date what none of its files has."""
-        home = self.folder / table / f"date={UNKNOWN_DATE if day is None else day.isoformat()}"
+        home = self.folder / table / f"{DAY}={UNKNOWN_DATE if day is None else day.isoformat()}"
         files = sorted(home.glob("*.parquet"))
         by: list[str] = [n for n in ("key", "part", "segment") if n in rows.columns]
         last = _columns(files[-1], None) if files else None
@@ -274,11 +393,7 @@ class Results:
             # A drive that failed, and fails again, has a new row.
             rows = pl.concat([last.join(rows, on=by, how="anti"), rows])
         home.mkdir(parents=True, exist_ok=True)
-        # By way of the memory: a full disk is told as one, which polars does not.
-        data = io.BytesIO()
-        rows.sort(by).write_parquet(data, compression="zstd")
-        with whole_file(home / f"{table}-{number:04d}.parquet") as part:
-            part.write_bytes(data.getbuffer())
+        _write(home / f"{table}-{number:04d}.parquet", rows.sort(by))
 
     def tell(self, progress: dict[str, Any]) -> None:
         """Write how far a run is."""
@@ -310,6 +425,15 @@ def check_end(path: Path) -> None:
     """
     with path.open("rb") as file, _whole(path):
         pl.read_parquet_schema(file)
+
+
+def _write(path: Path, rows: pl.DataFrame) -> None:
+    """Write a file of a table; one without rows stays, as a reader may be about to open it."""
+    # By way of the memory: a full disk is told as one, which polars does not.
+    data = io.BytesIO()
+    rows.write_parquet(data, compression="zstd")
+    with whole_file(path) as part:
+        part.write_bytes(data.getbuffer())
 
 
 def _columns(path: Path, names: list[str] | None) -> pl.DataFrame:

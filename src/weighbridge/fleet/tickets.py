@@ -150,9 +150,7 @@ def ticketed(tickets: Sequence[Ticket], drives: pl.LazyFrame) -> pl.DataFrame:
     -------
     Rows of ``drives`` with the columns ``ticket_kg`` and ``begin``, by vehicle and time
     """
-    rows = drives.with_columns(
-        begin=pl.col("start").str.to_datetime(time_zone="UTC", strict=False)
-    ).collect()
+    rows = drives.with_columns(begin=pl.col("start")).collect()
     length = pl.duration(milliseconds=1e3 * pl.col("duration_s"))
     spans = rows.with_row_index("place").select(
         "place", "vehicle_id", start="begin", end=pl.col("begin") + length

@@ -102,18 +102,19 @@ class Vehicles:
     Parameters
     ----------
     folder : of vehicle files; ``ID.toml`` is that of the vehicle ID
-    kind : class of a vehicle without a file
+    kind : class of a vehicle without a file; None for a car
     mapping : for all logs; None for the one that each vehicle file names
 
     Raises
     ------
     ConfigError
-        No folder, no file in it, or a file that cannot be used.
+        No folder, no such class, or a file that cannot be used.
     """
 
-    def __init__(self, folder: Path, kind: str = "car", mapping: Path | None = None) -> None:
+    def __init__(self, folder: Path, kind: str | None = None, mapping: Path | None = None) -> None:
         if not folder.is_dir():
             raise ConfigError(f"{folder}: no such folder of vehicle files")
+        kind = "car" if kind is None else kind
         if kind not in VEHICLE_CLASSES:
             raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {kind!r}")
         self._kind = kind
