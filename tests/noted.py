@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from weighbridge.errors import DriveError
-from weighbridge.messages import _phrases, catalogue
+from weighbridge.messages import PARTS, _phrases, catalogue
 from weighbridge.signals import Problem
 
 
@@ -39,11 +39,9 @@ def has(told: Iterable[Problem], /, *ids: str, **values: object) -> bool:
 
 
 def words(id: str, /, **values: object) -> re.Pattern[str]:
-    """Return what a text with the message, or the phrase, matches: any value where none is given.
-
-    Of a message only the first part, what was found, is asked for: what follows may be cut.
-    """
-    found = catalogue()[id]["text"] if "." in id else _phrases()[id]
+    """Return what a text with the message or phrase matches: any value where none is given."""
+    parts = catalogue()[id] if "." in id else {"text": _phrases()[id]}
+    found = "; ".join(parts[part] for part in PARTS if part in parts)
     pieces = []
     for literal, name, spec, kind in string.Formatter().parse(found):
         pieces.append(re.escape(literal))
