@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import polars as pl
 import pytest
+from tests.noted import says
 
 from weighbridge import Vehicle, __version__, read_drive
 from weighbridge.cli.own_masses import own_masses
@@ -132,7 +133,7 @@ def test_what_weigh_would_note_of_a_drive_of_a_calibration_is_told(car, known):
     drive = read_drive(known.folder)
     later = replace(drive.signals["engine_load"], time=drive.signals["engine_load"].time + 0.3)
     own = own_masses(Vehicle.load(car), [drive.with_signals(later)])
-    assert any("its clock was moved by that" in line for line in own.lines)
+    assert any(says(line, "torque.clock_moved") for line in own.lines)
 
 
 def test_weigh_in_words(weighbridge, car, loaded):
@@ -279,7 +280,7 @@ def test_vehicle_file_of_another_car_gives_no_mass(weighbridge, car, loaded, tmp
     result = json.loads(ran.out)
     assert result["status"] == "inconsistent"
     assert result["mass_kg"] is None
-    assert "gearing" in result["reason"]
+    assert result["reason_id"] == "gear.foreign"
     assert all(s["mass_kg"] is None for s in result["segments"])
 
 
@@ -289,7 +290,9 @@ def test_vehicle_file_for_load_and_a_drive_with_torque_only(weighbridge, car, lo
 
     ran = weighbridge("weigh", changed(obd=only_torque), "--vehicle", car, "--json", "-")
     assert ran.code == 1
-    assert "torque source 'measured'" in json.loads(ran.out)["reason"]
+    told = json.loads(ran.out)
+    assert told["reason_id"] == "torque.other_source"
+    assert says(told["reason"], "torque.other_source", other="measured")
 
 
 def test_data_sheet_without_gearings_is_told_to_be_uncalibrated(weighbridge, tmp_path):

@@ -13,6 +13,7 @@ import numpy as np
 import polars as pl
 import pytest
 from tests.docs.logs import dongle_and_phone
+from tests.noted import says
 
 from weighbridge.io import read_drive
 
@@ -70,7 +71,10 @@ def test_a_dongle_and_a_phone_on_clocks_of_their_own(weighbridge, loaded, car, t
     assert ran.code == 0, ran.err
     low, high = json.loads(ran.out)["interval95_kg"]
     assert low < loaded.mass < high
-    assert "elm327.csv: the clock was moved by -49989" in ran.out
+    told = json.loads(ran.out)["problems"]
+    (moved,) = [p["text"] for p in told if p["id"] == "clock.aligned"]
+    assert says(moved, "clock.aligned", group="elm327.csv")
+    assert "-49989" in moved
 
 
 def test_without_a_name_the_mapping_is_all_of_standard_output(weighbridge, foreign, tmp_path):

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import polars as pl
 import pytest
+from tests.noted import says
 
 
 def speeds(seed, seconds=1200):
@@ -55,7 +56,8 @@ def test_speed_alone_is_weighed_and_says_why_there_is_no_mass(weighbridge, car, 
     assert done.code == 1
     said = json.loads(done.out)
     assert (said["status"], said["mass_kg"]) == ("not_excited", None)
-    assert "the mass that the filter was started from (1092 kg" in said["reason"]
+    assert said["reason_id"] == "speed.no_mass"
+    assert says(said["reason"], "speed.no_mass", first=1092.0)
     assert said["used_s"] > 900.0
     page = report.read_text(encoding="utf-8")
     assert "No road grade" in page
@@ -73,7 +75,7 @@ def test_other_methods_still_ask_for_torque(weighbridge, car, alone):
     for method in ("rls", "ekf"):
         done = weighbridge("weigh", alone, "--vehicle", car, "--method", method)
         assert done.code == 1
-        assert "was calibrated for speed-ekf alone and knows neither gears nor torque" in done.out
+        assert says(done.out, "vehicle.no_torque_fit", fit="speed-ekf")
 
 
 def test_vehicle_without_a_speed_model(weighbridge, alone, tmp_path):
@@ -100,7 +102,7 @@ def test_calibration_without_grade_says_so(weighbridge, alone, tmp_path):
         "calibrate", alone, "--mass", 1092, "--method", "speed-ekf", "-o", tmp_path / "car.toml"
     )
     assert done.code == 2
-    assert "grade" in done.err
+    assert says(done.err, "calibration.no_grade")
 
 
 def test_inspect_lists_the_way_and_promises_no_mass(weighbridge, alone):
@@ -130,4 +132,5 @@ def test_a_poor_fit_is_told(weighbridge, known, tmp_path):
         path = tmp_path / f"{folder.name}.toml"
         done = weighbridge("calibrate", folder, "--mass", 1092, "--method", "speed-ekf", "-o", path)
         assert done.code == 0
-        assert ("note: " in done.out and "% of the changes of speed" in done.out) is told
+        text = " ".join(done.out.split())
+        assert ("note: " in text and says(text, "calibration.speed_poor")) is told

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from tests.noted import says
 
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -67,7 +68,7 @@ def test_a_load_means_nothing_before_a_calibration(weighbridge, loaded, tmp_path
     ran = weighbridge("weigh", loaded.folder, "--vehicle", path)
     assert ran.code == 1
     text = " ".join(ran.out.split())
-    assert "was never calibrated" in text
+    assert says(text, "vehicle.not_calibrated")
     assert "weighbridge calibrate DRIVE --torque load --mass KG" in text
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from make_logs import truth
 from numpy.testing import assert_allclose
+from tests.noted import has
 
 from weighbridge.io import read_drive
 from weighbridge.io.mdf import draft
@@ -74,7 +75,7 @@ def test_mf4_by_mapping():
     assert_allclose(drive.signals["engine_torque"].values, 80.0)
     assert_allclose(drive.signals["engine_torque"].time[[0, -1]], [10.0, 15.0])
     assert_allclose(drive.signals["vehicle_speed"].values[-1], 2 * 1.5 * 5.0)
-    assert "channel 'Gang' for gear is not there" in drive.problems[0].text
+    assert has(drive.problems, "file.column_missing", column="Gang", signal="gear")
 
 
 def test_formats_of_one_drive_can_be_joined():

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import has
 
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
@@ -153,7 +154,7 @@ def test_sensor_logger(tmp_path):
     assert_allclose(drive.signals["gnss_course"].values, [np.pi / 2])
     assert len(drive.signals["latitude"]) == 2
     assert drive.info.start_time == "2023-10-28T13:52:24+00:00"
-    assert "Accelerometer.csv has gravity taken off" in texts(drive)
+    assert has(drive.problems, "file.no_gravity", file="Accelerometer.csv")
 
 
 def test_sensor_logger_without_total_acceleration_has_none(tmp_path):

@@ -4,6 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from tests.noted import refused, says
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.fleet.vehicles import Vehicles
@@ -137,8 +138,9 @@ def test_a_dbc_of_the_mapping_is_for_one_bus_where_it_says_so(logged, named):
     named.write_text(text.replace("../car.dbc", "0:../car.dbc"))
     assert read_drive(log, named).has("vehicle_speed")
     named.write_text(text.replace("../car.dbc", "5:../car.dbc"))
-    with pytest.raises(DriveError, match="on bus 5; they are on another"):
+    with refused("bus.nothing_mapped") as told:
         read_drive(log, named)
+    assert says(str(told.value), "on_other_bus", bus=5, remedy="0:car.dbc")
 
 
 def test_a_dbc_of_the_mapping_that_is_not_there_is_told_with_its_line(logged, named):

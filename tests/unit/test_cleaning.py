@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import has
 
 from weighbridge.signals.cleaning import (
     clean_clock,
@@ -49,10 +50,8 @@ def test_rows_of_whole_seconds_are_spread_over_the_second():
     assert len(signals[0]) == 400
     assert_allclose(signals[0].time, true, atol=1e-9)
     assert_array_equal(signals[0].values, speed)
-    assert [p.text for p in problems] == [
-        "obd.csv: time stamps come in steps of 1 s and several rows share one; "
-        "they were spread evenly over the step"
-    ]
+    assert [p.id for p in problems] == ["clock.coarse"]
+    assert has(problems, "clock.coarse", source="obd.csv", step=1.0)
 
 
 def test_rows_that_come_unevenly_stay_in_their_second():
@@ -97,9 +96,8 @@ def test_rows_out_of_order_are_sorted(order):
     signals, problems = clean_columns(time[rows], [("vehicle_speed", np.sin(time[rows]))], "x.csv")
     assert_array_equal(signals[0].time, time)
     assert_array_equal(signals[0].values, np.sin(time))
-    assert [p.text for p in problems] == [
-        "x.csv: the rows are not in the order of their time; they were sorted"
-    ]
+    assert [p.id for p in problems] == ["clock.sorted"]
+    assert has(problems, "clock.sorted", source="x.csv", by="not in the order of their time")
 
 
 @pytest.mark.parametrize("falling", [False, True])
@@ -116,9 +114,8 @@ def test_a_table_sorted_by_another_column_is_put_in_the_order_of_time(falling):
     assert_array_equal(signals[0].time, time[::2])
     assert_array_equal(signals[0].values, speed[::2])
     assert_array_equal(signals[1].time, time[1::2])
-    assert [p.text for p in problems] == [
-        "x.csv: the rows are sorted by vehicle_speed, not by time; they were sorted"
-    ]
+    assert [p.id for p in problems] == ["clock.sorted"]
+    assert has(problems, "clock.sorted", source="x.csv", by="sorted by vehicle_speed, not by time")
 
 
 def test_an_odometer_that_rises_does_not_sort_a_clock_that_is_set_back():

@@ -71,8 +71,9 @@ def test_tare_and_gross_are_asked_for_where_only_the_mass_tells_the_scale():
     noted = replace(loads, provenance=replace(loads.provenance, notes=f"made of one drive; {text}"))
     car = tared(noted, 1500.0)
     assert car.tare == 1500.0
-    assert "tare_kg" not in car.provenance.notes
-    assert "state gross_kg" in car.provenance.notes
+    assert phrase("masses_missing") in noted.provenance.notes
+    assert phrase("masses_missing") not in car.provenance.notes
+    assert phrase("gross_missing") in car.provenance.notes
     assert unbacked_scale(replace(loads, tare=1500.0)) == []
     told = Vehicle(torque=TorqueModel(source="measured", coefficients=(0.0, 0.95)))
     assert unbacked_scale(told) == []

@@ -8,7 +8,6 @@ from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.calibration.problem import find_gears
-from weighbridge.errors import DriveError
 from weighbridge.signals import Signal
 from weighbridge.vehicle.engine_delay import find_engine_delay
 from weighbridge.vehicle.gear import (
@@ -100,7 +99,7 @@ def test_a_stepless_gearbox_is_refused():
     speed = 15.0 + 10.0 * np.sin(time / 40.0)
     engine = speed * np.exp(np.log(8.0) + np.cumsum(rng.normal(0, 0.01, time.size)) * 0.2)
     engine = np.clip(engine, 90.0, 500.0) * (1 + rng.normal(0, 0.2, time.size))
-    with pytest.raises(DriveError, match=r"steady ratio|stands out"):
+    with refused("gear.few_samples", "gear.none", "gear.unclear"):
         detect_gearings(time, engine, speed)
 
 

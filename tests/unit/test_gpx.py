@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import refused, says
 
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io import read_drive
@@ -128,7 +129,9 @@ def test_any_damage_leaves_signals_or_one_sentence(
 def test_a_track_beside_canonical_tables_is_read(tmp_path):
     (tmp_path / "gnss.csv").write_text("time_s,speed_mps\n0,1\n1,2\n")
     (tmp_path / "track.gpx").write_text(gpx(point(0), point(1)))
-    with pytest.raises(DriveError, match="has dates"):
+    with refused("clock.nothing_shared") as told:
         read_drive(tmp_path)
+    why = told.value.problem.values["why"]
+    assert says(why, "dates_and_counts", dated="track.gpx", counted="gnss.csv")
     (tmp_path / "gnss.csv").rename(tmp_path / "other.csv")
     assert "latitude" in read_drive(tmp_path / "track.gpx").signals

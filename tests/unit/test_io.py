@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import has, refused, says
 
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io import read_drive, read_table, write_drive, write_table
@@ -20,10 +21,6 @@ def write(path, content=OBD):
     path.parent.mkdir(exist_ok=True, parents=True)
     path.write_text(content, encoding="utf-8")
     return path
-
-
-def texts(drive):
-    return " | ".join(p.text for p in drive.problems)
 
 
 # What is read
@@ -79,7 +76,7 @@ def test_short_names_of_the_gnss_table(tmp_path):
 def test_short_names_elsewhere_are_not_guessed(tmp_path):
     drive = read_drive(write(tmp_path / "obd.csv", "time_s,speed_kmh,gear\n0,36,1\n"))
     assert set(drive.signals) == {"gear"}
-    assert "'speed_kmh' (did you mean vehicle_speed_kmh?)" in texts(drive)
+    assert any("'speed_kmh' (did you mean vehicle_speed_kmh?)" in p.text for p in drive.problems)
 
 
 def test_truth_and_other_files_are_not_read(tmp_path):
@@ -102,7 +99,8 @@ def test_second_column_of_a_quantity_is_told(tmp_path):
     write(tmp_path / "obd.csv", "time_s,vehicle_speed_kmh,vehicle_speed_mps\n0,36,99\n")
     drive = read_drive(tmp_path)
     assert drive.signals["vehicle_speed"].values == pytest.approx([10.0])
-    assert "'vehicle_speed_mps' says the same as 'vehicle_speed_kmh'" in texts(drive)
+    twice = {"name": "vehicle_speed_mps", "first": "vehicle_speed_kmh"}
+    assert has(drive.problems, "file.column_twice", **twice)
 
 
 def test_pieces_of_one_recording_are_joined(tmp_path):
@@ -237,8 +235,9 @@ def test_empty_file(tmp_path):
 
 def test_tables_with_headers_only(tmp_path):
     write(tmp_path / "obd.csv", "time_s,vehicle_speed_kmh\n")
-    with pytest.raises(DriveError, match=r"holds no samples.*obd\.csv has a header and no rows"):
+    with pytest.raises(DriveError, match=r"holds no samples.*obd\.csv") as caught:
         read_drive(tmp_path)
+    assert says(str(caught.value), "file.no_rows", file="obd.csv")
 
 
 def test_one_empty_table_beside_others_is_a_note(tmp_path):
@@ -246,7 +245,7 @@ def test_one_empty_table_beside_others_is_a_note(tmp_path):
     write(tmp_path / "gnss.csv", "time_s,latitude_deg,longitude_deg\n")
     drive = read_drive(tmp_path)
     assert drive.has("vehicle_speed")
-    assert "gnss.csv has a header and no rows" in texts(drive)
+    assert has(drive.problems, "file.no_rows", file="gnss.csv")
 
 
 def test_empty_parquet(tmp_path):
@@ -264,8 +263,8 @@ def test_duplicate_and_reversed_stamps_are_left_out_and_counted(tmp_path):
     )
     drive = read_drive(tmp_path)
     assert_array_equal(drive.signals["vehicle_speed"].values, [0.0, 1.0, 2.0, 3.0, 4.0])
-    assert "1 of 7 time stamps repeat" in texts(drive)
-    assert "the clock runs backwards" in texts(drive)
+    assert has(drive.problems, "clock.repeated", count=1, rows=7)
+    assert has(drive.problems, "clock.backwards", source="obd.csv", back="0.5 s")
 
 
 def test_block_of_nan_is_left_out_and_counted(tmp_path):
@@ -276,21 +275,22 @@ def test_block_of_nan_is_left_out_and_counted(tmp_path):
     )
     drive = read_drive(tmp_path)
     assert len(drive.signals["accel_x"]) == 60
-    assert "40 of 100 cells of 'accel_x_mps2' are NaN" in texts(drive)
+    assert has(drive.problems, "file.cells_nan", count=40, cells=100, name="accel_x_mps2")
 
 
 def test_infinite_values_are_left_out_and_counted(tmp_path):
     write(tmp_path / "imu.csv", "time_s,accel_x_mps2\n0,1\n1,inf\n2,-inf\n3,2\n")
     drive = read_drive(tmp_path)
     assert_array_equal(drive.signals["accel_x"].values, [1.0, 2.0])
-    assert "2 of 4 values of accel_x are infinite" in texts(drive)
+    assert has(drive.problems, "file.infinite", count=2, samples=4, signal="accel_x")
 
 
 def test_cells_that_are_no_numbers_are_left_out_and_counted(tmp_path):
     write(tmp_path / "obd.csv", "time_s,gear\n0,1\n1,oops\n2,n/a\n3,4\n4,5\n")
     drive = read_drive(tmp_path)
     assert_array_equal(drive.signals["gear"].values, [1.0, 4.0, 5.0])
-    assert "1 of 4 cells of 'gear' are no numbers, such as 'oops' in row 2" in texts(drive)
+    told = {"count": 1, "filled": 4, "name": "gear", "example": "oops", "row": 2}
+    assert has(drive.problems, "file.cells_text", **told)
 
 
 def test_column_of_text_is_refused(tmp_path):
@@ -320,7 +320,7 @@ def test_zero_bytes_of_a_broken_off_recording(tmp_path):
     (tmp_path / "obd.csv").write_bytes(b"time_s,gear\n0,1\n1,2\n" + bytes(64))
     drive = read_drive(tmp_path)
     assert_array_equal(drive.signals["gear"].values, [1.0, 2.0])
-    assert "64 zero bytes" in texts(drive)
+    assert has(drive.problems, "file.zero_bytes", count=64)
 
 
 @pytest.mark.parametrize("part", [0, 3, 200, -8, -1])
@@ -360,8 +360,10 @@ def test_clocks_of_two_kinds(tmp_path):
     stamps = pl.Series([0, 1_000_000], dtype=pl.Datetime("us"))
     pl.DataFrame({"time_s": stamps, "gear": [1.0, 2.0]}).write_parquet(tmp_path / "obd.parquet")
     write(tmp_path / "imu.csv", "time_s,accel_x_mps2\n0,1\n1,2\n")
-    with pytest.raises(DriveError, match=r"has dates and .* counts seconds"):
+    with refused("clock.nothing_shared") as caught:
         read_drive(tmp_path)
+    why = caught.value.problem.values["why"]
+    assert says(why, "dates_and_counts", dated="obd.parquet", counted="imu.csv")
 
 
 @pytest.mark.parametrize(

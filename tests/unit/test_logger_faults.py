@@ -8,7 +8,6 @@ from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.checks import check_drive, mend_drive
-from weighbridge.errors import DriveError
 from weighbridge.messages import phrase
 from weighbridge.signals import QUANTITIES
 from weighbridge.simulation import MIDSIZE, Scenario, Sensors, jensen_route, simulate_car
@@ -41,7 +40,7 @@ def with_inertial(drive, change):
 
 def test_a_speed_whose_rows_are_in_two_units_in_turn_is_refused(made, car):
     mixed = of_speed(made.drive, lambda t, v: np.where(np.arange(v.size) % 2, v / 1.609344, v))
-    with pytest.raises(DriveError, match=r"vehicle_speed jumps .*two sources or units take turns"):
+    with refused("speed.jumps", signal="vehicle_speed", why=phrase("jump_turns")):
         wb.weigh(mixed, car)
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests.noted import refused
+from tests.noted import has, refused
 
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io import read_drive, read_frame
@@ -138,7 +138,7 @@ def rows(values, units="km/h"):
 def speed(path):
     mapping = {"signals": {"vehicle_speed": {"column": "Vehicle speed"}}}
     drive = read_drive(path, mapping)
-    return drive.signals["vehicle_speed"].values * 3.6, " ".join(p.text for p in drive.problems)
+    return drive.signals["vehicle_speed"].values * 3.6, drive.problems
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_what_a_comma_means_is_settled_once_a_file(tmp_path, cells, numbers, tol
     path.write_text(rows(cells))
     values, notes = speed(path)
     assert_allclose(values, numbers)
-    assert ("part thousands" in notes) == told
+    assert has(notes, "file.thousands") == told
 
 
 def test_each_row_counts_in_its_own_unit(tmp_path):
@@ -165,7 +165,7 @@ def test_each_row_counts_in_its_own_unit(tmp_path):
     path.write_text(rows([36, 36, 36, 10, 36], ["km/h"] * 3 + ["km", "km/h"]))
     values, notes = speed(path)
     assert_allclose(values, [36.0] * 4)
-    assert "left out a row of 'Vehicle speed' with the unit 'km'" in notes
+    assert has(notes, "file.row_unit", name="Vehicle speed", unit="km")
     path.write_text(rows([36, 36, 36, 10, 10], ["km/h"] * 3 + ["rpm"] * 2))
     with pytest.raises(DriveError, match=r"is in 'km/h' and in 'rpm', which do not convert"):
         speed(path)

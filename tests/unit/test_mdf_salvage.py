@@ -8,10 +8,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import has
 
 from weighbridge.errors import DriveError, WeighbridgeError
 from weighbridge.io import read_drive
 from weighbridge.io.mdf_salvage import salvage
+from weighbridge.messages import phrase
 
 ANSWERS = 200
 # Stamps 0.1 s apart, and the speed that each answer of PID 0D tells [km/h].
@@ -142,7 +144,9 @@ def test_cut_at_many_places(tmp_path, layout):
         assert_allclose(speed.time, TIMES[: len(speed)], atol=1e-9)
         assert_allclose(speed.values, SPEEDS[: len(speed)] / 3.6)
         if layout != "unfinished" and len(speed) < ANSWERS:
-            assert f"ends early: {len(speed)} of {ANSWERS} records" in drive.problems[0].text
+            assert has(drive.problems[:1], "file.ends_short")
+            kept = drive.problems[0].values["kept"]
+            assert kept.startswith(phrase("kept_records", kept=len(speed), records=ANSWERS))
     # The more of the file is there, the more is read of it, up to nearly all.
     assert_array_equal(read, sorted(read))
     assert read[0] < 0.3 * ANSWERS

@@ -14,5 +14,6 @@ def test_a_clock_that_left_one_row_is_told_by_its_cause():
         "clock.backwards", source="ride.csv", back="1 s", at="2 s", lost=99, rows=100
     )
     drive = Drive(name="back", signals=signals, problems=(reversed_clock,))
-    with pytest.raises(DriveError, match=r"one row of the ride .* the clock runs backwards"):
+    with pytest.raises(DriveError, match="one row of the ride") as told:
         ride_samples(drive)
+    assert reversed_clock.text in str(told.value)

@@ -1,6 +1,5 @@
 """Steps of the torque's reading: another factor, unit or filter than in the calibration shows."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +8,7 @@ from tests.noted import refused
 
 from weighbridge.balance.disagreement import Finding
 from weighbridge.checks.steps import check_steps, reading_step
+from weighbridge.messages import phrase
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.signals import Signal
 from weighbridge.simulation import make_scenario, simulate_car
@@ -88,11 +88,11 @@ def test_a_factor_from_the_middle_on_is_told_with_its_time(car, factor):
         Signal("engine_load", load.time, np.where(late, factor, 1.0) * load.values)
     )
     (found,) = check_steps(made, vehicle)
-    assert f"it was multiplied by {factor:.3g}" in found.text
+    assert found.id == "torque.steps"
+    assert found.values["ratio"] == pytest.approx(factor, rel=5e-3)
     assert found.serious
-    begin, end = map(float, re.search(r"here from (\d+) to (\d+) s", found.text).groups())
-    assert begin == pytest.approx(middle, abs=0.1 * drive.duration)
-    assert end == pytest.approx(drive.end, abs=1.0)
+    assert found.start == pytest.approx(middle, abs=0.1 * drive.duration)
+    assert found.end == pytest.approx(drive.end, abs=1.0)
 
 
 def test_an_offset_or_a_filter_from_the_middle_on_is_told(car):
@@ -124,7 +124,7 @@ def test_pound_feet_are_refused(electric, factor):
     drive, vehicle = electric
     (found,) = check_steps(with_values(drive, "engine_torque", lambda x: factor * x), vehicle)
     assert found.serious
-    assert "pound-feet" in found.text
+    assert found.values["unit"] in (phrase("as_pound_feet"), phrase("as_newton_metres"))
 
 
 def test_a_filter_or_a_gain_that_drifts_leaves_no_steps(car):

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.noted import refused
 
-from weighbridge.errors import ConfigError, DriveError
+from weighbridge.errors import ConfigError
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque import (
@@ -101,7 +101,7 @@ def test_lowest_load_is_just_above_the_dragged_engine():
 @pytest.mark.parametrize("source", ["measured", "percent", "load", "air_flow"])
 def test_what_is_missing_is_named(source):
     coefficients = (0.0, 1.0) if source == "load" else ()
-    with pytest.raises(DriveError, match=f"torque source '{source}'"):
+    with refused("torque.missing", source=source):
         torque(drive(throttle=[0.5] * 5), source=source, coefficients=coefficients)
 
 

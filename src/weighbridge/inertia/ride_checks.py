@@ -192,14 +192,16 @@ def _units(found: Response) -> Iterator[Problem]:
         if not far[k]:
             continue
         slope, unit = float(found.slope[k]), QUANTITIES[name].suffix
-        likely = ""
+        likely = seems = ""
         if unit == "radps" and slope > UNIT:
-            likely = "it seems to be in degrees per second; "
+            likely, seems = "it seems to be in degrees per second; ", "degrees"
         elif unit == "radps":
             likely = "it seems to be in radians per second, and read as degrees; "
+            seems = "radians"
         yield Problem.of(
-            "ride.force_scale", name, serious=True, slope=slope, likely=likely, unit=unit
-        )
+            "ride.force_scale", name, serious=True, slope=slope, likely=likely, seems=seems,
+            unit=unit,
+        )  # fmt: skip
 
 
 def _turned(found: Response) -> Bools:

@@ -134,6 +134,8 @@ def _doubts(logs: Sequence[Log]) -> list[Problem]:
                         first=other.path.name,
                         second=log.path.name,
                         apart=_told(found),
+                        by=found.offset,
+                        std=found.std,
                         what=what,
                     )
                 )
@@ -153,6 +155,8 @@ def _move(fixed: Sequence[Log], group: Sequence[Log], why: str) -> Problem:
         "clock.aligned",
         group=_names(group),
         offset=_told(found),
+        by=found.offset,
+        std=found.std,
         fixed=_names(fixed),
         what=what,
         correlation=abs(found.correlation),

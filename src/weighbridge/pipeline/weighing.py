@@ -400,7 +400,7 @@ def torque_balance(drive: Drive, vehicle: Vehicle) -> tuple[ForceBalance, tuple[
         begun = force_balance(drive, vehicle, motion, delay=delay)
     balance = replace(begun, navigation=navigation)
     if behind := far_shift(balance, vehicle):
-        raise refused("torque.clock_alone", drive=drive.name, later=_later(-behind))
+        raise refused("torque.clock_alone", drive=drive.name, later=_later(-behind), by=-behind)
     return balance, notes + other_equipment(vehicle, motion) + balance.notes
 
 
@@ -419,7 +419,7 @@ def _other_clock(
     # As late as the speed beside it: the whole table is, and the shift brings all of it back.
     of_table = motion.speed_delay > CLOCKS_APART and abs(motion.speed_delay - later) < ONE_TABLE
     if abs(later) > CLOCKS_APART and not of_table:
-        raise refused("clock.torque_apart", drive=drive.name, later=_later(later))
+        raise refused("clock.torque_apart", drive=drive.name, later=_later(later), by=later)
     return later
 
 
