@@ -49,5 +49,6 @@ def test_each_load_counts_its_own_windows():
     begins = np.array([False, False, True, False, True])
     weight = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     mass_var = np.array([1.0, 1.0, 0.5, 0.5, 2.0])
-    low = attenuation(weight, np.full(5, 2.0), mass_var, begins)
-    assert_allclose(low, [6.0, 6.0, 7.0, 7.0, 20.0])
+    low = attenuation(weight, np.full(5, 0.02), mass_var, begins)
+    noise = np.array([0.06, 0.06, 0.07, 0.07, 0.2])
+    assert_allclose(low, noise / (1.0 - noise))

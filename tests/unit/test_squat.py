@@ -62,7 +62,8 @@ def test_what_the_calibration_took_out_is_taken_out(weighed):
     knows = calibrated(car, K)
     right = joint.estimate(seen(balance, K, factor=0.0), knows)
     leaning = joint.estimate(seen(balance, None, factor=1.0), knows)
-    assert_allclose(leaning.mass, right.mass, rtol=1e-6)
+    # The noise of the motion is learnt with the lean in it.
+    assert_allclose(leaning.mass, right.mass, rtol=1e-5)
 
 
 def test_what_the_calibration_left_in_is_put_back(weighed):
@@ -71,7 +72,7 @@ def test_what_the_calibration_left_in_is_put_back(weighed):
     without = calibrated(car, None)
     as_calibrated = joint.estimate(seen(balance, None, factor=1.0), without)
     shown = joint.estimate(seen(balance, K, factor=0.0), without)
-    assert_allclose(shown.mass, as_calibrated.mass, rtol=1e-6)
+    assert_allclose(shown.mass, as_calibrated.mass, rtol=1e-5)
     # Left as it is, the reading would be too small by 1 + g k.
     assert joint.estimate(seen(balance, None, factor=0.0), without).mass > 1.01 * shown.mass
 
