@@ -106,7 +106,9 @@ def test_measured_torque_is_preferred_and_better(empty):
 
 
 def test_torque_from_air_flow(empty, loaded):
-    car = calibrate(empty.drive, settings=CalibrationSettings(source="air_flow"))
+    settings = CalibrationSettings(source="air_flow")
+    known = Vehicle(name="car", tare=float(empty.truth.mass[0]))
+    car = calibrate(empty.drive, vehicle=known, settings=settings)
     assert car.torque.source == "air_flow"
     weighing = weigh(loaded.drive, car)
     assert weighing.std < 0.06 * weighing.mass
