@@ -39,16 +39,18 @@ class Air:
     ----------
     temperature : [K]
     pressure_ratio : pressure over that of the standard atmosphere [-]
+    height : altitude where it is unknown [m]
     known : a pressure or a height was known; else it is that of sea level
     """
 
     temperature: float
     pressure_ratio: float
+    height: float = 0.0
     known: bool = True
 
     def density(self, altitude: Floats) -> Floats:
-        """Density [kg/m^3] at altitudes (n,) [m]; where they are NaN, at sea level."""
-        pressure = standard_pressure(_height(altitude)) * self.pressure_ratio
+        """Density [kg/m^3] at altitudes (n,) [m]; where they are NaN, at that of the drive."""
+        pressure = standard_pressure(_height(altitude, self.height)) * self.pressure_ratio
         return np.asarray(pressure / (GAS_CONSTANT_DRY_AIR * self.temperature))
 
     def charge(self, altitude: Floats) -> Floats:
@@ -63,7 +65,7 @@ class Air:
         Calculated load, PID 04 of SAE J1979: the air flow is divided by its highest at that engine
         speed, times the pressure over 101.3 kPa and the root of 298 K over the temperature.
         """
-        pressure = standard_pressure(_height(altitude)) * self.pressure_ratio
+        pressure = standard_pressure(_height(altitude, self.height)) * self.pressure_ratio
         heat = np.sqrt(CHARGE_TEMPERATURE / self.temperature)
         return np.asarray(pressure / STANDARD_PRESSURE * heat)
 
@@ -83,7 +85,9 @@ def identify_air(drive: Drive, altitude: Floats) -> Air:
     signal = drive.get("ambient_temperature")
     if signal is not None and len(signal):
         temperature = float(np.median(signal.values))
-    height = _height(altitude)
+    known_height = altitude[np.isfinite(altitude)]
+    usual = float(np.median(known_height)) if known_height.size else 0.0
+    height = _height(altitude, usual)
     barometer = drive.get("barometric_pressure")
     known = drive.info.barometric_pressure
     if barometer is not None and len(barometer):
@@ -95,7 +99,7 @@ def identify_air(drive: Drive, altitude: Floats) -> Air:
         ratio = known / float(np.median(standard_pressure(height)))
     if temperature is None:
         temperature = STANDARD_TEMPERATURE - TEMPERATURE_LAPSE * float(np.median(height))
-    return Air(temperature, ratio, known is not None or bool(np.isfinite(altitude).any()))
+    return Air(temperature, ratio, usual, known is not None or known_height.size > 0)
 
 
 def _at_rest(drive: Drive) -> float | None:
@@ -123,7 +127,6 @@ def dynamic_pressure(density: Floats | float, air_speed: Floats) -> Floats:
     return np.asarray(0.5 * density * air_speed * np.abs(air_speed))
 
 
-def _height(altitude: Floats) -> Floats:
-    """Altitudes (n,), their median where they are unknown; sea level where all are [m]."""
-    known = np.isfinite(altitude)
-    return np.where(known, altitude, np.median(altitude[known]) if known.any() else 0.0)
+def _height(altitude: Floats, usual: float) -> Floats:
+    """Altitudes (n,), and the usual one where they are unknown [m]."""
+    return np.where(np.isfinite(altitude), altitude, usual)
