@@ -308,7 +308,7 @@ def test_a_cold_or_short_calibration_widens_every_mass(empty, car):
     brief = calibrate(empty.drive.between(start, start + 420.0))
     assert brief.provenance.mass_scale_std > car.provenance.mass_scale_std
     assert brief.provenance.mass_scale_std > 0.04
-    assert says(brief.provenance.notes, "drive_longer")
+    assert says(brief.provenance.notes, "calibration.few")
 
 
 def test_rolling_resistance_of_a_single_gear_is_not_fitted(electric):
