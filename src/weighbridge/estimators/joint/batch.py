@@ -145,7 +145,8 @@ def estimate(
     if cut.count.size < settings.fewest_windows:
         return nothing("joint", balance, vehicle, row_reason, int(cut.count.size), settings)
     noise = learnt_noise(balance, vehicle, cut)
-    balance = replace(balance, motion=with_variance(balance.motion, noise.variance))
+    if noise.learnt:
+        balance = replace(balance, motion=with_variance(balance.motion, noise.variance))
     rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
     asked = _ask(balance, vehicle, cut, rough, settings)
     if not load_changes:
