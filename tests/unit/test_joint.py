@@ -294,7 +294,8 @@ def test_forward_goes_on_from_a_drive_weighed_as_a_whole(balance, car, load):
     setup = joint_forward.identify_joint(given, track.sizes)
     end = track.mass + balance.table.fuel_burnt[-1]
     whole = joint_forward.resumed(given, setup, np.inf)
-    assert whole.mass == pytest.approx(end, rel=1e-5)
+    # What of each load is noise is told by the weights of its windows, as they come.
+    assert whole.mass == pytest.approx(end, rel=3e-5)
     assert whole.std(track.sizes) == pytest.approx(track.std, rel=1e-3)
     nearly = joint_forward.resumed(given, setup, float(given.time[-6]))
     assert nearly.windows == given.time.size - 5

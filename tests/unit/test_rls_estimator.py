@@ -27,6 +27,7 @@ def test_a_cold_start_counts_by_its_share_of_the_information():
         motion=SimpleNamespace(source="inertial", specific_force_scale_std=0.0),
         brake_hidden=False,
         coarse_std=0.0,
+        air_std=0.0,
     )
     assert consider_std(balance, phi, every, CAR) == pytest.approx(
         share * TORQUE_SOURCES["load"].cold_std

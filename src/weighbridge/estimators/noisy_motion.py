@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from weighbridge.balance.averaging import Windows
-from weighbridge.balance.law import force_on_mass
 from weighbridge.balance.table import ForceBalance, ForceTable
 from weighbridge.estimators.joint.slow_errors import MOTION_WINDOW_STD, motion_variance
+from weighbridge.estimators.regression import regression
 from weighbridge.messages import Problem
 from weighbridge.navigation.motion import BY_SPEED, noise_level
 from weighbridge.signals import Bools, Floats
@@ -103,8 +103,10 @@ def _changes(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> Floats:
     lasted = table.time[last] - table.time[first]
     with np.errstate(invalid="ignore", divide="ignore"):
         gained = (speed[last] - speed[first]) / lasted
-    force = np.nan_to_num(force_on_mass(table, vehicle))
-    rows = np.array([cut.mean(table.specific_force), cut.mean(force), gained])
+    phi, force = regression(table, vehicle)
+    # As if no fuel were burnt: the mass is then one all along.
+    force = np.nan_to_num(force + phi * table.fuel_burnt)
+    rows = np.array([cut.mean(phi), cut.mean(force), gained])
     told = (lasted > SHORTEST) & np.isfinite(rows).all(axis=0)
     beside = told[1:] & told[:-1] & (np.diff(cut.mean(table.time)) < APART)
     return np.asarray(np.diff(rows, axis=1)[:, beside])

@@ -32,7 +32,7 @@ from weighbridge.estimators.joint.bend import bent
 from weighbridge.estimators.joint.changing import in_place_of_loads, largest
 from weighbridge.estimators.joint.contradicted import contradicted
 from weighbridge.estimators.joint.foreign import of_another
-from weighbridge.estimators.joint.slow_errors import motion_variance
+from weighbridge.estimators.joint.slow_errors import motion_variance, with_variance
 from weighbridge.estimators.settings import differences
 from weighbridge.estimators.squat import of_vehicle
 from weighbridge.messages import Problem, phrase, refused
@@ -295,12 +295,14 @@ def _smoothed(drive: Drive, vehicle: Vehicle, track: MassTrack) -> Problem | Non
     """Say that the torque was smoothed, unless a person vouches for it."""
     if set(source_of(vehicle).found(drive)) & set(drive.info.trusted):
         return None
-    balance, found = track.balance, track.switched
+    balance, found, motion = track.balance, track.switched, track.balance.motion
+    if track.sizes is not None:
+        motion = with_variance(motion, track.sizes.motion_var)
     return smoothed_torque(
         balance,
         vehicle,
         beside=0.0 if found is None else found.force(balance.table, vehicle),
-        noise=partial(motion_variance, balance.motion),
+        noise=partial(motion_variance, motion),
     )
 
 

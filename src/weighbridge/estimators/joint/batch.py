@@ -145,6 +145,7 @@ def estimate(
     if cut.count.size < settings.fewest_windows:
         return nothing("joint", balance, vehicle, row_reason, int(cut.count.size), settings)
     noise = learnt_noise(balance, vehicle, cut)
+    given = balance
     if noise.learnt:
         balance = replace(balance, motion=with_variance(balance.motion, noise.variance))
     rough = first_guess(cut.mean(rows[:, 0]), cut.mean(y))
@@ -166,7 +167,9 @@ def estimate(
             switched=found,
         )
         solved = _solve(asked)
-    return _track(balance, vehicle, cut, row_reason, asked, solved, noise)
+    track = _track(balance, vehicle, cut, row_reason, asked, solved, noise)
+    # Weighed again, it is learnt again.
+    return replace(track, balance=given)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
