@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import signal
 import sys
@@ -49,9 +50,14 @@ def run() -> None:
 
 
 def _leave() -> NoReturn:
-    """End with the status of an interruption: Python may have kept it, and end by the signal."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """End with the status of an interruption: Python may have kept it, and end by the signal.
+
+    Threads that write are waited for as at any end, unless it is interrupted again.
+    """
     try:
+        with contextlib.suppress(KeyboardInterrupt):
+            threading._shutdown()  # type: ignore[attr-defined]
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         atexit._run_exitfuncs()
         sys.stdout.flush()
         sys.stderr.flush()

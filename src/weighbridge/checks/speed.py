@@ -22,8 +22,8 @@ from weighbridge.signals.units import UNITS
 from weighbridge.vehicle.classes import FASTEST, STRONGEST
 from weighbridge.vehicle.model import Vehicle
 
-# Unit the name says, unit the numbers are in, as they occur in practice.
 _SPEEDS: Final = ("kmh", "mph", "kn", "mps")
+# Unit the name says, unit the numbers are in, as they occur in practice.
 _CONFUSIONS: Final = tuple(
     (said, meant, UNITS[said].factor / UNITS[meant].factor)
     for said, meant in (

@@ -6,13 +6,14 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.constants import EARTH_RADIUS
 from weighbridge.signals import Floats
 
-_RADIUS: Final = 6.371e6
-"""Mean radius of the Earth [m]."""
+_WINDOW: Final = 5.0
+"""One position in such a time is compared with the next: the way hardly bends in it [s]."""
 
-_WINDOW: Final = (5.0, 30.0)
-"""Time between two positions that are compared: the way hardly bends, no long gap [s]."""
+_LONGEST: Final = 30.0
+"""Positions further apart are not compared [s]."""
 
 _LEAST: Final = 30.0
 """Way between two positions, at least: far more than their noise [m]."""
@@ -42,22 +43,13 @@ def way_ratio(
     t, v = time[known], np.abs(speed[known])
     way = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
     inside = fixed & (fix_time >= t[0]) & (fix_time <= t[-1])
-    at = _apart(fix_time[inside])
+    _, at = np.unique(fix_time[inside] // _WINDOW, return_index=True)
     if at.size < 2:
         return float("nan")
     stamps, north, east = (x[inside][at] for x in (fix_time, latitude, longitude))
-    chord = _RADIUS * np.hypot(np.diff(north), np.cos(north[1:]) * np.diff(east))
+    chord = EARTH_RADIUS * np.hypot(np.diff(north), np.cos(north[1:]) * np.diff(east))
     driven = np.diff(np.interp(stamps, t, way))
-    used = (np.diff(stamps) <= _WINDOW[1]) & (np.maximum(chord, driven) > _LEAST) & (driven > 0.0)
+    used = (np.diff(stamps) <= _LONGEST) & (np.maximum(chord, driven) > _LEAST) & (driven > 0.0)
     if np.count_nonzero(used) < _FEWEST:
         return float("nan")
     return float(np.median(chord[used] / driven[used]))
-
-
-def _apart(stamps: Floats) -> np.ndarray:
-    """Places of stamps that lie a window apart."""
-    found: list[int] = []
-    for k, stamp in enumerate(stamps.tolist()):
-        if not found or stamp - float(stamps[found[-1]]) >= _WINDOW[0]:
-            found.append(k)
-    return np.array(found, dtype=np.intp)

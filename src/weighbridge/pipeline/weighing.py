@@ -254,25 +254,19 @@ def weigh_balance(
             possible = result.possible_change
             given = joined.filter_input
             no_load = in_place_of_loads(given) if given is not None else None
-            doubts: tuple[Problem | None, ...] = (
-                doubt,
-                change.doubt if change is not None else None,
-                no_load.doubt if no_load is not None else None,
-                possible.note if possible is not None else None,
-            )
-            problems += tuple(d for d in doubts if d is not None)
+            of_scale = [one for one in (change, no_load) if one is not None and one.doubt]
             result = result.doubted(
                 math.hypot(
-                    change.doubt_std if change is not None else 0.0,
-                    no_load.doubt_std if no_load is not None else 0.0,
+                    *(one.doubt_std for one in of_scale),
                     ALTERED_STD if any(p.id in ALTERED for p in problems) else 0.0,
                     UNBACKED_STD if unbacked(vehicle) else 0.0,
                 )
             )
-            if result.std > GATE.widest * result.mass:
-                status = Status.INCONSISTENT
-                reason = next((d for d in doubts[1:3] if d is not None), reason)
-                problems = tuple(p for p in problems if p is not reason)
+            doubts = [one.doubt for one in of_scale]
+            if doubts and result.std > GATE.widest * result.mass:
+                status, reason = Status.INCONSISTENT, doubts.pop(0)
+            doubts += [doubt, possible.note if possible is not None else None]
+            problems += tuple(d for d in doubts if d is not None)
     return Weighing(
         drive=drive,
         vehicle=vehicle,
