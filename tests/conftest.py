@@ -28,6 +28,9 @@ from weighbridge.io import read_drive
 from weighbridge.simulation import make_scenario
 from weighbridge.simulation.simulate import SimulatedDrive
 
+# Programs that tests start need not compile all they import, each time.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 keep_drives(Path(os.environ["NUMBA_CACHE_DIR"]))
 
 CHROMIUM = next(

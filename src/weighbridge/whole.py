@@ -153,6 +153,30 @@ def refuse_unwritable(target: Path) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
+def refuse_unwritable_place(path: str | Path, error: type[WeighbridgeError] = ConfigError) -> None:
+    """Raise before the work where nothing can be written beside a result.
+
+    Parameters
+    ----------
+    path : the file that is to be written, or the folder that files go to; where folders are still
+        to be made, the nearest one that exists counts
+    error : the exception to raise
+
+    Raises
+    ------
+    WeighbridgeError
+        Of the type given: the disk or the folder is read-only.
+    """
+    path = Path(path)
+    with _told(path, error):
+        target = _followed(path)
+        if target.is_dir():
+            target /= "file"
+        while not target.parent.exists():
+            target = target.parent
+        _beside(target).rmdir()
+
+
 def _swapped(part: Path, target: Path, replaced: Collection[str]) -> Path:
     """Move the old files away and the new ones in; return the folder that is left over.
 

@@ -356,11 +356,15 @@ def all_pairs() -> list[Pair]:
 
 OF_CI: Final = ("own car", "own electric")
 SEEN_IN_CI: Final = ("full", "no IMU")
+FOREIGN_IN_CI: Final = "foreign: full"
 """Subjects and equipment of the part that CI weighs: few, for each has to be made."""
 
 
 def part(name: str) -> list[Pair]:
-    """Return the pairs of a part: ``all``, ``ci`` (150) or ``quick`` (30), and their references."""
+    """Return the pairs of a part: ``all``, ``ci`` (150) or ``quick`` (30), and their references.
+
+    Of the 150, eight are drives of another simulator, where its data are.
+    """
     pairs = all_pairs()
     if name == "all":
         return pairs
@@ -368,7 +372,10 @@ def part(name: str) -> list[Pair]:
     if name == "quick":
         there = [p for p in there if p.of == OF_CI[0] and p.equipment == "full"]
     order = sorted(there, key=lambda p: zlib.crc32(p.id.encode()))
-    chosen = order[: 150 if name == "ci" else 30]
+    chosen = order[:30]
+    if name == "ci":
+        foreign = [p for p in pairs if p.slice == FOREIGN_IN_CI and not unavailable(p)]
+        chosen = foreign + order[: 150 - len(foreign)]
     wanted = {p.id for p in chosen} | {p.reference for p in chosen}
     return [p for p in pairs if p.id in wanted]
 

@@ -51,3 +51,14 @@ def short(weighing):
 @pytest.fixture(scope="session")
 def forward(short, weighing, setup):
     return forward_weigh(short, setup)
+
+
+@pytest.fixture(scope="session")
+def brief(short):
+    """Return what is fed in the smallest steps."""
+    return short.between(short.start, short.start + 0.5 * SHORT)
+
+
+@pytest.fixture(scope="session")
+def forward_brief(brief, weighing, setup):
+    return forward_weigh(brief, setup)

@@ -56,16 +56,16 @@ def even(drive, length):
 )
 @pytest.mark.filterwarnings("ignore:Generating overly large repr")
 def test_live_is_the_forward_pass_to_the_last_bit(
-    short, weighing, setup, forward, lengths, late, seed
+    brief, weighing, setup, forward_brief, lengths, late, seed
 ):
-    edges = [short.start]
-    while edges[-1] < short.end:
+    edges = [brief.start]
+    while edges[-1] < brief.end:
         edges.append(edges[-1] + lengths[len(edges) % len(lengths)])
     edges.append(edges[-1] + 1.0)
     rng = np.random.default_rng(seed)
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
     held = {}
-    for block in blocks(short, edges):
+    for block in blocks(brief, edges):
         # Some samples come with the next block, just not too late; within a block any order.
         newest = max((t[-1] for t, _ in block.values()), default=-np.inf)
         now, held, before = {}, {}, held
@@ -82,30 +82,29 @@ def test_live_is_the_forward_pass_to_the_last_bit(
     told = scale.weighing()
     assert not told.provisional
     assert not any(s.late or s.unfit for s in told.signals)
-    assert told.mass == forward.state.mass - scale._state.force.fuel
-    assert told.std == forward.std[-1]
+    assert told.mass == forward_brief.state.mass - scale._state.force.fuel
+    assert told.std == forward_brief.std[-1]
 
 
-def test_single_samples_are_blocks_of_one(short, weighing, setup, forward):
+def test_single_samples_are_blocks_of_one(brief, weighing, setup, forward_brief):
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
     samples = sorted(
         (t, n, v)
-        for n, s in short.signals.items()
+        for n, s in brief.signals.items()
         for t, v in zip(s.time.tolist(), s.values.tolist(), strict=True)
     )
     for time, name, value in samples:
         scale.update(time, name, value)
     scale.finish()
-    assert scale.weighing().std == forward.std[-1]
+    assert scale.weighing().std == forward_brief.std[-1]
 
 
 @pytest.mark.parametrize("step", [0.25, 1.0])
-def test_other_steps_are_those_of_the_setup(short, weighing, step):
+def test_other_steps_are_those_of_the_setup(brief, weighing, step):
     setup = identify_forward(weighing, step)
-    part = short.between(short.start, short.start + 0.5 * SHORT)
-    forward = forward_weigh(part, setup)
+    forward = forward_weigh(brief, setup)
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    told = fed(scale, part, even(part, 3.0))
+    told = fed(scale, brief, even(brief, 3.0))
     assert told.std == forward.std[-1]
     assert told.mass == forward.state.mass - scale._state.force.fuel
 
@@ -115,11 +114,11 @@ def test_a_step_that_rounds_is_refused(car):
         wb.LiveScale(car, step=0.3)
 
 
-def test_the_settled_mass_is_as_old_as_lateness_look_ahead_and_step(short, weighing, setup):
+def test_the_settled_mass_is_as_old_as_lateness_look_ahead_and_step(brief, weighing, setup):
     """Samples come in blocks of 0.1 s, as from a source."""
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
     ages = []
-    for block in blocks(short, even(short, 0.1)):
+    for block in blocks(brief, even(brief, 0.1)):
         scale.update_block(block)
         ages.append(scale.weighing().age)
     ages = np.array([a for a in ages if np.isfinite(a)])[300:]
@@ -154,9 +153,9 @@ def looked_at_each_second(scale, drive, late=0.0):
     return shown, np.array(settled)
 
 
-def test_the_provisional_mass_is_young_and_near_the_settled_one(short, weighing, setup):
+def test_the_provisional_mass_is_young_and_near_the_settled_one(brief, weighing, setup):
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    shown, settled = looked_at_each_second(scale, short)
+    shown, settled = looked_at_each_second(scale, brief)
     told = [w for w in shown if np.isfinite(w.mass) and w.time <= settled[-1, 0]]
     assert len(told) > 100
     assert all(w.provisional for w in told)
@@ -168,10 +167,10 @@ def test_the_provisional_mass_is_young_and_near_the_settled_one(short, weighing,
     assert np.abs(far).max() < 0.5
 
 
-def test_the_provisional_mass_waits_for_no_late_sample(short, weighing, setup):
+def test_the_provisional_mass_waits_for_no_late_sample(brief, weighing, setup):
     """A third of the samples come 0.1 s late: it is no older, and within a standard deviation."""
     scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-    shown, settled = looked_at_each_second(scale, short, late=0.1)
+    shown, settled = looked_at_each_second(scale, brief, late=0.1)
     told = [w for w in shown if np.isfinite(w.mass) and w.time <= settled[-1, 0]]
     assert np.percentile([w.age for w in told], 99.0) <= LATENESS + 0.2
     known = np.interp([w.time for w in told], settled[:, 0], settled[:, 1])
@@ -179,13 +178,12 @@ def test_the_provisional_mass_waits_for_no_late_sample(short, weighing, setup):
     assert np.abs(far).max() < 0.5
 
 
-def test_a_look_ahead_leaves_no_trace(short, weighing, setup):
+def test_a_look_ahead_leaves_no_trace(brief, weighing, setup):
     """The states of two scales are the same to the last letter; one of them is looked at."""
-    part = short.between(short.start, short.start + 0.5 * SHORT)
     kept = []
     for looks in (False, True):
         scale = wb.LiveScale(weighing.vehicle, setup=setup, info=weighing.drive.info)
-        for block in blocks(part, even(part, 0.5)):
+        for block in blocks(brief, even(brief, 0.5)):
             scale.update_block(block)
             if looks:
                 scale.weighing(ahead=True)
@@ -194,11 +192,11 @@ def test_a_look_ahead_leaves_no_trace(short, weighing, setup):
     assert kept[0] == kept[1]
 
 
-def test_an_open_window_that_is_full_counts_as_the_whole_one(short, weighing, setup):
+def test_an_open_window_that_is_full_counts_as_the_whole_one(brief, weighing, setup):
     """Of one that has fewer rows the noise is larger, so that it moves the mass less."""
-    state, whole = begin(setup, short.start), 0
-    for until in np.arange(short.start, short.start + 0.5 * SHORT, 0.125):
-        after, _ = step(state, recent(short, until), until, setup)
+    state, whole = begin(setup, brief.start), 0
+    for until in np.arange(brief.start, brief.end, 0.125):
+        after, _ = step(state, recent(brief, until), until, setup)
         if state.windows.stood >= STOP:
             assert with_open(state, setup) == state.joint
         elif after.joint.windows > state.joint.windows:

@@ -314,6 +314,7 @@ def test_random_drivers_brake_as_often_as_recorded_ones():
                 habits=random_habits(np.random.default_rng([number, 41])),
                 polling=usual_polling(car),
                 effects=Effects().without(*without),
+                duration=2400.0,
             )
             rows.append(braked_rows(scenario))
         needed, braked, above, both = np.concatenate(rows, axis=1)

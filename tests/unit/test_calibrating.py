@@ -331,16 +331,19 @@ def test_an_inertia_stated_counts_though_engines_of_cars_have_it(electric, metho
     assert found.driveline.engine_inertia == pytest.approx(0.15, abs=0.02)
 
 
-def test_joint_calibration_weighs_its_own_drive(empty):
-    joint = calibrate(empty.drive, settings=CalibrationSettings(method="joint"))
+@pytest.fixture(scope="module")
+def joint(empty):
+    return calibrate(empty.drive, settings=CalibrationSettings(method="joint"))
+
+
+def test_joint_calibration_weighs_its_own_drive(empty, joint):
     w = weigh(empty.drive, joint, method="joint")
     assert w.mass == pytest.approx(empty.drive.info.mass, rel=0.005)
     assert 0.0 <= joint.timing.torque_lag <= 0.3
     assert joint.provenance.method == "joint"
 
 
-def test_joint_finds_a_load_in_unknown_wind(empty, loaded):
-    joint = calibrate(empty.drive, settings=CalibrationSettings(method="joint"))
+def test_joint_finds_a_load_in_unknown_wind(loaded, joint):
     w = weigh(loaded.drive, joint, method="joint")
     truth = float(np.mean(loaded.truth.mass))
     low, high = w.interval(0.95)

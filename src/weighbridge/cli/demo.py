@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 LOADS = (0.0, 125.0, 240.0)
 """Payloads of the weighing drives [kg] (Jensen 2022, Table B.1)."""
+DURATION = 1500.0
+"""Of each simulated drive [s]: the first minutes of a route that has all kinds of road."""
+
 PERMITTED = 2060.0
 """Permitted mass that the vehicle file states [kg]: 1.3 times the empty one, as of midsize cars."""
 
@@ -51,7 +54,8 @@ def demo(
     # Shares of the work: a calibration takes twice as long as what is done with each drive.
     with progress("demo", 5 + 3 * len(LOADS)) as bar:
         bar.begin("simulating a drive of known mass", 2)
-        known = simulate_car(make_scenario("car-calibration", seed=seed), bar.within)
+        shorter = replace(make_scenario("car-calibration", seed=seed), duration=DURATION)
+        known = simulate_car(shorter, bar.within)
         bar.begin("calibrating by it", 2)
         calibration = run_calibration(known.drive, float(known.truth.mass[0]), progress=bar.within)
         car = replace(
@@ -63,7 +67,8 @@ def demo(
         for k, load in enumerate(LOADS, 1):
             name = f"{load:+.0f} kg"
             bar.begin(f"simulating a drive with {name}")
-            chosen = replace(make_scenario("car", payload=load, seed=seed + k), name=name)
+            chosen = make_scenario("car", payload=load, seed=seed + k)
+            chosen = replace(chosen, name=name, duration=DURATION)
             made = simulate_car(chosen, bar.within)
             bar.begin(f"weighing it by {DEFAULT_METHOD}")
             weighed.append((weigh(made.drive, car), float(made.truth.mass[-1])))

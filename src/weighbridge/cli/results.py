@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from weighbridge.cli.terminal import say_json
 from weighbridge.errors import ConfigError, WeighbridgeError
-from weighbridge.whole import is_stream, write_whole
+from weighbridge.whole import is_stream, refuse_unwritable_place, write_whole
 
 Kind = Literal[
     "report",
@@ -161,6 +161,7 @@ def refuse_results(read: Inputs, results: Sequence[Result]) -> None:
         refuse_missing_folder(path)
         if is_stream(path):
             continue
+        refuse_unwritable_place(path)
         place = _place(path)
         if place is not None and place in known:
             raise ConfigError(_is_input(path, known[place], read))
@@ -203,6 +204,7 @@ def refuse_folder(read: Inputs, folder: Path) -> None:
 
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"{folder}: is a file; name a folder, or a file that ends in .mf4")
+    refuse_unwritable_place(folder)
     place = _place(folder)
     if place is None:
         return

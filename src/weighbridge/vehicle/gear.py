@@ -166,17 +166,41 @@ def _standing_out(grid: Floats, density: Floats, width: float, most: int) -> Int
     A gear is such a peak, be it ever so rarely used: shifting smears samples evenly, gears pile
     them up.
     """
-    from scipy.signal import find_peaks  # Slow to load.
-
-    peaks, found = find_peaks(
-        density,
-        prominence=max(5.0, 0.002 * density.sum() / (2.0 * width) * np.log(grid[1] / grid[0])),
-        distance=int(0.07 / np.log(grid[1] / grid[0])),
-    )
-    peaks = peaks[found["prominences"] > 0.55 * density[peaks]]
+    step = float(np.log(grid[1] / grid[0]))
+    least = max(5.0, 0.002 * density.sum() / (2.0 * width) * step)
+    peaks = _apart(density, _maxima(density), int(0.07 / step))
+    prominence = density[peaks] - np.array([_saddle(density, peak) for peak in peaks])
+    peaks = peaks[(prominence >= least) & (prominence > 0.55 * density[peaks])]
     if peaks.size > most:
         peaks = np.sort(peaks[np.argsort(density[peaks])[-most:]])
-    return np.asarray(peaks)
+    return peaks
+
+
+def _maxima(values: Floats) -> Ints:
+    """Places above both neighbours; of a level stretch that is, its middle."""
+    first = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    last = np.append(first[1:], values.size) - 1
+    level = values[first]
+    inner = np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] > level[2:])) + 1
+    return np.asarray((first[inner] + last[inner]) // 2)
+
+
+def _apart(values: Floats, peaks: Ints, distance: int) -> Ints:
+    """Leave out the peaks that are nearer than so many places to a higher one that is kept."""
+    kept: list[int] = []
+    for peak in peaks[np.argsort(-values[peaks], kind="stable")]:
+        if all(abs(peak - other) >= distance for other in kept):
+            kept.append(int(peak))
+    return np.sort(np.array(kept, dtype=np.int64))
+
+
+def _saddle(values: Floats, peak: int) -> float:
+    """Higher one of the two lowest values between a peak and what is higher, or the end."""
+    higher = np.flatnonzero(values > values[peak])
+    before, after = higher[higher < peak], higher[higher > peak]
+    left = values[before[-1] + 1 if before.size else 0 : peak + 1].min()
+    right = values[peak : after[0] if after.size else values.size].min()
+    return float(max(left, right))
 
 
 def predict_gear(
