@@ -18,15 +18,15 @@ PHONE = Sensors(imu_rate=50.0)
 
 def own_data(folder: Path) -> None:
     """Write what docs/data.md weighs: a dongle with a phone, days of a truck, MF4 of a van."""
-    for name, payload, seed, minutes in (("empty", 0.0, 1, 20.0), ("trip", 210.0, 2, 10.0)):
+    for name, payload, seed, minutes in (("empty", 0.0, 1, 12.0), ("trip", 210.0, 2, 8.0)):
         tables = _tables(folder, "car", payload, seed, minutes)
         dongle_and_phone(tables, folder / name)
     (folder / "days").mkdir()
     for day, payloads in ((10, (1713.0, 7698.0, 4278.0)), (11, (3000.0,)), (12, (6000.0,))):
-        drives = [_tables(folder, "truck", p, int(p), 15.0) for p in payloads]
+        drives = [_tables(folder, "truck", p, int(p), 10.0) for p in payloads]
         day_of_a_truck(drives, day, folder / "days" / f"2025-06-{day}.parquet")
     for run, payload in ((1, 226.0), (2, 1136.0), (3, 600.0)):
-        mf4_of_a_van(_tables(folder, "van", payload, run, 15.0), folder / f"run_{run}.mf4")
+        mf4_of_a_van(_tables(folder, "van", payload, run, 10.0), folder / f"run_{run}.mf4")
 
 
 def fleet(folder: Path) -> None:

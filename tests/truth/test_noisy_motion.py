@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.estimators.noisy_motion import attenuation
+from weighbridge.estimators.noisy_motion import attenuation, unmeasured_noise
 from weighbridge.kernels import disturbance as kernel
 
 MASS = 1500.0
@@ -34,15 +34,28 @@ def weighed(seed, n=400):
     rows = np.column_stack([motion, np.ones(n)])
     none = np.zeros(rows.shape)
     x, var, _, weight = kernel.smooth(start, time, rows, y, noise, none, params)
-    low = attenuation(weight, np.full(n, NOISE**2), var[:, 0], np.zeros(n, dtype=bool))
-    return x[-1, 0], x[-1, 0] * (1.0 + low[-1])
+    mass = x[-1, 0]
+
+    def put_back(variance):
+        return mass * (1.0 + attenuation(weight, variance, var[:, 0], np.zeros(n, dtype=bool))[-1])
+
+    def by_scatter(unanswered, grade_std):
+        known = np.full(n, 30.0**2), np.full(n, grade_std), unanswered, mass, var[-1, 0]
+        return put_back(unmeasured_noise(weight, *known))
+
+    by_size = put_back(np.full(n, NOISE**2))
+    return mass, by_size, by_scatter(1.0, NOISE), by_scatter(0.5, NOISE), by_scatter(1.0, 0.0)
 
 
 def test_the_mean_over_many_drives_is_right_once_the_noise_is_put_back():
-    as_it_is, put_back = np.mean([weighed(seed) for seed in range(60)], axis=0) / MASS - 1.0
+    found = np.mean([weighed(seed) for seed in range(60)], axis=0) / MASS - 1.0
+    as_it_is, by_size, by_scatter, by_half, by_true_heights = found
     assert -0.07 < as_it_is < -0.03
     # To first order: what is left is the square of what was taken.
-    assert put_back == pytest.approx(0.0, abs=0.006)
+    assert by_size == pytest.approx(0.0, abs=0.006)
+    assert by_scatter == pytest.approx(0.0, abs=0.006)
+    assert by_half == pytest.approx(0.5 * as_it_is, abs=0.006)
+    assert by_true_heights == pytest.approx(as_it_is, abs=1e-6)
 
 
 def test_each_load_counts_its_own_windows():

@@ -31,6 +31,10 @@ FEWEST_PAIRS: Final = 40
 PARTS: Final = 12
 """Parts of a drive that are left out one after another for a standard deviation."""
 
+UNANSWERED_STD: Final = 0.2
+"""Standard deviation of `weighbridge.vehicle.classes.VehicleClass.unanswered`, over it [-]:
+anything between a half and all."""
+
 
 class MotionNoise(NamedTuple):
     """Noise in the mean specific force of a window.
@@ -110,6 +114,42 @@ def _changes(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> Floats:
     told = (lasted > SHORTEST) & np.isfinite(rows).all(axis=0)
     beside = told[1:] & told[:-1] & (np.diff(cut.mean(table.time)) < APART)
     return np.asarray(np.diff(rows, axis=1)[:, beside])
+
+
+def unmeasured_noise(
+    weight: Floats,
+    torque_var: Floats,
+    grade_std: Floats,
+    unanswered: float,
+    mass: float,
+    mass_var: float,
+) -> Floats:
+    """Variance of the noise in a specific force that no accelerometer measured (m,) [m^2/s^4].
+
+    On a hill that heights smooth away a driver holds the pedal: the vehicle slows down, force and
+    true specific force stay, and the measured one falls. That is noise of the regressor. Or the
+    driver answers the hill: then only the force scatters. So a part of the scatter is noise, but
+    none that is the torque's, and no more than the grade is uncertain by.
+
+    Parameters
+    ----------
+    weight : (m,) diagonal of the inverse covariance of the force [1/N^2]; 0 where left out
+    torque_var : (m,) part of the variance that is noise of the torque [N^2]
+    grade_std : (m,) of the specific force, by the grade [m/s^2]
+    unanswered : the part, of the class of the vehicle [-]
+    mass : [kg]
+    mass_var : of it, by the whole drive [kg^2]
+
+    References
+    ----------
+    Fuller, Measurement Error Models, 1987, ch. 1; noise of the true value about the measured one:
+    Berkson, J. Am. Stat. Assoc. 45, 1950.
+    """
+    with np.errstate(divide="ignore"):
+        scatter = np.maximum(1.0 / weight - torque_var, 0.0)
+    scatter = np.where(weight > 0.0, np.minimum(scatter, (mass * grade_std) ** 2), 0.0)
+    part = unanswered * scatter / mass**2
+    return np.asarray(part / (1.0 + mass_var * float(np.sum(weight * part))))
 
 
 def attenuation(weight: Floats, variance: Floats, mass_var: Floats, begins: Bools) -> Floats:

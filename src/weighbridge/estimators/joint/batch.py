@@ -14,6 +14,7 @@ from weighbridge.balance.averaging import Windows, windows
 from weighbridge.balance.force_balance import highest_torque
 from weighbridge.balance.law import accessory_column, traction_gain
 from weighbridge.balance.table import ForceTable
+from weighbridge.constants import GRAVITY
 from weighbridge.estimators.considered import fit_consider_std, force_columns, sensitivity
 from weighbridge.estimators.joint.bend import KNEE, above_knee, torque_bend
 from weighbridge.estimators.joint.confounded import inertia_relative_std
@@ -51,7 +52,13 @@ from weighbridge.estimators.judging import (
     lacks_accelerometer,
     nothing,
 )
-from weighbridge.estimators.noisy_motion import MotionNoise, attenuation, learnt_noise
+from weighbridge.estimators.noisy_motion import (
+    UNANSWERED_STD,
+    MotionNoise,
+    attenuation,
+    learnt_noise,
+    unmeasured_noise,
+)
 from weighbridge.estimators.squat import ResidualSquat, residual_squat
 from weighbridge.estimators.torque_shape import shape_columns, shape_std
 from weighbridge.estimators.track import MassTrack, Segment
@@ -81,12 +88,12 @@ simulator came out 3.4 % (RMS) light with heights, and 10 % without."""
 
 
 UNCALIBRATED_MOTION_STD: Final[dict[MotionSource, float]] = {"speed_grade": 0.05, "speed": 0.09}
-"""The same where a data sheet is all there is, beside `JOINT_MOTION_STD` [-]: nine drives of a
-simulated truck and bus at 1 Hz, with their retarder logged, came out 9 % light with heights."""
+"""The same where a data sheet is all there is, beside `JOINT_MOTION_STD`, of classes whose noise
+of the motion is not known [-]."""
 
 UNTOLD_RETARDER_STD: Final = 0.08
-"""The same of a data sheet alone where a retarder may work that nothing tells of [-]: without their
-retarder the same drives came out 13 % light."""
+"""The same of a data sheet alone where a retarder may work that nothing tells of [-]: nine drives
+of a simulated truck and bus at 1 Hz came out 9 % light with their retarder logged, 13 % without."""
 
 
 def first_guess(phi: Floats, y: Floats) -> float:
@@ -299,9 +306,9 @@ def _track(
 ) -> MassTrack:
     """Lay out the running mass and judge the final one."""
     table, problem, time = balance.table, asked.problem, asked.problem.time
-    # More noise than usual is more likely the torque's; less is less on both sides.
-    shown = noise.variance if noise.learnt else min(solved.fast, 1.0) ** 2 * noise.variance
-    low = attenuation(solved.weight, np.full(time.size, shown), solved.var[:, 0], solved.begins)
+    by_speed = balance.motion.source in BY_SPEED
+    attenuating, unsure = _attenuating(balance, vehicle, cut, solved, noise)
+    low = attenuation(solved.weight, attenuating, solved.var[:, 0], solved.begins)
 
     left_out = np.zeros(table.time.size, dtype=bool)
     left_out[cut.index] = ~solved.taken[cut.window]
@@ -326,7 +333,6 @@ def _track(
         above = above_knee(torque_of, gain, knee)
         bend = torque_bend(given, cut.mean(above), cut.mean(gain), knee)
     phi = asked.rows[:, 0]
-    by_speed = balance.motion.source in BY_SPEED
     systematic = math.hypot(
         _systematic_std(balance, vehicle, mass),
         unseen_std(asked.stood, vehicle.of_class.boarding_std) if by_speed else 0.0,
@@ -335,7 +341,7 @@ def _track(
         inertia_relative_std(vehicle, mass, table.accel, phi, used),
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         shape_std(_moved(problem, solved, cut.mean(bends)), mass),
-        noise.std / noise.variance * float(low[-1]),
+        unsure * float(low[-1]),
     )
     std = float(np.hypot(UNMODELLED * stds[-1], mass * systematic))
     last = np.searchsorted(time, table.time, side="right") - 1
@@ -371,8 +377,30 @@ def _track(
         possible_change=possible,
         bend=bend,
         switched=asked.switched,
-        sizes=_sizes(balance, asked, solved, shown, systematic),
+        sizes=_sizes(balance, asked, solved, attenuating, systematic),
     )
+
+
+def _attenuating(
+    balance: ForceBalance, vehicle: Vehicle, cut: Windows, solved: _Solved, noise: MotionNoise
+) -> tuple[Floats, float]:
+    """Noise of the motion by window (m,) [m^2/s^4], and how unsure its size is [-]."""
+    motion, unanswered = balance.motion, vehicle.of_class.unanswered
+    if motion.source not in BY_SPEED or not unanswered:
+        # More noise than usual is more likely the torque's; less is less on both sides.
+        shown = noise.variance if noise.learnt else min(solved.fast, 1.0) ** 2 * noise.variance
+        return np.full(cut.count.size, shown), noise.std / noise.variance
+    time = cut.mean(balance.table.time)
+    found = unmeasured_noise(
+        np.where(solved.taken, solved.weight, 0.0),
+        min(solved.fast, 1.0) ** 2 * cut.mean(balance.table.force_std**2) / cut.count,
+        GRAVITY * np.interp(time, motion.time, motion.grade_std),
+        unanswered,
+        float(solved.x[-1, 0]),
+        float(solved.var[-1, 0]),
+    )
+    # Drives of a calibration are as low, so that it is told by how much all are.
+    return found, UNANSWERED_STD if by_data_sheet(vehicle) else 0.0
 
 
 def _moved(problem: Problem, solved: _Solved, columns: Floats) -> Floats:
@@ -392,16 +420,16 @@ def _air_std(balance: ForceBalance, problem: Problem, solved: _Solved, cut: Wind
 
 
 def _sizes(
-    balance: ForceBalance, asked: _Asked, solved: _Solved, shown: float, systematic: float
+    balance: ForceBalance, asked: _Asked, solved: _Solved, attenuating: Floats, systematic: float
 ) -> JointSizes:
-    """Keep what the drive tells of noise; ``shown`` is that of the motion [m^2/s^4]."""
+    """Keep what the drive tells of noise; ``attenuating`` is that of the motion [m^2/s^4]."""
     return JointSizes(
         std=asked.problem.std,
         fast=solved.fast,
         slow=solved.slow,
         body=asked.body,
         motion_var=window_motion_variance(balance.motion),
-        noise_information=shown * float(np.sum(solved.weight)),
+        noise_information=float(np.sum(attenuating * solved.weight)),
         systematic_std=systematic,
         switched_power=0.0 if asked.switched is None else asked.switched.power,
         settings=asked.problem.settings,
@@ -448,7 +476,8 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
     if lacks_accelerometer(vehicle, balance.motion):
         left = float(np.hypot(left, OTHER_MOTION_STD[balance.motion.source]))
     if by_data_sheet(vehicle) and balance.motion.source in BY_SPEED:
-        left = float(np.hypot(left, UNCALIBRATED_MOTION_STD[balance.motion.source]))
+        if not vehicle.of_class.unanswered:
+            left = float(np.hypot(left, UNCALIBRATED_MOTION_STD[balance.motion.source]))
         if balance.retarder_untold:
             left = float(np.hypot(left, UNTOLD_RETARDER_STD))
     if made.fit is not None and made.fit.torque and not made.fit.refined:
