@@ -536,6 +536,16 @@ def test_a_counter_of_minutes_alone_is_told(tmp_path, name):
     assert any("minutes" in doubt for doubt in found.doubts)
 
 
+@pytest.mark.parametrize("unit", ["s", "min"])
+def test_a_counter_of_minutes_that_a_mapping_names_is_serious(tmp_path, unit):
+    name = "TIME_SINCE_DTC_CLEARED"
+    path = driven(tmp_path, {name: (MINUTES // 60 + 7).astype(int)})
+    named = {"time": {"column": name, "unit": unit}, "signals": {"engine_speed": {"column": "RPM"}}}
+    named["signals"]["engine_speed"]["unit"] = "rpm"
+    serious = {p.id for p in read_drive(path, named).problems if p.serious}
+    assert serious == {"clock.minutes_named", *(["clock.minutes"] if unit == "min" else [])}
+
+
 def test_of_two_clocks_the_one_in_which_a_vehicle_moves_is_taken(tmp_path):
     clocks = {"Time (s)": np.round(MINUTES / 100.0, 4), "Timestamp (s)": np.round(MINUTES, 2)}
     found = draft(driven(tmp_path, clocks))

@@ -18,7 +18,7 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.columns import bracketed_unit, time_unit, unit_suffix
-from weighbridge.io.draft_time import is_number, text_time_format
+from weighbridge.io.draft_time import counts_minutes, is_number, minutes_problem, text_time_format
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.naming import is_time, recognise, unit_of, words_of
 from weighbridge.io.table import (
@@ -75,6 +75,9 @@ _THOUSANDS: Final = r"^[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
 # Columns of a table that is long: what a row says is in a few.
 _MOST: Final = 12
 
+
+_DAMAGED: Final = 0.005
+"""Part of the rows that a word stands in at most which a torn line left [-]."""
 
 # Rows by which it is known what a column of texts names, and part of the names that are known.
 _LOOKED_AT: Final = 200
@@ -150,7 +153,7 @@ def open_long(path: Path, time: TimeColumn) -> Recording:
         It has no rows, no time that can be read, too many names, or a name whose units do not
         convert into one another.
     """
-    return recording_of(read_text(path), time)
+    return recording_of(read_text(path, whole=True), time)
 
 
 def names_in(raw: RawTable) -> tuple[str, ...]:
@@ -171,7 +174,7 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
         raise DriveError(f"{path} has no columns of names and values; it has {column_list(names)}")
     if raw.rows == 0:
         raise DriveError(f"{path} has a header and no rows; record it again")
-    _refuse_several(raw, names)
+    of_one = _of_one_vehicle(raw, names)
     found = Recording([], notes=list(raw.notes))
     seconds = _seconds(raw, names, time, found)
     united = _place(names, _UNITS)
@@ -189,7 +192,8 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
             else raw.column(united).cast(pl.String),
         }
     )
-    known = table.drop_nulls(["name", "value"]).filter(pl.col("time").is_finite())
+    known = table if of_one is None else table.filter(of_one)
+    known = known.drop_nulls(["name", "value"]).filter(pl.col("time").is_finite())
     if known.height == 0:
         raise DriveError(f"{path} has no row with a time, a name and a number; record it again")
     if (lost := table.height - known.height) > 0:
@@ -211,26 +215,42 @@ def _some(raw: RawTable) -> list[list[str]]:
     return [list(row) for row in zip(*columns, strict=True)]
 
 
-def _refuse_several(raw: RawTable, names: list[str]) -> None:
-    """Refuse rows of several vehicles: a drive is of one."""
+def _of_one_vehicle(raw: RawTable, names: list[str]) -> pl.Series | None:
+    """Tell which rows are of the one vehicle of a table; None where none is named.
+
+    A name that stands in hardly any row is damage.
+
+    Raises
+    ------
+    DriveError
+        There are several: a drive is of one.
+    """
     place = _place(names, _VEHICLES)
     if place is None:
-        return
-    vehicles = raw.column(place).cast(pl.String).drop_nulls().unique(maintain_order=True)
-    if vehicles.len() > 1:
+        return None
+    told = raw.column(place).cast(pl.String).str.strip_chars()
+    counts = told.drop_nulls().value_counts(sort=True)
+    vehicles = [name for name, count in counts.rows() if not _is_damage(count, raw.rows)]
+    if len(vehicles) > 1:
         raise refused(
             "file.several_vehicles",
             file=raw.path.name,
-            count=vehicles.len(),
+            count=len(vehicles),
             column=names[place],
             example=vehicles[0],
         )
+    return (told.is_null() | told.is_in(vehicles)) if vehicles else None
+
+
+def _is_damage(count: int, rows: int) -> bool:
+    """Whether what stands in so many of the rows is no word of the logger, but a torn one."""
+    return count <= max(1.0, _DAMAGED * rows)
 
 
 def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[Problem | str]) -> Channel:
     """Values of one name, all in the unit that most of its rows state.
 
-    A unit that stands in one row alone and does not convert is damage; the row is left out.
+    A unit that stands in hardly any row and does not convert is damage; the row is left out.
     """
     stated = rows["unit"].fill_null("").str.strip_chars()
     units = (
@@ -248,7 +268,7 @@ def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[Problem | st
         suffix = unit_suffix(other)
         if suffix and common and UNITS[suffix].dimension == UNITS[common].dimension:
             values[here] = from_si(to_si(values[here], suffix), common)
-        elif count == 1:
+        elif _is_damage(count, rows.height):
             kept &= ~here
             notes.append(Problem.of("file.row_unit", name=name, unit=other))
         else:
@@ -274,6 +294,8 @@ def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording
         )
     name = names[index]
     found.time = name
+    if counts_minutes(name):
+        found.notes.append(minutes_problem(raw.path.name, name))
     texts = raw.column(index)
     found.time_format = time.format or ""
     if not found.time_format and texts.dtype == pl.String:

@@ -16,7 +16,12 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
-from weighbridge.io.understood import Lines, strange_rows
+from weighbridge.io.understood import (
+    Lines,
+    strange_rows,
+    without_open_quotes,
+    without_strange_rows,
+)
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
@@ -39,6 +44,9 @@ _HEAD: Final = 1 << 18
 """Bytes at the beginning of a text that hold its header and its first rows."""
 
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+
+# Stamps before and after midnight that have to agree that it was there.
+_AROUND: Final = 3
 
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
@@ -197,8 +205,17 @@ def _plain(name: str) -> str:
     return " ".join(name.split()).casefold()
 
 
-def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
+def read_text(
+    path: Path, text_format: TextFormat | None = None, *, whole: bool = False
+) -> RawTable:
     """Read a CSV or other separated text table.
+
+    Parameters
+    ----------
+    path : the file
+    text_format : how it is written; None to find it
+    whole : whether a row counts whole or not at all: one with other cells than the header names
+        is left out, as the cells of two torn rows stand in it
 
     Raises
     ------
@@ -227,8 +244,14 @@ def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
         read = Lines()
         read.add(b"\n" * skip, 0, 0, 0)
         data = body.encode(errors="replace")
-        read.add(data, *strange_rows(data, len(names), separator))
-        notes += read.problems("file.rows_strange", path)
+        if whole:
+            rows, counts = without_strange_rows(data, len(names), separator)
+            read.add(data, *counts)
+            notes += read.problems("file.rows_cut", path)
+            data = rows
+        else:
+            read.add(data, *strange_rows(data, len(names), separator))
+            notes += read.problems("file.rows_strange", path)
         frame = _parse(path, data, len(names), separator, fmt.decimal, notes)
     missing = frozenset(MISSING) | {m.strip().lower() for m in fmt.missing}
     return RawTable(path, names, frame, separator, missing, fmt.decimal, notes)
@@ -310,8 +333,8 @@ def _parse(
     # With a header of its own, the width does not hang on the first row.
     data = f"{separator.join(names)}\n".encode() + body
     # A quote that is never closed would swallow the rest of the file.
-    quote = '"' if data.count(b'"') % 2 == 0 else None
-    if quote is None:
+    if data.count(b'"') % 2 == 1:
+        data, _ = without_open_quotes(data)
         notes.append(Problem.of("file.open_quote"))
 
     def parse(dtype: type[pl.DataType]) -> pl.DataFrame:
@@ -323,7 +346,6 @@ def _parse(
                 schema=dict.fromkeys(names, dtype),
                 null_values=None if dtype is pl.String else ["NA", "na", "N/A", "null", "-"],
                 truncate_ragged_lines=True,
-                quote_char=quote,
             )
 
     try:
@@ -422,14 +444,16 @@ def _temporal(series: pl.Series) -> tuple[Floats, bool]:
 
 
 def unwrapped(seconds: Floats) -> Floats:
-    """Carry a time of day over midnight."""
+    """Carry a time of day over midnight; a stamp that alone falls by half a day is damaged."""
     day = 86_400.0
     finite = np.isfinite(seconds)
     present = seconds[finite]
     turns = np.zeros(present.size)
-    turns[1:] = np.cumsum(np.diff(present) < -day / 2)
+    falls = np.flatnonzero(np.diff(present) < -day / 2) + 1
+    for k in falls.tolist():
+        turns[k] = present[max(k - _AROUND, 0) : k].min() - present[k : k + _AROUND].max() > day / 2
     out = seconds.copy()
-    out[finite] = present + day * turns
+    out[finite] = present + day * np.cumsum(turns)
     return out
 
 
