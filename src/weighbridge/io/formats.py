@@ -18,6 +18,7 @@ from weighbridge.io import (
     candump,
     canlog,
     gpx,
+    grouped,
     hdf5,
     long_csv,
     matlab,
@@ -120,6 +121,15 @@ FORMATS: Final[tuple[Format, ...]] = (
         about="one row for each value, with its name, as Car Scanner writes it",
         takes=Takes.COLUMNS,
         draft=drafter(long_csv.open_long),
+    ),
+    Format(
+        name="grouped CSV",
+        suffixes=(".csv", ".tsv", ".txt"),
+        read=grouped.read_grouped,
+        begins=grouped.is_grouped,
+        about="several times side by side, each for the columns to its right, as VCDS writes them",
+        takes=Takes.TEXT,
+        draft=grouped.draft_grouped,
     ),
     Format(
         name="Parquet",
