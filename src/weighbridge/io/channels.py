@@ -46,7 +46,8 @@ from weighbridge.signals.units import to_si
 _EMPTY_NAMES: Final = frozenset(
     ("data", "value", "values", "val", "signal", "y", "x", "z", "ch", "channel", "0")
 )
-_PARTS: Final = re.compile(r"[/.]")
+# A mark within brackets is that of a unit.
+_PARTS: Final = re.compile(r"[/.](?![^\[(]*[\])])")
 
 # Bytes that a file may unpack to: 1 GB, or so many times its own size where that is more.
 _MOST_UNPACKED: Final = 1 << 30
