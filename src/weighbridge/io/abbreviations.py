@@ -45,7 +45,8 @@ _LONG: Final = {short: word for word, shorts in _SHORT.items() for short in shor
 SOURCES: Final = frozenset(
     (
         "imu", "vcu", "esp", "esc", "tcu", "tcm", "ecm", "pcm", "egs", "dme", "ins", "sg", "sig",
-        "hsc", "act", "actl", "actual", "phys",
+        "hsc", "act", "actl", "actual", "phys", "measured", "meas", "feedback", "fbk", "fdbk",
+        "detected", "estimated", "istwert", "ist", "reel", "sae",
     )
 )  # fmt: skip
 """Prefixes and endings that name who sends a signal, or that it is measured."""
@@ -57,7 +58,9 @@ OF_ANOTHER: Final = frozenset(
         "desired", "dmd", "valid", "vld", "vldy", "validity", "qf", "quality", "sts", "stat",
         "status", "state", "flt", "falt", "fault", "err", "error", "cnt", "counter", "crc", "chksm",
         "checksum", "alv", "alive", "diag", "warn", "warning", "lamp", "avail", "offset", "std",
-        "sigma", "rolling",
+        "sigma", "rolling", "source", "specified", "setpoint", "sp", "aim", "predicted",
+        "expected", "average", "avg", "mean", "derivative", "dot", "delta", "correction", "corr",
+        "cor", "trim", "adder", "limiter", "previous", "next", "blip",
         "soll", "sollwert", "ziel", "durchschnitt", "mittelwert", "fehler",
         "consigne", "cible", "moyenne", "moyen", "maxi", "defaut",
         "objetivo", "consigna", "deseado", "deseada", "promedio", "maxima", "maximo", "minima",

@@ -37,6 +37,24 @@ UNIT_TEXTS: Final[dict[str, str]] = {
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""
 
+_SPELLED: Final = {
+    "per": "/", "squared": "2",
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("kilometer", "kilometers", "kilometre", "kilometres"), "km"),
+    **dict.fromkeys(("mile", "miles"), "mi"),
+    **dict.fromkeys(("second", "seconds", "sec"), "s"),
+    **dict.fromkeys(("hour", "hours", "hr"), "h"),
+    **dict.fromkeys(("minute", "minutes"), "min"),
+    **dict.fromkeys(("degree", "degrees"), "deg"),
+    **dict.fromkeys(("radian", "radians"), "rad"),
+    **dict.fromkeys(("revolution", "revolutions", "revs"), "rev"),
+    **dict.fromkeys(("gram", "grams"), "g"),
+    **dict.fromkeys(("kilogram", "kilograms"), "kg"),
+    **dict.fromkeys(("pound", "pounds", "lbs"), "lb"),
+    **dict.fromkeys(("liter", "liters", "litre", "litres"), "l"),
+}  # fmt: skip
+"""Words of units that are spelled out."""
+
 UNKNOWN_UNIT: Final = "?"
 """Stands before a unit that a log states and nobody knows: no quantity is in it."""
 
@@ -64,11 +82,18 @@ def suffixes_of(quantity: Quantity) -> list[str]:
 
 
 def unit_suffix(text: str) -> str | None:
-    """Unit suffix for a unit as written by people, or None: ``km/h`` is ``kmh``."""
+    """Unit suffix for a unit as written by people, or None: ``km/h`` is ``kmh``.
+
+    It may be spelled out: ``meters per second`` is ``mps``.
+    """
     word = " ".join(text.strip().split()).lower()
     if word in UNITS:
         return word
-    return UNIT_TEXTS.get(word)
+    found = UNIT_TEXTS.get(word)
+    if found is None and " per " in word:
+        short = "".join(_SPELLED.get(part, part) for part in word.split())
+        return short if short in UNITS else UNIT_TEXTS.get(short)
+    return found
 
 
 def unit_refused(quantity: Quantity, text: str) -> str:

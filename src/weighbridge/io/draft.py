@@ -19,7 +19,8 @@ from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
 from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
-from weighbridge.io.draft_unit import SPEEDS, Values, unit_in_name, with_judged_units
+from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
+from weighbridge.io.draft_values import FOUND, with_judged_values
 from weighbridge.io.naming import Named, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
@@ -42,6 +43,9 @@ _STRANGE_UNIT: Final = re.compile(
 
 _BESIDE: Final = frozenset(("engine_speed", "vehicle_speed", "gnss_speed"))
 """Signals of a torque source that tell no torque by themselves."""
+
+_TELLING: Final = {UNITS[QUANTITIES[quantity].suffix].dimension for quantity in FOUND}
+"""Dimensions of columns of any name that are held against others."""
 
 _AXES: Final = (("x",), ("y",), ("z",))
 """Names of columns that tell an axis and no more."""
@@ -162,7 +166,8 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     times = by_motion(times, _swings(raw, columns))
     time = times[0]
     if time.row_rate is None:
-        columns = with_judged_units(columns, _told(raw, time, units, columns))
+        in_numbers = _told(raw, time, units, columns)
+        columns = with_judged_values(with_judged_units(columns, in_numbers), in_numbers)
     found = Draft(
         path=path,
         text=text,
@@ -190,7 +195,7 @@ def _told(
     wanted = {c.name for c in columns if c.quantity}
     for index, name in enumerate(raw.names):
         unit = unit_in_name(name, units.get(name))
-        if name in wanted or unit in SPEEDS:
+        if name in wanted or (unit in UNITS and UNITS[unit].dimension in _TELLING):
             with suppress(DriveError):
                 found[name] = Values(time.seconds, raw.numbers(index)[0], unit)
     return found

@@ -20,11 +20,23 @@ from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
 _NOISE: Final = frozenset(
-    ("obd", "ii", "obd2", "obdii", "pid", "sensor", "value", "avg", "raw", "data", "signal",
-     "bank", "of", "the", "in", "can", "ecu", "location", "txt", "wgs", "der", "des", "du", "de",
-     "la", "le", "el", "del", "della", "di", "do", "da", "from", "as")
+    ("obd", "ii", "obd2", "obdii", "pid", "sensor", "sensors", "value", "raw", "data", "signal",
+     "1", "by", "wire", "drive", "bank", "of", "the", "in", "can", "ecu", "location", "txt", "wgs",
+     "der", "des", "du", "de", "la", "le", "el", "del", "della", "di", "do", "da", "from", "as")
 )  # fmt: skip
-"""Words that say nothing of the quantity."""
+"""Words that say nothing of the quantity; the first of a kind is the one that others have alone."""
+
+_ASPECTS: Final = dict.fromkeys(
+    ("throttle", "relative_throttle", "commanded_throttle", "accelerator_pedal", "relative_pedal"),
+    frozenset(("position", "angle", "opening", "plate", "valve", "body", "percent", "percentage")),
+)
+"""Words for how far a quantity is open: one of them, several or none say the same."""
+
+_BARE: Final = frozenset(
+    ("current", "voltage", "speed", "torque", "power", "temperature", "pressure", "position",
+     "angle", "load", "rate", "flow", "force", "level", "gear")
+)  # fmt: skip
+"""Words that are measured of many things, and name none by themselves at the end of a path."""
 
 
 def _phrases(quantity: str) -> tuple[str, ...]:
@@ -89,6 +101,12 @@ _MARKS: Final = frozenset(("txt", "wgs84", "gear", "bool", "int", "float", "on/o
 
 _UNIT: Final = re.compile(r"[\[({<]\s*([^\])}>]{0,20}?)\s*[\])}>]")
 _PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)*$')
+_WORD_WIDE: Final = re.compile(r"([a-z][a-z0-9]+)_w$")
+"""A label of a control unit with the mark of 16 bits, as Bosch writes it: nmot_w."""
+
+_PATH: Final = re.compile(r"[/.\\:](?![^\[(]*[\])])")
+"""Parts the places of a name that is a path; not within brackets, where a unit may have it."""
+
 _PID: Final = re.compile(r"[0-9A-Fa-f]{2}-(?=[A-Za-z])")
 """The number of an OBD-II parameter before its name, as WiCAN writes it: 0C-EngineRPM."""
 
@@ -122,6 +140,7 @@ class Named:
 def words_of(name: str) -> tuple[str, ...]:
     """Words of a name in small letters, without accents and without units in brackets."""
     plain = _UNIT.sub(lambda found: _kept(found.group(1)), _piped(name))
+    plain = _WORD_WIDE.sub(r"\1", plain)
     plain = _CAMEL.sub(" ", plain)
     plain = unicodedata.normalize("NFKD", plain.translate(_LETTERS))
     plain = "".join(c for c in plain if not unicodedata.combining(c)).lower()
@@ -155,10 +174,13 @@ def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
         suffix = unit_suffix(found)
         if suffix is not None:
             return suffix, words
-    tail = name.rsplit("_", 1)
-    if len(tail) == 2 and (suffix := unit_suffix(tail[1])) is not None and len(words) > 1:
-        gone = len(words_of(tail[1]))
-        return suffix, words[: len(words) - gone]
+    parts = name.split("_")
+    # A unit may be spelled out in several words.
+    for count in (4, 3, 1):
+        tail = " ".join(parts[-count:])
+        gone = len(words_of(tail))
+        if len(parts) > count and len(words) > gone and (suffix := unit_suffix(tail)) is not None:
+            return suffix, words[: len(words) - gone]
     last = name.split()
     if len(last) > 1 and (suffix := unit_suffix(last[-1].strip("()[],;"))) is not None:
         gone = len(words_of(last[-1]))
@@ -193,15 +215,16 @@ def recognise(name: str, unit: str | None = None) -> Named:
 def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     """Recognise a column that states this unit; ``words`` are its name's without it."""
     # A last word may be a unit or part of the name, as in ENGINE_RPM.
-    readings = {frozenset(spelled(words)), frozenset(spelled(words_of(name)))}
     whole = frozenset(spelled(words_of(name)))
+    readings = {frozenset(spelled(words)), whole} | _last_place(name)
     best = Named("", stated, 0.0)
     for quantity, phrases in _WANTED.items():
         if _NOT.get(quantity, frozenset()) & whole and whole not in phrases:
             continue
         if stated is not None and not _can_be(quantity, stated):
             continue
-        score = max(_score(said, wanted) for said in readings for wanted in phrases)
+        aspects = _ASPECTS.get(quantity, frozenset())
+        score = max(_score(said, wanted, aspects) for said in readings for wanted in phrases)
         if stated is not None and any(
             frozenset(said.split()) in readings for said in _WITH_UNIT.get(quantity, ())
         ):
@@ -209,6 +232,12 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
         if score > best.score:
             best = Named(quantity, stated, score)
     return best if best.score >= LEAST else Named("", stated, best.score)
+
+
+def means_another(name: str, quantity: str) -> bool:
+    """Whether a name has a word with which it is not that quantity, whatever its unit is."""
+    words = frozenset(spelled(words_of(name)))
+    return bool(words & (OF_ANOTHER | _NOT.get(quantity, frozenset())))
 
 
 def is_time(name: str) -> bool:
@@ -225,14 +254,33 @@ def _can_be(quantity: str, unit: str) -> bool:
     return unit in UNITS and UNITS[unit].dimension == dimension_of(q)
 
 
-def _score(words: frozenset[str], phrase: frozenset[str]) -> float:
+def _last_place(name: str) -> set[frozenset[str]]:
+    """Words of the last part of a name that is a path, where they alone name something."""
+    parts = [part for part in _PATH.split(_piped(name)) if part.strip()]
+    words = frozenset(spelled(words_of(parts[-1]))) if len(parts) > 1 else frozenset()
+    return {words} if words - _SILENT - _BARE else set()
+
+
+def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str]) -> float:
     """Part of the words of a name that a phrase has; 0 where the name lacks one of the phrase's,
     or is that of a request, a bound or a state of it.
+
+    Parameters
+    ----------
+    words, phrase : of the name and of what is looked for
+    aspects : words that say nothing of this quantity
     """
     if (words - phrase) & OF_ANOTHER:
         return 0.0
-    said, wanted = words - _SILENT or words, phrase - _SILENT or phrase
-    return len(wanted) / len(said) if said and wanted <= said else 0.0
+    silent = _SILENT | aspects
+    wanted = phrase - silent
+    if not wanted or wanted <= _BARE:
+        wanted = phrase - _SILENT or phrase
+    if wanted <= _BARE:
+        # What is left of "current in" would name any current.
+        wanted = phrase
+    said = words - (silent - wanted) or words
+    return len(wanted) / len(said) if wanted <= said else 0.0
 
 
 def recognise_all(

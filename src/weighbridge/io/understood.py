@@ -195,7 +195,11 @@ class _Rows:
 
 def _cells(line: bytes, separator: str) -> list[str]:
     """Cells of a line."""
-    return next(csv.reader([line.decode("utf-8", "replace")], delimiter=separator), [])
+    text = line.decode("utf-8", "replace")
+    try:
+        return next(csv.reader([text], delimiter=separator), [])
+    except csv.Error:
+        return text.split(separator)
 
 
 def without_open_quotes(data: bytes) -> tuple[bytes, Ints]:
