@@ -33,6 +33,9 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "omw/min": "rpm", "toeren/min": "rpm", "varv/min": "rpm", "obr/min": "rpm", "obr./min": "rpm",
     "ot/min": "rpm", "ot./min": "rpm", "dev/dk": "rpm", "d/dk": "rpm", "dev/dak": "rpm",
     "kg/h": "kgph", "kg/hr": "kgph", "lb/min": "lbpmin", "lbs/min": "lbpmin", "msec": "ms",
+    "unit_minutinver": "rpm", "unit_kilometerperhour": "kmh", "unit_percent": "pct",
+    "unit_newtometer": "nm", "unit_degrecelsi": "degc", "unit_volt": "v", "unit_amper": "a",
+    "unit_meterperseconsquar": "mps2", "unit_degreofarc": "deg", "unit_secon": "s",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""

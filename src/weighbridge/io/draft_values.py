@@ -59,6 +59,12 @@ _STEADY: Final = 0.02
 _FASTEST: Final = 4.0
 """Mean size of a vehicle's acceleration, at most, as in `weighbridge.io.draft_time` [m/s^2]."""
 
+_SLOWEST: Final = 0.02
+"""Mean size of its acceleration in either half of a drive, at least [m/s^2]."""
+
+_SETTLED: Final = 0.25
+"""Range of an average in the second half of a drive over that in all of it, at most [-]."""
+
 _TOP: Final = 95.0
 """Speed of a road vehicle, at most [m/s]."""
 
@@ -199,11 +205,16 @@ def _moves(values: Values, known: Mapping[str, Values]) -> bool:
     time, speed = _rising(values)
     if speed.size < _FEWEST or speed.min() < -1.0 or speed.max() > _TOP or np.ptp(speed) < _SLOW:
         return False
-    length = float(time[-1] - time[0])
-    swing = float(np.sum(np.abs(np.diff(speed))))
-    # An average creeps, a limit or a set-point jumps.
+    swings = []
+    for half in np.array_split(np.arange(time.size), 2):
+        length = float(time[half[-1]] - time[half[0]])
+        swings.append(float(np.sum(np.abs(np.diff(speed[half])))) / length if length > 0.0 else 0.0)
+    settled = float(np.ptp(speed[speed.size // 2 :])) < _SETTLED * float(np.ptp(speed))
+    # An average settles; a limit or a set-point stands, and jumps.
     return (
-        0.02 < swing / length < _FASTEST
+        min(swings) > _SLOWEST
+        and not settled
+        and max(swings) < _FASTEST
         and float(np.max(np.abs(np.diff(speed)))) < 0.5 * float(np.ptp(speed))
         and ("engine_speed" not in known or _in_gear(values, known["engine_speed"]))
     )

@@ -2,7 +2,7 @@
 units call it inside, which tools that read their memory write.
 
 Bosch: labels of the ME7 function sheets. Siemens (Continental): labels of the SIMOS and MS4x
-function sheets. As public lists of logged variables have them.
+function sheets. As public lists of logged variables have them. OVMS: its tree of metrics.
 
 Without accents, in small letters, as `naming.words_of` cuts a name.
 """
@@ -28,6 +28,14 @@ LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "module_voltage": ("wub",),
         "brake_switch": ("b br", "b brems"),
         "clutch_switch": ("b kuppl",),
+    },
+    "OVMS": {
+        "vehicle_speed": ("v p speed",),
+        "gnss_speed": ("v p gps speed",),
+        "battery_voltage": ("v b voltage",),
+        "battery_current": ("v b current",),
+        "engine_speed": ("v m rpm",),
+        "ambient_temperature": ("v e temp",),
     },
     "Siemens": {
         "vehicle_speed": ("vs",),
