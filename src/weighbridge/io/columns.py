@@ -26,6 +26,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
     "%": "pct", "percent": "pct", "prozent": "pct", "proz": "pct", "-": "ratio", "1": "ratio",
     "°c": "degc", "℃": "degc", "c": "degc", "deg c": "degc", "celsius": "degc",
+    "degree celsius": "degc",
     "°f": "degf", "℉": "degf", "f": "degf", "â°c": "degc", "â°": "deg",
     "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
     "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
@@ -93,6 +94,8 @@ def unit_suffix(text: str) -> str | None:
     if word in UNITS:
         return word
     found = UNIT_TEXTS.get(word)
+    word = " ".join(word.replace("_", " ").split())
+    found = found or UNIT_TEXTS.get(word)
     if found is None and " per " in word:
         short = "".join(_SPELLED.get(part, part) for part in word.split())
         return short if short in UNITS else UNIT_TEXTS.get(short)

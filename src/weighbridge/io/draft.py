@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
+from weighbridge.io.columns import dimension_of, stated_unit, suffixes_of, unit_refused
 from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
@@ -151,6 +151,8 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
         raw = read_text(path, text)
     if raw.rows == 0:
         raise DriveError(f"{path} has a header and no rows; nothing can be told of its columns")
+    in_cells = {n: raw.cell_unit(k) for k, n in enumerate(raw.names) if n not in units}
+    units |= {n: stated for n, u in in_cells.items() if (stated := stated_unit(u)) is not None}
     above = head(path, text.skip_rows) if text.skip_rows else []
     times = find_times(raw, units, above)
     time = times[0]

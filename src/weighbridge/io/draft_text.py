@@ -50,7 +50,7 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
         It is no table, has no header, or other columns than those named.
     """
     found = head(path, HEAD_LINES)
-    lines = [line for line in found if line]
+    lines = [line for line in found if _filled(line)]
     if not lines:
         raise DriveError(f"{path} is empty; record it again")
     if any("\r" in line for line in lines):
@@ -64,10 +64,10 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
     begin = first_values(rows, width)
     if begin == len(rows) and len(found) >= HEAD_LINES and not columns:
         longer = head(path, _LONG_HEAD)
-        wide = [cells(line, separator_of(longer[HEAD_LINES:])) for line in longer if line]
+        wide = [cells(line, separator_of(longer[HEAD_LINES:])) for line in longer if _filled(line)]
         if len(longer) > HEAD_LINES and first_values(wide, usual_width(wide)) < len(wide):
             found, rows, width = longer, wide, usual_width(wide)
-            lines = [line for line in longer if line]
+            lines = [line for line in longer if _filled(line)]
             separator = separator_of(longer[HEAD_LINES:])
             begin = first_values(rows, width)
     first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
@@ -107,6 +107,11 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
     return text, units
 
 
+def _filled(line: str) -> bool:
+    """Whether a line has a cell; spreadsheets write separators alone for a blank one."""
+    return bool(line.strip(f"{''.join(SEPARATORS)} \t"))
+
+
 def usual_width(rows: Sequence[Sequence[str]]) -> int:
     """Cells of the rows of the lower half."""
     return int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
@@ -137,7 +142,7 @@ def _names_above(
     """Rows of text directly above the values, which a blank line parts from a preamble."""
     if not 0 < begin < len(rows):
         return range(0)
-    at = [k for k, line in enumerate(found) if line]
+    at = [k for k, line in enumerate(found) if _filled(line)]
     top = begin
     while top > 0:
         row = rows[top - 1]

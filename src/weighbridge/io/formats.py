@@ -21,6 +21,7 @@ from weighbridge.io import (
     gpx,
     grouped,
     hdf5,
+    json_lines,
     long_csv,
     matlab,
     mdf,
@@ -263,6 +264,18 @@ FORMATS: Final[tuple[Format, ...]] = (
         extra="position",
     ),
     Format(
+        name="NMEA text",
+        suffixes=(".txt", ".log"),
+        read=nmea.read_nmea,
+        begins=nmea.is_nmea,
+        magic=True,
+        about="the same, known by its first lines, which may begin with what an app writes",
+        takes=Takes.CLOCK,
+        self_described=True,
+        package="pynmea2",
+        extra="position",
+    ),
+    Format(
         name="GPX",
         suffixes=(".gpx",),
         read=gpx.read_gpx,
@@ -371,9 +384,19 @@ FORMATS: Final[tuple[Format, ...]] = (
         takes=Takes.CHANNELS,
         draft=drafter(tesla_fleet.open_fleet_telemetry),
     ),
+    Format(
+        name="JSON lines",
+        suffixes=(".jsonl", ".ndjson"),
+        read=reader(json_lines.open_json_lines),
+        begins=json_lines.is_json_lines,
+        magic=True,
+        about="one object a line: a value with its name, as OpenXC has it, or a row of values",
+        takes=Takes.COLUMNS,
+        draft=drafter(json_lines.open_json_lines),
+    ),
 )
 """The formats of this project; where several have one suffix, the first that recognises a file's
-first bytes reads it, else the one that needs no recognising."""
+first bytes reads it, else the one that needs no recognising, else the last."""
 
 
 def formats() -> tuple[Format, ...]:
@@ -449,7 +472,7 @@ def format_of(path: Path) -> Format | None:
     for found in among:
         if found.begins is not None and found.begins(head):
             return found
-    return next((f for f in named if f.begins is None), named[0] if named else None)
+    return next((f for f in named if f.begins is None), named[-1] if named else None)
 
 
 @lru_cache(maxsize=4)

@@ -27,6 +27,7 @@ from weighbridge.io.table import (
     RawTable,
     cells,
     column_list,
+    numbers_with_units,
     read_text,
     time_seconds,
     unwrapped,
@@ -39,11 +40,12 @@ _NAMES: Final = frozenset(
     ("pid", "name", "parameter", "param", "param_name", "signal", "signal_name", "channel",
      "metric", "key", "variable", "field", "parameter name", "sensor name", "diagnostic",
      "diagnostic name", "measurement", "measure name", "tag", "tag name", "channel name", "sensor",
-     "signalname", "item", "messgroesse", "measurand")
+     "signalname", "item", "command name", "command", "messgroesse", "measurand")
 )  # fmt: skip
 _VALUES: Final = frozenset(
     ("value", "val", "values", "wert", "valeur", "valor", "reading", "data", "numeric value",
-     "double value", "measure value", "signal value", "messwert", "raw value")
+     "double value", "measure value", "response value", "obd response value", "response",
+     "signal value", "messwert", "raw value")
 )  # fmt: skip
 _UNITS: Final = frozenset(
     (
@@ -99,7 +101,7 @@ def _places(names: list[str], rows: Sequence[Sequence[str]]) -> tuple[int | None
     if named is None and told:
         named = next((k for k in range(len(names)) if _names_quantities(told, k)), None)
     if valued is None and named is not None and told:
-        timed = _time_place(names)
+        timed = _time_place(names, rows)
         places = [k for w in _PLACES.values() if (k := _place(names, w)) is not None]
         free = (k for k in range(len(names)) if k not in (named, timed, *places))
         numeric = [k for k in free if all(is_number(row[k]) for row in told)]
@@ -116,8 +118,15 @@ def _names_quantities(rows: Sequence[Sequence[str]], column: int) -> bool:
     return len(known) >= 2 and len(known) >= _KNOWN * len(kinds)
 
 
-def _time_place(names: list[str]) -> int | None:
-    return next((k for k, n in enumerate(names) if is_time(n) or time_unit(n) is not None), None)
+def _time_place(names: list[str], rows: Sequence[Sequence[str]] = ()) -> int | None:
+    """Column of the time: by its name, else the first whose cells are times."""
+    named = (k for k, n in enumerate(names) if is_time(n) or time_unit(n) is not None)
+    place = next(named, None)
+    if place is not None or not rows:
+        return place
+    told = [row for row in rows if len(row) == len(names)]
+    columns = ([row[k] for row in told if row[k]] for k in range(len(names)))
+    return next((k for k, cells in enumerate(columns) if text_time_format(cells)[0]), None)
 
 
 def is_long(head: bytes) -> bool:
@@ -139,7 +148,7 @@ def are_long(names: list[str], rows: Sequence[Sequence[str]] = ()) -> bool:
     """
     return (
         3 <= len(names) <= _MOST
-        and _time_place(names) is not None
+        and _time_place(names, rows) is not None
         and None not in _places(names, rows)
     )
 
@@ -182,14 +191,18 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
     thousands = _have_thousands([raw.column(k) for k in numeric])
     if thousands:
         found.notes.append(Problem.of("file.thousands"))
+    texts = raw.column(valued)
+    in_cells = numbers_with_units(texts) if united is None else None
     table = pl.DataFrame(
         {
             "time": seconds,
             "name": raw.column(named).cast(pl.String).str.strip_chars(),
-            "value": _numbers(raw.column(valued), thousands),
-            "unit": pl.repeat("", raw.rows, eager=True)
-            if united is None
-            else raw.column(united).cast(pl.String),
+            "value": _numbers(texts, thousands) if in_cells is None else in_cells[0],
+            "unit": raw.column(united).cast(pl.String)
+            if united is not None
+            else in_cells[1]
+            if in_cells is not None
+            else pl.repeat("", raw.rows, eager=True),
         }
     )
     known = table if of_one is None else table.filter(of_one)
@@ -286,7 +299,7 @@ def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording
             f"{raw.path} has one row for each value, so that rate_hz in [time] of the mapping is "
             "no rate of a signal; name the time's column in its place"
         )
-    index = _time_place(names) if time.column is None else raw.index(time.column)
+    index = _time_place(names, _some(raw)) if time.column is None else raw.index(time.column)
     if index is None:
         raise DriveError(
             f"{raw.path} has no time column {time.column or ''!r}; it has {column_list(names)}: "

@@ -48,6 +48,15 @@ _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
 # Stamps before and after midnight that have to agree that it was there.
 _AROUND: Final = 3
 
+_NUMBER_UNIT: Final = (
+    r"^(?P<number>[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s+(?P<unit>[A-Za-z%°µ][^\d,;]{0,40})$"
+)
+"""A number with a unit behind it."""
+
+# Rows by which a unit in the cells is known, and part of them that may have another one.
+_LOOKED_AT: Final = 1000
+_FEW: Final = 0.02
+
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
 
@@ -151,6 +160,10 @@ class RawTable:
             numbers = text.cast(pl.Float64, strict=False)
             empty = text.is_null() | text.str.to_lowercase().is_in(sorted(self.missing))
             wrong = numbers.is_null() & ~empty
+            if int(wrong.sum()) > _TEXT_PART * int((~empty).sum()):
+                told = _one_unit(text)
+                numbers = told[0] if told is not None else numbers
+                wrong = numbers.is_null() & ~empty
             if bad := int(wrong.sum()):
                 example = text.filter(wrong)[0]
                 row = int(wrong.arg_max() or 0) + 1
@@ -189,6 +202,50 @@ class RawTable:
         if not (values.flags.writeable and values.flags.c_contiguous):
             values = np.array(values, dtype=np.float64)
         return np.asarray(values, dtype=np.float64), notes
+
+    def cell_unit(self, index: int) -> str:
+        """Unit that stands in the cells of a column, behind their numbers; empty for none."""
+        if index in self.plain or self.column(index).dtype != pl.String:
+            return ""
+        told = _one_unit(self.column(index).head(_LOOKED_AT))
+        return told[1] if told is not None else ""
+
+
+def numbers_with_units(cells: pl.Series) -> tuple[pl.Series, pl.Series] | None:
+    """Numbers and units of cells such as ``1165.0 revolutions_per_minute``.
+
+    Parameters
+    ----------
+    cells : (n,)
+
+    Returns
+    -------
+    numbers, units : (n,) null where a cell is of another form
+
+    None where hardly any cell is of that form.
+    """
+    if cells.dtype != pl.String:
+        return None
+    text = cells.str.strip_chars()
+    parts = text.str.extract_groups(_NUMBER_UNIT).struct.unnest()
+    filled = int((text.is_not_null() & (text != "")).sum())
+    if parts["unit"].len() - parts["unit"].null_count() < max(_TEXT_PART * filled, 1):
+        return None
+    return parts["number"].cast(pl.Float64, strict=False), parts["unit"]
+
+
+def _one_unit(cells: pl.Series) -> tuple[pl.Series, str] | None:
+    """Numbers of the cells of a column and the unit behind them; None where it has none or more."""
+    told = numbers_with_units(cells)
+    if told is None:
+        return None
+    units = told[1].drop_nulls().value_counts(sort=True)
+    if units.height > 1 and units["count"][1] > _FEW * cells.len():
+        return None
+    unit = str(units[told[1].name][0])
+    return pl.DataFrame({"n": told[0], "u": told[1]}).select(
+        pl.when(pl.col("u") == unit).then(pl.col("n"))
+    ).to_series(), unit
 
 
 def _nan_notes(nans: int, cells: int, name: str) -> list[Problem]:
