@@ -62,10 +62,12 @@ def written(path, records):
     return path
 
 
-@pytest.mark.parametrize("suffix", [".jsonl", ".json"])
+@pytest.mark.parametrize("name", ["drive.jsonl", "drive.json", "list.json"])
 @pytest.mark.parametrize("form", FORMS)
-def test_from_records_to_signals(tmp_path, form, suffix):
-    path = written(tmp_path / f"drive{suffix}", FORMS[form]())
+def test_from_records_to_signals(tmp_path, form, name):
+    path = written(tmp_path / name, FORMS[form]())
+    if name == "list.json":
+        path.write_text(json.dumps([*FORMS[form]()]))
     assert format_of(path).name == "JSON lines"
     found = format_of(path).draft(path)
     drive = read_drive(path, tomllib.loads(mapping_text([found])))
@@ -94,7 +96,7 @@ def test_a_damaged_line_costs_itself_and_is_told(tmp_path):
 
 def test_records_without_a_time_are_refused(tmp_path):
     path = written(tmp_path / "drive.jsonl", [{"speed": 1.0 * k, "rpm": 900} for k in range(50)])
-    with pytest.raises(DriveError, match="has no time"):
+    with pytest.raises(DriveError, match="no record with a time"):
         format_of(path).draft(path)
 
 

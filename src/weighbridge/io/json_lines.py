@@ -1,4 +1,4 @@
-"""JSON lines: one object a line, a value with its name or a row of values.
+"""JSON lines: one object a line, or all in one list; a value with its name or a row of values.
 
 OpenXC writes ``{"timestamp", "name", "value"}`` (openxcplatform.com, *Open Vehicle Data Trace
 File*), telemetry-obd ``{"command_name", "obd_response_value", "iso_ts_pre", "iso_ts_post"}`` with
@@ -8,6 +8,7 @@ the unit behind the value. Objects in objects are parted by dots.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -21,8 +22,12 @@ from weighbridge.io.draft_time import DraftTime, find_times
 from weighbridge.io.long_csv import are_long, recording_of
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.table import MOST_COLUMNS, RawTable, column_list, time_seconds
+from weighbridge.io.tesla_fleet import records_of
 from weighbridge.io.understood import Lines
 from weighbridge.signals.units import UNITS
+
+_LIST: Final = re.compile(rb"\s*\[\s*\{")
+"""Begins a list of records."""
 
 _DEEPEST: Final = 6
 """Objects within objects."""
@@ -32,8 +37,11 @@ _LOOKED_AT: Final = 200
 
 
 def is_json_lines(head: bytes) -> bool:
-    """Tell whether a text has an object on each of its first lines."""
-    lines = head.removeprefix(b"\xef\xbb\xbf").splitlines()
+    """Tell whether a text has an object on each of its first lines, or is a list of objects."""
+    text = head.removeprefix(b"\xef\xbb\xbf")
+    if _LIST.match(text):
+        return True
+    lines = text.splitlines()
     if len(lines) < 2 or not lines[0].lstrip().startswith(b"{"):
         return False
     try:
@@ -57,8 +65,8 @@ def open_json_lines(path: Path, time: TimeColumn) -> Recording:
     names = list(dict.fromkeys(name for row in rows for name in row))
     if not rows or len(names) > MOST_COLUMNS:
         raise DriveError(
-            f"{path} holds {len(names)} names in {len(rows)} records, {MOST_COLUMNS} at most; "
-            "write one object per line, with a time and its values"
+            f"{path} holds no record, or more than {MOST_COLUMNS} names; write one object per "
+            "line, with a time and its values"
         )
     frame = pl.DataFrame(
         {str(k): [row.get(name, "") for row in rows] for k, name in enumerate(names)},
@@ -71,19 +79,11 @@ def open_json_lines(path: Path, time: TimeColumn) -> Recording:
 
 def _rows(path: Path, lines: Lines) -> Iterator[dict[str, str]]:
     """Records of a file as texts by name; lines that are none are counted."""
-    with path.open("rb") as file:
-        for number, line in enumerate(file, start=1):
-            if not line.strip():
-                continue
-            try:
-                record = json.loads(line.removeprefix(b"\xef\xbb\xbf").replace(b"\x00", b""))
-            except (ValueError, RecursionError):
-                record = None
-            strange = not isinstance(record, dict)
-            lines.first = lines.first or number * strange
-            lines.add(b"", 1, strange, 0)
-            if isinstance(record, dict):
-                yield dict(_flat(record, "", 0))
+    for record in records_of(path):
+        strange = not isinstance(record, dict)
+        lines.add(b"\n", 1, strange, int(strange))
+        if not strange:
+            yield dict(_flat(record, "", 0))
 
 
 def _flat(record: Mapping[str, Any], prefix: str, depth: int) -> Iterator[tuple[str, str]]:
@@ -135,7 +135,7 @@ def _clock(raw: RawTable, time: TimeColumn) -> DraftTime:
     found = find_times(raw, {}, ())[0]
     if time.column is not None or time.rate is not None or found.row_rate is not None:
         raise DriveError(
-            f"{raw.path} has no time {time.column or 'that is known'!r}; it has "
+            f"{raw.path} holds no record with a time {time.column or 'that is known'!r}; it has "
             f"{column_list(raw.names)}: name it as column in [time] of a mapping"
         )
     return found
