@@ -20,7 +20,7 @@ from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usu
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
 from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
-from weighbridge.io.draft_values import FOUND, with_judged_values
+from weighbridge.io.draft_values import FOUND, VACUUM, with_judged_values
 from weighbridge.io.naming import Named, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
@@ -388,9 +388,10 @@ def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]
         unit = "ratio" if high <= 1.02 else "pct"
         return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
     usual = [q.suffix, *(s for s in suffixes_of(q) if s != q.suffix)]
+    low = VACUUM if quantity == "intake_pressure" else q.low
     for unit in usual:
         si = to_si(values, unit)
-        if np.mean((si < q.low) | (si > q.high)) <= 0.01:
+        if np.mean((si < low) | (si > q.high)) <= 0.01:
             sure = q.suffix in ("deg", "rpm", "v", "a") and unit == q.suffix
             return unit, "" if sure else f"states no unit; taken as {unit}"
     return q.suffix, f"states no unit, and its values fit none; taken as {q.suffix}"

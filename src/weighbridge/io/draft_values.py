@@ -23,7 +23,7 @@ ON_BOARD: Final = 32.0
 """Battery that feeds control units, at most: those of trucks are charged at 29 V, and batteries
 that drive anything have 36 V or more [V]."""
 
-_VACUUM: Final = 8_000.0
+VACUUM: Final = 8_000.0
 """Pressure in a manifold, at least: engines pull down to some 20 kPa [Pa]."""
 
 _BELOW: Final = 0.2
@@ -117,10 +117,10 @@ def _without_gauge(column: DraftColumn, told: Mapping[str, Values]) -> DraftColu
     if column.quantity != "intake_pressure" or column.name not in told:
         return column
     values = told[column.name].values
-    below = to_si(values[np.isfinite(values)], column.unit) < _VACUUM
-    if below.size < _FEWEST or np.mean(below) <= _BELOW:
+    below = to_si(values[np.isfinite(values)], column.unit) < VACUUM
+    if not below.size or np.mean(below) <= _BELOW:
         return column
-    return _nothing(column, f"goes below {_VACUUM / 1000.0:.0f} kPa, to which no engine pulls down")
+    return _nothing(column, f"goes below {VACUUM / 1000.0:.0f} kPa, to which no engine pulls down")
 
 
 def _nothing(column: DraftColumn, why: str) -> DraftColumn:

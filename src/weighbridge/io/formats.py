@@ -6,6 +6,7 @@ names a `weighbridge.io.format.Format`.
 
 from __future__ import annotations
 
+import difflib
 import logging
 import sys
 from functools import lru_cache
@@ -52,7 +53,7 @@ _HEAD: Final = 4096
 FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="CSV",
-        suffixes=(".csv", ".tsv", ".txt"),
+        suffixes=(".csv", ".tsv", ".txt", ".msl"),
         read=tabular.read_csv,
         about="a table of text: canonical names, or those of a mapping",
         takes=Takes.TEXT,
@@ -418,12 +419,24 @@ _SHEET: Final = "it is a spreadsheet: save its sheet as CSV"
 _PACKED: Final = "it is packed: unpack it first"
 _TRACK: Final = "export the track as GPX"
 _RACE: Final = "export it as CSV from Race Studio"
+_FRAMES: Final = "it holds CAN frames in a maker's own form: save them as ASC, BLF or TRC"
+_ENGINE: Final = "it is of an engine's control unit: export it as CSV from the tuner's program"
+_TABLE: Final = "write its table as Parquet or CSV"
 
 _REMEDIES: Final = {
     **dict.fromkeys((".xlsx", ".xls", ".xlsm", ".ods", ".numbers"), _SHEET),
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".xz"), _PACKED),
     **dict.fromkeys((".fit", ".tcx", ".kml", ".kmz", ".igc"), _TRACK),
     **dict.fromkeys((".xrk", ".xrz", ".drk"), _RACE),
+    **dict.fromkeys((".kmf", ".kme", ".vsb", ".cdr", ".rf64", ".tio", ".can"), _FRAMES),
+    **dict.fromkeys(
+        (".mlg", ".llg", ".lf3", ".hpl", ".dl", ".dlz", ".ftl", ".stf", ".daq", ".lg1"), _ENGINE
+    ),
+    **dict.fromkeys((".arrow", ".feather", ".avro", ".pkl", ".pickle", ".rds", ".sav"), _TABLE),
+    **dict.fromkeys((".pcap", ".pcapng"), "write its CAN frames by candump -l, or as ASC"),
+    **dict.fromkeys((".dat", ".erg", ".d97"), "save it as MDF (.mf4), as INCA and CANape do"),
+    **dict.fromkeys((".rcz", ".rc1"), "export the session as CSV v3 from RaceChrono"),
+    ".ulg": "turn its topics into CSV by ulog2csv",
     ".ld": "export it as CSV from i2",
     ".dbc": "it is the database of a bus and no log: give it by --dbc beside the log",
     ".toml": "it is no log: a vehicle file goes with --vehicle, a mapping with --mapping",
@@ -442,11 +455,28 @@ def unreadable(path: Path) -> str:
     ----------
     path : the file
     """
-    remedy = _REMEDIES.get(path.suffix.lower(), "")
-    return (
-        f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; known are "
-        f"{', '.join(suffixes())}, and folders of tables{'; ' if remedy else ''}{remedy}"
-    )
+    suffix = path.suffix.lower()
+    remedy = _REMEDIES.get(suffix, "")
+    if suffix not in _REMEDIES or suffix == ".dat":
+        remedy = _of_text(path) or remedy
+    near = difflib.get_close_matches(suffix, [s for s in suffixes() if s.startswith(".")], n=1)
+    known = f"the nearest that is known is {near[0]}" if near and not remedy else ""
+    told = known or remedy or f"known are {', '.join(suffixes())}, and folders of tables"
+    return f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; {told}"
+
+
+def _of_text(path: Path) -> str:
+    """Say of a file of unknown suffix that is a text what helps; empty where it is none."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError:
+        return ""
+    printable = sum(byte >= 32 or byte in b"\t\r\n" for byte in head)
+    lines = head.count(b"\n")
+    if lines < 2 or printable < 0.98 * len(head):
+        return ""
+    return "it is a text: name it .csv where it is a table, .log where it holds CAN frames"
 
 
 def format_of(path: Path) -> Format | None:

@@ -208,6 +208,7 @@ TIME_WORDS: Final = frozenset(
         "tiempo",
         "hora",
         "ts",
+        "seconds",
         "epoch",
         "stamp",
         "utc",
@@ -220,8 +221,8 @@ AGAINST: Final[dict[str, frozenset[str]]] = {
                       "target", "accuracy", "set", "shaft", "output", "input", "turbine", "angular", "idle", "course")),
     "engine_speed": frozenset(("idle", "max", "min", "target", "wheel", "shaft", "turbo", "vehicle", "fan", "limit", "desired", "average")),
     "engine_load": frozenset(("absolute", "sensor", "cpu", "axle", "torque")),
-    "engine_torque": frozenset(("steer", "eps", "reserve", "resv", "reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder", "ret", "axle")),
-    "engine_torque_fraction": frozenset(("steer", "eps", "reserve", "resv", "reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "ret", "nominal", "converter")),
+    "engine_torque": frozenset(("loss", "losses", "lost", "drag", "steer", "eps", "reserve", "resv", "reference", "brake", "maximum", "minimum", "min", "front", "rear", "left", "right", "max", "demand", "demanded", "friction", "target", "request", "requested", "wheel", "steering", "limit", "available", "parasitic", "nominal", "converter", "retarder", "ret", "axle")),
+    "engine_torque_fraction": frozenset(("loss", "losses", "lost", "drag", "steer", "eps", "reserve", "resv", "reference", "max", "demand", "demanded", "friction", "target", "request", "requested", "limit", "steering", "point", "wheel", "retarder", "ret", "nominal", "converter")),
     "engine_power": frozenset(("max", "min", "limit", "available", "charge", "charger", "charging", "battery", "heater", "ac", "steering", "window", "supply", "seat",
                                "mode", "state", "level", "demand", "demanded", "request", "requested", "target", "regen", "rated", "reference", "accessory", "hvac", "front", "rear", "ecu")),
     **{
