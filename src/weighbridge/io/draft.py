@@ -346,6 +346,8 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     else:
         by_log = False
         unit, doubt = _plausible_unit(name, found.quantity, known)
+        if not unit:
+            return _nothing(name, doubt)
     low, usual, high = map(float, np.quantile(known, [0.0, 0.5, 1.0]))
     return DraftColumn(
         name,
@@ -372,7 +374,10 @@ def _beyond(quantity: str, unit: str, values: Floats) -> str:
 
 
 def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]:
-    """Unit in which values are those of a drive: the usual one first, and a doubt."""
+    """Unit in which values are those of a drive, the usual one first, and a doubt.
+
+    The unit is empty where they fit none.
+    """
     q = QUANTITIES[quantity]
     high = float(np.percentile(np.abs(values), 99.5))
     if quantity in ("vehicle_speed", "gnss_speed"):
@@ -394,4 +399,4 @@ def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]
         if np.mean((si < low) | (si > q.high)) <= 0.01:
             sure = q.suffix in ("deg", "rpm", "v", "a") and unit == q.suffix
             return unit, "" if sure else f"states no unit; taken as {unit}"
-    return q.suffix, f"states no unit, and its values fit none; taken as {q.suffix}"
+    return "", f"not taken for {quantity}: it states no unit, and its values fit none"

@@ -21,6 +21,7 @@ from weighbridge.io import (
     frame_text,
     gpx,
     grouped,
+    haltech,
     hdf5,
     json_lines,
     long_csv,
@@ -124,6 +125,15 @@ FORMATS: Final[tuple[Format, ...]] = (
         about="one row for each value, with its name, as Car Scanner writes it",
         takes=Takes.COLUMNS,
         draft=drafter(long_csv.open_long),
+    ),
+    Format(
+        name="Haltech CSV",
+        suffixes=(".csv",),
+        read=reader(haltech.open_haltech),
+        begins=haltech.is_haltech,
+        about="channels of an engine's control unit, as NSP exports them",
+        takes=Takes.CHANNELS,
+        draft=drafter(haltech.open_haltech),
     ),
     Format(
         name="grouped CSV",
