@@ -1,6 +1,7 @@
 """MATLAB, HDF5 and TDMS: written by other libraries, drafted, read, damaged."""
 
 import datetime as dt
+import tomllib
 
 import numpy as np
 import pytest
@@ -267,3 +268,29 @@ def test_arrays_without_a_time_are_read_by_a_rate(tmp_path):
         speed = read_drive(path, {"time": time, "signals": signals}).signals["vehicle_speed"]
         assert_allclose(speed.time, start + SLOW)
         assert_allclose(speed.values, SPEED)
+
+
+@pytest.mark.parametrize("even", [False, True])
+def test_a_recording_of_dspace(tmp_path, even):
+    """Clocks in X, signals in Y with the number of theirs, as ControlDesk exports them."""
+    path = tmp_path / "exp.mat"
+    other = SLOW if even else FAST
+
+    def array(elements):
+        kind = [(name, object) for name in elements[0]]
+        return np.array([tuple(e.values()) for e in elements], dtype=kind).reshape(1, -1)
+
+    clocks = [
+        {"Name": "Slow", "Data": SLOW, "Unit": "s"},
+        {"Name": "Fast", "Data": other, "Unit": "s"},
+    ]
+    signals = [
+        {"Name": "VehicleSpeed", "Data": 3.6 * SPEED, "Unit": "km/h", "XIndex": 1},
+        {"Name": "EngineSpeed", "Data": 900.0 + np.arange(other.size), "Unit": "rpm", "XIndex": 2},
+    ]
+    savemat(path, {"exp": {"X": array(clocks), "Y": array(signals), "Description": "a drive"}})
+    found = format_of(path).draft(path)
+    drive = read_drive(path, tomllib.loads(mapping_text([found])))
+    assert_allclose(drive.signals["vehicle_speed"].time, SLOW)
+    assert_allclose(drive.signals["vehicle_speed"].values, SPEED)
+    assert_allclose(drive.signals["engine_speed"].time, other)

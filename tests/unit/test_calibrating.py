@@ -190,8 +190,13 @@ def test_measured_gear_signal(empty):
 def test_gear_ratios_of_another_vehicle_are_refused(empty, car):
     of_another = tuple(1.25 * g for g in (*car.driveline.gearings[:3], 17.5))
     base = Vehicle(driveline=Driveline(gearings=of_another))
-    with refused("calibration.foreign_gears"):
+    with refused("calibration.foreign_gears") as found:
         calibrate(empty.drive, vehicle=base)
+    # It says which ratio was seen and which was expected.
+    told = found.value.problem.values
+    at_cruise = 100.0 / 3.6 * 30.0 / np.pi
+    assert min(abs(told["seen"] / at_cruise / g - 1.0) for g in car.driveline.gearings) < 0.02
+    assert min(abs(told["expected"] / at_cruise / g - 1.0) for g in of_another) < 1e-6
 
 
 def test_gears_that_are_named_and_not_found_are_told(empty):

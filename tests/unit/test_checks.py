@@ -289,6 +289,13 @@ def test_altitude_in_feet_by_the_accelerometer():
     assert check_drive(drive) == ()
     (note,) = check_drive(scaled(drive, altitude=1 / 0.3048))
     assert note.id == "altitude.feet"
+    assert note.values["remedy"] == phrase("altitude_feet")
+    # What is declared to be in feet is in no need of that advice.
+    declared = replace(scaled(drive, altitude=1 / 0.3048), units={"altitude": "ft"})
+    (other,) = check_drive(declared)
+    factor = 1.0 / other.values["ratio"]
+    assert factor == pytest.approx(0.305, rel=0.05)
+    assert other.values["remedy"] == phrase("altitude_factor", unit="ft", factor=factor)
 
 
 def test_load_as_a_part_of_one(sane):

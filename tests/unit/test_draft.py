@@ -165,7 +165,7 @@ def test_a_unit_that_is_not_known_is_told_and_the_column_left_out(tmp_path):
 
 
 def test_empty_columns_and_text_are_told(tmp_path):
-    rows = [f"{t:.2f},,2100 rpm,50" for t in T]
+    rows = [f"{t:.2f},,about 2100,50" for t in T]
     head = "Time (s),Engine Torque (Nm),Engine RPM,Vehicle speed (km/h)"
     doubts = " ".join(draft(written(tmp_path / "x.csv", [head, *rows])).all_doubts)
     assert "not taken for engine_torque: it has no values" in doubts
@@ -536,6 +536,16 @@ def test_a_counter_of_minutes_alone_is_told(tmp_path, name):
     assert any("minutes" in doubt for doubt in found.doubts)
 
 
+@pytest.mark.parametrize("unit", ["s", "min"])
+def test_a_counter_of_minutes_that_a_mapping_names_is_serious(tmp_path, unit):
+    name = "TIME_SINCE_DTC_CLEARED"
+    path = driven(tmp_path, {name: (MINUTES // 60 + 7).astype(int)})
+    named = {"time": {"column": name, "unit": unit}, "signals": {"engine_speed": {"column": "RPM"}}}
+    named["signals"]["engine_speed"]["unit"] = "rpm"
+    serious = {p.id for p in read_drive(path, named).problems if p.serious}
+    assert serious == {"clock.minutes_named", *(["clock.minutes"] if unit == "min" else [])}
+
+
 def test_of_two_clocks_the_one_in_which_a_vehicle_moves_is_taken(tmp_path):
     clocks = {"Time (s)": np.round(MINUTES / 100.0, 4), "Timestamp (s)": np.round(MINUTES, 2)}
     found = draft(driven(tmp_path, clocks))
@@ -554,6 +564,9 @@ BODY = [f"{t:.2f},{v:.0f},{n:.0f},{x}," for t, v, n, x in zip(T, SPEED, RPM, LOA
         # Of keys and values in quotes, parted from the names by blank lines.
         ['"Format","Logger file",,,', '"Date","05/03/2026",,,"Workbook"', '"Rate","4.0","Hz",,',
          "", "", '"Time","Speed","RPM","Load",', '"s","km/h","rpm","%",', "", ""],
+        # The same as a spreadsheet saves it again: separators alone for blank lines.
+        ["Format,Logger file,,,", "Date,05/03/2026,,,", "Rate,4.0,Hz,,", ",,,,", ",,,,",
+         "Time,Speed,RPM,Load,", "s,km/h,rpm,%,", ",,,,", ",,,,"],
         # One line of the session, and units in brackets.
         ["Session 12,,,,", "time,Speed,RPM,Load,", "(sec),(km/h),(1/min),(%),"],
         # Groups above names above units.
@@ -572,3 +585,33 @@ def test_a_preamble_with_the_separator_of_the_table_hides_no_header(tmp_path, he
     drive = read_drive(path, tomllib.loads(mapping_text([found])))
     assert len(drive.signals["vehicle_speed"]) == ROWS
     assert not [p for p in drive.problems if p.id == "file.rows_strange"]
+
+
+def test_units_behind_the_numbers_of_cells(tmp_path):
+    """As python-OBD writes its quantities; a request without an answer is empty."""
+    lines = ["timestamp,RPM,SPEED,LOAD"]
+    for k, (t, v, n, x) in enumerate(zip(T, SPEED, RPM, LOAD, strict=True)):
+        speed = "None" if k % 50 == 7 else f"{v / 1.609344:.2f} mile_per_hour"
+        lines.append(f"{t:.2f},{n:.1f} revolutions_per_minute,{speed},{x} percent")
+    path = written(tmp_path / "obd.csv", lines)
+    found = draft(path)
+    units = {c.quantity: (c.unit, c.stated) for c in found.known}
+    assert units == {
+        "engine_speed": ("rpm", True),
+        "vehicle_speed": ("mph", True),
+        "engine_load": ("pct", True),
+    }
+    drive = read_drive(path, tomllib.loads(mapping_text([found])))
+    speed = drive.signals["vehicle_speed"]
+    assert len(speed) == ROWS - len(range(7, ROWS, 50))
+    assert np.allclose(3.6 * speed.values, np.interp(speed.time, T, SPEED), atol=0.01)
+
+
+def test_cells_of_two_units_are_no_numbers(tmp_path):
+    lines = ["timestamp,RPM,SPEED (km/h)"]
+    lines += [
+        f"{t:.2f},{n:.0f} {'rpm' if t < 9 else 'Hz'},{v}"
+        for t, n, v in zip(T, RPM, SPEED, strict=True)
+    ]
+    found = draft(written(tmp_path / "obd.csv", lines))
+    assert "engine_speed" not in {c.quantity for c in found.known}

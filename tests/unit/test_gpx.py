@@ -79,7 +79,26 @@ def test_a_file_that_breaks_off_is_salvaged(tmp_path):
     text = gpx(*(point(k) for k in range(20)))
     found = drive(tmp_path, text[: int(0.7 * len(text))])
     assert 10 <= len(found.signals["latitude"]) < 20
-    assert found.problems[0].id == "file.points_break_off"
+    assert [p.id for p in found.problems] == ["file.points_break_off"]
+
+
+@pytest.mark.parametrize(
+    "torn",
+    [
+        point(7)[:50],
+        point(7)[30:],
+        point(7, lat="north"),
+        point(7).replace("</ele>", "</el"),
+        "\x07<junk",
+    ],
+)
+def test_a_damaged_point_costs_itself_and_is_told(tmp_path, torn):
+    points = [point(k) + "\n" for k in range(20)]
+    found = drive(tmp_path, gpx(*points[:7], torn + "\n", *points[8:]))
+    assert 18 <= len(found.signals["latitude"]) <= 19
+    (problem,) = found.problems
+    assert (problem.id, problem.values["count"]) == ("file.rows_cut", 1)
+    assert "line 8" in problem.values["example"] or "line 7" in problem.values["example"]
 
 
 def test_latin_1_text(tmp_path):

@@ -11,6 +11,7 @@ from weighbridge.vehicle.file import save_vehicle
 from weighbridge.vehicle.known import Known, describe
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.telling import can_weigh, tell
+from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 from weighbridge.vehicle.tyre import rolling_radius
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -114,7 +115,7 @@ def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
     [
         ({"tare": 3483.0, "gross": 2000.0}, "gross of 2000 kg is not above the tare"),
         ({"tare": 50.0}, "tare of 50 kg: a car has 250 to 8000 kg"),
-        ({"kind": "lorry"}, "class must be car, van, bus or truck"),
+        ({"kind": "lorry"}, "class must be motorcycle, racer, quad, car, van, bus or truck"),
         ({"gear_ratios": (1.0, 2.0)}, "must fall"),
         ({"gear_ratios": (2.0, -1.0)}, "must be positive"),
         ({"final_drive": 3.9}, "needs gear ratios"),
@@ -156,7 +157,14 @@ def test_a_truck_by_radius_and_axles_weighs_by_data_sheet(tmp_path):
     assert not loaded.driveline.gearings
     assert can_weigh(loaded)
     assert "weighs by data sheet, never calibrated: ±" in dict(tell(loaded))["worth"]
-    assert not can_weigh(describe(Known(kind="truck", torque="load")).vehicle)
+
+
+@pytest.mark.parametrize("torque", ["load", "air_flow"])
+def test_a_reading_that_is_no_torque_waits_for_a_calibration(torque):
+    vehicle = describe(Known(torque=torque, gear_ratios=(3.8, 2.1, 1.0), final_drive=4.0)).vehicle
+    assert vehicle.torque.source == torque
+    assert not can_weigh(vehicle)
+    assert dict(tell(vehicle))["torque"].startswith(f"by {TORQUE_SOURCES[torque].title};")
 
 
 def test_the_engine_is_kept_in_the_file_and_told(tmp_path):

@@ -179,6 +179,47 @@ def test_damage_leaves_signals_or_one_sentence(tmp_path_factory, assert_salvaged
     assert_salvaged(path)
 
 
+@pytest.mark.parametrize("start", [48373.0, 86390.0])
+@pytest.mark.parametrize(
+    "torn",
+    [
+        '"48380.4";"Engine RPM";"8',
+        '"48380.4";"Engine RPM";"870.0"',
+        'gine RPM";"870.0";"rpm";"45.0";"15.7";',
+        '"1911.5";"rpm";"45.0";"15.7";',
+        '"48380.4";"Engine"48381.0";"Vehicle speed";"43";"km/h";"45.0";"15.7";',
+    ],
+)
+def test_a_torn_line_costs_itself_and_is_told(tmp_path, torn, start):
+    path = tmp_path / "trip.csv"
+    lines = scanner(start, rows=40).splitlines()
+    path.write_text("\n".join(lines))
+    sound = mapped(path, tmp_path)
+    lines[30] = torn
+    path.write_text("\n".join(lines))
+    found = mapped(path, tmp_path)
+    for name in ("vehicle_speed", "engine_speed"):
+        before, after = sound.signals[name], found.signals[name]
+        assert len(after) >= len(before) - 1
+        assert_allclose(after.values, np.interp(after.time, before.time, before.values))
+    ids = {p.id for p in found.problems} - {p.id for p in sound.problems}
+    left_out = next(p for p in found.problems if p.id == "file.rows_left_out").values["count"]
+    assert ids or left_out == 41
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_a_torn_name_or_time_of_a_telematics_row(tmp_path, column):
+    path = telematics(tmp_path / "s.csv", "Device,Time,Name,Value,Unit")
+    lines = path.read_text().splitlines()
+    cells = lines[200].split(",")
+    cells[column] = cells[column][1:]
+    lines[200] = ",".join(cells)
+    path.write_text("\n".join(lines))
+    drive = mapped(path, tmp_path)
+    assert sum(map(len, drive.signals.values())) == 359
+    assert drive.problems
+
+
 def test_a_vertical_tab_stays_out_of_the_sentence():
     assert first_line(ValueError("could not parse \x0b here\nmore")) == r"could not parse \x0b here"
 

@@ -125,11 +125,12 @@ def test_a_doubt_of_a_vehicle_file_of_before_is_read():
 
 
 def test_parts_of_a_message_are_one_sentence():
-    found = Problem.of("gear.foreign", share=12.0, vehicle="car")
+    told = {"share": 12.0, "vehicle": "car", "seen": 2500.0, "expected": 2000.0}
+    found = Problem.of("gear.foreign", **told)
     parts = catalogue()["gear.foreign"]
     whole = "; ".join(parts[part] for part in PARTS if part in parts)
-    assert found.text == whole.format(share=12.0, vehicle="car")
-    assert found.values == {"share": 12.0, "vehicle": "car"}
+    assert found.text == whole.format(**told)
+    assert found.values == told
 
 
 def test_a_message_is_written_as_json_and_read_again():

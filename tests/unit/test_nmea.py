@@ -179,3 +179,14 @@ def test_any_damage_leaves_signals_or_one_sentence(
     path = tmp_path_factory.mktemp("nmea") / "log.nmea"
     path.write_bytes(WHOLE[:at] + junk + WHOLE[at + cut :])
     assert_salvaged(path)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [("NMEA,", ",1614938400000"), ("2021-03-05 10:00:00 ", ""), ("", "")]
+)
+@pytest.mark.parametrize("name", ["phone.txt", "phone.log", "phone.nmea"])
+def test_what_an_app_writes_around_sentences(tmp_path, before, after, name):
+    lines = [f"{before}{gga(f'1235{k:02d}').strip()}{after}\n" for k in range(20)]
+    found = drive(tmp_path, "".join(lines), name)
+    assert len(found.signals["latitude"]) == 20
+    assert not found.problems

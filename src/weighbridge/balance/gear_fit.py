@@ -10,6 +10,7 @@ from weighbridge.balance.table import ForceBalance
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 from weighbridge.signals.instants import span
+from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.gear import steady
 from weighbridge.vehicle.model import Vehicle
 
@@ -25,6 +26,9 @@ FEWEST_RATIOS: Final = 100
 
 PAUSE: Final = 60.0
 """After so long without rows another recording may begin [s]."""
+
+_CRUISE: Final = 100.0 / 3.6
+"""Speed at which a ratio is told as an engine speed [m/s]."""
 
 SLOWEST: Final = 3.0
 """Below, clutches slip [m/s]."""
@@ -49,6 +53,33 @@ def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     if time.size < FEWEST_RATIOS:
         return None
     return _share(ratio, vehicle)
+
+
+def ratio_apart(balance: ForceBalance, vehicle: Vehicle) -> tuple[float, float]:
+    """Return the ratio that most of the rows have which lie at no gearing, and the nearest gearing.
+
+    Parameters
+    ----------
+    balance, vehicle : with gearings, and steady ratios that lie elsewhere
+
+    Returns
+    -------
+    Both as the engine speed at 100 km/h [rpm]
+    """
+    gearings = np.log(np.array(vehicle.driveline.gearings))
+    _, ratio = held_ratios(balance)
+    off = np.sort(ratio[np.abs(ratio[:, None] - gearings).min(axis=1) >= NEAR])
+    # The densest stretch of the width of a gear.
+    counts = np.searchsorted(off, off + NEAR, side="right") - np.arange(off.size)
+    most = int(np.argmax(counts))
+    seen = float(np.median(off[most : most + int(counts[most])]))
+    expected = float(gearings[np.argmin(np.abs(gearings - seen))])
+    return _rpm(seen), _rpm(expected)
+
+
+def _rpm(ratio: float) -> float:
+    """Engine speed at 100 km/h of the logarithm of a ratio [rpm]."""
+    return scalar_from_si(float(np.exp(ratio)) * _CRUISE, "rpm")
 
 
 def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> Problem | None:

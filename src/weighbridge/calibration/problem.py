@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.arguments import check_number, check_type
-from weighbridge.balance.gear_fit import ENOUGH, share_on_gears
+from weighbridge.balance.gear_fit import ENOUGH, ratio_apart, share_on_gears
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.known_mass import check_mass
 from weighbridge.calibration.recording import Recording
@@ -196,10 +196,16 @@ def _refuse_foreign_gears(recordings: Sequence[Recording]) -> None:
         A drive's ratios of engine to vehicle speed lie elsewhere.
     """
     for recording in recordings:
-        share = share_on_gears(recording.balance(0.0), recording.draft)
+        balance = recording.balance(0.0)
+        share = share_on_gears(balance, recording.draft)
         if share is not None and share < ENOUGH:
+            seen, expected = ratio_apart(balance, recording.draft)
             raise refused(
-                "calibration.foreign_gears", drive=recording.drive.name, share=100.0 * share
+                "calibration.foreign_gears",
+                drive=recording.drive.name,
+                share=100.0 * share,
+                seen=seen,
+                expected=expected,
             )
 
 

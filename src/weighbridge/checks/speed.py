@@ -311,12 +311,19 @@ def _check_altitude(drive: Drive) -> Iterator[Problem]:
     grade = np.where(full, np.diff(altitude.at(at)) / np.maximum(v * length, 1.0), 0.0)
     steep = float(np.percentile(np.abs(grade[full]), 95))
     ratio = _grade_ratio(drive, speed, at, grade, full)
+    said = drive.units.get("altitude")
     if steep > 0.2:
         # Where an accelerometer sees the grade, the height does not make the mass.
         alone = not drive.has("longitudinal_accel") and not drive.has("accel_x", "gyro_x")
-        yield Problem.of("altitude.steep", "altitude", serious=alone, steep=100 * steep)
+        remedy = phrase("altitude_none", unit=said) if said == "ft" else phrase("altitude_feet")
+        yield Problem.of(
+            "altitude.steep", "altitude", serious=alone, steep=100 * steep, remedy=remedy
+        )
     elif ratio is not None and abs(np.log(ratio / UNITS["ft"].factor)) < 0.2:
-        yield Problem.of("altitude.feet", "altitude", ratio=1.0 / ratio)
+        remedy = phrase("altitude_feet")
+        if said == "ft":
+            remedy = phrase("altitude_factor", unit=said, factor=ratio)
+        yield Problem.of("altitude.feet", "altitude", ratio=1.0 / ratio, remedy=remedy)
 
 
 def _grade_ratio(

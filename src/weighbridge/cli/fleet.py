@@ -96,8 +96,8 @@ _Kind = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
         "--class",
-        help="Class of vehicles that have no file: car, van, bus, truck; car by default. Needed "
-        "where none has one.",
+        help="Class of vehicles that have no file, such as car, van, bus, truck; car by default. "
+        "Needed where none has one.",
     ),
 ]
 _Learn = Annotated[

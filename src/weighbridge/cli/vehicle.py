@@ -78,7 +78,9 @@ def new(
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
     ],
-    kind: Annotated[str, typer.Option("--class", help="car, van, bus or truck.")] = "car",
+    kind: Annotated[
+        str, typer.Option("--class", help="car, van, bus, truck, motorcycle, quad or racer.")
+    ] = "car",
     name: Annotated[str, typer.Option("--name", help="Name shown in results.")] = "vehicle",
     engine: Annotated[
         _Text, typer.Option("--engine", help="petrol, diesel or electric.", show_default=False)

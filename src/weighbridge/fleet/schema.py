@@ -60,7 +60,7 @@ DRIVES: Final[dict[str, Column]] = {
     "outcome": Column(_TEXT, "weighed, unread (bad data) or failed (three tries; tried again)"),
     "vehicle_id": Column(_TEXT, "id by which its vehicle file was found"),
     "vehicle_file": Column(_TEXT, "name of that file; null where the class's data sheet stood in"),
-    "vehicle_class": Column(_TEXT, "car, van, bus or truck"),
+    "vehicle_class": Column(_TEXT, "car, van, bus, truck, motorcycle …"),
     "tare_kg": Column(_NUMBER, "mass of the empty vehicle, of its file"),
     "gross_kg": Column(_NUMBER, "permitted mass, of its file"),
     "drive": Column(_TEXT, "name; from here to warnings as `weighbridge weigh` has it"),

@@ -21,7 +21,7 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
     "temperature": ("temp", "tmp", "tempr"),
     "ambient": ("amb", "ambt", "ambnt"),
     "coolant": ("clnt", "coolnt"),
-    "current": ("cur", "curr", "crnt"),
+    "current": ("cur", "curr", "crnt", "amps"),
     "voltage": ("volt", "volts", "vltg"),
     "power": ("pwr",),
     "battery": ("batt", "bat", "batry"),
@@ -33,6 +33,7 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
     "gear": ("gr",),
     "longitudinal": ("longi", "longt", "longit", "lgt"),
     "acceleration": ("acceln", "accn"),
+    "beschleunigung": ("beschl",),
     "applied": ("appd", "appl"),
     "estimated": ("est", "estd", "estmd"),
     "percent": ("pct", "perc"),
@@ -40,12 +41,15 @@ _SHORT: Final[dict[str, tuple[str, ...]]] = {
     "gps": ("gnss",),
 }
 
-_LONG: Final = {short: word for word, shorts in _SHORT.items() for short in shorts}
+LONG: Final = {short: word for word, shorts in _SHORT.items() for short in shorts}
+"""Words by their shortened spelling."""
 
 SOURCES: Final = frozenset(
     (
-        "imu", "vcu", "esp", "esc", "tcu", "tcm", "ecm", "pcm", "egs", "dme", "ins", "sg", "sig",
-        "hsc", "act", "actl", "actual", "phys",
+        "imu", "vcu", "inv", "inverter", "mcu", "pcu", "hvc", "bms", "esp", "esc", "tcu", "tcm",
+        "ecm", "pcm", "egs", "dme", "ins", "sg", "sig", "hsc", "act", "actl", "actual", "phys",
+        "measured", "meas", "feedback", "fbk", "fdbk", "detected", "estimated", "istwert", "ist",
+        "reel", "sae",
     )
 )  # fmt: skip
 """Prefixes and endings that name who sends a signal, or that it is measured."""
@@ -57,7 +61,9 @@ OF_ANOTHER: Final = frozenset(
         "desired", "dmd", "valid", "vld", "vldy", "validity", "qf", "quality", "sts", "stat",
         "status", "state", "flt", "falt", "fault", "err", "error", "cnt", "counter", "crc", "chksm",
         "checksum", "alv", "alive", "diag", "warn", "warning", "lamp", "avail", "offset", "std",
-        "sigma", "rolling",
+        "sigma", "rolling", "source", "specified", "setpoint", "sp", "aim", "predicted",
+        "expected", "average", "avg", "mean", "derivative", "dot", "delta", "correction", "corr",
+        "cor", "trim", "adder", "limiter", "previous", "next", "blip",
         "soll", "sollwert", "ziel", "durchschnitt", "mittelwert", "fehler",
         "consigne", "cible", "moyenne", "moyen", "maxi", "defaut",
         "objetivo", "consigna", "deseado", "deseada", "promedio", "maxima", "maximo", "minima",
@@ -75,4 +81,4 @@ English, German, French, Spanish, Italian, Dutch, Polish, Swedish, Czech, Turkis
 
 def spelled(words: Iterable[str]) -> tuple[str, ...]:
     """Spell shortened words out."""
-    return tuple(_LONG.get(word, word) for word in words)
+    return tuple(LONG.get(word, word) for word in words)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from datetime import datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -18,13 +20,22 @@ from weighbridge.io.understood import Lines
 from weighbridge.kernels.frame_text import FrameRows, parse_candump
 
 _BLOCK: Final = 1 << 25
+_HEAD: Final = 4096
 _INTERFACES: Final = 256
 _EPOCH_LIKE: Final = 1e8
 """Stamps above count from 1970, not from the start of the log [s]."""
 
 
+_DATED: Final = re.compile(rb"\((\d{4}-\d\d-\d\d \d\d:\d\d:\d\d)(\.\d+)?\)")
+"""A stamp of ``candump -tA``: date and time of day, by the clock of the computer."""
+
+_FALLS: Final = 0.2
+"""Part of the stamps that do not rise, from which they are times since the frame before [-]."""
+
 _LINE: Final = re.compile(
-    rb"(?:\xef\xbb\xbf)?\s*(?:\(\d+(?:\.\d+)?\)\s+)?\w+\s+(?:[RT]X\s+\S+\s+\S+\s+)?"
+    rb"(?:\xef\xbb\xbf)?\s*"
+    rb"(?P<stamp>\((?:\d{4}-\d\d-\d\d \d\d:\d\d:)?\d+(?:\.\d+)?\)\s+)?"
+    rb"\w+\s+(?:[RT]X\s+\S+\s+\S+\s+)?"
     rb"[0-9A-Fa-f]{3,8}(?:#|\s+\[\d{1,2}\](?:\s|$))"
 )
 
@@ -46,18 +57,41 @@ def read_candump(path: Path, table: str | None, mapping: TableMapping | None) ->
     channels: dict[str, int] = {}
     lines = Lines()
     for block in whole_lines(path):
+        block = _DATED.sub(_seconds, block) if _DATED.search(block, 0, _HEAD) else block
         frames, total, bad, first = _parse(block, channels)
         lines.add(block, total, bad, first)
         parts.append(frames)
     frames = in_order(parts)
     if not len(frames):
+        with path.open("rb") as file:
+            begins = _LINE.match(file.read(_HEAD))
+        if begins is not None and begins["stamp"] is None:
+            raise DriveError(
+                f"{path}: its frames have no times, without which nothing can be weighed; record "
+                "it with candump -l"
+            )
         raise DriveError(
             f"{path}: no line reads like candump's (1436509052.249713) can0 123#DEADBEEF; "
             "record it with candump -l, or convert it"
         )
+    if float(np.max(frames.time)) < _EPOCH_LIKE and frames.time.size > 1:
+        # candump -td gives the time since the frame before.
+        falls = np.mean(np.diff(frames.time) <= 0.0) if frames.time[0] == 0.0 else 0.0
+        if falls > _FALLS and np.ptp(frames.time) > 0.0:
+            frames = replace(frames, time=np.cumsum(frames.time))
     log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH_LIKE), frames=frames)
     log.problems += lines.problems("file.lines_left_out", path)
     return log
+
+
+def _seconds(stamp: re.Match[bytes]) -> bytes:
+    """Write a date as seconds since 1970, in the time zone of this computer."""
+    return b"(%d%s)" % (_since_1970(stamp[1]), stamp[2] or b"")
+
+
+@lru_cache(maxsize=16)
+def _since_1970(date: bytes) -> int:
+    return int(datetime.fromisoformat(date.decode("ascii")).timestamp())
 
 
 def whole_lines(path: Path) -> Iterator[bytes]:

@@ -25,6 +25,7 @@ from weighbridge.io.columns import (
 from weighbridge.io.draft import Draft, draft_column
 from weighbridge.io.draft_column import DraftColumn, checked, usual_rate
 from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
+from weighbridge.io.draft_values import with_judged_values
 from weighbridge.io.frames import Frames
 from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import (
@@ -46,7 +47,8 @@ from weighbridge.signals.units import to_si
 _EMPTY_NAMES: Final = frozenset(
     ("data", "value", "values", "val", "signal", "y", "x", "z", "ch", "channel", "0")
 )
-_PARTS: Final = re.compile(r"[/.]")
+# A mark within brackets is that of a unit.
+_PARTS: Final = re.compile(r"[/.](?![^\[(]*[\])])")
 
 # Bytes that a file may unpack to: 1 GB, or so many times its own size where that is more.
 _MOST_UNPACKED: Final = 1 << 30
@@ -274,7 +276,7 @@ def _told(name: str) -> str:
 
 
 def _judged(channels: list[Channel], columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
-    """Give speeds without a stated unit the one that the log's positions and speeds show."""
+    """Judge columns by the values of all channels."""
     told = {c.name: Values(c.time, c.values, unit_in_name(c.name, c.unit)) for c in channels}
     # What the format itself knows is compared too.
     nan = float("nan")
@@ -283,7 +285,8 @@ def _judged(channels: list[Channel], columns: tuple[DraftColumn, ...]) -> tuple[
         for c in channels
         if c.quantity
     )
-    return with_judged_units((*columns, *known), told)[: len(columns)]
+    judged = with_judged_units((*columns, *known), told)
+    return with_judged_values(judged, told)[: len(columns)]
 
 
 def draft_of(path: Path, found: Recording) -> Draft:

@@ -26,6 +26,7 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "nm": "nm", "n m": "nm", "n·m": "nm", "n.m": "nm", "n*m": "nm",
     "%": "pct", "percent": "pct", "prozent": "pct", "proz": "pct", "-": "ratio", "1": "ratio",
     "°c": "degc", "℃": "degc", "c": "degc", "deg c": "degc", "celsius": "degc",
+    "degree celsius": "degc",
     "°f": "degf", "℉": "degf", "f": "degf", "â°c": "degc", "â°": "deg",
     "g/s": "gps", "g/sec": "gps", "kg/s": "kgps",
     "l/h": "lph", "l/hr": "lph", "volt": "v", "volts": "v", "kilopascal": "kpa", "u/min": "rpm",
@@ -33,9 +34,30 @@ UNIT_TEXTS: Final[dict[str, str]] = {
     "omw/min": "rpm", "toeren/min": "rpm", "varv/min": "rpm", "obr/min": "rpm", "obr./min": "rpm",
     "ot/min": "rpm", "ot./min": "rpm", "dev/dk": "rpm", "d/dk": "rpm", "dev/dak": "rpm",
     "kg/h": "kgph", "kg/hr": "kgph", "lb/min": "lbpmin", "lbs/min": "lbpmin", "msec": "ms",
+    "unit_minutinver": "rpm", "unit_kilometerperhour": "kmh", "unit_percent": "pct",
+    "unit_newtometer": "nm", "unit_degrecelsi": "degc", "unit_volt": "v", "unit_amper": "a",
+    "unit_meterperseconsquar": "mps2", "unit_degreofarc": "deg", "unit_secon": "s",
     "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
 }  # fmt: skip
 """Units as people and loggers write them, and the suffix each stands for."""
+
+_SPELLED: Final = {
+    "per": "/", "squared": "2",
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("kilometer", "kilometers", "kilometre", "kilometres"), "km"),
+    **dict.fromkeys(("mile", "miles"), "mi"),
+    **dict.fromkeys(("second", "seconds", "sec"), "s"),
+    **dict.fromkeys(("hour", "hours", "hr"), "h"),
+    **dict.fromkeys(("minute", "minutes"), "min"),
+    **dict.fromkeys(("degree", "degrees"), "deg"),
+    **dict.fromkeys(("radian", "radians"), "rad"),
+    **dict.fromkeys(("revolution", "revolutions", "revs"), "rev"),
+    **dict.fromkeys(("gram", "grams"), "g"),
+    **dict.fromkeys(("kilogram", "kilograms"), "kg"),
+    **dict.fromkeys(("pound", "pounds", "lbs"), "lb"),
+    **dict.fromkeys(("liter", "liters", "litre", "litres"), "l"),
+}  # fmt: skip
+"""Words of units that are spelled out."""
 
 UNKNOWN_UNIT: Final = "?"
 """Stands before a unit that a log states and nobody knows: no quantity is in it."""
@@ -64,11 +86,20 @@ def suffixes_of(quantity: Quantity) -> list[str]:
 
 
 def unit_suffix(text: str) -> str | None:
-    """Unit suffix for a unit as written by people, or None: ``km/h`` is ``kmh``."""
+    """Unit suffix for a unit as written by people, or None: ``km/h`` is ``kmh``.
+
+    It may be spelled out: ``meters per second`` is ``mps``.
+    """
     word = " ".join(text.strip().split()).lower()
     if word in UNITS:
         return word
-    return UNIT_TEXTS.get(word)
+    found = UNIT_TEXTS.get(word)
+    word = " ".join(word.replace("_", " ").split())
+    found = found or UNIT_TEXTS.get(word)
+    if found is None and " per " in word:
+        short = "".join(_SPELLED.get(part, part) for part in word.split())
+        return short if short in UNITS else UNIT_TEXTS.get(short)
+    return found
 
 
 def unit_refused(quantity: Quantity, text: str) -> str:

@@ -15,11 +15,12 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import dimension_of, suffixes_of, unit_refused
+from weighbridge.io.columns import dimension_of, stated_unit, suffixes_of, unit_refused
 from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
-from weighbridge.io.draft_unit import SPEEDS, Values, unit_in_name, with_judged_units
+from weighbridge.io.draft_unit import Values, unit_in_name, with_judged_units
+from weighbridge.io.draft_values import FOUND, VACUUM, with_judged_values
 from weighbridge.io.naming import Named, recognise_all, words_of
 from weighbridge.io.parquet import read_parquet
 from weighbridge.io.table import (
@@ -42,6 +43,9 @@ _STRANGE_UNIT: Final = re.compile(
 
 _BESIDE: Final = frozenset(("engine_speed", "vehicle_speed", "gnss_speed"))
 """Signals of a torque source that tell no torque by themselves."""
+
+_TELLING: Final = {UNITS[QUANTITIES[quantity].suffix].dimension for quantity in FOUND}
+"""Dimensions of columns of any name that are held against others."""
 
 _AXES: Final = (("x",), ("y",), ("z",))
 """Names of columns that tell an axis and no more."""
@@ -147,6 +151,8 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
         raw = read_text(path, text)
     if raw.rows == 0:
         raise DriveError(f"{path} has a header and no rows; nothing can be told of its columns")
+    in_cells = {n: raw.cell_unit(k) for k, n in enumerate(raw.names) if n not in units}
+    units |= {n: stated for n, u in in_cells.items() if (stated := stated_unit(u)) is not None}
     above = head(path, text.skip_rows) if text.skip_rows else []
     times = find_times(raw, units, above)
     time = times[0]
@@ -162,7 +168,8 @@ def draft(path: Path, names: Sequence[str] = ()) -> Draft:
     times = by_motion(times, _swings(raw, columns))
     time = times[0]
     if time.row_rate is None:
-        columns = with_judged_units(columns, _told(raw, time, units, columns))
+        in_numbers = _told(raw, time, units, columns)
+        columns = with_judged_values(with_judged_units(columns, in_numbers), in_numbers)
     found = Draft(
         path=path,
         text=text,
@@ -190,7 +197,7 @@ def _told(
     wanted = {c.name for c in columns if c.quantity}
     for index, name in enumerate(raw.names):
         unit = unit_in_name(name, units.get(name))
-        if name in wanted or unit in SPEEDS:
+        if name in wanted or (unit in UNITS and UNITS[unit].dimension in _TELLING):
             with suppress(DriveError):
                 found[name] = Values(time.seconds, raw.numbers(index)[0], unit)
     return found
@@ -339,6 +346,8 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     else:
         by_log = False
         unit, doubt = _plausible_unit(name, found.quantity, known)
+        if not unit:
+            return _nothing(name, doubt)
     low, usual, high = map(float, np.quantile(known, [0.0, 0.5, 1.0]))
     return DraftColumn(
         name,
@@ -365,7 +374,10 @@ def _beyond(quantity: str, unit: str, values: Floats) -> str:
 
 
 def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]:
-    """Unit in which values are those of a drive: the usual one first, and a doubt."""
+    """Unit in which values are those of a drive, the usual one first, and a doubt.
+
+    The unit is empty where they fit none.
+    """
     q = QUANTITIES[quantity]
     high = float(np.percentile(np.abs(values), 99.5))
     if quantity in ("vehicle_speed", "gnss_speed"):
@@ -381,9 +393,10 @@ def _plausible_unit(name: str, quantity: str, values: Floats) -> tuple[str, str]
         unit = "ratio" if high <= 1.02 else "pct"
         return unit, f"states no unit; its highest is {high:.3g}, taken as {unit}"
     usual = [q.suffix, *(s for s in suffixes_of(q) if s != q.suffix)]
+    low = VACUUM if quantity == "intake_pressure" else q.low
     for unit in usual:
         si = to_si(values, unit)
-        if np.mean((si < q.low) | (si > q.high)) <= 0.01:
+        if np.mean((si < low) | (si > q.high)) <= 0.01:
             sure = q.suffix in ("deg", "rpm", "v", "a") and unit == q.suffix
             return unit, "" if sure else f"states no unit; taken as {unit}"
-    return q.suffix, f"states no unit, and its values fit none; taken as {q.suffix}"
+    return "", f"not taken for {quantity}: it states no unit, and its values fit none"

@@ -50,7 +50,7 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
         It is no table, has no header, or other columns than those named.
     """
     found = head(path, HEAD_LINES)
-    lines = [line for line in found if line]
+    lines = [line for line in found if _filled(line)]
     if not lines:
         raise DriveError(f"{path} is empty; record it again")
     if any("\r" in line for line in lines):
@@ -58,18 +58,18 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
             f"{path}: its lines end in carriage returns alone, as of an old Macintosh; save it "
             "again with other line ends"
         )
-    separator = _separator(lines)
+    separator = separator_of(lines)
     rows = [cells(line, separator) for line in lines]
-    width = _width(rows)
-    begin = _first_values(rows, width)
+    width = usual_width(rows)
+    begin = first_values(rows, width)
     if begin == len(rows) and len(found) >= HEAD_LINES and not columns:
         longer = head(path, _LONG_HEAD)
-        wide = [cells(line, _separator(longer[HEAD_LINES:])) for line in longer if line]
-        if len(longer) > HEAD_LINES and _first_values(wide, _width(wide)) < len(wide):
-            found, rows, width = longer, wide, _width(wide)
-            lines = [line for line in longer if line]
-            separator = _separator(longer[HEAD_LINES:])
-            begin = _first_values(rows, width)
+        wide = [cells(line, separator_of(longer[HEAD_LINES:])) for line in longer if _filled(line)]
+        if len(longer) > HEAD_LINES and first_values(wide, usual_width(wide)) < len(wide):
+            found, rows, width = longer, wide, usual_width(wide)
+            lines = [line for line in longer if _filled(line)]
+            separator = separator_of(longer[HEAD_LINES:])
+            begin = first_values(rows, width)
     first = next((k for k, r in enumerate(rows) if abs(len(r) - width) <= 1 and width > 1), None)
     if first is None:
         raise DriveError(f"{path} is no table: its lines have no common separator")
@@ -81,10 +81,10 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
         if first not in named or _known_names(rows[best]) > _known_names(rows[first]) + 1:
             first = best
     # Numbers of the channels may stand above their names.
-    if _of_numbers(rows[first]) and first + 1 < len(rows):
+    if of_numbers(rows[first]) and first + 1 < len(rows):
         below = rows[first + 1]
         first += abs(len(below) - width) <= 1 and not any(map(is_number, below))
-    if _of_numbers(rows[first]):
+    if of_numbers(rows[first]):
         raise DriveError(
             f"{path} has no header line: its first row is {lines[first][:60]!r}; name its "
             f"{len(rows[first])} columns in their order, with - for those of no use: "
@@ -100,19 +100,24 @@ def text_format(path: Path, columns: Sequence[str] = ()) -> tuple[TextFormat, di
     skipped = found.index(lines[first])
     beside = bool(units) or (bool(named) and first + 1 in named)
     after = _until_rows(found[skipped + 1 :], separator, width) if beside else 0
-    decimal = _decimal(rows[first + 1 + bool(units) :], separator)
+    decimal = decimal_mark(rows[first + 1 + bool(units) :], separator)
     text = TextFormat(
         separator=separator, decimal=decimal, skip_rows=skipped, skip_after_header=after
     )
     return text, units
 
 
-def _width(rows: Sequence[Sequence[str]]) -> int:
+def _filled(line: str) -> bool:
+    """Whether a line has a cell; spreadsheets write separators alone for a blank one."""
+    return bool(line.strip(f"{''.join(SEPARATORS)} \t"))
+
+
+def usual_width(rows: Sequence[Sequence[str]]) -> int:
     """Cells of the rows of the lower half."""
     return int(np.median([len(r) for r in rows[-max(len(rows) // 2, 1) :]]))
 
 
-def _first_values(rows: Sequence[Sequence[str]], width: int) -> int:
+def first_values(rows: Sequence[Sequence[str]], width: int) -> int:
     """Place of the first of the rows of values that go on to the end; the end where there are none.
 
     Lines of another form between them part nothing.
@@ -120,7 +125,7 @@ def _first_values(rows: Sequence[Sequence[str]], width: int) -> int:
     begin = len(rows)
     for k in range(len(rows) - 1, -1, -1):
         fits = abs(len(rows[k]) - width) <= 1 and width > 1
-        if fits and _of_numbers(rows[k]):
+        if fits and of_numbers(rows[k]):
             begin = k
         elif fits and sum(map(bool, rows[k])) > 0.5 * width:
             break
@@ -137,7 +142,7 @@ def _names_above(
     """Rows of text directly above the values, which a blank line parts from a preamble."""
     if not 0 < begin < len(rows):
         return range(0)
-    at = [k for k, line in enumerate(found) if line]
+    at = [k for k, line in enumerate(found) if _filled(line)]
     top = begin
     while top > 0:
         row = rows[top - 1]
@@ -145,7 +150,7 @@ def _names_above(
         units = [cell for cell in filled if unit_suffix(cell.strip("()[]")) is not None]
         parted = top < begin and at[top] - at[top - 1] > 1
         texts = 2 * len(filled) >= width - 1 or 2 * len(units) > len(filled)
-        if parted or not texts or abs(len(row) - width) > 1 or _of_numbers(row):
+        if parted or not texts or abs(len(row) - width) > 1 or of_numbers(row):
             break
         top -= 1
     return range(top, begin)
@@ -156,7 +161,7 @@ def _known_names(row: Sequence[str]) -> int:
     return sum(is_time(cell) or bool(recognise(cell).quantity) for cell in row)
 
 
-def _decimal(rows: Sequence[Sequence[str]], separator: str) -> str:
+def decimal_mark(rows: Sequence[Sequence[str]], separator: str) -> str:
     """Mark of the decimals in rows of numbers."""
     body = [c for r in rows for c in r if c]
     commas = sum(_COMMA.match(c) is not None for c in body)
@@ -188,13 +193,13 @@ def _named_by_hand(
         raise DriveError(f"{path}: two columns are called {repeated[0]!r}; rename one")
     return TextFormat(
         separator=separator,
-        decimal=_decimal(rows[first:], separator),
+        decimal=decimal_mark(rows[first:], separator),
         skip_rows=found.index(lines[first]),
         columns=names,
     )
 
 
-def _of_numbers(row: Sequence[str]) -> bool:
+def of_numbers(row: Sequence[str]) -> bool:
     """Whether a row holds values and no names: numbers, times of day, empty cells."""
     filled = [cell for cell in row if cell]
     clocks = sum(map(is_clock, filled))
@@ -212,7 +217,7 @@ def _until_rows(lines: Sequence[str], separator: str, width: int) -> int:
     return 1
 
 
-def _separator(lines: Sequence[str]) -> str:
+def separator_of(lines: Sequence[str]) -> str:
     """Separator that cuts most lines into equally many cells.
 
     A comma comes last: between semicolons or tabs it is a decimal mark.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -68,6 +68,9 @@ _ONE_BY_ONE: Final = 0.9
 _MINUTES: Final = re.compile(r"\b(run ?time|time|minutes|min)\b.*\b(cleared|clear|clr|mil)\b")
 """Names of PID 4D and 4E, as `words_of` cuts them: whole minutes with the malfunction lamp on, and
 since trouble codes were cleared."""
+
+_TORN: Final = 0.05
+"""Part of the cells of a column that torn lines may have made something else [-]."""
 
 _FASTEST: Final = 4.0
 """Mean of the size of a vehicle's acceleration, at most: tyres carry some 10, hardly ever used for
@@ -141,13 +144,13 @@ def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) ->
     ]
     if not found:
         return [_counted(raw, _told_rate(above))]
-    minutes = [t for t in found if _counts_minutes(t.column)]
+    minutes = [t for t in found if counts_minutes(t.column)]
     if len(minutes) == len(found) and (other := _beside_minutes(raw, minutes[0])) is not None:
         found.append(other)
     # The finer of several clocks; where they are alike, one that other files can share, a date.
     found.sort(
         key=lambda t: (
-            _counts_minutes(t.column),
+            counts_minutes(t.column),
             -round(_resolution(t.seconds), 3),
             not since_1970(t.seconds),
             t.index,
@@ -156,9 +159,14 @@ def find_times(raw: RawTable, units: Mapping[str, str], above: Sequence[str]) ->
     return found
 
 
-def _counts_minutes(name: str) -> bool:
+def counts_minutes(name: str) -> bool:
     """Whether a name is that of a counter of minutes of OBD-II."""
     return _MINUTES.search(" ".join(words_of(name))) is not None
+
+
+def minutes_problem(source: str, name: str) -> Problem:
+    """Say that a mapping names a counter of minutes as the clock of a file."""
+    return Problem.of("clock.minutes_named", serious=True, source=source, name=name)
 
 
 def _beside_minutes(raw: RawTable, minutes: DraftTime) -> DraftTime | None:
@@ -328,13 +336,13 @@ def _as_time(raw: RawTable, index: int, units: Mapping[str, str]) -> DraftTime |
         stated, _ = unit_of(f"{name} [{units[name]}]")
     if stated is not None and UNITS[stated].dimension == "s":
         unit = stated
-    elif _counts_minutes(name):
+    elif counts_minutes(name):
         unit = "min"
     else:
         unit, doubt = guessed_time_unit(name, known)
         doubts += [doubt.text] if doubt is not None else []
         guessed = doubt is not None
-    if _counts_minutes(name):
+    if counts_minutes(name):
         doubts.append(
             f"{name!r} counts whole minutes, and is no clock of the rows: record a time with each "
             "row, or state rate_hz in [time] where the rows are even"
@@ -389,9 +397,9 @@ def text_time_format(texts: Sequence[str]) -> tuple[str, list[Problem]]:
     """
     if not texts:
         return "", []
-    if all(map(is_clock, texts)):
+    if _most(map(is_clock, texts)):
         return "clock", []
-    if all(_ISO.match(t) for t in texts):
+    if _most(_ISO.match(t) is not None for t in texts):
         return "iso", []
     fits = [f for f in DATE_FORMATS if _fits(texts, f)]
     doubts = []
@@ -400,6 +408,12 @@ def text_time_format(texts: Sequence[str]) -> tuple[str, list[Problem]]:
     return (fits[0] if fits else ""), doubts
 
 
+def _most(fits: Iterable[bool]) -> bool:
+    """Whether all fit but for the few that torn lines leave."""
+    fitting = list(fits)
+    return sum(fitting) >= (1.0 - _TORN) * len(fitting)
+
+
 def _fits(texts: Sequence[str], form: str) -> bool:
     parsed = pl.Series(texts).str.to_datetime(form, strict=False, time_unit="us")
-    return int(parsed.null_count()) <= 0.02 * len(texts)
+    return _most(parsed.is_not_null())

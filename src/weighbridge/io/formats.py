@@ -6,6 +6,7 @@ names a `weighbridge.io.format.Format`.
 
 from __future__ import annotations
 
+import difflib
 import logging
 import sys
 from functools import lru_cache
@@ -17,8 +18,12 @@ from weighbridge.io import (
     bus_text,
     candump,
     canlog,
+    frame_text,
     gpx,
+    grouped,
+    haltech,
     hdf5,
+    json_lines,
     long_csv,
     matlab,
     mdf,
@@ -49,7 +54,7 @@ _HEAD: Final = 4096
 FORMATS: Final[tuple[Format, ...]] = (
     Format(
         name="CSV",
-        suffixes=(".csv", ".tsv", ".txt"),
+        suffixes=(".csv", ".tsv", ".txt", ".msl"),
         read=tabular.read_csv,
         about="a table of text: canonical names, or those of a mapping",
         takes=Takes.TEXT,
@@ -120,6 +125,24 @@ FORMATS: Final[tuple[Format, ...]] = (
         about="one row for each value, with its name, as Car Scanner writes it",
         takes=Takes.COLUMNS,
         draft=drafter(long_csv.open_long),
+    ),
+    Format(
+        name="Haltech CSV",
+        suffixes=(".csv",),
+        read=reader(haltech.open_haltech),
+        begins=haltech.is_haltech,
+        about="channels of an engine's control unit, as NSP exports them",
+        takes=Takes.CHANNELS,
+        draft=drafter(haltech.open_haltech),
+    ),
+    Format(
+        name="grouped CSV",
+        suffixes=(".csv", ".tsv", ".txt"),
+        read=grouped.read_grouped,
+        begins=grouped.is_grouped,
+        about="several times side by side, each for the columns to its right, as VCDS writes them",
+        takes=Takes.TEXT,
+        draft=grouped.draft_grouped,
     ),
     Format(
         name="Parquet",
@@ -209,10 +232,55 @@ FORMATS: Final[tuple[Format, ...]] = (
         extra="can",
     ),
     Format(
+        name="table of CAN frames",
+        suffixes=(".csv", ".tsv", ".txt"),
+        read=frame_text.read_frame_table,
+        begins=frame_text.is_frame_table,
+        about="CAN frames, one a row under names, as CLX000, Kvaser and Vehicle Spy write them",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="CanKing",
+        suffixes=(".txt", ".log"),
+        read=frame_text.read_canking,
+        begins=frame_text.is_canking,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
+        name="BUSMASTER",
+        suffixes=(".log", ".txt"),
+        read=frame_text.read_busmaster,
+        begins=frame_text.is_busmaster,
+        about="CAN frames",
+        takes=Takes.CHANNELS,
+        self_described=True,
+        package="cantools",
+        extra="can",
+    ),
+    Format(
         name="NMEA 0183",
         suffixes=(".nmea", ".ubx"),
         read=nmea.read_nmea,
         about="RMC, GGA, GNS, GST, VTG of any talker",
+        takes=Takes.CLOCK,
+        self_described=True,
+        package="pynmea2",
+        extra="position",
+    ),
+    Format(
+        name="NMEA text",
+        suffixes=(".txt", ".log"),
+        read=nmea.read_nmea,
+        begins=nmea.is_nmea,
+        magic=True,
+        about="the same, known by its first lines, which may begin with what an app writes",
         takes=Takes.CLOCK,
         self_described=True,
         package="pynmea2",
@@ -327,9 +395,19 @@ FORMATS: Final[tuple[Format, ...]] = (
         takes=Takes.CHANNELS,
         draft=drafter(tesla_fleet.open_fleet_telemetry),
     ),
+    Format(
+        name="JSON lines",
+        suffixes=(".jsonl", ".ndjson"),
+        read=reader(json_lines.open_json_lines),
+        begins=json_lines.is_json_lines,
+        magic=True,
+        about="one object a line: a value with its name, as OpenXC has it, or a row of values",
+        takes=Takes.COLUMNS,
+        draft=drafter(json_lines.open_json_lines),
+    ),
 )
 """The formats of this project; where several have one suffix, the first that recognises a file's
-first bytes reads it, else the one that needs no recognising."""
+first bytes reads it, else the one that needs no recognising, else the last."""
 
 
 def formats() -> tuple[Format, ...]:
@@ -351,12 +429,24 @@ _SHEET: Final = "it is a spreadsheet: save its sheet as CSV"
 _PACKED: Final = "it is packed: unpack it first"
 _TRACK: Final = "export the track as GPX"
 _RACE: Final = "export it as CSV from Race Studio"
+_FRAMES: Final = "it holds CAN frames in a maker's own form: save them as ASC, BLF or TRC"
+_ENGINE: Final = "it is of an engine's control unit: export it as CSV from the tuner's program"
+_TABLE: Final = "write its table as Parquet or CSV"
 
 _REMEDIES: Final = {
     **dict.fromkeys((".xlsx", ".xls", ".xlsm", ".ods", ".numbers"), _SHEET),
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".xz"), _PACKED),
     **dict.fromkeys((".fit", ".tcx", ".kml", ".kmz", ".igc"), _TRACK),
     **dict.fromkeys((".xrk", ".xrz", ".drk"), _RACE),
+    **dict.fromkeys((".kmf", ".kme", ".vsb", ".cdr", ".rf64", ".tio", ".can"), _FRAMES),
+    **dict.fromkeys(
+        (".mlg", ".llg", ".lf3", ".hpl", ".dl", ".dlz", ".ftl", ".stf", ".daq", ".lg1"), _ENGINE
+    ),
+    **dict.fromkeys((".arrow", ".feather", ".avro", ".pkl", ".pickle", ".rds", ".sav"), _TABLE),
+    **dict.fromkeys((".pcap", ".pcapng"), "write its CAN frames by candump -l, or as ASC"),
+    **dict.fromkeys((".dat", ".erg", ".d97"), "save it as MDF (.mf4), as INCA and CANape do"),
+    **dict.fromkeys((".rcz", ".rc1"), "export the session as CSV v3 from RaceChrono"),
+    ".ulg": "turn its topics into CSV by ulog2csv",
     ".ld": "export it as CSV from i2",
     ".dbc": "it is the database of a bus and no log: give it by --dbc beside the log",
     ".toml": "it is no log: a vehicle file goes with --vehicle, a mapping with --mapping",
@@ -375,11 +465,28 @@ def unreadable(path: Path) -> str:
     ----------
     path : the file
     """
-    remedy = _REMEDIES.get(path.suffix.lower(), "")
-    return (
-        f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; known are "
-        f"{', '.join(suffixes())}, and folders of tables{'; ' if remedy else ''}{remedy}"
-    )
+    suffix = path.suffix.lower()
+    remedy = _REMEDIES.get(suffix, "")
+    if suffix not in _REMEDIES or suffix == ".dat":
+        remedy = _of_text(path) or remedy
+    near = difflib.get_close_matches(suffix, [s for s in suffixes() if s.startswith(".")], n=1)
+    known = f"the nearest that is known is {near[0]}" if near and not remedy else ""
+    told = known or remedy or f"known are {', '.join(suffixes())}, and folders of tables"
+    return f"{path}: logs of kind {path.suffix or 'without a suffix'!r} cannot be read; {told}"
+
+
+def _of_text(path: Path) -> str:
+    """Say of a file of unknown suffix that is a text what helps; empty where it is none."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError:
+        return ""
+    printable = sum(byte >= 32 or byte in b"\t\r\n" for byte in head)
+    lines = head.count(b"\n")
+    if lines < 2 or printable < 0.98 * len(head):
+        return ""
+    return "it is a text: name it .csv where it is a table, .log where it holds CAN frames"
 
 
 def format_of(path: Path) -> Format | None:
@@ -405,7 +512,7 @@ def format_of(path: Path) -> Format | None:
     for found in among:
         if found.begins is not None and found.begins(head):
             return found
-    return next((f for f in named if f.begins is None), named[0] if named else None)
+    return next((f for f in named if f.begins is None), named[-1] if named else None)
 
 
 @lru_cache(maxsize=4)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +13,7 @@ import numpy as np
 from weighbridge.errors import DriveError, MissingExtraError
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping
+from weighbridge.io.understood import Lines
 from weighbridge.signals import Problem
 from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
@@ -24,6 +27,13 @@ _COLUMNS: Final = (
     ("gnss_course", "deg"),
     ("hdop", ""),
 )
+
+
+_ROOT: Final = re.compile(r"<gpx\b[^<>]*>")
+_POINT: Final = re.compile(r"(?=<trkpt\b)")
+_END: Final = "</trkpt>"
+_OPEN_TAG: Final = re.compile(r"<[^<>]*(?:<|$)")
+_END_OF_FILE: Final = "</gpx>"
 
 
 def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
@@ -50,22 +60,33 @@ def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log
             f"{path} declares XML entities, which GPX has no use for and which can be made to "
             "fill any memory; remove its <!DOCTYPE …>"
         )
-    text, salvaged = _text(data)
+    text = _text(data)
+
+    def points_of(text: str) -> list[Any]:
+        """Return the track points of a whole GPX text; a ValueError says why there are none."""
+        try:
+            tracks = gpxpy.parse(text).tracks
+        except gpxpy.gpx.GPXException as e:
+            raise ValueError(str(e)) from None
+        return [p for track in tracks for part in track.segments for p in part.points]
+
+    log = Log(path, absolute=True)
     try:
-        gpx = gpxpy.parse(text)
-    except (gpxpy.gpx.GPXException, ValueError) as e:
-        raise DriveError(
-            f"{path} is not a readable GPX file ({str(e).strip().splitlines()[0][:120]}); "
-            "it may have been cut off: export it again"
-        ) from None
-    points = [p for track in gpx.tracks for part in track.segments for p in part.points]
+        points = points_of(text)
+    except ValueError as e:
+        points, damage = _salvaged(text, points_of)
+        if not points:
+            raise DriveError(
+                f"{path} is not a readable GPX file ({str(e).strip().splitlines()[0][:120]}); "
+                "it may have been cut off: export it again"
+            ) from None
+        log.problems += damage.problems("file.rows_cut", path)
+        if _END_OF_FILE not in text:
+            log.problems.append(Problem.of("file.points_break_off", file=path.name))
     rows = [_row(p) for p in points if p.time is not None]
     if not rows:
         what = f"{len(points)} track points, none of them with a time" if points else "no track"
         raise DriveError(f"{path} has {what}; export the recording itself, not a planned route")
-    log = Log(path, absolute=True)
-    if salvaged:
-        log.problems.append(Problem.of("file.points_break_off", file=path.name))
     if len(rows) < len(points):
         log.problems.append(
             Problem.of("clock.points_without", file=path.name, count=len(points) - len(rows))
@@ -84,17 +105,56 @@ def read_gpx(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     return log
 
 
-def _text(data: bytes) -> tuple[str, bool]:
-    """Decode, and close a file that broke off after a whole track point."""
+def _text(data: bytes) -> str:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
-    text = text.replace("\x00", "")
-    if "</gpx>" in text or "</trkpt>" not in text:
-        return text, False
-    end = text.rindex("</trkpt>") + len("</trkpt>")
-    return text[:end] + "</trkseg></trk></gpx>", True
+    return text.replace("\x00", "")
+
+
+def _salvaged(text: str, points_of: Callable[[str], list[Any]]) -> tuple[list[Any], Lines]:
+    """Read the track points of a damaged file that are whole, and count the others.
+
+    Parameters
+    ----------
+    text : of the file
+    points_of : reads a whole GPX text, or raises a ValueError
+    """
+    head, *blocks = _POINT.split(text)
+    opened = _ROOT.search(head)
+    root = opened.group() if opened is not None else "<gpx>"
+    if blocks and _END_OF_FILE not in text and _END not in blocks[-1]:
+        blocks.pop()
+
+    def line_of(part: str) -> int:
+        at = text.find(part)
+        return text.count("\n", 0, at + len(part) - len(part.lstrip())) + 1
+
+    damage = Lines("track point")
+    damage.add(b"", len(blocks), 0, 0)
+    points: list[Any] = []
+    # Parts that hold a damaged point are halved until it stands alone.
+    parts = [blocks] if blocks else []
+    while parts:
+        part = parts.pop()
+        whole = "".join(block[: block.find(_END) + len(_END)] for block in part)
+        try:
+            if any(_END not in block for block in part):
+                raise ValueError
+            points += points_of(f"{root}<trk><trkseg>{whole}</trkseg></trk></gpx>")
+        except ValueError:
+            half = len(part) // 2
+            if half:
+                parts += [part[half:], part[:half]]
+            else:
+                damage.add(b"", 0, 1, line_of(part[0]))
+    # Between the points stand whole tags, and no end of a point.
+    for block in blocks:
+        rest = block[block.find(_END) + len(_END) :] if _END in block else ""
+        if _END in rest or _OPEN_TAG.search(rest):
+            damage.add(b"", 1, 1, line_of(rest))
+    return points, damage
 
 
 def _row(point: Any) -> tuple[float, ...]:

@@ -1,4 +1,8 @@
-"""What loggers call each quantity in Dutch, Polish, Swedish, Czech and Turkish.
+"""What loggers call each quantity in Dutch, Polish, Swedish, Czech and Turkish, and what control
+units call it inside, which tools that read their memory write.
+
+Bosch: labels of the ME7 function sheets. Siemens (Continental): labels of the SIMOS and MS4x
+function sheets. As public lists of logged variables have them. OVMS: its tree of metrics.
 
 Without accents, in small letters, as `naming.words_of` cuts a name.
 """
@@ -8,6 +12,43 @@ from __future__ import annotations
 from typing import Final
 
 LANGUAGES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
+    "Bosch": {
+        "vehicle_speed": ("vfzg", "vfil"),
+        "engine_speed": ("nmot", "nmotor"),
+        "mass_air_flow": ("mshfm", "msdk", "ml"),
+        "accelerator_pedal": ("wped",),
+        "throttle": ("wdkba", "wdk"),
+        "intake_pressure": ("psrg",),
+        "barometric_pressure": ("pu", "pus"),
+        "gear": ("gangi",),
+        "lambda_1": ("lamsoni",),
+        "coolant_temperature": ("tmot", "tmotlin"),
+        "intake_temperature": ("tans", "tanslin"),
+        "ambient_temperature": ("tumg",),
+        "module_voltage": ("wub",),
+        "brake_switch": ("b br", "b brems"),
+        "clutch_switch": ("b kuppl",),
+    },
+    "OVMS": {
+        "vehicle_speed": ("v p speed",),
+        "gnss_speed": ("v p gps speed",),
+        "battery_voltage": ("v b voltage",),
+        "battery_current": ("v b current",),
+        "engine_speed": ("v m rpm",),
+        "ambient_temperature": ("v e temp",),
+    },
+    "Siemens": {
+        "vehicle_speed": ("vs",),
+        "accelerator_pedal": ("pv av", "pvs"),
+        "throttle": ("tps av",),
+        "engine_torque": ("tqi av",),
+        "coolant_temperature": ("tco",),
+        "intake_temperature": ("tia",),
+        "oil_temperature": ("toil",),
+        "ambient_temperature": ("tam",),
+        "barometric_pressure": ("amp",),
+        "lambda_1": ("lamb ls up",),
+    },
     "Dutch": {
         "vehicle_speed": ("snelheid", "voertuigsnelheid", "rijsnelheid", "snelheid voertuig", "wielsnelheid", "obd snelheid"),
         "engine_speed": ("toerental", "motortoerental", "toeren", "toerental motor", "motor toerental"),

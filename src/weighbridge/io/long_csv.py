@@ -18,7 +18,7 @@ import polars as pl
 from weighbridge.errors import DriveError
 from weighbridge.io.channels import Channel, Recording
 from weighbridge.io.columns import bracketed_unit, time_unit, unit_suffix
-from weighbridge.io.draft_time import is_number, text_time_format
+from weighbridge.io.draft_time import counts_minutes, is_number, minutes_problem, text_time_format
 from weighbridge.io.mapping import TimeColumn
 from weighbridge.io.naming import is_time, recognise, unit_of, words_of
 from weighbridge.io.table import (
@@ -27,6 +27,7 @@ from weighbridge.io.table import (
     RawTable,
     cells,
     column_list,
+    numbers_with_units,
     read_text,
     time_seconds,
     unwrapped,
@@ -39,11 +40,12 @@ _NAMES: Final = frozenset(
     ("pid", "name", "parameter", "param", "param_name", "signal", "signal_name", "channel",
      "metric", "key", "variable", "field", "parameter name", "sensor name", "diagnostic",
      "diagnostic name", "measurement", "measure name", "tag", "tag name", "channel name", "sensor",
-     "signalname", "item", "messgroesse", "measurand")
+     "signalname", "item", "command name", "command", "messgroesse", "measurand")
 )  # fmt: skip
 _VALUES: Final = frozenset(
     ("value", "val", "values", "wert", "valeur", "valor", "reading", "data", "numeric value",
-     "double value", "measure value", "signal value", "messwert", "raw value")
+     "double value", "measure value", "response value", "obd response value", "response",
+     "signal value", "messwert", "raw value")
 )  # fmt: skip
 _UNITS: Final = frozenset(
     (
@@ -76,6 +78,9 @@ _THOUSANDS: Final = r"^[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
 _MOST: Final = 12
 
 
+_DAMAGED: Final = 0.005
+"""Part of the rows that a word stands in at most which a torn line left [-]."""
+
 # Rows by which it is known what a column of texts names, and part of the names that are known.
 _LOOKED_AT: Final = 200
 _KNOWN: Final = 0.5
@@ -96,7 +101,7 @@ def _places(names: list[str], rows: Sequence[Sequence[str]]) -> tuple[int | None
     if named is None and told:
         named = next((k for k in range(len(names)) if _names_quantities(told, k)), None)
     if valued is None and named is not None and told:
-        timed = _time_place(names)
+        timed = _time_place(names, rows)
         places = [k for w in _PLACES.values() if (k := _place(names, w)) is not None]
         free = (k for k in range(len(names)) if k not in (named, timed, *places))
         numeric = [k for k in free if all(is_number(row[k]) for row in told)]
@@ -113,8 +118,15 @@ def _names_quantities(rows: Sequence[Sequence[str]], column: int) -> bool:
     return len(known) >= 2 and len(known) >= _KNOWN * len(kinds)
 
 
-def _time_place(names: list[str]) -> int | None:
-    return next((k for k, n in enumerate(names) if is_time(n) or time_unit(n) is not None), None)
+def _time_place(names: list[str], rows: Sequence[Sequence[str]] = ()) -> int | None:
+    """Column of the time: by its name, else the first whose cells are times."""
+    named = (k for k, n in enumerate(names) if is_time(n) or time_unit(n) is not None)
+    place = next(named, None)
+    if place is not None or not rows:
+        return place
+    told = [row for row in rows if len(row) == len(names)]
+    columns = ([row[k] for row in told if row[k]] for k in range(len(names)))
+    return next((k for k, cells in enumerate(columns) if text_time_format(cells)[0]), None)
 
 
 def is_long(head: bytes) -> bool:
@@ -136,7 +148,7 @@ def are_long(names: list[str], rows: Sequence[Sequence[str]] = ()) -> bool:
     """
     return (
         3 <= len(names) <= _MOST
-        and _time_place(names) is not None
+        and _time_place(names, rows) is not None
         and None not in _places(names, rows)
     )
 
@@ -150,7 +162,7 @@ def open_long(path: Path, time: TimeColumn) -> Recording:
         It has no rows, no time that can be read, too many names, or a name whose units do not
         convert into one another.
     """
-    return recording_of(read_text(path), time)
+    return recording_of(read_text(path, whole=True), time)
 
 
 def names_in(raw: RawTable) -> tuple[str, ...]:
@@ -171,7 +183,7 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
         raise DriveError(f"{path} has no columns of names and values; it has {column_list(names)}")
     if raw.rows == 0:
         raise DriveError(f"{path} has a header and no rows; record it again")
-    _refuse_several(raw, names)
+    of_one = _of_one_vehicle(raw, names)
     found = Recording([], notes=list(raw.notes))
     seconds = _seconds(raw, names, time, found)
     united = _place(names, _UNITS)
@@ -179,17 +191,22 @@ def recording_of(raw: RawTable, time: TimeColumn) -> Recording:
     thousands = _have_thousands([raw.column(k) for k in numeric])
     if thousands:
         found.notes.append(Problem.of("file.thousands"))
+    texts = raw.column(valued)
+    in_cells = numbers_with_units(texts) if united is None else None
     table = pl.DataFrame(
         {
             "time": seconds,
             "name": raw.column(named).cast(pl.String).str.strip_chars(),
-            "value": _numbers(raw.column(valued), thousands),
-            "unit": pl.repeat("", raw.rows, eager=True)
-            if united is None
-            else raw.column(united).cast(pl.String),
+            "value": _numbers(texts, thousands) if in_cells is None else in_cells[0],
+            "unit": raw.column(united).cast(pl.String)
+            if united is not None
+            else in_cells[1]
+            if in_cells is not None
+            else pl.repeat("", raw.rows, eager=True),
         }
     )
-    known = table.drop_nulls(["name", "value"]).filter(pl.col("time").is_finite())
+    known = table if of_one is None else table.filter(of_one)
+    known = known.drop_nulls(["name", "value"]).filter(pl.col("time").is_finite())
     if known.height == 0:
         raise DriveError(f"{path} has no row with a time, a name and a number; record it again")
     if (lost := table.height - known.height) > 0:
@@ -211,26 +228,42 @@ def _some(raw: RawTable) -> list[list[str]]:
     return [list(row) for row in zip(*columns, strict=True)]
 
 
-def _refuse_several(raw: RawTable, names: list[str]) -> None:
-    """Refuse rows of several vehicles: a drive is of one."""
+def _of_one_vehicle(raw: RawTable, names: list[str]) -> pl.Series | None:
+    """Tell which rows are of the one vehicle of a table; None where none is named.
+
+    A name that stands in hardly any row is damage.
+
+    Raises
+    ------
+    DriveError
+        There are several: a drive is of one.
+    """
     place = _place(names, _VEHICLES)
     if place is None:
-        return
-    vehicles = raw.column(place).cast(pl.String).drop_nulls().unique(maintain_order=True)
-    if vehicles.len() > 1:
+        return None
+    told = raw.column(place).cast(pl.String).str.strip_chars()
+    counts = told.drop_nulls().value_counts(sort=True)
+    vehicles = [name for name, count in counts.rows() if not _is_damage(count, raw.rows)]
+    if len(vehicles) > 1:
         raise refused(
             "file.several_vehicles",
             file=raw.path.name,
-            count=vehicles.len(),
+            count=len(vehicles),
             column=names[place],
             example=vehicles[0],
         )
+    return (told.is_null() | told.is_in(vehicles)) if vehicles else None
+
+
+def _is_damage(count: int, rows: int) -> bool:
+    """Whether what stands in so many of the rows is no word of the logger, but a torn one."""
+    return count <= max(1.0, _DAMAGED * rows)
 
 
 def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[Problem | str]) -> Channel:
     """Values of one name, all in the unit that most of its rows state.
 
-    A unit that stands in one row alone and does not convert is damage; the row is left out.
+    A unit that stands in hardly any row and does not convert is damage; the row is left out.
     """
     stated = rows["unit"].fill_null("").str.strip_chars()
     units = (
@@ -248,7 +281,7 @@ def _channel(path: Path, name: str, rows: pl.DataFrame, notes: list[Problem | st
         suffix = unit_suffix(other)
         if suffix and common and UNITS[suffix].dimension == UNITS[common].dimension:
             values[here] = from_si(to_si(values[here], suffix), common)
-        elif count == 1:
+        elif _is_damage(count, rows.height):
             kept &= ~here
             notes.append(Problem.of("file.row_unit", name=name, unit=other))
         else:
@@ -266,7 +299,7 @@ def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording
             f"{raw.path} has one row for each value, so that rate_hz in [time] of the mapping is "
             "no rate of a signal; name the time's column in its place"
         )
-    index = _time_place(names) if time.column is None else raw.index(time.column)
+    index = _time_place(names, _some(raw)) if time.column is None else raw.index(time.column)
     if index is None:
         raise DriveError(
             f"{raw.path} has no time column {time.column or ''!r}; it has {column_list(names)}: "
@@ -274,6 +307,8 @@ def _seconds(raw: RawTable, names: list[str], time: TimeColumn, found: Recording
         )
     name = names[index]
     found.time = name
+    if counts_minutes(name):
+        found.notes.append(minutes_problem(raw.path.name, name))
     texts = raw.column(index)
     found.time_format = time.format or ""
     if not found.time_format and texts.dtype == pl.String:

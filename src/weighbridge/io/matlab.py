@@ -122,6 +122,8 @@ def _tree(group: Mapping[str, Any], depth: int) -> Tree:
     """Groups and arrays of what the library hands over."""
     if depth > _DEEPEST:
         return {}
+    if {"X", "Y"} <= group.keys() and (rasters := _rasters(group["X"], group["Y"])):
+        return rasters
     unit = unit_beside(group)
     found: dict[str, Tree | Leaf] = {}
     for name, value in group.items():
@@ -136,6 +138,52 @@ def _tree(group: Mapping[str, Any], depth: int) -> Tree:
             if leaf is not None:
                 found[str(name)] = leaf
     return found
+
+
+def _rasters(clocks: Any, signals: Any) -> Tree:
+    """Groups of a recording of dSPACE ControlDesk: a clock each, and the signals that are on it.
+
+    ``X`` holds the clocks, ``Y`` the signals with the number of their clock (dSPACE, *MAT file
+    export of ControlDesk*).
+
+    Parameters
+    ----------
+    clocks, signals : structures, or what they hold by name
+
+    Returns
+    -------
+    Empty where they are no such recording.
+    """
+    found: dict[str, dict[str, Tree | Leaf]] = {}
+    times = [_leaf(x.get("Data"), str(x.get("Unit", ""))) for x in _elements(clocks)]
+    for signal in _elements(signals):
+        leaf = _leaf(signal.get("Data"), str(signal.get("Unit", "")))
+        number = signal.get("XIndex")
+        if leaf is None or not isinstance(number, int) or not 1 <= number <= len(times):
+            continue
+        clock = times[number - 1]
+        if clock is None:
+            continue
+        raster = found.setdefault(f"raster {number}", {"time": clock})
+        raster[str(signal.get("Name", len(raster)))] = leaf
+    return found
+
+
+def _elements(structures: Any) -> list[dict[str, Any]]:
+    """Elements of an array of structures, however the library hands it over."""
+    if isinstance(structures, list):
+        return [x for x in structures if isinstance(x, dict)]
+    if not isinstance(structures, Mapping):
+        return []
+    names = structures.get("Name")
+    if isinstance(names, str):
+        return [dict(structures)]
+    if not isinstance(names, list):
+        return []
+    return [
+        {key: told[k] for key, told in structures.items() if len(told) == len(names)}
+        for k in range(len(names))
+    ]
 
 
 def _label(element: Mapping[str, Any], index: int) -> str:

@@ -10,9 +10,10 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
-from weighbridge.io.abbreviations import OF_ANOTHER, SOURCES, spelled
+from weighbridge.io.abbreviations import LONG, OF_ANOTHER, SOURCES, spelled
 from weighbridge.io.columns import UNKNOWN_UNIT, dimension_of, unit_refused, unit_suffix
 from weighbridge.io.languages import LANGUAGES, TIMES
 from weighbridge.io.phrases import AGAINST, PHRASES, TIME_PHRASES
@@ -20,11 +21,38 @@ from weighbridge.signals import QUANTITIES
 from weighbridge.signals.units import UNITS
 
 _NOISE: Final = frozenset(
-    ("obd", "ii", "obd2", "obdii", "pid", "sensor", "value", "avg", "raw", "data", "signal",
-     "bank", "of", "the", "in", "can", "ecu", "location", "txt", "wgs", "der", "des", "du", "de",
-     "la", "le", "el", "del", "della", "di", "do", "da", "from", "as")
+    ("obd", "ii", "obd2", "obdii", "pid", "sensor", "sensors", "value", "raw", "rohwert", "data",
+     "signal", "1", "01", "by", "wire", "drive", "bank", "of", "the", "in", "can", "ecu",
+     "location", "txt", "wgs", "der", "des", "du", "de", "la", "le", "el", "del", "della", "di",
+     "do", "da", "from", "as")
 )  # fmt: skip
-"""Words that say nothing of the quantity."""
+"""Words that say nothing of the quantity; the first of a kind is the one that others have alone."""
+
+_ASPECTS: Final = {
+    **dict.fromkeys(
+        ("throttle", "relative_throttle", "commanded_throttle", "accelerator_pedal",
+         "relative_pedal"),
+        frozenset(("position", "angle", "opening", "plate", "valve", "body", "percent",
+                   "percentage")),
+    ),
+    "gear": frozenset(("position",)),
+    **dict.fromkeys(
+        ("engine_torque", "engine_torque_fraction"),
+        frozenset(("at", "clutch", "crank", "crankshaft", "flywheel", "net")),
+    ),
+}  # fmt: skip
+"""Words that tell how a quantity is measured, or where: with one of them, several or none it is the
+same."""
+
+_BARE: Final = frozenset(
+    ("current", "voltage", "speed", "torque", "power", "temperature", "pressure", "position",
+     "angle", "load", "rate", "flow", "force", "level", "gear")
+)  # fmt: skip
+"""Words that are measured of many things, and name none by themselves at the end of a path."""
+
+
+_ALONG: Final = ("long", "lon", "longitudinal", "forward", "fwd")
+_ACCEL_WORDS: Final = ("acc", "accel", "acceleration", "a", "g", "g force", "gforce")
 
 
 def _phrases(quantity: str) -> tuple[str, ...]:
@@ -32,6 +60,8 @@ def _phrases(quantity: str) -> tuple[str, ...]:
     found = list(PHRASES.get(quantity, (quantity.replace("_", " "),)))
     for told in LANGUAGES.values():
         found += told.get(quantity, ())
+    if quantity == "longitudinal_accel":
+        found += [f"{way} {kind}" for way in _ALONG for kind in _ACCEL_WORDS]
     return tuple(found)
 
 
@@ -56,10 +86,27 @@ _TIMES: Final = TIME_PHRASES | frozenset(TIMES)
 
 _SILENT: Final = _NOISE | SOURCES
 
+_SHORTEST: Final = 3
+"""Letters of a word at least that stands in another one."""
+
+_VOCABULARY: Final = frozenset(
+    word
+    for words in (
+        *(phrase.split() for quantity in QUANTITIES for phrase in _phrases(quantity)),
+        *(time.split() for time in _TIMES),
+        *AGAINST.values(),
+        OF_ANOTHER,
+        _SILENT,
+        LONG,
+    )
+    for word in words
+    if len(word) >= _SHORTEST
+)
+"""Words of which others may be put together without a mark: gpsspeed."""
+
 _ENGINE: Final = frozenset(("engine_speed", "engine_load", "engine_torque", "mass_air_flow"))
 """Quantities of a table that an engine's control unit fills."""
 
-_ACCEL_WORDS: Final = ("acc", "accel", "acceleration", "a")
 _RATE_WORDS: Final = ("rate", "velocity", "speed", "angular rate", "angular velocity")
 
 _DIRECTIONS: Final[dict[str, frozenset[frozenset[str]]]] = {
@@ -67,7 +114,7 @@ _DIRECTIONS: Final[dict[str, frozenset[frozenset[str]]]] = {
         frozenset(spelled((where, *what.split()))) for where in directions for what in kinds
     )
     for quantity, directions, kinds in (
-        ("accel_x", ("long", "lon", "longitudinal", "forward", "fwd"), _ACCEL_WORDS),
+        ("accel_x", _ALONG, _ACCEL_WORDS),
         ("accel_y", ("lat", "lateral", "transversal", "transverse"), _ACCEL_WORDS),
         ("accel_z", ("vert", "vertical", "up"), _ACCEL_WORDS),
         ("gyro_x", ("roll",), _RATE_WORDS),
@@ -81,6 +128,8 @@ _OTHERWISE: Final[dict[str, str | None]] = {"gps": None, "ms": "mps"}
 """What a unit at the end of a name means where no quantity of that name has it: g/s may be the
 satellites', and ms m/s."""
 
+_SIDES: Final = frozenset(("front", "rear", "left", "right"))
+
 LEAST: Final = 0.66
 """Part of the words of a name that have to be those of a quantity [-]."""
 
@@ -89,6 +138,15 @@ _MARKS: Final = frozenset(("txt", "wgs84", "gear", "bool", "int", "float", "on/o
 
 _UNIT: Final = re.compile(r"[\[({<]\s*([^\])}>]{0,20}?)\s*[\])}>]")
 _PIPED: Final = re.compile(r'"?(?P<name>[^"|]+)"?\|"(?P<unit>[^"|]*)"(?:\|[^|]*)*$')
+_WORD_WIDE: Final = re.compile(r"([a-z][a-z0-9]+)_w$")
+"""A label of a control unit with the mark of 16 bits, as Bosch writes it: nmot_w."""
+
+_SENDER: Final = re.compile(r"([A-Za-z]{2,4})_(?=[A-Za-z]{2})")
+"""A short mark before a name."""
+
+_PATH: Final = re.compile(r"[/.\\:](?![^\[(]*[\])])")
+"""Parts the places of a name that is a path; not within brackets, where a unit may have it."""
+
 _PID: Final = re.compile(r"[0-9A-Fa-f]{2}-(?=[A-Za-z])")
 """The number of an OBD-II parameter before its name, as WiCAN writes it: 0C-EngineRPM."""
 
@@ -122,10 +180,26 @@ class Named:
 def words_of(name: str) -> tuple[str, ...]:
     """Words of a name in small letters, without accents and without units in brackets."""
     plain = _UNIT.sub(lambda found: _kept(found.group(1)), _piped(name))
+    plain = _WORD_WIDE.sub(r"\1", plain)
     plain = _CAMEL.sub(" ", plain)
     plain = unicodedata.normalize("NFKD", plain.translate(_LETTERS))
     plain = "".join(c for c in plain if not unicodedata.combining(c)).lower()
-    return tuple(_WORD.findall(plain))
+    return tuple(part for word in _WORD.findall(plain) for part in _parts_of(word))
+
+
+@lru_cache(maxsize=4096)
+def _parts_of(word: str) -> tuple[str, ...]:
+    """Known words that a word is put together of, the fewest; itself where it is one or none."""
+    if word in _VOCABULARY or len(word) < 2 * _SHORTEST:
+        return (word,)
+    for k in range(len(word) - _SHORTEST, _SHORTEST - 1, -1):
+        head, tail = word[:k], word[k:]
+        if head not in _VOCABULARY:
+            continue
+        parts = _parts_of(tail)
+        if all(part in _VOCABULARY for part in parts):
+            return (head, *parts)
+    return (word,)
 
 
 def _piped(name: str) -> str:
@@ -155,10 +229,13 @@ def unit_of(name: str) -> tuple[str | None, tuple[str, ...]]:
         suffix = unit_suffix(found)
         if suffix is not None:
             return suffix, words
-    tail = name.rsplit("_", 1)
-    if len(tail) == 2 and (suffix := unit_suffix(tail[1])) is not None and len(words) > 1:
-        gone = len(words_of(tail[1]))
-        return suffix, words[: len(words) - gone]
+    parts = name.split("_")
+    # A unit may be spelled out in several words.
+    for count in (4, 3, 1):
+        tail = " ".join(parts[-count:])
+        gone = len(words_of(tail))
+        if len(parts) > count and len(words) > gone and (suffix := unit_suffix(tail)) is not None:
+            return suffix, words[: len(words) - gone]
     last = name.split()
     if len(last) > 1 and (suffix := unit_suffix(last[-1].strip("()[],;"))) is not None:
         gone = len(words_of(last[-1]))
@@ -193,15 +270,16 @@ def recognise(name: str, unit: str | None = None) -> Named:
 def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
     """Recognise a column that states this unit; ``words`` are its name's without it."""
     # A last word may be a unit or part of the name, as in ENGINE_RPM.
-    readings = {frozenset(spelled(words)), frozenset(spelled(words_of(name)))}
     whole = frozenset(spelled(words_of(name)))
+    readings = {frozenset(spelled(words)), whole} | _last_place(name)
     best = Named("", stated, 0.0)
     for quantity, phrases in _WANTED.items():
         if _NOT.get(quantity, frozenset()) & whole and whole not in phrases:
             continue
         if stated is not None and not _can_be(quantity, stated):
             continue
-        score = max(_score(said, wanted) for said in readings for wanted in phrases)
+        aspects = _ASPECTS.get(quantity, frozenset())
+        score = max(_score(said, wanted, aspects) for said in readings for wanted in phrases)
         if stated is not None and any(
             frozenset(said.split()) in readings for said in _WITH_UNIT.get(quantity, ())
         ):
@@ -209,6 +287,12 @@ def _recognised(name: str, words: tuple[str, ...], stated: str | None) -> Named:
         if score > best.score:
             best = Named(quantity, stated, score)
     return best if best.score >= LEAST else Named("", stated, best.score)
+
+
+def means_another(name: str, quantity: str) -> bool:
+    """Whether a name has a word with which it is not that quantity, whatever its unit is."""
+    words = frozenset(spelled(words_of(name)))
+    return bool(words & (OF_ANOTHER | _NOT.get(quantity, frozenset())))
 
 
 def is_time(name: str) -> bool:
@@ -225,14 +309,33 @@ def _can_be(quantity: str, unit: str) -> bool:
     return unit in UNITS and UNITS[unit].dimension == dimension_of(q)
 
 
-def _score(words: frozenset[str], phrase: frozenset[str]) -> float:
+def _last_place(name: str) -> set[frozenset[str]]:
+    """Words of the last part of a name that is a path, where they alone name something."""
+    parts = [part for part in _PATH.split(_piped(name)) if part.strip()]
+    words = frozenset(spelled(words_of(parts[-1]))) if len(parts) > 1 else frozenset()
+    return {words} if words - _SILENT - _BARE else set()
+
+
+def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str]) -> float:
     """Part of the words of a name that a phrase has; 0 where the name lacks one of the phrase's,
     or is that of a request, a bound or a state of it.
+
+    Parameters
+    ----------
+    words, phrase : of the name and of what is looked for
+    aspects : words that say nothing of this quantity
     """
     if (words - phrase) & OF_ANOTHER:
         return 0.0
-    said, wanted = words - _SILENT or words, phrase - _SILENT or phrase
-    return len(wanted) / len(said) if said and wanted <= said else 0.0
+    silent = _SILENT | aspects
+    wanted = phrase - silent
+    if not wanted or wanted <= _BARE:
+        wanted = phrase - _SILENT or phrase
+    if wanted <= _BARE:
+        # What is left of "current in" would name any current.
+        wanted = phrase
+    said = words - (silent - wanted) or words
+    return len(wanted) / len(said) if wanted <= said else 0.0
 
 
 def recognise_all(
@@ -258,6 +361,7 @@ def recognise_all(
     -------
     One for each name.
     """
+    names = without_senders(names)
     found = [
         recognise(name, unit)
         for name, unit in zip(names, units or [None] * len(names), strict=True)
@@ -265,20 +369,62 @@ def recognise_all(
     found = _speed_of_satellites(list(names), found)
     found = _axes_by_direction(names, found)
     best: dict[str, int] = {}
+    lengths = [len(words_of(name)) for name in names]
     for k, named in enumerate(found):
         other = best.get(named.quantity)
-        if other is None or named.score > found[other].score:
+        # Of names that say the same, the one without more words: "TPS" before "TPS raw".
+        if other is None or (named.score, -lengths[k]) > (found[other].score, -lengths[other]):
             best[named.quantity] = k
+    for quantity, k in list(best.items()):
+        if quantity and (other_name := _sibling(names, found, k)):
+            why = f"not taken for {quantity}: {other_name!r} may be it as well"
+            found[k] = Named("", found[k].unit, found[k].score, why)
     taken = {named.quantity for named in found}
     stated = units or [None] * len(names)
     return [
-        Named("", named.unit, named.score, _misfit(name, unit, taken) if misfits else "")
+        Named(
+            "",
+            named.unit,
+            named.score,
+            named.misfit or (_misfit(name, unit, taken) if misfits else ""),
+        )
         if not named.quantity
         else named
         if best[named.quantity] == k
         else Named("", named.unit, named.score)
         for k, (name, unit, named) in enumerate(zip(names, stated, found, strict=True))
     ]
+
+
+def without_senders(names: Sequence[str]) -> list[str]:
+    """Names of one log without the short mark of who sends them: MO_Drehzahl, ESP_v_Signal.
+
+    It is no word, and stands before several names.
+    """
+    marks = [found.group(1) if (found := _SENDER.match(name)) else "" for name in names]
+    known = _VOCABULARY | LONG.keys()
+    return [
+        name[len(mark) + 1 :]
+        if mark and mark.lower() not in known and marks.count(mark) > 1
+        else name
+        for name, mark in zip(names, marks, strict=True)
+    ]
+
+
+def _sibling(names: Sequence[str], found: Sequence[Named], place: int) -> str:
+    """Name of a column that is the same on another side of the vehicle; empty where there is none.
+
+    Of two motors, one on each axle, neither is the engine.
+    """
+    words = set(words_of(names[place]))
+    if not words & _SIDES:
+        return ""
+    for name, named in zip(names, found, strict=True):
+        others = set(words_of(name))
+        alike = others != words and others - _SIDES == words - _SIDES and bool(others & _SIDES)
+        if alike and named.quantity in ("", found[place].quantity):
+            return name
+    return ""
 
 
 def _misfit(name: str, stated: str | None, taken: set[str]) -> str:

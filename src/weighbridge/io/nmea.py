@@ -27,8 +27,15 @@ from weighbridge.signals.cleaning import clean_columns
 from weighbridge.signals.units import to_si
 
 # Longest sentence of the standard is 82 characters; receivers send longer ones of their own.
-SENTENCE: Final = re.compile(rb"\$[A-Z]{2}(?:RMC|GGA|GNS|GST|VTG)[ -#%-~]{0,180}")
-"""A sentence that is read, among any other bytes."""
+SENTENCE: Final = re.compile(
+    rb"\$[A-Z]{2}(?:RMC|GGA|GNS|GST|VTG)[ -#%-)+-~]{0,180}(?:\*[0-9A-Fa-f]{2})?"
+)
+"""A sentence that is read, among any other bytes; it ends with its checksum, where it has one."""
+
+_WHOLE: Final = re.compile(
+    rb"^[^$\n]{0,80}\$G[A-Z]{4},[ -)+-~]{0,180}\*[0-9A-Fa-f]{2}", re.MULTILINE
+)
+"""A line with a whole sentence, after what an app may write before it."""
 
 _OTHER: Final = re.compile(rb"\$[A-Z]{5,6},")
 _DAY: Final = 86_400.0
@@ -41,6 +48,11 @@ _NO_FIX: Final = frozenset((0, 6, 7, 8))
 _FIXLESS: Final = "without a fix"
 
 _FIELDS: Final = {"RMC": 9, "GGA": 9, "GNS": 9, "GST": 7, "VTG": 7}
+
+
+def is_nmea(head: bytes) -> bool:
+    """Tell whether a text has lines of sentences, with or without something before them."""
+    return len(_WHOLE.findall(head)) >= 2
 
 
 class UnfitSentenceError(Exception):
@@ -183,7 +195,7 @@ def read_nmea(path: Path, table: str | None, mapping: TableMapping | None) -> Lo
             accuracy.add(stamp, (said.spread,))
         else:
             position.add(stamp, said.place)
-        if b"*" not in found.group()[-5:]:
+        if b"*" not in found.group()[-3:]:
             lost[phrase("no_checksum")] += 1
     if not clocks:
         raise DriveError(_nothing(path, data, lost))

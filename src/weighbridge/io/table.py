@@ -16,7 +16,12 @@ import polars as pl
 
 from weighbridge.errors import DriveError
 from weighbridge.io.quiet import PARSE_ERRORS, first_line, quietly
-from weighbridge.io.understood import Lines, strange_rows
+from weighbridge.io.understood import (
+    Lines,
+    strange_rows,
+    without_open_quotes,
+    without_strange_rows,
+)
 from weighbridge.messages import Problem
 from weighbridge.signals import Floats
 
@@ -39,6 +44,18 @@ _HEAD: Final = 1 << 18
 """Bytes at the beginning of a text that hold its header and its first rows."""
 
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+
+# Stamps before and after midnight that have to agree that it was there.
+_AROUND: Final = 3
+
+_NUMBER_UNIT: Final = (
+    r"^(?P<number>[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s+(?P<unit>[A-Za-z%°µ][^\d,;]{0,40})$"
+)
+"""A number with a unit behind it."""
+
+# Rows by which a unit in the cells is known, and part of them that may have another one.
+_LOOKED_AT: Final = 1000
+_FEW: Final = 0.02
 
 # Above this part of cells that are not numbers, a column is text.
 _TEXT_PART: Final = 0.5
@@ -143,6 +160,10 @@ class RawTable:
             numbers = text.cast(pl.Float64, strict=False)
             empty = text.is_null() | text.str.to_lowercase().is_in(sorted(self.missing))
             wrong = numbers.is_null() & ~empty
+            if int(wrong.sum()) > _TEXT_PART * int((~empty).sum()):
+                told = _one_unit(text)
+                numbers = told[0] if told is not None else numbers
+                wrong = numbers.is_null() & ~empty
             if bad := int(wrong.sum()):
                 example = text.filter(wrong)[0]
                 row = int(wrong.arg_max() or 0) + 1
@@ -182,6 +203,50 @@ class RawTable:
             values = np.array(values, dtype=np.float64)
         return np.asarray(values, dtype=np.float64), notes
 
+    def cell_unit(self, index: int) -> str:
+        """Unit that stands in the cells of a column, behind their numbers; empty for none."""
+        if index in self.plain or self.column(index).dtype != pl.String:
+            return ""
+        told = _one_unit(self.column(index).head(_LOOKED_AT))
+        return told[1] if told is not None else ""
+
+
+def numbers_with_units(cells: pl.Series) -> tuple[pl.Series, pl.Series] | None:
+    """Numbers and units of cells such as ``1165.0 revolutions_per_minute``.
+
+    Parameters
+    ----------
+    cells : (n,)
+
+    Returns
+    -------
+    numbers, units : (n,) null where a cell is of another form
+
+    None where hardly any cell is of that form.
+    """
+    if cells.dtype != pl.String:
+        return None
+    text = cells.str.strip_chars()
+    parts = text.str.extract_groups(_NUMBER_UNIT).struct.unnest()
+    filled = int((text.is_not_null() & (text != "")).sum())
+    if parts["unit"].len() - parts["unit"].null_count() < max(_TEXT_PART * filled, 1):
+        return None
+    return parts["number"].cast(pl.Float64, strict=False), parts["unit"]
+
+
+def _one_unit(cells: pl.Series) -> tuple[pl.Series, str] | None:
+    """Numbers of the cells of a column and the unit behind them; None where it has none or more."""
+    told = numbers_with_units(cells)
+    if told is None:
+        return None
+    units = told[1].drop_nulls().value_counts(sort=True)
+    if units.height > 1 and units["count"][1] > _FEW * cells.len():
+        return None
+    unit = str(units[told[1].name][0])
+    return pl.DataFrame({"n": told[0], "u": told[1]}).select(
+        pl.when(pl.col("u") == unit).then(pl.col("n"))
+    ).to_series(), unit
+
 
 def _nan_notes(nans: int, cells: int, name: str) -> list[Problem]:
     return [Problem.of("file.cells_nan", count=nans, cells=cells, name=name)] if nans else []
@@ -197,8 +262,17 @@ def _plain(name: str) -> str:
     return " ".join(name.split()).casefold()
 
 
-def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
+def read_text(
+    path: Path, text_format: TextFormat | None = None, *, whole: bool = False
+) -> RawTable:
     """Read a CSV or other separated text table.
+
+    Parameters
+    ----------
+    path : the file
+    text_format : how it is written; None to find it
+    whole : whether a row counts whole or not at all: one with other cells than the header names
+        is left out, as the cells of two torn rows stand in it
 
     Raises
     ------
@@ -227,8 +301,14 @@ def read_text(path: Path, text_format: TextFormat | None = None) -> RawTable:
         read = Lines()
         read.add(b"\n" * skip, 0, 0, 0)
         data = body.encode(errors="replace")
-        read.add(data, *strange_rows(data, len(names), separator))
-        notes += read.problems("file.rows_strange", path)
+        if whole:
+            rows, counts = without_strange_rows(data, len(names), separator)
+            read.add(data, *counts)
+            notes += read.problems("file.rows_cut", path)
+            data = rows
+        else:
+            read.add(data, *strange_rows(data, len(names), separator))
+            notes += read.problems("file.rows_strange", path)
         frame = _parse(path, data, len(names), separator, fmt.decimal, notes)
     missing = frozenset(MISSING) | {m.strip().lower() for m in fmt.missing}
     return RawTable(path, names, frame, separator, missing, fmt.decimal, notes)
@@ -310,8 +390,8 @@ def _parse(
     # With a header of its own, the width does not hang on the first row.
     data = f"{separator.join(names)}\n".encode() + body
     # A quote that is never closed would swallow the rest of the file.
-    quote = '"' if data.count(b'"') % 2 == 0 else None
-    if quote is None:
+    if data.count(b'"') % 2 == 1:
+        data, _ = without_open_quotes(data)
         notes.append(Problem.of("file.open_quote"))
 
     def parse(dtype: type[pl.DataType]) -> pl.DataFrame:
@@ -323,7 +403,6 @@ def _parse(
                 schema=dict.fromkeys(names, dtype),
                 null_values=None if dtype is pl.String else ["NA", "na", "N/A", "null", "-"],
                 truncate_ragged_lines=True,
-                quote_char=quote,
             )
 
     try:
@@ -422,14 +501,16 @@ def _temporal(series: pl.Series) -> tuple[Floats, bool]:
 
 
 def unwrapped(seconds: Floats) -> Floats:
-    """Carry a time of day over midnight."""
+    """Carry a time of day over midnight; a stamp that alone falls by half a day is damaged."""
     day = 86_400.0
     finite = np.isfinite(seconds)
     present = seconds[finite]
     turns = np.zeros(present.size)
-    turns[1:] = np.cumsum(np.diff(present) < -day / 2)
+    falls = np.flatnonzero(np.diff(present) < -day / 2) + 1
+    for k in falls.tolist():
+        turns[k] = present[max(k - _AROUND, 0) : k].min() - present[k : k + _AROUND].max() > day / 2
     out = seconds.copy()
-    out[finite] = present + day * turns
+    out[finite] = present + day * np.cumsum(turns)
     return out
 
 

@@ -20,6 +20,7 @@ from weighbridge.io.columns import (
     parse_column,
     time_unit,
 )
+from weighbridge.io.draft_time import counts_minutes, minutes_problem
 from weighbridge.io.log import Log
 from weighbridge.io.mapping import TableMapping, UnnamedError, lacking, resolved_unit
 from weighbridge.io.naming import recognise
@@ -200,6 +201,8 @@ def _mapped_time(raw: RawTable, mapping: TableMapping, log: Log) -> tuple[Floats
         rows, notes = raw.numbers(index)
         return rows / rate, notes
     name = raw.names[index]
+    if counts_minutes(name):
+        log.problems.append(minutes_problem(raw.path.name, name))
     suffix = mapping.time.unit or time_unit(name) or bracketed_unit(name) or "s"
     factor = UNITS[suffix].factor if UNITS[suffix].dimension == "s" else 1.0
     time, log.absolute, notes = time_seconds(raw, index, factor, mapping.time.format)

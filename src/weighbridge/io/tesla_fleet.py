@@ -53,7 +53,7 @@ def open_fleet_telemetry(path: Path, time: TimeColumn) -> Recording:
     found = Recording([], absolute=True)
     strange = 0
     lines = Lines()
-    for record in _records(path):
+    for record in records_of(path):
         payload = _payload(record)
         lines.add(b"\n", 1, record is None, record is None)
         if payload is None:
@@ -89,8 +89,14 @@ def open_fleet_telemetry(path: Path, time: TimeColumn) -> Recording:
     return found
 
 
-def _records(path: Path) -> Iterator[Any]:
-    """Records of a file; None for a line that is none."""
+def records_of(path: Path) -> Iterator[Any]:
+    """Records of a file, one a line or in one list; None for a line that is none.
+
+    Raises
+    ------
+    DriveError
+        It is a list that is cut off.
+    """
     text = path.read_bytes().decode("utf-8-sig", "replace").replace("\x00", "")
     if text.lstrip().startswith("["):
         try:

@@ -7,13 +7,20 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weighbridge.messages import Problem
+from weighbridge.signals.signal import Bools
 from weighbridge.signals.words import counted
 
 MOST_STRANGE: Final = 0.5
 """Part of a text's lines that a reader may not understand: above it is of another form [-]."""
 
+
+Ints = NDArray[np.intp]
+
+_FEW: Final = 0.01
+"""Part of the rows that end early, at most: above it the logger leaves last cells out [-]."""
 
 # Lines with more cells than names of which it is looked at what stands in them.
 _LOOKED_AT: Final = 1000
@@ -22,13 +29,18 @@ _LOOKED_AT: Final = 1000
 class Lines:
     """Lines that a reader has seen, and those that it did not understand.
 
+    Parameters
+    ----------
+    what : one of them is called
+
     Attributes
     ----------
     total, strange : lines seen, and those of them that were not understood
     first : number of the first of these in the file; 0 where it is not known
     """
 
-    def __init__(self) -> None:
+    def __init__(self, what: str = "line") -> None:
+        self._what = what
         self.total = 0
         self.strange = 0
         self.first = 0
@@ -75,13 +87,15 @@ class Lines:
         return {
             "file": path.name,
             "count": self.strange,
-            "lines": counted(self.total, "line"),
+            "lines": counted(self.total, self._what),
             "example": _example(path, self.first),
         }
 
 
 def strange_rows(data: bytes, columns: int, separator: str) -> tuple[int, int, int]:
     """Count rows of a table that have values beyond its last column, or no separator at all.
+
+    A quote that is not closed makes no row strange: see `without_open_quotes`.
 
     Parameters
     ----------
@@ -94,33 +108,122 @@ def strange_rows(data: bytes, columns: int, separator: str) -> tuple[int, int, i
     total, strange, first : rows that are not blank, those of them that are strange, and the number
         of the first line among these, 0 for none
     """
-    if columns < 2 or not data:
-        return 0, 0, 0
-    text = np.frombuffer(data if data.endswith(b"\n") else data + b"\n", np.uint8)
-    free = np.ones(text.size, dtype=bool)
-    if b'"' in data and data.count(b'"') % 2 == 0:
-        free = np.cumsum(text == ord('"')) % 2 == 0
-    ends = np.flatnonzero((text == ord("\n")) & free)
-    starts = np.concatenate([[0], ends[:-1] + 1])
-    marks = np.concatenate([[0], np.cumsum((text == ord(separator)) & free)])
-    parts = marks[ends] - marks[starts]
-    blank = (ends == starts) | ((ends - starts == 1) & (text[starts] == ord("\r")))
-    lone = (parts == 0) & ~blank
-    long = np.flatnonzero(parts >= columns)
-    looked = long[:_LOOKED_AT]
-    beyond = [
-        any(c.strip() for c in _cells(bytes(text[starts[k] : ends[k]]), separator)[columns:])
-        for k in looked.tolist()
-    ]
-    share = np.count_nonzero(beyond) / max(len(beyond), 1)
-    strange = np.flatnonzero(lone).tolist() + looked[np.array(beyond, dtype=bool)].tolist()
-    total = int(np.count_nonzero(~blank))
-    return total, int(lone.sum()) + round(share * long.size), min(strange, default=-1) + 1
+    rows = _Rows(data, columns, separator)
+    looked = rows.long[:_LOOKED_AT]
+    beyond = rows.beyond(looked)
+    share = np.count_nonzero(beyond) / max(beyond.size, 1)
+    strange = [*np.flatnonzero(rows.lone).tolist(), *looked[beyond].tolist()]
+    return (
+        rows.total,
+        int(rows.lone.sum()) + round(share * rows.long.size),
+        min(strange, default=-1) + 1,
+    )
+
+
+def without_strange_rows(
+    data: bytes, columns: int, separator: str
+) -> tuple[bytes, tuple[int, int, int]]:
+    """Leave out the rows of a table that `strange_rows` counts.
+
+    Rows that do not close a quote are left out as well, and the few that end before the others do.
+
+    Parameters
+    ----------
+    data, columns, separator : of `strange_rows`
+
+    Returns
+    -------
+    data : the other rows
+    counts : as of `strange_rows`
+    """
+    data, opened = without_open_quotes(data)
+    rows = _Rows(data, columns, separator)
+    strange = rows.lone.copy()
+    strange[rows.long[rows.beyond(rows.long)]] = True
+    strange[opened] = True
+    if rows.short.size <= max(1.0, _FEW * rows.total):
+        strange[rows.short] = True
+    places = np.flatnonzero(strange)
+    counts = rows.total, places.size, int(places[0]) + 1 if places.size else 0
+    if not places.size:
+        return data, counts
+    kept = (
+        data[a : b + 1] for a, b in zip(rows.starts[~strange], rows.ends[~strange], strict=True)
+    )
+    return b"".join(kept), counts
+
+
+class _Rows:
+    """Rows of a table, by the separators in them.
+
+    Attributes
+    ----------
+    starts, ends : (n,) places of their first byte and of the end of their line
+    lone : (n,) which have no separator, though the table has
+    long : places among them of those with more cells than columns
+    short : of those with fewer cells than most
+    total : how many are not blank
+    """
+
+    def __init__(self, data: bytes, columns: int, separator: str) -> None:
+        self._data, self._columns, self._separator = data, columns, separator
+        text = np.frombuffer(data if data.endswith(b"\n") else data + b"\n", np.uint8)
+        free = np.ones(text.size, dtype=bool)
+        if b'"' in data and data.count(b'"') % 2 == 0:
+            free = np.cumsum(text == ord('"')) % 2 == 0
+        self.ends = np.flatnonzero((text == ord("\n")) & free)
+        self.starts = np.concatenate([[0], self.ends[:-1] + 1])
+        marks = np.concatenate([[0], np.cumsum((text == ord(separator)) & free)])
+        parts = marks[self.ends] - marks[self.starts]
+        blank = self.ends == self.starts
+        blank |= (self.ends - self.starts == 1) & (text[self.starts] == ord("\r"))
+        self.lone = (parts == 0) & ~blank & (columns > 1)
+        self.long = np.flatnonzero((parts >= columns) & (columns > 1))
+        self.total = int(np.count_nonzero(~blank)) if columns > 1 else 0
+        usual = np.median(parts[~blank]) if self.total else 0
+        self.short = np.flatnonzero((parts < usual) & ~blank & ~self.lone)
+
+    def beyond(self, places: Ints) -> Bools:
+        """Which of these rows have a value beyond the last column."""
+        found = [
+            any(c.strip() for c in _cells(line, self._separator)[self._columns :])
+            for k in places.tolist()
+            for line in (self._data[self.starts[k] : self.ends[k]],)
+        ]
+        return np.array(found, dtype=bool)
 
 
 def _cells(line: bytes, separator: str) -> list[str]:
     """Cells of a line."""
-    return next(csv.reader([line.decode("utf-8", "replace")], delimiter=separator), [])
+    text = line.decode("utf-8", "replace")
+    try:
+        return next(csv.reader([text], delimiter=separator), [])
+    except csv.Error:
+        return text.split(separator)
+
+
+def without_open_quotes(data: bytes) -> tuple[bytes, Ints]:
+    """Take the quotes off lines that do not close one.
+
+    Parameters
+    ----------
+    data : of a table whose cells hold no ends of lines
+
+    Returns
+    -------
+    data : as long as before; blanks stand in place of those quotes
+    lines : places of the lines that had one, from 0
+    """
+    text = np.frombuffer(data, np.uint8)
+    quotes = np.flatnonzero(text == ord('"'))
+    line = np.searchsorted(np.flatnonzero(text == ord("\n")), quotes)
+    lines, place, count = np.unique(line, return_inverse=True, return_counts=True)
+    opened = count % 2 == 1
+    if not opened.any():
+        return data, lines[:0]
+    mended = text.copy()
+    mended[quotes[opened[place]]] = ord(" ")
+    return mended.tobytes(), lines[opened]
 
 
 def number_of(path: Path, text: str) -> int:

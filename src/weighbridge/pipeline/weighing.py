@@ -20,7 +20,7 @@ from weighbridge.balance.delay import (
     estimate_torque_delay,
     far_shift,
 )
-from weighbridge.balance.gear_fit import ENOUGH, foreign_part, share_on_gears
+from weighbridge.balance.gear_fit import ENOUGH, foreign_part, ratio_apart, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
 from weighbridge.balance.shaking import shaken
 from weighbridge.balance.speed_balance import speed_balance
@@ -230,7 +230,14 @@ def weigh_balance(
     share = None if estimator.speed_alone else share_on_gears(balance, vehicle)
     if share is not None and share < ENOUGH:
         status = Status.INCONSISTENT
-        reason = Problem.of("gear.foreign", share=100.0 * share, vehicle=vehicle.name)
+        seen, expected = ratio_apart(balance, vehicle)
+        reason = Problem.of(
+            "gear.foreign",
+            share=100.0 * share,
+            vehicle=vehicle.name,
+            seen=seen,
+            expected=expected,
+        )
     elif not estimator.speed_alone and (
         why := scale_contradiction(balance, vehicle)
         or foreign_part(balance, vehicle)

@@ -21,6 +21,10 @@ Rows = NDArray[np.intp]
 COARSE: Final = 0.05
 """Stamps in steps below this are as fine as a drive needs [s]."""
 
+MOST_COARSE: Final = 20.0
+"""Rows that are spread over a longer step stand too far from when they were recorded: a vehicle
+starts, brakes and stops within it [s]."""
+
 SHARED: Final = 0.25
 """Part of the rows with the stamp of the row before, from which the clock is coarse and the
 stamps are no mistake [-]."""
@@ -324,7 +328,9 @@ def clean_columns(
     coarse = spread_rows(time)
     if coarse is not None:
         time, step = coarse
-        problems.append(Problem.of("clock.coarse", source=source, step=step))
+        blind = step > MOST_COARSE
+        id = "clock.minutes" if blind else "clock.coarse"
+        problems.append(Problem.of(id, serious=blind, source=source, step=step))
     columns = _first_present(time, columns)
     clock = clean_clock(time, source)
     problems += clock.problems

@@ -134,6 +134,68 @@ VEHICLE_CLASSES: Final = Registry(
     "weighbridge.vehicle_classes",
     (
         VehicleClass(
+            name="motorcycle",
+            mass_range=(60.0, 900.0),
+            typical_mass=280.0,
+            emptied=20.0,
+            # With rider, passenger and luggage: its mass in running order is without them.
+            loaded=2.8,
+            heaviest=4.0,
+            drag_area=(0.50, 0.20),
+            rolling_coefficient=(0.018, 0.006),
+            engine_inertia=(0.02, 0.01),
+            wheel_inertia=(1.1, 0.3),
+            drag_area_range=(0.20, 1.20),
+            rolling_coefficient_range=(0.005, 0.040),
+            engine_inertia_range=(0.002, 0.15),
+            wheel_inertia_range=(0.2, 3.0),
+            efficiency=(0.92, 0.03),
+            tyre="180/55 ZR17",
+            fastest=85.0,
+            strongest=400.0,
+        ),
+        VehicleClass(
+            name="racer",
+            mass_range=(120.0, 900.0),
+            typical_mass=270.0,
+            emptied=80.0,
+            loaded=1.8,
+            heaviest=2.2,
+            drag_area=(1.00, 0.40),
+            rolling_coefficient=(0.018, 0.007),
+            engine_inertia=(0.02, 0.01),
+            wheel_inertia=(0.9, 0.3),
+            drag_area_range=(0.30, 2.50),
+            rolling_coefficient_range=(0.005, 0.040),
+            engine_inertia_range=(0.002, 0.15),
+            wheel_inertia_range=(0.2, 3.0),
+            efficiency=(0.92, 0.03),
+            tyre="165/55 R13",
+            fastest=60.0,
+            strongest=400.0,
+        ),
+        VehicleClass(
+            name="quad",
+            mass_range=(120.0, 1_800.0),
+            typical_mass=430.0,
+            emptied=20.0,
+            loaded=2.4,
+            heaviest=4.0,
+            drag_area=(0.80, 0.25),
+            rolling_coefficient=(0.022, 0.008),
+            engine_inertia=(0.03, 0.015),
+            wheel_inertia=(2.4, 0.8),
+            drag_area_range=(0.40, 1.60),
+            rolling_coefficient_range=(0.005, 0.060),
+            engine_inertia_range=(0.002, 0.30),
+            wheel_inertia_range=(0.5, 8.0),
+            # Most have a belt that slips and is squeezed.
+            efficiency=(0.87, 0.05),
+            tyre="255/65 R12",
+            fastest=40.0,
+            strongest=200.0,
+        ),
+        VehicleClass(
             name="car",
             mass_range=(250.0, 8_000.0),
             typical_mass=1500.0,
@@ -240,5 +302,9 @@ truck's 100 kg and 0.4 m, 16 kg m^2 each. Their ranges: cars from Jensen 2022, T
 spanning the usual values of Gillespie. ``efficiency``: cars and vans stand between both layouts;
 trucks: 0.99 in a direct and 0.96 in other gears (Regulation (EU) 2017/2400, Annex VI, App. 8),
 times 0.98 in a single reduction axle without its drag (Annex VII); buses have automatic gearboxes.
+Motorcycles: C_d A 0.3 to 0.7 m^2, C_r about 0.02, wheels of 0.4 to 0.8 kg m^2 each and a chain
+that passes on 0.97 (Cossalter, Motorcycle Dynamics, 2nd ed., 2006, ch. 2 and 3); their mass in
+running order is without the rider (Regulation (EU) 168/2013, Art. 5). Quads: belts of variators
+pass on 0.8 to 0.9. Racers: those that students build, 150 to 250 kg with wings, and the driver.
 ``boarding_std``: nine passengers of 71 kg get on and as many off, each by chance, a
 bus of 12 t. ``tyre``: those of cars lie within 6 % of its radius, of trucks within 8 %."""

@@ -84,7 +84,7 @@ def needs_calibration(vehicle: Vehicle) -> bool:
     """Whether torque is made from a load or a flow, and no calibration shows what that is worth."""
     model = vehicle.torque
     fitted = vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None
-    return model.of_source.needs_map and not model.coefficients and not fitted
+    return not model.of_source.signed and not model.coefficients and not fitted
 
 
 def usual_efficiency(vehicle: Vehicle) -> tuple[float, float]:

@@ -106,8 +106,7 @@ def describe(known: Known) -> Described:
     origins: dict[tuple[str, str], str] = {}
     driveline = _driveline(known, origins)
     torque = TorqueModel()
-    of_torque = TORQUE_SOURCES[known.torque] if known.torque is not None else None
-    if of_torque is not None and (of_torque.signed or of_torque.needs_map):
+    if known.torque is not None:
         torque = TorqueModel(source=known.torque, reference_torque=known.reference_torque)
         origins["torque", "source"] = "given"
     vehicle = Vehicle(

@@ -19,7 +19,7 @@ _INCH: Final = 0.0254
 
 _METRIC: Final = re.compile(
     r"""^\s*(?:LT|P|C)?\s*
-    (?P<width>\d{3})\s*
+    (?P<width>\d{3}|\d{2}(?=\s*/))\s*
     (?:/\s*(?P<aspect>\d{2,3}))?\s*
     (?:Z?R|-)\s*
     (?P<rim>\d{2}(?:[.,]5)?)
@@ -42,7 +42,10 @@ _INCH_HEIGHT: Final = (1.06, 0.86)
 end in a half, such as 11 R 22.5. Makers print diameters of 1053 mm for the first and 1050 mm for
 the second (Pirelli, truck size conversions); other sizes are within 2.5 % in radius."""
 
-_LIMITS: Final = {"width": (125.0, 500.0), "aspect": (20.0, 107.0), "rim": (10.0, 26.0)}
+_LIMITS: Final = {"width": (125.0, 500.0), "aspect": (20.0, 107.0), "rim": (8.0, 26.0)}
+
+_NARROWEST: Final = 60.0
+"""Width of a tyre of motorcycles, at least, which all state their height [mm]."""
 
 
 def rolling_radius(size: str) -> float:
@@ -70,6 +73,8 @@ def rolling_radius(size: str) -> float:
         )
     parts = _parts({name: text.replace(",", ".") for name, text in found.groupdict("").items()})
     for name, (low, high) in _LIMITS.items():
+        if name == "width" and found.groupdict().get("aspect"):
+            low = _NARROWEST
         if not low <= parts[name] <= high:
             raise ConfigError(
                 f"tyre size {size!r}: its {name} is {parts[name]:g}, and tyres have "

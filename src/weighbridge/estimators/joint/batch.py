@@ -106,7 +106,7 @@ def first_guess(phi: Floats, y: Floats) -> float:
 
 
 def _sensible(mass: float) -> float:
-    return float(np.clip(mass, 200.0, 60_000.0)) if np.isfinite(mass) else 2000.0
+    return float(np.clip(mass, 50.0, 60_000.0)) if np.isfinite(mass) else 2000.0
 
 
 def estimate(

@@ -1,0 +1,272 @@
+"""What the columns of a log are, judged by their values beside their names.
+
+A name may fit where the values do not: the battery of 12 V is no traction battery, and a pressure
+over that of the air is none of the manifold. And a unit with values that move as a vehicle's do
+tells what a name does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from weighbridge.io.draft_column import DraftColumn
+from weighbridge.io.draft_unit import Values
+from weighbridge.io.naming import means_another
+from weighbridge.signals import QUANTITIES, Floats
+from weighbridge.signals.units import UNITS, to_si
+
+ON_BOARD: Final = 32.0
+"""Battery that feeds control units, at most: those of trucks are charged at 29 V, and batteries
+that drive anything have 36 V or more [V]."""
+
+VACUUM: Final = 8_000.0
+"""Pressure in a manifold, at least: engines pull down to some 20 kPa [Pa]."""
+
+_BELOW: Final = 0.2
+"""Part of the values of a pressure that may lie below: sensors fail now and then [-]."""
+
+FOUND: Final = ("vehicle_speed", "engine_speed", "mass_air_flow")
+"""Quantities that a unit and the values may tell without a name."""
+
+_FEWEST: Final = 20
+"""Rows in which something is to be seen."""
+
+_SLOW: Final = 3.0
+"""Slower, gears and clutches hide how engine and vehicle go together [m/s]."""
+
+_TURNS: Final = 50.0
+"""An engine turns faster while it drives the vehicle [rad/s]."""
+
+_WINDOW: Final = 8.0
+"""Time in which a vehicle mostly stays in one gear [s]."""
+
+_ROWS: Final = 6
+"""Rows in such a time, at least."""
+
+_WINDOWS: Final = 4
+"""Such times in which the speed changes, at least."""
+
+_CHANGES: Final = 0.1
+"""Change of a speed over its mean by which something is to be seen [-]."""
+
+_STEADY: Final = 0.02
+"""Change of a speed over that of all rows which is no change [-]."""
+
+_FASTEST: Final = 4.0
+"""Mean size of a vehicle's acceleration, at most, as in `weighbridge.io.draft_time` [m/s^2]."""
+
+_SLOWEST: Final = 0.02
+"""Mean size of its acceleration in either half of a drive, at least [m/s^2]."""
+
+_SETTLED: Final = 0.25
+"""Range of an average in the second half of a drive over that in all of it, at most [-]."""
+
+_TOP: Final = 95.0
+"""Speed of a road vehicle, at most [m/s]."""
+
+_TOGETHER: Final = 0.6
+"""Correlation of engine and vehicle speed in a gear, and of air flow and engine speed, at least:
+gears are changed, and in overrun little air flows [-]."""
+
+
+def with_judged_values(
+    columns: tuple[DraftColumn, ...], told: Mapping[str, Values]
+) -> tuple[DraftColumn, ...]:
+    """Judge what columns are taken for by their values, and find what names do not tell.
+
+    Parameters
+    ----------
+    columns : of one log
+    told : what the log holds in numbers, by its names
+    """
+    columns = tuple(_without_gauge(c, told) for c in _on_board(columns))
+    for quantity, fits in zip(FOUND, (_moves, _turns, _breathes), strict=True):
+        columns = _found_by_unit(columns, told, quantity, fits)
+    return columns
+
+
+def _on_board(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
+    """Take a battery that feeds control units for what it is, and its current for nothing."""
+    low = {
+        c.name
+        for c in columns
+        if c.quantity == "battery_voltage" and c.unit and c.usual * UNITS[c.unit].factor < ON_BOARD
+    }
+    if not low:
+        return columns
+    taken = any(c.quantity == "module_voltage" for c in columns)
+    found = []
+    for c in columns:
+        if c.name in low and not taken:
+            found.append(replace(c, quantity="module_voltage", unsure=False))
+        elif c.name in low:
+            found.append(_nothing(c, f"reads {c.usual:.3g} {c.unit}: no traction battery"))
+        elif c.quantity == "battery_current":
+            found.append(_nothing(c, f"is of a battery of less than {ON_BOARD:.0f} V"))
+        else:
+            found.append(c)
+    return tuple(found)
+
+
+def _without_gauge(column: DraftColumn, told: Mapping[str, Values]) -> DraftColumn:
+    """Take no pressure over that of the air for one of the manifold, which is counted from zero."""
+    if column.quantity != "intake_pressure" or column.name not in told:
+        return column
+    values = told[column.name].values
+    below = to_si(values[np.isfinite(values)], column.unit) < VACUUM
+    if not below.size or np.mean(below) <= _BELOW:
+        return column
+    return _nothing(column, f"goes below {VACUUM / 1000.0:.0f} kPa, to which no engine pulls down")
+
+
+def _nothing(column: DraftColumn, why: str) -> DraftColumn:
+    """Take a column for nothing, and say why."""
+    doubt = f"not taken for {column.quantity}: it {why}"
+    return replace(column, quantity="", unit="", stated=False, doubt=doubt, unsure=False)
+
+
+def _found_by_unit(
+    columns: tuple[DraftColumn, ...],
+    told: Mapping[str, Values],
+    quantity: str,
+    fits: Callable[[Values, Mapping[str, Values]], bool],
+) -> tuple[DraftColumn, ...]:
+    """Take the one column with a quantity's unit whose values move as that quantity does.
+
+    Columns that read alike are one: the first is taken.
+    """
+    taken = {c.quantity for c in columns}
+    if quantity in taken or (quantity == "vehicle_speed" and "gnss_speed" in taken):
+        return columns
+    dimension = UNITS[QUANTITIES[quantity].suffix].dimension
+    known = {c.quantity: told[c.name] for c in columns if c.quantity and c.name in told}
+    fitting = [
+        c
+        for c in columns
+        if not c.quantity
+        and c.name in told
+        and told[c.name].unit in UNITS
+        and UNITS[told[c.name].unit].dimension == dimension
+        and not means_another(c.name, quantity)
+        and fits(told[c.name], known)
+    ]
+    if not fitting or not _alike([told[c.name] for c in fitting]):
+        return columns
+    values = told[fitting[0].name]
+    there = values.values[np.isfinite(values.values)]
+    low, usual, high = map(float, np.quantile(there, (0.0, 0.5, 1.0)))
+    found = replace(
+        fitting[0],
+        quantity=quantity,
+        unit=values.unit,
+        stated=True,
+        low=low,
+        usual=usual,
+        high=high,
+        count=int(there.size),
+        rows=np.isfinite(values.values),
+        doubt=f"its name is not known; taken for {quantity} by its unit and by how it moves",
+        unsure=True,
+    )
+    return tuple(found if c is fitting[0] else c for c in columns)
+
+
+def _alike(several: Sequence[Values]) -> bool:
+    """Whether columns read alike, but for a delay."""
+    first = several[0]
+    for other in several[1:]:
+        at = _at(other, first.time)
+        here = to_si(first.values, first.unit)
+        both = np.isfinite(here + at)
+        if np.count_nonzero(both) < _FEWEST:
+            return False
+        spread = float(np.ptp(here[both]))
+        if float(np.median(np.abs(here[both] - at[both]))) > _STEADY * spread:
+            return False
+    return True
+
+
+def _at(values: Values, time: Floats) -> Floats:
+    """Return values in SI at other instants; NaN outside."""
+    there = np.isfinite(values.time) & np.isfinite(values.values)
+    if np.count_nonzero(there) < 2:
+        return np.full(time.size, np.nan)
+    order = np.argsort(values.time[there], kind="stable")
+    x, y = values.time[there][order], to_si(values.values[there][order], values.unit)
+    return np.asarray(np.interp(time, x, y, left=np.nan, right=np.nan))
+
+
+def _moves(values: Values, known: Mapping[str, Values]) -> bool:
+    """Whether values change as the speed of a vehicle: often, and no faster than tyres allow."""
+    time, speed = _rising(values)
+    if speed.size < _FEWEST or speed.min() < -1.0 or speed.max() > _TOP or np.ptp(speed) < _SLOW:
+        return False
+    swings = []
+    for half in np.array_split(np.arange(time.size), 2):
+        length = float(time[half[-1]] - time[half[0]])
+        swings.append(float(np.sum(np.abs(np.diff(speed[half])))) / length if length > 0.0 else 0.0)
+    settled = float(np.ptp(speed[speed.size // 2 :])) < _SETTLED * float(np.ptp(speed))
+    # An average settles; a limit or a set-point stands, and jumps.
+    return (
+        min(swings) > _SLOWEST
+        and not settled
+        and max(swings) < _FASTEST
+        and float(np.max(np.abs(np.diff(speed)))) < 0.5 * float(np.ptp(speed))
+        and ("engine_speed" not in known or _in_gear(values, known["engine_speed"]))
+    )
+
+
+def _turns(values: Values, known: Mapping[str, Values]) -> bool:
+    """Whether values turn as an engine does: with the vehicle, in one gear or several."""
+    _, turns = _rising(values)
+    if turns.size < _FEWEST or turns.max() < 2.0 * _TURNS or np.ptp(turns) < _TURNS:
+        return False
+    speed = known.get("vehicle_speed") or known.get("gnss_speed")
+    return speed is not None and _in_gear(speed, values)
+
+
+def _in_gear(speed: Values, engine: Values) -> bool:
+    """Whether engine and vehicle speed rise and fall together, as in a gear."""
+    time, v = _rising(speed)
+    n = _at(engine, time)
+    moving = np.isfinite(n) & (v > _SLOW) & (n > _TURNS)
+    time, v, n = time[moving], v[moving], n[moving]
+    together = []
+    begin = 0
+    for k in range(time.size):
+        if time[k] - time[begin] < _WINDOW or k - begin < _ROWS:
+            continue
+        a, b = v[begin:k], n[begin:k]
+        if np.ptp(a) > _CHANGES * float(a.mean()) and np.ptp(b) > 0.0:
+            together.append(float(np.corrcoef(a, b)[0, 1]))
+        elif np.ptp(a) > _CHANGES * float(a.mean()):
+            together.append(0.0)
+        begin = k
+    return len(together) >= _WINDOWS and float(np.median(together)) > _TOGETHER
+
+
+def _breathes(values: Values, known: Mapping[str, Values]) -> bool:
+    """Whether values go with the engine's speed as the air does that it breathes."""
+    engine = known.get("engine_speed")
+    if engine is None:
+        return False
+    time, flow = _rising(values)
+    n = _at(engine, time)
+    both = np.isfinite(n)
+    q = QUANTITIES["mass_air_flow"]
+    if np.count_nonzero(both) < _FEWEST or flow.min() < 0.0 or flow.max() > q.high:
+        return False
+    if np.ptp(flow[both]) == 0.0 or np.ptp(n[both]) == 0.0:
+        return False
+    return float(np.corrcoef(flow[both], n[both])[0, 1]) > _TOGETHER
+
+
+def _rising(values: Values) -> tuple[Floats, Floats]:
+    """Return instants in their order and values in SI."""
+    there = np.isfinite(values.time) & np.isfinite(values.values)
+    order = np.argsort(values.time[there], kind="stable")
+    return values.time[there][order], to_si(values.values[there][order], values.unit)
