@@ -30,10 +30,11 @@ CAR_ENGINE_INERTIA: Final = 0.15
 
 
 UNANSWERED: Final = 0.75
-"""Of trucks and buses [-]. With 0, 0.5, 0.75 and 1 sixteen drives of two trucks of the second
+"""Of trucks [-]. With 0, 0.5, 0.75 and 1 sixteen drives of two trucks of the second
 simulator, by data sheet and with heights that wander, came out 17 and 6 % light, 1 and 8 % heavy in
 the mean; five of another simulator's truck, by which the cause was found, 17 and 6 % light, 0 and
-7 % heavy. Fourteen drives of cars, calibrated alike, had 2.8 % (RMS) with 0 and 4.3 % with 0.75."""
+7 % heavy. Cars and buses have power to answer a hill: fourteen drives of cars, calibrated alike,
+had 2.8 % (RMS) with 0 and 4.3 % with 0.75."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -263,7 +264,6 @@ VEHICLE_CLASSES: Final = Registry(
             strongest=60.0,
             boarding_std=0.025,
             retarded=True,
-            unanswered=UNANSWERED,
         ),
         VehicleClass(
             name="truck",
