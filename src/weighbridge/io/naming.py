@@ -328,14 +328,11 @@ def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str
     if (words - phrase) & OF_ANOTHER:
         return 0.0
     silent = _SILENT | aspects
-    wanted = phrase - silent
-    if not wanted or wanted <= _BARE:
-        wanted = phrase - _SILENT or phrase
-    if wanted <= _BARE:
-        # What is left of "current in" would name any current.
-        wanted = phrase
-    said = words - (silent - wanted) or words
-    return len(wanted) / len(said) if wanted <= said else 0.0
+    core = phrase - silent or phrase - _SILENT or phrase
+    said = words - silent or words - _SILENT or words
+    # What is left of "current in" would name any current.
+    needed = phrase if core <= _BARE else core
+    return len(core) / len(said) if needed <= words and core <= said else 0.0
 
 
 def recognise_all(
