@@ -89,6 +89,9 @@ _SILENT: Final = _NOISE | SOURCES
 _SHORTEST: Final = 3
 """Letters of a word at least that stands in another one."""
 
+_LONGEST: Final = 40
+"""Letters of a word at most that is put together of others."""
+
 _VOCABULARY: Final = frozenset(
     word
     for words in (
@@ -190,7 +193,7 @@ def words_of(name: str) -> tuple[str, ...]:
 @lru_cache(maxsize=4096)
 def _parts_of(word: str) -> tuple[str, ...]:
     """Known words that a word is put together of, the fewest; itself where it is one or none."""
-    if word in _VOCABULARY or len(word) < 2 * _SHORTEST:
+    if word in _VOCABULARY or not 2 * _SHORTEST <= len(word) <= _LONGEST:
         return (word,)
     for k in range(len(word) - _SHORTEST, _SHORTEST - 1, -1):
         head, tail = word[:k], word[k:]
