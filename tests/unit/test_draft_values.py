@@ -44,6 +44,11 @@ def test_a_pressure_over_that_of_the_air_is_not_the_manifold_s(tmp_path, offset)
     assert ("intake_pressure" in found) == (offset == 0.0)
 
 
+def test_the_number_of_a_map_is_no_pressure(tmp_path):
+    found, _ = drafted(tmp_path, {"map": np.full(T.size, 1.0)})
+    assert "intake_pressure" not in found
+
+
 def test_what_only_its_unit_tells_is_found_by_how_it_moves(tmp_path):
     columns = {
         "zz1 [km/h]": 3.6 * SPEED,

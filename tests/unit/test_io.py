@@ -190,9 +190,19 @@ def test_folder_without_tables(tmp_path):
         read_drive(tmp_path)
 
 
-def test_unknown_suffix_names_the_known_ones(tmp_path):
-    with pytest.raises(DriveError, match=r"'\.xlsx' cannot be read; known are \.csv"):
-        read_drive(write(tmp_path / "log.xlsx"))
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("log.xlsx", b"PK", "save its sheet as CSV"),
+        ("log.cvs", b"a,b\n1,2\n3,4\n", "it is a text: name it \\.csv"),
+        ("log.parket", bytes(range(256)), r"the nearest that is known is \.parquet"),
+        ("log.odd", bytes(range(256)), r"known are \.csv"),
+    ],
+)
+def test_an_unknown_suffix_is_told_the_nearest_or_what_to_export(tmp_path, name, content, said):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DriveError, match=f"cannot be read; .*{said}"):
+        read_drive(tmp_path / name)
 
 
 def test_one_table_in_two_formats(tmp_path):

@@ -113,11 +113,14 @@ def _on_board(columns: tuple[DraftColumn, ...]) -> tuple[DraftColumn, ...]:
 
 
 def _without_gauge(column: DraftColumn, told: Mapping[str, Values]) -> DraftColumn:
-    """Take no pressure over that of the air for one of the manifold, which is counted from zero."""
+    """Take no pressure over that of the air, and no number, for the pressure of the manifold."""
     if column.quantity != "intake_pressure" or column.name not in told:
         return column
     values = told[column.name].values
-    below = to_si(values[np.isfinite(values)], column.unit) < VACUUM
+    values = values[np.isfinite(values)]
+    if not column.stated and values.size >= _FEWEST and np.ptp(values) == 0.0:
+        return _nothing(column, "states no unit and never changes, as the number of a map")
+    below = to_si(values, column.unit) < VACUUM
     if not below.size or np.mean(below) <= _BELOW:
         return column
     return _nothing(column, f"goes below {VACUUM / 1000.0:.0f} kPa, to which no engine pulls down")

@@ -89,6 +89,9 @@ _SILENT: Final = _NOISE | SOURCES
 _SHORTEST: Final = 3
 """Letters of a word at least that stands in another one."""
 
+_LONGEST: Final = 40
+"""Letters of a word at most that is put together of others."""
+
 _VOCABULARY: Final = frozenset(
     word
     for words in (
@@ -190,7 +193,7 @@ def words_of(name: str) -> tuple[str, ...]:
 @lru_cache(maxsize=4096)
 def _parts_of(word: str) -> tuple[str, ...]:
     """Known words that a word is put together of, the fewest; itself where it is one or none."""
-    if word in _VOCABULARY or len(word) < 2 * _SHORTEST:
+    if word in _VOCABULARY or not 2 * _SHORTEST <= len(word) <= _LONGEST:
         return (word,)
     for k in range(len(word) - _SHORTEST, _SHORTEST - 1, -1):
         head, tail = word[:k], word[k:]
@@ -328,14 +331,11 @@ def _score(words: frozenset[str], phrase: frozenset[str], aspects: frozenset[str
     if (words - phrase) & OF_ANOTHER:
         return 0.0
     silent = _SILENT | aspects
-    wanted = phrase - silent
-    if not wanted or wanted <= _BARE:
-        wanted = phrase - _SILENT or phrase
-    if wanted <= _BARE:
-        # What is left of "current in" would name any current.
-        wanted = phrase
-    said = words - (silent - wanted) or words
-    return len(wanted) / len(said) if wanted <= said else 0.0
+    core = phrase - silent or phrase - _SILENT or phrase
+    said = words - silent or words - _SILENT or words
+    # What is left of "current in" would name any current.
+    needed = phrase if core <= _BARE else core
+    return len(core) / len(said) if needed <= words and core <= said else 0.0
 
 
 def recognise_all(
