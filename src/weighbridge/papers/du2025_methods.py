@@ -55,6 +55,7 @@ PRINTED: Final = hybrid.HybridSettings(
         ),
         grade_offset=0.0,
         offset_walk=0.0,
+        jacobian_window=0.0,
     ),
     blend=hybrid.Blend.SPEED,
 )
