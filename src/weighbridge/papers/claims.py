@@ -156,7 +156,7 @@ class Row:
         check = f"`{self.check}`" if self.check else ""
         return (
             self.item, self.what, self.conditions, self.printed, self.ours, self.tolerance,
-            self.verdict, ": ".join(filter(None, (self.why, check))), self.where,
+            self.verdict, listed(self.why, check), self.where,
         )  # fmt: skip
 
 
@@ -181,6 +181,11 @@ def same(
     k = int(np.argmax(apart))
     text = [f"{x.flat[k]:.9g} {unit}".strip() for x in (b, a)]
     return Found(text[0], close, text[1])
+
+
+def listed(*parts: str) -> str:
+    """Write reasons one after another, those that are empty left out."""
+    return "; ".join(filter(None, parts))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

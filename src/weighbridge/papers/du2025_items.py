@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from weighbridge.papers.claims import EXACT, Conditions, Item
+from weighbridge.papers.claims import EXACT, Conditions, Item, listed
 from weighbridge.papers.du2025_claims import CLAIMS, paper_work
 from weighbridge.papers.du2025_methods import FORMS, METHODS, PAPER_RMSE, PAPER_TIME
 
@@ -170,7 +170,7 @@ def _texts() -> tuple[Item, ...]:
         Item(item=claim.section, what=f"{claim.what}, {form.name}",
              where="`papers/du2025_claims.py`", printed=claim.printed,
              ours=f"{{{claim.code} {form.code}}}", tolerance=claim.tolerance,
-             why="; ".join(filter(None, (claim.departure, form.why))), check=form.check)
+             why=listed(claim.departure, form.why), check=form.check)
         for claim in CLAIMS
         for form in FORMS
     )  # fmt: skip

@@ -10,6 +10,7 @@ from typing import Final, TypeVar
 
 from weighbridge.balance import ForceBalance
 from weighbridge.estimators import MassTrack, ekf, hybrid, robust_rls
+from weighbridge.papers.claims import listed
 from weighbridge.report.style import BLUE, GREEN, ORANGE
 from weighbridge.vehicle.model import Vehicle
 
@@ -91,10 +92,7 @@ class Form:
 
 
 _COMMAND: Final = "weighbridge reproduce du2025"
-_BRAKED: Final = (
-    "with every row a braking is a row without the brake's force, and Huber's threshold, which "
-    "grows with the noise, lets it in"
-)
+_BRAKED: Final = "brakings are rows without the brake's force, and Huber's threshold lets them in"
 _CALMER: Final = f"{_COMMAND} --set printed.ekf.start.threshold=0.5"
 _ROWS: Final = {
     True: ("e", "every row", _BRAKED, _CALMER),
@@ -104,11 +102,11 @@ _ROWS: Final = {
     ),
 }  # fmt: skip
 _ROLLING: Final = {
-    "1": (0.0005, "f = 0.0005", "tyres have 0.0075 here; each 0.001 less makes the bus 1.6 % heavy",
+    "1": (0.0005, "f = 0.0005", "tyres have 0.0075 here, and each 0.001 less is 1.6 % of mass",
           f"{_COMMAND} --set as_printed=true --set rolling_coefficient=0.0075"),
-    "10": (0.005, "f = 0.005", "tyres have 0.0075 here; each 0.001 less makes the bus 1.6 % heavy",
+    "10": (0.005, "f = 0.005", "tyres have 0.0075 here, and each 0.001 less is 1.6 % of mass",
            f"{_COMMAND} --set as_printed=true --set rolling_coefficient=0.0075"),
-    "t": (None, "f of the tyres", "f is exact here, as it cannot be in the paper", ""),
+    "t": (None, "f of the tyres", "f is exact here, unlike in the paper", ""),
 }  # fmt: skip
 
 FORMS: Final = tuple(
@@ -117,7 +115,7 @@ FORMS: Final = tuple(
         name=f"{words}, {name}",
         rolling=rolling,
         every_row=every,
-        why=f"{f_why}; {why}",
+        why=listed(f_why, why),
         check=check if every else f_check or check,
     )
     for every, (rows, words, why, check) in _ROWS.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from weighbridge.papers.claims import EXACT, Conditions, Item
+from weighbridge.papers.claims import EXACT, Conditions, Item, listed
 from weighbridge.papers.jensen2022_tables import (
     PAPER_R_SQUARED,
     PAPER_ROAD,
@@ -105,7 +105,7 @@ class _Way:
 _PRINTED: Final = _Way(code="printed", conditions=Conditions.PRINTED, why="")
 _OURS: Final = _Way(
     code="ours", conditions=Conditions.OURS,
-    why="our navigation, lateness, fit and reasons against rows; the wind is unknown as well",
+    why="our navigation, lateness, fit and rows; the wind is unknown",
 )  # fmt: skip
 
 
@@ -117,7 +117,7 @@ def _both(
     return tuple(
         Item(item=item, what=what, conditions=way.conditions, where=where, printed=printed,
              ours=f"{{{name} {way.code}}}", tolerance=tolerance,
-             why="; ".join(filter(None, (reason, way.why))), check=command)
+             why=listed(reason, way.why), check=command)
         for way, reason, command in (
             (_PRINTED, why, check), (_OURS, own_why, own_check),
         )
@@ -192,7 +192,7 @@ _WARMING: Final = (
 )
 _REMEMBERS: Final = (
     "λ = 0.9995 remembers 500 s of pulling, as long as one pass takes: both directions share the "
-    "wind. The paper draws its wind, and names no λ here"
+    "wind"
 )
 _SHORTER: Final = f"{_COMMAND} --set printed.forgetting=0.998"
 _OWN_SHORTER: Final = f"{_COMMAND} --set rls.forgetting=0.998"
@@ -206,7 +206,7 @@ _SAME_TYRES: Final = (
 _ORDER: Final = "none: the order is the claim"
 _CALM: Final = (
     "half of 5 m/s at 10 m, across the road by 60°, reaches the simulated car: less than 3 m/s in "
-    f"the model; {_DRIVE_7}"
+    "the model"
 )
 _WINDY: Final = f"{_COMMAND} --set conditions.wind=4"
 _GUARD: Final = "nothing is forgotten where nothing is learnt: 0.9995 is as calm as 0.9999"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from weighbridge.papers.claims import EXACT, Conditions, Item
+from weighbridge.papers.claims import EXACT, Conditions, Item, listed
 
 _RIDE: Final = "`simulation/ride.py`"
 _FILTER: Final = "`kernels/kalman_bucy.py`"
@@ -37,10 +37,7 @@ TABLE_2: Final = {
 }
 """What Table 2 prints, by the name of our figure."""
 
-_ZEROS: Final = (
-    "single samples near zero, by which eq. 10 divides, make most of it: the median road depends "
-    "on how many there are"
-)
+_ZEROS: Final = "samples near zero, by which eq. 10 divides, make most of it"
 
 
 def _equation(number: int, where: str, why: str = "") -> Item:
@@ -61,7 +58,7 @@ def _followed(
         Item(
             item="table 2", what=f"{what}, {words}", conditions=conditions, where=where,
             printed=printed, ours=f"{{{name} {code}}}", tolerance=_AT_MOST,
-            why=f"{why}; {_ZEROS}" if name == "velocity mape" else why, check=check,
+            why=listed(why, _ZEROS) if name == "velocity mape" else why, check=check,
         )
         for name, (what, printed) in TABLE_2.items()
     ]  # fmt: skip
