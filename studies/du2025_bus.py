@@ -21,7 +21,7 @@ from weighbridge.estimators import MassTrack, hybrid, robust_rls
 from weighbridge.estimators.hybrid import Blend
 from weighbridge.papers import du2025 as paper
 from weighbridge.papers import du2025_bus
-from weighbridge.papers.du2025_methods import METHODS, PAPER_RMSE, Settings
+from weighbridge.papers.du2025_methods import FORMS, METHODS, PAPER_RMSE, PRINTED, Settings
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats
 from weighbridge.signals.units import scalar_to_si
@@ -169,7 +169,8 @@ def early() -> str:
     for load, payload in du2025_bus.LOADS.items():
         cells = []
         for printed in (True, False):
-            estimate = Settings(as_printed=printed).estimators["robust-rls"]
+            settings = Settings(as_printed=printed, printed=FORMS[-1].of(PRINTED))
+            estimate = settings.estimators["robust-rls"]
             for braking in (True, False):
                 found = []
                 for seed in range(SEED, SEED + 5):
@@ -201,7 +202,8 @@ def opposite() -> Part:
             weighed = wb.weigh(made.drive, vehicle, method="robust-rls").result
             balances[load, seed] = weighed.balance, float(np.mean(made.truth.mass))
     for rolling in (0.005, 0.0065, 0.0075, None):
-        chosen = Settings(as_printed=True, rolling_coefficient=rolling)
+        form = replace(FORMS[-1], rolling=rolling)
+        chosen = Settings(as_printed=True, printed=form.of(PRINTED))
         least = chosen.estimators["hybrid"].keywords["settings"]
         for load in du2025_bus.LOADS:
             found = []

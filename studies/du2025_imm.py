@@ -124,8 +124,8 @@ def interacting_mass(balance: ForceBalance, vehicle: Vehicle, way: Interacting) 
     begin = robust_rls.initial_state(settings.ekf.start, params.rls.window)
     change = min(0.5, params.rls.window / way.dwell)
     return _run(
-        hybrid_mass.initial_state(begin, params), ekf.columns(balance, vehicle, valid), phi, y,
-        params, change, way.mixing,
+        hybrid_mass.initial_state(begin, params),
+        ekf.columns(balance, vehicle, valid, settings.ekf), phi, y, params, change, way.mixing,
     )[0]  # fmt: skip
 
 

@@ -30,9 +30,12 @@ from weighbridge.calibration.speed import calibrate_by_speed, speed_rows
 from weighbridge.calibration.speed_fit import SpeedRows
 from weighbridge.estimators.speed_ekf import SpeedEkfSettings, mean_mass, run_filter, start_share
 from weighbridge.papers import galvao as paper
+from weighbridge.papers.claims import Verdict
+from weighbridge.papers.galvao_figures import item_figures
 from weighbridge.report.table import Table
 from weighbridge.simulation import Route, jensen_route, mixed_route, random_car, simulate_car
 from weighbridge.vehicle.model import Vehicle
+from weighbridge.vehicle.speed_model import SpeedSampling
 
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "shared" / "data"
@@ -52,9 +55,13 @@ def markdown(table: Table) -> str:
 
 
 def comparison_table(done: paper.Reproduction) -> str:
-    lines = ["| figure | paper | ours | |", "|---|---|---|---|"]
+    found = item_figures(done)
+    rows = [item.row("galvao", found) for item in paper.ITEMS]
+    lines = ["| paper | what | printed | ours | |", "|---|---|---|---|---|"]
     lines += [
-        f"| {c.figure} | {c.theirs} | {c.ours} | {c.verdict} |" for c in paper.comparisons(done)
+        f"| {r.item} | {r.what} | {r.printed} | {r.ours} | {r.verdict} |"
+        for r in rows
+        if r.item.startswith(("fig.", "table")) and r.verdict is not Verdict.NOT_REPRODUCIBLE
     ]
     return "\n".join(lines)
 
@@ -164,7 +171,7 @@ def courses(route: Route, seed: int) -> list[SpeedRows]:
     """Drive one road three times; means of 7 s with the true grade."""
     made = [simulate_car(paper.scenario(seed + k, route)) for k in range(3)]
     base = Vehicle(name=paper.CAR.name)
-    return [speed_rows(paper.with_grade(m), base, paper.mass_of(m), 7.0) for m in made]
+    return [speed_rows(paper.with_grade(m), base, paper.mass_of(m), SpeedSampling()) for m in made]
 
 
 def city_road(seed: int) -> Route:

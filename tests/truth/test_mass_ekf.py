@@ -57,11 +57,12 @@ def drive(seed, n=6000, period=0.02, noise=1.0):
         grade=grade + noise * rng.normal(0.0, 0.02, n),
         driven=np.ones(n, bool),
         standing=np.zeros(n, bool),
+        regressor=np.full(n, np.nan),
     )
 
 
 def test_derivatives_are_those_of_differences():
-    row = mass_ekf.Row(0.0, 9000.0, 3.3, -2.0, 250.0, 12.0, 0.03, True, False)
+    row = mass_ekf.Row(0.0, 9000.0, 3.3, -2.0, 250.0, 12.0, 0.03, True, False, np.nan)
     at = np.array([14.0, 0.03, MASS])
     accel, *derivatives = mass_ekf.acceleration(*at, row, PARAMS)
     weight = 9.81 * (np.sin(0.03) + (0.007 + 4e-5 * 14.0) * np.cos(0.03))
@@ -87,7 +88,7 @@ def test_equals_the_filter_in_matrices():
         assert taken
         span = table.time[k] - table.time[k - 1]
         mean = [0.5 * (c[k - 1] + c[k]) for c in table[:5]]
-        row = mass_ekf.Row(*mean, 0.0, 0.0, True, False)
+        row = mass_ekf.Row(*mean, 0.0, 0.0, True, False, np.nan)
         accel, *slopes = mass_ekf.acceleration(*x[:3], row, PARAMS)
         transition = np.eye(4)
         transition[0, :3] += span * np.array(slopes)
@@ -210,7 +211,7 @@ def test_a_change_of_load_at_a_stop_is_followed():
 def hybrid_params(blend=hybrid_mass.SPEED):
     return hybrid_mass.HybridParams(
         rls=robust_rls.RobustRlsParams(
-            0.5, 0.02, 0.8, 0.95, 20.0, 1.5, True, 100.0, 10, 0.03, 1.0, 0.03, 10.0
+            0.5, 0.02, 0.8, 0.95, 20.0, 1.5, 0.0, True, 100.0, 10, 0.03, 1.0, 0.03, 10.0
         ),
         ekf=PARAMS,
         first_information=2.0,

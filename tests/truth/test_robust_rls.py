@@ -15,6 +15,7 @@ def params(**changed):
         "forgetting": 0.98,
         "kept_information": 0.0,
         "threshold": np.inf,
+        "threshold_force": 0.0,
         "weight_information": True,
         "scale_windows": 100.0,
         "settle_windows": 10,

@@ -1,64 +1,153 @@
-"""Items of a paper and the table that is made of them."""
+"""Items of the papers, the rows that a run makes of them, and the page of the rows."""
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from weighbridge.errors import ConfigError
-from weighbridge.papers import PAPERS, items_of
-from weighbridge.papers.claims import NOT_REPRODUCED, Item, markdown, tables
+from weighbridge.estimators.settings import changed, differences, parsed
+from weighbridge.papers import PAPERS, items_of, settings_of
+from weighbridge.papers.claims import (
+    COLUMNS,
+    Conditions,
+    Found,
+    Item,
+    Section,
+    Verdict,
+    document,
+    same,
+)
+from weighbridge.papers.du2025_equations import equations as du2025_equations
+from weighbridge.papers.galvao_equations import equations as galvao_equations
+from weighbridge.papers.jensen2022_equations import equations as jensen2022_equations
+from weighbridge.papers.nguyen2024_equations import equations as nguyen2024_equations
 
 PAGE = Path(__file__).parents[2] / "docs" / "papers.md"
 
-LAW = Item("eq. 1", "`law.py`", True, "", "", "", True)
-RATIO = Item("table 4", "`gear.py`", False, "steady rows", "2 %", "{ratio} | {unmade}", True)
-BETTER = Item("fig. 11", "`joint`", False, "wind found", "±5 %", "worst {worst}", False)
+EQUATIONS = {
+    "du2025": du2025_equations,
+    "galvao": galvao_equations,
+    "jensen2022": jensen2022_equations,
+    "nguyen2024": nguyen2024_equations,
+}
+
+NUMBERED = {
+    "du2025": {"eq.": range(1, 35), "fig.": range(1, 8), "table": range(1, 3)},
+    "galvao": {"eq.": range(1, 27), "fig.": range(1, 16), "table": range(1, 3)},
+    "jensen2022": {
+        "eq.": range(1, 52),
+        "fig.": [*range(1, 20), "A.1", *(f"C.{n}" for n in range(1, 8))],
+        "table": [*range(1, 7), "B.1"],
+    },
+    "nguyen2024": {"eq.": range(1, 11), "fig.": range(1, 7), "table": range(1, 3)},
+}
+"""What the papers number."""
+
+RULE = Item(item="table 4", where="`gear.py`", printed="2 %", ours="{ratio} | {more}",
+            tolerance="none")  # fmt: skip
+EXCUSED = Item(item="fig. 11", what="worst", conditions=Conditions.OURS, where="`joint`",
+               printed="±5 %", ours="{ratio}", tolerance="none", why="wind",
+               check="weighbridge reproduce jensen2022")  # fmt: skip
+DRAWN = Item(item="fig. 1", where="docs", why="a drawing")
 
 
-def test_like_conditions_come_first_and_others_apart():
-    like, other = tables("A paper", (BETTER, LAW, RATIO), {"ratio": "0.2 %", "worst": "1 %"})
-    assert [row[0] for row in like.rows] == ["eq. 1", "table 4"]
-    assert [row[0] for row in other.rows] == ["fig. 11"]
-    assert like.rows[1][-1] == "0.2 % | not run"
-    assert other.rows[0][-1] == "worst 1 %"
-    assert "conditions of the paper" in like.title
+def figures(*, agrees):
+    return {"ratio": Found("3 %", agrees), "more": Found("1 %", True)}
 
 
-def test_a_table_of_nothing_is_left_out():
-    (like,) = tables("A paper", (LAW,), {})
-    assert len(like.rows) == 1
+def test_a_row_agrees_if_all_its_figures_do():
+    good, bad = (RULE.row("a", figures(agrees=a)) for a in (True, False))
+    assert (good.verdict, bad.verdict) == (Verdict.AGREES, Verdict.DIFFERS)
+    assert good.ours == "3 % | 1 %"
+    assert good.accounted
+    assert not bad.accounted
+    record = bad.record()
+    assert record["verdict"] == "differs"
+    assert record["paper"] == "a"
 
 
-def test_markdown_keeps_bars_in_their_cell():
-    (like,) = tables("A paper", (RATIO,), {"ratio": "0.2 %"})
-    row = markdown(like).splitlines()[-1]
-    assert row.count(" | ") == 5
-    assert "0.2 % \\| not run" in row
+def test_a_difference_needs_a_reason_and_a_command():
+    assert EXCUSED.row("a", figures(agrees=False)).accounted
+    nothing = DRAWN.row("a", {})
+    assert nothing.verdict is Verdict.NOT_REPRODUCIBLE
+    assert nothing.accounted
+    with pytest.raises(ConfigError, match="say why nothing is compared"):
+        Item(item="fig. 1", where="docs")
+    with pytest.raises(ConfigError, match="within what tolerance"):
+        Item(item="fig. 1", where="docs", ours="{ratio}")
 
 
-def test_a_departure_must_be_said():
-    with pytest.raises(ConfigError, match=r"eq\. 7: say what departs"):
-        Item("eq. 7", "`rls.py`", False, "", "", "", True)
+def test_an_equation_agrees_to_rounding_alone():
+    assert same([1.0, 2.0], [1.0, 2.0 + 1e-10]).agrees
+    apart = same([1.0, 2.0], [1.0, 2.0 + 1e-7], "N")
+    assert not apart.agrees
+    assert apart.printed == "2 N"
+    assert not same(1.0, np.nan).agrees
+    assert not same([1.0], [1.0, 1.0]).agrees
 
 
-def test_the_page_lists_every_item_of_today_with_a_figure_of_a_run():
-    lines = PAGE.read_text(encoding="utf-8").splitlines()
-    rows = [
-        line.removeprefix("| ").removesuffix(" |").split(" | ") for line in lines if "| " in line
-    ]
-    rows = [row for row in rows if row[0] not in ("paper", "---")]
-    items = [
-        item
-        for name in PAPERS
-        for kind in (True, False)
-        for item in items_of(name)
-        if item.like_for_like is kind
-    ]
-    wanted = [
-        [i.paper_item, i.where, "yes" if i.as_printed else "no", i.departure, i.printed]
-        for i in items
-    ]
-    assert [row[:5] for row in rows] == wanted
+def test_bars_stay_in_their_cell_of_the_page():
+    rows = tuple(i.row("a", figures(agrees=True)) for i in (RULE, EXCUSED, DRAWN))
+    page = document([Section(title="A paper", note="seeds 5 to 6", rows=rows)])
+    (line,) = (line for line in page.splitlines() if line.startswith("| table 4"))
+    assert line.count(" | ") == len(COLUMNS) - 1
+    assert "3 % \\| 1 %" in line
+    assert "seeds 5 to 6: 2 agrees, 0 differs, 1 not reproducible." in page
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_every_numbered_equation_table_and_figure_has_a_row(paper):
+    numbered = {i.item for i in items_of(paper) if i.item.split()[0] in ("eq.", "fig.", "table")}
+    assert numbered == {f"{kind} {n}" for kind, some in NUMBERED[paper].items() for n in some}
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_a_check_is_a_command_that_changes_something(paper):
+    for check in {i.check for i in items_of(paper) if i.check}:
+        program, command, name, *options = check.split()
+        assert (program, command, name) == ("weighbridge", "reproduce", paper)
+        assert options[::2] == ["--set"] * (len(options) // 2)
+        if options:
+            assert differences(changed(settings_of(paper)(), parsed(options[1::2]))), check
+
+
+@pytest.fixture(scope="module")
+def equations():
+    return {paper: made() for paper, made in EQUATIONS.items()}
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_the_code_computes_what_is_printed(paper, equations):
+    departing = {i.names[0] for i in items_of(paper) if i.ours and i.conditions == "ours"}
+    for name, found in equations[paper].items():
+        assert found.agrees is (name not in departing), (paper, name, found)
+
+
+def page_rows(title):
+    text = PAGE.read_text(encoding="utf-8").split(f"\n## {title}\n")[1].split("\n## ")[0]
+    lines = [line for line in text.splitlines() if line.startswith("| ")][2:]
+    return [line.removeprefix("| ").removesuffix(" |").split(" | ") for line in lines]
+
+
+@pytest.mark.parametrize(
+    ("paper", "title"),
+    [("du2025", "Du et al. 2025"), ("galvao", "Galvão et al."),
+     ("jensen2022", "Jensen et al. 2022"), ("nguyen2024", "Nguyen 2024")],
+)  # fmt: skip
+def test_the_page_has_the_rows_of_today(paper, title, equations):
+    """`python studies/papers.py --check` compares every figure; here those that are quick."""
+    rows, items = page_rows(title), items_of(paper)
+    assert [row[:3] for row in rows] == [[i.item, i.what, i.conditions] for i in items]
     for item, row in zip(items, rows, strict=True):
-        assert NOT_REPRODUCED not in row[5]
-        assert bool(row[5].strip()) is bool(item.ours), item.paper_item
+        printed, ours, tolerance, verdict = row[3:7]
+        assert tolerance == item.tolerance
+        assert (verdict == "not reproducible") is not item.ours
+        if item.why:
+            assert row[7].startswith(item.why)
+        if set(item.names) & set(equations[paper]):
+            (name,) = item.names
+            found = equations[paper][name]
+            assert ours == found.text, name
+            assert printed == (item.printed or found.printed)
+            assert verdict == ("agrees" if found.agrees else "differs")

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from weighbridge.balance.law import STANDARD_DENSITY, needed_force, rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
-from weighbridge.estimators.settings import changed
+from weighbridge.estimators.settings import changed, parsed
 from weighbridge.papers import PAPERS, galvao
 from weighbridge.papers.galvao_bounds import (
     FAST,
@@ -18,9 +18,10 @@ from weighbridge.papers.galvao_bounds import (
     STEP,
     coasting_speed,
     speed_says,
+    speed_table,
 )
 from weighbridge.papers.galvao_drives import CAR
-from weighbridge.papers.galvao_figures import item_figures
+from weighbridge.papers.galvao_figures import PAPER_WORST, item_figures
 from weighbridge.papers.galvao_statistics import rank_correlation, slope
 from weighbridge.papers.galvao_torque import (
     WAYS,
@@ -88,7 +89,7 @@ def test_the_road_is_easy_and_the_drives_are_as_long_as_the_papers(three):
 
 def test_same_mass_is_met_from_its_own_start_and_not_from_the_printed_one(three):
     for test in three[2]:
-        assert abs(test.error(test.ours)) <= galvao.PAPER_WORST
+        assert abs(test.error(test.ours)) <= PAPER_WORST
         assert test.band(test.ours) <= 100.0
         assert abs(test.error(test.printed)) > 0.1
 
@@ -100,9 +101,15 @@ def test_a_setting_of_the_printed_filter_moves_it_alone(three):
         np.testing.assert_array_equal(usual.ours.mass, other.ours.mass)
         assert abs(usual.printed.mass[-1] - other.printed.mass[-1]) > 10.0
 
-
-def test_sample_time_model_and_mean_are_settings(three):
-    given = {"sample_time": 14.0, "model.drag": 0.5, "printed.groups": 1, "printed.tail": 1.0}
+    given = {
+        "sampling.sample_time": 14.0, "model.drag": 0.5, "printed.groups": 1, "printed.tail": 1.0,
+    }  # fmt: skip
+    given = {
+        "sampling.sample_time": 14.0,
+        "model.drag": 0.5,
+        "printed.groups": 1,
+        "printed.tail": 1.0,
+    }
     settings = changed(galvao.Settings(), given)
     fitted = settings.fitted(three[1][0])
     assert fitted.vehicle.speed_model.sample_time == 14.0
@@ -112,19 +119,43 @@ def test_sample_time_model_and_mean_are_settings(three):
     # One group of all samples: nothing is left out.
     assert run.answer == pytest.approx(np.mean(run.mass[run.used]))
     assert run.answer != three[2][1].printed.answer
+    limits = {"sampling.averaged": 0.0, "sampling.slowest": 8.0, "sampling.hardest": 0.2}
+    model = changed(galvao.Settings(), limits).fitted(three[1][0]).vehicle.speed_model
+    assert (model.averaged, model.slowest, model.hardest) == (0.0, 8.0, 0.2)
     with pytest.raises(ConfigError, match="sample_time must be in"):
-        changed(galvao.Settings(), {"sample_time": 0.5})
+        changed(galvao.Settings(), {"sampling.sample_time": 0.5})
 
 
-def test_what_falls_behind_is_told(done):
-    by_start, band, printed, *_ = galvao.comparisons(done)
-    assert "gives back the mass it is started from" in by_start.figure
-    verdicts = (by_start.verdict, band.verdict, printed.verdict)
-    assert verdicts == ("other conditions", "other conditions", "behind")
+def rows_of(done):
+    found = item_figures(done)
+    return {(i.item, i.what): i.row("galvao", found) for i in galvao.ITEMS}
+
+
+def test_what_differs_has_its_reason(done):
+    rows = rows_of(done)
+    printed = rows["table 1", "mean mass, start and noise as printed"]
+    assert (printed.verdict, printed.accounted) == ("differs", True)
+    assert rows["table 1", "mean mass"].verdict == "agrees"
+    for number in (1, 2, 3):
+        speed = rows[f"fig. {6 + number}", f"model speed of Test 0{number}, one step ahead"]
+        assert speed.verdict == "differs"
+        known = np.isfinite(done.tests[number - 1].predicted)
+        off = (done.tests[number - 1].rows.speed - done.tests[number - 1].predicted)[known]
+        assert speed.ours.startswith(f"off by {np.sqrt(np.mean(off**2)):.2f} m/s")
     off = done.tests[0]
     moved = replace(off, mass=1.01 * off.mass)
-    worse = galvao.comparisons(replace(done, tests=(moved, *done.tests[1:])))
-    assert not worse[0].good
+    worse = rows_of(replace(done, tests=(moved, *done.tests[1:])))["table 1", "mean mass"]
+    # Nothing excuses ours.
+    assert (worse.verdict, worse.accounted) == ("differs", False)
+
+
+def test_started_at_the_mass_the_printed_filter_gives_it_back(three):
+    """The command of the rows that differ shows their reason."""
+    (check,) = {i.check for i in galvao.ITEMS if i.item in ("fig. 10", "fig. 15")}
+    settings = changed(galvao.Settings(), parsed(check.split()[4::2]))
+    for test in three[2]:
+        run = galvao.run_filter(test.balance, three[0].vehicle, settings.printed)
+        assert abs(test.error(run)) < 0.1
 
 
 def test_tables_have_a_text_for_every_column(done):
@@ -152,7 +183,7 @@ def test_page_begins_with_the_papers_figures(done, tmp_path, monkeypatch):
     page = tmp_path / "page.html"
     galvao.reproduced(1234, None).write_report(page)
     text = page.read_text(encoding="utf-8")
-    assert text.index("largest error from 1500 kg") < text.index("Test 01")
+    assert text.index("start and noise as printed") < text.index("ours started at the calibration")
 
 
 @pytest.fixture(scope="module")
@@ -168,15 +199,17 @@ def test_recorded_torque_weighs_the_load_where_speed_alone_does_not(trial):
     assert trial.slope(by_map)[0] == pytest.approx(gain)
 
 
-def test_a_calibration_that_knows_more_of_the_grade_than_the_drive_makes_it_light(trial):
+def test_a_calibration_that_knows_more_of_the_grade_than_the_drive_widens_the_interval(trial):
     _, alike, mixed = WAYS
     # Drives that no calibration saw.
     by_alike, by_mixed = (np.mean(trial.errors(way)[1:]) for way in (alike, mixed))
-    assert by_mixed < by_alike - 0.03
+    # Deming's regression takes most of it out: 10 % before, and its interval knows.
+    assert abs(by_mixed - by_alike) < 0.05
+    assert np.all(trial.ways[mixed].std > 1.5 * trial.ways[alike].std)
 
 
 def test_errors_of_recorded_torque_are_told(done):
-    said = torque_figures(done.torque)
+    said = {name: found.text for name, found in torque_figures(done.torque).items()}
     # 30 kg of standard deviation are 59 kg of 95 %: 5.4 % of 1092, 4.6 of 1292, 3.9 of 1492.
     assert said["torque errors"].startswith("errors +0.0 / -1.0 / +1.0 % ± 5.4 / 5.4 / 5.4 %; ")
     assert "200 and 400 kg loaded +0.0 / no mass % ± 4.6 / 3.9 %" in said["torque errors"]
@@ -184,28 +217,29 @@ def test_errors_of_recorded_torque_are_told(done):
     # 109 kg off with ± 78 told, twice.
     assert said["blind torque errors"].endswith("3 of 5 within 95 % told")
     assert said["torque errors"].endswith("4 of 4 within 95 % told")
+    # A drive without a mass agrees with nothing.
+    assert not torque_figures(done.torque)["torque errors"].agrees
     *_, last, slopes = torque_table(done.torque).rows
     assert last[2] == "no mass"
     # 100 kg found for 200 loaded, and 200 for 400.
     assert slopes[-2] == "+0.50 ± 0.00"
-    assert said["torque slopes"].startswith(slopes[2])
 
 
 def test_the_error_that_stays_is_that_of_the_run(done):
-    said = item_figures(done)["printed late errors"]
-    ends = [100.0 * (t.printed.mass[t.printed.used][-1] / t.mass - 1.0) for t in done.tests]
-    assert said.endswith(f"at the end {' / '.join(f'{x:+.0f}' for x in ends)} %")
+    said = item_figures(done)
+    for t in done.tests:
+        end = 100.0 * (t.printed.mass[t.printed.used][-1] / t.mass - 1.0)
+        assert said[f"end {t.number}"].text == f"{end:+.1f} %"
 
 
 def test_errors_have_their_sign(done):
     light = replace(done.tests[1], mass=1.01 * done.tests[1].ours.answer)
     signed = replace(done, tests=(done.tests[0], light, done.tests[2]))
-    errors = item_figures(signed)["errors"].removeprefix("errors ").split(" / ")
+    errors = item_figures(signed)["errors"].text.removeprefix("errors ").split(" / ")
     assert [e[0] for e in errors] == ["-" if t.error(t.ours) < 0.0 else "+" for t in signed.tests]
     assert float(errors[1]) == pytest.approx(100.0 / 1.01 - 100.0, abs=1e-3)
     assert galvao.tests_table(signed).rows[1][6] == errors[1]
-    worst = galvao.comparisons(signed)[0]
-    assert (worst.ours, worst.good) == (f"{errors[1]} %", False)
+    assert not item_figures(signed)["errors"].agrees
 
 
 @pytest.mark.parametrize("head_wind", [-4.0, 0.0, 3.0])
@@ -238,4 +272,4 @@ def test_speed_alone_bounds_the_mass_and_tells_the_drag_over_it(done):
     # Drag area and mass of sec. 2.1.
     assert low < 0.35 * 2.15 / 1092.0 < high
     assert done.says.coast.drag_over_mass == pytest.approx(0.35 * 2.15 / 1092.0, rel=0.05)
-    assert item_figures(done)["bounds"].endswith("truly 1092")
+    assert speed_table(done.says).rows[0][-1] == "1092"

@@ -10,11 +10,13 @@ from weighbridge.estimators.settings import parsed
 LEAST_SQUARES = (
     "memory=30", "forgetting=0.999", "window=0", "kept_information=0", "threshold=0.5",
     "weight_information=false", "start_mass=900 start_information=3", "rolling_coefficient=0.0005",
+    "threshold_force=50", "settle_windows=0 threshold=0.5", "every_row=true",
     "offset_std=0", "count_grade_twice=true", "first_information=3", "offset_memory=20",
 )  # fmt: skip
 KALMAN = (
     "start_mass=900", "start_std=0.1", "speed_noise=0.03", "grade_noise=0.02", "accel_walk=0.3",
     "grade_walk=0.02", "mass_walk=0.005", "grade_offset=0", "offset_walk=0", "gate=0.1",
+    "jacobian_window=0", "jacobian_window=6",
 )  # fmt: skip
 BLENDS = (
     "blend=speed", "blend=variance", "blend=covariance", "blend=intersection", "blend=share",

@@ -45,7 +45,7 @@ def test_settings_within_settings_are_reached_by_dots():
         ("hybrid", {"blend": "wind"}, "blend takes one of .*speed.*, got 'wind'"),
         ("hybrid", {"blend": 1.0}, "blend takes one of .*speed.*, got 1.0"),
         ("hybrid", {"ekf.start_mass": "speed"}, "takes a number, got 'speed'"),
-        ("speed-ekf", {"process_var": [1.0, 2.0]}, "takes 3 numbers in brackets, got list"),
+        ("speed-ekf", {"process_var": [1.0, 2.0]}, "takes 3 numbers with commas, got list"),
     ],
 )
 def test_what_cannot_be_set_is_one_sentence(method, given, said):
@@ -67,9 +67,10 @@ def test_texts_are_read_as_toml():
         "blend": "speed",
         "process_var": [0.1, 1e-12, 5e-3],
     }
+    assert parsed(["process_var=0.1, 1e-12,5e-3"]) == {"process_var": [0.1, 1e-12, 5e-3]}
 
 
-@pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=5,0", "gate=1\nmass=2"])
+@pytest.mark.parametrize("text", ["forgetting", "=1", "gate=", "gate=5;0", "gate=1\nmass=2"])
 def test_a_text_of_another_form_is_one_sentence(text):
     with pytest.raises(ConfigError, match=r"write NAME=VALUE|is expected after =") as refused:
         parsed([text])

@@ -24,6 +24,7 @@ from weighbridge.estimators.speed_ekf import (
 from weighbridge.navigation.speed import speed_motion
 from weighbridge.signals import Drive, Signal
 from weighbridge.vehicle.model import Driveline, Provenance, SpeedModel, Vehicle
+from weighbridge.vehicle.speed_model import SpeedSampling
 
 NOMINAL = Nominal(force_gain=19.83, drag=0.918, rolling_coefficient=0.01, rotating_mass=71.0)
 SPEED_EKF = wb.CalibrationSettings(method="speed-ekf")
@@ -74,21 +75,28 @@ def test_windows_are_means_and_gaps_leave_none():
     time = np.concatenate([np.arange(0.0, 35.0, 0.1), np.arange(56.0, 140.4, 0.1)])
     values = 10.0 + 0.1 * time
     motion = speed_motion(Drive("d", {"vehicle_speed": Signal("vehicle_speed", time, values)}))
-    means = window_means(motion, motion.speed, 7.0)
+    means = window_means(motion, motion.speed, SpeedSampling())
     assert means.size == 20
     middles = 7.0 * np.arange(20) + 3.45
     assert np.isnan(means[5:8]).all()
     sound = np.r_[0:5, 8:20]
     assert_allclose(means[sound], 10.0 + 0.1 * middles[sound], atol=0.02)
+    points = window_means(motion, motion.speed, SpeedSampling(averaged=0.0))
+    assert_allclose(points[sound], means[sound] + 0.35, atol=0.03)
+    halves = window_means(motion, motion.speed, SpeedSampling(averaged=0.5))
+    assert_allclose(halves[sound], means[sound] + 0.175, atol=0.03)
 
 
 def test_on_and_off_by_speed_alone():
     speed = np.array([3.0, 12.0, 15.0, 11.0, 10.0, np.nan, 14.0, 2.0])
-    known, slow, braked = running(speed, 7.0)
+    known, slow, braked = running(speed, SpeedSampling())
     assert known.tolist() == [True] * 5 + [False, True, True]
     assert (slow & known).tolist() == [True] + [False] * 6 + [True]
     # 4 m/s in 7 s is braking, 1 m/s is not, and after a gap nobody knows.
     assert braked.tolist() == [False] * 3 + [True] + [False] * 3 + [True]
+    _, slow, braked = running(speed, SpeedSampling(slowest=11.5, hardest=2.0))
+    assert slow[known].tolist() == [True, False, False, True, True, False, True]
+    assert not braked.any()
 
 
 def test_calm_groups_count():

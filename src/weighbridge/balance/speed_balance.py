@@ -17,16 +17,10 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Bools, Drive, Floats
 from weighbridge.vehicle.model import SpeedModel, Vehicle
+from weighbridge.vehicle.speed_model import SpeedSampling
 
 SPEEDS: Final = ("vehicle_speed", "gnss_speed")
 """Signals of which one is enough, the better first."""
-
-SLOW: Final = 5.0
-"""Windows with a lower mean speed are left out: clutch, first gears and stops [m/s]."""
-
-BRAKING: Final = 0.4
-"""A window this much slower per second than the one before it is braked: over 7 s no car
-in a high gear coasts down like that on a low grade [m/s^2]."""
 
 FULL: Final = 0.8
 """Part of a window in which the speed must be known [-]."""
@@ -79,22 +73,26 @@ def speed_motion_of(drive: Drive, vehicle: Vehicle, length: float) -> Motion:
     )
 
 
-def window_means(motion: Motion, values: Floats, length: float) -> Floats:
-    """Average over windows of ``length`` [s]; NaN where less than `FULL` of one is there.
+def window_means(motion: Motion, values: Floats, sampling: SpeedSampling) -> Floats:
+    """Average over windows, or over their last part; NaN where less than `FULL` of that is there.
 
     Parameters
     ----------
     motion : its clock and gaps
     values : (n,) at its instants
-    length : [s]
+    sampling : length of the windows, and the part
 
     Returns
     -------
     (m,)
     """
-    window = ((motion.time - motion.time[0]) / length + 1e-9).astype(np.int64)
+    length = sampling.sample_time
+    place = (motion.time - motion.time[0]) / length + 1e-9
+    window = place.astype(np.int64)
+    # At least the last row of a window.
+    part = max(sampling.averaged, 1.0 / (motion.rate * length))
     count = int((motion.time[-1] - motion.time[0] + 1.0 / motion.rate) / length + 1e-9)
-    inside = window < count
+    inside = (window < count) & (place - window >= 1.0 - part - 1e-6)
     good = inside & motion.valid & np.isfinite(values)
     total = np.bincount(window[good], values[good], count)
     known = np.bincount(window[good], minlength=count).astype(np.float64)
@@ -103,25 +101,26 @@ def window_means(motion: Motion, values: Floats, length: float) -> Floats:
     return np.where(enough, total / np.maximum(known, 1.0), np.nan)
 
 
-def running(speed: Floats, length: float) -> tuple[Bools, Bools, Bools]:
-    """Judge windows by their mean speeds alone.
+def running(speed: Floats, sampling: SpeedSampling) -> tuple[Bools, Bools, Bools]:
+    """Judge samples by their speeds alone.
 
     Parameters
     ----------
-    speed : (m,) mean of each window; NaN where unknown [m/s]
-    length : of a window [s]
+    speed : (m,) of each window; NaN where unknown [m/s]
+    sampling : with the limits
 
     Returns
     -------
     known : (m,) there is a speed
-    slow : (m,) slower than `SLOW`
-    braked : (m,) slowed by more than `BRAKING` since the window before
+    slow : (m,) slower than ``slowest``
+    braked : (m,) slowed by more than ``hardest`` since the window before
     """
     known = np.isfinite(speed)
     filled = np.where(known, speed, 0.0)
     change = np.concatenate(([0.0], np.diff(filled)))
     both = known & np.concatenate(([False], known[:-1]))
-    return known, filled < SLOW, both & (change < -BRAKING * length)
+    hardest = sampling.hardest * sampling.sample_time
+    return known, filled < sampling.slowest, both & (change < -hardest)
 
 
 def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
@@ -140,8 +139,8 @@ def speed_balance(drive: Drive, vehicle: Vehicle) -> ForceBalance:
     model = model_of(vehicle)
     length = model.sample_time
     motion = speed_motion_of(drive, vehicle, length)
-    speed = window_means(motion, motion.speed, length)
-    known, slow, braked = running(speed, length)
+    speed = window_means(motion, motion.speed, model)
+    known, slow, braked = running(speed, model)
     time = motion.time[0] + length * np.arange(1, speed.size + 1)
     params = kernel_parameters(model, (0.0, 0.0, 0.0), 0.0)
     traction = kernel.traction_force(speed, params)

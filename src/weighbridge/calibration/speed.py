@@ -23,9 +23,7 @@ from weighbridge.navigation.select import find_motion
 from weighbridge.signals import Drive
 from weighbridge.vehicle.fits import SPEED_EKF
 from weighbridge.vehicle.model import Provenance, SpeedModel, Vehicle
-
-SAMPLE_TIME: Final = 7.0
-"""Length of a window [s] (Galvão et al., sec. 5.1)."""
+from weighbridge.vehicle.speed_model import SpeedSampling
 
 AIR_DENSITY: Final = 1.22
 """Density of the air [kg/m^3] (Galvão et al., sec. 2.1)."""
@@ -95,8 +93,8 @@ def nominal_of(vehicle: Vehicle) -> Nominal:
     )
 
 
-def speed_rows(drive: Drive, vehicle: Vehicle, mass: float, sample_time: float) -> SpeedRows:
-    """Average speed and grade of a drive over windows.
+def speed_rows(drive: Drive, vehicle: Vehicle, mass: float, sampling: SpeedSampling) -> SpeedRows:
+    """Sample speed and grade of a drive.
 
     Raises
     ------
@@ -108,16 +106,16 @@ def speed_rows(drive: Drive, vehicle: Vehicle, mass: float, sample_time: float) 
     graded = find_motion(drive, vehicle)
     if graded.source == "speed":
         raise refused("calibration.no_grade", drive=drive.name)
-    motion = speed_motion_of(drive, vehicle, sample_time)
+    motion = speed_motion_of(drive, vehicle, sampling.sample_time)
     seen = np.where(graded.valid, graded.grade, np.nan)
     grade = np.interp(motion.time, graded.time, seen, left=np.nan, right=np.nan)
-    speed = window_means(motion, motion.speed, sample_time)
-    known, slow, braked = running(speed, sample_time)
+    speed = window_means(motion, motion.speed, sampling)
+    known, slow, braked = running(speed, sampling)
     return SpeedRows(
         name=drive.name,
         mass=mass,
         speed=speed,
-        grade=window_means(motion, grade, sample_time),
+        grade=window_means(motion, grade, sampling),
         used=known & ~slow & ~braked,
     )
 
@@ -128,7 +126,7 @@ def calibrate_by_speed(
     base: Vehicle,
     *,
     nominal: Nominal | None = None,
-    sample_time: float = SAMPLE_TIME,
+    sampling: SpeedSampling | None = None,
 ) -> SpeedCalibration:
     """Fit the speed model of a vehicle; all else of the vehicle stays.
 
@@ -138,7 +136,7 @@ def calibrate_by_speed(
     masses : known mass of each [kg]
     base : what is known of the vehicle
     nominal : constants of the model; from the vehicle when None
-    sample_time : length of the windows [s]
+    sampling : of the speed; ours when None
 
     Raises
     ------
@@ -146,14 +144,17 @@ def calibrate_by_speed(
         A drive lacks speed or grade, or is too short or too even.
     """
     nominal = nominal or nominal_of(base)
+    sampling = sampling or SpeedSampling()
     rows = tuple(
-        speed_rows(drive, base, mass, sample_time)
-        for drive, mass in zip(drives, masses, strict=True)
+        speed_rows(drive, base, mass, sampling) for drive, mass in zip(drives, masses, strict=True)
     )
-    fit = fit_speed_model(rows, nominal, sample_time)
+    fit = fit_speed_model(rows, nominal, sampling.sample_time)
     model = SpeedModel(
         mass=float(np.mean(masses)),
-        sample_time=sample_time,
+        sample_time=sampling.sample_time,
+        averaged=sampling.averaged,
+        slowest=sampling.slowest,
+        hardest=sampling.hardest,
         force_gain=nominal.force_gain,
         drag=nominal.drag,
         rolling_coefficient=nominal.rolling_coefficient,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
@@ -9,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 import typer
 
 from weighbridge.cli.progress import progress
-from weighbridge.cli.results import Kind, Result, inputs, refuse_results
-from weighbridge.cli.terminal import console, say
+from weighbridge.cli.results import Kind, Result, asked_for, inputs, refuse_results, write_json
+from weighbridge.cli.terminal import complain, console, say
 from weighbridge.cli.verbosity import say_written
 
 if TYPE_CHECKING:
@@ -40,6 +41,15 @@ def reproduce(
             help="Seed of the simulated drives; by default the one chosen for the paper.",
         ),
     ] = None,
+    json_path: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--json",
+            metavar="FILE",
+            help="Write every row to a file, or - for standard output: conditions, printed value, "
+            "ours, tolerance, verdict, reason.",
+        ),
+    ] = None,
     changes: Annotated[
         Optional[list[str]],  # noqa: UP045
         typer.Option(
@@ -50,10 +60,9 @@ def reproduce(
         ),
     ] = None,
 ) -> None:
-    """Reproduce a published system on simulated drives; exit status 1 if our result is worse.
+    """Reproduce a published system on simulated drives, and judge each printed value.
 
-    Figures that were made under other conditions than the paper's are marked. A sentence of a paper
-    that our drives do not confirm is "not found", and counts as behind.
+    The exit status is 1 if a value differs and no reason is given that a reader can check.
 
     Example: weighbridge reproduce jensen2022 --report jensen2022.html
     """
@@ -67,29 +76,38 @@ def reproduce(
     settings = _settings(paper, changes or [])
     pages = _pages(report, names, every=paper == "all")
     written = dict.fromkeys([*pages.values(), *([report] if report is not None else [])])
-    refuse_results(inputs(), [Result("--report", page, _kind(page)) for page in written])
-    behind: list[str] = []
-    sections: list[Section] = []
+    results = [Result("--report", page, _kind(page)) for page in written]
+    refuse_results(inputs(), [*results, *asked_for(json=json_path)])
+    aside = json_path == "-"
+    tell = complain if aside else say
+    every: list[Reproduced] = []
     for name in names:
         first = papers.seed_of(name) if seed is None else seed
         asked = (settings,) if settings is not None else ()
         with progress(f"reproducing {name}") as bar:
             done = papers.paper(name)(first, bar.tell, *asked)
         if changed := differences(settings) if settings is not None else "":
-            done = replace(done, title=f"{done.title}; {changed}")
-        show(done)
-        behind += [f"{name}: {figure}" for figure in done.behind]
-        if papers.items_of(name):
-            sections.append(papers.section_of(name, done))
+            done = replace(done, note=f"{done.note}; {changed}")
+        if not aside:
+            show(done)
+        every.append(done)
         if name in pages:
             done.write_report(pages[name])
-            say_written(pages[name])
+            say_written(pages[name], aside=aside)
     if report is not None and report not in pages.values():
-        _write_items(report, sections)
-        say_written(report)
-    for figure in behind:
-        say(f"behind, {figure}")
-    if behind:
+        _write_items(report, [done.section for done in every])
+        say_written(report, aside=aside)
+    rows = [row for done in every for row in done.rows]
+    if json_path is not None:
+        text = json.dumps({"rows": [r.record() for r in rows]}, ensure_ascii=False, indent=1)
+        if not write_json(json_path, text):
+            say_written(json_path)
+    told = [f"{sum(r.verdict is v for r in rows)} {v}" for v in papers.Verdict]
+    tell(f"{len(rows)} rows: {', '.join(told)}")
+    unaccounted = [row for row in rows if not row.accounted]
+    for row in unaccounted:
+        tell(f"differs without a reason, {row.paper}: {row.name}")
+    if unaccounted:
         raise typer.Exit(1)
 
 
@@ -132,8 +150,7 @@ def _write_items(report: Path, sections: list[Section]) -> None:
     if report.suffix.lower() == ".md":
         write_whole(report, document(sections))
         return
-    tables = [table for section in sections for table in section.tables]
-    write_study("The papers, item by item", tables, [], report)
+    write_study("The papers, row by row", [section.table for section in sections], [], report)
 
 
 def show(done: Reproduced) -> None:

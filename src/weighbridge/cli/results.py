@@ -29,7 +29,7 @@ Kind = Literal[
 # What a file of each kind shows at its beginning.
 _BEGINS: Final[dict[Kind, re.Pattern[bytes]]] = {
     "report": re.compile(rb"\A\s*<(?:!doctype\s+html|html)\b", re.IGNORECASE),
-    "list of items": re.compile(rb"\A# The papers, item by item\b"),
+    "list of items": re.compile(rb"\A# The papers, row by row\b"),
     "JSON file": re.compile(rb"\A\s*\{"),
     # Columns that no drive has and no truth; a Parquet file names them within its first page.
     "track": re.compile(rb"\A[^\r\n]*\btime_s\b[^\r\n]*(?:\bstd_kg\b|\bsprung_mass_std_kg\b)"),

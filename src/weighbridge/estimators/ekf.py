@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
 from weighbridge.balance.instants import SLOWEST_GEARED
-from weighbridge.balance.law import drag_factor, rotating_mass
+from weighbridge.balance.law import drag_factor, mass_column, rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import robust_rls
@@ -19,7 +19,7 @@ from weighbridge.estimators.gate import GateSettings
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import mass_ekf as kernel
 from weighbridge.kernels import robust_rls as rls_kernel
-from weighbridge.signals import Bools
+from weighbridge.signals import Bools, Floats
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive
 
@@ -49,6 +49,9 @@ class EkfFilter:
     offset_walk : change of that offset in one second [rad]
     gate : speed innovations beyond this many standard deviations are left out [-]; inf leaves none
         out, as the paper
+    jacobian_window : the model is linearised in the mass at the measured specific force, its mean
+        over so long about the row [s]. 0 for that of the model, as the paper: then noise of the
+        force draws the mass up. Noise of single rows would draw it down
     """
 
     start: robust_rls.RobustRlsFilter = field(default_factory=robust_rls.RobustRlsFilter)
@@ -63,6 +66,7 @@ class EkfFilter:
     grade_offset: float = 0.003
     offset_walk: float = 1e-4
     gate: float = 5.0
+    jacobian_window: float = 2.0
 
     def __post_init__(self) -> None:
         for name in ("start_std", "speed_noise", "grade_noise", "accel_walk"):
@@ -70,7 +74,8 @@ class EkfFilter:
         if not self.gate > 0.0:
             raise ConfigError(f"gate must be positive, got {self.gate}")
         positive("start_mass", self.start_mass)
-        for name in ("grade_walk", "mass_walk", "load_walk", "grade_offset", "offset_walk"):
+        for name in ("grade_walk", "mass_walk", "load_walk", "grade_offset", "offset_walk",
+                     "jacobian_window"):  # fmt: skip
             not_negative(name, getattr(self, name))
 
 
@@ -83,9 +88,16 @@ class EkfSettings(GateSettings, EkfFilter):
         GateSettings.__post_init__(self)
 
 
-def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Columns:
+def columns(
+    balance: ForceBalance, vehicle: Vehicle, valid: Bools, settings: EkfFilter
+) -> kernel.Columns:
     """Collect what the filter needs of each row."""
     table = balance.table
+    if settings.jacobian_window > 0.0:
+        measured = mass_column(table, vehicle)
+        regressor = around(table.time, measured, valid, settings.jacobian_window)
+    else:
+        regressor = np.full(table.time.size, np.nan)
     return kernel.Columns(
         time=table.time,
         traction=table.traction_force,
@@ -96,7 +108,28 @@ def columns(balance: ForceBalance, vehicle: Vehicle, valid: Bools) -> kernel.Col
         grade=table.grade,
         driven=valid & np.isfinite(table.grade),
         standing=np.asarray(table.speed < SLOWEST_GEARED),
+        regressor=regressor,
     )
+
+
+def around(time: Floats, values: Floats, valid: Bools, length: float) -> Floats:
+    """Mean of the valid rows within half of ``length`` [s] of each (n,); NaN where there is none.
+
+    Parameters
+    ----------
+    time : (n,) rising [s]
+    values : (n,)
+    valid : (n,)
+    length : [s]
+    """
+    known = valid & np.isfinite(values)
+    total = np.concatenate(([0.0], np.cumsum(np.where(known, values, 0.0))))
+    count = np.concatenate(([0], np.cumsum(known)))
+    first = np.searchsorted(time, time - 0.5 * length, side="left")
+    last = np.searchsorted(time, time + 0.5 * length, side="right")
+    inside = count[last] - count[first]
+    mean = (total[last] - total[first]) / np.maximum(inside, 1)
+    return np.where(inside > 0, mean, np.nan)
 
 
 def parameters(settings: EkfFilter, vehicle: Vehicle, period: float) -> kernel.MassEkfParams:
@@ -189,7 +222,7 @@ def estimate(
     )
     fit = robust_rls.window_fit(table.time, mean_phi, mean_y, rls_params)
     params = parameters(settings, vehicle, robust_rls.row_period(table.time))
-    rows = columns(balance, vehicle, valid)
+    rows = columns(balance, vehicle, valid, settings)
     informed = np.flatnonzero(information * rls_params.window >= settings.start.first_information)
     n = table.time.size
     mass, var, taken = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool)

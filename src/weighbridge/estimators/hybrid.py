@@ -131,7 +131,7 @@ def estimate(
     table = balance.table
     phi, y, valid = robust_rls.rows(table, vehicle, settings.ekf.start)
     params = parameters(settings, vehicle, robust_rls.row_period(table.time))
-    rows = ekf.columns(balance, vehicle, valid)
+    rows = ekf.columns(balance, vehicle, valid, settings.ekf)
     begin = robust_rls.initial_state(settings.ekf.start, params.rls.window)
     start = kernel.initial_state(begin, params)  # type: ignore[no-untyped-call]
     _, mass, var, share, _, _, mean_phi, mean_y, _, _ = kernel.run(start, rows, phi, y, params)

@@ -67,6 +67,10 @@ class RobustRlsFilter:
         is forgotten that is not replaced [(m/s^2)^2 s]; 0 forgets as the paper
     first_information : the same, from which a mass is told [(m/s^2)^2 s]
     threshold : Huber's, in standard deviations of the innovation [-]
+    threshold_force : the same in their place [N]
+    settle_windows : means that are folded in before the threshold holds
+    every_row : take every row of the moving vehicle, as the paper: braking, shifts and slip of the
+        clutch are left to Huber's weight
     weight_information : Huber's weight counts in the covariance, too; not so in eq. 20
     rolling_coefficient : in place of that of the vehicle file and its growth with speed [-];
         the paper's Table 1 has 0.0005
@@ -90,6 +94,9 @@ class RobustRlsFilter:
     kept_information: float = 10.0
     first_information: float = 1.0
     threshold: float = 1.5
+    threshold_force: float | None = None
+    settle_windows: int = 10
+    every_row: bool = False
     weight_information: bool = True
     rolling_coefficient: float | None = None
     sensor_ahead: float | None = None
@@ -102,9 +109,10 @@ class RobustRlsFilter:
             positive(name, getattr(self, name))
         for name in (
             "window", "start_mass", "start_information", "kept_information", "offset_std",
-            "rolling_coefficient",
+            "rolling_coefficient", "settle_windows",
         ):  # fmt: skip
             not_negative(name, getattr(self, name))
+        positive("threshold_force", self.threshold_force)
         if self.forgetting is not None and not 0.9 < self.forgetting <= 1.0:
             raise ConfigError(f"forgetting must be in (0.9, 1], got {self.forgetting:g}")
         within("sensor_ahead", self.sensor_ahead, -20.0, 20.0, "m")
@@ -127,7 +135,7 @@ class Known(NamedTuple):
 
 
 def as_set(balance: ForceBalance, vehicle: Vehicle, settings: RobustRlsFilter) -> Known:
-    """Return rows and vehicle as the settings have them: rolling resistance, bends."""
+    """Return rows and vehicle as the settings have them: rolling resistance, rows, bends."""
     if settings.rolling_coefficient is not None:
         load = replace(
             vehicle.road_load,
@@ -136,6 +144,10 @@ def as_set(balance: ForceBalance, vehicle: Vehicle, settings: RobustRlsFilter) -
         )
         vehicle = replace(vehicle, road_load=load)
     table = balance.table
+    if settings.every_row:
+        taken = np.where(table.moving, np.uint8(Reason.USED), table.reason)
+        table = replace(table, reason=taken)
+        balance = replace(balance, table=table)
     if settings.sensor_ahead is not None:
         # The rear axle does not drift: ahead of it the lateral speed is yaw rate times distance.
         turning = np.nan_to_num(yaw_rate(table.time, table.heading, 1.0 / row_period(table.time)))
@@ -180,9 +192,10 @@ def parameters(settings: RobustRlsFilter, period: float) -> kernel.RobustRlsPara
         forgetting=forgetting,
         kept_information=settings.kept_information / window,
         threshold=settings.threshold,
+        threshold_force=settings.threshold_force or 0.0,
         weight_information=settings.weight_information,
         scale_windows=100.0,
-        settle_windows=10,
+        settle_windows=settings.settle_windows,
         offset_std=settings.offset_std,
         offset_forgetting=float(np.exp(-window / settings.offset_memory)),
         noise_floor=NOISE_FLOOR,

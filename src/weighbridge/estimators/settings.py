@@ -15,6 +15,9 @@ from weighbridge.errors import ConfigError
 WORD: Final = re.compile(r"(?!(true|false|nan|inf)$)[a-z][a-z-]*")
 """A choice, which a command has without quotes."""
 
+LIST: Final = re.compile(r"[^\[\],\"]+(,[^\[\],\"]+)+")
+"""Numbers with commas between them, which a command has without brackets."""
+
 
 def changed(settings: Any, given: Mapping[str, object]) -> Any:
     """Return settings with some values changed; they check themselves.
@@ -59,11 +62,13 @@ def parsed(texts: Sequence[str]) -> dict[str, object]:
         if WORD.fullmatch(value):
             found[name] = value
             continue
+        whole = f"[{value}]" if LIST.fullmatch(value) else value
         try:
-            found[name] = tomllib.loads(f"value = {value}")["value"]
+            found[name] = tomllib.loads(f"value = {whole}")["value"]
         except tomllib.TOMLDecodeError:
             raise ConfigError(
-                f"{text!r}: a number, true, false, a word or [numbers] is expected after ="
+                f"{text!r}: a number, true, false, a word, or numbers with commas, is expected "
+                "after ="
             ) from None
     return found
 
@@ -111,7 +116,7 @@ def _like(old: Any, name: str, value: Any) -> Any:
         # An empty one says that there may be numbers; the settings know how many.
         fits = isinstance(value, list | tuple) and (not old or len(value) == len(old))
         fits = fits and all(isinstance(v, int | float) for v in value)
-        wanted = f"{len(old) or ''} numbers in brackets".strip()
+        wanted = f"{len(old) or ''} numbers with commas".strip()
         value = tuple(map(float, value)) if fits else value
     elif dataclasses.is_dataclass(old):
         fits, wanted = isinstance(value, type(old)), f"one of {', '.join(_values(old, f'{name}.'))}"

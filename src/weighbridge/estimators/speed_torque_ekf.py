@@ -74,9 +74,10 @@ CLOSE: Final = 0.003
 MOTION_STD: Final = 0.025
 """Relative standard deviation that speeds leave in a mass without an accelerometer [-]."""
 
-OTHER_MOTION_STD: Final = 0.06
+OTHER_MOTION_STD: Final = 0.02
 """The same where the vehicle file was made with an accelerometer [-]: its torque and delay are
-those against that sensor."""
+those against that sensor. 58 drives of twelve vehicles of the second model were off by 3.2 %
+(RMS), of which 2.1 % are of the calibration."""
 
 GRADE_STD: Final = 6.0
 """The same over how much surer or less sure the grade was in the calibration [1/rad]: made with a
@@ -112,8 +113,9 @@ class SpeedTorqueSettings(GateSettings):
     mass_walk : change of the inverse mass in one second, relative [-]
     gate : innovations beyond so many standard deviations are left out [-]
     measured_grade : take grades of a map or by heights; off, the slope is a state alone
-    measured_jacobian : linearise in the mass at the measured acceleration. Off, at that of the
-        model, as the paper does: then the driver's answer to hills and gusts is in the regressor
+    measured_jacobian : linearise in the mass at the best estimate of the acceleration, that of
+        `blended`. Off, at that of the model, as the paper does: then the driver's answer to hills
+        and gusts is in the regressor
     constant_errors : estimate drag area, cold start and offset of the torque beside the mass
     """
 
@@ -201,12 +203,15 @@ def run_filter(
     )
     first = settings.initial_mass or vehicle.tare or vehicle.of_class.typical_mass
     low, high = vehicle.of_class.mass_range
-    mass, levels = first, np.zeros(3)
+    mass, levels, measured = first, np.zeros(3), table
+    slope_var: Floats | float = math.nan
     for _ in range(ROUNDS):
         levels = _likeliest(balance, vehicle, settings, table, mass, levels)
         params = parameters(balance, vehicle, settings, mass, levels)
+        table = blended(measured, params, mass, slope_var)
         start = initial_state(balance, vehicle, settings, mass, params)
         _, x, var, innovation, _, taken = kernel.run(start, table, params)
+        slope_var = var[:, kernel.SLOPE]
         before, found = mass, float(1.0 / x[-1, kernel.INVERSE])
         mass = float(np.clip(found, low, high)) if found > 0.0 else high
         if abs(mass / before - 1.0) < CLOSE:
@@ -273,6 +278,44 @@ def parameters(
         mass_walk=(settings.mass_walk / mass) ** 2,
         gate=settings.gate,
     )
+
+
+def blended(
+    table: kernel.Columns,
+    params: kernel.SpeedTorqueParams,
+    mass: float,
+    slope_var: Floats | float = math.nan,
+) -> kernel.Columns:
+    """Take as acceleration the best estimate, of the measured one and the model's.
+
+    What multiplies the mass has noise in both: that of speed and slope in the measured one, that
+    of force and gusts in the model's. Alone, the first draws the mass down and the second up.
+    Weighed by their variances both cancel, as in Deming's regression.
+
+    Parameters
+    ----------
+    table : with the measured acceleration; NaN stays
+    params : with the levels of noise
+    mass : rough [kg]
+    slope_var : what is not known of the slope beside the measured grade, one or (n,): its variance
+        as a pass before left it; that of the prior where NaN [-]
+
+    References
+    ----------
+    Deming, Statistical Adjustment of Data, 1943, ch. 11.
+    """
+    speed, length = np.nan_to_num(table.speed), np.maximum(table.length, 1e-9)
+    air = speed + table.headwind
+    rolling = params.rolling + params.rolling_speed * speed
+    lifted = params.gravity * (np.sin(table.grade) + rolling * np.cos(table.grade))
+    pulled = (table.force - table.drag * air * np.abs(air)) / mass
+    model = (pulled - lifted) / (1.0 + table.rotating / mass)
+    gusts = 0.5 * (1.0 + (speed / params.gust_speed) ** 2)
+    of_force = gusts * params.accel_density / length + table.force_var / mass**2
+    unknown = np.where(np.isfinite(slope_var), slope_var, params.slope_var)
+    of_motion = 2.0 * params.speed_var / length**2 + params.gravity**2 * unknown
+    share = of_force / (of_force + of_motion)
+    return table._replace(accel=share * table.accel + (1.0 - share) * model)
 
 
 def initial_state(

@@ -23,6 +23,8 @@ class InertiaSettings:
     ----------
     range : least and largest parameter over that of the vehicle file [-]
     start_std : standard deviation of the inverse parameter at the start, relative [-]
+    start_velocity_std : of the velocities at the start [m/s], [rad/s]; for the filters without
+        jumps
     jump_rate : jumps expected per time [1/s]
     jump_std : standard deviation of the inverse parameter after a jump, relative [-]
     spawn : time between two hypotheses of a jump [s]
@@ -47,6 +49,7 @@ class InertiaSettings:
 
     range: tuple[float, float] = (0.125, 8.0)
     start_std: float = 1.0
+    start_velocity_std: float = 10.0
     jump_rate: float = 1e-4
     jump_std: float = 1.0
     spawn: float = 2e-3
@@ -72,7 +75,7 @@ class InertiaSettings:
         low, high = self.range
         if not 0.0 < low < 1.0 < high:
             raise ConfigError(f"range must be two numbers around 1, got {self.range}")
-        for name in ("start_std", "jump_rate", "jump_std", "spawn"):
+        for name in ("start_std", "start_velocity_std", "jump_rate", "jump_std", "spawn"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}")
         for name, count in (("process_densities", 6), ("noise_densities", 3)):

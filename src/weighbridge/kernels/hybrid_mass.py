@@ -92,7 +92,7 @@ class HybridState(NamedTuple):
 
 def initial_state(rls, params):
     """Start from a state of the least squares; the Kalman filter follows later."""
-    nothing = mass_ekf.Row(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, False)
+    nothing = mass_ekf.Row(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, False, 0.0)
     ekf = mass_ekf.initial_state(0.0, 0.0, nothing, params.ekf)
     return HybridState(rls, ekf, False, Rivals(0.0, 0.0, 0.0, 0.0, 0.0), 1.0, np.nan, np.nan)
 

@@ -57,6 +57,8 @@ class Row(NamedTuple):
     speed, grade : measured [m/s], [rad]; may be NaN
     driven : forces are known: no brake, no shift
     standing : the vehicle stands
+    regressor : measured specific force and rolling resistance over the mass, at which the model is
+        linearised in the mass; NaN to linearise at the model's own [m/s^2]
     """
 
     time: float
@@ -68,6 +70,7 @@ class Row(NamedTuple):
     grade: float
     driven: bool
     standing: bool
+    regressor: float
 
 
 class MassEkfState(NamedTuple):
@@ -130,7 +133,9 @@ def acceleration(speed, grade, mass, row, params):
     ----------
     Du et al. 2025, eqs. 22, 28; here without the small-angle approximation,
     with the slope of the rolling resistance and with the part of the rotating
-    mass in the derivative by mass.
+    mass in the derivative by mass. That is minus what multiplies the mass over the
+    inertia. By the model it holds the noise of the force, which draws the mass up:
+    the measured one does not.
     """
     air = speed + row.headwind
     sine, cosine = np.sin(grade), np.cos(grade)
@@ -142,7 +147,10 @@ def acceleration(speed, grade, mass, row, params):
         -2.0 * row.drag * abs(air) - mass * params.gravity * params.rolling_speed * cosine
     ) / inertia
     by_grade = -mass * params.gravity * (cosine - rolling * sine) / inertia
-    by_mass = -(weight + accel) / inertia
+    moved = weight + accel
+    if np.isfinite(row.regressor):
+        moved = row.regressor
+    by_mass = -moved / inertia
     return accel, by_speed, by_grade, by_mass
 
 
@@ -228,6 +236,7 @@ def step(state, row, params):
             row.grade,
             True,
             False,
+            0.5 * (before.regressor + row.regressor) - params.gravity * x[OFFSET],
         )
         accel, by_speed, by_grade, by_mass = acceleration(x[SPEED], x[GRADE], x[MASS], held, params)
         x[SPEED] += accel * span
@@ -274,6 +283,7 @@ def row_at(columns, k):
         columns.grade[k],
         columns.driven[k],
         columns.standing[k],
+        columns.regressor[k],
     )
 
 
@@ -289,6 +299,7 @@ class Columns(NamedTuple):
     grade: np.ndarray
     driven: np.ndarray
     standing: np.ndarray
+    regressor: np.ndarray
 
 
 @kernel

@@ -22,6 +22,7 @@ class RobustRlsParams(NamedTuple):
     kept_information : sum of squared regressors below which nothing is forgotten
         without being replaced: the guard against wind-up
     threshold : Huber's, in standard deviations of the innovation [-]
+    threshold_force : the same in their place [N]; 0 for none
     weight_information : Huber's weight counts in the information, too
     scale_windows : windows over which the innovation variance is averaged [-]
     settle_windows : windows before the threshold holds
@@ -39,6 +40,7 @@ class RobustRlsParams(NamedTuple):
     forgetting: float
     kept_information: float
     threshold: float
+    threshold_force: float
     weight_information: bool
     scale_windows: float
     settle_windows: int
@@ -133,7 +135,9 @@ def fold(state, phi, y, params):
     innovation = y - phi * state.mass - state.offset
     spread = 1.0 + phi * phi / mass_information(state, params)
     size = abs(innovation)
-    bound = params.threshold * np.sqrt(floor_var(state, params) * spread)
+    bound = params.threshold_force
+    if bound <= 0.0:
+        bound = params.threshold * np.sqrt(floor_var(state, params) * spread)
     settled = state.windows >= params.settle_windows
     weight = 1.0
     if settled and size > bound:

@@ -1,104 +1,220 @@
-"""What a paper says, where it is in the code, and our figure beside the printed one."""
+"""What a paper prints, what we find in its place, and whether both agree."""
 
 from __future__ import annotations
 
 import string
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any, Final
+
+import numpy as np
 
 from weighbridge.errors import ConfigError
 from weighbridge.report.table import Table
+from weighbridge.signals import Floats
 
-COLUMNS: Final = ("paper", "where", "as printed", "departure and why", "printed", "ours")
-"""Heads of the table of `items_table`."""
+COLUMNS: Final = (
+    "paper", "what", "conditions", "printed", "ours", "tolerance", "verdict", "reason and check",
+    "where",
+)  # fmt: skip
+"""Heads of the table of `Section`."""
 
-NOT_REPRODUCED: Final = "not run"
-"""Stands for a figure that this run did not make."""
+ROUNDING: Final = 1e-9
+"""Largest relative difference of one equation computed in two ways [-]."""
+
+EXACT: Final = "1e-9 of the value: rounding"
+"""Tolerance of an equation, which both sides compute at the same numbers."""
+
+
+class Conditions(StrEnum):
+    """Whose rules a figure is made by: the paper's, or those of weighbridge."""
+
+    PRINTED = "as printed"
+    OURS = "ours"
+
+
+class Verdict(StrEnum):
+    """What a figure of ours says of the printed one."""
+
+    AGREES = "agrees"
+    DIFFERS = "differs"
+    NOT_REPRODUCIBLE = "not reproducible"
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
-    """One equation, table or figure of a paper.
+class Found:
+    """One figure of a run.
 
     Attributes
     ----------
-    paper_item : as the paper numbers it: "eq. 5", "fig. 13, λ = 0.998"
-    where : place in the code or in the report
-    as_printed : the code does what is printed
-    departure : what differs and why; empty where nothing does
-    printed : the paper's figure; empty where it has none
-    ours : ours; ``{name}`` stands for the figure of that name in `Reproduced.figures`
-    like_for_like : ours was made under the conditions of the printed figure, as far as a
-        simulated drive can be; others are shown apart
+    text : as it is written beside the printed one
+    agrees : with the printed one, within the tolerance of its item
+    printed : the printed one, where it is computed, as that of an equation is
     """
 
-    paper_item: str
+    text: str
+    agrees: bool
+    printed: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Item:
+    """One numbered equation, table or figure of a paper, or a sentence of its text.
+
+    Attributes
+    ----------
+    item : as the paper numbers it: "eq. 5", "fig. 13", "sec. 4.2"
+    what : of it: "λ = 0.998"; empty for all of it
+    conditions : whose rules ours is made by
+    where : place in the code or in the report
+    printed : the paper's figure or claim; empty where that of the run is taken
+    ours : ``{name}`` stands for the figure of that name; empty where nothing can be compared
+    tolerance : up to what difference both agree, with its reason
+    why : what departs from print; of a figure that differs the reason, of an item without
+        ``ours`` why it is not reproducible
+    check : command by which a reader sees the reason of a difference
+    """
+
+    item: str
+    what: str = ""
+    conditions: Conditions = Conditions.PRINTED
     where: str
-    as_printed: bool
-    departure: str
-    printed: str
-    ours: str
-    like_for_like: bool
+    printed: str = ""
+    ours: str = ""
+    tolerance: str = ""
+    why: str = ""
+    check: str = ""
 
     def __post_init__(self) -> None:
-        if not self.as_printed and not self.departure:
-            raise ConfigError(f"{self.paper_item}: say what departs from print, and why")
+        if not self.ours and not self.why:
+            raise ConfigError(f"{self.item}: say why nothing is compared")
+        if self.ours and not self.tolerance:
+            raise ConfigError(f"{self.item}: say within what tolerance both agree, and why")
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the reproduced figures that ``ours`` asks for."""
+        """Names of the figures that ``ours`` asks for."""
         return tuple(name for _, name, _, _ in string.Formatter().parse(self.ours) if name)
 
-    def filled(self, figures: Mapping[str, str]) -> str:
-        """Return ``ours`` with today's figures; `NOT_REPRODUCED` for those that are missing."""
-        known = {name: figures.get(name, NOT_REPRODUCED) for name in self.names}
-        return self.ours.format_map(known)
+    def row(self, paper: str, figures: Mapping[str, Found]) -> Row:
+        """Judge the item by the figures of a run."""
+        asked = [figures[name] for name in self.names]
+        verdict = Verdict.NOT_REPRODUCIBLE
+        if asked:
+            verdict = Verdict.AGREES if all(f.agrees for f in asked) else Verdict.DIFFERS
+        return Row(
+            paper=paper,
+            item=self.item,
+            what=self.what,
+            conditions=self.conditions,
+            printed=self.printed or "; ".join(f.printed for f in asked),
+            ours=self.ours.format_map({n: figures[n].text for n in self.names}),
+            tolerance=self.tolerance,
+            verdict=verdict,
+            why=self.why,
+            check=self.check,
+            where=self.where,
+        )
 
 
-def items_table(
-    title: str, items: Iterable[Item], figures: Mapping[str, str], *, like_for_like: bool
-) -> Table:
-    """Return the items under like conditions, or those under others, in their order.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """An `Item` beside the figure of a run."""
+
+    paper: str
+    item: str
+    what: str
+    conditions: Conditions
+    printed: str
+    ours: str
+    tolerance: str
+    verdict: Verdict
+    why: str
+    check: str
+    where: str
+
+    @property
+    def accounted(self) -> bool:
+        """It agrees, or a reader can check why not."""
+        if self.verdict is Verdict.DIFFERS:
+            return bool(self.why and self.check)
+        return self.verdict is Verdict.AGREES or bool(self.why)
+
+    @property
+    def name(self) -> str:
+        """Item, what of it and by whose rules."""
+        return ", ".join(filter(None, (self.item, self.what, self.conditions)))
+
+    def record(self) -> dict[str, Any]:
+        """Return the row as JSON has it."""
+        return {key: str(value) for key, value in asdict(self).items()}
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The row as tables have it, in the order of `COLUMNS`."""
+        check = f"`{self.check}`" if self.check else ""
+        return (
+            self.item, self.what, self.conditions, self.printed, self.ours, self.tolerance,
+            self.verdict, listed(self.why, check), self.where,
+        )  # fmt: skip
+
+
+def same(
+    printed: float | Sequence[float] | Floats,
+    ours: float | Sequence[float] | Floats,
+    unit: str = "",
+) -> Found:
+    """Compare an equation as it is printed with the code, both at the same numbers.
 
     Parameters
     ----------
-    title : above the table
-    items : of one paper
-    figures : today's, by name
-    like_for_like : which of the two kinds
+    printed, ours : of one shape
+    unit : for people
     """
-    rows = tuple(
-        (
-            item.paper_item,
-            item.where,
-            "yes" if item.as_printed else "no",
-            item.departure,
-            item.printed,
-            item.filled(figures),
-        )
-        for item in items
-        if item.like_for_like is like_for_like
+    a, b = np.atleast_1d(np.asarray(printed, float)), np.atleast_1d(np.asarray(ours, float))
+    close = a.shape == b.shape and bool(
+        np.max(np.abs(a - b)) <= ROUNDING * max(float(np.max(np.abs(a))), 1e-300)
     )
-    return Table(title, COLUMNS, rows)
+    # One number stands for an array: the one that differs most, else the largest.
+    apart = np.abs(a - b) if a.shape == b.shape and np.any(a != b) else np.abs(a)
+    k = int(np.argmax(apart))
+    text = [f"{x.flat[k]:.9g} {unit}".strip() for x in (b, a)]
+    return Found(text[0], close, text[1])
 
 
-def tables(title: str, items: Sequence[Item], figures: Mapping[str, str]) -> tuple[Table, ...]:
-    """Return the table of like conditions first, then that of others, where there are such."""
-    both = (
-        items_table(f"{title}: conditions of the paper", items, figures, like_for_like=True),
-        items_table(f"{title}: other conditions", items, figures, like_for_like=False),
-    )
-    return tuple(table for table in both if table.rows)
+def listed(*parts: str) -> str:
+    """Write reasons one after another, those that are empty left out."""
+    return "; ".join(filter(None, parts))
 
 
-def markdown(table: Table) -> str:
-    """Write a table as Markdown, its title as a heading of the third level."""
-    lines = [f"### {table.title}", ""]
-    lines.append(_line(table.columns))
-    lines.append(_line(("---",) * len(table.columns)))
-    lines += [_line(row) for row in table.rows]
-    return "\n".join(lines) + "\n"
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """The rows of one paper.
+
+    Attributes
+    ----------
+    title : of the paper
+    note : on which seeds, and what they are apart from
+    rows : of a run
+    """
+
+    title: str
+    note: str
+    rows: tuple[Row, ...]
+
+    @property
+    def table(self) -> Table:
+        """All its rows."""
+        return Table(f"{self.title}, row by row", COLUMNS, tuple(r.cells for r in self.rows))
+
+    def markdown(self) -> str:
+        """Its note, how many rows agree, and its rows."""
+        count = {v: sum(r.verdict is v for r in self.rows) for v in Verdict}
+        said = ", ".join(f"{n} {verdict}" for verdict, n in count.items())
+        lines = [_line(COLUMNS), _line(("---",) * len(COLUMNS))]
+        lines += [_line(r.cells) for r in self.rows]
+        return f"{self.note}: {said}.\n\n" + "\n".join(lines) + "\n"
 
 
 def _line(cells: Iterable[str]) -> str:
@@ -106,41 +222,14 @@ def _line(cells: Iterable[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Section:
-    """The items of one paper with the figures of a run.
-
-    Attributes
-    ----------
-    title : of the paper
-    note : on which seeds, and what they are apart from
-    items : of the paper
-    figures : today's, by name
-    """
-
-    title: str
-    note: str
-    items: tuple[Item, ...]
-    figures: Mapping[str, str]
-
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """Like conditions first, others apart."""
-        return tables(self.title, self.items, self.figures)
-
-    def markdown(self) -> str:
-        """Its note and tables."""
-        return "\n".join([f"{self.note}\n", *map(markdown, self.tables)])
-
-
 def document(sections: Iterable[Section]) -> str:
-    """Write a page of Markdown with the items of several papers."""
+    """Write a page of Markdown with the rows of several papers."""
     parts = [
-        "# The papers, item by item\n",
+        "# The papers, row by row\n",
         "Written by `weighbridge reproduce all --report docs/papers.md`; the figures are of that "
-        "run. A paper's\nconditions come first: drives and inputs like its own, though simulated. "
-        "There, rows of *ours* are\nanother method. What was measured under other conditions "
-        "stands in a table of its own.\n",
+        "run.\nRows *as printed* follow the paper's own rules, on simulated drives. Rows of "
+        "*ours* are made by\nthe methods of weighbridge on the same drives. A row that differs "
+        "has its reason, and a command\nthat shows it. `--json FILE` writes the same rows.\n",
     ]
     for section in sections:
         parts += [f"## {section.title}\n", section.markdown()]

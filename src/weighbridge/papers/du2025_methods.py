@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
@@ -9,6 +10,7 @@ from typing import Final, TypeVar
 
 from weighbridge.balance import ForceBalance
 from weighbridge.estimators import MassTrack, ekf, hybrid, robust_rls
+from weighbridge.papers.claims import listed
 from weighbridge.report.style import BLUE, GREEN, ORANGE
 from weighbridge.vehicle.model import Vehicle
 
@@ -35,15 +37,6 @@ BAND: Final = 0.10
 
 COLOURS: Final = dict(zip(METHODS, (ORANGE, GREEN, BLUE), strict=True))
 
-PRINTED_ROLLING: Final[dict[str, float | None]] = {
-    "f = 0.0005": 0.0005,
-    "f = 0.005": 0.005,
-    "f of the tyres": None,
-}
-"""Rolling coefficients that the filters as printed are told: that of Table 1, ten times it, and
-that of the vehicle file, with its growth with speed."""
-
-
 PRINTED: Final = hybrid.HybridSettings(
     ekf=ekf.EkfFilter(
         start=robust_rls.RobustRlsFilter(
@@ -52,15 +45,83 @@ PRINTED: Final = hybrid.HybridSettings(
             kept_information=0.0,
             offset_std=0.0,
             weight_information=False,
+            every_row=True,
+            rolling_coefficient=0.0005,
         ),
         grade_offset=0.0,
         offset_walk=0.0,
+        gate=math.inf,
+        jacobian_window=0.0,
     ),
     blend=hybrid.Blend.SPEED,
 )
 """Each row by itself with a forgetting factor of 0.999, forgetting that never stops, no offset,
-Huber's weight in the gain alone, the blend by speed (eqs. 15-20, 34, Table 1). Q and R are ours,
-for the paper gives none, and so is P0, of which it says that it is typically the identity."""
+Huber's weight in the gain alone, the blend by speed (eqs. 15-20, 34, Table 1), every row of the
+moving bus. Q and R are ours, for the paper gives none, and so are P0, of which it says that it is
+typically the identity, Huber's c and the information at which the first mass is told."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Form:
+    """One reading of what the paper leaves open: rows, and the rolling coefficient.
+
+    Attributes
+    ----------
+    code : name of its figures
+    name : for people
+    rolling : coefficient that the filters are given; that of the vehicle file when None [-]
+    every_row : braking, shifts and slip are left to Huber's weight; else rows with a reason
+        against them are left out, and speeds of 5 standard deviations too
+    why, check : reason of a difference, and the command that shows it
+    """
+
+    code: str
+    name: str
+    rolling: float | None
+    every_row: bool
+    why: str
+    check: str
+
+    def of(self, settings: hybrid.HybridSettings) -> hybrid.HybridSettings:
+        """Return the printed settings in this reading."""
+        start = replace(
+            settings.ekf.start, rolling_coefficient=self.rolling, every_row=self.every_row
+        )
+        gate = math.inf if self.every_row else 5.0
+        return replace(settings, ekf=replace(settings.ekf, start=start, gate=gate))
+
+
+_COMMAND: Final = "weighbridge reproduce du2025"
+_BRAKED: Final = "brakings are rows without the brake's force, and Huber's threshold lets them in"
+_CALMER: Final = f"{_COMMAND} --set printed.ekf.start.threshold=0.5"
+_ROWS: Final = {
+    True: ("e", "every row", _BRAKED, _CALMER),
+    False: (
+        "l", "rows left out", "braking, shifts and slip are left out, which the paper does not "
+        "say", f"{_COMMAND} --set as_printed=true",
+    ),
+}  # fmt: skip
+_ROLLING: Final = {
+    "1": (0.0005, "f = 0.0005", "tyres have 0.0075 here, and each 0.001 less is 1.6 % of mass",
+          f"{_COMMAND} --set as_printed=true --set rolling_coefficient=0.0075"),
+    "10": (0.005, "f = 0.005", "tyres have 0.0075 here, and each 0.001 less is 1.6 % of mass",
+           f"{_COMMAND} --set as_printed=true --set rolling_coefficient=0.0075"),
+    "t": (None, "f of the tyres", "f is exact here, unlike in the paper", ""),
+}  # fmt: skip
+
+FORMS: Final = tuple(
+    Form(
+        code=f"{rows}{code}",
+        name=f"{words}, {name}",
+        rolling=rolling,
+        every_row=every,
+        why=listed(f_why, why),
+        check=check if every else f_check or check,
+    )
+    for every, (rows, words, why, check) in _ROWS.items()
+    for code, (rolling, name, f_why, f_check) in _ROLLING.items()
+)
+"""As printed first: every row, f = 0.0005."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +132,8 @@ class Settings:
     ----------
     ours, printed : of the blend and of both filters within it, by our defaults and as printed;
         ``printed.ekf.start.forgetting`` is the paper's λ
-    as_printed : take ``printed`` in place of ``ours``
+    as_printed : take ``printed`` in place of ``ours``, rows with a reason against them left out
+        where ``printed.ekf.start.every_row`` is false
     count_grade_twice : in the regressor, as eq. 14 is printed
     rolling_coefficient : that the filters are told in place of the vehicle's [-]
     blend : of the hybrid, short for ``ours.blend``; not when ``as_printed``
@@ -96,11 +158,6 @@ class Settings:
         if not self.as_printed and self.blend is not hybrid.HybridSettings().blend:
             whole = replace(whole, blend=self.blend)
         return replace(whole, ekf=replace(whole.ekf, start=least))
-
-    def started_within(self, std: float) -> Settings:
-        """Return the same with another start of the printed Kalman filter, relative [-]."""
-        kalman = replace(self.printed.ekf, start_std=std)
-        return replace(self, printed=replace(self.printed, ekf=kalman))
 
     def blended(self, blend: hybrid.Blend) -> Settings:
         """Return the same with another blend of ours."""

@@ -7,7 +7,7 @@ import numpy as np
 from weighbridge.balance import ForceBalance
 from weighbridge.estimators import MassTrack, hybrid
 from weighbridge.papers.du2025_bus import LOADS
-from weighbridge.papers.du2025_methods import BAND, COLOURS
+from weighbridge.papers.du2025_methods import BAND, COLOURS, FORMS
 from weighbridge.papers.du2025_results import Reproduction
 from weighbridge.report.style import BLUE, GREY, VERMILLION, Panel, blank, line
 from weighbridge.signals.units import from_si
@@ -19,12 +19,22 @@ def panels(done: Reproduction) -> tuple[Panel, ...]:
     first = {d.load: d for d in reversed(done.drives)}
     for number, load in enumerate(LOADS):
         d = first[load]
+        letter = "a" if number == 0 else ""
+        for form in FORMS:
+            drawn.append(
+                mass_panel(
+                    d.printed_tracks[form.code],
+                    f"Fig. {5 + number}{letter}: mass, {load}, {form.name}",
+                    f"Running mass of the paper's three filters, seed {d.seed}; true mass "
+                    f"{d.true_mass:.0f} kg, dotted at 10 % of it.",
+                    true_mass=d.true_mass,
+                )
+            )
         drawn.append(
             mass_panel(
                 d.tracks,
-                f"Fig. {5 + number}{'a' if number == 0 else ''}: mass, {load}",
-                f"Running mass of the three methods, seed {d.seed}; true mass "
-                f"{d.true_mass:.0f} kg, dotted at 10 % of it.",
+                f"The same drive by our filters: mass, {load}",
+                f"Running mass of the three methods, told the tyres' rolling, seed {d.seed}.",
                 true_mass=d.true_mass,
             )
         )

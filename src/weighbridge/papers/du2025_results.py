@@ -14,6 +14,23 @@ from weighbridge.vehicle.model import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Opposite:
+    """Both filters as printed where their errors have opposite signs.
+
+    Attributes
+    ----------
+    part : of the rows from `CONVERGED` where the signs differ [-]
+    share : of the least squares in the best blend of a constant share, from 0 to 1 [-]
+    parts, blended : RMSE of least squares and Kalman filter, and of that blend [kg]
+    """
+
+    part: float
+    share: float
+    parts: tuple[float, float]
+    blended: float
+
+
+@dataclass(slots=True, kw_only=True)
 class DriveResult:
     """How one drive went, by method.
 
@@ -31,12 +48,15 @@ class DriveResult:
     steady_at : time since the start from when on the running mass stays within `BAND` [s]
     twice_rmse : of robust-rls with the grade counted twice, from the first mass told [kg]
     blends : ``late_rmse`` of the hybrid by its blend
-    printed : ``late_rmse`` of each method as printed, by `PRINTED_ROLLING`; empty where the bus
-        is not known
+    printed : ``late_rmse`` of each method as printed, by the code of a `Form`; empty where the
+        bus is not known
     printed_mean : mean error of the running mass of the same [kg]
     printed_worst : largest relative error of the running mass of the same from `CONVERGED` [-]
-    printed_unit_start : ``printed`` with a first variance of the mass of 1 kg², P0 = I
     printed_told : what the running mass of the same does, method by method
+    printed_tracks : their tracks with f = 0.005, by the code of the form
+    unit_start : ``printed`` of the Kalman filter, first form, with a first variance of the mass
+        of 1 kg², P0 = I [kg]
+    opposite : errors of opposite sign, `Opposite`; None where the bus is not known
     """
 
     load: str
@@ -54,8 +74,10 @@ class DriveResult:
     printed: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_mean: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_worst: dict[str, dict[str, float]] = field(default_factory=dict)
-    printed_unit_start: dict[str, dict[str, float]] = field(default_factory=dict)
     printed_told: dict[str, dict[str, Told]] = field(default_factory=dict)
+    printed_tracks: dict[str, dict[str, MassTrack]] = field(default_factory=dict)
+    unit_start: float = float("nan")
+    opposite: Opposite | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +109,7 @@ def cell(
     load : of `LOADS`
     method : of `METHODS`
     name : field of `DriveResult`
-    form : of `PRINTED_ROLLING`, where the field has one value for each
+    form : code of a `Form`, where the field has one value for each
     """
     values = [getattr(d, name) for d in drives if d.load == load]
     return np.array([(v[form] if form else v)[method] for v in values])

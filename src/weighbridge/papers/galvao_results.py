@@ -46,6 +46,14 @@ class Test:
         """Relative error of the mean mass of a run [-]."""
         return run.answer / self.mass - 1.0
 
+    @property
+    def superimposed(self) -> tuple[float, float]:
+        """How far the model's speed is off, RMS [m/s], and the part of the speed it explains."""
+        known = np.isfinite(self.predicted)
+        left = (self.rows.speed - self.predicted)[known]
+        part = 1.0 - np.var(left) / np.var(self.rows.speed[known])
+        return float(np.sqrt(np.mean(left**2))), float(part)
+
     def band(self, run: FilterRun) -> float:
         """Widest half of the 95 % band over the last samples used [kg]."""
         return float(np.max(1.96 * run.std[run.used][-LAST:]))

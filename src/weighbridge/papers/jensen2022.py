@@ -14,12 +14,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from weighbridge.papers.jensen2022_drives import TABLE_B1, scenario
+from weighbridge.papers.jensen2022_found import found
 from weighbridge.papers.jensen2022_items import ITEMS
 from weighbridge.papers.jensen2022_reproduction import SEED, Reproduction, Settings, reproduce
 from weighbridge.papers.jensen2022_tables import (
-    comparisons,
     drives_table,
-    figures,
+    highway_table,
     parameters_table,
 )
 from weighbridge.papers.reproduced import Progress, Reproduced
@@ -72,10 +72,14 @@ def as_reproduced(done: Reproduction) -> Reproduced:
 
     seeds = f"seeds {done.seed} to {done.last_seed}"
     apart = "which no choice of the weighing was made on" if done.seed >= SEED else "not held out"
+    figures = found(done)
     return Reproduced(
-        title=f"Jensen et al. 2022, {seeds}, {apart}",
-        tables=(drives_table(done), parameters_table(done)),
-        comparisons=comparisons(done),
+        title="Jensen et al. 2022",
+        note=f"{seeds}, {apart}",
+        tables=(drives_table(done), parameters_table(done), highway_table(done)),
+        # A part of the drives makes a part of the figures.
+        rows=tuple(
+            item.row("jensen2022", figures) for item in ITEMS if set(item.names) <= set(figures)
+        ),
         write_page=write,
-        figures=figures(done),
     )

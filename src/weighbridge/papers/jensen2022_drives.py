@@ -11,7 +11,7 @@ import numpy as np
 from weighbridge.errors import ConfigError
 from weighbridge.signals import Drive
 from weighbridge.signals.units import scalar_from_si, scalar_to_si
-from weighbridge.simulation import make_scenario
+from weighbridge.simulation import Effects, make_scenario
 
 if TYPE_CHECKING:
     from weighbridge.simulation import Scenario
@@ -31,6 +31,8 @@ class Conditions:
     wind : factor on the wind of every drive of Table B.1 [-]
     high_wind, low_wind : of the two highway drives, at 10 m [m/s]; the paper's are in figures
     cold : how much of the warming of engine and tyres there is [-]; 0 for warm drives
+    ideal : nothing but eq. 1 acts on the car, and the inertial noise is the only error: no wind, no
+        slip, no lean of the body, no lateness
     """
 
     tyre_under: float = 1.13
@@ -41,11 +43,18 @@ class Conditions:
     high_wind: float = 9.0
     low_wind: float = 1.5
     cold: float = 1.0
+    ideal: bool = False
 
     def __post_init__(self) -> None:
         for name in ("wind", "high_wind", "low_wind", "cold", "one_window", "two_windows"):
             if not getattr(self, name) >= 0.0:
                 raise ConfigError(f"{name} must be zero or positive, got {getattr(self, name):g}")
+
+    def of(self, made: Scenario) -> Scenario:
+        """Return a scenario as it is, or that by eq. 1 alone."""
+        if not self.ideal:
+            return made
+        return replace(made, effects=Effects.only(imu_noise=1.0), wind_speed=0.0)
 
 
 CONDITIONS: Final = Conditions()
@@ -155,7 +164,7 @@ def scenario(drive: TestDrive, *, seed: int, conditions: Conditions = CONDITIONS
     turn = HIGHWAY_BEARING - float(np.mean(route.heading[out]))
     tyres = {-0.5: conditions.tyre_under, 0.0: 1.0, 0.5: conditions.tyre_over}
     drag = (0.0, conditions.one_window, conditions.two_windows)
-    return replace(
+    chosen = replace(
         made,
         route=replace(route, heading=route.heading + turn),
         effects=replace(made.effects, warm_up=conditions.cold * drive.cooled),
@@ -166,6 +175,7 @@ def scenario(drive: TestDrive, *, seed: int, conditions: Conditions = CONDITIONS
         wind_speed=conditions.wind * drive.wind_speed,
         wind_from=drive.wind_from,
     )
+    return conditions.of(chosen)
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +225,7 @@ def highway_scenario(
     turn = HIGHWAY_BEARING - math.pi - float(np.mean(route.heading[out]))
     mean, swing = 0.5 * (trip.fastest + trip.slowest), 0.5 * (trip.fastest - trip.slowest)
     held = mean + swing * np.sin(2.0 * math.pi * np.arange(highway.size) / 4000.0)
-    return replace(
+    chosen = replace(
         made,
         route=replace(
             route,
@@ -227,6 +237,7 @@ def highway_scenario(
         wind_speed=conditions.high_wind if trip.wind == "high" else conditions.low_wind,
         wind_from=trip.wind_from,
     )
+    return conditions.of(chosen)
 
 
 def without_weather(drive: Drive) -> Drive:

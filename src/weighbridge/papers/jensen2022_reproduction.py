@@ -12,7 +12,6 @@ from weighbridge.calibration.run import run_calibration
 from weighbridge.calibration.settings import CalibrationSettings
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.rls import RlsSettings, estimate
-from weighbridge.navigation.select import find_motion
 from weighbridge.papers.jensen2022_drives import (
     HIGHWAY_TRIPS,
     TABLE_B1,
@@ -38,7 +37,7 @@ from weighbridge.papers.jensen2022_printed import (
     pulling,
     weigh_as_printed,
 )
-from weighbridge.papers.reproduced import Progress, rms
+from weighbridge.papers.reproduced import Progress
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.results.calibration import Calibration
 from weighbridge.signals import Drive, Floats
@@ -48,9 +47,6 @@ from weighbridge.vehicle.model import Vehicle
 SEED: Final = 172_000
 """First seed of a reproduction: no choice of the weighing was made on seeds 172000 and up. Tuning
 saw 1-60, 500-520, 777-795, 2022-2040 and 3000-3020."""
-
-OUTAGE: Final = (2400.0, 2520.0)
-"""The 120 s without fixes that are tried on drive 1 [s]."""
 
 LOADED: Final = (4, 5, 6, 7, 8)
 """Drives of figs. 8b, 12 and 13."""
@@ -129,14 +125,13 @@ class Reproduction:
     calibration : ours, from the separate drive
     car : that of ``calibration``, with a tare
     printed_car : by the paper's rules, from the same drive
+    control : by the paper's rules, from the same drive with nothing but eq. 1 acting on the car
     ratio_errors, printed_ratio_errors : (7,) relative, of the gearings [-]
     drives : the 18 drives by our ``rls``, the wind unknown as in the paper
-    informed : the same drives with the weather report of the day
     printed : the same drives by the paper's rules, the wind unknown
     loads, printed_loads : torques of drives 4-8, ours and by the paper's rules (fig. 8b)
     sample : drive 1
     highways, printed_highways : trips of fig. 16
-    outage_grade_rms : grade error within the outage with and without fixes [rad]
     gradient : the runs of fig. 5
     """
 
@@ -145,17 +140,16 @@ class Reproduction:
     calibration: Calibration
     car: Vehicle
     printed_car: PrintedCar
+    control: PrintedCar
     ratio_errors: Floats
     printed_ratio_errors: Floats
     drives: tuple[DriveResult, ...]
-    informed: tuple[DriveResult, ...]
     printed: tuple[DriveResult, ...]
     loads: tuple[Torques, ...]
     printed_loads: tuple[Torques, ...]
     sample: Sample
     highways: tuple[HighwayResult, ...]
     printed_highways: tuple[HighwayResult, ...]
-    outage_grade_rms: tuple[float, float]
     gradient: tuple[GradientRun, ...] = ()
 
     @property
@@ -184,17 +178,19 @@ def reproduce(
     progress : called with drives done and drives in all
     """
     settings = settings or Settings()
-    total = len(drives) + len(trips) + 3
-    known = simulate_car(make_scenario("car-calibration", seed=seed))
+    total = len(drives) + len(trips) + 2
+    usual = make_scenario("car-calibration", seed=seed)
+    known = simulate_car(settings.conditions.of(usual))
     mass = float(np.mean(known.truth.mass))
     fit = CalibrationSettings(method="rls", curved=settings.curved)
     unaware = without_weather(known.drive)
     calibration = run_calibration(unaware, mass, settings=fit)
-    car, informed_car = (
-        replace(made.vehicle, name="Audi A4 2.0 (simulated)", tare=MIDSIZE.mass)
-        for made in (calibration, run_calibration(known.drive, mass, settings=fit))
+    car = replace(calibration.vehicle, name="Audi A4 2.0 (simulated)", tare=MIDSIZE.mass)
+    cars = _Cars(car, calibrate_as_printed(unaware, mass, settings.printed))
+    ideal = simulate_car(Conditions(ideal=True).of(usual))
+    control = calibrate_as_printed(
+        without_weather(ideal.drive), float(np.mean(ideal.truth.mass)), settings.printed
     )
-    cars = _Cars(car, informed_car, calibrate_as_printed(unaware, mass, settings.printed))
     if progress:
         progress(1, total)
     done: list[_Weighed] = []
@@ -207,11 +203,8 @@ def reproduce(
         ways.append(_driven(trip, seed + k, cars, settings))
         if progress:
             progress(1 + k, total)
-    outage = _outage(drives[0], car, seed + 1, settings)
-    if progress:
-        progress(total - 1, total)
     last = seed + len(drives) + len(trips)
-    gradient = gradient_runs(last + 1, car, cars.printed, settings.printed)
+    gradient = gradient_runs(last + 1, car, cars.printed, settings.printed, settings.conditions)
     if progress:
         progress(total, total)
     return Reproduction(
@@ -220,36 +213,33 @@ def reproduce(
         calibration=calibration,
         car=car,
         printed_car=cars.printed,
+        control=control,
         ratio_errors=_ratio_errors(car),
         printed_ratio_errors=_ratio_errors(cars.printed.vehicle),
         drives=tuple(d.ours for d in done),
-        informed=tuple(d.informed for d in done),
         printed=tuple(d.printed for d in done),
         loads=tuple(d.torques for d in done if d.ours.drive.number in LOADED),
         printed_loads=tuple(d.printed_torques for d in done if d.ours.drive.number in LOADED),
         sample=done[0].sample,
         highways=tuple(ours for ours, _ in ways),
         printed_highways=tuple(printed for _, printed in ways),
-        outage_grade_rms=outage,
         gradient=gradient,
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Cars:
-    """The car as the three ways of weighing know it."""
+    """The car as the two ways of weighing know it."""
 
     ours: Vehicle
-    informed: Vehicle
     printed: PrintedCar
 
 
 @dataclass(frozen=True, slots=True)
 class _Weighed:
-    """One drive of the table, three ways."""
+    """One drive of the table, both ways."""
 
     ours: DriveResult
-    informed: DriveResult
     printed: DriveResult
     torques: Torques
     printed_torques: Torques
@@ -261,7 +251,6 @@ def _weighed(row: TestDrive, seed: int, cars: _Cars, settings: Settings) -> _Wei
     made = simulate_car(scenario(row, seed=seed, conditions=settings.conditions))
     drive, own = without_weather(made.drive), _own(settings)
     ours = judge(row, made, weigh(drive, cars.ours, method="rls", settings=own))
-    informed = judge(row, made, weigh(made.drive, cars.informed, method="rls", settings=own))
     printed = judge_track(row, made, weigh_as_printed(drive, cars.printed, settings.printed))
     mass, by_print = ours.true_mass, cars.printed.vehicle
     efficiency = settings.printed.engine_efficiency
@@ -269,7 +258,6 @@ def _weighed(row: TestDrive, seed: int, cars: _Cars, settings: Settings) -> _Wei
     three = torques(drive, printed.balance, by_print, mass, rows, efficiency=efficiency)
     return _Weighed(
         ours=ours,
-        informed=informed,
         printed=printed,
         torques=torques(
             drive, ours.balance, cars.ours, mass, ours.track.used, efficiency=efficiency
@@ -310,20 +298,6 @@ def _ratio_errors(car: Vehicle) -> Floats:
     if found.size != true.size:
         return np.full(true.size, np.inf)
     return np.asarray(found / true - 1.0)
-
-
-def _outage(row: TestDrive, car: Vehicle, seed: int, settings: Settings) -> tuple[float, float]:
-    """Grade error within `OUTAGE` [rad], without and with fixes in it."""
-    errors = []
-    for outages in ((OUTAGE,), ()):
-        chosen = scenario(row, seed=seed, conditions=settings.conditions)
-        chosen = replace(chosen, sensors=replace(chosen.sensors, gnss_outages=outages))
-        made = simulate_car(chosen)
-        motion = find_motion(made.drive, car)
-        inside = (motion.time >= OUTAGE[0]) & (motion.time <= OUTAGE[1])
-        true = np.interp(motion.time, made.truth.time, made.truth.grade)
-        errors.append(rms((motion.grade - true)[inside]))
-    return errors[0], errors[1]
 
 
 def perturbed(

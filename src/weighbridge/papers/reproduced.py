@@ -1,51 +1,19 @@
-"""What every reproduction answers: tables, its figures against the paper's, a report."""
+"""What every reproduction answers: tables, its rows beside the paper's, a report."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from weighbridge.papers.claims import Row, Section, Verdict
 from weighbridge.report.table import Table
 from weighbridge.signals import Floats
 
 Progress = Callable[[int, int], None]
 """Called with steps done and steps in all."""
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """One figure beside the paper's.
-
-    Attributes
-    ----------
-    figure : what is compared
-    theirs, ours : as printed; ``theirs`` is empty where the paper has none
-    good : False where ours falls behind
-    like_for_like : ours was made under the conditions of the printed figure, as far as a
-        simulated drive can be; where it was not, it is never ahead
-    claim : ``theirs`` is a sentence of the paper, which our figure bears out or not
-    """
-
-    figure: str
-    theirs: str
-    ours: str
-    good: bool
-    like_for_like: bool = True
-    claim: bool = False
-
-    @property
-    def short(self) -> str:
-        """What ours is where it is not ``good``."""
-        return "not found" if self.claim else "behind"
-
-    @property
-    def verdict(self) -> str:
-        """What stands beside the figures."""
-        told = ((self.short, not self.good), ("other conditions", not self.like_for_like))
-        return ", ".join(word for word, so in told if so)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,27 +22,36 @@ class Reproduced:
 
     Attributes
     ----------
-    title : paper and what was done
+    title : of the paper
+    note : which drives, and what they are apart from
     tables : of single drives or parameters
-    comparisons : figures beside the paper's
+    rows : its equations, tables and figures, judged
     write_page : write a page of the given tables and the paper's figures from our data
-    figures : values by name, that `weighbridge.papers.claims.Item.ours` may ask for
     """
 
     title: str
+    note: str
     tables: tuple[Table, ...]
-    comparisons: tuple[Comparison, ...]
+    rows: tuple[Row, ...]
     write_page: Callable[[Sequence[Table], Path], None]
-    figures: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def comparison(self) -> Table:
-        """The figures beside the paper's, those behind or of other conditions marked."""
+        """The rows in which something is compared, for a terminal."""
         return Table(
-            self.title,
-            ("figure", "paper", "ours", ""),
-            tuple((c.figure, c.theirs, c.ours, c.verdict) for c in self.comparisons),
+            f"{self.title}, {self.note}",
+            ("paper", "what", "conditions", "printed", "ours", "verdict"),
+            tuple(
+                (r.item, r.what, r.conditions, r.printed, r.ours, r.verdict)
+                for r in self.rows
+                if r.verdict is not Verdict.NOT_REPRODUCIBLE
+            ),
         )
+
+    @property
+    def section(self) -> Section:
+        """The rows as a list of items has them."""
+        return Section(title=self.title, note=self.note, rows=self.rows)
 
     def write_report(self, path: Path) -> None:
         """Write a page that begins with what the paper has and what we have.
@@ -84,19 +61,12 @@ class Reproduced:
         ConfigError
             The file cannot be written.
         """
-        self.write_page((self.comparison, *self.tables), path)
+        self.write_page((self.section.table, *self.tables), path)
 
     @property
-    def behind(self) -> tuple[str, ...]:
-        """Names of the figures that fall behind, of claims that were not found, and how so."""
-        return tuple(map(_told, (c for c in self.comparisons if not c.good)))
-
-
-def _told(row: Comparison) -> str:
-    """Name a row that falls behind, with what limits the word."""
-    marks = (("other conditions", not row.like_for_like), (row.short, row.claim))
-    said = ", ".join(word for word, so in marks if so)
-    return f"{row.figure} ({said})" if said else row.figure
+    def unaccounted(self) -> tuple[str, ...]:
+        """Names of the rows that differ without a reason that a reader can check."""
+        return tuple(r.name for r in self.rows if not r.accounted)
 
 
 def rms(values: Floats) -> float:

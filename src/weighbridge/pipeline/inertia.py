@@ -148,10 +148,15 @@ def _estimate(
             "and axle distances, as in examples/ride-truck/vehicle.toml"
         )
 
-    def nothing(status: Status, refusal: Problem, problems: tuple[Problem, ...] = ()) -> Inertia:
+    def nothing(
+        status: Status,
+        refusal: Problem,
+        problems: tuple[Problem, ...] = (),
+        track: InertiaTrack | None = None,
+    ) -> Inertia:
         return Inertia(
-            drive=drive, vehicle=vehicle, method=chosen, status=status, refusal=refusal, track=None,
-            suspension=None, model_std=np.zeros(3), segments=(), problems=problems,
+            drive=drive, vehicle=vehicle, method=chosen, status=status, refusal=refusal,
+            track=track, suspension=None, model_std=np.zeros(3), segments=(), problems=problems,
         )  # fmt: skip
 
     if lacking := drive.missing(NEEDED):
@@ -191,6 +196,7 @@ def _estimate(
             Status.NOT_EXCITED,
             Problem.of("ride.filter_stuck", method=chosen, other=DEFAULT_METHOD),
             problems,
+            track,
         )
     return _judged(drive, vehicle, ride, samples, track, seen.slope, problems)
 

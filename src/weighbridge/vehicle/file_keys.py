@@ -239,7 +239,10 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
         SpeedModel,
         (
             Key("mass", "mass", "known mass of the fit; the filter starts there", suffix="kg"),
-            Key("sample_time", "sample_time", "windows of the speed's means", suffix="s"),
+            Key("sample_time", "sample_time", "between samples of the speed", suffix="s"),
+            Key("averaged", "averaged", "part of it over which the speed is averaged"),
+            Key("slowest", "slowest", "slower samples are off", suffix="mps"),
+            Key("hardest", "hardest", "samples that slow down by more are off", suffix="mps2"),
             Key("force_gain_per_m", "force_gain", "a1, traction force per engine torque"),
             Key("drag_kg_per_m", "drag", "a2, air density times drag area"),
             Key("rolling_coefficient", "rolling_coefficient", "f_r, rolling resistance / weight"),
