@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from weighbridge.estimators.noisy_motion import attenuation, unmeasured_noise
+from weighbridge.estimators.noisy_motion import attenuation, left_open, unmeasured_noise
 from weighbridge.kernels import disturbance as kernel
 
 MASS = 1500.0
@@ -65,3 +65,9 @@ def test_each_load_counts_its_own_windows():
     low = attenuation(weight, np.full(5, 0.02), mass_var, begins)
     noise = np.array([0.06, 0.06, 0.07, 0.07, 0.2])
     assert_allclose(low, noise / (1.0 - noise))
+
+
+def test_where_most_is_noise_the_mass_is_left_open():
+    most = attenuation(np.ones(1), np.full(1, 0.7), np.ones(1), np.zeros(1, dtype=bool))[0]
+    assert left_open(most, 0.1) == 1.0
+    assert left_open(0.9 * most, 0.1) == pytest.approx(0.09 * most)

@@ -179,6 +179,21 @@ def too_low(noise: Floats) -> Floats:
     return np.asarray(1.0 / (1.0 - np.minimum(noise, MOSTLY)) - 1.0)
 
 
+def left_open(low: float, unsure: float) -> float:
+    """Standard deviation of a mass that was raised by a part of itself, over it [-].
+
+    Parameters
+    ----------
+    low : by which it was raised [-]
+    unsure : standard deviation of the noise, over it [-]
+
+    Returns
+    -------
+    One where most of the information is noise: then nothing tells how much of it is not.
+    """
+    return unsure * low if low < 1.0 / (1.0 - MOSTLY) - 1.0 else 1.0
+
+
 MOSTLY: Final = 0.5
 """Part of the information that counts as noise, at most [-]: beyond nothing is left to be told."""
 

@@ -57,6 +57,7 @@ from weighbridge.estimators.noisy_motion import (
     MotionNoise,
     attenuation,
     learnt_noise,
+    left_open,
     unmeasured_noise,
 )
 from weighbridge.estimators.squat import ResidualSquat, residual_squat
@@ -341,7 +342,7 @@ def _track(
         inertia_relative_std(vehicle, mass, table.accel, phi, used),
         UNMODELLED * fit_consider_std(vehicle, moved, mass),
         shape_std(_moved(problem, solved, cut.mean(bends)), mass),
-        unsure * float(low[-1]),
+        left_open(float(low[-1]), unsure),
     )
     std = float(np.hypot(UNMODELLED * stds[-1], mass * systematic))
     last = np.searchsorted(time, table.time, side="right") - 1
