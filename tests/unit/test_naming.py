@@ -203,9 +203,9 @@ BY_VALUES = {("battery_voltage", "module_voltage"), ("battery_voltage", ""), ("v
 @pytest.mark.parametrize("round", [1, 2, 3])
 def test_tools_that_nothing_was_made_for(round):
     """Of the columns that weigh 0.79, 0.76 and 0.82 were named before; rounds 2 and 3 had 0.88 and
-    0.92 when they were first looked at."""
+    0.92 when they were first looked at. Lists of round 3 that no source states are left out."""
     lists = [told["columns"] for told in TOOLS.values() if told["round"] == round]
-    assert len(lists) >= 12
+    assert len(lists) >= 6
     pairs = [
         (found, meant.split("|"))
         for columns in lists
