@@ -85,12 +85,19 @@ def test_pound_feet_and_thousandths_are_units(tmp_path):
     assert np.isclose(columns["engine_torque"].low, 1.0)
 
 
+def test_words_behind_the_numbers_of_a_column_are_no_unit(tmp_path):
+    rows = [f"{k},{50 + k % 2} or so,{k}" for k in range(ROWS)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["Time (s),Speed (km/h),Load (%)", *rows]))
+    assert {c.quantity: c.unit for c in draft(path).known}["vehicle_speed"] == "kmh"
+
+
 def test_cells_that_are_no_numbers_are_shown(tmp_path):
-    rows = [f"{k},{50 + k % 2} km/h,{k}" for k in range(ROWS)]
+    rows = [f"{k},v{50 + k % 2},{k}" for k in range(ROWS)]
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["Time (s),Speed (km/h),Load (%)", *rows]))
     (doubt,) = (d for d in draft(path).all_doubts if "Speed" in d)
-    assert "its cells are no numbers, such as '50 km/h'" in doubt
+    assert "its cells are no numbers, such as 'v50'" in doubt
 
 
 def test_lines_that_end_in_carriage_returns_alone_are_told(tmp_path):

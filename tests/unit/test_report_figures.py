@@ -33,23 +33,23 @@ from weighbridge.report.thinning import LINE_POINTS, single
 def test_a_method_that_does_not_fit_is_marked_in_table_and_figure(tmp_path):
     w = weighed_by_rls()
     methods = [m for m in compare(w) if np.isfinite(m.mass)]
-    far = next(m for m in methods if m.method == "ekf")
+    far = next(m for m in methods if m.method == "hybrid")
     other = replace(far, result=replace(far.result, mass=1.3 * w.mass))
     section = methods_section(w, [w, other], None)
     assert section.table.marked == (1,)
     assert [row[5] for row in section.table.rows] == ["the answer", "does not fit"]
     marks = {t.y[0]: t.marker.symbol for t in section.panels[0].figure.data}
-    assert marks == {"rls": "circle", "ekf": "x"}
+    assert marks == {"rls": "circle", "hybrid": "x"}
     assert "1 does not fit" in section.panels[0].title
     names = [t.name for t in section.panels[1].figure.data]
-    assert names == ["rls", "ekf (does not fit)"]
+    assert names == ["rls", "hybrid (does not fit)"]
     html = written(tmp_path, [w], comparisons=[[w, other]])
-    assert re.search(r"<tr class=marked><td[^>]*>ekf</td>", html)
+    assert re.search(r"<tr class=marked><td[^>]*>hybrid</td>", html)
     assert html.count("class=marked") == 1
     # Its residuals are of a mass that nobody believes: they are not drawn.
     drawn = {t.name for p in residual_section(w, [w, other]).panels if p.figure
              for t in p.figure.data}  # fmt: skip
-    assert "ekf" not in drawn
+    assert "hybrid" not in drawn
 
 
 def test_torques_of_a_calibration_are_drawn_over_minutes():

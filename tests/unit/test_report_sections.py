@@ -366,7 +366,7 @@ def test_page_with_a_comparison_shows_every_method(tmp_path):
     links, _, page = links_and_ids(html)
     assert "drive-1-methods" in links
     weighed = {m.method for m in compare(w) if m.status == "converged"}
-    assert {"joint", "rls", "robust-rls", "ekf", "hybrid"} <= weighed
+    assert {"joint", "rls", "robust-rls", "hybrid"} <= weighed
     assert f"{len(weighed)} of {len(ESTIMATORS)} methods found a mass" in page.text
     drawn = {t.get("name") for f in figures(html).values() for t in f["data"]}
     assert weighed <= drawn

@@ -15,7 +15,13 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import DriveError
-from weighbridge.io.columns import dimension_of, stated_unit, suffixes_of, unit_refused
+from weighbridge.io.columns import (
+    UNKNOWN_UNIT,
+    dimension_of,
+    stated_unit,
+    suffixes_of,
+    unit_refused,
+)
 from weighbridge.io.draft_column import DraftColumn, checked, is_calculated, usual_rate
 from weighbridge.io.draft_text import text_format
 from weighbridge.io.draft_time import DraftTime, by_motion, find_times, is_number, swings
@@ -335,7 +341,8 @@ def draft_column(name: str, found: Named, values: Floats, stated: str | None) ->
     if known.size == 0:
         return _nothing(name, f"not taken for {found.quantity}: it has no values")
     quantity = QUANTITIES[found.quantity]
-    unit, doubt, by_log = stated or found.unit, "", True
+    told = stated if stated is not None and not stated.startswith(UNKNOWN_UNIT) else None
+    unit, doubt, by_log = told or found.unit, "", True
     strange = _STRANGE_UNIT.search(name)
     if quantity.suffix and unit is None and strange is not None:
         return _nothing(name, unit_refused(quantity, strange.group(1)))

@@ -161,6 +161,10 @@ _WORD: Final = re.compile(r"[a-z]+|\d+")
 _CAMEL: Final = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
+MOST_LETTERS: Final = 1000
+"""A longer name is none [-]: the longest of the lists of headers has 90."""
+
+
 @dataclass(frozen=True, slots=True)
 class Named:
     """What a name says.
@@ -261,6 +265,8 @@ def recognise(name: str, unit: str | None = None) -> Named:
     Named
         With an empty quantity where nothing fits well enough.
     """
+    if len(name) > MOST_LETTERS:
+        return Named("", unit, 0.0)
     stated, words = unit_of(name)
     known = unit is not None and not unit.startswith(UNKNOWN_UNIT)
     found = _recognised(name, words, unit if known else stated or unit)
