@@ -191,7 +191,7 @@ def left_open(low: float, unsure: float) -> float:
     -------
     One where most of the information is noise: then nothing tells how much of it is not.
     """
-    return unsure * low if low < 1.0 / (1.0 - MOSTLY) - 1.0 else 1.0
+    return unsure * low if low < too_low(np.full(1, MOSTLY))[0] else 1.0
 
 
 MOSTLY: Final = 0.5

@@ -238,17 +238,20 @@ def _in_gear(speed: Values, engine: Values) -> bool:
     n = _at(engine, time)
     moving = np.isfinite(n) & (v > _SLOW) & (n > _TURNS)
     time, v, n = time[moving], v[moving], n[moving]
+    if not time.size:
+        return False
+    # A window with few rows is joined to the next one.
+    edges = np.searchsorted(time, np.arange(time[0], time[-1], _WINDOW))
     together = []
     begin = 0
-    for k in range(time.size):
-        if time[k] - time[begin] < _WINDOW or k - begin < _ROWS:
+    for end in edges.tolist():
+        if end - begin < _ROWS:
             continue
-        a, b = v[begin:k], n[begin:k]
-        if np.ptp(a) > _CHANGES * float(a.mean()) and np.ptp(b) > 0.0:
-            together.append(float(np.corrcoef(a, b)[0, 1]))
-        elif np.ptp(a) > _CHANGES * float(a.mean()):
-            together.append(0.0)
-        begin = k
+        a, b = v[begin:end], n[begin:end]
+        if np.ptp(a) > _CHANGES * float(a.mean()):
+            moves = np.ptp(b) > 0.0
+            together.append(float(np.corrcoef(a, b)[0, 1]) if moves else 0.0)
+        begin = end
     return len(together) >= _WINDOWS and float(np.median(together)) > _TOGETHER
 
 

@@ -302,9 +302,7 @@ truck's 100 kg and 0.4 m, 16 kg m^2 each. Their ranges: cars from Jensen 2022, T
 spanning the usual values of Gillespie. ``efficiency``: cars and vans stand between both layouts;
 trucks: 0.99 in a direct and 0.96 in other gears (Regulation (EU) 2017/2400, Annex VI, App. 8),
 times 0.98 in a single reduction axle without its drag (Annex VII); buses have automatic gearboxes.
-Motorcycles: C_d A 0.3 to 0.7 m^2, C_r about 0.02, wheels of 0.4 to 0.8 kg m^2 each and a chain
-that passes on 0.97 (Cossalter, Motorcycle Dynamics, 2nd ed., 2006, ch. 2 and 3); their mass in
-running order is without the rider (Regulation (EU) 168/2013, Art. 5). Quads: belts of variators
-pass on 0.8 to 0.9. Racers: those that students build, 150 to 250 kg with wings, and the driver.
+Motorcycles, racers (built by students) and quads: chosen, and wide, for no source was at hand;
+their mass in running order is without the rider (Regulation (EU) 168/2013, Art. 5).
 ``boarding_std``: nine passengers of 71 kg get on and as many off, each by chance, a
 bus of 12 t. ``tyre``: those of cars lie within 6 % of its radius, of trucks within 8 %."""
