@@ -2,7 +2,8 @@
 windows of Kvaser's CanKing, and BUSMASTER's logs.
 
 Tables are those of CSS Electronics (CLX000), Kvaser and Vehicle Spy, and any other that names a
-time, an identifier and bytes. The forms are those of the makers' manuals and of public files.
+time, an identifier and bytes. The forms are those that descriptions give; no file of these tools
+was at hand.
 """
 
 from __future__ import annotations
