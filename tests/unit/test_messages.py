@@ -4,6 +4,7 @@ import ast
 import re
 import string
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -51,21 +52,37 @@ def literals(node):
     return []
 
 
+@cache
+def nodes():
+    """Return the calls and texts of the program, each with its file."""
+    return [
+        (path, node)
+        for path in sorted(SOURCE.rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call | ast.Constant)
+    ]
+
+
+def name_of(function):
+    """Return the dotted name of what is called; empty where it has none."""
+    if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
+        return f"{function.value.id}.{function.attr}"
+    return function.id if isinstance(function, ast.Name) else ""
+
+
+@cache
 def calls():
-    """Yield the place, kind, ids and named values of each use of the catalogue in the program."""
-    for path in sorted(SOURCE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.Call) or path.name == "messages.py":
-                continue
-            kind = ast.unparse(node.func)
-            if kind not in ("Problem.of", "Message.of", "refused", "phrase"):
-                continue
+    """Return the place, kind, ids and named values of each use of the catalogue in the program."""
+    found = []
+    for path, node in nodes():
+        if not isinstance(node, ast.Call) or path.name == "messages.py":
+            continue
+        kind = name_of(node.func)
+        if kind in ("Problem.of", "Message.of", "refused", "phrase"):
             names = {k.arg for k in node.keywords}
             place = f"{path.relative_to(SOURCE)}:{node.lineno}"
-            yield place, kind, literals(node.args[0]), names
-
-
-CALLS = list(calls())
+            found.append((place, kind, literals(node.args[0]), names))
+    return found
 
 
 @pytest.mark.parametrize("id", catalogue())
@@ -88,8 +105,8 @@ def test_a_phrase_renders(name):
 
 
 def test_the_program_uses_messages_of_the_catalogue_only():
-    assert len(CALLS) > 300
-    for place, kind, ids, _ in CALLS:
+    assert len(calls()) > 300
+    for place, kind, ids, _ in calls():
         known = PHRASES if kind == "phrase" else catalogue()
         assert [id for id in ids if id not in known] == [], place
 
@@ -97,8 +114,7 @@ def test_the_program_uses_messages_of_the_catalogue_only():
 def test_the_program_uses_each_message():
     texts = {
         node.value
-        for path in SOURCE.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for _, node in nodes()
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     }
     assert [id for id in catalogue() if id not in texts] == []
@@ -106,7 +122,7 @@ def test_the_program_uses_each_message():
 
 
 def test_each_use_names_the_values_of_its_message():
-    for place, kind, ids, names in CALLS:
+    for place, kind, ids, names in calls():
         for id in ids:
             if None in names:
                 continue

@@ -1,6 +1,7 @@
 """Torque readings held against other signals of the same engine, on made-up drives."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -81,22 +82,25 @@ def smoothed(span):
     return change
 
 
-KNOWN = [drive(seed) for seed in (1, 2, 3)]
+@cache
+def known_drives():
+    return [drive(seed) for seed in (1, 2, 3)]
 
 
-def learnt(signals=("mass_air_flow",), known=KNOWN, vehicle=CAR):
-    """The car with these witnesses."""
+@cache
+def learnt(*signals):
+    """The car with these witnesses, learnt from drives of known mass."""
+    return with_witnesses(signals, known_drives(), CAR)
+
+
+def with_witnesses(signals, known, vehicle):
     found, doubts = learn_witnesses(known, vehicle)
     assert not doubts
     return replace(vehicle, witnesses=tuple(w for w in found if w.signal in signals))
 
 
-ALONE = learnt()
-TWO = learnt(("mass_air_flow", "intake_pressure"))
-
-
 def test_the_relation_gives_the_reading_back():
-    found, doubts = learn_witnesses(KNOWN, CAR)
+    found, doubts = learn_witnesses(known_drives(), CAR)
     assert [w.signal for w in found] == ["mass_air_flow", "intake_pressure", "fuel_rate"]
     assert not doubts
     for relation in found:
@@ -125,7 +129,7 @@ def test_what_does_not_explain_the_reading_is_no_witness():
 
 def test_a_source_is_no_witness_of_itself():
     air = replace(CAR, torque=TorqueModel(source="air_flow"))
-    found, _ = learn_witnesses(KNOWN, air)
+    found, _ = learn_witnesses(known_drives(), air)
     assert "mass_air_flow" not in [w.signal for w in found]
     assert "engine_load" in [w.signal for w in found]
 
@@ -133,8 +137,11 @@ def test_a_source_is_no_witness_of_itself():
 def test_other_drives_agree():
     for seed in range(10, 18):
         made = drive(seed)
-        assert [f.verdict for f in findings(made, TWO)] == ["agrees", "agrees"]
-        assert check_witnesses(made, TWO) == ()
+        assert [f.verdict for f in findings(made, learnt("mass_air_flow", "intake_pressure"))] == [
+            "agrees",
+            "agrees",
+        ]
+        assert check_witnesses(made, learnt("mass_air_flow", "intake_pressure")) == ()
 
 
 FAULTS = {
@@ -152,7 +159,7 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_reading_that_left_its_only_witness_gives_no_mass(fault):
     change, expected = FAULTS[fault]
-    (problem,) = check_witnesses(changed(drive(20), "engine_load", change), ALONE)
+    (problem,) = check_witnesses(changed(drive(20), "engine_load", change), learnt("mass_air_flow"))
     assert problem.serious
     assert problem.signal == "engine_load"
     found = {"start": problem.start, "end": problem.end, **problem.values}
@@ -169,13 +176,13 @@ def test_a_reading_that_left_its_only_witness_gives_no_mass(fault):
 def test_every_method_refuses_it(method):
     made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
     with refused("torque.witness") as found:
-        wb.weigh(made, ALONE, method)
+        wb.weigh(made, learnt("mass_air_flow"), method)
     assert found.value.problem.values["scale"] == pytest.approx(0.8, abs=0.005)
 
 
 def test_a_moderate_disagreement_is_a_warning():
     made = changed(drive(20), "engine_load", lambda t, x: 0.93 * x)
-    (problem,) = check_witnesses(made, ALONE)
+    (problem,) = check_witnesses(made, learnt("mass_air_flow"))
     assert not problem.serious
     assert problem.values["scale"] == pytest.approx(0.93, abs=0.005)
     assert problem.values["witnesses"] == "mass_air_flow"
@@ -185,7 +192,9 @@ def test_a_moderate_disagreement_with_a_reading_altered_on_the_way_gives_no_mass
     step = 1.0 / 255.0
     sent = changed(drive(20), "engine_load", lambda t, x: step * np.round(x / step))
     made = changed(sent, "engine_load", lambda t, x: 0.93 * x)
-    known = replace(ALONE, torque=replace(ALONE.torque, reading_step=step))
+    known = replace(
+        learnt("mass_air_flow"), torque=replace(learnt("mass_air_flow").torque, reading_step=step)
+    )
     steps, witness = check_reading(made, known)
     assert steps.id == "torque.steps"
     assert f"{steps.values['ratio']:.3g}" == "0.93"
@@ -196,7 +205,7 @@ def test_a_moderate_disagreement_with_a_reading_altered_on_the_way_gives_no_mass
 
 def test_where_the_change_begins_is_told():
     made = changed(drive(20), "engine_load", lambda t, x: np.where(t < 1050.0, x, 0.8 * x))
-    (found,) = findings(made, ALONE)
+    (found,) = findings(made, learnt("mass_air_flow"))
     assert abs(found.start - 1050.0) < 0.06 * END
     assert abs(found.scale - 0.8) < 0.02
 
@@ -204,14 +213,14 @@ def test_where_the_change_begins_is_told():
 def test_a_small_change_in_the_drive_is_told_against_what_was_before():
     # 3 % up before and down after: neither leaves what drives of one car differ by.
     made = changed(drive(20), "engine_load", lambda t, x: np.where(t < MIDDLE, 1.03, 0.97) * x)
-    (problem,) = check_witnesses(made, ALONE)
+    (problem,) = check_witnesses(made, learnt("mass_air_flow"))
     assert not problem.serious
     assert problem.id == "torque.witness"
 
 
 def test_two_witnesses_say_that_the_reading_is_wrong():
     made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
-    (problem,) = check_witnesses(made, TWO)
+    (problem,) = check_witnesses(made, learnt("mass_air_flow", "intake_pressure"))
     assert problem.serious
     assert problem.values["witnesses"] == "mass_air_flow and intake_pressure"
     assert problem.values["which"] == phrase("reading_wrong", reading="engine_load")
@@ -219,7 +228,7 @@ def test_two_witnesses_say_that_the_reading_is_wrong():
 
 def test_a_witness_alone_against_another_is_off_itself():
     made = changed(drive(20), "mass_air_flow", lambda t, x: 0.7 * x)
-    (problem,) = check_witnesses(made, TWO)
+    (problem,) = check_witnesses(made, learnt("mass_air_flow", "intake_pressure"))
     assert not problem.serious
     assert problem.signal == "mass_air_flow"
     assert problem.id == "witness.off"
@@ -228,7 +237,7 @@ def test_a_witness_alone_against_another_is_off_itself():
 
 
 def test_more_fuel_than_torque_is_doubted_and_less_refused():
-    fuel = learnt(("fuel_rate",))
+    fuel = learnt("fuel_rate")
     regenerating = changed(drive(20), "fuel_rate", lambda t, x: 1.25 * x)
     (problem,) = check_witnesses(regenerating, fuel)
     assert not problem.serious
@@ -239,14 +248,16 @@ def test_more_fuel_than_torque_is_doubted_and_less_refused():
 def test_what_a_person_vouches_for_gives_a_mass():
     made = changed(drive(20), "engine_load", lambda t, x: 0.8 * x)
     made = replace(made, info=replace(made.info, trusted=("engine_load",)))
-    (problem,) = check_witnesses(made, ALONE)
+    (problem,) = check_witnesses(made, learnt("mass_air_flow"))
     assert not problem.serious
 
 
 @pytest.mark.parametrize("normalised", [True, False])
 def test_thin_air_is_no_fault(normalised):
     """Load is the share of what the air there lets the engine take, or it is not (SAE J1979)."""
-    car = learnt(known=[drive(seed, normalised=normalised) for seed in (1, 2, 3)])
+    car = with_witnesses(
+        ("mass_air_flow",), [drive(seed, normalised=normalised) for seed in (1, 2, 3)], CAR
+    )
     high = drive(20, warm=303.0, pressure=0.82e5, normalised=normalised)
     assert check_witnesses(high, car) == ()
     # Without the air known to the check the same drive would be doubted, one way or the other.
@@ -255,7 +266,7 @@ def test_thin_air_is_no_fault(normalised):
 
 
 def test_air_accounts_for_no_more_than_it_can():
-    relation = ALONE.witnesses[0]
+    relation = learnt("mass_air_flow").witnesses[0]
     low, high = accepted_scales("load", relation, (0.8e5, 288.0))
     assert_allclose((low, high), (1.0, 1.25), rtol=1e-9)
     assert accepted_scales("measured", relation, (0.8e5, 300.0)) == (1.0, 1.0)
@@ -301,26 +312,26 @@ def test_delays_gaps_jitter_and_dropouts_are_no_fault():
         ),
     }
     for what, spoilt in harmless.items():
-        assert not any(p.serious for p in check_witnesses(spoilt, ALONE)), what
+        assert not any(p.serious for p in check_witnesses(spoilt, learnt("mass_air_flow"))), what
 
 
 def test_nothing_is_said_where_nothing_can_be():
     made = drive(20)
     assert check_witnesses(made, None) == ()
     assert check_witnesses(made, CAR) == ()
-    assert check_witnesses(made.without("mass_air_flow"), ALONE) == ()
-    assert check_witnesses(made.without("engine_load"), ALONE) == ()
-    assert check_witnesses(made.without("vehicle_speed"), ALONE) == ()
-    assert check_witnesses(made.between(0.0, 60.0), ALONE) == ()
+    assert check_witnesses(made.without("mass_air_flow"), learnt("mass_air_flow")) == ()
+    assert check_witnesses(made.without("engine_load"), learnt("mass_air_flow")) == ()
+    assert check_witnesses(made.without("vehicle_speed"), learnt("mass_air_flow")) == ()
+    assert check_witnesses(made.between(0.0, 60.0), learnt("mass_air_flow")) == ()
     empty = Signal("mass_air_flow", np.zeros(0), np.zeros(0))
-    assert check_witnesses(made.with_signals(empty), ALONE) == ()
+    assert check_witnesses(made.with_signals(empty), learnt("mass_air_flow")) == ()
     still = changed(made, "engine_speed", lambda t, x: 0.0 * x)
-    assert check_witnesses(still, ALONE) == ()
+    assert check_witnesses(still, learnt("mass_air_flow")) == ()
 
 
 def test_calibration_drives_that_contradict_each_other_are_told():
     off = changed(drive(4), "engine_load", lambda t, x: 0.8 * x)
-    found, doubts = learn_witnesses([*KNOWN[:2], off], CAR)
+    found, doubts = learn_witnesses([*known_drives()[:2], off], CAR)
     assert found == ()
     assert len(doubts) == 3
     assert doubts[0].id == "calibration.drives_contradict"
@@ -362,8 +373,8 @@ def test_a_battery_bears_witness_of_a_motor_whatever_is_heated():
 
 def test_rows_need_a_reference_torque_to_be_a_torque():
     percent = replace(CAR, torque=TorqueModel(source="percent"))
-    s = KNOWN[0].signals["engine_load"]
-    made = KNOWN[0].with_signals(replace(s, name="engine_torque_fraction"))
+    s = known_drives()[0].signals["engine_load"]
+    made = known_drives()[0].with_signals(replace(s, name="engine_torque_fraction"))
     assert rows_of(made, percent, BY_SIGNAL["mass_air_flow"]) is None
     known = replace(percent, torque=replace(percent.torque, reference_torque=250.0))
     rows = rows_of(made, known, BY_SIGNAL["mass_air_flow"])
@@ -371,7 +382,7 @@ def test_rows_need_a_reference_torque_to_be_a_torque():
 
 
 def test_a_relation_is_one_of_a_known_signal():
-    good = ALONE.witnesses[0]
+    good = learnt("mass_air_flow").witnesses[0]
     for fields, words in (
         ({"signal": "throttle"}, "signal must be one of"),
         ({"coefficients": (1.0, 2.0)}, "must be 4 numbers"),
@@ -391,7 +402,9 @@ def test_a_witness_that_only_unknown_air_makes_agree_clears_nothing():
         return made.with_signals(Signal("engine_torque", load.time, 180.0 * load.values - 20.0))
 
     car = replace(CAR, torque=TorqueModel(source="measured"))
-    known = learnt(("mass_air_flow", "intake_pressure"), [told(d) for d in KNOWN], car)
+    known = with_witnesses(
+        ("mass_air_flow", "intake_pressure"), [told(d) for d in known_drives()], car
+    )
     assert len(known.witnesses) == 2
     for scale in (0.88, 1.12):
         made = told(replace(drive(20), info=DriveInfo()))
@@ -403,8 +416,10 @@ def test_a_witness_that_froze_or_is_on_another_clock_accuses_nobody():
     def stuck(time, x):
         return np.where(time < 900.0, x, x[np.searchsorted(time, 900.0)])
 
-    assert check_witnesses(changed(drive(20), "mass_air_flow", stuck), ALONE) == ()
+    assert (
+        check_witnesses(changed(drive(20), "mass_air_flow", stuck), learnt("mass_air_flow")) == ()
+    )
     late = drive(20)
     air = late.signals["mass_air_flow"]
     late = late.with_signals(Signal(air.name, air.time + 2.5, air.values))
-    assert not any(p.serious for p in check_witnesses(late, ALONE))
+    assert not any(p.serious for p in check_witnesses(late, learnt("mass_air_flow")))
