@@ -103,6 +103,20 @@ EQUIPMENT: Final[dict[str, Callable[[Drive], Drive]]] = {
     "no IMU": lambda d: d.without(*IMU),
     "no IMU, OBD 1 Hz": lambda d: polled(d.without(*IMU), 1.0),
 }
+"""What every subject is seen through."""
+
+OTHER_EQUIPMENT: Final[dict[str, Callable[[Drive], Drive]]] = {
+    "accelerometer alone": lambda d: d.without(*IMU[3:]),
+    "speed alone": lambda d: d.without(*IMU, *GNSS),
+}
+"""What some are seen through."""
+
+
+def seen_through(equipment: str, drive: Drive) -> Drive:
+    """Return a drive as an equipment records it."""
+    return (EQUIPMENT | OTHER_EQUIPMENT)[equipment](drive)
+
+
 OF_TRUCK: Final = ("no IMU", "no IMU, OBD 1 Hz")
 """What a recording without an inertial sensor can be thinned to."""
 
@@ -110,9 +124,10 @@ OF_TRUCK: Final = ("no IMU", "no IMU, OBD 1 Hz")
 def calibrated(of: str, equipment: str) -> Vehicle:
     """Calibrate a subject with its known drives, seen through an equipment."""
     one = subject(of)
-    seen = EQUIPMENT[equipment]
     return wb.calibrate(
-        [seen(drive) for drive, _ in one.known], [mass for _, mass in one.known], vehicle=one.base
+        [seen_through(equipment, drive) for drive, _ in one.known],
+        [mass for _, mass in one.known],
+        vehicle=one.base,
     )
 
 
@@ -121,7 +136,7 @@ def calibrated(of: str, equipment: str) -> Vehicle:
 
 def _seen(one: Subject, vehicle: Vehicle, *, drive: str, equipment: str) -> Made:
     recorded, true = one.drives[drive]
-    return Made(EQUIPMENT[equipment](recorded), vehicle, true)
+    return Made(seen_through(equipment, recorded), vehicle, true)
 
 
 def _cut(one: Subject, vehicle: Vehicle, *, drive: str, part: float, equipment: str) -> Made:
@@ -212,6 +227,70 @@ def _altered(
     over = (s.time - recorded.start) / recorded.duration
     seen = recorded.without(*without).with_signals(Signal(name, s.time, change(over, s.values)))
     return Made(seen, vehicle, true)
+
+
+def _misread(
+    one: Subject,
+    vehicle: Vehicle,
+    *,
+    drive: str,
+    equipment: str,
+    change: Callable[[Drive], Drive],
+) -> Made:
+    """Change a drive as a wrong unit, sign or column does, then see it through an equipment."""
+    recorded, true = one.drives[drive]
+    return Made(seen_through(equipment, change(recorded)), vehicle, true)
+
+
+def _times(drive: Drive, *, factors: dict[str, float]) -> Drive:
+    """Multiply signals that are there."""
+    found = [(s, factors[name]) for name in factors if (s := drive.get(name)) is not None]
+    return drive.with_signals(*(Signal(s.name, s.time, f * s.values) for s, f in found))
+
+
+def _held(drive: Drive, *, name: str) -> Drive:
+    """Let a signal never change from its first value in motion."""
+    s = drive.signals[name]
+    return drive.with_signals(Signal(name, s.time, np.full(len(s), s.values[len(s) // 2])))
+
+
+def _swapped(drive: Drive) -> Drive:
+    lat, lon = drive.signals["latitude"], drive.signals["longitude"]
+    return drive.with_signals(
+        Signal("latitude", lat.time, lon.values), Signal("longitude", lon.time, lat.values)
+    )
+
+
+def _clock_times(drive: Drive, *, factor: float) -> Drive:
+    """Let the table of the vehicle's bus count its time in another unit."""
+    bus = [s for s in drive.signals.values() if s.name not in (*IMU, *GNSS)]
+    return drive.with_signals(*(Signal(s.name, factor * s.time, s.values) for s in bus))
+
+
+def _derived(drive: Drive) -> Drive:
+    """Give the change of the speed as an accelerometer."""
+    s = drive.signals["vehicle_speed"]
+    rate = np.gradient(s.values, s.time)
+    return drive.without(*IMU).with_signals(Signal("longitudinal_accel", s.time, rate))
+
+
+def _averaged(drive: Drive, *, span: float) -> Drive:
+    """Average the inertial sensor over a span [s]."""
+    kept = []
+    for name in IMU:
+        s = drive.signals[name]
+        window = np.ones(max(1, round(span / s.period)))
+        mean = np.convolve(s.values, window, "same") / np.convolve(np.ones(len(s)), window, "same")
+        kept.append(Signal(name, s.time, mean))
+    return drive.with_signals(*kept)
+
+
+def _on_other_tyres(drive: Drive, *, scale: float, torque: str) -> Drive:
+    """Turn wheels of another circumference: more of it, fewer turns and more torque."""
+    turned = _times(drive, factors={"vehicle_speed": 1 / scale, "engine_speed": 1 / scale})
+    s = turned.signals[torque]
+    highest = float(np.max(s.values)) if torque == "engine_torque" else 1.0
+    return turned.with_signals(Signal(torque, s.time, np.minimum(scale * s.values, highest)))
 
 
 def _scaled(over: np.ndarray, x: np.ndarray, *, factor: float, since: float) -> np.ndarray:
@@ -347,10 +426,114 @@ def _strangers() -> Iterator[Pair]:
             )  # fmt: skip
 
 
+TORQUE: Final = {
+    "own car": "engine_load", "own truck": "engine_torque_fraction",
+    "own electric": "engine_torque", "second petrol": "engine_torque",
+}  # fmt: skip
+"""Subjects whose signals are misread, and what their torque is read from."""
+
+MILES: Final = 1.609344
+FEET: Final = 0.3048
+
+
+def _misreadings(of: str) -> Iterator[tuple[str, tuple[str, ...], Callable[[Drive], Drive]]]:
+    """What is misread, the equipments it is seen through, and how."""
+    torque = TORQUE[of]
+    every_way = ("full", "no GNSS", "no IMU")
+    lat_lon, accel, gyro = GNSS[:2], IMU[:3], IMU[3:]
+
+    def times(names: tuple[str, ...], factor: float) -> Callable[[Drive], Drive]:
+        return partial(_times, factors=dict.fromkeys(names, factor))
+
+    for words, seen, names, factor in (
+        ("mph taken for km/h", (*every_way, "speed alone"), ("vehicle_speed",), 1 / MILES),
+        ("km/h taken for mph", (*every_way, "speed alone"), ("vehicle_speed",), MILES),
+        ("m/s taken for km/h", (*every_way, "speed alone"), ("vehicle_speed",), 1 / 3.6),
+        ("knots taken for m/s", ("full", "no IMU"), ("gnss_speed",), 1 / 0.514444),
+        ("speed turned round", every_way, ("vehicle_speed",), -1.0),
+        ("radians taken for degrees", ("full", "no IMU"), lat_lon, np.pi / 180.0),
+        ("feet taken for metres", ("full", "no IMU", "one axis"), ("altitude",), 1 / FEET),
+        ("metres taken for feet", ("full", "no IMU", "one axis"), ("altitude",), FEET),
+        ("g taken for m/s2", ("full", "no GNSS"), accel, 1 / 9.80665),
+        ("degrees taken for radians", ("full", "no GNSS"), gyro, 180.0 / np.pi),
+        ("radians taken for degrees, gyro", ("full", "no GNSS"), gyro, np.pi / 180.0),
+        ("revolutions a second taken for rpm", ("full", "no IMU"), ("engine_speed",), 1 / 60.0),
+        ("parts of one taken for percent", ("full", "no IMU"), (torque,), 0.01),
+        ("torque turned round", every_way, (torque,), -1.0),
+        ("hPa taken for kPa", ("full", "no IMU"), ("barometric_pressure",), 10.0),
+        ("kPa taken for hPa", ("full", "no IMU"), ("barometric_pressure",), 0.1),
+        ("retarder turned round", ("full", "no IMU"), ("retarder_torque",), -1.0),
+        ("brake switch dead", ("full", "no IMU"), ("brake_switch",), 0.0),
+    ):  # fmt: skip
+        yield words, seen, times(names, factor)
+    if torque == "engine_torque":
+        factor = 100.0 / {"own electric": 250.0, "second petrol": 190.0}[of]
+        yield "percent taken for N m", ("full", "no IMU"), times((torque,), factor)
+    yield "latitude and longitude swapped", ("full", "no IMU"), _swapped
+    for name, seen in (
+        ("vehicle_speed", ("full", "no GNSS")), (torque, ("full", "no IMU")),
+        ("engine_speed", ("full", "no IMU")), ("altitude", ("full", "no IMU")),
+        ("gyro_z", ("full", "no GNSS")), ("accel_x", ("full", "no GNSS")),
+        ("latitude", ("full", "no IMU")),
+    ):  # fmt: skip
+        yield f"{name} never changes", seen, partial(_held, name=name)
+    for words, factor in (("milliseconds", 1000.0), ("minutes", 1.0 / 60.0)):
+        yield (
+            f"time of the bus in {words}",
+            ("full", "no GNSS"),
+            partial(_clock_times, factor=factor),
+        )
+    yield "change of the speed as accelerometer", ("one axis",), _derived
+    for span in (1.0, 3.0):
+        seen = ("full", "no GNSS")
+        yield f"inertial sensor averaged over {span:g} s", seen, partial(_averaged, span=span)
+    for scale in (0.96, 1.04):
+        way = partial(_on_other_tyres, scale=scale, torque=torque)
+        yield f"tyres of {scale:.0%} of the circumference", ("full", "no IMU"), way
+
+
+def _misread_pairs() -> Iterator[Pair]:
+    for of in TORQUE:
+        name = "ordinary" if of.startswith("second") else "drive"
+        for words, seen, change in _misreadings(of):
+            truck_alone = words.startswith(("retarder", "brake"))
+            if truck_alone and of != "own truck":
+                continue
+            if "kPa" in words and of == "second petrol":
+                continue
+            for equipment in seen:
+                calibrated_by = "no IMU" if equipment == "speed alone" else equipment
+                derived = words.startswith("change")
+                make = partial(
+                    _misread, drive=name, equipment="full" if derived else equipment,
+                    change=change,
+                )  # fmt: skip
+                yield Pair(
+                    f"{of}/{name}/{words}/{equipment}", "fault: misread", of, calibrated_by, make,
+                    sound=False, reference=f"{of}/{name}/{calibrated_by}",
+                )  # fmt: skip
+
+
+def _other_sensors() -> Iterator[Pair]:
+    """Calibrated with an inertial sensor and weighed without, and with one without a gyroscope."""
+    for of in MADE:
+        name = "drive" if of.startswith("own") else "ordinary"
+        heavy = " (truck)" if of.split()[-1] in ("truck", "semi", "electric_bus") else ""
+        for made_by, seen, slice in (
+            ("full", "no IMU", "calibrated with an IMU, weighed without"),
+            ("accelerometer alone", "accelerometer alone", "accelerometer alone"),
+        ):
+            yield Pair(
+                f"{of}/{name}/{slice}", f"sound: {slice}{heavy}", of, made_by,
+                partial(_seen, drive=name, equipment=seen), sound=True,
+            )  # fmt: skip
+
+
 def all_pairs() -> list[Pair]:
     """List all pairs, in an order that stays."""
     return [
         *_of_equipment(), *_cuts(), *_faults(), *_heights(), *_recordings(), *_strangers(),
+        *_misread_pairs(), *_other_sensors(),
     ]  # fmt: skip
 
 
