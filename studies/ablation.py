@@ -1,11 +1,11 @@
-"""What each check, correction and doubt of the program is worth: the corpus without it.
+"""What each check, correction and uncertainty of the program is worth: the corpus without it.
 
     python studies/ablation.py record            # weigh the corpus once, and note what acted in which pair
     python studies/ablation.py weigh [NAME ...]  # weigh again, without each, the pairs in which it acted
     python studies/ablation.py write             # write studies/ablation.md
 
-A part that acts in no pair changes none, so that it needs no second run. Part and neutral value stand in `PARTS`: the real
-function runs, and its answer is replaced by the one that it would give if it had found nothing.
+A part that acts in no pair changes none, and needs no second run. To take a part out, its function runs as ever, and its
+answer is replaced by the one in `NAMED`, as if it had found nothing.
 """  # noqa: E501
 
 from __future__ import annotations
@@ -105,28 +105,25 @@ class Part(NamedTuple):
     neutral: Callable[..., Any]
 
 
-def _parts() -> dict[str, Part]:
-    """List all parts by ``room.function``."""
-    listed: list[tuple[str, str, Callable[..., Any]]] = []
-    from weighbridge import checks
+def _passed(found: Any, *given: Any) -> Any:
+    from weighbridge.estimators.track import Status
 
-    listed += [(f.__module__, f.__name__, _nothing) for f in checks._CHECKS]
-    listed += [
-        ("weighbridge.checks.clocks", n, _nothing)
-        for n in ("check_rates", "check_overlap", "check_pauses")
-    ]
-    listed += [
-        ("weighbridge.checks.witnesses", n, _nothing)
-        for n in ("check_reading", "check_witnesses", "witnessed")
-    ]
-    listed += [("weighbridge.checks.steps", "check_steps", _nothing)]
-    for module, names in {
+    return Status.CONVERGED, None
+
+
+NAMED: Final[tuple[tuple[Callable[..., Any], dict[str, str]], ...]] = (
+    (_nothing, {
+        "checks.clocks": "check_rates check_overlap check_pauses",
+        "checks.witnesses": "check_reading check_witnesses witnessed",
+        "checks.steps": "check_steps",
         "checks.inertial": "_check_parts _check_gravity _check_rate _check_axes",
         "checks.speed": "_check_alone _check_positions _check_altitude",
         "checks.vehicle": "_check_reference _check_gears",
-    }.items():
-        listed += [(f"weighbridge.{module}", n, _nothing) for n in names.split()]
-    for module, names in {
+        "navigation.clock_drift": "_lost",
+        "pipeline.notes": "unbacked other_equipment beside_speed overload beyond_class below_tare "
+                          "lighter_than_known uncalibrated",
+    }),
+    (_none, {
         "checks.inertial": "_not_about_vertical _against_course _against_speed",
         "checks.speed": "_usual_gearing _gear_ratio _accel_ratio _grade_ratio",
         "balance.bandwidth": "smoothed_torque",
@@ -152,9 +149,8 @@ def _parts() -> dict[str, Part]:
         "calibration.known_mass": "scale_doubt fuel_doubt drag_doubt",
         "signals.timeline": "_clock_set",
         "vehicle.power_balance": "find_power_balance",
-    }.items():
-        listed += [(f"weighbridge.{module}", n, _none) for n in names.split()]
-    for module, names in {
+    }),
+    (_first, {
         "signals.held": "without_repeats",
         "signals.timeline": "one_recording",
         "checks.derived": "without_derived",
@@ -170,9 +166,8 @@ def _parts() -> dict[str, Part]:
         "navigation.frozen": "thawed",
         "vehicle.as_read": "as_read",
         "estimators.squat": "of_vehicle",
-    }.items():
-        listed += [(f"weighbridge.{module}", n, _first) for n in names.split()]
-    for module, names in {
+    }),
+    (_zero, {
         "balance.coarse": "coarse_std",
         "balance.delay": "clock_shift far_shift",
         "balance.instants": "identify_engine_delay",
@@ -188,77 +183,53 @@ def _parts() -> dict[str, Part]:
         "navigation.longitudinal": "_lateness",
         "calibration.doubted_motion": "gain_std",
         "vehicle.power_balance": "_lateness",
-    }.items():
-        listed += [(f"weighbridge.{module}", n, _zero) for n in names.split()]
-    for module, names in {
+    }),
+    (_false, {
         "checks.false_samples": "isolated piled clipped",
         "checks.frozen": "frozen",
-        "checks.frozen_imu": "",
+        "checks.witnesses": "_outvoted",
+        "checks.steps": "_cleared",
         "navigation.dropouts": "false_rows rare_spikes repeated_rows _spikes _zeros _clipped",
+        "navigation.identify.gain": "_upheld _smoothed _rougher",
+        "navigation.clock_drift": "_strangers",
         "balance.cornering": "cornering",
         "balance.filled": "filled",
         "balance.braking": "_misses _braked _trailing",
         "balance.foot": "_pressed _noisy",
+        "balance.disagreement": "_smoothed",
         "estimators.joint.load_stops": "too_hasty",
         "estimators.judging": "lacks_accelerometer",
-        "navigation.identify.gain": "_upheld _smoothed _rougher",
-        "navigation.clock_drift": "_strangers",
-        "checks.witnesses": "_outvoted",
-        "checks.steps": "_cleared",
-        "balance.disagreement": "_smoothed",
-    }.items():
-        listed += [(f"weighbridge.{module}", n, _false) for n in names.split()]
-    for module, names in {
+    }),
+    (_empty, {
         "calibration.doubted_masses": "doubted_masses contradicting unbacked_scale",
         "calibration.doubted_motion": "doubted_gains",
         "calibration.run": "_mass_doubts _balance_notes",
         "navigation.identify.remounting": "find_changes",
-    }.items():
-        listed += [(f"weighbridge.{module}", n, _empty) for n in names.split()]
-    for name in (
-        "_enough_rows",
-        "_narrow_enough",
-        "_possible",
-        "_long_enough",
-        "_excited",
-        "_plausible",
-    ):
-        listed.append(
-            (
-                "weighbridge.estimators.judging",
-                name,
-                lambda found, *given: (weighbridge_converged(), None),
-            )
-        )
-    for name in (
-        "unbacked",
-        "other_equipment",
-        "beside_speed",
-        "overload",
-        "beyond_class",
-        "below_tare",
-        "lighter_than_known",
-        "uncalibrated",
-    ):
-        listed.append(("weighbridge.pipeline.notes", name, _nothing))
-    listed += [
-        ("weighbridge.navigation.frozen", "frozen_stretches", _no_rows),
-        ("weighbridge.navigation.clock_drift", "_lost", _nothing),
-        ("weighbridge.navigation.identify.rounds", "_doubted", _same_setup),
-        ("weighbridge.balance.charge", "in_this_air", _second),
-        ("weighbridge.vehicle.power_balance", "by_power", _vehicle_first),
-        ("weighbridge.balance.circumference", "on_its_tyres", _vehicle_kept),
-        ("weighbridge.estimators.joint.foreign", "of_another", _not_another),
-        ("weighbridge.balance.torque_drift", "steadied", _not_steadied),
-    ]
-    return {f"{m.removeprefix('weighbridge.')}.{n}": Part(m, n, f) for m, n, f in listed}
+    }),
+    (_passed, {
+        "estimators.judging": "_enough_rows _narrow_enough _possible _long_enough _excited "
+                              "_plausible",
+    }),
+    (_no_rows, {"navigation.frozen": "frozen_stretches"}),
+    (_same_setup, {"navigation.identify.rounds": "_doubted"}),
+    (_second, {"balance.charge": "in_this_air"}),
+    (_vehicle_first, {"vehicle.power_balance": "by_power"}),
+    (_vehicle_kept, {"balance.circumference": "on_its_tyres"}),
+    (_not_another, {"estimators.joint.foreign": "of_another"}),
+    (_not_steadied, {"balance.torque_drift": "steadied"}),
+)  # fmt: skip
+"""Functions by module, with the answer of each that found nothing."""
 
 
-def weighbridge_converged() -> Any:
-    """Return the status of a gate that lets a mass pass."""
-    from weighbridge.estimators.track import Status
+def _parts() -> dict[str, Part]:
+    """List all parts by ``room.function``: those of `NAMED`, and each check of a drive."""
+    from weighbridge import checks
 
-    return Status.CONVERGED
+    listed = [Part(f.__module__, f.__name__, _nothing) for f in checks._CHECKS]
+    for neutral, modules in NAMED:
+        for module, names in modules.items():
+            listed += [Part(f"weighbridge.{module}", name, neutral) for name in names.split()]
+    return {f"{p.module.removeprefix('weighbridge.')}.{p.name}": p for p in listed}
 
 
 def _load_all() -> None:
@@ -268,7 +239,7 @@ def _load_all() -> None:
         ):
             try:
                 importlib.import_module(found.name)
-            except ImportError:
+            except ImportError:  # An extra that is not installed.
                 continue
 
 
@@ -328,8 +299,6 @@ def _wrapped(key: str, part: Part, f: Callable[..., Any]) -> Callable[..., Any]:
 
 def install() -> None:
     """Put a switch around each part, wherever a module has its name."""
-    from weighbridge import checks
-
     _load_all()
     modules = [m for n, m in list(sys.modules.items()) if n.startswith("weighbridge") and m]
     for key, part in _parts().items():
@@ -341,7 +310,6 @@ def install() -> None:
                     setattr(module, name, wrapped)
                 elif isinstance(value, tuple) and any(v is f for v in value):
                     setattr(module, name, tuple(wrapped if v is f else v for v in value))
-    assert checks
 
 
 @contextmanager

@@ -108,8 +108,12 @@ EQUIPMENT: Final[dict[str, Callable[[Drive], Drive]]] = {
 OTHER_EQUIPMENT: Final[dict[str, Callable[[Drive], Drive]]] = {
     "accelerometer alone": lambda d: d.without(*IMU[3:]),
     "speed alone": lambda d: d.without(*IMU, *GNSS),
+    "calculated axis": lambda d: _derived(d),
 }
 """What some are seen through."""
+
+CALIBRATED_BY: Final = {"speed alone": "no IMU", "calculated axis": "one axis"}
+"""Where it is not the equipment itself."""
 
 
 def seen_through(equipment: str, drive: Drive) -> Drive:
@@ -249,7 +253,7 @@ def _times(drive: Drive, *, factors: dict[str, float]) -> Drive:
 
 
 def _held(drive: Drive, *, name: str) -> Drive:
-    """Let a signal never change from its first value in motion."""
+    """Let a signal keep the value that it has in the middle of the drive."""
     s = drive.signals[name]
     return drive.with_signals(Signal(name, s.time, np.full(len(s), s.values[len(s) // 2])))
 
@@ -432,6 +436,12 @@ TORQUE: Final = {
 }  # fmt: skip
 """Subjects whose signals are misread, and what their torque is read from."""
 
+RECORDED_BY: Final = {
+    "barometric_pressure": ("own car", "own truck", "own electric"),
+    "retarder_torque": ("own truck",), "brake_switch": ("own truck",),
+}  # fmt: skip
+"""Signals that not all of them record."""
+
 MILES: Final = 1.609344
 FEET: Final = 0.3048
 
@@ -465,7 +475,8 @@ def _misreadings(of: str) -> Iterator[tuple[str, tuple[str, ...], Callable[[Driv
         ("retarder turned round", ("full", "no IMU"), ("retarder_torque",), -1.0),
         ("brake switch dead", ("full", "no IMU"), ("brake_switch",), 0.0),
     ):  # fmt: skip
-        yield words, seen, times(names, factor)
+        if of in RECORDED_BY.get(names[0], TORQUE):
+            yield words, seen, times(names, factor)
     if torque == "engine_torque":
         factor = 100.0 / {"own electric": 250.0, "second petrol": 190.0}[of]
         yield "percent taken for N m", ("full", "no IMU"), times((torque,), factor)
@@ -483,7 +494,7 @@ def _misreadings(of: str) -> Iterator[tuple[str, tuple[str, ...], Callable[[Driv
             ("full", "no GNSS"),
             partial(_clock_times, factor=factor),
         )
-    yield "change of the speed as accelerometer", ("one axis",), _derived
+    yield "change of the speed as accelerometer", ("calculated axis",), lambda d: d
     for span in (1.0, 3.0):
         seen = ("full", "no GNSS")
         yield f"inertial sensor averaged over {span:g} s", seen, partial(_averaged, span=span)
@@ -496,21 +507,12 @@ def _misread_pairs() -> Iterator[Pair]:
     for of in TORQUE:
         name = "ordinary" if of.startswith("second") else "drive"
         for words, seen, change in _misreadings(of):
-            truck_alone = words.startswith(("retarder", "brake"))
-            if truck_alone and of != "own truck":
-                continue
-            if "kPa" in words and of == "second petrol":
-                continue
             for equipment in seen:
-                calibrated_by = "no IMU" if equipment == "speed alone" else equipment
-                derived = words.startswith("change")
-                make = partial(
-                    _misread, drive=name, equipment="full" if derived else equipment,
-                    change=change,
-                )  # fmt: skip
+                made_by = CALIBRATED_BY.get(equipment, equipment)
                 yield Pair(
-                    f"{of}/{name}/{words}/{equipment}", "fault: misread", of, calibrated_by, make,
-                    sound=False, reference=f"{of}/{name}/{calibrated_by}",
+                    f"{of}/{name}/{words}/{equipment}", "fault: misread", of, made_by,
+                    partial(_misread, drive=name, equipment=equipment, change=change),
+                    sound=False, reference=f"{of}/{name}/{made_by}",
                 )  # fmt: skip
 
 
