@@ -30,7 +30,7 @@ from weighbridge.estimators.joint.problem import UNMODELLED
 from weighbridge.estimators.joint.slow_errors import design, prior_std
 from weighbridge.estimators.regression import regression
 from weighbridge.estimators.squat import SQUAT, ResidualSquat
-from weighbridge.io.candump import read_candump
+from weighbridge.io.frame_text import read_candump
 from weighbridge.io.j1939 import decode_j1939
 from weighbridge.kernels.rotation import euler_to_matrix
 from weighbridge.navigation.select import find_motion

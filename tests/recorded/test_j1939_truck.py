@@ -11,7 +11,7 @@ from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.balance.law import force_on_mass
-from weighbridge.io.candump import read_candump
+from weighbridge.io.frame_text import read_candump
 from weighbridge.io.frames import Frames
 from weighbridge.io.j1939 import decode_j1939
 

@@ -6,11 +6,11 @@ import can
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.noted import has
+from tests.noted import has, refused
 
 from weighbridge.errors import DriveError, MissingExtraError
-from weighbridge.io.candump import read_candump
 from weighbridge.io.formats import format_of
+from weighbridge.io.frame_text import read_candump
 from weighbridge.io.read import read_drive
 
 START = 1_600_000_000.0
@@ -122,7 +122,7 @@ def test_every_spelling_of_candump(tmp_path):
 def test_text_of_another_kind_says_what_is_expected(tmp_path):
     path = tmp_path / "x.log"
     path.write_text("2024-01-01 server started\n")
-    with pytest.raises(DriveError, match="no line reads like candump's"):
+    with refused("file.not_understood"):
         read_drive(path)
 
 
@@ -266,7 +266,7 @@ def test_one_damaged_line_does_not_cost_those_behind_it(tmp_path):
         path.write_text(head + "".join(line.format(k, b) for k, b in enumerate(bytes_)))
         drive = read_drive(path)
         assert_allclose(drive.signals["vehicle_speed"].values * 3.6, [16, 32, 48, 64])
-        assert drive.problems[0].id == "file.frames_damaged"
+        assert drive.problems[0].id == "file.lines_left_out"
         assert drive.problems[0].values["count"] == 1
         assert drive.problems[0].values["lines"] == "5 lines"
 

@@ -1,7 +1,6 @@
-"""Text of CAN frames under names, of CanKing and of BUSMASTER; candump's other stamps."""
+"""Text of CAN frames: tables, CRTD, CanKing and BUSMASTER; candump's other stamps."""
 
 import sys
-from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.noted import has
 
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
@@ -17,6 +17,7 @@ from weighbridge.io.formats import format_of
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 DAY = datetime(2026, 3, 5, 22, 15)
+EPOCH = 1_600_000_000.0
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +80,27 @@ def busmaster(sent):
     return [*lines, "***[STOP LOGGING SESSION]***"]
 
 
+def gvret(sent, direction=True):
+    lines = [f"Time Stamp,ID,Extended,{'Dir,' * direction}Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8"]
+    for t, number, extended, data in sent:
+        told = "".join(f"{b:02X}," for b in data)
+        lines.append(
+            f"{round((EPOCH + t) * 1e6)},{number:08X},{str(extended).lower()},"
+            f"{'Rx,' * direction}0,{len(data)},{told}"
+        )
+    return lines
+
+
+def crtd(sent):
+    lines = [f"{EPOCH:.6f} CXX Info Type:crtd; Path:'/sd/drive.crtd'; Filter:off;"]
+    for k, (t, number, extended, data) in enumerate(sent):
+        kind = f"1{'T' if k % 7 == 0 else 'R'}{29 if extended else 11}"
+        lines.append(f"{EPOCH + t:.6f} {kind} {number:X} {data.hex(' ').upper()}")
+        if k % 10 == 0:
+            lines.append(f"{EPOCH + t:.6f} CEV Event vehicle.on")
+    return lines
+
+
 def candump_by(stamps):
     def lines(sent):
         times = stamps([t for t, *_ in sent])
@@ -104,6 +126,10 @@ FORMS = {
     "clx000.txt": ("table of CAN frames", clx, 1e-3),
     "kvaser.csv": ("table of CAN frames", kvaser, 1e-6),
     "spy.csv": ("table of CAN frames", vehicle_spy, 1e-6),
+    "gvret.csv": ("table of CAN frames", gvret, 1e-6),
+    "old.csv": ("table of CAN frames", lambda sent: gvret(sent, direction=False), 1e-6),
+    "drive.crtd": ("OVMS CRTD", crtd, 1e-6),
+    "crtd.log": ("OVMS CRTD", crtd, 1e-6),
     "king.txt": ("CanKing", canking, 1e-6),
     "master.log": ("BUSMASTER", busmaster, 1e-4),
     "dates.log": ("candump", candump_by(dates), 1e-5),
@@ -130,6 +156,33 @@ def test_frames_come_back(tmp_path, sent, name):
         assert frames.time[0] == pytest.approx(DAY.timestamp())
 
 
+def test_fd_frames_and_lines_that_are_none(tmp_path, sent):
+    path = tmp_path / "log.csv"
+    text = "\n".join(gvret(sent[:5]))
+    long = ",".join(f"{k:02X}" for k in range(64))
+    path.write_text(
+        f"{text}\n1600000100000000,00000123,false,Rx,1,64,{long},\n7,xyz,false,Rx,0,8,1\n"
+    )
+    log = format_of(path).read(path, None, None)
+    assert log.frames.length[-1] == 64
+    assert_array_equal(log.frames.data[-1], np.arange(64))
+    assert has(log.problems, "file.lines_left_out", count=1, lines="7 lines")
+    path = tmp_path / "log.crtd"
+    bad = "1600000100.0 1R11 12 0 1\n1600000100.0 1R29 FFFFFFFF 00\n"
+    path.write_text("\n".join([*crtd(sent[:5]), bad]))
+    log = format_of(path).read(path, None, None)
+    assert len(log.frames) == 5
+    assert has(log.problems, "file.lines_left_out", count=2, lines="7 lines")
+
+
+@pytest.mark.parametrize("name", ["gvret.csv", "drive.crtd", "clx000.txt", "king.txt"])
+def test_no_frame_is_one_sentence(tmp_path, name):
+    path = tmp_path / name
+    path.write_text("\n".join(FORMS[name][1]([])) + "\n")
+    with pytest.raises(DriveError, match="holds no CAN frame"):
+        read_drive(path)
+
+
 def test_frames_without_times_are_refused_by_that_cause(tmp_path):
     path = tmp_path / "bare.txt"
     path.write_text("  can0  100   [8]  11 22 33 44 55 66 77 88\n" * 20)
@@ -137,11 +190,10 @@ def test_frames_without_times_are_refused_by_that_cause(tmp_path):
         format_of(path).read(path, None, None)
 
 
-@settings(max_examples=40, deadline=None)
-@given(name=st.sampled_from([*FORMS]), cut=st.integers(0, 3000), junk=st.binary(max_size=12))
-def test_damage_leaves_frames_or_one_sentence(tmp_path_factory, sent, name, cut, junk):
-    path = tmp_path_factory.mktemp("cut") / name
-    text = "\n".join(FORMS[name][1](sent)).encode()
-    path.write_bytes(text[:cut] + junk + text[cut + 30 :])
-    with suppress(DriveError):
-        read_drive(path)
+@settings(max_examples=60, deadline=None)
+@given(
+    name=st.sampled_from([*FORMS]), part=st.floats(0.0, 1.0), at=st.floats(0.0, 1.0),
+    junk=st.binary(max_size=16),
+)  # fmt: skip
+def test_damage_leaves_signals_or_one_sentence(sent, assert_damage_is_told, name, part, at, junk):
+    assert_damage_is_told(name, "\n".join(FORMS[name][1](sent)).encode(), part, at, junk)

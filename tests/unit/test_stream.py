@@ -9,8 +9,8 @@ from tests.unit.test_j1939 import frames
 
 from weighbridge.errors import ConfigError
 from weighbridge.io.bus import decode
-from weighbridge.io.candump import read_candump
 from weighbridge.io.dbc import load_dbcs
+from weighbridge.io.frame_text import read_candump
 from weighbridge.io.j1939 import SPNS, decode_j1939
 from weighbridge.io.mapping import load_mapping
 from weighbridge.io.stream import DbcStream, J1939Stream, ObdStream

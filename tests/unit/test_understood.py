@@ -5,9 +5,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.noted import refused
 
 from weighbridge.io import read_drive
-from weighbridge.io.bus_text import read_crtd, read_gvret
-from weighbridge.io.candump import read_candump
-from weighbridge.io.canlog import read_asc, read_can_csv, read_trc
+from weighbridge.io.frame_text import read_asc, read_candump, read_crtd, read_frame_table, read_trc
 from weighbridge.io.understood import strange_rows
 
 CANDUMP = "({:.6f}) can1 1A0#0102"
@@ -24,8 +22,8 @@ READERS = {
     "a.asc": (read_asc, "base hex timestamps absolute\n", ASC),
     "p.trc": (read_trc, ";$FILEVERSION=1.1\n", PEAK),
     "h.trc": (read_trc, "Time ID DLC Data Comment\n", HACKER),
-    "g.csv": (read_gvret, "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2\n", GVRET),
-    "c.csv": (read_can_csv, "timestamp,arbitration_id,extended,remote,error,dlc,data\n", CSV),
+    "g.csv": (read_frame_table, "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2\n", GVRET),
+    "c.csv": (read_frame_table, "timestamp,arbitration_id,extended,remote,error,dlc,data\n", CSV),
 }
 
 

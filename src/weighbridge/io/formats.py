@@ -9,15 +9,13 @@ from __future__ import annotations
 import difflib
 import logging
 import sys
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
 from weighbridge.io import (
     blf,
-    bus_text,
-    candump,
-    canlog,
     frame_text,
     gpx,
     grouped,
@@ -43,6 +41,7 @@ from weighbridge.io import (
 from weighbridge.io.channels import drafter, reader
 from weighbridge.io.draft import draft
 from weighbridge.io.format import Format, Takes, starts_with
+from weighbridge.io.log import Reader
 
 _logger = logging.getLogger(__name__)
 
@@ -50,6 +49,23 @@ GROUP: Final = "weighbridge.formats"
 """Entry points by which packages add formats."""
 
 _HEAD: Final = 4096
+
+
+def _frames(
+    name: str,
+    suffixes: tuple[str, ...],
+    read: Reader,
+    begins: Callable[[bytes], bool] | None = None,
+    *,
+    magic: bool = False,
+    about: str = "CAN frames",
+) -> Format:
+    """Record of a format of raw CAN frames."""
+    return Format(
+        name=name, suffixes=suffixes, read=read, begins=begins, magic=magic, about=about,
+        takes=Takes.CHANNELS, self_described=True, package="cantools", extra="can",
+    )  # fmt: skip
+
 
 FORMATS: Final[tuple[Format, ...]] = (
     Format(
@@ -60,26 +76,13 @@ FORMATS: Final[tuple[Format, ...]] = (
         takes=Takes.TEXT,
         draft=draft,
     ),
-    Format(
-        name="python-can CSV",
-        suffixes=(".csv",),
-        read=canlog.read_can_csv,
-        begins=canlog.is_can_csv,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="SavvyCAN GVRET CSV",
-        suffixes=(".csv",),
-        read=bus_text.read_gvret,
-        begins=bus_text.is_gvret,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
+    _frames(
+        "table of CAN frames",
+        (".csv", ".tsv", ".txt"),
+        frame_text.read_frame_table,
+        frame_text.is_frame_table,
+        about="CAN frames, one a row under names, as python-can, SavvyCAN, CLX000, Kvaser and "
+        "Vehicle Spy write them",
     ),
     Format(
         name="RaceChrono CSV v3",
@@ -166,104 +169,14 @@ FORMATS: Final[tuple[Format, ...]] = (
         package="asammdf",
         extra="mdf",
     ),
-    Format(
-        name="BLF",
-        suffixes=(".blf",),
-        read=blf.read_blf,
-        begins=starts_with(b"LOGG"),
-        magic=True,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="ASC",
-        suffixes=(".asc",),
-        read=canlog.read_asc,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="TRC",
-        suffixes=(".trc",),
-        read=canlog.read_trc,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="candump",
-        suffixes=(".log",),
-        read=candump.read_candump,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="candump text",
-        suffixes=(".txt",),
-        read=candump.read_candump,
-        begins=candump.is_candump,
-        magic=True,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="OVMS CRTD",
-        suffixes=(".crtd", ".log", ".txt"),
-        read=bus_text.read_crtd,
-        begins=bus_text.is_crtd,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="table of CAN frames",
-        suffixes=(".csv", ".tsv", ".txt"),
-        read=frame_text.read_frame_table,
-        begins=frame_text.is_frame_table,
-        about="CAN frames, one a row under names, as CLX000, Kvaser and Vehicle Spy write them",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="CanKing",
-        suffixes=(".txt", ".log"),
-        read=frame_text.read_canking,
-        begins=frame_text.is_canking,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
-    Format(
-        name="BUSMASTER",
-        suffixes=(".log", ".txt"),
-        read=frame_text.read_busmaster,
-        begins=frame_text.is_busmaster,
-        about="CAN frames",
-        takes=Takes.CHANNELS,
-        self_described=True,
-        package="cantools",
-        extra="can",
-    ),
+    _frames("BLF", (".blf",), blf.read_blf, starts_with(b"LOGG"), magic=True),
+    _frames("ASC", (".asc",), frame_text.read_asc),
+    _frames("TRC", (".trc",), frame_text.read_trc),
+    _frames("candump", (".log",), frame_text.read_candump),
+    _frames("candump text", (".txt",), frame_text.read_candump, frame_text.is_candump, magic=True),
+    _frames("OVMS CRTD", (".crtd", ".log", ".txt"), frame_text.read_crtd, frame_text.is_crtd),
+    _frames("CanKing", (".txt", ".log"), frame_text.read_canking, frame_text.is_canking),
+    _frames("BUSMASTER", (".log", ".txt"), frame_text.read_busmaster, frame_text.is_busmaster),
     Format(
         name="NMEA 0183",
         suffixes=(".nmea", ".ubx"),

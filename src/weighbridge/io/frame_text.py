@@ -1,31 +1,566 @@
-"""CAN frames out of text whose header says what stands where: tables with named columns, the text
-windows of Kvaser's CanKing, and BUSMASTER's logs.
+"""CAN frames out of text, one frame a line: what stands where in each of its forms.
 
-Tables are those of CSS Electronics (CLX000), Kvaser and Vehicle Spy, and any other that names a
-time, an identifier and bytes. The forms are those that descriptions give; no file of these tools
-was at hand.
+ASC is Vector's, TRC of PEAK or CANHacker, candump of can-utils (its log, or what it shows on a
+terminal), CRTD of OVMS, and CanKing and BUSMASTER as they save their windows. Tables name their
+columns: those of python-can, SavvyCAN, CSS Electronics (CLX000), Kvaser and Vehicle Spy, and any
+other with a time, an identifier and bytes. The forms of tables, of CanKing and of BUSMASTER are
+those that descriptions give; no file of these tools was at hand.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import polars as pl
 
 from weighbridge.errors import DriveError
-from weighbridge.io.bus_text import frames_of_table
-from weighbridge.io.candump import whole_lines
-from weighbridge.io.draft_time import is_number, text_time_format
+from weighbridge.io.draft_time import is_clock, is_number, text_time_format
 from weighbridge.io.frames import Frames, in_order
-from weighbridge.io.log import Log
+from weighbridge.io.log import Log, Reader
 from weighbridge.io.mapping import TableMapping
 from weighbridge.io.table import SEPARATORS, cells, unwrapped
 from weighbridge.io.understood import Lines
+from weighbridge.kernels.frame_text import (
+    ALONE,
+    BASE64,
+    BLANK,
+    CELL,
+    FRAME,
+    LACKING,
+    MARKS,
+    NOTHING,
+    REMARK,
+    STRANGE,
+    UNSEEN,
+    WORD,
+    WORDS,
+    FrameForm,
+    FrameRows,
+    parse_frames,
+)
+from weighbridge.signals import Floats
+
+_BLOCK: Final = 1 << 25
+_SAMPLE: Final = 1 << 16
+_BUSES: Final = 256
+_EPOCH: Final = 1e8
+"""Stamps above count from 1970, not from the start of the log [s]."""
+_FALLS: Final = 0.2
+"""Part of the stamps that do not rise, from which they are times since the frame before [-]."""
+_HEAD_LINES: Final = 60
+
+_UNREADABLE: Final = "holds no CAN frame that can be read; record it again, or copy it again"
+
+
+class Shape(NamedTuple):
+    """A form of lines: its marks, and the places of its words; negative ones count from the end.
+
+    ``marks`` are words, parted by blanks, of which one stands at a place. ``skip`` letters stand
+    before the bytes, of which there are ``most``.
+    """
+
+    id: int = 0
+    data: int = LACKING
+    bus: int = LACKING
+    size: int = LACKING
+    extended: int = LACKING
+    marks: Mapping[int, str] = {}
+    kind: int = FRAME
+    coding: int = WORDS
+    skip: int = 0
+    most: int = 64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Form:
+    """What stands where in a text of frames, see `weighbridge.kernels.frame_text.FrameForm`.
+
+    Attributes
+    ----------
+    shapes, other, time, time_words, short, base, socketcan, coded, relative : of `FrameForm`
+    alone, remark : letters that are words of their own, or begin lines without a frame
+    separator : between cells; empty where blanks part words
+    extended : words by which an identifier has 29 bits, parted by blanks
+    unit, start : of the stamps [s], and what they count from [s since 1970]
+    dates : how dates of stamps are written; empty where they are none
+    bus : number of the bus of frames that name none
+    """
+
+    shapes: tuple[Shape, ...]
+    other: int = STRANGE
+    time: int = 0
+    time_words: int = 1
+    short: int = 0
+    base: int = 16
+    socketcan: bool = False
+    coded: bool = False
+    relative: bool = False
+    alone: str = ""
+    remark: str = ""
+    separator: str = ""
+    extended: str = ""
+    unit: float = 1.0
+    start: float = 0.0
+    dates: str = ""
+    bus: int = 0
+
+    def compiled(self) -> FrameForm:
+        """As the kernel takes it."""
+        letters = np.zeros(256, np.uint8)
+        blanks = ' \t\r"' if self.separator else " \t\r"
+        for role, those in ((BLANK, blanks), (ALONE, self.alone), (REMARK, self.remark),
+                            (CELL, self.separator)):  # fmt: skip
+            letters[[ord(letter) for letter in those]] = role
+        tags = [_tag(word) for word in self.extended.split()]
+        told = len(tags)
+        rows = []
+        for s in self.shapes:
+            places = [p for p in (s.id, *s.marks, self.time) if p >= 0]
+            row = [
+                s.kind,
+                1 + max(places, default=0),
+                s.bus,
+                s.id,
+                s.extended,
+                s.size,
+                s.data,
+                s.coding,
+                s.skip,
+                s.most,
+            ]
+            for place, words in s.marks.items():
+                row += [place, len(tags), len(tags) + len(words.split())]
+                tags += [_tag(word) for word in words.split()]
+            rows.append(row + [LACKING, 0, 0] * (MARKS - len(s.marks)))
+        return FrameForm(
+            letters, np.array(rows, np.int64), np.array(tags, np.int64), told, self.other,
+            self.time, self.time_words, self.short, self.base, bool(self.separator),
+            self.socketcan, self.coded, self.relative, bool(self.dates),
+        )  # fmt: skip
+
+
+def _tag(word: str) -> int:
+    return int.from_bytes(word[:7].encode("ascii"), "big")
+
+
+Pieces = Iterable[tuple[bytes, Form]]
+"""Whole lines of a file, with their form; where it is a new one, relative stamps begin anew."""
+
+
+def _reader(pieces: Callable[[Path], Pieces]) -> Reader:
+    def read(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
+        """Read the frames of a text; see `weighbridge.io.log.Reader`.
+
+        Raises
+        ------
+        DriveError
+            No frame in it, or a form of it that is not known.
+        """
+        parts: list[Frames] = []
+        buses: dict[str, int] = {}
+        lines = Lines()
+        last, clock, of_day = None, 0.0, False
+        for text, form in pieces(path):
+            clock = clock if form is last else 0.0
+            last = form
+            frames, counts, clock, hours = _parse(text, form, buses, clock)
+            of_day |= hours and not form.relative
+            lines.add(text, *counts)
+            parts.append(frames)
+        problems = lines.problems("file.lines_left_out", path)
+        frames = in_order(parts)
+        if not len(frames):
+            raise DriveError(f"{path} {_UNREADABLE}")
+        if of_day:
+            frames = replace(frames, time=unwrapped(frames.time))
+        absolute = bool(np.median(frames.time) > _EPOCH)
+        return Log(path, problems=problems, absolute=absolute, of_day=of_day, frames=frames)
+
+    return read
+
+
+def _parse(
+    text: bytes, form: Form, buses: dict[str, int], clock: float
+) -> tuple[Frames, tuple[int, int, int], float, bool]:
+    """Read lines of one form.
+
+    Returns
+    -------
+    Frames, counts of `Lines.add`, stamp of the last line, and whether stamps are times of day
+    """
+    letters = np.frombuffer(text, np.uint8)
+    places = np.zeros((_BUSES, 2), np.int64)
+    n = text.count(b"\n") + 1
+    for width in (8, 64):
+        rows = FrameRows(
+            np.zeros(n), np.zeros(n, np.int16), np.zeros(n, np.uint32), np.zeros(n, np.bool_),
+            np.zeros(n, np.uint8), np.zeros((n, width), np.uint8), np.zeros((n, 2), np.int64),
+        )  # fmt: skip
+        count, total, bad, first, seen, longest, last = parse_frames(
+            letters, rows, places, form.compiled(), clock
+        )
+        if longest <= width:
+            break
+    numbers = np.zeros(max(seen, 1), np.int16)
+    for k, (begin, end) in enumerate(places[:seen].tolist()):
+        name = text[begin:end].decode("latin-1")
+        numbers[k] = buses.setdefault(name, _number(name, buses) if name else form.bus)
+    time = rows.time[:count]
+    if form.dates:
+        stamps = (text[begin:end] for begin, end in rows.stamp[:count].tolist())
+        time = _dates([stamp.decode("latin-1") for stamp in stamps], form.dates)
+    frames = Frames(
+        time * form.unit + form.start, numbers[rows.channel[:count]],
+        *(column[:count].copy() for column in rows[2:6]),
+    )  # fmt: skip
+    dated = np.isfinite(time)
+    hours = count > 0 and not form.dates and b":" in text[slice(*rows.stamp[0].tolist())]
+    counts = (total, bad + int(np.count_nonzero(~dated)), first)
+    return frames.select(dated), counts, last, hours
+
+
+def _number(bus: str, taken: Mapping[str, int]) -> int:
+    """Number of a bus: the one its name ends in, or the first one free."""
+    found = re.search(r"\d{1,3}$", bus)
+    if found and int(found.group()) not in taken.values():
+        return int(found.group())
+    return next(k for k in range(1000) if k not in taken.values())
+
+
+def _dates(stamps: Sequence[str], form: str) -> Floats:
+    """Seconds since 1970, where no zone is told by the clock of this computer; NaN of no date."""
+    texts = pl.Series(stamps, dtype=pl.String)
+    universal = texts.str.ends_with("Z").any()
+    if form == "iso":
+        texts = texts.str.replace(" ", "T", literal=True).str.replace(r"Z$", "")
+        form = "%Y-%m-%dT%H:%M:%S%.f"
+    parsed = texts.str.to_datetime(form, strict=False, time_unit="us")
+    counts = parsed.cast(pl.Int64).cast(pl.Float64).fill_null(math.nan)
+    seconds = np.array(1e-6 * counts.to_numpy(), np.float64)
+    first = parsed.drop_nulls().head(1).to_list()
+    if universal or not first:
+        return seconds
+    naive = (first[0] - datetime(1970, 1, 1)).total_seconds()
+    return seconds + float(first[0].timestamp() - naive)
+
+
+def _blocks(path: Path) -> Iterator[bytes]:
+    """Whole lines of a text file, many at a time."""
+    with path.open("rb") as file:
+        rest = b""
+        while block := file.read(_BLOCK):
+            block = rest + block
+            end = block.rfind(b"\n") + 1
+            if end == 0 and len(block) > 4 * _BLOCK:
+                return
+            rest = block[end:]
+            if end:
+                yield block[:end]
+        if rest:
+            yield rest
+
+
+def _with_head(head: Callable[[Path, bytes], tuple[int, Form]], path: Path) -> Pieces:
+    """Blocks of the form that the first tells, without the bytes that are its head."""
+    form = None
+    for block in _blocks(path):
+        if form is None:
+            length, form = head(path, block)
+            # The lines of the head count.
+            block = b"\n" * block.count(b"\n", 0, length) + block[length:]
+        yield block, form
+
+
+# ASC ----------------------------------------------------------------------------------------------
+
+_ASC_MARK: Final = re.compile(
+    rb"^[ \t]*(?:(?:date|begin[ \t]+triggerblock)[ \t]+\w+[ \t]+(?P<date>[^\r\n]+)"
+    rb"|base[ \t]+(?P<base>hex|dec)(?:[ \t]+timestamps[ \t]+(?P<stamps>absolute|relative))?)",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""Lines of an ASC log that change how the lines after them are read."""
+_ASC_DATE: Final = re.compile(
+    r"(?P<month>[^\W\d]{3})\w*\s+(?P<day>\d{1,2})\s+(?P<hour>\d{1,2}):(?P<minute>\d{2}):"
+    r"(?P<second>\d{2})(?P<part>\.\d+)?(?:\s+(?P<half>[ap]m))?\s+(?P<year>\d{4})",
+    re.IGNORECASE,
+)
+_MONTHS: Final = {
+    name: k + 1
+    for names in (
+        "jan feb mar apr may jun jul aug sep oct nov dec",
+        "jan feb mär apr mai jun jul aug sep okt nov dez",
+    )
+    for k, name in enumerate(names.split())
+}
+_WAYS: Final = "rx tx rxrq txrq"
+_ASC: Final = Form(
+    shapes=(
+        Shape(marks={3: _WAYS, 4: "r errorframe"}, kind=NOTHING),
+        # With CAN FD, a name of the message may stand between.
+        Shape(4, 9, bus=2, size=8, marks={1: "canfd", 3: _WAYS, 5: "0 1", 6: "0 1"}),
+        Shape(4, 10, bus=2, size=9, marks={1: "canfd", 3: _WAYS, 6: "0 1", 7: "0 1"}),
+        Shape(2, 6, bus=1, size=5, marks={3: _WAYS, 4: "d"}, most=8),
+        Shape(marks={3: _WAYS}, kind=STRANGE),
+    ),
+    other=UNSEEN,
+)
+
+
+def _asc(path: Path) -> Pieces:
+    form = _ASC
+    for k, block in enumerate(_blocks(path)):
+        marks = [*_ASC_MARK.finditer(block)] if k == 0 or b"riggerblock" in block else []
+        edges = [0, *(m.start() for m in marks), len(block)]
+        for mark, begin, end in zip([None, *marks], edges[:-1], edges[1:], strict=True):
+            if mark is not None and mark["date"] is not None:
+                form = replace(form, start=_asc_date(mark["date"].decode("latin-1")) or form.start)
+            elif mark is not None:
+                base = 10 if mark["base"].lower() == b"dec" else 16
+                relative = (mark["stamps"] or b"").lower() == b"relative"
+                form = replace(form, base=base, relative=relative)
+            yield block[begin:end], form
+
+
+def _asc_date(text: str) -> float | None:
+    """Seconds since 1970 of ``Sep 13 12:26:40.0 2020``, with or without am and pm.
+
+    It is of the recording computer's clock, taken in the time zone of this one.
+    """
+    found = _ASC_DATE.match(text.strip())
+    month = _MONTHS.get(found["month"].lower()) if found else None
+    if found is None or month is None:
+        return None
+    hour = int(found["hour"])
+    if found["half"]:
+        hour = hour % 12 + (12 if found["half"].lower() == "pm" else 0)
+    try:
+        day = datetime(
+            int(found["year"]), month, int(found["day"]), hour, int(found["minute"]),
+            int(found["second"]),
+        )  # fmt: skip
+        return day.timestamp() + float(found["part"] or 0.0)
+    except (ValueError, OverflowError, OSError):
+        return None
+
+
+# TRC ----------------------------------------------------------------------------------------------
+
+_TRACE_KEY: Final = re.compile(rb"^;\$(?P<key>[A-Z]+)=(?P<value>[^\r\n]*)", re.MULTILINE)
+_NUMBERED: Final = {1: ")"}
+_ONES: Final = "ffffffff"
+_TRACE_VERSIONS: Final[Mapping[str, tuple[int, Shape]]] = {
+    # Version 1.0 tells of the bus under an identifier of ones.
+    "1.0": (2, Shape(3, 5, size=4, marks=_NUMBERED)),
+    "1.1": (2, Shape(4, 6, size=5, marks={**_NUMBERED, 3: "rx tx"})),
+    "1.3": (2, Shape(5, 8, bus=3, size=7, marks={**_NUMBERED, 4: "rx tx"})),
+    "2.0": (1, Shape(3, 6, size=5, marks={2: "dt fd fb fe bi"})),
+    "2.1": (1, Shape(4, 8, bus=3, size=7, marks={2: "dt fd fb fe bi"})),
+}
+"""Place of the stamp and form of lines, by version of the file."""
+_TRACE_NAMES: Final = {
+    "time": ("time", "timestamp"),
+    "id": ("id", "identifier", "canid", "can-id"),
+    "size": ("dlc", "len", "length", "size"),
+    "data": ("data",),
+}
+"""Names of columns in the first line of a log that has no remarks, as CANHacker writes it."""
+
+
+def _trace_form(time: int, shape: Shape, unit: float = 1e-3) -> Form:
+    # Lines of other kinds are errors, status and remote frames; a kind stands behind the number.
+    kinds = {p: words for p, words in shape.marks.items() if words != ")"}
+    numbered = {p: words for p, words in shape.marks.items() if words == ")"}
+    others = [Shape(marks={**numbered, shape.data: "rtr"}, kind=NOTHING)]
+    if not kinds:
+        others.append(Shape(marks={**numbered, shape.id: _ONES}, kind=NOTHING))
+    behind = [Shape(max(kinds), marks=numbered, kind=NOTHING)] if kinds else []
+    return Form(
+        shapes=(*others, shape, *behind), time=time, short=4, alone=")", remark=";", bus=1,
+        unit=unit,
+    )  # fmt: skip
+
+
+def _trace_head(path: Path, block: bytes) -> tuple[int, Form]:
+    first, _, below = block.lstrip().partition(b"\n")
+    names = first.decode("latin-1").lower().split()
+    places = {
+        what: next((k for k, name in enumerate(names) if name in said), -1)
+        for what, said in _TRACE_NAMES.items()
+    }
+    if first[:1] != b";" and min(places.values()) >= 0:
+        words = below.split()
+        stamp = words[places["time"]] if len(words) > places["time"] else b""
+        # Milliseconds are whole; seconds have decimals.
+        unit = 1.0 if b"," in stamp or b"." in stamp else 1e-3
+        shape = Shape(places["id"], places["data"], size=places["size"])
+        return block.find(b"\n") + 1, _trace_form(places["time"], shape, unit)
+    told = {m["key"].upper(): m["value"].strip() for m in _TRACE_KEY.finditer(block)}
+    version = told.get(b"FILEVERSION", b"1.0").decode("latin-1")
+    if version not in _TRACE_VERSIONS:
+        raise DriveError(
+            f"{path} is of TRC version {version}; known are {', '.join(_TRACE_VERSIONS)}: "
+            "convert it"
+        )
+    time, shape = _TRACE_VERSIONS[version]
+    coded = False
+    if version.startswith("2"):
+        columns = told.get(b"COLUMNS", b"N,O,T,B,I,d,R,L,D").decode("latin-1").split(",")
+        at = {name: columns.index(name) for name in columns}
+        lacking = [n for n in ("O", "T", "I", "D") if n not in at]
+        if lacking or not {"l", "L"} & set(at):
+            raise DriveError(f"{path}: its $COLUMNS lack {', '.join(lacking) or 'l'}; convert it")
+        coded = "l" not in at
+        time = at["O"]
+        shape = Shape(
+            at["I"], at["D"], bus=at.get("B", LACKING), size=at["L" if coded else "l"],
+            marks={at["T"]: shape.marks[2]},
+        )  # fmt: skip
+    try:
+        days = float(told.get(b"STARTTIME", b"nan"))
+    except ValueError:
+        days = math.nan
+    # Days since the end of 1899.
+    start = (days - 25569.0) * 86400.0
+    start = start if math.isfinite(start) else 0.0
+    return 0, replace(_trace_form(time, shape), start=start, coded=coded)
+
+
+# candump ------------------------------------------------------------------------------------------
+
+_CANDUMP_LINE: Final = re.compile(
+    rb"(?:\xef\xbb\xbf)?\s*"
+    rb"(?P<stamp>\((?:\d{4}-\d\d-\d\d \d\d:\d\d:)?\d+(?:\.\d+)?\)\s+)?"
+    rb"\w+\s+(?:[RT]X\s+\S+\s+\S+\s+)?"
+    rb"[0-9A-Fa-f]{3,8}(?:#|\s+\[\d{1,2}\](?:\s|$))"
+)
+
+
+def _candump_form(words: int) -> Form:
+    """Form of a log whose stamps have so many words."""
+    bus = words + 2
+    front = {0: "(", bus - 1: ")"}
+    shapes = []
+    # candump -x tells the direction and two flags before the identifier.
+    for at, way in ((bus + 4, {bus + 1: "rx tx"}), (bus + 1, {})):
+        known = {**front, **way}
+        shapes += [
+            Shape(marks={**known, at + 1: "[", at + 4: "remote"}, kind=NOTHING),
+            # CAN FD has a digit of flags behind the second mark.
+            Shape(at, at + 3, bus, marks={**known, at + 1: "#", at + 2: "#"}, coding=WORD, skip=1),
+            Shape(at, at + 2, bus, marks={**known, at + 1: "#"}, coding=WORD),
+            Shape(at, at + 4, bus, at + 2, marks={**known, at + 1: "[", at + 3: "]"}),
+        ]  # fmt: skip
+    return Form(
+        shapes=tuple(shapes), time=1, time_words=words, socketcan=True, short=3, alone="()[]#",
+        dates="iso" if words > 1 else "",
+    )  # fmt: skip
+
+
+def is_candump(head: bytes) -> bool:
+    """Tell whether a text begins with a line of candump."""
+    return _CANDUMP_LINE.match(head) is not None
+
+
+def _candump_head(path: Path, block: bytes) -> tuple[int, Form]:
+    head = block[:_SAMPLE]
+    begins = _CANDUMP_LINE.match(head)
+    if begins is not None and begins["stamp"] is None:
+        raise DriveError(
+            f"{path}: its frames have no times, without which nothing can be weighed; record it "
+            "with candump -l"
+        )
+    if re.search(rb"\(\d{4}-\d\d-\d\d ", head):
+        return 0, _candump_form(2)
+    form = _candump_form(1)
+    stamps = np.array([float(stamp) for stamp in re.findall(rb"^\s*\((\d+\.\d+)\)", head, re.M)])
+    # candump -td gives the time since the frame before.
+    relative = (
+        stamps.size > 1
+        and stamps[0] == 0.0
+        and 0.0 < stamps.max() < _EPOCH
+        and float(np.mean(np.diff(stamps) <= 0.0)) > _FALLS
+    )
+    return 0, replace(form, relative=relative)
+
+
+# CRTD, CanKing, BUSMASTER -------------------------------------------------------------------------
+
+_CRTD_LINE: Final = re.compile(rb"^\d+(?:\.\d+)? \d?(?:C[A-Z]{2}|[RT](?:11|29))\b")
+# ``seconds [bus]R11 id bytes``; R for received, T for sent, 11 or 29 bits (Open Vehicles, *CRTD CAN
+# Log Format*). Version 1 had one bus.
+_CRTD: Final = Form(
+    shapes=(
+        Shape(4, 5, bus=1, extended=3, marks={2: "r t", 3: "11 29"}),
+        Shape(3, 4, extended=2, marks={1: "r t", 2: "11 29"}),
+    ),
+    other=UNSEEN,
+    alone="RT",
+    extended="29",
+    bus=1,
+)
+
+_CANKING_HEAD: Final = re.compile(rb"\s*Chn\s+Identifier\s+Flg\b", re.IGNORECASE)
+_CANKING: Final = Form(
+    shapes=(
+        Shape(1, 4, 0, 3, 2, marks={-1: "r t", 2: "x xr xt n r t e w"}),
+        Shape(1, 3, 0, 2, marks={-1: "r t"}),
+    ),
+    time=-2,
+    remark="CL",
+    extended="x xr xt",
+)
+
+_BUSMASTER_HEAD: Final = re.compile(rb"\s*\*\*\*BUSMASTER", re.IGNORECASE)
+_BUSMASTER: Final = Form(
+    shapes=(
+        Shape(marks={1: "rx tx", 4: "sr xr"}, kind=NOTHING),
+        Shape(3, 6, 2, 5, 4, marks={1: "rx tx", 4: "s x"}),
+    ),
+    remark="*",
+    extended="x",
+)
+
+
+def is_crtd(head: bytes) -> bool:
+    """Tell whether a text begins with a record of CRTD."""
+    return _CRTD_LINE.match(head) is not None
+
+
+def is_canking(head: bytes) -> bool:
+    """Tell whether a text begins with the header of CanKing's window."""
+    return _CANKING_HEAD.match(head) is not None
+
+
+def is_busmaster(head: bytes) -> bool:
+    """Tell whether a text begins as BUSMASTER's logs do."""
+    return _BUSMASTER_HEAD.match(head) is not None
+
+
+def _canking_head(path: Path, block: bytes) -> tuple[int, Form]:
+    lines = [line.split() for line in block[:_SAMPLE].decode("latin-1").split("\n")]
+    words = [word for line in lines if line and line[-1] in ("R", "T") for word in line[1:-2]]
+    # Bytes of three digits are decimal, unless a letter shows that they are not.
+    letters = any(re.fullmatch("[0-9A-Fa-f]*[A-Fa-f][0-9A-Fa-f]*", word) for word in words)
+    decimal = not letters and any(re.fullmatch(r"\d{3}", word) for word in words)
+    return 0, replace(_CANKING, base=10 if decimal else 16)
+
+
+def _busmaster_head(path: Path, block: bytes) -> tuple[int, Form]:
+    head = block[:_SAMPLE].upper()
+    return 0, replace(
+        _BUSMASTER, base=10 if b"***DEC***" in head else 16, relative=b"***RELATIVE MODE***" in head
+    )
+
+
+# Tables -------------------------------------------------------------------------------------------
 
 _NAMES: Final[Mapping[str, frozenset[str]]] = {
     "time": frozenset(
@@ -38,50 +573,28 @@ _NAMES: Final[Mapping[str, frozenset[str]]] = {
     ),
     "extended": frozenset(("extended", "ext", "xtd", "ide", "type", "flags", "frame type")),
     "bus": frozenset(("channel", "bus", "network", "chn", "busid", "busnum")),
-    "length": frozenset(("dlc", "len", "length", "size", "datalength")),
+    "size": frozenset(("dlc", "len", "length", "size", "datalength")),
     "data": frozenset(("data", "payload", "data bytes", "databytes", "data hex", "bytes")),
+    "remote": frozenset(("remote", "rtr")),
+    "error": frozenset(("error",)),
 }  # fmt: skip
 """What columns of frames are called."""
-
 _BYTE: Final = re.compile(r"(?:b|d|data|byte|data ?byte|byte ?data) ?(\d{1,2})$")
-_EXTENDED: Final = frozenset(("1", "t", "true", "x", "e", "ext", "extended", "xtd", "yes"))
-"""What says that an identifier has 29 bits; 1 is CLX000's type."""
-
-_HEAD_LINES: Final = 60
-_EPOCH: Final = 1e8
-_STANDARD: Final = 0x7FF
+_TRUE: Final = "1 t true x e ext extended xtd yes"
+"""What says that an identifier has 29 bits, or that a frame is a remote one; 1 is CLX000's type."""
+_PYTHON_CAN: Final = b"timestamp,arbitration_id,extended,remote,error,dlc,data"
+_GVRET: Final = re.compile(rb"^time ?stamp,id,extended,(?:dir,)?bus,len,d1,", re.IGNORECASE)
 _CLX_TIME: Final = "%Y%m%dT%H%M%S%3f"
-
-_BUSMASTER: Final = re.compile(rb"\s*\*\*\*BUSMASTER", re.IGNORECASE)
-_BUSMASTER_LINE: Final = (
-    r"^(\d+):(\d+):(\d+):(\d+) [RT]x (\d+) (?:0x)?([0-9A-Fa-f]+) ([sx])\w* \d+"
-    r"((?: [0-9A-Fa-f]{1,3})*)\s*$"
-)
-_CANKING: Final = re.compile(rb"\s*Chn\s+Identifier\s+Flg\b", re.IGNORECASE)
-_CANKING_LINE: Final = (
-    r"^\s*(\d+)\s+([0-9A-Fa-f]{3,8})\s+(X?)[ RTEWN]*?(\d{1,2})((?:\s+[0-9A-Fa-f]{1,3})*)"
-    r"\s+(\d+\.\d+)\s+[RT]\s*$"
-)
-
-
-def is_busmaster(head: bytes) -> bool:
-    """Tell whether a text begins as BUSMASTER's logs do."""
-    return _BUSMASTER.match(head) is not None
-
-
-def is_canking(head: bytes) -> bool:
-    """Tell whether a text begins with the header of CanKing's window."""
-    return _CANKING.match(head) is not None
+_BOM: Final = b"\xef\xbb\xbf"
 
 
 def is_frame_table(head: bytes) -> bool:
     """Tell whether a text begins with a table of frames that names its columns."""
-    lines = head.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace").splitlines()
-    return _table_header(lines) is not None
+    return _table_header(_head_lines(head)) is not None
 
 
-def _plain(name: str) -> str:
-    return " ".join(re.findall(r"[a-z]+|\d+", name.lower()))
+def _head_lines(head: bytes) -> list[str]:
+    return head.removeprefix(_BOM)[:_SAMPLE].decode("utf-8", "replace").split("\n")
 
 
 def _table_header(lines: Sequence[str]) -> tuple[int, str, dict[str, int], list[int]] | None:
@@ -94,233 +607,62 @@ def _table_header(lines: Sequence[str]) -> tuple[int, str, dict[str, int], list[
     """
     for k, line in enumerate(lines[:_HEAD_LINES]):
         separator = max(SEPARATORS, key=line.count)
-        names = [_plain(cell) for cell in cells(line, separator)]
+        names = [" ".join(re.findall(r"[a-z]+|\d+", c.lower())) for c in cells(line, separator)]
         places = {
-            what: next((i for i, name in enumerate(names) if name in said), -1)
+            what: next((i for i, name in enumerate(names) if name in said), LACKING)
             for what, said in _NAMES.items()
         }
         single = [i for i, name in enumerate(names) if _BYTE.match(name)]
-        if min(places["time"], places["id"]) >= 0 and (single or places["data"] >= 0):
+        held = single or places["data"] < LACKING
+        if max(places["time"], places["id"]) < LACKING and held:
             return k, separator, places, single
     return None
 
 
-def read_frame_table(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    """Read the frames of a table with named columns; see `weighbridge.io.log.Reader`.
+def _table_head(path: Path, block: bytes) -> tuple[int, Form]:
+    lines = _head_lines(block)
+    header = _table_header(lines)
+    if header is None:
+        raise DriveError(f"{path} {_UNREADABLE}")
+    line, separator, places, single = header
+    rows = [cells(row, separator) for row in lines[line + 1 : 1000]]
 
-    Raises
-    ------
-    DriveError
-        No frame in it, or no header.
-    """
-    parts: list[Frames] = []
-    lines = Lines()
-    header = None
-    for block in whole_lines(path):
-        text = block.decode("utf-8-sig", "replace").replace("\r", "")
-        skipped = 0
-        if header is None:
-            header = _table_header(text.split("\n", _HEAD_LINES))
-            if header is None:
-                break
-            skipped = header[0] + 1
-        rows = text.split("\n")[skipped:]
-        frames, strange = _table_frames(rows, *header[1:])
-        first = skipped + strange[0] + 1 if strange else 0
-        lines.add(block, len(frames) + len(strange), len(strange), first)
-        parts.append(frames)
-    return _log(path, parts, lines)
+    def sample(place: int) -> list[str]:
+        return [row[place] for row in rows if len(row) > place and row[place]]
 
-
-def _table_frames(
-    rows: Sequence[str], separator: str, places: Mapping[str, int], single: Sequence[int]
-) -> tuple[Frames, list[int]]:
-    """Frames of rows, and the places of rows that are none."""
-    quote = '"' if any('"' in row for row in rows[:100]) else ""
-    texts = pl.Series([row.replace(quote, "") if quote else row for row in rows], dtype=pl.String)
-    parts = texts.str.split(separator)
-
-    def column(place: int) -> pl.Series:
-        return parts.list.get(place, null_on_oob=True).str.strip_chars()
-
-    number = column(places["id"]).str.to_lowercase().str.strip_prefix("0x")
-    decimal = False
-    if single:
-        said = pl.DataFrame({str(k): column(k).str.strip_prefix("0x") for k in single})
-        # A byte of three digits is decimal.
-        decimal = any(one.str.contains(r"^\d{3}$").any() for one in said)
-        text = said.select(pl.concat_str(pl.all().fill_null(""), separator=" ")).to_series()
-        data = _bytes(text, decimal=decimal)
-    else:
-        data = _bytes(column(places["data"]).str.replace_all(r"[:\-]|0x", " "), decimal=False)
-    base = 10 if decimal else 16
-    if places["length"] >= 0:
-        size = column(places["length"]).cast(pl.Int64, strict=False)
-        cut = pl.DataFrame({"data": data, "size": size.fill_null(64)})
-        data = cut.select(pl.col("data").bin.slice(0, pl.col("size"))).to_series()
-    identifier = number.str.to_integer(base=base, strict=False)
-    extended = identifier > _STANDARD
-    if places["extended"] >= 0:
-        told = column(places["extended"]).str.to_lowercase().is_in(sorted(_EXTENDED))
-        extended = extended | told.fill_null(value=False)
-    bus = column(places["bus"]) if places["bus"] >= 0 else pl.repeat("0", len(rows), eager=True)
-    kinds = {name: k for k, name in enumerate(bus.drop_nulls().unique(maintain_order=True))}
-    channel = bus.cast(pl.Int16, strict=False)
-    if channel.null_count() > bus.null_count() + 0.5 * len(rows):
-        channel = bus.replace_strict(kinds, default=None, return_dtype=pl.Int16)
-    table = pl.DataFrame(
-        {
-            "time": _seconds(column(places["time"])),
-            "channel": channel,
-            "id": identifier,
-            "extended": extended,
-            "data": data,
-        }
-    ).with_columns(pl.col("time").fill_nan(None))
-    whole = table.select(pl.all_horizontal(pl.all().is_not_null())).to_series()
-    filled = texts.str.strip_chars() != ""
-    return frames_of_table(table), np.flatnonzero(~whole & filled).tolist()
+    # A byte of three digits is decimal.
+    decimal = any(re.fullmatch(r"\d{3}", cell) for place in single for cell in sample(place))
+    stamps = sample(places["time"])[:200]
+    dates = ""
+    if sum(not (is_number(s) or is_clock(s)) for s in stamps) > 0.5 * len(stamps):
+        dates = _CLX_TIME if re.match(r"\d{8}T\d{9}$", stamps[0]) else text_time_format(stamps)[0]
+    head = lines[line].encode()
+    # Stamps of SavvyCAN are microseconds; those with a point are in seconds, as other programs
+    # write this form.
+    micro = _GVRET.match(head) and not any("." in stamp for stamp in stamps[:1])
+    coding = WORDS if single else WORD
+    kinds = [places["remote"], places["error"]]
+    frame = Shape(
+        places["id"], single[0] if single else places["data"], places["bus"], places["size"],
+        places["extended"], coding=BASE64 if head.startswith(_PYTHON_CAN) else coding,
+        most=len(single) if single and places["size"] == LACKING else 64,
+    )  # fmt: skip
+    others = [Shape(marks={place: _TRUE}, kind=NOTHING) for place in kinds if place < LACKING]
+    length = len(b"\n".join(block.split(b"\n", line + 1)[: line + 1]))
+    return length, Form(
+        shapes=(*others, frame), time=places["time"], separator=separator, extended=_TRUE,
+        base=10 if decimal else 16, unit=1e-6 if micro else 1.0, dates=dates, remark="#",
+    )  # fmt: skip
 
 
-def _seconds(stamps: pl.Series) -> pl.Series:
-    """Times of the rows [s]: numbers, times of day or dates; NaN where there is none."""
-    sample = [t for t in stamps.drop_nulls().head(200).to_list() if t]
-    if sum(map(is_number, sample)) > 0.5 * len(sample):
-        return stamps.cast(pl.Float64, strict=False)
-    form = _CLX_TIME if sample and re.match(r"\d{8}T\d{9}$", sample[0]) else ""
-    form = form or text_time_format(sample)[0]
-    if form == "clock":
-        part = stamps.str.extract_groups(r"^(\d+):(\d+):(\d+(?:[.,]\d+)?)$").struct.unnest()
-        hour, minute, second = (
-            part[c].str.replace(",", ".", literal=True).cast(pl.Float64, strict=False)
-            for c in part.columns
-        )
-        day = (3600.0 * hour + 60.0 * minute + second).fill_null(float("nan"))
-        return pl.Series(unwrapped(np.array(day.to_numpy())))
-    if form == "iso":
-        stamps = stamps.str.replace(" ", "T", literal=True).str.replace(r"Z$", "")
-        form = "%Y-%m-%dT%H:%M:%S%.f"
-    if not form:
-        return pl.repeat(float("nan"), stamps.len(), eager=True)
-    parsed = stamps.str.to_datetime(form, strict=False, time_unit="us")
-    return (parsed.cast(pl.Int64).cast(pl.Float64) * 1e-6).fill_null(float("nan"))
+def _whole(form: Form, path: Path) -> Pieces:
+    return ((block, form) for block in _blocks(path))
 
 
-def read_busmaster(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    """Read the frames of a BUSMASTER log; see `weighbridge.io.log.Reader`.
-
-    Raises
-    ------
-    DriveError
-        No frame in it.
-    """
-    with path.open("rb") as file:
-        head = file.read(4096).upper()
-    decimal, relative = b"***DEC***" in head, b"***RELATIVE MODE***" in head
-
-    def rows(found: pl.DataFrame) -> pl.DataFrame:
-        hour, minute, second, part = (
-            pl.col(str(k)).cast(pl.Float64, strict=False) for k in range(1, 5)
-        )
-        return found.select(
-            time=3600.0 * hour + 60.0 * minute + second + 1e-4 * part,
-            channel=pl.col("5").cast(pl.Int16, strict=False),
-            id=pl.col("6").str.to_integer(base=10 if decimal else 16, strict=False),
-            extended=pl.col("7") == "x",
-            data=pl.col("8"),
-        )
-
-    log = _read_lines(path, _BUSMASTER_LINE, rows, r"^\s*(\*\*\*.*)?$", decimal=decimal)
-    assert log.frames is not None
-    time = log.frames.time
-    log.frames = replace(log.frames, time=np.cumsum(time) if relative else unwrapped(time))
-    log.of_day = not relative
-    return log
-
-
-def read_canking(path: Path, table: str | None, mapping: TableMapping | None) -> Log:
-    """Read the frames of a text window of Kvaser's CanKing; see `weighbridge.io.log.Reader`.
-
-    Raises
-    ------
-    DriveError
-        No frame in it.
-    """
-    with path.open("rb") as file:
-        sample = file.read(1 << 16).decode("latin-1")
-    told = re.findall(_CANKING_LINE, sample, re.MULTILINE)
-    words = [word for line in told for word in (line[1], *line[4].split())]
-    # Bytes of three digits are decimal, unless a letter shows that they are not.
-    letters = any(re.search("[A-Fa-f]", word) for word in words)
-    decimal = not letters and any(len(w) == 3 for line in told for w in line[4].split())
-
-    def rows(found: pl.DataFrame) -> pl.DataFrame:
-        number = pl.col("2").str.to_integer(base=10 if decimal else 16, strict=False)
-        return found.select(
-            time=pl.col("6").cast(pl.Float64, strict=False),
-            channel=pl.col("1").cast(pl.Int16, strict=False),
-            id=number,
-            extended=(pl.col("3") == "X") | (number > _STANDARD),
-            data=pl.col("5"),
-        )
-
-    other = r"^\s*(Chn\s|Logging|$)"
-    return _read_lines(path, _CANKING_LINE, rows, other, decimal=decimal)
-
-
-def _read_lines(
-    path: Path,
-    form: str,
-    rows: Callable[[pl.DataFrame], pl.DataFrame],
-    other: str,
-    *,
-    decimal: bool,
-) -> Log:
-    """Read frames that stand one on a line.
-
-    Parameters
-    ----------
-    path : the file
-    form : pattern of a line
-    rows : makes columns of `frames_of_table` of what the pattern finds; data as text
-    other : pattern of lines that hold no frame
-    decimal : whether bytes are decimal
-    """
-    parts: list[Frames] = []
-    lines = Lines()
-    for block in whole_lines(path):
-        text = pl.Series(block.decode("latin-1").replace("\r", "").split("\n"), dtype=pl.String)
-        ignored = text.str.contains(other)
-        found = rows(text.str.extract_groups(form).struct.unnest())
-        found = found.with_columns(data=_bytes(found["data"], decimal=decimal))
-        whole = found.select(pl.all_horizontal(pl.all().is_not_null())).to_series()
-        strange = np.flatnonzero(~(whole | ignored))
-        total = int((~ignored).sum())
-        lines.add(block, total, strange.size, int(strange[0]) + 1 if strange.size else 0)
-        parts.append(frames_of_table(found))
-    return _log(path, parts, lines)
-
-
-def _bytes(texts: pl.Series, *, decimal: bool) -> pl.Series:
-    """Bytes that are spelled one after the other, parted by blanks; null where they are none."""
-    if not decimal:
-        # A byte of one digit stands alone between blanks.
-        padded = texts.str.replace_all(r"\b([0-9A-Fa-f])\b", "0${1}")
-        return padded.str.replace_all(r"\s+", "").str.decode("hex", strict=False)
-    found: list[bytes | None] = []
-    for text in texts.to_list():
-        words = (text or "").split()
-        numbers = [int(word) for word in words if word.isascii() and word.isdecimal()]
-        fits = text is not None and len(numbers) == len(words) and max(numbers, default=0) < 256
-        found.append(bytes(numbers) if fits else None)
-    return pl.Series(found, dtype=pl.Binary)
-
-
-def _log(path: Path, parts: list[Frames], lines: Lines) -> Log:
-    problems = lines.problems("file.lines_left_out", path)
-    frames = in_order(parts)
-    if not len(frames):
-        raise DriveError(f"{path} holds no CAN frame that can be read; record it again")
-    log = Log(path, absolute=bool(np.median(frames.time) > _EPOCH), frames=frames)
-    log.problems += problems
-    return log
+read_asc: Final = _reader(_asc)
+read_trc: Final = _reader(partial(_with_head, _trace_head))
+read_candump: Final = _reader(partial(_with_head, _candump_head))
+read_crtd: Final = _reader(partial(_whole, _CRTD))
+read_canking: Final = _reader(partial(_with_head, _canking_head))
+read_busmaster: Final = _reader(partial(_with_head, _busmaster_head))
+read_frame_table: Final = _reader(partial(_with_head, _table_head))
