@@ -203,5 +203,5 @@ def test_channels_outside_their_records_do_not_end_the_process(tmp_path):
         at = raw.find(b"##CN", at + 1)
     path = tmp_path / "log.mf4"
     path.write_bytes(raw)
-    with pytest.raises(WeighbridgeError, match="stands outside its records"):
+    with pytest.raises(WeighbridgeError, match="records none is whole"):
         read_drive(path)

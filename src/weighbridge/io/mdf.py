@@ -34,9 +34,8 @@ from weighbridge.io.mapping import (
     lacking,
     resolved_unit,
 )
-from weighbridge.io.mdf_bus import bus_frames, check_places
-from weighbridge.io.mdf_check import check_links, guard, settle
-from weighbridge.io.mdf_salvage import Salvaged, salvage
+from weighbridge.io.mdf_bus import bus_frames
+from weighbridge.io.mdf_mend import Mended, guard, mended
 from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import column_list
 from weighbridge.messages import phrase
@@ -66,7 +65,7 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     """
     with _file(path) as (file, saved):
         log = _read(file, path, table, mapping)
-    if saved is not None:
+    if saved is not None and saved.damaged:
         log.problems.insert(0, _told(log, saved))
     return log
 
@@ -85,7 +84,7 @@ def recording_of(path: Path) -> Recording:
         every, raw_bus = _channels(file)
         channels = {n: p for n, p in every.items() if not n.startswith(_BUS_PREFIXES)}
         found = Recording([], start=_start(file))
-        if saved is not None:
+        if saved is not None and saved.damaged:
             found.notes.append(Problem.of("file.cut_off"))
         found.frames = _frames(file, path) if raw_bus else None
         places = [_longest(file, places) for places in channels.values()]
@@ -118,19 +117,19 @@ def draft(path: Path) -> Draft:
 
 
 @contextmanager
-def _file(path: Path) -> Iterator[tuple[Any, Salvaged | None]]:
+def _file(path: Path) -> Iterator[tuple[Any, Mended | None]]:
     """Open an MDF file, and what could be salvaged of one that was cut off."""
     try:
         from asammdf import MDF
     except ImportError:
         raise MissingExtraError("asammdf", "mdf", f"reading {path.name}") from None
-    saved = salvage(path)
-    if saved is not None and not saved.kept and not saved.unfinished:
+    try:
+        saved = mended(path)
+    except ValueError as e:
+        raise _unreadable(path, str(e)) from None
+    if saved is not None and saved.damaged and not saved.kept and not saved.unfinished:
         records = f"of its {saved.told} records none is whole" if saved.told else "nothing is whole"
-        raise DriveError(
-            f"{path} ends early and {records}, as what they need stands further behind; "
-            "copy it again"
-        )
+        raise DriveError(f"{path} ends early or is damaged, and {records}; copy it again")
     with (
         warnings.catch_warnings(),
         # Of an unfinished file the library makes a copy, which it leaves behind if that fails.
@@ -141,7 +140,7 @@ def _file(path: Path) -> Iterator[tuple[Any, Salvaged | None]]:
             yield file, saved
 
 
-def _told(log: Log, saved: Salvaged) -> Problem:
+def _told(log: Log, saved: Mended) -> Problem:
     """Say what was salvaged of a file that was cut off."""
     clocks = [s.time for s in log.signals if len(s)]
     clocks += [log.frames.time] if log.frames is not None and len(log.frames) else []
@@ -156,7 +155,7 @@ def _told(log: Log, saved: Salvaged) -> Problem:
     return Problem.of("file.ends_short", file=log.path.name, kept=counted, length=span)
 
 
-def _open(opener: Any, path: Path, saved: Salvaged | None, folder: str) -> Any:
+def _open(opener: Any, path: Path, saved: Mended | None, folder: str) -> Any:
     """Open the file; what the library raises for a broken one becomes one sentence."""
     # The library tells of damage with a traceback of its own, beside raising or not.
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
@@ -165,12 +164,8 @@ def _open(opener: Any, path: Path, saved: Salvaged | None, folder: str) -> Any:
     sys.unraisablehook = lambda _: None
     reason = ""
     try:
-        exact = check_links(path if saved is None else saved.raw)
         guard()
-        if saved is not None:
-            source: Path | io.BytesIO = io.BytesIO(saved.raw)
-        else:
-            source = path if exact else io.BytesIO(path.read_bytes())
+        source = path if saved is None else io.BytesIO(saved.raw)
         with redirect_stdout(io.StringIO()):
             return opener(
                 source,
@@ -185,7 +180,11 @@ def _open(opener: Any, path: Path, saved: Salvaged | None, folder: str) -> Any:
         if reason:
             gc.collect()
         sys.unraisablehook = hook
-    raise DriveError(
+    raise _unreadable(path, reason)
+
+
+def _unreadable(path: Path, reason: str) -> DriveError:
+    return DriveError(
         f"{path} is not a readable MDF file ({reason}); it may have been cut off: copy it again"
     )
 
@@ -361,9 +360,8 @@ def _samples(file: Any, path: Path, place: _Place) -> tuple[Floats, Floats | Non
     group = file.groups[place[0]]
     try:
         # asammdf does not come back from packed data of which no record is to be read.
-        if not settle(group):
+        if not group.channel_group.cycles_nr:
             return np.empty(0), np.empty(0)
-        check_places(group)
         found = file.get(group=place[0], index=place[1], ignore_invalidation_bits=True)
     except Exception as e:
         raise DriveError(

@@ -8,37 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.io.frames import EXTENDED_MASK, Frames, in_order
-from weighbridge.io.mdf_check import settle
 
 _DATA_FRAME: Final = "CAN_DataFrame"
 _NUMBERS: Final = frozenset({"ID", "IDE", "DataLength", "DLC", "BusChannel"})
 # Bytes that a data length code stands for (ISO 11898-1).
 _DLC: Final = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64], np.uint8)
-
-
-# Channels that have no place in a record: virtual master and virtual data (ASAM MDF 4.1, CN).
-_VIRTUAL: Final = (3, 6)
-
-
-def check_places(group: Any) -> None:
-    """Refuse a group whose channels stand outside its records.
-
-    asammdf takes other bytes for such a channel. Of MDF 3, the check of the bytes asked for in
-    `weighbridge.io.mdf_check.guard` is the only one.
-
-    Raises
-    ------
-    ValueError
-        Such a channel.
-    """
-    size = int(group.channel_group.samples_byte_nr)
-    for channel in group.channels:
-        if not hasattr(channel, "bit_offset"):
-            return
-        if channel.channel_type not in _VIRTUAL:
-            bits = int(channel.bit_offset) + int(channel.bit_count)
-            if int(channel.byte_offset) + (bits + 7) // 8 > size:
-                raise ValueError(f"channel {channel.name!r} stands outside its records")
 
 
 def bus_frames(file: Any) -> Frames:
@@ -55,12 +29,11 @@ def bus_frames(file: Any) -> Frames:
     """
     parts = []
     for g, group in enumerate(file.groups):
-        if not settle(group):
+        if not group.channel_group.cycles_nr:
             continue
         for c, channel in enumerate(group.channels):
             # A frame is a structure of its fields; each of them is a channel, too.
             if channel.name.startswith(_DATA_FRAME) and "." not in channel.name:
-                check_places(group)
                 found = file.get(group=g, index=c, ignore_invalidation_bits=True)
                 if found.samples.dtype.names:
                     parts.append(_frames(found.timestamps, found.samples))

@@ -1,6 +1,10 @@
-"""MF4 files cut off at any byte: what is whole is read, and said; else one sentence."""
+"""MDF files cut off at any byte, or with links and lengths that lie.
+
+What is whole is read, and said; else it is one sentence, without a hang, a crash or much memory.
+"""
 
 import struct
+import tracemalloc
 import zlib
 
 import numpy as np
@@ -12,7 +16,7 @@ from tests.noted import has
 
 from weighbridge.errors import DriveError, WeighbridgeError
 from weighbridge.io import read_drive
-from weighbridge.io.mdf_salvage import salvage
+from weighbridge.io.mdf_mend import guard, mended
 from weighbridge.messages import phrase
 
 ANSWERS = 200
@@ -121,7 +125,7 @@ LAYOUTS = ("sorted", "lists", "unsorted", "unfinished")
 def test_whole_files_are_left_alone(tmp_path, layout):
     path = tmp_path / "log.mf4"
     path.write_bytes(log(layout))
-    assert salvage(path) is None
+    assert mended(path) is None
     drive = read_drive(path)
     assert drive.problems == ()
     assert_allclose(drive.signals["vehicle_speed"].time, TIMES, atol=1e-9)
@@ -162,8 +166,194 @@ def test_a_file_without_its_data_is_refused_in_a_sentence(tmp_path):
     with pytest.raises(DriveError, match="of its 200 records none is whole"):
         read_drive(path)
     path.write_bytes(raw[:300])
-    with pytest.raises(DriveError, match="ends early and nothing is whole"):
+    with pytest.raises(DriveError, match="nothing is whole"):
         read_drive(path)
+
+
+COUNT = 40
+STAMPS = 0.1 * np.arange(COUNT)
+RISING = np.linspace(0.0, 20.0, COUNT)
+
+
+def place(raw, kind, link=None, number=0):
+    """Where a block stands, or one of its links."""
+    at = -1
+    for _ in range(number + 1):
+        at = raw.index(kind, at + 1)
+    return at if link is None else at + 24 + 8 * link
+
+
+def body(raw, kind, number=0):
+    at = place(raw, kind, number=number)
+    return at + 24 + 8 * struct.unpack_from("<Q", raw, at + 16)[0]
+
+
+def written(tmp_path, version="4.10", compression=0, values=RISING):
+    from asammdf import MDF, Signal
+
+    path = tmp_path / ("log.mf4" if version[0] == "4" else "log.mdf")
+    with MDF(version=version) as file:
+        file.append([Signal(values, STAMPS, name="vehicle_speed_mps", unit="mps")])
+        file.save(path, compression=compression)
+    return path
+
+
+def patched(path, form, at, value):
+    """Write a number into a file."""
+    raw = bytearray(path.read_bytes())
+    struct.pack_into(form, raw, at(raw) if callable(at) else at, value)
+    path.write_bytes(raw)
+
+
+def group_3(raw):
+    return struct.unpack_from("<I", raw, 68)[0]
+
+
+@pytest.mark.parametrize("compression", [0, 1, 2])
+def test_whole_files_of_asammdf_pass(tmp_path, compression):
+    assert mended(written(tmp_path, compression=compression)) is None
+
+
+def test_mdf_3(tmp_path):
+    speed = read_drive(written(tmp_path, "3.30")).signals["vehicle_speed"]
+    assert_allclose(speed.time, STAMPS)
+    assert_allclose(speed.values, RISING)
+
+
+@pytest.mark.parametrize(
+    ("at", "form", "value", "says"),
+    [
+        (lambda raw: group_3(raw) + 4, "<I", None, "two links lead to the block"),
+        (lambda raw: struct.unpack_from("<I", raw, group_3(raw) + 8)[0] + 22, "<I", 1 << 31,
+         "are more than there are"),
+        (lambda raw: raw.index(b"CN", group_3(raw)) + 186, "<H", 4000, "stands outside records"),
+        (lambda raw: raw.index(b"CN", group_3(raw)) + 226, "<H", 4000, "stands outside records"),
+    ],
+)  # fmt: skip
+def test_damaged_mdf_3(tmp_path, at, form, value, says):
+    path = written(tmp_path, "3.30")
+    raw = path.read_bytes()
+    patched(path, form, at, group_3(raw) if value is None else value)
+    with pytest.raises(DriveError, match=says):
+        read_drive(path)
+
+
+@pytest.mark.parametrize(("kind", "link"), [(b"##DG", 0), (b"##CG", 0), (b"##CN", 0), (b"##FH", 0),
+                                            (b"##CN", 1), (b"##DL", 0)])  # fmt: skip
+def test_links_in_a_circle(tmp_path, kind, link):
+    raw = bytearray(log("lists"))
+    struct.pack_into("<Q", raw, place(raw, kind, link), place(raw, kind))
+    path = tmp_path / "log.mf4"
+    path.write_bytes(raw)
+    if kind == b"##CN":
+        with pytest.raises(DriveError, match="of its 200 records none is whole"):
+            read_drive(path)
+        return
+    drive = read_drive(path)
+    assert drive.problems[0].id == "file.ends_short"
+    assert_allclose(drive.signals["vehicle_speed"].values * 3.6, SPEEDS)
+
+
+@pytest.mark.parametrize(
+    ("form", "at", "value"),
+    [
+        ("<Q", lambda raw: body(raw, b"##CA") + 16, 1 << 20),
+        ("<I", lambda raw: body(raw, b"##CN", 1) + 4, 1 << 24),
+        ("<II", lambda raw: body(raw, b"##CN", 1) + 12, (2, 900)),
+    ],
+)
+def test_channels_beyond_their_record(tmp_path, form, at, value):
+    rows = np.zeros(COUNT, [("vehicle_speed_mps", "<f8", (2, 3))])
+    path = written(tmp_path, values=rows)
+    assert mended(path) is None
+    raw = bytearray(path.read_bytes())
+    struct.pack_into(form, raw, at(raw), *(value if isinstance(value, tuple) else (value,)))
+    path.write_bytes(raw)
+    with pytest.raises(DriveError, match="of its 40 records none is whole"):
+        read_drive(path)
+
+
+def test_start_in_no_calendar(tmp_path):
+    path = written(tmp_path)
+    patched(path, "<Q", lambda raw: body(raw, b"##HD"), (1 << 61) + 1)
+    drive = read_drive(path)
+    assert drive.info.start_time is None
+    assert_allclose(drive.signals["vehicle_speed"].values, RISING)
+
+
+def test_packed_data_without_records_end(tmp_path):
+    path = written(tmp_path, compression=1)
+    patched(path, "<Q", lambda raw: body(raw, b"##CG") + 8, 0)
+    with pytest.raises(DriveError, match="no samples"):
+        read_drive(path)
+
+
+@pytest.mark.parametrize("cycles", [1, 1 << 20, 1 << 40])
+@pytest.mark.parametrize("length", [None, 1 << 31])
+def test_records_beyond_the_data_take_no_memory(tmp_path, cycles, length):
+    path = written(tmp_path, compression=0 if length is None else 1)
+    patched(path, "<Q", lambda raw: body(raw, b"##CG") + 8, cycles)
+    if length is not None:
+        patched(path, "<I", lambda raw: body(raw, b"##CG") + 28, length)
+    tracemalloc.start()
+    if length is None:
+        speed = read_drive(path).signals["vehicle_speed"]
+        assert_allclose(speed.values, RISING[:cycles])
+    else:
+        with pytest.raises(DriveError, match="none is whole"):
+            read_drive(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1 << 25
+
+
+def test_identifier_that_is_no_number(tmp_path):
+    raw = bytearray(log("sorted"))
+    # The third channel; its data type becomes bytes.
+    raw[body(raw, b"##CN", 2) + 2] = 10
+    path = tmp_path / "log.mf4"
+    path.write_bytes(raw)
+    with pytest.raises(DriveError, match="field ID of the frames is no number"):
+        read_drive(path)
+
+
+@pytest.mark.parametrize("length", [9, 1 << 20, (1 << 32) - 4])
+def test_values_of_variable_length_beyond_their_data(tmp_path, length):
+    raw = bytearray(log("sorted"))
+    at = body(raw, b"##SD") + 199 * 12
+    assert raw[at : at + 4] == b"\x08\0\0\0"
+    struct.pack_into("<I", raw, at, length)
+    path = tmp_path / "log.mf4"
+    path.write_bytes(raw)
+    with pytest.raises(DriveError, match="stands outside its data"):
+        read_drive(path)
+
+
+@pytest.mark.parametrize("offset", [12 * 200, (1 << 63) - 1, (1 << 64) - 2])
+def test_places_of_values_beyond_their_data(tmp_path, offset):
+    raw = bytearray(log("sorted"))
+    size = len(blocks("sorted")["data"][2]) // 200
+    struct.pack_into("<Q", raw, body(raw, b"##DT") + 100 * size + 13, offset)
+    path = tmp_path / "log.mf4"
+    path.write_bytes(raw)
+    with pytest.raises(DriveError, match="stands outside its data"):
+        read_drive(path)
+
+
+def test_one_long_value_does_not_fill_the_memory():
+    from asammdf.blocks import mdf_v4
+
+    guard()
+    guard()
+    data = b"".join(struct.pack("<I", k) + bytes([k] * k) for k in (1, 3, 2))
+    rows = mdf_v4.extract(data, True, np.array([0, 5, 12], np.uint64))
+    assert_array_equal(rows, [[1, 0, 0], [3, 3, 3], [2, 2, 0]])
+    long = 1 << 22
+    data = struct.pack("<I", long) + bytes(long) + bytes(4)
+    offsets = np.full(10_000, long + 4, np.uint64)
+    offsets[0] = 0
+    with pytest.raises(ValueError, match=f"claims {long} bytes"):
+        mdf_v4.extract(data, True, offsets)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
