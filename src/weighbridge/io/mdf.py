@@ -35,7 +35,7 @@ from weighbridge.io.mapping import (
     resolved_unit,
 )
 from weighbridge.io.mdf_bus import bus_frames
-from weighbridge.io.mdf_mend import Mended, guard, mended
+from weighbridge.io.mdf_mend import Mended, guard, mended, settle
 from weighbridge.io.naming import recognise_all
 from weighbridge.io.table import column_list
 from weighbridge.messages import phrase
@@ -63,10 +63,10 @@ def read_mdf(path: Path, table: str | None, mapping: TableMapping | None) -> Log
     MissingExtraError
         asammdf is not installed.
     """
-    with _file(path) as (file, saved):
+    with _file(path) as (file, kept):
         log = _read(file, path, table, mapping)
-    if saved is not None and saved.damaged:
-        log.problems.insert(0, _told(log, saved))
+    if kept:
+        log.problems.insert(0, _told(log, kept))
     return log
 
 
@@ -80,11 +80,11 @@ def recording_of(path: Path) -> Recording:
     DriveError, MissingExtraError
         As of `read_mdf`.
     """
-    with _file(path) as (file, saved):
+    with _file(path) as (file, kept):
         every, raw_bus = _channels(file)
         channels = {n: p for n, p in every.items() if not n.startswith(_BUS_PREFIXES)}
         found = Recording([], start=_start(file))
-        if saved is not None and saved.damaged:
+        if kept:
             found.notes.append(Problem.of("file.cut_off"))
         found.frames = _frames(file, path) if raw_bus else None
         places = [_longest(file, places) for places in channels.values()]
@@ -117,8 +117,8 @@ def draft(path: Path) -> Draft:
 
 
 @contextmanager
-def _file(path: Path) -> Iterator[tuple[Any, Mended | None]]:
-    """Open an MDF file, and what could be salvaged of one that was cut off."""
+def _file(path: Path) -> Iterator[tuple[Any, str]]:
+    """Open an MDF file, and say what is left of one that is damaged; empty of a whole one."""
     try:
         from asammdf import MDF
     except ImportError:
@@ -127,36 +127,39 @@ def _file(path: Path) -> Iterator[tuple[Any, Mended | None]]:
         saved = mended(path)
     except ValueError as e:
         raise _unreadable(path, str(e)) from None
-    if saved is not None and saved.damaged and not saved.kept and not saved.unfinished:
-        records = f"of its {saved.told} records none is whole" if saved.told else "nothing is whole"
-        raise DriveError(f"{path} ends early or is damaged, and {records}; copy it again")
     with (
         warnings.catch_warnings(),
         # Of an unfinished file the library makes a copy, which it leaves behind if that fails.
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
     ):
         warnings.simplefilter("ignore")
-        with _open(MDF, path, saved, folder) as file:
-            yield file, saved
+        file, kept = _open(MDF, path, saved, folder)
+        with file:
+            told = ""
+            if saved is not None and saved.damaged:
+                if not kept and not saved.unfinished:
+                    records = f"of its {saved.told} records none" if saved.told else "nothing"
+                    raise DriveError(
+                        f"{path} ends early or is damaged, and {records} is whole; copy it again"
+                    )
+                told = phrase("what_is_left")
+                if saved.told:
+                    told = phrase("kept_records", kept=kept, records=saved.told)
+            yield file, told
 
 
-def _told(log: Log, saved: Mended) -> Problem:
+def _told(log: Log, kept: str) -> Problem:
     """Say what was salvaged of a file that was cut off."""
     clocks = [s.time for s in log.signals if len(s)]
     clocks += [log.frames.time] if log.frames is not None and len(log.frames) else []
     span = max((float(c[-1]) for c in clocks), default=0.0) - min(
         (float(c[0]) for c in clocks), default=0.0
     )
-    counted = (
-        phrase("kept_records", kept=saved.kept, records=saved.told)
-        if saved.told
-        else phrase("what_is_left")
-    )
-    return Problem.of("file.ends_short", file=log.path.name, kept=counted, length=span)
+    return Problem.of("file.ends_short", file=log.path.name, kept=kept, length=span)
 
 
-def _open(opener: Any, path: Path, saved: Mended | None, folder: str) -> Any:
-    """Open the file; what the library raises for a broken one becomes one sentence."""
+def _open(opener: Any, path: Path, saved: Mended | None, folder: str) -> tuple[Any, int]:
+    """Open the file and count its records; what the library raises becomes one sentence."""
     # The library tells of damage with a traceback of its own, beside raising or not.
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
     hook = sys.unraisablehook
@@ -167,12 +170,13 @@ def _open(opener: Any, path: Path, saved: Mended | None, folder: str) -> Any:
         guard()
         source = path if saved is None else io.BytesIO(saved.raw)
         with redirect_stdout(io.StringIO()):
-            return opener(
+            file = opener(
                 source,
                 temporary_folder=folder,
                 # Frames are sorted by identifier there, which takes long and is not used here.
                 process_bus_logging=False,
             )
+            return file, settle(file)
     # The library's errors are of many kinds, down to struct.error.
     except Exception as e:
         reason = _first_line(e)

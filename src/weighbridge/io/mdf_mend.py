@@ -9,11 +9,12 @@ which every byte is there.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import io
 import math
 import mmap
 import struct
-import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -24,8 +25,8 @@ _ID_BLOCK: Final = 64
 _HEAD: Final = struct.Struct("<4s4xQQ")
 _LINK: Final = struct.Struct("<Q")
 _BYTE: Final = struct.Struct("<B")
-# Record id, cycles, flags, bytes of a record and of its invalidation bits.
-_GROUP: Final = struct.Struct("<QQH6xII")
+# Cycles, flags, bytes of a record and of its invalidation bits.
+_GROUP: Final = struct.Struct("<8xQH6xII")
 # Type, bit and byte offset, bits, flags and place of the invalidation bit of a channel.
 _CHANNEL: Final = struct.Struct("<B2xBIIII")
 # Method of packing, columns, bytes before and after it.
@@ -53,7 +54,8 @@ _VLSD, _VIRTUAL = 1, (3, 6)
 _CHANNEL_DATA: Final = 5
 _VLSD_GROUP: Final = 0x1
 _HAS_INVALIDATION: Final = 0x2
-_UNZIPPED_LIMIT: Final = 1 << 28
+# A file that says that its counters, and the bytes of its values of variable length, are not final.
+_UNCOUNTED: Final = 0x1 | 0x20
 # Elements of an array that are taken however short the records are: of a group may be none.
 _FEW: Final = 4096
 # Room that values of variable length may take when all are as long as the longest, as a multiple
@@ -66,15 +68,13 @@ class Mended(NamedTuple):
 
     Attributes
     ----------
-    raw : its bytes, with links and counters mended
-    kept, told : records that are whole, and those that the file speaks of as far as its groups are
-        known
+    raw : its bytes, with links mended
+    told : records that it speaks of, as far as its groups are known
     damaged : whether something had to be mended
     unfinished : whether its logger never got to count its records
     """
 
     raw: bytes
-    kept: int
     told: int
     damaged: bool
     unfinished: bool
@@ -127,9 +127,10 @@ def mended(path: Path) -> Mended | None:
             return None
         file = _File(raw)
         file.follow()
-        if not file.damaged and file.exact:
+        damaged = isinstance(file.raw, bytearray)
+        if not damaged and file.exact:
             return None
-        return Mended(bytes(file.raw), file.kept, file.told, file.damaged, file.unfinished)
+        return Mended(bytes(file.raw), file.told, damaged, bool(file.flags))
 
 
 class _File:
@@ -138,81 +139,71 @@ class _File:
     def __init__(self, raw: mmap.mmap) -> None:
         self.raw: mmap.mmap | bytearray = raw
         self.size = len(raw)
-        # The counters and the length of the last block are not final.
-        self.unfinished = bool(struct.unpack_from("<H", raw, 60)[0])
-        self.kept = self.told = 0
+        (self.flags,) = struct.unpack_from("<H", raw, 60)
+        self.told = 0
         self.exact = True
         # Whether a chain of blocks ended early.
         self.cut = False
         self.seen: set[int] = set()
 
-    @property
-    def damaged(self) -> bool:
-        return isinstance(self.raw, bytearray)
-
     def follow(self) -> None:
         """Follow all blocks from the header on."""
-        try:
+        with contextlib.suppress(_LostError):
             header = self.block(_ID_BLOCK, b"##HD")
-        except _LostError:
-            self.copy()
-            return
-        for k in range(1, len(header.links)):
-            if header.links[k]:
+            for k in range(1, len(header.links)):
                 kind = bytes(self.raw[header.links[k] : header.links[k] + 4])
                 for _ in self.chain(header, k, kind):
                     pass
-        for group in self.chain(header, 0, b"##DG"):
-            if len(group.links) > 3:
-                self.spare(group, 3)
-                self.data_group(group)
+            for group in self.chain(header, 0, b"##DG"):
+                if len(group.links) > 3:
+                    self.spare(group, 3)
+                    self.data_group(group)
+            if isinstance(self.raw, bytearray):
+                # asammdf counts the records that are left.
+                self.raw[:8] = b"UnFinMF "
+                struct.pack_into("<H", self.raw, 60, self.flags | _UNCOUNTED)
+            return
+        self.copy()
 
     def copy(self) -> bytearray:
         self.raw = self.raw if isinstance(self.raw, bytearray) else bytearray(self.raw)
         return self.raw
 
-    def block(self, at: int, *kinds: bytes, whole: bool = True) -> _Block:
-        """Read the header and the links of a block, and ask for all of it where ``whole``."""
-        if not _ID_BLOCK <= at <= self.size - 24:
+    def block(self, at: int, *kinds: bytes, whole: bool = True, anew: bool = True) -> _Block:
+        """Read the header and the links of a block.
+
+        Parameters
+        ----------
+        at, kinds : where it stands, and what it may be
+        whole : whether all of it must be there
+        anew : whether no other link may lead to it
+        """
+        if not _ID_BLOCK <= at <= self.size - 24 or (anew and at in self.seen):
             raise _LostError
         kind, length, count = _HEAD.unpack_from(self.raw, at)
         end = at + (length if whole else 24 + 8 * count)
-        if kind not in kinds or length < 24 or end > self.size:
-            raise _LostError
-        if count > (length - 24 if whole else self.size) // 8:
-            raise _LostError
-        return _Block(at, kind, length, struct.unpack_from(f"<{count}Q", self.raw, at + 24))
-
-    def once(self, at: int, *kinds: bytes, whole: bool = True) -> _Block:
-        """As `block`, of one that no other link leads to."""
-        block = self.block(at, *kinds, whole=whole)
-        if at in self.seen:
+        if kind not in kinds or length < 24 + 8 * count or end > self.size:
             raise _LostError
         self.seen.add(at)
-        return block
+        return _Block(at, kind, length, struct.unpack_from(f"<{count}Q", self.raw, at + 24))
 
     def unpack(self, block: _Block, form: struct.Struct) -> tuple[Any, ...]:
         if block.body + form.size > min(block.at + block.length, self.size):
             raise _LostError
         return form.unpack_from(self.raw, block.body)
 
-    def link(self, block: _Block, link: int, target: int = 0) -> None:
-        """Point a link elsewhere, or at nothing."""
-        _LINK.pack_into(self.copy(), block.at + 24 + 8 * link, target)
-
-    def append(self, kind: bytes, content: bytes) -> int:
-        """Put a block at the end of the file; return where it stands."""
+    def link(self, block: _Block, link: int, content: bytes = b"", kind: bytes = b"##DT") -> None:
+        """Let a link lead to a new block at the end of the file; to nothing without a content."""
         raw = self.copy()
         raw += bytes(-len(raw) % 8)
-        at = len(raw)
-        raw += _HEAD.pack(kind, 24 + len(content), 0) + content
-        return at
+        _LINK.pack_into(raw, block.at + 24 + 8 * link, len(raw) if content else 0)
+        raw += _HEAD.pack(kind, 24 + len(content), 0) + content if content else b""
 
     def chain(self, owner: _Block, link: int, kind: bytes) -> Iterator[_Block]:
         """Blocks that follow each other; the link to one that is not there is cleared."""
         while at := owner.link(link):
             try:
-                block = self.once(at, kind)
+                block = self.block(at, kind)
             except _LostError:
                 self.link(owner, link)
                 self.cut = True
@@ -224,7 +215,7 @@ class _File:
         """Clear a link that points at nothing and is not needed."""
         if at := owner.link(link):
             try:
-                self.block(at, bytes(self.raw[at : at + 4]))
+                self.block(at, bytes(self.raw[at : at + 4]), anew=False)
             except _LostError:
                 self.link(owner, link)
 
@@ -232,37 +223,51 @@ class _File:
         """Keep what is whole of the channel groups of one data group."""
         (id_size,) = _BYTE.unpack_from(self.raw, group.body)
         self.cut = False
-        waiting = list(self.chain(group, 1, b"##CG"))
-        if self.cut and id_size:
+        channel_groups = list(self.chain(group, 1, b"##CG"))
+        parts, whole = self.pieces(group.link(2))
+        if (self.cut and id_size) or (self.flags and not whole):
             # Records of unknown size cannot be told apart.
             self.link(group, 1)
             self.link(group, 2)
             return
-        parts, whole = self.pieces(group.link(2))
-        if self.unfinished:
-            if not whole:
-                self.link(group, 2)
-            whole = True
         held = sum(self.plain(part)[0] for part in parts)
-        sizes, variable = {}, {}
-        for cg in waiting:
-            number, cycles, flags, samples, invalid = self.unpack(cg, _GROUP)
+        told = size = 0
+        strings: list[tuple[_Block, list[_Block], bool]] = []
+        for cg in channel_groups:
+            cycles, flags, samples, invalid = self.unpack(cg, _GROUP)
+            size = id_size + samples + invalid
+            told += 0 if flags & _VLSD_GROUP else cycles * size
+            self.told += 0 if flags & _VLSD_GROUP else cycles
             try:
-                room = max(8 * min(samples, held), _FEW)
-                variable[cg.at] = self.described(cg, samples, invalid, room)
+                strings += self.described(cg, samples, invalid, max(8 * min(samples, held), _FEW))
             except _LostError:
-                self.told += 0 if flags & _VLSD_GROUP else cycles
                 self.link(cg, 1)
-                _LINK.pack_into(self.copy(), cg.body + 8, 0)
-            sizes[number] = (cg, -1 if flags & _VLSD_GROUP else samples + invalid, cycles)
-        if self.unfinished:
+        if self.flags:
             return
-        if len(waiting) == 1 and waiting[0].at in variable:
-            self.sorted(group, waiting[0], parts, whole, variable[waiting[0].at])
-        elif len(waiting) > 1 and not whole:
-            self.unsorted(group, id_size, parts, sizes)
+        if whole and all(sound for *_, sound in strings):
+            if not id_size and held < told:
+                self.copy()
+            self.exact &= bool(id_size) or (
+                held == told and all(self.plain(part)[1] for part in parts)
+            )
+            return
+        content = self.content(parts)
+        if len(channel_groups) == 1 and size:
+            kept = len(content) // size
+            rows = np.frombuffer(content, np.uint8, kept * size).reshape(kept, size)
+            for cn, those, _ in strings:
+                values = self.content(those)
+                _, _, byte, bits, *_ = self.unpack(cn, _CHANNEL)
+                at = _places(rows[:, id_size + byte :][:, : (bits + 7) // 8])
+                good = _inside(np.frombuffer(values, np.uint8), at)[0]
+                kept = min(kept, int(np.argmin(good)) if not good.all() else at.size)
+                self.link(cn, _CHANNEL_DATA, values, b"##SD")
+            content = content[: kept * size]
+        self.link(group, 2, content)
 
-    def described(self, cg: _Block, samples: int, invalid: int, room: int) -> list[_Block]:
+    def described(
+        self, cg: _Block, samples: int, invalid: int, room: int
+    ) -> list[tuple[_Block, list[_Block], bool]]:
         """Check that all channels of a group are described; return those of variable length.
 
         Each element of an array becomes a channel; there may not be more than ``room``.
@@ -271,22 +276,19 @@ class _File:
         waiting = [(cg, k, 1) for k in range(1, len(cg.links))]
         while waiting:
             owner, k, count = waiting.pop()
-            if not owner.links[k]:
-                continue
+            at = owner.links[k]
             if k in _SPARE.get(owner.kind, ()):
                 self.spare(owner, k)
                 continue
             if owner.kind == b"##CN" and k == _CHANNEL_DATA:
                 # Values of variable length may also be records of a group in the same data.
-                if self.unpack(owner, _BYTE)[0] == _VLSD:
-                    variable.append(owner)
+                grouped = self.raw[at : at + 4] == b"##CG"
+                if at and self.unpack(owner, _BYTE)[0] == _VLSD and not grouped:
+                    variable.append((owner, *self.pieces(at)))
                 continue
-            block = self.block(owner.links[k], *_DESCRIPTION)
-            if block.at in self.seen:
-                if block.kind in (b"##CN", b"##CA"):
-                    raise _LostError
+            if not at or (at in self.seen and self.raw[at : at + 4] not in (b"##CN", b"##CA")):
                 continue
-            self.seen.add(block.at)
+            block = self.block(at, *_DESCRIPTION)
             if block.kind == b"##CA":
                 (dimensions,) = self.unpack(block, struct.Struct("<2xH"))
                 count *= math.prod(self.unpack(block, struct.Struct(f"<16x{dimensions}Q")))
@@ -303,118 +305,55 @@ class _File:
     def pieces(self, at: int) -> tuple[list[_Block], bool]:
         """Data blocks that hang on a link, up to the first that is not there; whether all are."""
         found: list[_Block] = []
-        if not at:
-            return found, True
         try:
-            block = self.once(at, *_DATA, *_LISTS, b"##HL", whole=False)
-            if block.kind in _DATA:
-                found.append(block)
-            elif block.kind == b"##HL" and block.link(0):
-                block = self.once(block.link(0), *_LISTS)
-            while block.kind in _LISTS:
-                block = self.block(block.at, *_LISTS)
-                for target in block.links[1:]:
-                    if target:
-                        found.append(self.once(target, *_DATA, whole=False))
-                if not block.link(0):
+            while at:
+                block = self.block(at, *_DATA, *_LISTS, b"##HL", whole=False)
+                if block.kind in _DATA:
+                    found.append(block)
                     break
-                block = self.once(block.link(0), *_LISTS)
+                self.block(at, block.kind, anew=False)
+                for target in block.links[1:] if block.kind in _LISTS else ():
+                    if target:
+                        found.append(self.block(target, *_DATA, whole=False))
+                at = block.link(0)
         except _LostError:
             return found, False
-        return found, all(b.at + b.length <= self.size and self.plain(b)[2] for b in found)
+        ends = (b.at + (b.length if not self.flags else 24) for b in found)
+        return found, max(ends, default=0) <= self.size and all(self.plain(b)[2] for b in found)
 
     def plain(self, block: _Block) -> tuple[int, bool, bool]:
         """Bytes of one data block when unpacked, whether zlib unpacks it, and whether it may be."""
         if block.kind != b"##DZ":
             return block.length - 24, True, True
-        if block.body + _ZIPPED.size > self.size:
+        try:
+            method, columns, size, packed = self.unpack(block, _ZIPPED)
+        except _LostError:
             return 0, True, False
-        method, columns, size, packed = _ZIPPED.unpack_from(self.raw, block.body)
         sound = block.body + _ZIPPED.size + packed <= block.at + block.length
         return size, method < 2, sound and (method % 2 == 0 or 0 < columns <= size)
 
     def content(self, parts: list[_Block]) -> bytes:
         """Data of blocks, up to the first byte that is missing."""
+        from asammdf.blocks.v4_blocks import DataZippedBlock
+
         found = []
         for block in parts:
-            size, known, _ = self.plain(block)
-            data = bytes(self.raw[block.body : min(block.at + block.length, self.size)])
+            size, _, sound = self.plain(block)
+            raw = bytes(self.raw[block.at : block.at + block.length])
+            data = raw[block.body - block.at :]
             if block.kind == b"##DZ":
-                head, packed = data[: _ZIPPED.size], data[_ZIPPED.size :]
                 try:
-                    method, columns, _, _ = _ZIPPED.unpack(head)
-                    limit = min(size, _UNZIPPED_LIMIT) or 1
-                    data = zlib.decompressobj().decompress(packed, limit) if known else b""
-                except (zlib.error, struct.error):
+                    packed = DataZippedBlock(
+                        address=0, stream=io.BytesIO(raw), file_limit=len(raw), mapped=False
+                    )
+                    data = bytes(packed.data) if sound else b""
+                # The library's errors on damaged data are of many kinds.
+                except Exception:
                     break
-                if method % 2 and columns:
-                    if len(data) < size:
-                        break
-                    lines = size // columns
-                    table = np.frombuffer(data[: lines * columns], np.uint8)
-                    rest = data[lines * columns :]
-                    data = table.reshape(columns, lines).T.tobytes() + rest
             found.append(data)
-            if len(data) < size:
+            if len(data) != size:
                 break
         return b"".join(found)
-
-    def sorted(
-        self, group: _Block, cg: _Block, parts: list[_Block], whole: bool, variable: list[_Block]
-    ) -> None:
-        """Keep the whole records of a data group that has one channel group."""
-        (id_size,) = _BYTE.unpack_from(self.raw, group.body)
-        _, cycles, _, samples, invalid = self.unpack(cg, _GROUP)
-        size = id_size + samples + invalid
-        self.told += cycles
-        strings = [(cn, *self.pieces(cn.links[_CHANNEL_DATA])) for cn in variable]
-        told = [self.plain(part) for part in parts]
-        held = sum(n for n, *_ in told)
-        if (whole and all(w for *_, w in strings) and held >= cycles * size) or size == 0:
-            self.kept += cycles
-            self.exact &= held == cycles * size and all(known for _, known, _ in told)
-            return
-        content = self.content(parts)
-        kept = min(cycles, len(content) // size)
-        rows = np.frombuffer(content, np.uint8, kept * size).reshape(kept, size)
-        for cn, those, sound in strings:
-            if not sound:
-                values = self.content(those)
-                _, _, byte, bits, *_ = self.unpack(cn, _CHANNEL)
-                at = _places(rows[:, id_size + byte :][:, : (bits + 7) // 8])
-                good = _inside(np.frombuffer(values, np.uint8), at)[0]
-                kept = min(kept, int(np.argmin(good)) if not good.all() else at.size)
-                self.link(cn, _CHANNEL_DATA, self.append(b"##SD", values))
-        self.link(group, 2, self.append(b"##DT", content[: kept * size]))
-        _LINK.pack_into(self.copy(), cg.body + 8, kept)
-        self.kept += kept
-
-    def unsorted(
-        self,
-        group: _Block,
-        id_size: int,
-        parts: list[_Block],
-        sizes: dict[int, tuple[_Block, int, int]],
-    ) -> None:
-        """Keep the whole records of a data group whose channel groups are mixed."""
-        content = self.content(parts)
-        counts = dict.fromkeys(sizes, 0)
-        at = end = 0
-        while at + id_size <= len(content):
-            number = int.from_bytes(content[at : at + id_size], "little")
-            _, size, _ = sizes.get(number, (None, None, 0))
-            at += id_size
-            if size == -1:
-                size = 4 + int.from_bytes(content[at : at + 4], "little")
-            if size is None or at + size > len(content):
-                break
-            at = end = at + size
-            counts[number] += 1
-        self.link(group, 2, self.append(b"##DT", content[:end]))
-        for number, (cg, size, cycles) in sizes.items():
-            _LINK.pack_into(self.copy(), cg.body + 8, counts[number])
-            self.told += 0 if size == -1 else cycles
-            self.kept += 0 if size == -1 else counts[number]
 
 
 def _places(columns: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -467,6 +406,22 @@ def _check_three(raw: mmap.mmap) -> None:
                     raise ValueError(f"a channel stands outside records of {size} bytes")
         if told and data + told > len(raw):
             raise ValueError(f"{told} bytes of data from byte {data} on are more than there are")
+
+
+def settle(file: Any) -> int:
+    """Let no group of an open file have more records than its data can hold; return how many.
+
+    asammdf takes memory for as many as the group tells of.
+    """
+    for group in file.groups:
+        told = group.channel_group
+        # Lists of columns hold the invalidation bits apart; MDF 3 has none.
+        apart = getattr(group, "uses_ld", False)
+        invalid = 0 if apart else int(getattr(told, "invalidation_bytes_nr", 0))
+        if told.cycles_nr and (size := int(told.samples_byte_nr) + invalid):
+            held = sum(int(b.original_size) for b in group.get_data_blocks())
+            told.cycles_nr = min(int(told.cycles_nr), held // size)
+    return sum(int(g.channel_group.cycles_nr) for g in file.groups if g.channels)
 
 
 def guard() -> None:
