@@ -94,8 +94,8 @@ MUTANTS = (
     ),
     Mutant(
         "checks/steps.py",
-        "return resolution(np.round(values, 9)) if values.size >= FEWEST else 0.0",
-        "return 2.0 * resolution(np.round(values, 9)) if values.size >= FEWEST else 0.0",
+        "return resolution(values) if values.size >= FEWEST else 0.0",
+        "return 2.0 * resolution(values) if values.size >= FEWEST else 0.0",
         "a factor",
         ("tests/unit/test_steps.py",),
     ),

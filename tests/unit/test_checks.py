@@ -16,7 +16,7 @@ from weighbridge.checks.inertial import check_imu
 from weighbridge.errors import DriveError
 from weighbridge.io import read_drive
 from weighbridge.messages import phrase
-from weighbridge.pipeline.inspection import describe, inspect_drive, quantisation
+from weighbridge.pipeline.inspection import describe, inspect_drive
 from weighbridge.pipeline.weighing import weigh
 from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.signals.units import UNITS
@@ -755,15 +755,6 @@ def test_report_of_a_signal():
     assert report.jitter == 0.0
     assert (report.low, report.high) == pytest.approx((0.0, 18.0))
     assert report.unit == "kmh"
-
-
-def test_quantisation_is_found_in_the_unit_recorded():
-    rng = np.random.default_rng(2)
-    values = rng.uniform(0.0, 100.0, 5000)
-    assert quantisation(values) is None
-    assert quantisation(np.round(values)) == 1.0
-    assert quantisation(np.round(values / 0.39) * 0.39) == pytest.approx(0.39)
-    assert quantisation(np.zeros(100)) is None
 
 
 def test_ways_follow_from_signals(sane):

@@ -16,7 +16,6 @@ from weighbridge.errors import ConfigError
 from weighbridge.kernels.ins_model import P
 from weighbridge.kernels.lowpass import lowpass_resample
 from weighbridge.messages import phrase
-from weighbridge.navigation.aiding import resolution
 from weighbridge.navigation.geodesy import LocalFrame
 from weighbridge.navigation.identify.timing import estimate_speed_delay
 from weighbridge.navigation.inertial import inertial_motion
@@ -390,12 +389,6 @@ def test_local_frame_both_ways():
     back = frame.to_geodetic(ned)
     for got, want in zip(back, (lat, lon, alt), strict=True):
         assert_allclose(got, want, atol=1e-8, rtol=1e-9)
-
-
-def test_resolution():
-    assert resolution(np.round(np.linspace(0.0, 30.0, 500) * 3.6) / 3.6) == pytest.approx(1 / 3.6)
-    assert resolution(np.random.default_rng(0).normal(size=500)) == 0.0
-    assert resolution(np.ones(10)) == 0.0
 
 
 def test_nodes_hold_each_fix_and_both_sides_of_a_gap():

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.signals import Floats
+from weighbridge.signals.robust import spread
 from weighbridge.vehicle.model import DraggedReading
 
 BIN: Final = 1.12
@@ -168,5 +169,5 @@ def find_floor(reading: Floats, engine_speed: Floats) -> Floor | None:
     every = np.arange(count)
     steps = np.abs(every[:, None] - every[shown]) * SLOPE * span
     level = np.min(level[shown] + steps, axis=1)
-    spread = 1.4826 * float(np.median(np.abs(np.concatenate(rest))))
-    return Floor(middle, level, float(np.clip(spread, *np.multiply(SCATTER, span))), span)
+    scatter = spread(np.concatenate(rest))
+    return Floor(middle, level, float(np.clip(scatter, *np.multiply(SCATTER, span))), span)

@@ -11,6 +11,7 @@ import numpy as np
 
 from weighbridge.balance.floor import FEWEST_IN_BIN, SCATTER, Floor, find_floor
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.robust import spread
 from weighbridge.vehicle.model import DraggedReading, Vehicle
 from weighbridge.vehicle.torque import averaged
 
@@ -294,7 +295,7 @@ def _asked(source: Signal, level: Floats, span: float, torque: Floats) -> Asked 
 def _white_noise(values: Floats, clear: Bools) -> float:
     """Standard deviation of what clear samples have for themselves, beside their neighbours."""
     alone = (values[1:-1] - 0.5 * (values[:-2] + values[2:]))[clear[1:-1]]
-    return 1.4826 * float(np.median(np.abs(alone))) / np.sqrt(1.5) if alone.size else 0.0
+    return spread(alone) / math.sqrt(1.5)
 
 
 def _pedal(drive: Drive, vehicle: Vehicle) -> Signal | None:

@@ -20,6 +20,7 @@ from weighbridge.messages import Problem, phrase, refused
 from weighbridge.navigation.motion import BY_SPEED, Motion
 from weighbridge.signals import Drive, Floats, Signal
 from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.robust import spread
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -161,7 +162,7 @@ def _line(found: ForceLags) -> tuple[float, float]:
     i, j = np.triu_indices(found.lag.size, 1)
     slope = float(np.median((found.lag[j] - found.lag[i]) / (found.time[j] - found.time[i])))
     left = found.lag - slope * found.time
-    return slope, 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    return slope, spread(left - np.median(left))
 
 
 def _median_of_three(y: Floats) -> Floats:

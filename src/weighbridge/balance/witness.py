@@ -17,10 +17,10 @@ from scipy.ndimage import median_filter
 
 from weighbridge.errors import DriveError
 from weighbridge.kernels.first_order import even_lag
-from weighbridge.kernels.robust_line import lines_without_parts, robust_line
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.correlation import correlations
 from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.robust import robust_fit
 from weighbridge.vehicle.air import standard_pressure
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
 from weighbridge.vehicle.torque import source_of
@@ -45,9 +45,6 @@ SLOW_PERIOD: Final = 1.0
 
 BLOCKS: Final = 12
 """Parts of a drive that are left out one after another for a standard deviation."""
-
-ROUNDS: Final = 12
-"""Rounds of weights of a robust fit."""
 
 FEWEST_MEANS: Final = 40
 """Means from which a drive, or a part of it, can tell."""
@@ -306,30 +303,17 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
     """
     middle = float(np.mean(predicted))
     off = predicted - middle
-    reading = np.ascontiguousarray(reading)
-    scale, level = robust_line(off, reading, 0, 0, ROUNDS)
+    columns = np.column_stack([off, np.ones_like(off)])
+    scale, level = robust_fit(columns, reading)[0]
     # Each is fitted anew: which of two clusters of rows is the outlier may hang on one part.
     size = -(-reading.size // BLOCKS)
     begin = (np.arange(BLOCKS) * (reading.size - size)) // (BLOCKS - 1)
-    left_out = lines_without_parts(off, reading, begin, size, ROUNDS)
+    rows = np.arange(reading.size)
+    others = [(rows < first) | (rows >= first + size) for first in begin.tolist()]
+    left_out = np.array([robust_fit(columns[k], reading[k])[0] for k in others])
     spread = (BLOCKS - 1) / BLOCKS * np.sum((left_out - np.mean(left_out, 0)) ** 2, 0)
     scale_std, level_std = np.sqrt(spread)
     return Comparison(float(scale), float(scale_std), float(level), float(level_std), middle)
-
-
-def robust_fit(columns: Floats, y: Floats) -> Floats:
-    """Least squares with Huber's weights: parameters (k,)."""
-    size = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
-    scaled = columns / size
-    weight = np.ones_like(y)
-    found = np.zeros(size.size)
-    for _ in range(ROUNDS):
-        root = np.sqrt(weight)
-        found = np.linalg.lstsq(scaled * root[:, None], y * root, rcond=None)[0]
-        off = np.abs(y - scaled @ found)
-        limit = 2.0 * float(np.median(off)) + 1e-12 * float(np.abs(y).max())
-        weight = np.minimum(1.0, limit / np.maximum(off, 1e-300))
-    return np.asarray(found / size)
 
 
 def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following | None:

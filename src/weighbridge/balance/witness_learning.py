@@ -19,11 +19,11 @@ from weighbridge.balance.witness import (
     follow,
     means,
     ranges_of,
-    robust_fit,
     rows_of,
 )
 from weighbridge.messages import Problem
 from weighbridge.signals import Drive, Floats
+from weighbridge.signals.robust import robust_fit, spread
 from weighbridge.vehicle.model import Vehicle, WitnessRelation
 from weighbridge.vehicle.torque import source_of
 
@@ -114,7 +114,7 @@ class _Followed(NamedTuple):
         floor.
         """
         span = float(np.ptp(np.percentile(self.reading, [2.0, 98.0])))
-        scatter = 1.4826 * float(np.median(np.abs(self.reading - self.columns @ self.found)))
+        scatter = spread(self.reading - self.columns @ self.found)
         added = columns[:, 1] < float(np.min(self.columns[:, 1]))
         off = np.abs(reading[added] - columns[added] @ self.found)
         stray = np.count_nonzero(off > OUTLYING * max(scatter, FINEST * span))
@@ -188,14 +188,14 @@ def learn(
             continue
         if best is not None and best.strays_below(columns, reading):
             break
-        best = _Followed(ends, columns, reading, robust_fit(columns, reading))
+        best = _Followed(ends, columns, reading, robust_fit(columns, reading)[0])
     if best is None:
         return None
     value_range, columns, reading, found = best
     predicted = columns @ found
     bottom, top = np.percentile(reading, [2.0, 98.0])
     span = float(top - bottom)
-    scatter = 1.4826 * float(np.median(np.abs(reading - predicted)))
+    scatter = spread(reading - predicted)
     if not span > 0.0 or scatter > SCATTERED * span:
         return None
     if 1.0 - float(np.var(reading - predicted)) / float(np.var(reading)) < EXPLAINED:

@@ -10,9 +10,9 @@ from scipy.optimize import lsq_linear
 
 from weighbridge.balance.law import ROAD_PARAMETERS, reading_columns, road_columns
 from weighbridge.balance.table import ForceTable
-from weighbridge.constants import HUBER
 from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats
+from weighbridge.signals.robust import huber, spread
 
 BLOCK: Final = 60.0
 """Rows nearer than this share their errors [s]."""
@@ -162,8 +162,7 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
         r = np.asarray(np.linalg.qr(weighted, mode="r"))
         solved = lsq_linear(r[:, :width], r[:, width], bounds=(lower, upper), method="bvls").x
         residual = rows.target - design @ solved
-        noise = 1.4826 * float(np.median(np.abs(residual)))
-        weight = np.minimum(1.0, HUBER * noise / np.maximum(np.abs(residual), 1e-12))
+        weight = huber(residual, spread(residual))
         moved = np.max(np.abs(solved - parameters))
         parameters = solved
         if moved < 1e-9 * np.max(np.abs(solved)):
@@ -182,7 +181,7 @@ def fit(rows: TorqueRows, low: Floats, high: Floats, *, iterations: int = 12) ->
         weight=weight,
         residual=residual,
         r_squared=_r_squared(rows.target - rows.design[:, -4:] @ parameters[-4:], residual, weight),
-        residual_std=1.4826 * float(np.median(np.abs(residual))),
+        residual_std=spread(residual),
         at_bound=tuple(name for name, at in zip(ROAD_PARAMETERS, held[-4:], strict=True) if at),
         independent_rows=n / dependence,
     )
@@ -225,7 +224,7 @@ def at_point(rows: TorqueRows, fitted: TorqueFit, coefficients: Floats, road: Fl
         road=road,
         residual=residual,
         r_squared=_r_squared(rows.target - rows.design[:, -4:] @ road, residual, fitted.weight),
-        residual_std=1.4826 * float(np.median(np.abs(residual))),
+        residual_std=spread(residual),
         at_bound=(),
     )
 

@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from weighbridge.navigation.aiding import resolution
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.robust import resolution
 
 COARSEST: Final = 0.22
 """Larger steps of the accelerometer do not show whether digits are cut off [m/s^2], which at
@@ -39,7 +39,7 @@ def with_half_digits(drive: Drive) -> Drive:
     about zero. It shows in a step at zero that is twice as wide as the others.
     """
     axes = [s for name in IMU_SIGNALS[:3] if (s := drive.get(name)) is not None and len(s) > FEWEST]
-    steps = {s.name: _step(s.values) for s in axes}
+    steps = {s.name: resolution(s.values) for s in axes}
     step = float(np.median(list(steps.values()))) if steps else 0.0
     if step <= 0.0:
         return drive
@@ -62,11 +62,6 @@ def with_half_digits(drive: Drive) -> Drive:
     return drive.with_signals(*more).with_problems(
         Problem.of("imu.digits_cut", "accel_x", step=step)
     )
-
-
-def _step(values: Floats) -> float:
-    """Step that values are quantised to, 0 where none shows."""
-    return resolution(values, 9)
 
 
 def _moving(time: Floats, speed: Signal | None) -> Bools:

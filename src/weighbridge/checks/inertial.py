@@ -16,12 +16,12 @@ import numpy as np
 from weighbridge.checks import windows
 from weighbridge.constants import GRAVITY
 from weighbridge.messages import phrase
-from weighbridge.navigation.aiding import resolution
 from weighbridge.navigation.dropouts import rare_spikes
 from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.signals.instants import span
+from weighbridge.signals.robust import resolution
 from weighbridge.vehicle.model import Vehicle
 
 # Samples enough for a median; more would only take time.
@@ -215,7 +215,7 @@ def _check_axes(
     if found is None and speed is not None and len(speed) > 20:
         found = _against_speed(speed, at, force, rate, full, down)
         if found is not None and found.id == "imu.gyro_sign":
-            step = max(resolution(s.values, 9) for s in gyro)
+            step = max(resolution(s.values) for s in gyro)
             if step > _COARSE_RATE:
                 found = Problem.of("imu.gyro_coarse", found.signal, step=step)
     if found is not None:

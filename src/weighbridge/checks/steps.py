@@ -11,9 +11,9 @@ import numpy as np
 from weighbridge.balance.disagreement import Finding
 from weighbridge.checks.needed import show
 from weighbridge.messages import phrase
-from weighbridge.navigation.aiding import resolution
 from weighbridge.signals import Drive, Floats, Problem
 from weighbridge.signals.instants import span
+from weighbridge.signals.robust import resolution
 from weighbridge.vehicle.model import Vehicle
 
 SAME: Final = 0.003
@@ -52,7 +52,7 @@ POUND_FOOT: Final = 1.35581795
 
 def reading_step(values: Floats) -> float:
     """Step in which a reading was sent [SI], 0 where none shows."""
-    return resolution(np.round(values, 9)) if values.size >= FEWEST else 0.0
+    return resolution(values) if values.size >= FEWEST else 0.0
 
 
 def check_steps(

@@ -19,6 +19,7 @@ from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import rls as kernel
 from weighbridge.signals import Bools, Floats
+from weighbridge.signals.robust import spread
 from weighbridge.vehicle.model import Vehicle
 
 BLOCK: Final = 60.0
@@ -248,5 +249,5 @@ def _bound(phi: Floats, residual: Floats, used: Bools) -> float:
     """Cramér-Rao bound if the residuals were white and the model true [kg]."""
     if np.count_nonzero(used) < 3:
         return float("nan")
-    noise = 1.4826 * float(np.median(np.abs(residual[used])))
+    noise = spread(residual[used])
     return noise / float(np.sqrt(np.sum(phi[used] ** 2)))

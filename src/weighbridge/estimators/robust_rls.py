@@ -28,6 +28,7 @@ from weighbridge.estimators.regression import regression
 from weighbridge.estimators.track import MassTrack
 from weighbridge.kernels import robust_rls as kernel
 from weighbridge.signals import Bools, Floats, Ints
+from weighbridge.signals.robust import huber, spread
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.possible import not_negative, positive, within
 
@@ -283,9 +284,9 @@ class WindowFit:
         weight, noise = np.ones_like(phi), 0.0
         for _ in range(50):
             before = mass
-            size = np.abs(y - phi * mass - offset)
-            noise = max(1.4826 * float(np.median(size)), self.params.noise_floor * abs(mass))
-            weight = np.minimum(1.0, self.params.threshold * noise / np.maximum(size, 1e-9))
+            residual = y - phi * mass - offset
+            noise = max(spread(residual), self.params.noise_floor * abs(mass))
+            weight = huber(residual, noise, self.params.threshold)
             if self.params.offset_std > 0.0:
                 ridge = self.params.dependence * (noise / (self.params.offset_std * mass)) ** 2
             mass, offset = (float(x[0]) for x in _solve(_sums(phi, y, weight)[:, None], ridge))
@@ -306,7 +307,7 @@ class WindowFit:
     @property
     def bound(self) -> float:
         """Cramér-Rao bound if the windows were independent and the model true [kg]."""
-        noise = 1.4826 * float(np.median(np.abs(self.y - self.phi * self.mass()[0])))
+        noise = spread(self.y - self.phi * self.mass()[0])
         return noise / float(np.sqrt(np.sum(self.phi**2)))
 
 

@@ -31,9 +31,6 @@ _REACH = 3.0
 _AT_ONCE = 1 << 12
 """Outputs low-passed at a time: their samples stay in the processor's cache."""
 
-_TELLING = 20_000
-"""So many values show the step of a signal."""
-
 _SLOWEST = 0.11
 """Inertial samples further apart lose what happens between them [s]."""
 
@@ -188,22 +185,6 @@ def resample(
             time[rows], values, start, period, first, _REACH, part, np.empty(len(part))
         )
     return out
-
-
-def resolution(values: Floats, digits: int | None = None) -> float:
-    """Return the step a signal (n,) is quantised to, 0 where none shows.
-
-    Values are rounded to so many ``digits`` first where that is not None.
-    """
-    some = values[:_TELLING]
-    levels = np.unique(some if digits is None else np.round(some, digits))
-    if levels.size < 3:
-        return 0.0
-    gaps = np.diff(levels)
-    step = float(gaps.min())
-    # a lattice has all its gaps at whole multiples of the smallest
-    ratio = gaps / step
-    return step if np.abs(ratio - np.round(ratio)).max() < 0.1 else 0.0
 
 
 def speed_from_fixes(fixes: Fixes) -> Signal:

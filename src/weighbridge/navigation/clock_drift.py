@@ -21,6 +21,7 @@ from weighbridge.navigation.clock_lag import (
 from weighbridge.navigation.frozen import thawed
 from weighbridge.signals import QUANTITIES, Bools, Drive, Floats, Problem, Signal
 from weighbridge.signals.instants import instant, span
+from weighbridge.signals.robust import huber, spread
 from weighbridge.signals.runs import marked_runs
 
 _LOG = logging.getLogger(__name__)
@@ -196,8 +197,7 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
     if lag.size < _FEWEST:
         return None
     # By second differences, so that neither drift nor step counts as scatter.
-    bends = float(np.median(np.abs(np.diff(lag, 2))))
-    scatter = max(1.4826 * bends / np.sqrt(6.0), float(np.median(lags.std)))
+    scatter = max(spread(np.diff(lag, 2)) / np.sqrt(6.0), float(np.median(lags.std)))
     slope, slope_std, fit = _line(time, lag, scatter)
     length = float(time[-1] - time[0])
     drifts = abs(slope) * length > _DRIFT and abs(slope) > _SURE * slope_std
@@ -319,11 +319,9 @@ def _line(time: Floats, lag: Floats, scatter: float) -> tuple[float, float, Floa
     slope = float(np.median((lag[j] - lag[i]) / (t[j] - t[i])))
     middle = float(np.median(lag - slope * t))
     weight = np.ones(t.size)
-    scale = 0.01
     for _ in range(20):
         left = lag - middle - slope * t
-        scale = max(1.4826 * float(np.median(np.abs(left))), 0.01)
-        weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(left), 1e-9))
+        weight = huber(left, max(spread(left), 0.01), 2.0)
         total = np.sum(weight)
         off = t - np.sum(t * weight) / total
         slope = float(np.sum(weight * off * lag) / max(np.sum(weight * off**2), 1e-9))

@@ -11,9 +11,9 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import SAMPLES_AT_ONCE
-from weighbridge.navigation.aiding import resolution
 from weighbridge.signals import Bools, Floats, Signal
 from weighbridge.signals.interpolation import interpolate
+from weighbridge.signals.robust import resolution
 
 STEP: Final = 0.2
 """Grid on which force and speed are compared [s]."""
@@ -43,8 +43,6 @@ _LIVELY: Final = 0.25
 # The same in steps of the speed [-]: the rounding of its changes alone spreads by 0.41 of a step,
 # and the axes explain half of the variance from 0.58 on.
 _STEPS: Final = 0.7
-# Samples of a speed, spread over the drive, that show its step.
-_SHOWING: Final = 2000
 # Where less of a piece is seen, means are those of what was seen and felt together [-].
 _WHOLE: Final = 0.9
 # Part of the variance that the three axes explain, at least; by chance they explain 0.2 at most.
@@ -133,7 +131,7 @@ def find_lags(force: Integrated, speed: Signal, *, centre: float = 0.0) -> Lags:
     grid: Floats = np.asarray(start + STEP * np.arange(count), dtype=np.float64)
     shown, seen = _speed_changes(speed, grid)
     x = _high_passed(shown, seen)
-    spread = max(_LIVELY, _STEPS * resolution(speed.values[:: 1 + len(speed) // _SHOWING], 6))
+    spread = max(_LIVELY, _STEPS * resolution(speed.values))
     lively = [
         first
         for first in range(0, count - size + 1, hop)

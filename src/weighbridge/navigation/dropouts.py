@@ -10,6 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from weighbridge.constants import GRAVITY
 from weighbridge.navigation.axes import Axes
 from weighbridge.signals import Bools, Floats
+from weighbridge.signals.robust import spread
 
 _LEAST_FORCE, _MOST_FORCE = 2.0, 50.0
 """No body on wheels feels less or more than so for a sample [m/s^2]."""
@@ -123,7 +124,7 @@ def _spikes(x: Floats, least: float) -> Bools:
     np.abs(off, out=off)
     if not off.max(initial=0.0) > least:
         return np.zeros(x.size, dtype=bool)
-    limit = max(_SPIKE * 1.4826 * float(np.median(off)), least)
+    limit = max(_SPIKE * spread(off), least)
     found = off > limit
     # The neighbours of a spike are off by half of it.
     found[1:] &= off[1:] > off[:-1]

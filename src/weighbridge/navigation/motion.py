@@ -10,6 +10,7 @@ import numpy as np
 from weighbridge.constants import GRAVITY
 from weighbridge.messages import Problem, phrase
 from weighbridge.signals import Bools, Floats, Ints, Signal
+from weighbridge.signals.robust import spread
 
 MotionSource = Literal["inertial", "longitudinal_accel", "speed_grade", "speed"]
 
@@ -189,7 +190,7 @@ def noise_level(y: Floats) -> float:
     if y.size < 10:
         return 0.1
     second = y[2:] - 2.0 * y[1:-1] + y[:-2]
-    return max(0.005, float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)))
+    return max(0.005, spread(second) / float(np.sqrt(6.0)))
 
 
 def bridged(time: Floats, y: Floats) -> Floats:

@@ -25,10 +25,11 @@ from weighbridge.kernels.ins_model import (
     Z_VVAR,
     Z_YAW_MOVED,
 )
-from weighbridge.navigation.aiding import Fixes, interpolated, resolution
+from weighbridge.navigation.aiding import Fixes, interpolated
 from weighbridge.navigation.even import Even
 from weighbridge.navigation.settings import NavigationSettings
 from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
+from weighbridge.signals.robust import resolution
 
 AHEAD: Final = 0.3
 """A causal pass looks so far past an instant [s], delays of the sources taken off."""

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 from weighbridge.kernels import rts
 from weighbridge.signals import Floats, Ints, Signal
+from weighbridge.signals.robust import resolution
 
 _Model = tuple[Floats, Floats, float, Floats, Floats]
 """Transitions, process covariances, noise variance, first state and its covariance."""
@@ -49,13 +50,6 @@ LEVEL_STD: Final = 1.0
 
 _FARTHEST: Final = 8.0 * LEVEL_STD
 """Logarithms are sought up to here [-]."""
-
-
-def resolution(values: Floats) -> float:
-    """Step in which values come, 0 where they are one value."""
-    steps = np.diff(np.unique(values))
-    steps = steps[steps > 1e-9]
-    return float(steps.min()) if steps.size else 0.0
 
 
 def _stride(time: Floats) -> int:
@@ -242,7 +236,7 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
         cannot be told, that of any grade
     """
     quantum = resolution(measured.values)
-    if not quantum:
+    if not np.ptp(measured.values) > 0.0:
         return np.full(time.size, measured.values[0]), np.full(time.size, GRADE_NOISE)
     usual = np.log([GRADE_STD, GRADE_LENGTH, np.hypot(GRADE_NOISE, quantum / np.sqrt(12.0))])
     row = np.array([0.0, 1.0])

@@ -22,8 +22,9 @@ from weighbridge.pipeline.given import (
     mapping_of,
 )
 from weighbridge.results.writing import number
-from weighbridge.signals import QUANTITIES, Drive, Floats, Problem, Signal
+from weighbridge.signals import QUANTITIES, Drive, Problem, Signal
 from weighbridge.signals.catalogue import IMU_SIGNALS
+from weighbridge.signals.robust import resolution
 from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.signals.units import from_si
 from weighbridge.vehicle.model import Vehicle
@@ -37,9 +38,6 @@ GAP_PERIODS: Final = 5.0
 DRIVEN_NEEDED: Final = "the torque of every driven axle (or driven in the vehicle file)"
 REFERENCE_NEEDED: Final = "reference_torque (or reference_torque_nm in the vehicle file)"
 """What a torque in percent needs that its drive does not tell."""
-
-# Values enough to see a quantisation step; more would only take time.
-_STEP_SAMPLES: Final = 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,36 +248,8 @@ def describe(signal: Signal) -> SignalReport:
         longest_gap=float(np.max(steps[gap])) if gap.any() else 0.0,
         low=float(np.min(values)) if count else math.nan,
         high=float(np.max(values)) if count else math.nan,
-        step=quantisation(values),
+        step=float(f"{step:.4g}") if (step := resolution(values)) else None,
     )
-
-
-def quantisation(values: Floats) -> float | None:
-    """Smallest step between values, where all are multiples of it.
-
-    Parameters
-    ----------
-    values : (n,) in the unit they were recorded in
-
-    Returns
-    -------
-    The step in that unit, or None where the values are continuous, or too few
-    to tell.
-    """
-    some = values[:: max(1, values.size // _STEP_SAMPLES)]
-    largest = float(np.max(np.abs(some), initial=0.0))
-    if largest == 0.0:
-        return None
-    # Rounding takes out what the conversion of units left behind.
-    grain = 1e-9 * largest
-    levels = np.unique(np.round(some / grain))
-    if levels.size < 3 or levels.size > 0.5 * some.size:
-        return None
-    spacing = np.diff(levels) * grain
-    step = float(np.min(spacing))
-    multiples = spacing / step
-    whole = np.abs(multiples - np.round(multiples)) < 0.05
-    return float(f"{step:.4g}") if float(np.mean(whole)) > 0.9 else None
 
 
 def _ways(drive: Drive, vehicle: Vehicle | None) -> tuple[Way, ...]:

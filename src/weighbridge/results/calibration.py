@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from weighbridge.balance import ForceBalance
-from weighbridge.constants import HUBER
 from weighbridge.signals import Floats, Ints, Problem
+from weighbridge.signals.robust import huber, spread
 from weighbridge.signals.units import scalar_from_si
 from weighbridge.vehicle.gear import GearDetection
 from weighbridge.vehicle.model import Vehicle
@@ -44,15 +44,14 @@ class FittedRows:
     @property
     def residual_std(self) -> float:
         """Robust standard deviation of the residual [N m]."""
-        return 1.4826 * float(np.median(np.abs(self.residual)))
+        return spread(self.residual)
 
     @property
     def r_squared(self) -> float:
         """Part of the motion's torque that the source explains, by Huber's weights [-]."""
-        residual, noise = np.abs(self.residual), self.residual_std
-        weight = np.minimum(1.0, HUBER * noise / np.maximum(residual, 1e-12))
+        weight = huber(self.residual, self.residual_std)
         centred = self.motion_torque - np.average(self.motion_torque, weights=weight)
-        return float(1.0 - np.sum(weight * residual**2) / np.sum(weight * centred**2))
+        return float(1.0 - np.sum(weight * self.residual**2) / np.sum(weight * centred**2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,6 +15,7 @@ import numpy as np
 
 from weighbridge.errors import ConfigError
 from weighbridge.signals import Drive, Signal
+from weighbridge.signals.robust import resolution
 from weighbridge.simulation.car import SimulatedCar
 from weighbridge.simulation.named import usual_polling
 from weighbridge.simulation.route import RoadKind, Route, mixed_route
@@ -217,8 +218,7 @@ def with_torque_scale(drive: Drive, scale: float) -> Drive:
 
 
 def _scaled(signal: Signal, scale: float) -> Signal:
-    steps = np.diff(np.unique(np.round(signal.values, 9)))
-    step = float(steps.min()) if steps.size else 1.0
+    step = resolution(signal.values) or 1.0
     return replace(signal, values=step * np.round(scale * signal.values / step))
 
 

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.signals import Bools, Floats, Ints
+from weighbridge.signals.robust import huber, spread
 from weighbridge.vehicle.gear import effective_gearing, predict_gear, steady
 
 USUAL_STD: Final = 0.2
@@ -21,9 +22,6 @@ ROUNDS: Final = 4
 
 REWEIGHTED: Final = 5
 """Rounds of weighing rows by how far they lie off."""
-
-ROBUST: Final = 1.5
-"""Robust standard deviations beyond which a row counts less [-] (Huber)."""
 
 SLOWEST: Final = 3.0
 """Below clutches slip [m/s]."""
@@ -118,7 +116,6 @@ def _slope(rate: Floats, log_ratio: Floats, gear: Floats, alike: float) -> tuple
         if not power > 0.0:
             return 0.0, np.inf
         slope = float(np.sum(weight * x * y)) / power
-        off = np.abs(y - slope * x)
-        scatter = 1.4826 * float(np.median(off)) + 1e-9
-        weight = np.minimum(1.0, ROBUST * scatter / np.maximum(off, 1e-12))
+        scatter = spread(y - slope * x) + 1e-9
+        weight = huber(y - slope * x, scatter)
     return slope, alike * scatter**2 / power

@@ -11,6 +11,7 @@ import numpy as np
 
 from weighbridge.messages import refused
 from weighbridge.signals import Bools, Floats, Ints
+from weighbridge.signals.robust import spread
 
 LOWEST_GEARING: Final = 3.0
 """Below any top gear of a road vehicle, engine angle per distance [1/m]."""
@@ -350,9 +351,9 @@ def _refine(
             return value, float(centre * width), 0
         weight = speed[near] ** 2 if speed_step > 0.0 else np.ones(np.count_nonzero(near))
         value = _weighted_median(gearing[near], weight)
-    spread = 1.4826 * float(np.median(np.abs(gearing[near] - value)))
+    scatter = spread(gearing[near] - value)
     count = int(np.count_nonzero(near))
-    return value, max(spread, 1e-4 * value) * float(np.sqrt(np.pi / (2.0 * count))), count
+    return value, max(scatter, 1e-4 * value) * float(np.sqrt(np.pi / (2.0 * count))), count
 
 
 def _weighted_median(values: Floats, weight: Floats) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 
 from weighbridge.messages import Problem
 from weighbridge.signals import Bools, Drive, Floats, Signal
+from weighbridge.signals.robust import robust_fit
 from weighbridge.vehicle.data_sheet import by_data_sheet, torque_std
 from weighbridge.vehicle.force_sources import SLOWEST_POWER
 from weighbridge.vehicle.model import Vehicle
@@ -271,15 +272,9 @@ def _robust_fit(rows: Floats, y: Floats, block: Floats) -> tuple[Floats, float]:
     y : (n,) [W]
     block : (n,) rows of one number are left out together
     """
+    found, weight = robust_fit(rows, y)
     size = np.sqrt(np.mean(rows**2, axis=0)) + 1e-12
     scaled = rows / size
-    weight = np.ones_like(y)
-    found = np.zeros(size.size)
-    for _ in range(20):
-        root = np.sqrt(weight)
-        found = np.linalg.lstsq(scaled * root[:, None], y * root, rcond=None)[0]
-        off = np.abs(y - scaled @ found)
-        weight = np.minimum(1.0, 2.0 * float(np.median(off)) / np.maximum(off, 1e-9) + 1e-6)
     _, number = np.unique(block, return_inverse=True)
     many = int(number.max()) + 1
     gram = np.zeros((many, size.size, size.size))
@@ -295,5 +290,5 @@ def _robust_fit(rows: Floats, y: Floats, block: Floats) -> tuple[Floats, float]:
             for k in range(many)
         ]
     )
-    spread = (many - 1) / many * float(np.sum((left_out - left_out.mean()) ** 2))
-    return found / size, math.sqrt(spread) / float(size[0])
+    variance = (many - 1) / many * float(np.sum((left_out - left_out.mean()) ** 2))
+    return found, math.sqrt(variance) / float(size[0])

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from weighbridge.constants import GRAVITY, SAMPLES_AT_ONCE
-from weighbridge.navigation.aiding import resolution
 from weighbridge.navigation.axes import Axes
 from weighbridge.navigation.identify.steps import fitted
 from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Floats, Signal
+from weighbridge.signals.robust import resolution, spread
 
 _STEP: Final = 0.25
 """Faster speeds are thinned to it [s]."""
@@ -301,5 +301,5 @@ def changes_of_speed(
     if use.sum() < 4 * ahead:
         return None
     error = np.abs(by_force - by_speed)
-    use &= error < 6.0 * 1.4826 * float(np.median(error[use])) + 0.1
+    use &= error < 6.0 * spread(error[use]) + 0.1
     return (0.5 * (stamps[ahead:] + stamps[:-ahead]))[use], by_force[use], by_speed[use]

@@ -13,6 +13,7 @@ from weighbridge.constants import GRAVITY
 from weighbridge.errors import DriveError
 from weighbridge.messages import Problem, phrase, refused
 from weighbridge.signals import Bools, Floats
+from weighbridge.signals.robust import huber
 
 _LOG = logging.getLogger(__name__)
 
@@ -174,7 +175,7 @@ def _regressed(
             sol, *_ = np.linalg.lstsq(design * root, f * root, rcond=None)
             res = f - design @ sol
             size = np.linalg.norm(res, axis=1)
-            weight = 1.0 / np.maximum(1.0, size / (1.5 * np.median(size) + 1e-9))
+            weight = huber(size, float(np.median(size)), 1.5)
         # gravity where rest says it: not tilted by the mean grade of the rows
         down = -(sol[0]) / np.linalg.norm(sol[0])
         coef[: sol.shape[0]] = sol
