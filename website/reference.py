@@ -107,8 +107,8 @@ def commands_page() -> str:
 
     lines = ["# Commands", "", "`weighbridge COMMAND --help` says the same on a terminal.", ""]
     lines += [
-        "Exit status: 0 a mass was found. 1 the data cannot carry a mass, and the reason is told. "
-        "2 bad input or wrong usage, told in one line. 130 interrupted. 141 nobody reads on.",
+        "Exit status: 0 a mass was found. 1 no mass can be found, and the reason is shown. "
+        "2 bad input or wrong usage, in one line. 130 interrupted. 141 nobody reads on.",
         "",
     ]
     _tell(get_command(app), "weighbridge", lines)

@@ -82,7 +82,7 @@ class Registry(Mapping[str, Record], Generic[Record]):
         try:
             record = point.load()
         except Exception as error:  # what another package does wrong can be anything
-            raise self._refusal(point, f"{error}; mend or remove that package") from error
+            raise self._refusal(point, f"{error}; repair or remove that package") from error
         if not isinstance(record, self._kind):
             raise self._refusal(point, f"it is no {self._kind.__name__}, but {type(record)}")
         if record.name != point.name:

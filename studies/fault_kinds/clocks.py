@@ -9,7 +9,8 @@ from weighbridge.signals import Drive, Floats
 
 GROUP = "clocks"
 WORDS = (
-    r"\bclocks?\b|time stamps?|run apart|\blags?\b|late against|\bspread evenly"
+    r"\bclocks?\b|time stamps?|run apart|whatever the delay|\bspread evenly"
+    r"|the delay of|stamps were shifted|straight lines"
     r"|rows? (are|were) (lost|missing)|samples? every"
 )
 LATE_WORDS = WORDS + r"|torque delay|is late"

@@ -24,16 +24,17 @@ SPEED_WORDS = r"engine.speed|gearings?\b|gears change|another vehicle|two vehicl
 TORQUE = "load and torque"
 TORQUE_WORDS = (
     r"engine_load|engine_torque|reference_torque|reference torque"
-    r"|(the|its|high) torques? (or load )?(that was|of|reads?|runs|tells)|load or torque"
+    r"|(the|its|high) torques? (or load )?(of|reads?|runs|shows)|load or torque"
+    r"|torque,? (or )?load\b|engine reads"
 )
 UNITS = "speed and units"
 UNITS_WORDS = (
     r"(?<!engine_)(?<!engine )\bvehicle.speed\b|\bspeed from|jumps? of the speed|\bmph\b|miles"
-    r"|speed's (unit|scale)|\btyres\b|rolls? .* around|the two speeds|\bboth speeds"
+    r"|speed's (unit|scale)|\btyres\b|rolls? .* around|the two speeds|\bboth speeds|steady ratios"
 )
 WHOLE = "another vehicle, impossible values"
-SPLICE_WORDS = "recordings are put one behind another"
-WHOLE_WORDS = r"another vehicle|two vehicles|gears change|\bgearings?\b|different drives"
+SPLICE_WORDS = "recordings seem to be joined"
+WHOLE_WORDS = r"another vehicle|two vehicles|gears (change|of)|\bgearings?\b|different drives"
 ACCEL_WORDS = r"accel_x .*outside|values of accel_x|samples of accel_x|inertial samples are"
 
 Rng = np.random.Generator
@@ -306,7 +307,7 @@ FAULTS = (
     Fault(WHOLE, speed_out_of_range, (0.001, 0.05), UNITS_WORDS),
     Fault(WHOLE, torque_out_of_range, (0.001, 0.05), TORQUE_WORDS),
     Fault(
-        WHOLE, tare_above_mass, (273, 600), r"below nothing|below the tare|negative payload",
+        WHOLE, tare_above_mass, (273, 600), r"less than zero|less than the tare",
         stage="vehicle", must_tell=True,
     ),
 )  # fmt: skip

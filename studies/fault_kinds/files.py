@@ -14,11 +14,11 @@ STAMPS_WORDS = (
     r"\bclocks?\b|time stamps?|1970|spread evenly|rows .*(left out|sorted)|samples? every"
 )
 CELLS = "cells in files"
-CELLS_WORDS = r"values? of \w+ (is|are) (outside|infinite)|samples of \w+ leap|inertial samples are"
+CELLS_WORDS = r"values? of \w+ (is|are) (outside|infinite)|samples of \w+ jump|inertial samples are"
 MASSES = "mass of a calibration"
 MASSES_WORDS = (
-    r"by the calibration, above|kg the torque of|has a drag area of|against its \d+ kg"
-    r"|which no engine does|masses given alone"
+    r"by the calibration, more|kg the torque of|has a drag area of|against its \d+ kg"
+    r"|no engine does|from the masses given"
 )
 
 Rng = np.random.Generator

@@ -18,7 +18,10 @@ from fault_kinds.shaping import (
 from weighbridge.signals import Drive, Floats
 
 GROUP = "frozen"
-WORDS = r"froze|frozen|\bstuck\b|same value|does not change|all the time|repeats? (its|one|their)"
+WORDS = (
+    r"froze|frozen|\bstuck\b|same value|does not change|all the time"
+    r"|(repeats?|keeps?) (its|one|their)"
+)
 
 Rng = np.random.Generator
 

@@ -22,17 +22,18 @@ from weighbridge.signals import Bools, Drive, Floats, Signal
 
 MOUNTING = "mounting"
 MOUNTING_WORDS = (
-    r"sensor (was|is) (moved|turned)|\bmounting\b|\bholder\b|wrong sign"
-    r"|axes .*(swapped|reversed|mirrored|alike)|accelerometer('s)? offset"
+    r"sensor (was|is) (moved|turned)|\bmounting\b|\bmount\b|vibration shifts|wrong sign"
+    r"|axes .*(swapped|reversed|mirrored|differ)|accelerometer('s)? offset"
 )
 SCALE = "scale of the inertial sensor"
 SCALE_WORDS = (
-    r"accelerometer (reads \d|offset|is recorded in)|\baccel_[xyz]\b|accelerometer\b.*\bin g\b"
+    r"accelerometer (reads \d|offset|has steps)|\baccel_[xyz]\b|accelerometer\b.*\bin g\b"
+    r"|inertial axes"
 )
-TURN_WORDS = r"\bgyro(scope)?\b|\bgyro_[xyz]\b"
+TURN_WORDS = r"inertial axes|sensor was left out|\bgyro(scope)?\b|\bgyro_[xyz]\b"
 QUALITY = "noise, rate and range"
 QUALITY_WORDS = (
-    r"\baccel_[xyz]\b|accelerometer (is so noisy|is noisy|shakes|is recorded in)"
+    r"\baccel_[xyz]\b|accelerometer (is so noisy|is noisy|varies|has steps)"
     r"|inertial (samples|sensor) (are|come|is|shakes)|vibration|was smoothed"
 )
 

@@ -245,7 +245,7 @@ def test_warnings_of_several_drives_are_a_few_lines():
     assert warning_lines(drives) == [
         "every drive: heights",
         *(f"day part 2 of 2: {x}" for x in "abc"),
-        "day part 2 of 2: 2 more, told by --json",
+        "day part 2 of 2: 2 more, see --json",
     ]
     assert warning_lines([]) == []
     assert "never calibrated" in result_table(drives, [], truck).title

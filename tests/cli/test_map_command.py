@@ -300,7 +300,7 @@ def test_on_a_terminal_the_last_line_names_the_questions(weighbridge, tmp_path):
     os.close(theirs)
     told = os.read(ours, 1 << 16).decode()
     os.close(ours)
-    assert "to be asked about what is doubtful" in told.splitlines()[-1]
+    assert "to be asked about uncertain findings" in told.splitlines()[-1]
     assert "--force --ask" in told.splitlines()[-1]
 
 

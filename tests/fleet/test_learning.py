@@ -91,7 +91,7 @@ def test_a_vehicle_that_kills_its_worker_loses_nothing_of_the_others(
     assert (car["vehicle_id"], car["weighed"], car["refined"]) == ("car", 1, "car.toml")
     assert wb.Vehicle.load(tmp_path / "learnt" / "car.toml").torque is not None
     assert (deadly["vehicle_id"], deadly["drives"], deadly["refined"]) == ("deadly", 1, None)
-    assert deadly["told"].startswith("nothing was learnt: its worker died 3 times")
+    assert deadly["told"].startswith("nothing was learnt: its worker ended 3 times")
     assert odd["told"] == "nothing was learnt: KeyError: 'gone'"
 
 

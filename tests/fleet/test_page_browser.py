@@ -72,7 +72,7 @@ def column(tab, key, name):
 
 def test_a_table_sorts_and_filters(tab):
     legs = tab.locator("#legs")
-    told = legs.locator(".told")
+    told = legs.locator(".note")
     assert told.inner_text() == "20 of 60"
     # Newest first, with the payload's ± in sight.
     assert column(tab, "legs", "payload, kg")[:2] == ["5590 ± 980", "5580 ± 980"]
@@ -94,7 +94,7 @@ def test_a_table_sorts_and_filters(tab):
 def test_a_vehicle_has_its_history_by_a_click(tab):
     tab.locator("#learnt td button", has_text="truck2").click()
     assert tab.locator("#history select option:checked").inner_text() == "truck2"
-    assert tab.locator("#history p.told").inner_text() == "20 legs, 0 without a mass"
+    assert tab.locator("#history p.note").inner_text() == "20 legs, 0 without a mass"
     inked = "c => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(x => x > 0)"
     assert tab.locator("#history canvas").evaluate(inked)
     assert column(tab, "learnt", "mean error, %") == ["+12.3 ± 4.0"]

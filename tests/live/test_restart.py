@@ -184,7 +184,7 @@ def test_a_drive_with_no_inertial_sensor_says_what_it_costs(car, loaded):
         notes.append([n for n in told.notes if n.startswith("no inertial sensor comes")])
     assert not notes[0]
     assert len(notes[-1]) == 1
-    again = {r for r in reasons if "looked at again after" in r}
+    again = {r for r in reasons if "checked again after" in r}
     assert len(again) > 3
     # The bar of the next look moves with the driving, and begins anew at a look.
     steps = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(looks)]

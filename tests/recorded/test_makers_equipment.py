@@ -37,7 +37,7 @@ def test_obd_and_gnss_without_an_inertial_sensor(foreign_simulator, vehicle, rat
 
     limits = wb.Vehicle(name=vehicle, gross=2300.0)
     car = wb.calibrate([drive("calibration-1"), drive("calibration-2")], vehicle=limits)
-    assert "not fitted anew" not in (car.provenance.notes or "")
+    assert "not fitted again" not in (car.provenance.notes or "")
     errors = []
     for name in ("drive-1", "drive-3"):
         w = wb.weigh(drive(name), car)

@@ -106,29 +106,29 @@ def test_of_a_pair_each_fault_that_spoils_the_mass_must_be_named(car):
 
 
 SAID = {
-    "leans": "perhaps the sensor leans by 0.63° per m/s² as the vehicle accelerates, in the "
-    "calibration by 0.25°: its holder gives way in one of the two, or the springs are others; "
-    "the interval allows for it",
-    "reads": "the accelerometer reads 0.913 times what the speed changes by along the vehicle, and "
-    "gravity does not show it: the scale of that axis is off, or the lean of the body is not known "
-    "so well; 3.5 % of the mass, as standard deviation, are in the interval for it",
+    "leans": "perhaps when the vehicle accelerates, the sensor tilts by 0.63° per m/s² "
+    "(calibration 0.25°): its mount is loose, or the springs are others; the interval "
+    "contains this",
+    "reads": "the accelerometer reads 0.913 times the change of speed, and gravity does not show "
+    "this; the interval contains a standard deviation of 3.5 % for it",
     "payload": "with a probability of 43 % the load changed at a stop, most likely before 200 s; "
-    "mass and interval allow for it",
+    "mass and interval contain this",
     "delay": "torque delay +0.21 s found from this drive",
     "drift": "the clock of obd drifts by +496 ppm against that of imu, by speed and acceleration; "
-    "they were brought together (by up to 0.58 s)",
-    "stands": "the vehicle stands for 14 min from 300 s; if it was loaded there, look at the mass "
-    "of each segment",
-    "air": "engine_load reads 0.91 times as much as mass_air_flow tells by the calibration of car: "
-    "one of the two, or engine_speed, is wrong, and a mass from it is off by as much",
-    "masses": "with 1763 kg the torque of drive 1 would read 0.81 of what it is; by data sheets, "
-    "which are good to 7 %, 1428 kg are plausible: check the mass",
-    "squat": "the drive does not show the squat: pitch of the body is taken as grade",
-    "level": "no grade and no altitude: the road is taken as level",
+    "they were aligned (by up to 0.58 s)",
+    "stands": "the vehicle stands still for 14 min from 300 s; if it was loaded there, look at the "
+    "mass of each segment",
+    "air": "engine_load reads 0.91 times as much as mass_air_flow shows by the calibration of car: "
+    "one of the two, or engine_speed, is wrong; a mass from it is off by the same share",
+    "masses": "with 1763 kg the torque of drive 1 reads 0.81 of its value; by data sheets (± 7 %) "
+    "1428 kg are plausible; check the mass",
+    "squat": "the drive does not show how the body pitches under acceleration; its pitch is read "
+    "as grade",
+    "level": "no grade and no altitude; the road is assumed to be level",
     "noisy": "the gyro is noisy: it reads 0.3 rad/s while the vehicle stands",
-    "splice": "there are jumps of the position, once, at 449 s, as where recordings are put one "
-    "behind another: weighbridge weigh parts them, and read_drives in Python",
-    "step": "engine_torque came in steps of 0.5 N m in the calibration, and lies between them here",
+    "splice": "there are jumps of the position, once, at 449 s: several recordings seem to be "
+    "joined; weighbridge weigh splits them, and read_drives in Python",
+    "step": "engine_torque had steps of 0.5 N m in the calibration, and has values between them",
 }
 """Sentences of the program."""
 

@@ -215,8 +215,8 @@ def test_errors_of_recorded_torque_are_told(done):
     assert "200 and 400 kg loaded +0.0 / no mass % ± 4.6 / 3.9 %" in said["torque errors"]
     assert said["blind torque errors"].startswith("errors +0.0 / -10.0 / -10.0 %")
     # 109 kg off with ± 78 told, twice.
-    assert said["blind torque errors"].endswith("3 of 5 within 95 % told")
-    assert said["torque errors"].endswith("4 of 4 within 95 % told")
+    assert said["blind torque errors"].endswith("3 of 5 within 95 %")
+    assert said["torque errors"].endswith("4 of 4 within 95 %")
     # A drive without a mass agrees with nothing.
     assert not torque_figures(done.torque)["torque errors"].agrees
     *_, last, slopes = torque_table(done.torque).rows

@@ -391,7 +391,7 @@ def test_a_relation_is_one_of_a_known_signal():
     ):
         with pytest.raises(wb.ConfigError, match=words):
             replace(good, **fields)
-    with pytest.raises(wb.ConfigError, match="must stand once"):
+    with pytest.raises(wb.ConfigError, match="may be named once"):
         replace(CAR, witnesses=(good, good))
     assert isinstance(good, WitnessRelation)
 

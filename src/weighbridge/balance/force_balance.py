@@ -82,7 +82,7 @@ def force_balance(
     A control unit smooths what it reports. The motion is smoothed alike, so
     that both sides have lost the same.
 
-    With a setup that looks no further than ``setup.ahead`` each row hangs on the setup, on what
+    With a setup that looks no further than ``setup.ahead`` each row depends on the setup, on what
     came before and on what comes so soon after, and on nothing else: a drive whose rows are found
     together has the same ones, to the last bit, as one that is read second by second.
 
@@ -91,9 +91,9 @@ def force_balance(
     drive, vehicle, motion
     delay : lateness of the torque; the vehicle's when None, 0 if that is unknown [s]
     lag : time constant of its first-order smoothing; the vehicle's when None [s]
-    signed : whether the torque tells what a dragged engine takes; a load that stands for it
+    signed : whether the torque shows what a dragged engine takes; a load that means it
         does not
-    setup : what a whole drive tells of its force side; found from this drive when None
+    setup : what a whole drive shows of its force side; found from this drive when None
     since : what earlier rows left, where ``drive`` and ``motion`` hold the last seconds alone
 
     Raises

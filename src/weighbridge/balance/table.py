@@ -89,7 +89,7 @@ class ForceTable:
     gearing : (n,) [1/m]; NaN without a gear
     air_speed : (n,) against the air, with the reported wind [m/s]
     air_density : (n,) [kg/m^3]
-    fuel_burnt : (n,) since the first row, as far as the drive tells [kg]
+    fuel_burnt : (n,) since the first row, as far as the drive shows it [kg]
     reason : (n,) `Reason` why a sample is not usable
     set_off : instant at which the vehicle first moved; found from the rows when None [s]
     """
@@ -146,19 +146,19 @@ class ForceTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceSetup:
-    """What a whole drive tells of its force side, by which each row can be found alone.
+    """What a whole drive shows of its force side, by which each row can be found alone.
 
     Attributes
     ----------
     foot : accelerator and floor of the reading
     switch_dead : the brake switch contradicts the motion and is not used
-    gears : number of the vehicle file's gear by what the gearbox tells
+    gears : number of the vehicle file's gear as the gearbox reports it
     engine_delay : lateness of the engine speed [s]
     air : temperature and pressure
     air_std : what the air leaves open of the torque [-]
     full_torque : torque of the engine that the drive hardly exceeds [N m]
     torque_noise : of one torque [N m]
-    fill : how readings that a logger filled in would look; None where they cannot be told
+    fill : how readings that a logger filled in would look; None where they cannot be seen
     periods : median time between samples of each signal [s]
     """
 
@@ -191,15 +191,15 @@ class ForceBalance:
     Attributes
     ----------
     table, motion
-    brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading tells
+    brake_hidden : the vehicle slows, and no switch, accelerator or floor of the reading shows it
         where it is braked
     switch_dead : the brake switch contradicts the motion and is not used
-    retarder_untold : a retarder may slow the vehicle that the drive does not tell of
-    coarse_std : what steps of the torque's reading leave open, relative to the mass [-]
+    retarder_untold : a retarder may slow the vehicle, unseen in the drive
+    coarse_std : standard deviation by steps of the torque's reading, relative to the mass [-]
     wheel_speed : (n,) speed of the wheels as recorded, at the instants of the rows [m/s]; None for
         stages that go forward, and without one
-    air_std : what other air than that of the calibration leaves open, relative to the torque [-]
-    setup : what a whole drive tells of its force side; None but for stages that go forward
+    air_std : the same by other air than that of the calibration, relative to the torque [-]
+    setup : what a whole drive shows of its force side; None but for stages that go forward
     delay : lateness of the torque, which is off its instants [s]
     navigation : what the motion was found by; None where it was not from an inertial sensor
     lagged, fuel_flow : the motion, smoothed as the torque is, and the fuel of each row (n,) [kg/s];

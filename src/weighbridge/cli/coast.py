@@ -66,7 +66,7 @@ def coast(
         low, high = found.rolling_interval()
         say(
             f"rolling resistance coefficient {found.rolling:.4f}, 95 % between {low:.4f} and "
-            f"{high:.4f}, driveline drag taken in; no mass, for a coast-down tells none"
+            f"{high:.4f}, driveline drag taken in; a coast-down shows no mass"
         )
 
 

@@ -148,7 +148,7 @@ def _say_outside(outside: pl.DataFrame) -> None:
         when = "" if row["worst_start"] is None else f" {row['worst_start']:%Y-%m-%d %H:%M} UTC"
         say(
             f"  {row['vehicle_id']}: {row['outside']} of {row['known']}, worst{when}: known "
-            f"{row['worst_known_kg']:.0f} kg, told {row['worst_low95_kg']:.0f} to "
+            f"{row['worst_known_kg']:.0f} kg, 95 % interval {row['worst_low95_kg']:.0f} to "
             f"{row['worst_high95_kg']:.0f} kg ({100.0 * row['worst_error']:+.1f} %)"
         )
     more = doubted.height - _TOLD

@@ -67,7 +67,7 @@ def map_log(
     ] = None,
     ask: Annotated[
         bool,
-        typer.Option("--ask", help="Ask about everything doubtful: time, columns, units, rate."),
+        typer.Option("--ask", help="Ask about everything uncertain: time, columns, units, rate."),
     ] = False,
     rate: Annotated[
         Optional[float],  # noqa: UP045
@@ -167,7 +167,7 @@ def _to_ask(drafts: list[Draft], again: list[str]) -> str:
     doubtful = any(found.all_doubts for found in drafts)
     if not (doubtful and sys.stdin.isatty() and sys.stdout.isatty()):
         return ""
-    return f"or, to be asked about what is doubtful: {shlex.join([*again, '--ask'])}"
+    return f"or, to be asked about uncertain findings: {shlex.join([*again, '--ask'])}"
 
 
 def _named_dbcs(dbc: list[str], output: Path | None) -> list[str]:
@@ -240,7 +240,7 @@ def _files(
             raise DriveError(
                 f"{path}: map drafts mappings of tables ({', '.join(drafted)}), and of CAN logs "
                 "by their DBC (--dbc FILE); other logs are read as they are: weighbridge inspect "
-                "tells what they hold"
+                "shows what they hold"
             )
         else:
             found.append((path, draft))
@@ -361,7 +361,7 @@ def _show(found: Draft, screen: Console) -> None:
         names = ", ".join(shown(n) for n in others[:_SHOWN])
         screen.print(f"  not taken: {names}{more}", highlight=False)
     for doubt in found.all_doubts:
-        screen.print(f"  doubtful: {shown(doubt)}", highlight=False)
+        screen.print(f"  uncertain: {shown(doubt)}", highlight=False)
 
 
 def _length(found: Draft) -> str:

@@ -348,7 +348,7 @@ def warning_lines(rows: list[WeighingRow]) -> list[str]:
         own = [p.text for p in row.problems if p.text not in shared and p.id != "file.part"]
         lines += [f"{row.drive}: {text}" for text in own[:_NOTED]]
         if len(own) > _NOTED:
-            lines.append(f"{row.drive}: {len(own) - _NOTED} more, told by --json")
+            lines.append(f"{row.drive}: {len(own) - _NOTED} more, see --json")
     return lines
 
 

@@ -38,7 +38,7 @@ class Estimator:
         `weighbridge.balance.speed_balance`
     by_speed : it weighs without an accelerometer, and takes a balance of a motion by speed whatever
         the drive holds
-    segments_are_loads : its segments are loads told apart, not just legs of a drive
+    segments_are_loads : the load changes between its segments; else they are legs of a drive
     reckons_fuel : its mass is that at the end of the drive, fuel burnt taken off; else that of
         the whole drive
     slow_errors : it estimates wind, resistance and their like beside the mass, which its residual

@@ -26,7 +26,7 @@ class GateSettings:
         0.25 to 0.4
     widest : standard deviation over the mass above which no mass is given [-]: the interval of
         95 % is 30 % to both sides then
-    widest_of_drive : the same of what the drive itself leaves open, the vehicle file aside [-].
+    widest_of_drive : the same by the drive itself, the vehicle file aside [-].
         Intervals beyond hold as well, but a quarter of the masses were more than 10 % off, below
         one in 100
 

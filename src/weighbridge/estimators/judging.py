@@ -77,7 +77,7 @@ between two stops, over which they do not average [-]."""
 def consider_std(balance: ForceBalance, phi: Floats, used: Bools, vehicle: Vehicle) -> float:
     """Relative standard deviation that no row of this drive can take away [-].
 
-    What the calibration left open, how the motion was found, and the cold
+    Uncertainty of the calibration, how the motion was found, and the cold
     start: engine and tyres that are not warm yet make a vehicle seem heavy, by
     as much as `TorqueSource.cold_std` where all that was learnt is from the first `WARMING`
     of driving.
@@ -152,7 +152,7 @@ class Evidence:
     blocks : stretches of time that say something of their own
     systematic_std : part of ``std`` that the vehicle file leaves, whatever the drive [kg]
     degrees_of_freedom : behind ``std``
-    motion : the rows are of; tells why few of them count
+    motion : of the rows; shows why few of them count
     gate : what a mass needs
     """
 
@@ -183,7 +183,7 @@ class Evidence:
 
     @property
     def drive_std(self) -> float:
-        """Standard deviation by what the drive itself leaves open [kg]."""
+        """Standard deviation by the drive itself [kg]."""
         return float(np.sqrt(max(self.std**2 - self.systematic_std**2, 0.0)))
 
     @property

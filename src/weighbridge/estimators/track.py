@@ -103,7 +103,7 @@ class MassTrack:
     sizes: JointSizes | None = None
 
     def doubted(self, share: float) -> MassTrack:
-        """Return the track with a doubt in all its masses.
+        """Return the track with more uncertainty in all its masses.
 
         Parameters
         ----------

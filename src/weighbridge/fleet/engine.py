@@ -31,7 +31,7 @@ _MEASURED: Final = 1.0  # between looks at the cluster's size [s]
 _CANCELLED: Final = (asyncio.CancelledError, concurrent.futures.CancelledError)
 
 WORKER_DIED: Final = (
-    f"its worker died {TRIES} times, as one does that runs out of memory: give workers more"
+    f"its worker ended {TRIES} times, probably for lack of memory: give workers more"
 )
 """Why a job has no receipt."""
 

@@ -30,14 +30,14 @@ NOT_WEIGHED: Final = "no force was usable from a stop on, and the load may have 
 
 
 class Limits(NamedTuple):
-    """What is told as overload, as a trailer and as empty.
+    """What counts as overload, as a trailer and as empty.
 
     Attributes
     ----------
-    warn, alarm : probabilities that the mass is above the permitted one, from which on it is told
+    warn, alarm : least probabilities that the mass is above the permitted one
     empty : payload below this part of the permitted payload is none [-]
     trailer : mass above this multiple of the permitted one is taken for one with a trailer, where
-        no coupling is told [-]
+        no coupling is known [-]
     """
 
     warn: float = 0.5

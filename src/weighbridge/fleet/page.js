@@ -26,8 +26,8 @@ function table(key, count, columns, order) {
   const tools = make("div", undefined, "tools");
   const filter = make("input");
   filter.type = "search"; filter.placeholder = "filter"; filter.setAttribute("aria-label", "filter");
-  const told = make("span", "", "told");
-  tools.append(filter, told);
+  const note = make("span", "", "note");
+  tools.append(filter, note);
   const scroll = make("div", undefined, "scroll");
   const grid = make("table"), head = make("thead"), rows = make("tbody"), line = make("tr");
   const more = make("button", "Show more", "more");
@@ -53,7 +53,7 @@ function table(key, count, columns, order) {
     }
     rows.replaceChildren(parts);
     more.hidden = found.length <= shown;
-    told.textContent = `${Math.min(shown, found.length)} of ${found.length}`;
+    note.textContent = `${Math.min(shown, found.length)} of ${found.length}`;
   }
   function arrange() {
     const wanted = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
@@ -177,7 +177,7 @@ function history() {
   names.forEach((name, k) => { const o = make("option", name); o.value = String(k); picker.append(o); });
   picker.addEventListener("change", () => choose(Number(picker.value)));
   label.append(picker); tools.append(label);
-  const told = make("p", "", "told");
+  const note = make("p", "", "note");
   body.append(tools);
   let spots = [];
   const { canvas, paint } = board(body, 320, (pen, wide, high) => {
@@ -185,7 +185,7 @@ function history() {
     const left = 62, right = wide - 12, top = 14, bottom = high - 34;
     spots = [];
     pen.fillStyle = colour("--soft");
-    told.textContent = `${at.length} legs, ${at.length - known.length} without a mass`;
+    note.textContent = `${at.length} legs, ${at.length - known.length} without a mass`;
     if (!known.length) { pen.fillText("no leg of this vehicle has a mass", left, high / 2); return; }
     const gross = V.gross_kg[chosen], tare = V.tare_kg[chosen];
     const ends = [...known.map((k) => L.high95_kg[k]), gross, 0].filter((x) => x !== null);
@@ -216,7 +216,7 @@ function history() {
       pen.fillText(text, left + 4, y(mass) - 4);
     }
     pen.setLineDash([]);
-    // One load, over the legs between which no change was told.
+    // One load, over the legs between which no change was found.
     pen.lineWidth = 6; pen.globalAlpha = 0.3; pen.strokeStyle = colour("--soft");
     for (const k of spansOf[chosen]) {
       const first = at.findIndex((leg) => L.start[leg] >= T.start[k]);
@@ -241,11 +241,11 @@ function history() {
   canvas.addEventListener("pointermove", (event) => {
     const near = nearest(spots, event.offsetX, event.offsetY, 20);
     if (near === null) return;
-    told.textContent = `${time(L.start[near])}: ${number(L.mass_kg[near])} kg, ${number(L.low95_kg[near])} to ` +
+    note.textContent = `${time(L.start[near])}: ${number(L.mass_kg[near])} kg, ${number(L.low95_kg[near])} to ` +
       `${number(L.high95_kg[near])} kg; payload ${number(L.payload_kg[near])} kg; ` +
       `${number(L.distance_km[near])} km; overload ${sure(L.overload[near])}${state(near)}`;
   });
-  body.append(told);
+  body.append(note);
   painted.push(paint);
 }
 
@@ -272,7 +272,7 @@ function map() {
   const middle = (south + north) / 2, narrow = Math.cos(middle * Math.PI / 180), KM = 111.2;
   const east0 = (west + east) / 2, span = Math.max((north - south) * KM, (east - west) * KM * narrow, 0.5);
   let zoom = 1, shift = [0, 0], spots = [], only = false;
-  const tools = make("div", undefined, "tools"), told = make("p", "", "told"), key = make("p", undefined, "key");
+  const tools = make("div", undefined, "tools"), note = make("p", "", "note"), key = make("p", undefined, "key");
   const label = make("label"), box = make("input");
   box.type = "checkbox"; label.append(box, " only the vehicle of the history");
   for (const [sign, factor] of [["+", 1.6], ["−", 1 / 1.6]]) {
@@ -317,22 +317,22 @@ function map() {
     event.preventDefault(); scale(event.deltaY < 0 ? 1.2 : 1 / 1.2);
   }, { passive: false });
   let drag = null;
-  canvas.addEventListener("pointerdown", (event) => { drag = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); tell(event); });
+  canvas.addEventListener("pointerdown", (event) => { drag = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); point(event); });
   canvas.addEventListener("pointerup", () => { drag = null; });
   canvas.addEventListener("pointercancel", () => { drag = null; });
   canvas.addEventListener("pointermove", (event) => {
     if (drag) {
       shift = [shift[0] + event.clientX - drag[0], shift[1] + event.clientY - drag[1]];
       drag = [event.clientX, event.clientY]; paint();
-    } else tell(event);
+    } else point(event);
   });
-  function tell(event) {
+  function point(event) {
     const k = nearest(spots, event.offsetX, event.offsetY, 16);
     if (k === null) return;
-    told.textContent = `${names[C.v[k]]}, ${time(C.time[k])}: ${C.kind[k]}, ${number(C.before_kg[k])} to ` +
+    note.textContent = `${names[C.v[k]]}, ${time(C.time[k])}: ${C.kind[k]}, ${number(C.before_kg[k])} to ` +
       `${number(C.after_kg[k])} kg (${C.change_kg[k] > 0 ? "+" : ""}${pair(C.change_kg[k], 1.96 * C.std_kg[k])} kg)`;
   }
-  body.append(key, told);
+  body.append(key, note);
   painted.push(() => { if (only) paint(); });
 }
 colour.kept = {};
@@ -362,7 +362,7 @@ function learnt() {
     drift("torque scale, %", "torque_drift_pct", "torque_drift_std_pct", 1),
     drift("rolling", "rolling_drift", "rolling_drift_std", 4),
     drift("pitch, deg", "pitch_drift_deg", "pitch_drift_std_deg", 2),
-    { head: "told", value: of(G.told), kind: "w" },
+    { head: "what was found", value: of(G.told), kind: "w" },
   ], [1, true]);
 }
 

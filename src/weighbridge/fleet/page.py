@@ -33,7 +33,7 @@ _SECTIONS: Final = (
     ("history", "History of a vehicle", "Mass of each leg with its 95 % interval."),
     ("legs", "Legs", "Spans with one load, with 95 % intervals; below zero a payload is none."),
     ("map", "Where loads changed", "Each mark is a stop; no map is loaded from the net."),
-    ("quality", "Data quality", "What keeps drives from being weighed, and what was doubted."),
+    ("quality", "Data quality", "What keeps drives from being weighed, and what is uncertain."),
     (
         "learnt",
         "Learnt from tickets",
@@ -144,7 +144,7 @@ def _answer(report: FleetReport) -> str:
     )
     more = first.height - _FIRST
     link = f'<p><a href="#overloads">and {_count(more, "more vehicle")}</a></p>' if more > 0 else ""
-    note = '<p class="lead">A trailer counts as load where no table of couplings tells of it.</p>'
+    note = '<p class="lead">A trailer counts as load unless a table of couplings names it.</p>'
     why = f'<p class="why">{why[:1].upper() + why[1:]}</p>'
     return head + why + (table + link + note if rows else "")
 
@@ -186,12 +186,12 @@ def _outside(report: FleetReport) -> str:
     none = "" if rows else "<p>No leg has both a known mass and an interval.</p>"
     table = (
         '<div class="scroll"><table><thead><tr><th>vehicle<th class=n>outside<th class=n>worst, UTC'
-        "<th class=n>known, kg<th class=n>told 95 %, kg<th class=n>error, %</tr></thead>"
+        "<th class=n>known, kg<th class=n>95 % interval, kg<th class=n>error, %</tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"
     )
     return (
         '<section id="outside"><h3>Outside the interval</h3><p class="lead">Legs whose known mass '
-        "(ticket or drive.toml) lies outside the 95 % interval that was told. By chance it is one "
+        "(ticket or drive.toml) lies outside the 95 % interval. By chance it is one "
         f"in twenty.</p>{none or table}</section>"
     )
 

@@ -27,7 +27,7 @@ class FleetReport:
 
     Attributes
     ----------
-    limits : by which overload, trailer and empty are told
+    limits : of overload, trailer and empty
     tolerance : of the verdicts [-]
     legs : one row per leg, see `weighbridge.fleet.legs.legs`
     changes : of the load, see `weighbridge.fleet.legs.load_changes`
@@ -63,7 +63,7 @@ class FleetReport:
 
     @property
     def overloads(self) -> pl.DataFrame:
-        """Legs that are told as overloaded, the surest first."""
+        """Overloaded legs, the surest first."""
         told = self.legs.filter(pl.col("level").is_in(["warn", "alarm"]))
         return told.sort("overload", "mass_kg", descending=True, nulls_last=True)
 
@@ -125,7 +125,7 @@ def report(
     Parameters
     ----------
     results : folder that ``weighbridge fleet`` wrote
-    limits : by which overload, trailer and empty are told
+    limits : of overload, trailer and empty
     tickets : table of known masses, see `weighbridge.fleet.tickets.read_tickets`
     couplings : table of trailers, see `weighbridge.fleet.couplings.read_couplings`
     tolerance : largest error that passes the protocol [-]

@@ -59,7 +59,7 @@ DRIVES: Final[dict[str, Column]] = {
     ),
     "outcome": Column(_TEXT, "weighed, unread (bad data) or failed (three tries; tried again)"),
     "vehicle_id": Column(_TEXT, "id by which its vehicle file was found"),
-    "vehicle_file": Column(_TEXT, "name of that file; null where the class's data sheet stood in"),
+    "vehicle_file": Column(_TEXT, "name of that file; null where the class's data sheet was used"),
     "vehicle_class": Column(_TEXT, "car, van, bus, truck, motorcycle …"),
     "tare_kg": Column(_NUMBER, "mass of the empty vehicle, of its file"),
     "gross_kg": Column(_NUMBER, "permitted mass, of its file"),
@@ -83,7 +83,7 @@ DRIVES: Final[dict[str, Column]] = {
         pl.List(pl.String()), "what was corrected or is uncertain, one sentence each"
     ),
     "problem_ids": Column(pl.List(pl.String()), "ids of these messages, in their order"),
-    "load_changed": Column(pl.Boolean(), "segments are loads told apart"),
+    "load_changed": Column(pl.Boolean(), "the load changed between segments"),
     "unweighed_s": Column(_NUMBER, "time of its segments without a usable force"),
     "freedom": Column(_NUMBER, "degrees of freedom of the mass (Student's t); infinite is normal"),
     "distance_km": Column(_NUMBER, "driven, from the speed"),
@@ -92,7 +92,7 @@ DRIVES: Final[dict[str, Column]] = {
     "first_mass_s": Column(_NUMBER, "from the first motion to a running mass within 10 %, 1 std"),
     "checked_kg": Column(_NUMBERS, "running mass 15 min after the first motion, then every 10 min"),
     "checked_std_kg": Column(_NUMBERS, "its standard deviations; null where there was none yet"),
-    "known_mass_kg": Column(_NUMBER, "mass that the drive itself tells (drive.toml)"),
+    "known_mass_kg": Column(_NUMBER, "mass that the drive itself states (drive.toml)"),
     "start_latitude_deg": Column(_NUMBER, "first position"),
     "start_longitude_deg": Column(_NUMBER, ""),
     "end_latitude_deg": Column(_NUMBER, "last position"),
@@ -112,10 +112,10 @@ SEGMENTS: Final[dict[str, Column]] = {
     "vehicle_id": Column(_TEXT, "as of the drive"),
     "start_s": Column(
         _NUMBER,
-        "begin as `weigh` tells it, on the drive's clock; null where no force was usable from a "
+        "begin as in `weigh`, on the drive's clock; null where no force was usable from a "
         "stop on at which the load could change",
     ),
-    "end_s": Column(_NUMBER, "end as `weigh` tells it"),
+    "end_s": Column(_NUMBER, "end as in `weigh`"),
     "mass_kg": Column(_NUMBER, "mass; null where none was weighed"),
     "std_kg": Column(_NUMBER, "its standard deviation"),
     "from_s": Column(_NUMBER, "from here on the mass stands; all segments fill the drive"),

@@ -21,11 +21,11 @@ _REACH: Final = float(ndtri(0.975))
 LONGEST: Final = 16_200.0
 """Driving on for longer is no remedy [s]: 4.5 h, after which a driver rests (EU 561/2006)."""
 
-CALIBRATE: Final = "a calibration on more drives of several masses leaves less open"
+CALIBRATE: Final = "a calibration on more drives of several masses narrows the interval"
 """What helps where driving on does not."""
 
 ADVICE: Final = (
-    "starts, hills and changes of speed tell most; steady driving and braking tell little"
+    "starts, hills and changes of speed help most; steady driving and braking help little"
 )
 """Which driving helps."""
 

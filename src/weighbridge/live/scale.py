@@ -40,7 +40,7 @@ RENEWED: Final = 60.0
 class LiveScale:
     """Weigh a vehicle from samples while they arrive.
 
-    The first minutes are weighed as a whole, again and again, until they tell mounting, delays and
+    The first minutes are weighed as a whole, again and again, until they show mounting, delays and
     noise; from then on each step is weighed by the forward stages
     (`weighbridge.pipeline.forward`), and all that came is still looked at now and then, by the
     checks of a recorded drive. With a ``setup`` nothing is learnt, and the mass is to the last bit
@@ -56,7 +56,7 @@ class LiveScale:
     setup : of `weighbridge.pipeline.forward.identify_forward`
     info : what is known beside the samples, such as wind and temperature
     step : in which samples are weighed [s], one of `weighbridge.signals.recent.STEPS`: shorter ones
-        tell sooner and cost more; that of ``setup`` where there is one
+        show it sooner and cost more; that of ``setup`` where there is one
 
     Attributes
     ----------
@@ -254,9 +254,9 @@ class LiveScale:
         self._records.follow(start, STOP)
 
     def load_changed(self) -> None:
-        """Tell that the load has changed: what was weighed before says nothing of it any more.
+        """Report that the load has changed: earlier samples say nothing about the new one.
 
-        What the records have told of sensors and noise stays, and so does a contradiction.
+        What is known of sensors and noise stays, and so does a contradiction.
         """
         self._take(wait=True)
         if self._state is not None:
@@ -269,7 +269,7 @@ class LiveScale:
         self._move.begin_anew()
 
     def renew(self) -> None:
-        """Tell that the clock of a device has begun anew, as of one that was turned on again.
+        """Report that the clock of a device starts again, as of one that was turned on again.
 
         Where all signals were silent before, the vehicle may have been driven and loaded
         meanwhile: what comes is weighed as a new drive. Where others went on it is the same drive.
@@ -294,7 +294,7 @@ class LiveScale:
         The mass is the settled one, of which nothing changes any more: that of the forward stages
         over all samples that can no longer be late. With ``ahead`` it is provisional: what came
         since is weighed on a copy of the state, with less to look ahead and the open window as it
-        is. The copy is thrown away. Nothing that is settled, kept or learnt hangs on it.
+        is. The copy is thrown away. Nothing that is settled, kept or learnt depends on it.
 
         Parameters
         ----------

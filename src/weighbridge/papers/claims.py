@@ -146,6 +146,22 @@ class Row:
         """Item, what of it and by whose rules."""
         return ", ".join(filter(None, (self.item, self.what, self.conditions)))
 
+    @property
+    def label(self) -> str:
+        """Item and what of it, marked where it is by our rules."""
+        ours = " (ours)" if self.conditions is Conditions.OURS else ""
+        return ", ".join(filter(None, (self.item, self.what))) + ours
+
+    @property
+    def figures(self) -> tuple[str, str]:
+        """The printed figure and ours."""
+        return self.printed, self.ours
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Each reason and the command that shows it, as often repeated in other rows."""
+        return (*self.why.split("; "), *([f"`{self.check}`"] if self.check else ()))
+
     def record(self) -> dict[str, Any]:
         """Return the row as JSON has it."""
         return {key: str(value) for key, value in asdict(self).items()}
@@ -209,27 +225,50 @@ class Section:
         return Table(f"{self.title}, row by row", COLUMNS, tuple(r.cells for r in self.rows))
 
     def markdown(self) -> str:
-        """Its note, how many rows agree, and its rows."""
-        count = {v: sum(r.verdict is v for r in self.rows) for v in Verdict}
-        said = ", ".join(f"{n} {verdict}" for verdict, n in count.items())
-        lines = [_line(COLUMNS), _line(("---",) * len(COLUMNS))]
-        lines += [_line(r.cells) for r in self.rows]
-        return f"{self.note}: {said}.\n\n" + "\n".join(lines) + "\n"
+        """Its note, how many rows agree, and its rows: one line each, the same reason once.
+
+        Equations that agree to rounding are named together; the rest of a row is in its record.
+        """
+        part = {v: [r for r in self.rows if r.verdict is v] for v in Verdict}
+        said = ", ".join(f"{len(rows)} {verdict}" for verdict, rows in part.items())
+        lines = [f"{self.note}: {said}.", ""]
+        exact = [r.label for r in part[Verdict.AGREES] if r.tolerance == EXACT]
+        if exact:
+            lines += ["Agree to rounding:", "", *(f"- {label}" for label in exact), ""]
+        agree = [r for r in part[Verdict.AGREES] if r.tolerance != EXACT]
+        lines += _table(("agrees", "printed", "ours"), [(r.label, *r.figures) for r in agree])
+        differs = part[Verdict.DIFFERS]
+        reasons = list(dict.fromkeys(part for r in differs for part in r.reasons))
+        number = {reason: str(k) for k, reason in enumerate(reasons, 1)}
+        lines += _table(
+            ("differs", "printed", "ours", "why"),
+            [(r.label, *r.figures, ",".join(number[x] for x in r.reasons)) for r in differs],
+        )
+        lines += [*(f"{number[reason]}. {reason}" for reason in reasons), *([""] * bool(reasons))]
+        drawn: dict[str, list[str]] = {}
+        for r in part[Verdict.NOT_REPRODUCIBLE]:
+            drawn.setdefault(r.why, []).append(r.label)
+        lines += _table(
+            ("not reproducible", "why"), [(", ".join(of), why) for why, of in drawn.items()]
+        )
+        return "\n".join(lines).rstrip() + "\n"
 
 
-def _line(cells: Iterable[str]) -> str:
-    """Write one row; bars within a cell would end it."""
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Write a table; none without rows. Bars within a cell would end it."""
+    if not rows:
+        return []
+    lines = (heads, ("---",) * len(heads), *rows)
+    return [*("|" + "|".join(c.replace("|", "\\|") for c in line) + "|" for line in lines), ""]
 
 
 def document(sections: Iterable[Section]) -> str:
     """Write a page of Markdown with the rows of several papers."""
     parts = [
         "# The papers, row by row\n",
-        "Written by `weighbridge reproduce all --report docs/papers.md`; the figures are of that "
-        "run.\nRows *as printed* follow the paper's own rules, on simulated drives. Rows of "
-        "*ours* are made by\nthe methods of weighbridge on the same drives. A row that differs "
-        "has its reason, and a command\nthat shows it. `--json FILE` writes the same rows.\n",
+        "`weighbridge reproduce all --report docs/papers.md` wrote this page. Rows follow the "
+        "paper's own rules,\nor (ours) the methods of weighbridge, on the same simulated drives. "
+        "`--json FILE` writes each row in full:\ntolerance, reason, and place in the code.\n",
     ]
     for section in sections:
         parts += [f"## {section.title}\n", section.markdown()]

@@ -270,7 +270,10 @@ def reproduced(
         note=seen,
         tables=(
             printed_table(done),
-            _cells(done.drives, "Table 2, our filters on the same drives, told the tyres' rolling"),
+            _cells(
+                done.drives,
+                "Table 2, our filters on the same drives, rolling of the tyres given",
+            ),
             _cells(done.road, "Table 2 with all effects, the bus calibrated on other drives"),
             blend_table(done),
             _drives_table(done),

@@ -177,7 +177,7 @@ def _better(load: str, section: str) -> TextClaim:
     )
 
 
-_SPLIT: Final = "from the first mass told, all loads; h(v) is only drawn: its limit is ours"
+_SPLIT: Final = "from the first mass, all loads; h(v) is only drawn: its limit is ours"
 _THEIRS: Final = "it starts from theirs; sec. 3.3 says the contrary of sec. 4.2"
 _BRAKED: Final = "farthest that the running mass moves in 20 s after the brakings at 115 and 147 s"
 
@@ -202,13 +202,13 @@ CLAIMS: Final = (
     TextClaim(
         code="first", tolerance=_BOUND, section="sec. 4.2",
         what="first masses of the least squares, no-load",
-        printed="more than 10 % off", judge=_first, departure="the first one told",
+        printed="more than 10 % off", judge=_first, departure="the first one",
     ),
     TextClaim(
         code="steady", tolerance=_BOUND, section="sec. 4.2",
         what="least squares within 10 % from, no-load",
         printed="21 s",
-        judge=_steady, departure="braking at 12 s; the paper tells no time of it",
+        judge=_steady, departure="braking at 12 s; the paper gives no time",
     ),
     TextClaim(
         code="sooner", tolerance=_ORDER, section="sec. 4.2",

@@ -57,7 +57,7 @@ _EQUATIONS: Final = (
     _Equation(number=8, where=_KALMAN, tolerance=_ANGLES),
     _Equation(number=9, where="`estimators/robust_rls.py`: as_set", what="sensor_ahead set",
               tolerance="1e-6: the yaw rate is a difference of headings",
-              why="off until sensor_ahead tells where the sensor sits"),
+              why="off until sensor_ahead states the place of the sensor"),
     _Equation(number=10, where="`kernels/rotation.py`"),
     _Equation(number=11, where="`kernels/rotation.py`"),
     _Equation(number=12, where=f"{_LAW}: mass_column", what="count_grade_twice",
@@ -180,7 +180,7 @@ _BLENDED: Final = (
     Item(
         item="sec. 3.3", what="innovations, on all judged drives, over the better part",
         conditions=Conditions.OURS, where="`kernels/hybrid_mass.py`", printed="at most 1",
-        ours="{innovations}", tolerance="3 %: what 9 drives of each kind tell",
+        ours="{innovations}", tolerance="3 %: what 9 drives of each kind can show",
         why="with all effects the least squares are better empty, the Kalman filter laden: the "
         "blend cannot know",
         check=f"{_COMMAND} --set blend=share",

@@ -34,7 +34,7 @@ def panels(done: Reproduction) -> tuple[Panel, ...]:
             mass_panel(
                 d.tracks,
                 f"The same drive by our filters: mass, {load}",
-                f"Running mass of the three methods, told the tyres' rolling, seed {d.seed}.",
+                f"Running mass of the three methods, rolling of the tyres given, seed {d.seed}.",
                 true_mass=d.true_mass,
             )
         )

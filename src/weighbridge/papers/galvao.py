@@ -317,7 +317,7 @@ def starts_table(done: Reproduction) -> Table:
         for start, ours, printed in done.starts
     ]
     rows += [
-        (f"calibration told {stated:.0f} kg", f"{ends:.1f}", "", f"{r_squared:.3f}")
+        (f"calibration with {stated:.0f} kg", f"{ends:.1f}", "", f"{r_squared:.3f}")
         for stated, ends, r_squared in done.stated
     ]
     return Table(

@@ -130,7 +130,7 @@ def speed_table(said: SpeedSays) -> Table:
     low, high = said.coast.interval()
     bounds = " / ".join(f"{x:.0f}" for x in said.bounds)
     return Table(
-        "What speed alone tells, which is no weighing",
+        "What speed alone shows, which is not a weighing",
         ("what", "found", "truly"),
         (
             ("mass at most, 95 %, three tests, engine's full power, grade of a map, kg", bounds,

@@ -60,7 +60,7 @@ ITEMS: Final = (
     Item(item="fig. 3", where="docs/methods/galvao.md", why="a flow chart of the estimation"),
     Item(item="fig. 4", what="mean mass of calm groups", where="`estimators/speed_ekf.py`",
          ours="{fig 4}", tolerance=EXACT,
-         why="ten groups of the last three quarters, of which the paper tells neither: "
+         why="ten groups of the last three quarters, of which the paper gives neither: "
          "`printed.groups`, `printed.tail`"),
     *(
         Item(item=f"fig. {n}", where="none", why="not in the text that was read, which has no "

@@ -166,14 +166,14 @@ def torque_figures(done: TorqueTrial) -> dict[str, Found]:
         held = np.count_nonzero(np.abs(masses - done.masses)[known] < 1.96 * std[known])
         width = 196.0 * std / done.masses
 
-        def told(part: slice, errors: Floats = errors, width: Floats = width) -> str:
-            """Errors of some drives and the half widths told of them."""
+        def shown(part: slice, errors: Floats = errors, width: Floats = width) -> str:
+            """Errors of some drives and their half widths."""
             off = " / ".join(f"{x:+.1f}" if np.isfinite(x) else "no mass" for x in errors[part])
             return f"{off} % ± {' / '.join(f'{x:.1f}' for x in width[part])} %"
 
         found[f"{name} errors"] = Found(
-            f"errors {told(slice(3))}; 200 and 400 kg loaded {told(slice(3, None))}; {held} of "
-            f"{known.sum()} within 95 % told",
+            f"errors {shown(slice(3))}; 200 and 400 kg loaded {shown(slice(3, None))}; {held} of "
+            f"{known.sum()} within 95 %",
             bool(known.all() and np.max(np.abs(errors)) <= BOUND),
         )
     return found

@@ -166,7 +166,7 @@ _TABLES: Final = (
          why="lateness is found; the wind, which is not known, is in C_r", check=_IDEAL),
     Item(item="table 6", what="w0 to w3", where="`calibration/grid.py`",
          printed=with_units(PAPER_WEIGHTS, WEIGHT_UNITS),
-         why="another engine; what ours has stands in the tables of the report"),
+         why="another engine; ours is in the tables of the report"),
     Item(item="table 6", what="R²", where="`calibration/grid.py`", printed=f"{PAPER_R_SQUARED}",
          ours="{r2 printed}", tolerance="0.005: another engine", why=_LATE, check=_IDEAL),
     Item(item="table 6", what="R² of a control drive by eq. 1 alone",

@@ -193,7 +193,7 @@ def advice(weighing: MassResult) -> str:
     result = weighing.result
     assert result is not None
     if weighing.estimator.speed_alone:
-        return "Record torque or engine load beside the speed: speed alone hardly tells the load."
+        return "Record torque or engine load beside the speed: speed alone hardly shows the load."
     low, high = weighing.interval(0.95)
     half = 0.5 * (high - low)
     if grade(weighing.mass, half) == "fine":
@@ -231,7 +231,7 @@ def _calibrate(vehicle: Vehicle) -> str:
     made = vehicle.provenance
     drives = max(len(made.drives), len(made.masses))
     if made.doubts:
-        return "Calibrate again: the notes tell what is doubtful of the calibration."
+        return "Calibrate again: the notes list what is uncertain in the calibration."
     if not drives:
         return CALIBRATE_TEXT
     if drives <= FEW_DRIVES:

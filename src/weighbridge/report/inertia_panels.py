@@ -156,7 +156,7 @@ def suspension_panel(check: SuspensionCheck | None) -> Panel:
     """Draw springs and dampers against the vehicle file."""
     title = "Springs and dampers"
     if check is None:
-        return Panel(title=title, absent="the ride is too short to tell springs and dampers apart")
+        return Panel(title=title, absent="the ride is too short to separate springs and dampers")
     figure = blank("over the vehicle file's value [-]", "", height=360)
     dots(
         figure, check.factor, list(PARTS), "found", BLUE, size=8.0, opacity=1.0,

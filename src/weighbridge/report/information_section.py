@@ -230,8 +230,8 @@ def information_section(weighing: MassResult) -> Section:
     return Section(
         key=key,
         title=title,
-        lead="The shares of the information say which driving told the mass; a kind that tells "
-        "more than its share of time is what the next drive needs more of.",
+        lead="The shares of the information show which driving determined the mass. "
+        "The next drive needs more of the kinds whose share is larger than their share of time.",
         table=Table(
             "",
             ("", "information", "time", "information over time", "minutes", "what counts as such"),

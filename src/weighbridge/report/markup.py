@@ -22,11 +22,11 @@ def left_out(reasons: Sequence[str]) -> str:
 
 
 def remarks(texts: Sequence[str]) -> str:
-    """List what was found, mended or doubted; nothing where nothing was."""
+    """List findings and corrections; nothing where there are none."""
     if not texts:
         return ""
     noted = "".join(f"<li>{prose(sentence(text))}</li>" for text in dict.fromkeys(texts))
-    return f'<h3>What was found, mended or doubted</h3><ul class="warnings">{noted}</ul>'
+    return f'<h3>Findings and corrections</h3><ul class="warnings">{noted}</ul>'
 
 
 def text_table(table: Table) -> str:

@@ -231,7 +231,7 @@ def residual_panel(weighing: MassResult, beside: Sequence[MassResult], against: 
         figure.update_layout(xaxis_range=[0, against.around], xaxis_dtick=90)
     says = against.says
     if weighing.estimator.speed_alone:
-        says = "It says how well the speed model tells the next sample; no force was measured."
+        says = "It shows how well the speed model predicts the next sample; no force was measured."
     return Panel(
         title=f"The residual should not depend on {against.name}",
         caption=f"{says} Bars are one standard deviation of the samples of a bin.",

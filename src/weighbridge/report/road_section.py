@@ -59,7 +59,7 @@ def map_panel(weighing: MassResult, tiles: Tiles | None = None) -> Panel:
     mark(figure, places, from_si(places.speed, "kmh"), "Speed [km/h]", "Cividis")
     return Panel(
         title="Where the drive went, and how fast",
-        caption="East and north of the middle of the drive, to one scale; the bar tells lengths."
+        caption="East and north of the middle of the drive, to one scale; the bar shows lengths."
         + (f" {tiles.credit}" if tiles is not None else ""),
         figure=figure,
     )

@@ -296,8 +296,8 @@ def wind_map(weighing: MassResult, wind: Wind, blind: bool, tiles: Tiles | None)
     if not rows.size:
         return Panel(
             title=title,
-            absent="no wind on the map: the drive is too slow, or goes too much one way, to "
-            "tell it.",
+            absent="no wind on the map: the drive is too slow, or has too few directions, to "
+            "show it.",
         )
     places = track.at(wind.time[rows])
     rows = rows[_evenly(places.east, places.north)]
@@ -324,7 +324,7 @@ def wind_map(weighing: MassResult, wind: Wind, blind: bool, tiles: Tiles | None)
     return Panel(
         title=f"How the wind blew: up to {float(np.max(strength)):.1f} m/s",
         caption="Arrows point where the wind goes and end at the place; the longest is the "
-        "strongest. They stand where the drive told both components."
+        "strongest. They are drawn where the drive shows both components."
         + (f" {tiles.credit}" if tiles is not None else ""),
         figure=figure,
     )

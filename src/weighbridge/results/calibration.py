@@ -142,7 +142,7 @@ def _figures(vehicle: Vehicle, held: tuple[str, ...]) -> Iterator[Figure]:
     ):  # fmt: skip
         if value is not None:
             found = _figure(name, value, std, digits)
-            yield Figure(name, found.value, "held by a bound") if key in held else found
+            yield Figure(name, found.value, "at its limit") if key in held else found
     for k, (w, std) in enumerate(zip(torque.coefficients, torque.coefficient_stds, strict=True)):
         yield Figure(f"torque w{k}", f"{w:.5g}", f"{std:.2g}")
     names = ("torque of load times engine speed", "torque of load squared")

@@ -28,7 +28,7 @@ class WeighingRow:
     payload : mass minus the vehicle's tare [kg]; NaN where either is unknown
     duration, used_time, converged_at : of the drive, of the rows used, until the mass stays [s]
     bound_std : Cramer-Rao bound of the drive [kg]
-    load_changed : whether segments are loads told apart, not just legs of a drive
+    load_changed : whether the load changed between segments; else they are legs of a drive
     """
 
     drive: str

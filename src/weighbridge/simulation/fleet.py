@@ -180,7 +180,7 @@ def simulate_day(day: PlannedDay) -> list[SimulatedDrive]:
     Returns
     -------
     list of SimulatedDrive
-        Faults are not in them yet, see `with_fault`; the mass is not told by the drive.
+        Faults are not in them yet, see `with_fault`; the drive does not state its mass.
     """
     place, made = day.vehicle.depot, []
     for number, start in enumerate(day.starts):

@@ -157,7 +157,7 @@ def simulate_car(
     Parameters
     ----------
     scenario : Scenario
-    progress : told of parts done of all
+    progress : called with parts done and all
 
     Returns
     -------

@@ -295,7 +295,7 @@ def with_random_details(rng: np.random.Generator, car: SimulatedCar) -> Simulate
     - Overrun: a closed throttle passes about the air of idling, burnt until the fuel is cut after
       1 to 6 s, and always below 1.2 to 1.6 times the idle speed; control units wait, so that the
       torque does not jump and the catalyst stays warm. A cycle needs 10 to 18 % of the full
-      charge to burn at all: the spark is late instead, and the load reading tells the air. A
+      charge to burn at all: the spark is late instead, and the load reading shows the air. A
       diesel has no throttle and is cut within half a second, but for what heats its exhaust.
       See Reif (ed.), Gasoline Engine Management, 2015, on overrun fuel cut-off. Times and charge
       are such that the load stands above its floor about as often as in the recorded car of

@@ -46,7 +46,7 @@ class VehicleClass:
     name : in vehicle files and options
     mass_range : from the lightest empty one to an overloaded one with a trailer [kg]: outside,
         data or vehicle file are wrong
-    typical_mass : of one whose tare is unknown, to tell braking [kg]
+    typical_mass : of one whose tare is unknown, to detect braking [kg]
     emptied : what may be missing of an empty vehicle [kg]: driver and fuel
     loaded : largest mass over the tare where the permitted one is not known, without a trailer [-]
     heaviest : above this multiple of the empty mass neither load nor a trailer explains it [-]
@@ -57,7 +57,7 @@ class VehicleClass:
     engine_inertia, wheel_inertia : of all that turns with the engine, of all wheels [kg m^2]
     drag_area_range, rolling_coefficient_range, engine_inertia_range, wheel_inertia_range : bounds
         of the same in a fit
-    efficiency : slope of wheel over engine torque, where the layout is not told [-]
+    efficiency : slope of wheel over engine torque, where the layout is unknown [-]
     layouts : whether the engine may lie across or lengthwise, with an efficiency of each
     tyre : usual size
     squat_growth : power of the mass with which the squat grows [-]: of springs that stay as

@@ -147,7 +147,7 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
             Key(
                 "reading_step",
                 "reading_step",
-                "steps in which the drives of the calibration told it, in SI",
+                "steps of the reading in the drives of the calibration, in SI",
             ),
             Key("engine_efficiency", "engine_efficiency", "shaft over fuel power, for air_flow"),
             Key("noise", "noise", "standard deviation of the torque", suffix="nm"),
@@ -331,11 +331,11 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "dbc", "dbc", "DBC files they were read with, seen from this file's folder", "texts"
             ),
             Key("notes", "notes", "free text", "text"),
-            Key("doubts", "doubts", "of its masses, told at each weighing", "texts"),
+            Key("doubts", "doubts", "on its masses, shown at each weighing", "texts"),
             Key(
                 "fit_cov",
                 "fit_cov",
-                "what the fit leaves open beside that part, lower triangle in SI: coefficients, "
+                "covariance of the fit beside that part, lower triangle in SI: coefficients, "
                 "curvature, knot slopes, drag area, rolling coefficient, engine and wheel inertia",
                 "triangle",
             ),

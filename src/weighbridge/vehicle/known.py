@@ -142,7 +142,7 @@ def _refuse(known: Known) -> None:
         faults.said += _wrong_masses(known)
     faults.said += _wrong_gears(known)
     if known.radius is not None and known.tyre is not None:
-        faults.said.append("a tyre tells its rolling radius; give the tyre or the radius")
+        faults.said.append("a tyre has its rolling radius; give the tyre or the radius")
     with faults.gathered():
         within("radius", known.radius, *RADII, "m")
     if known.tyre is not None:

@@ -57,7 +57,7 @@ class Vehicle:
     mapping : path of a mapping TOML for its logs
     dragged : what the torque source reads without a foot on the accelerator; None where it was
         not calibrated, or its drives did not show it
-    witnesses : how that source goes with other signals of the engine, those alone that tell
+    witnesses : how that source varies with a second signal of the engine
     speed_model : for ``--method speed-ekf``; None where it was not calibrated
     """
 
@@ -97,7 +97,7 @@ class Vehicle:
             within(name, getattr(self, name), *MASSES, "kg")
         signals = [witness.signal for witness in self.witnesses]
         if len(set(signals)) < len(signals):
-            raise ConfigError(f"a witness must stand once, got {', '.join(signals)}")
+            raise ConfigError(f"each second signal may be named once, got {', '.join(signals)}")
         if self.mapping is not None and visible(self.mapping) != self.mapping:
             raise ConfigError(
                 f"mapping must be a path without control characters, got {self.mapping!r}"

@@ -100,7 +100,7 @@ def _masses(vehicle: Vehicle) -> str:
     parts.append(
         f"tare {vehicle.tare:.0f} kg"
         if vehicle.tare is not None
-        else "tare unknown, so payloads are not told"
+        else "tare unknown, so no payload is shown"
     )
     if vehicle.gross is not None:
         parts.append(f"permitted mass {vehicle.gross:.0f} kg")

@@ -251,7 +251,7 @@ class WitnessRelation:
                 f"got {len(self.coefficients)}"
             )
         for value in (*self.coefficients, *self.value_range, *self.speed_range):
-            within("a number of a witness", value, -1e9, 1e9)
+            within("a number of a second signal of the engine", value, -1e9, 1e9)
         within("the upper end of speed_range", self.speed_range[1], 1.0, 1e5, "rad/s")
         for name in ("scatter", "span", "scale_std"):
             positive(name, getattr(self, name))

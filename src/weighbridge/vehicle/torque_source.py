@@ -77,11 +77,11 @@ class TorqueSource:
     before_motor : the reading holds what the motor's own inertia takes, where ``gearing`` is given
     efficiency : slope of wheel force over reading where nothing was calibrated, and its standard
         deviation [-]; None for that of the driveline
-    by_radius : the force hangs on the rolling radius
+    by_radius : the force depends on the rolling radius
     refusal : says why a drive has no mass by it, of a vehicle whose driven axles are
         "front", "rear", "all" or unknown; empty where it has one
     reading : what torque is proportional to [N m], or a share where ``needs_map``
-    signed : the reading is a torque as the vehicle computed it, which tells what a dragged engine
+    signed : the reading is a torque as the vehicle computed it, which shows what a dragged engine
         takes, and can be weighed by without a calibration; else it is only roughly torque, bends
         with engine speed and load, and says nothing in overrun
     needs_map : the reading is no torque, and means nothing without the coefficients of a
@@ -97,7 +97,7 @@ class TorqueSource:
         an electric motor with one gear where it is another [-]
     transfer_std : what a calibration by eq. 48 loses on other drives, relative to the mass [-]
     between_std, motor_between_std : how far masses of one vehicle scatter from drive to drive by
-        what the reading does not tell, and those of an electric motor with one gear where it is
+        what the reading does not show, and those of an electric motor with one gear where it is
         another, relative [-]; a fit by likelihood adds it to what all sources leave
     cold_std : of a mass made from a cold start alone, relative [-]
     cold_torque_std : of the friction torque of the cold in the reading, over the highest torque [-]

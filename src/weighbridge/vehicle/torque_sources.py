@@ -147,7 +147,7 @@ _MEASURED: Final = REPORTED(
     signals=("engine_torque",),
     reading=_torque,
     title="torque in N m",
-    words="torque in N m, as the control unit tells it",
+    words="torque in N m, as the control unit reports it",
     axis="Recorded torque [N m]",
     # Told from the currents of a motor; its limit is 5 %.
     motor_scale_std=0.03,

@@ -1,5 +1,5 @@
 "use strict";
-// Shows what the server tells; asks for nothing else and sends nothing.
+// Shows what the server sends; asks for nothing else and sends nothing.
 
 const WINDOW = 1800; // [s]
 const MOST = 1800; // points
@@ -209,10 +209,10 @@ let heard = 0;
 let waiting = null;
 
 function take(event) {
-  const told = JSON.parse(event.data);
+  const news = JSON.parse(event.data);
   heard = Date.now();
-  waiting = told;
-  keep(told.points);
+  waiting = news;
+  keep(news.points);
   // A page in the background draws when it is looked at again.
   requestAnimationFrame(() => {
     if (waiting === null) return;
