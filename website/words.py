@@ -38,7 +38,7 @@ def pages() -> Iterator[tuple[str, str]]:
     """Yield place and text of what people read: docs, README, messages, and pages of results."""
     shown = (p for p in SOURCE.rglob("*") if p.suffix in (".toml", ".html", ".js", ".css"))
     written = (HOME / "docs").rglob("*.md")
-    for path in sorted([HOME / "README.md", *written, *shown]):
+    for path in sorted([HOME / "README.md", HOME / "CHANGELOG.md", *written, *shown]):
         text = path.read_text(encoding="utf-8")
         if path.suffix == ".toml":
             text = _VALUE.sub("", text)

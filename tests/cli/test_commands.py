@@ -32,6 +32,17 @@ def test_help_has_an_example(weighbridge, command):
     assert f"Example: weighbridge {command}" in " ".join(ran.out.split())
 
 
+def test_a_short_option_prints_the_same_help(weighbridge):
+    assert weighbridge("weigh", "-h").out == weighbridge("weigh", "--help").out
+
+
+@pytest.mark.parametrize("group", ["vehicle", "fleet"])
+def test_a_group_alone_prints_no_empty_error(weighbridge, group):
+    ran = weighbridge(group)
+    assert ran.code == 2
+    assert "weighbridge: ;" not in ran.err
+
+
 def test_version(weighbridge):
     assert weighbridge("--version").out == f"weighbridge {__version__}\n"
 
@@ -248,6 +259,7 @@ def test_weigh_never_replaces_what_it_reads(weighbridge, car, loaded, option):
     ("words", "said"),
     [
         (["--method", "guess"], "unknown method 'guess'"),
+        (["--method", "jiont"], "did you mean joint?"),
         (["--track", "track.xlsx"], ".csv or .parquet"),
         (["--mapping", "nowhere.toml"], "nowhere.toml"),
     ],
@@ -336,6 +348,7 @@ def test_simulate_writes_a_folder_once(weighbridge, tmp_path):
     ("words", "said"),
     [
         (["moon"], "unknown scenario 'moon'"),
+        (["hihgway"], "did you mean highway?"),
         (["car-short", "--without", "friction"], "unknown effect 'friction'"),
         (["car-short", "--format", "xlsx"], "csv or parquet"),
     ],

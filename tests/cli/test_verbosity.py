@@ -156,7 +156,14 @@ def test_times_are_told_for_people():
 
 @pytest.mark.parametrize(
     ("typed", "offered"),
-    [("weighbridge we", "weigh"), ("weighbridge weigh --ve", "--vehicle")],
+    [
+        ("weighbridge we", "weigh"),
+        ("weighbridge weigh --ve", "--vehicle"),
+        ("weighbridge weigh x --method sp", "speed-torque-ekf"),
+        ("weighbridge calibrate x --torque wh", "wheel_torque"),
+        ("weighbridge vehicle new --class tr", "truck"),
+        ("weighbridge simulate hi", "highway"),
+    ],
 )
 def test_the_shell_completes(typed, offered):
     environment = {

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Optional
 
 import typer
 
+from weighbridge.cli.listed import method_names, source_names
 from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
@@ -82,7 +83,9 @@ _Tare = Annotated[
 _Method = Annotated[
     str,
     typer.Option(
-        "--method", help="Estimator to calibrate for: joint, rls, speed-torque-ekf or speed-ekf."
+        "--method",
+        help="Estimator to calibrate for: joint, rls, speed-torque-ekf or speed-ekf.",
+        autocompletion=method_names,
     ),
 ]
 _Order = Annotated[
@@ -91,7 +94,7 @@ _Order = Annotated[
 ]
 _Torque = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option("--torque", help="Torque source of the drives."),
+    typer.Option("--torque", help="Torque source of the drives.", autocompletion=source_names),
 ]
 _Grid = Annotated[
     bool,

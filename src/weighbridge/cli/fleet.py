@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from weighbridge.cli import fleet_report
+from weighbridge.cli.listed import class_names, method_names
 from weighbridge.cli.options import DbcPaths, MappingPath, Whole
 from weighbridge.cli.progress import time_text
 from weighbridge.cli.terminal import complain, console, say, shown
@@ -98,6 +99,7 @@ _Kind = Annotated[
         "--class",
         help="Class of vehicles that have no file, such as car, van, bus, truck; car by default. "
         "Needed where none has one.",
+        autocompletion=class_names,
     ),
 ]
 _Learn = Annotated[
@@ -127,7 +129,9 @@ def run(
     workers: _Workers = None,
     memory: _Memory = None,
     kind: _Kind = None,
-    method: Annotated[str, typer.Option("--method", help="Estimator.")] = "joint",
+    method: Annotated[
+        str, typer.Option("--method", help="Estimator.", autocompletion=method_names)
+    ] = "joint",
     changes: _Changes = None,
     learn: _Learn = None,
     tickets: _Tickets = None,

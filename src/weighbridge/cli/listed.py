@@ -1,7 +1,8 @@
-"""Help of ``--torque``: the torque sources there are, those of other packages included."""
+"""Names that options take, of other packages too: in the help, and to complete in the shell."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from typer.core import TyperCommand, TyperOption
@@ -40,3 +41,35 @@ def sources() -> str:
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
     return ", ".join(f"{source.name} ({source.title})" for source in TORQUE_SOURCES.values())
+
+
+def method_names(incomplete: str) -> list[str]:
+    """Estimators that begin so, for the completion of the shell."""
+    from weighbridge.estimators import ESTIMATORS
+
+    return _beginning(ESTIMATORS, incomplete)
+
+
+def source_names(incomplete: str) -> list[str]:
+    """Torque sources that begin so."""
+    from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
+
+    return _beginning(TORQUE_SOURCES, incomplete)
+
+
+def class_names(incomplete: str) -> list[str]:
+    """Vehicle classes that begin so."""
+    from weighbridge.vehicle.classes import VEHICLE_CLASSES
+
+    return _beginning(VEHICLE_CLASSES, incomplete)
+
+
+def scenario_names(incomplete: str) -> list[str]:
+    """Scenarios of the simulator that begin so."""
+    from weighbridge.simulation.named import SCENARIOS
+
+    return _beginning((*SCENARIOS, "ride"), incomplete)
+
+
+def _beginning(names: Iterable[str], incomplete: str) -> list[str]:
+    return [name for name in names if name.startswith(incomplete)]

@@ -49,6 +49,7 @@ app = typer.Typer(
     cls=EveryCommand,
     help="Weigh a road vehicle while it drives, from data it already has.",
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     epilog="Start with: weighbridge demo",
 )
@@ -96,7 +97,7 @@ def run() -> None:
     """Run the command line; a mistake of the caller is one line and exit status 2."""
     words = sys.argv[1:]
     # A help page is ours alone: its colours may pass.
-    styled = not words or "--help" in words
+    styled = not words or not {"-h", "--help"}.isdisjoint(words)
     with guarded(styled), asked_anew(), _interruptible() as interrupted:
         try:
             code = _started(words)
@@ -126,7 +127,7 @@ def _started(words: list[str]) -> int | str | None:
 
 
 def _failed(error: Exception) -> int:
-    """Tell an error that the caller can mend in one line; raise any other again."""
+    """Print an error of the caller in one line; raise any other again."""
     if isinstance(error, WeighbridgeError):
         complain(f"weighbridge: {error}")
     elif _is_broken_pipe(error):
@@ -141,8 +142,10 @@ def _failed(error: Exception) -> int:
     elif isinstance(error, MemoryError):
         complain("weighbridge: the memory is full; close other programs, or give shorter drives")
     elif hasattr(error, "format_message"):
-        # Usage errors of typer, whose home differs between its versions.
-        complain(f"weighbridge: {error.format_message()}; weighbridge COMMAND --help shows how")
+        # Usage errors of typer, whose home differs between its versions. A group of commands
+        # alone has none: its help is printed.
+        if text := error.format_message():
+            complain(f"weighbridge: {text}; weighbridge COMMAND --help shows how")
     else:
         sys.excepthook = _show_bug
         raise error

@@ -8,6 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from weighbridge.cli.fleet import RunsDrives, Unnamed
+from weighbridge.cli.listed import scenario_names
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import inputs, refuse_folder, refuse_overwriting
 from weighbridge.cli.terminal import say
@@ -24,6 +25,7 @@ def simulate(
             "compact-calibration, electric, bus, bus-urban, bus-calibration, diesel, "
             "diesel-calibration, van, van-calibration, truck, truck-calibration or ride; fleet has "
             "options of its own: weighbridge simulate fleet --help.",
+            autocompletion=scenario_names,
             show_default=False,
         ),
     ],

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.listed import TellsSources
+from weighbridge.cli.listed import TellsSources, class_names, source_names
 from weighbridge.cli.options import MappingPath
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say, shown
@@ -60,6 +60,7 @@ _Torque = Annotated[
     typer.Option(
         "--torque",
         help="Torque source of the drives.",
+        autocompletion=source_names,
         show_default=False,
     ),
 ]
@@ -79,7 +80,12 @@ def new(
         Path, typer.Option("-o", "--output", help="Vehicle file to write.", show_default=False)
     ],
     kind: Annotated[
-        str, typer.Option("--class", help="car, van, bus, truck, motorcycle, quad or racer.")
+        str,
+        typer.Option(
+            "--class",
+            help="car, van, bus, truck, motorcycle, quad or racer.",
+            autocompletion=class_names,
+        ),
     ] = "car",
     name: Annotated[str, typer.Option("--name", help="Name shown in results.")] = "vehicle",
     engine: Annotated[

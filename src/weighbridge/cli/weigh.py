@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
+from weighbridge.cli.listed import method_names
 from weighbridge.cli.options import (
     DbcPaths,
     DrivePaths,
@@ -54,7 +55,7 @@ _VehiclePath = Annotated[
         "--vehicle", help="Vehicle file, written by calibrate or vehicle new.", show_default=False
     ),
 ]
-_Method = Annotated[str, typer.Option("--method", help="Estimator.")]
+_Method = Annotated[str, typer.Option("--method", help="Estimator.", autocompletion=method_names)]
 _Changes = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(

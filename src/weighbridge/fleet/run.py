@@ -22,6 +22,7 @@ from weighbridge.fleet.remote import is_url, was_url
 from weighbridge.fleet.store import KEYS, Results
 from weighbridge.fleet.tickets import read_tickets
 from weighbridge.fleet.vehicles import Vehicles
+from weighbridge.signals.tomlfile import suggestion
 
 if TYPE_CHECKING:
     import polars as pl
@@ -64,7 +65,9 @@ class FleetSettings:
         from weighbridge.estimators import ESTIMATORS
 
         if self.method not in ESTIMATORS:
-            raise ConfigError(f"unknown method {self.method!r}; known are {ESTIMATORS.names}")
+            raise ConfigError(
+                f"unknown method {self.method!r}{suggestion(self.method, ESTIMATORS)}"
+            )
         if (self.learn is None) != (self.tickets is None):
             raise ConfigError(
                 "learning needs a folder for the refined vehicle files and a table of tickets: "

@@ -21,6 +21,7 @@ from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.signals import Bools, Floats
+from weighbridge.signals.tomlfile import suggestion
 from weighbridge.vehicle.model import Ride
 
 Method = Literal["kalman-bucy", "inverse", "extended", "printed"]
@@ -339,7 +340,7 @@ def estimate(
         The method is not known.
     """
     if method not in METHODS:
-        raise ConfigError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
+        raise ConfigError(f"unknown method {method!r}{suggestion(method, METHODS)}")
     chosen = settings or InertiaSettings()
     if method != "kalman-bucy":
         return _run_fixed(samples, ride, method, chosen)

@@ -236,13 +236,17 @@ class Section:
         if exact:
             lines += ["Agree to rounding:", "", *(f"- {label}" for label in exact), ""]
         agree = [r for r in part[Verdict.AGREES] if r.tolerance != EXACT]
-        lines += _table(("agrees", "printed", "ours"), [(r.label, *r.figures) for r in agree])
+        lines += _table(
+            ("agrees", "printed", "ours"), _shared([(r.label, *r.figures) for r in agree])
+        )
         differs = part[Verdict.DIFFERS]
         reasons = list(dict.fromkeys(part for r in differs for part in r.reasons))
         number = {reason: str(k) for k, reason in enumerate(reasons, 1)}
         lines += _table(
             ("differs", "printed", "ours", "why"),
-            [(r.label, *r.figures, ",".join(number[x] for x in r.reasons)) for r in differs],
+            _shared(
+                [(r.label, *r.figures, ",".join(number[x] for x in r.reasons)) for r in differs]
+            ),
         )
         lines += [*(f"{number[reason]}. {reason}" for reason in reasons), *([""] * bool(reasons))]
         drawn: dict[str, list[str]] = {}
@@ -252,6 +256,24 @@ class Section:
             ("not reproducible", "why"), [(", ".join(of), why) for why, of in drawn.items()]
         )
         return "\n".join(lines).rstrip() + "\n"
+
+
+def _shared(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Write ″ for what a row shares with the one above: the first parts of a label, a cell."""
+    short, above = [], ("",) * len(rows[0]) if rows else ()
+    for row in rows:
+        parts, before = row[0].split(", "), above[0].split(", ")
+        same = next(
+            (k for k, p in enumerate(parts[:-1]) if before[k : k + 1] != [p]), len(parts) - 1
+        )
+        label = f"″, {', '.join(parts[same:])}" if same else row[0]
+        cells = (
+            "″" if cell and cell == there else cell
+            for cell, there in zip(row[1:], above[1:], strict=True)
+        )
+        short.append((label, *cells))
+        above = row
+    return short
 
 
 def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
@@ -268,7 +290,8 @@ def document(sections: Iterable[Section]) -> str:
         "# The papers, row by row\n",
         "`weighbridge reproduce all --report docs/papers.md` wrote this page. Rows follow the "
         "paper's own rules,\nor (ours) the methods of weighbridge, on the same simulated drives. "
-        "`--json FILE` writes each row in full:\ntolerance, reason, and place in the code.\n",
+        "A ″ repeats the row above. `--json FILE` writes each row in full:\n"
+        "tolerance, reason, and place in the code.\n",
     ]
     for section in sections:
         parts += [f"## {section.title}\n", section.markdown()]

@@ -59,6 +59,7 @@ from weighbridge.pipeline.given import (
 )
 from weighbridge.results.inertia import TOO_WIDE, InertiaResult, LoadSegment
 from weighbridge.signals import Drive, Floats
+from weighbridge.signals.tomlfile import suggestion
 from weighbridge.vehicle.model import Ride, Vehicle
 
 DEFAULT_METHOD: Final[Method] = "kalman-bucy"
@@ -133,7 +134,7 @@ def estimate_inertia(
     own = changed(InertiaSettings(), settings) if isinstance(settings, Mapping) else settings
     chosen: Method | None = next((m for m in METHODS if m == method), None)
     if chosen is None:
-        raise ConfigError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
+        raise ConfigError(f"unknown method {method!r}{suggestion(method, METHODS)}")
     home, vehicle = home_of(vehicle), as_vehicle(vehicle)
     return _estimate(as_drive(drive, mapping_of(vehicle, home)), vehicle, chosen, own)
 

@@ -62,6 +62,7 @@ from weighbridge.pipeline.notes import (
 )
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
+from weighbridge.signals.tomlfile import suggestion
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
@@ -159,7 +160,7 @@ def weigh(
     if settings is not None:
         check_type("settings", settings, Mapping, "a dictionary of values by name")
     if method not in ESTIMATORS:
-        raise ConfigError(f"unknown method {method!r}; known are {', '.join(ESTIMATORS)}")
+        raise ConfigError(f"unknown method {method!r}{suggestion(method, ESTIMATORS)}")
     chosen = ESTIMATORS[method].settings_of(settings) if settings else None
 
     from weighbridge.checks import mend_drive, refuse_serious

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from weighbridge.errors import ConfigError
+from weighbridge.signals.tomlfile import suggestion
 from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar
 from weighbridge.simulation.route import (
     bus_route,
@@ -291,7 +292,7 @@ def make_scenario(
     """
     maker = SCENARIOS.get(name)
     if maker is None:
-        raise ConfigError(f"unknown scenario {name!r}; known are {', '.join(SCENARIOS)}")
+        raise ConfigError(f"unknown scenario {name!r}{suggestion(name, SCENARIOS)}")
     if payload is not None and mass is not None:
         raise ConfigError("give a payload or a mass, not both")
     made = maker(payload or 0.0, seed)
