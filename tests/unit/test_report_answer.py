@@ -64,12 +64,15 @@ def test_payload_and_permitted_mass_have_the_same_interval(tmp_path):
 def test_an_overload_is_said_as_sure_as_it_is(gross, verdict):
     html = answer_block(
         Answer(
-            mass=1500.0, interval=(1450.0, 1550.0), tare=None, gross=gross,
+            mass=1500.0, interval=(1450.0, 1550.0), most=1542.0, tare=None, gross=gross,
             payload=(math.nan, math.nan), file="", advice="",
         )
     )  # fmt: skip
     assert re.search(rf"of {gross:.0f} kg, {verdict}( it)?:", html)
     assert ('class="bar over"' in html) == (gross < 1500.0)
+    assert ('class="alert bad"' in html) == (gross < 1500.0)
+    assert ("Overload: " in html) == (gross < 1450.0)
+    assert ("room left: 58 kg, 95 % sure" in html) == (gross == 1600.0)
 
 
 def test_what_is_not_in_the_vehicle_file_is_asked_for(tmp_path):
@@ -81,7 +84,7 @@ def test_what_is_not_in_the_vehicle_file_is_asked_for(tmp_path):
 def test_an_interval_without_an_upper_bound_is_rough():
     html = answer_block(
         Answer(
-            mass=1500.0, interval=(1200.0, math.inf), tare=1400.0, gross=2000.0,
+            mass=1500.0, interval=(1200.0, math.inf), most=math.inf, tare=1400.0, gross=2000.0,
             payload=(-200.0, math.inf), file="", advice="",
         )
     )  # fmt: skip

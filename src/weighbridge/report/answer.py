@@ -74,6 +74,7 @@ class Answer:
     ----------
     mass : [kg]
     interval : of the mass [kg]
+    most : mass that is not exceeded, with a probability of 95 % [kg]
     tare, gross : empty and permitted mass of the vehicle file [kg]; None where unknown
     payload : interval of the payload [kg]; NaN where there is no tare
     file : what the vehicle file is worth, a sentence
@@ -83,6 +84,7 @@ class Answer:
 
     mass: float
     interval: tuple[float, float]
+    most: float
     tare: float | None
     gross: float | None
     payload: tuple[float, float]
@@ -117,8 +119,11 @@ def answer_block(answer: Answer) -> str:
     told = f"{named}: ± {_percent(answer.half / answer.mass)}" if sure else "rough: no upper bound"
     holds = f"95 % interval {low:.0f} to {high:.0f} kg" if sure else "no interval"
     judged = "".join(f'<p class="why">{prose(text)}</p>' for text in answer.judged)
+    alert = _alert(answer)
+    over = " over" if alert else ""
     return (
-        f'<div class="verdict {named}"><p class="answer {named}">{answer.mass:.0f}{half} kg '
+        f'<div class="verdict {named}{over}">{alert}'
+        f'<p class="answer {named}">{answer.mass:.0f}{half} kg '
         f'<span class="grade">{told}</span></p><p class="holds">{holds}</p>{judged}'
         f'<dl class="key">{_payload(answer)}{_share(answer)}'
         f"{_item('vehicle file', answer.file)}{_item('for a better answer', answer.advice)}"
@@ -150,6 +155,7 @@ def weighing_answer(weighing: MassResult, judged: tuple[str, ...]) -> str:
         Answer(
             mass=weighing.mass,
             interval=(low, high),
+            most=weighing.interval(0.9)[1],
             tare=tare,
             gross=weighing.vehicle.gross,
             payload=(low - empty, high - empty),
@@ -248,6 +254,21 @@ def _payload(answer: Answer) -> str:
     return _item("payload", f"over a tare of {kg(answer.tare)}", f"{value}{half} kg")
 
 
+def _alert(answer: Answer) -> str:
+    """Say at the top that the vehicle is overloaded; nothing where it is not."""
+    if not answer.gross or answer.mass <= answer.gross:
+        return ""
+    sure = "Overload" if answer.interval[0] > answer.gross else "Overload is likely"
+    over = answer.mass - answer.gross
+    return f'<p class="alert bad">{sure}: {kg(over)} above the permitted {kg(answer.gross)}.</p>'
+
+
+def _room(answer: Answer) -> str:
+    """Payload that may be added [kg], in words; nothing where there is no room for sure."""
+    room = (answer.gross or 0.0) - answer.most
+    return f"; room left: {kg(room)}, 95 % sure" if room > 0.0 else ""
+
+
 def _share(answer: Answer) -> str:
     """Part of the permitted mass, as text and as a bar."""
     if not answer.gross:
@@ -272,7 +293,7 @@ def _share(answer: Answer) -> str:
     reach = f"{100.0 * low:.0f} to {100.0 * high:.0f} %"
     if not math.isfinite(high):
         reach = f"{100.0 * low:.0f} % or more"
-    text = f"of {kg(answer.gross)}, {verdict}: {reach}"
+    text = f"of {kg(answer.gross)}, {verdict}: {reach}{_room(answer)}"
     return _item("of the permitted mass", text, f"{100.0 * share:.0f} %", bar)
 
 

@@ -207,6 +207,7 @@ def _answer(result: InertiaResult) -> str:
         Answer(
             mass=result.mass,
             interval=result.mass_interval(),
+            most=result.mass_interval(0.9)[1],
             tare=result.vehicle.tare,
             gross=result.vehicle.gross,
             payload=result.payload_interval(),

@@ -218,11 +218,18 @@ def _facts(weighing: MassResult) -> str:
     ]
     if result is not None and _found(weighing):
         after = result.converged_at - weighing.drive.start
-        facts.append(("within 5 % for good after", duration(after)))
-        if math.isfinite(result.bound_std):
-            bound = f"± {REACH * result.bound_std:.0f} kg"
-            facts.append(("Cramér-Rao bound of this drive", bound))
-    return facts_list(facts)
+        facts.append(("settled within ± 5 % after", duration(after)))
+    return facts_list(facts) + _details(weighing)
+
+
+def _details(weighing: MassResult) -> str:
+    """What only a specialist asks for, folded."""
+    result = weighing.result
+    if result is None or not _found(weighing) or not math.isfinite(result.bound_std):
+        return ""
+    bound = f"± {REACH * result.bound_std:.0f} kg"
+    facts = facts_list([("Cramér-Rao bound: half the 95 % interval by noise alone", bound)])
+    return f"<details><summary>Details</summary>{facts}</details>"
 
 
 def _segments(weighing: MassResult) -> str:
