@@ -53,7 +53,7 @@ def demo(
     comparisons: list[tuple[Weighing, ...]] = []
     # Shares of the work: a calibration takes twice as long as what is done with each drive.
     with progress("demo", 5 + 3 * len(LOADS)) as bar:
-        bar.begin("simulating a drive of known mass", 2)
+        bar.begin("simulating a drive of known mass (the first run compiles)", 2)
         shorter = replace(make_scenario("car-calibration", seed=seed), duration=DURATION)
         known = simulate_car(shorter, bar.within)
         bar.begin("calibrating by it", 2)
