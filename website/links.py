@@ -36,7 +36,8 @@ def outside_pages() -> dict[str, Path]:
             found[f"studies/{study.name}"] = study
     for figure in sorted((HOME / "studies" / "figures").glob("*.png")):
         found[f"studies/figures/{figure.name}"] = figure
-    for example in sorted((HOME / "examples").rglob("*.toml")):
+    examples = (p for p in (HOME / "examples").rglob("*") if p.suffix in (".toml", ".ino"))
+    for example in sorted(examples):
         found[example.relative_to(HOME).as_posix()] = example
     return found
 
