@@ -19,7 +19,7 @@ def type_name(given: object) -> str:
 
 
 def is_frame(given: object) -> bool:
-    """Tell whether something is a data frame of pandas or polars."""
+    """Say whether something is a data frame of pandas or polars."""
     home = type(given).__module__.partition(".")[0]
     return home in ("pandas", "polars") and type(given).__name__ == "DataFrame"
 

@@ -1,4 +1,4 @@
-"""Exceptions for what a caller can mend.
+"""Exceptions for what a caller can correct.
 
 Every message is one sentence or two that name the file or argument, the
 offending value and the remedy. Poor data is not an exception but a result

@@ -9,7 +9,7 @@ LONGEST: Final = 1900
 """Characters of a message that are shown: a screen of 24 lines of 80."""
 
 # C0, delete and C1; line and paragraph separators; marks that turn the direction of
-# writing (Unicode 16.0, UAX 9); invisible tags; halves of surrogate pairs, which stand for
+# writing (Unicode 16.0, UAX 9); invisible tags; halves of surrogate pairs, which mean
 # the bytes of names that are no UTF-8.
 _ACTING: Final = (
     "\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"

@@ -38,7 +38,7 @@ _MOST_LINKS: Final = 40
 
 
 def is_stream(path: str | Path) -> bool:
-    """Tell whether a path is a device, a pipe or an open file: written to, never replaced."""
+    """Say whether a path is a device, a pipe or an open file: written to, never replaced."""
     if _open_file(Path(path)) is not None:
         return True
     try:

@@ -28,7 +28,7 @@ SURE: Final = 3.0
 """Standard deviations by which it is below `SMOOTHED` [-]."""
 
 FEWEST_ROWS: Final = 200
-"""Fewer changes tell nothing."""
+"""Fewer changes show nothing."""
 
 FOLLOWS: Final = 0.5
 """Least correlation of force and acceleration over `SLOW` [-]: beneath, they say nothing."""
@@ -40,10 +40,10 @@ THERE: Final = 0.6
 """Part of the time before and after that rows have to cover [-]."""
 
 BLOCK: Final = 60.0
-"""Blocks left out in turn tell how the ratio scatters [s]."""
+"""Blocks left out in turn show how the ratio scatters [s]."""
 
 FEWEST_BLOCKS: Final = 5
-"""Fewer blocks tell no standard deviation."""
+"""Fewer blocks show no standard deviation."""
 
 LONGEST_PERIOD: Final = 0.6
 """Torque that comes less often does not show `FAST` [s]."""
@@ -119,7 +119,7 @@ def _slopes(
 
     Returns
     -------
-    common, square : (k,); None where they tell nothing
+    common, square : (k,); None where they show nothing
     """
     before, after = np.searchsorted(time, time - span), np.searchsorted(time, time + span)
     here = np.arange(time.size)

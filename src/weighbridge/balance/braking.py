@@ -29,7 +29,7 @@ HARD_BRAKING: Final = 0.15
 """Braking force over weight that no retarder makes: a brake switch is on there [-]."""
 
 SWITCH_ROWS: Final = 20
-"""Rows of hard braking that tell whether a brake switch can be believed."""
+"""Rows of hard braking that show whether a brake switch can be believed."""
 
 SWITCH_MISSES: Final = 0.2
 """Part of them with the switch off from which it is not believed [-]; true ones miss none."""
@@ -55,7 +55,7 @@ class Brakes:
     ----------
     braked : (n,) brake or retarder work, or the vehicle slows more than its torque explains
     overrun : (n,) the foot may be on the brake, or smoothing still holds what it did
-    hidden : nothing tells where the brake is on
+    hidden : nothing shows where the brake is on
     switch_dead : the brake switch contradicts the motion
     foot : what holds all along the drive
     """
@@ -74,7 +74,7 @@ class _Slowing:
     Attributes
     ----------
     needed : (n,) force at the wheels [N]
-    weight : it is told for [N]
+    weight : it is shown for [N]
     beyond : (n,) the same, less what a dragged engine explains [N]
     moving : (n,)
     """
@@ -106,7 +106,7 @@ def find_brakes(
     table : (n,) rows, at the stamps of the source
     known : (n,) the motion is known there
     lag : time constant of the smoothing [s]
-    signed : the torque tells what a dragged engine takes
+    signed : the torque shows what a dragged engine takes
     setup : what holds all along the drive; found from this drive when None
     """
     recorded, traction = source.time, table.traction_force
@@ -147,7 +147,7 @@ def find_brakes(
 
 
 def retarder_untold(drive: Drive, vehicle: Vehicle) -> bool:
-    """Whether a retarder may slow the vehicle that neither switch nor signal tells of."""
+    """Whether a retarder may slow the vehicle that neither switch nor signal shows."""
     retarder = drive.get("retarder_torque")
     recorded = retarder is not None and len(retarder) > 0
     return vehicle.of_class.retarded and not vehicle.driveline.single_speed and not recorded
@@ -200,7 +200,7 @@ def _trailing(
     vehicle, motion
     time : (n,) instants of the torque [s]
     slowed : (n,) where the brake may work
-    traction : (n,) of a torque that tells what a dragged engine takes [N]; None for none
+    traction : (n,) of a torque that shows what a dragged engine takes [N]; None for none
     lag : time constant of the smoothing [s]
     forward : take the last motion before a row, for which no later row counts, not between two
     """

@@ -31,7 +31,7 @@ def in_this_air(drive: Drive, vehicle: Vehicle) -> Vehicle:
     Parameters
     ----------
     drive
-    vehicle : itself where its reading does not change with the air, or no witness tells
+    vehicle : itself where its reading does not change with the air, or no witness shows
 
     References
     ----------

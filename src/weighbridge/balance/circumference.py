@@ -42,7 +42,7 @@ def on_its_tyres(balance: ForceBalance, vehicle: Vehicle) -> tuple[Vehicle, Prob
 
     Returns
     -------
-    vehicle : itself where its tyres are those of the calibration, or nothing tells
+    vehicle : itself where its tyres are those of the calibration, or nothing shows
     note : what was found; None if nothing
     """
     motion, line = balance.motion, vehicle.driveline

@@ -30,7 +30,7 @@ def yaw_rate(time: Floats, heading: Floats, rate: float, ahead: float = math.inf
     time : (n,) [s]
     heading : (n,) [rad]
     rate : of the rows [Hz]
-    ahead : how far past a row others may tell of it [s]
+    ahead : how far past a row others may show it [s]
     """
     half = max(1, round(0.5 * TURN_TIME * rate))
     seen = min(half, math.floor(min(ahead, TURN_TIME) * rate))
@@ -45,7 +45,7 @@ def yaw_rate(time: Floats, heading: Floats, rate: float, ahead: float = math.inf
 def lateral_acceleration(motion: Motion, ahead: float = math.inf) -> Floats:
     """Return yaw rate times speed (n,) [m/s^2]; NaN where the heading is unknown.
 
-    ``ahead`` is how far past a row others may tell of it [s].
+    ``ahead`` is how far past a row others may show it [s].
     """
     turning = yaw_rate(motion.time, motion.heading, motion.rate, ahead)
     return np.asarray(motion.speed * turning)
@@ -58,7 +58,7 @@ def cornering(motion: Motion, time: Floats, ahead: float = math.inf) -> Bools:
     ----------
     motion
     time : (n,) instants asked about [s]
-    ahead : how far past an instant the motion may tell of it [s]
+    ahead : how far past an instant the motion may show it [s]
 
     Returns
     -------

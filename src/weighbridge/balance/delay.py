@@ -41,7 +41,7 @@ _SOUGHT: Final = 30.0
 """Farthest that such a clock is looked for [s]: as far as clocks of tables are put together."""
 
 _STEP: Final = 0.25
-"""Rows nearer to each other tell nothing more of a shift of half seconds [s]."""
+"""Rows nearer to each other show nothing more of a shift of half seconds [s]."""
 
 _CLEARER: Final = 0.5
 """Misfit there over the misfit near by at which it is one [-]: at 4 s it was 0.09, in an undamaged
@@ -64,14 +64,14 @@ def best_delay(
 
     Parameters
     ----------
-    misfit : of a delay in s; NaN where it cannot be told
+    misfit : of a delay in s; NaN where it cannot be seen
     start, end : of the search at first [s]
     farthest : delay on either side at which it stops [s]
 
     Returns
     -------
     float
-        Delay [s]; NaN where no delay can be told or the best lies at the farthest.
+        Delay [s]; NaN where no delay can be shown or the best lies at the farthest.
     """
     step = 0.2
     grid = np.arange(start, end + 0.5 * step, step)

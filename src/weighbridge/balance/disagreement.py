@@ -55,7 +55,7 @@ PARTS: Final = 10
 """Instants at which a drive is split, less one."""
 
 TELLING: Final = 0.04
-"""A scale whose own standard deviation is larger tells nothing [-]."""
+"""A scale whose own standard deviation is larger shows nothing [-]."""
 
 UNKNOWN_PRESSURE: Final = 0.10
 """By how much pressures may differ where one is not known [-]: 700 m of height and weather."""
@@ -99,8 +99,8 @@ class Finding:
     ----------
     signal : of the witness
     verdict
-    scale : reading over what the witness tells [-]
-    offset : reading less what it tells, over the reading's range [-]
+    scale : reading over what the witness shows [-]
+    offset : reading less what it shows, over the reading's range [-]
     scaled : whether it is the scale that is off, not the level
     start, end : of the part that is off [s]; infinite for the ends of the drive
     before : the part is off against the one before it, not against the calibration
@@ -124,7 +124,7 @@ class Finding:
 
 
 def findings(drive: Drive, vehicle: Vehicle) -> tuple[Finding, ...]:
-    """What each witness of a vehicle file that can tell says of a drive's torque reading."""
+    """What each witness of a vehicle file that can show says of a drive's torque reading."""
     found = (_finding(drive, vehicle, relation) for relation in vehicle.witnesses)
     return tuple(f for f in found if f is not None)
 
@@ -197,7 +197,7 @@ def _against_before(
 
 
 def _smoothed(found: Following, relation: WitnessRelation) -> bool:
-    """Tell whether a reading is smoother than in the calibration.
+    """Say whether a reading is smoother than in the calibration.
 
     A noisy witness, smoothed, goes better with the reading as well, but not as well as it did.
     """
@@ -228,7 +228,7 @@ def judged(
     Returns
     -------
     Finding
-        None where the part is not off and cannot tell that it is right either.
+        None where the part is not off and cannot show that it is right either.
     """
     found = compare(part.reading, predicted_by(relation, part))
     if found.scale <= 0.0:
@@ -355,7 +355,7 @@ def accepted_scales(
 
 
 def difference(finding: Finding) -> str:
-    """How the reading differs from what the witness tells, in words."""
+    """How the reading differs from what the witness shows, in words."""
     if finding.scaled:
         return phrase("as_much", scale=finding.scale)
     which = "range_more" if finding.sign > 0 else "range_less"

@@ -37,7 +37,7 @@ class Fill:
 
 
 def identify_fill(signal: Signal) -> Fill | None:
-    """Find from a whole drive how filled readings would look; None where they cannot be told.
+    """Find from a whole drive how filled readings would look; None where they cannot be seen.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def filled(signal: Signal, fill: Fill | None, *, forward: bool = False) -> Bools
     ----------
     signal : of n samples
     fill : of `identify_fill`
-    forward : tell a run only from where it has lasted so long, not from its begin
+    forward : show a run only from where it has lasted so long, not from its begin
 
     Returns
     -------

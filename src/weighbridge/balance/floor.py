@@ -1,4 +1,4 @@
-"""The floor of a torque reading: what it tells while the engine is dragged."""
+"""The floor of a torque reading: what it shows while the engine is dragged."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def _stops(drive: Drive) -> bool:
 def _pressed(pedal: Signal, recorded: Floats, setup: FootSetup) -> Bools:
     """Where the accelerator is surely pressed, so that the brake is not (n,).
 
-    A pedal that is up tells less: cruise control pushes without a foot.
+    A pedal that is up shows less: cruise control pushes without a foot.
     """
     margin = max(MARGIN, setup.pedal_period)
     known = pedal.age(recorded) <= margin
@@ -141,12 +141,12 @@ def _dragged(
     torque: Floats,
     setup: FootSetup,
 ) -> Bools | None:
-    """Where engine or motor may be dragged, by reading and motion; None where neither tells.
+    """Where engine or motor may be dragged, by reading and motion; None where neither shows.
 
     Parameters are those of `find_foot`.
     """
     if setup.by_motion:
-        # A motor that recuperates may be helped by the brake, and no floor tells where it ends.
+        # A motor that recuperates may be helped by the brake, and no floor shows where it ends.
         return np.asarray(~(setup.mean(need, source.time) > 0.0))
     floor = setup.floor
     if floor is None:
@@ -163,7 +163,7 @@ def _dragged(
     margin = float(np.clip(MARGIN_POLLS * setup.period, MARGIN, MOST_MARGIN))
     off = near(recorded, off, recorded, margin, setup.ahead)
     # An engine without fuel cut burns its idle charge in overrun, and so reads above its floor
-    # what it also reads when it pushes a little. The motion tells these rows, not the reading.
+    # what it also reads when it pushes a little. The motion shows these rows, not the reading.
     if setup.least is None:
         return off
     return np.asarray(off | (setup.mean(torque, recorded) < setup.least))

@@ -1,4 +1,4 @@
-"""What a whole drive tells of accelerator and floor, by which each reading is judged alone."""
+"""What a whole drive shows accelerator and floor, by which each reading is judged alone."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ PUSHED: Final = 0.1
 low reading may be noise [-]."""
 
 PUSHED_TIME: Final = 1.0
-"""Time over which the motion tells whether the engine pushes the vehicle [s]."""
+"""Time over which the motion shows whether the engine pushes the vehicle [s]."""
 
 PRESSED: Final = 0.01
 """Position of the accelerator above its lowest from which a foot is on it [-]."""
 
 DRAGGED_SPEED: Final = 1.0
-"""Speed above which a reading tells of a dragged engine [m/s]."""
+"""Speed above which a reading shows a dragged engine [m/s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,13 +70,13 @@ class FootSetup:
     period : of the reading [s]
     by_motion : a motor that recuperates, judged by the motion alone
     floor : of the reading; None where none shows
-    asked : what the motion asks of the reading; None where it cannot be told
+    asked : what the motion asks of the reading; None where it cannot be seen
     least : torque below which a reading off its floor may be a dragged engine's [N m]; None
         where every such reading lies on its floor
-    pedal : name of the signal of the accelerator; None where nothing tells it
+    pedal : name of the signal of the accelerator; None where nothing shows it
     pedal_up : its position below which no foot is on it
     pedal_period : its period [s]
-    ahead : time after a reading that may tell of it, as far as the motion is known [s]
+    ahead : time after a reading that may show it, as far as the motion is known [s]
     """
 
     period: float
@@ -219,7 +219,7 @@ def _driven(drive: Drive, source: Signal) -> Floats:
 def _slowing(recorded: Floats, need: Floats) -> Bools:
     """Where the motion slows so long that no foot is on the accelerator (n,).
 
-    The readings to both sides tell of the time between, however far apart they are.
+    The readings to both sides show the time between, however far apart they are.
     """
     slows = np.concatenate(([False], need < -SLOWING, [False]))
     beside = slows[:-2] & slows[2:]
@@ -299,7 +299,7 @@ def _white_noise(values: Floats, clear: Bools) -> float:
 
 
 def _pedal(drive: Drive, vehicle: Vehicle) -> Signal | None:
-    """Position of the accelerator; None where nothing tells it.
+    """Position of the accelerator; None where nothing shows it.
 
     The throttle of an engine may be the valve of its intake, which is never quite shut.
     """

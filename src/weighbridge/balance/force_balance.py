@@ -258,7 +258,7 @@ def _air_std(vehicle: Vehicle, torque_of: Callable[[float], Torque]) -> float:
 
 
 def _reasons(read: _Read, brakes: Brakes, without: Bools, turning: Bools) -> NDArray[np.uint8]:
-    """Why a row is not usable (n,); the first reason that applies is told, so the order matters.
+    """Why a row is not usable (n,); the first reason that applies is shown, so the order matters.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ PART: Final = 60.0
 """Parts of a drive this long are judged together [s]."""
 
 FEWEST_OF_PART: Final = 20
-"""Ratios that tell of a part."""
+"""Ratios that show a part."""
 
 OFF: Final = 0.3
 """Part of the ratios on gearings below which a part of a drive is off them [-]."""

@@ -26,7 +26,7 @@ from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 SLOWEST_GEARED: Final = 1.5
-"""Below this speed gears, slip and torque are not told apart [m/s]."""
+"""Below this speed gears, slip and torque are not separated [m/s]."""
 
 SHIFT_MARGIN: Final = 0.4
 """Samples nearer than this to a change of gear are left out [s]."""
@@ -147,7 +147,7 @@ def engine_speed_at(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Flo
 def identify_told_gears(
     drive: Drive, vehicle: Vehicle, recorded: Floats, engine_speed: Floats, speed: Floats
 ) -> Mapping[int, int]:
-    """Find which gears of the vehicle file are those that the gearbox tells on a whole drive."""
+    """Find which gears of the vehicle file are those that the gearbox shows on a whole drive."""
     measured = drive.get("gear")
     if measured is None or not len(measured) or len(vehicle.driveline.gearings) < 2:
         return {}
@@ -201,7 +201,7 @@ class Instants:
 
     Attributes
     ----------
-    columns : of `weighbridge.balance.table.ForceTable` that hang on neither torque nor air (n,)
+    columns : of `weighbridge.balance.table.ForceTable` that depend on neither torque nor air (n,)
     altitude : (n,) [m]; NaN where unknown
     known : (n,) the motion is known
     slipping : (n,) the clutch slips
@@ -239,7 +239,7 @@ def read_instants(
     delay : by which they are late [s]
     numbers : of `identify_told_gears`; found from this drive when None
     engine_delay : of `identify_engine_delay`; found from this drive when None [s]
-    ahead : how far past a row others may tell of it [s]
+    ahead : how far past a row others may show it [s]
     """
     time = recorded - delay
     rows = interpolate_motion(motion, time)

@@ -8,7 +8,7 @@ Along the road, with the traction force F at the wheels::
       + rho C_d A v (w_n cos(psi) + w_e sin(psi))   wind that nobody reported
       + s d + c                                     gusts and fast errors, lasting offset
       + G q_c exp(-t / tau)                         cold engine: friction in the reading
-      + G (o + p G v / N_0)                         torque that is told too high, all data sheets
+      + G (o + p G v / N_0)                         torque that is shown too high, all data sheets
       + P eta G / N                                 power that the engine gives beside the wheels
 
     F = eta G T(reading, engine speed)
@@ -46,7 +46,7 @@ STANDARD_DENSITY: Final = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_T
 """Of air at sea level [kg/m^3] (ISO 2533)."""
 
 DISTURBANCE_STD: Final = 0.04
-"""Standard deviation of the disturbance before the drive has told, over mass [m/s^2]."""
+"""Standard deviation of the disturbance before the drive has shown, over mass [m/s^2]."""
 
 GUST_SPEED: Final = 15.0
 """Speed at which gusts are half of the disturbance [m/s]: so the likelihood of 82 drives of two
@@ -165,7 +165,7 @@ def cold_torque_column(table: ForceTable) -> Floats:
 
 
 def torque_offset_column(table: ForceTable) -> Floats:
-    """Of what the torque is told too high by, ``G`` (n,) [1/m]."""
+    """Of what the torque is shown too high by, ``G`` (n,) [1/m]."""
     return np.nan_to_num(table.gearing)
 
 
@@ -257,9 +257,9 @@ def force_on_mass(table: ForceTable, vehicle: Vehicle) -> Floats:
 def needed_force(
     vehicle: Vehicle, specific_force: Floats, pressure: Floats, rotating: Floats | float = 0.0
 ) -> tuple[Floats, float]:
-    """Force at the wheels (n,) that a motion takes, and the weight it is told for [N].
+    """Force at the wheels (n,) that a motion takes, and the weight it is shown for [N].
 
-    Its sign hangs on the mass through the drag alone. The largest mass known is the
+    Its sign depends on the mass through the drag alone. The largest mass known is the
     cautious one: drag explains least of how a heavy vehicle slows down.
 
     Parameters

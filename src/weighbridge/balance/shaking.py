@@ -17,13 +17,13 @@ SPAN: Final = 3.0
 """Changes of the speed are compared with those by the accelerometer over so long [s]."""
 
 SHIFTS: Final = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 9.0)
-"""What the accelerometer tells so much earlier explains a speed that is late or smoothed [s]."""
+"""What the accelerometer shows so much earlier explains a speed that is late or smoothed [s]."""
 
 BANDS: Final = 24
 """Bands of engine speed, each with as many samples as any other [-]."""
 
 FEWEST: Final = 6
-"""Spans that lie apart, in each band: fewer tell nothing [-]."""
+"""Spans that lie apart, in each band: fewer show nothing [-]."""
 
 LEAST: Final = 0.010
 """Root mean square over the bands of what the two differ by, above which a mass is wrong [m/s^2]:

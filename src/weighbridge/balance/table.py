@@ -25,7 +25,7 @@ MOVING: Final = 0.5
 """Slower a vehicle stands [m/s]."""
 
 UNKNOWN_AIR: Final = 0.02
-"""What the air leaves open of the torque is told from here on [-]."""
+"""What the air leaves open of the torque is shown from here on [-]."""
 
 
 class Reason(IntEnum):
@@ -175,12 +175,12 @@ class ForceSetup:
 
     @property
     def ahead(self) -> float:
-        """How far past a row the motion may tell of it [s]; infinite for a whole drive."""
+        """How far past a row the motion may show it [s]; infinite for a whole drive."""
         return self.foot.ahead
 
     @property
     def readings_ahead(self) -> float:
-        """How far past a row the readings may tell of it [s]: rows beside it look on from there."""
+        """How far past a row the readings may show it [s]: rows beside it look on from there."""
         return 2.0 * self.foot.ahead
 
 

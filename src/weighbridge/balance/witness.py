@@ -41,13 +41,13 @@ DELAYS: Final = tuple(float(d) for d in np.arange(-1.0, 1.51, 0.25))
 """Delays of the reading against its witness that are tried beside [s]."""
 
 SLOW_PERIOD: Final = 1.0
-"""Signals sampled more slowly tell of no blur [s]."""
+"""Signals sampled more slowly show no blur [s]."""
 
 BLOCKS: Final = 12
 """Parts of a drive that are left out one after another for a standard deviation."""
 
 FEWEST_MEANS: Final = 40
-"""Means from which a drive, or a part of it, can tell."""
+"""Means from which a drive, or a part of it, can show."""
 
 
 Ranges: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
@@ -168,13 +168,13 @@ class Means:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Reading against what a witness tells, ``reading = level + scale (told - told's mean)``.
+    """Reading against what a witness shows, ``reading = level + scale (told - told's mean)``.
 
     Attributes
     ----------
     scale, scale_std : [-]
-    level, level_std : reading where the witness tells ``predicted``, in the reading's unit
-    predicted : mean of what the witness tells
+    level, level_std : reading where the witness shows ``predicted``, in the reading's unit
+    predicted : mean of what the witness shows
     """
 
     scale: float
@@ -213,7 +213,7 @@ def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0
     source = source_of(vehicle)
     made_of = source.found(drive)
     motor = vehicle.driveline.single_speed
-    # A reading is no witness of itself, and none tells of wheels.
+    # A reading is no witness of itself, and none shows wheels.
     if set(made_of) & set(witness.needs) or source.gearing or motor != witness.battery:
         return None
     name = made_of[0]
@@ -285,12 +285,12 @@ def ranges_of(relation: WitnessRelation) -> Ranges:
 
 
 def predicted_by(relation: WitnessRelation, rows: Means) -> Floats:
-    """Reading that a witness tells (m,)."""
+    """Reading that a witness shows (m,)."""
     return np.asarray(rows.terms @ np.array(relation.coefficients))
 
 
 def compare(reading: Floats, predicted: Floats) -> Comparison:
-    """Fit a scale and a level of the reading against what a witness tells.
+    """Fit a scale and a level of the reading against what a witness shows.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
     off = predicted - middle
     columns = np.column_stack([off, np.ones_like(off)])
     scale, level = robust_fit(columns, reading)[0]
-    # Each is fitted anew: which of two clusters of rows is the outlier may hang on one part.
+    # Each is fitted anew: which of two clusters of rows is the outlier may depend on one part.
     size = -(-reading.size // BLOCKS)
     begin = (np.arange(BLOCKS) * (reading.size - size)) // (BLOCKS - 1)
     rows = np.arange(reading.size)
@@ -317,7 +317,7 @@ def compare(reading: Floats, predicted: Floats) -> Comparison:
 
 
 def follow(rows: Rows, witness: Witness, relation: WitnessRelation) -> Following | None:
-    """Find how late and how smooth the reading is against what the witness tells.
+    """Find how late and how smooth the reading is against what the witness shows.
 
     Parameters
     ----------

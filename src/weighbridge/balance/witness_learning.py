@@ -41,7 +41,7 @@ FINEST: Final = 0.005
 """where a scatter is at least this part of the reading's range [-]."""
 
 STRAY: Final = 0.1
-"""Where a larger part of the means is of another state, a witness tells nothing [-]."""
+"""Where a larger part of the means is of another state, a witness shows nothing [-]."""
 
 FEWEST_LEARNT: Final = 100
 """Means from which a relation is learnt: five minutes of pulling."""
@@ -108,7 +108,7 @@ class _Followed(NamedTuple):
     found: Floats
 
     def strays_below(self, columns: Floats, reading: Floats) -> bool:
-        """Tell whether the means that a lower begin of the range adds are of another state.
+        """Say whether the means that a lower begin of the range adds are of another state.
 
         Where the clutch is open or fuel is cut the engine breathes, and the reading lies on its
         floor.

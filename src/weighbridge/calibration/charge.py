@@ -16,7 +16,7 @@ from weighbridge.vehicle.air import identify_air
 from weighbridge.vehicle.model import Vehicle
 
 APART: Final = 0.04
-"""Charges of the drives that differ by less tell nothing [-]: 350 m of height."""
+"""Charges of the drives that differ by less show nothing [-]: 350 m of height."""
 
 BETWEEN_STD: Final = 0.015
 """Of a drive's mass by all else, relative [-]; see `TorqueSource.transfer_std`."""

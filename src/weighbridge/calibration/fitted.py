@@ -51,7 +51,7 @@ def noted(vehicle: Vehicle, message: Message) -> Vehicle:
 
 
 def check_delay(problem: Problem, delay: float) -> None:
-    """Refuse a delay of the torque that no logger has, and say how to mend it.
+    """Refuse a delay of the torque that no logger has, and say how to correct it.
 
     Raises
     ------

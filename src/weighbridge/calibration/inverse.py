@@ -87,7 +87,7 @@ AROUND: Final = 60.0
 """Pressures are averaged over so long before and after [s]."""
 
 TYPICAL_SPEED: Final = 300.0
-"""Engine speed at which the growth of torque terms is told [rad/s]."""
+"""Engine speed at which the growth of torque terms is shown [rad/s]."""
 
 KNOT_LENGTH: Final = 0.35
 """Length over which the full-load curve of an engine bends, in the logarithm of its speed [-]."""
@@ -181,7 +181,7 @@ def fit_with_gusts(drives: list[DriveRows], settings: FitSettings) -> InverseFit
 
     A vehicle that meets a gust slows down. So where drag is high speed is low, the more the less
     power there is in hand: the drag area comes out small, and offset and rolling resistance
-    large for it. How fast a road is driven at all hangs on no gust, but says less. Where both
+    large for it. How fast a road is driven at all depends on no gust, but says less. Where both
     ways to learn the drag area differ, the covariance holds their difference.
 
     Parameters and errors are those of `fit`.
@@ -241,7 +241,7 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     is regressed: ``w1 G L = m f + C_d A q + ... - G (w0 + w2 N + ...)`` is
     divided by w1, which keeps the problem linear. The curvature needs the
     reading on the right as well; there the fitted one of the round before
-    stands for it, so that no noise enters.
+    means it, so that no noise enters.
 
     Parameters
     ----------

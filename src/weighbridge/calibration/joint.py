@@ -51,7 +51,7 @@ LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4)
 of a polled speed: with up to 1.25 s, 2 Hz without an accelerometer went from 3 to 13 % RMS."""
 
 USUAL_LAG: Final = 0.15
-"""What a reading is smoothed by, before any drive has told it [s]: a tenth of a second or two."""
+"""What a reading is smoothed by, before any drive has shown it [s]: a tenth of a second or two."""
 
 LAG_SPREAD: Final = 0.08
 """Its standard deviation [s]."""
@@ -80,7 +80,7 @@ FARTHEST: Final = 5.0
 seen without an accelerometer, where hills and torque noise pass for drag."""
 
 ROUGH_NOISE: Final = 0.05
-"""Noise of the torque over the highest of the motion, until a fit has told it [-]."""
+"""Noise of the torque over the highest of the motion, until a fit has shown it [-]."""
 
 
 def fit_joint(problem: Problem) -> Fitted:
@@ -119,7 +119,7 @@ def _fit(problem: Problem, weigher: Weigher) -> Fitted:
 
 
 def _would_help(problem: Problem) -> str:
-    """Name the signals that tell hills and braking from resistance and that the drives lack."""
+    """Name the signals that show hills and braking from resistance and that the drives lack."""
     drives = [recording.drive for recording in problem.recordings]
     lacked = [phrase("an_inertial_sensor")]
     if any(not (d.has("altitude") or d.has("grade")) for d in drives):

@@ -1,4 +1,4 @@
-"""Can the mass that a calibration is told be true? By tare, gross, class and torque."""
+"""Can the mass that a calibration is shown be true? By tare, gross, class and torque."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ BEST_DIESEL, BEST_PETROL = 0.45, 0.38
 flow and its ratio: the best engines have as much at their best point, and nothing of it is lost."""
 
 DRAG_FAR: Final = 2.5
-"""Standard deviations of the class from which a drag area is told [-]."""
+"""Standard deviations of the class from which a drag area is shown [-]."""
 
 DOUBTFUL: Final = 3.0
-"""Standard deviations from which such a scale is told [-]."""
+"""Standard deviations from which such a scale is shown [-]."""
 
 
 def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:

@@ -220,7 +220,7 @@ def _held(base: Vehicle, source: TorqueSource) -> Vehicle:
 def _draft(
     drives: Sequence[Drive], motions: Sequence[Motion], base: Vehicle, source: TorqueSource
 ) -> tuple[GearDetection | None, Vehicle]:
-    """Find the gears, where they are not known, and let the source stand for the torque."""
+    """Find the gears, where they are not known, and let the source mean the torque."""
     gears = None
     driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions, base))
     if not driveline.gearings:
@@ -271,7 +271,7 @@ def best_source(drives: Sequence[Drive], vehicle: Vehicle) -> TorqueSource:
 def find_gears(
     drives: Sequence[Drive], motions: Sequence[Motion], *, idle_speed: float | None = None
 ) -> GearDetection:
-    """Find the gearings from all the drives together, as many as their gear signals tell at most.
+    """Find the gearings from all the drives together, as many as their gear signals show at most.
 
     Raises
     ------
@@ -309,7 +309,7 @@ def find_gears(
 
 
 def _told_gears(drives: Sequence[Drive]) -> int:
-    """Forward gears that the gear signals of the drives tell together; 0 where one has none."""
+    """Forward gears that the gear signals of the drives show together; 0 where one has none."""
     gears: set[float] = set()
     for drive in drives:
         signal = drive.get("gear")
@@ -350,7 +350,7 @@ def _engine_and_speed(
 
 
 def _name(drives: Sequence[Drive]) -> str:
-    """Take the vehicle's name from the first drive that tells it."""
+    """Take the vehicle's name from the first drive that shows it."""
     return next((drive.info.vehicle for drive in drives if drive.info.vehicle), "vehicle")
 
 

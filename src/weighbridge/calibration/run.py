@@ -72,7 +72,7 @@ MASSES_APART: Final = 0.01
 
 
 FEW_IN_GEAR: Final = 5
-"""Fewer samples name no gear: gearboxes tell odd numbers while they shift."""
+"""Fewer samples name no gear: gearboxes show odd numbers while they shift."""
 
 
 def calibrate(
@@ -200,7 +200,7 @@ def run_calibration(
 def _mass_doubts(
     vehicle: Vehicle, drives: Sequence[Drive], balances: Sequence[ForceBalance], problem: Problem
 ) -> list[Message]:
-    """Say what torque, drag and fuel tell against the masses; refuse those above gross as well."""
+    """Say what torque, drag and fuel show against the masses; refuse those above gross as well."""
     masses = problem.masses
     scale = scale_doubt(vehicle, masses, problem.names)
     each = zip(drives, balances, masses, strict=True)
@@ -228,7 +228,7 @@ def _told_reference(drives: Sequence[Drive], problem: Problem) -> float | None:
 
 
 def _reading_step(drives: Sequence[Drive], problem: Problem) -> float | None:
-    """Return the step in which all drives tell the torque's reading [SI]; None if they differ."""
+    """Return the step in which all drives show the torque's reading [SI]; None if they differ."""
     signals = [drive.get(problem.source.found(drive)[0]) for drive in drives]
     steps = [reading_step(signal.values) if signal else 0.0 for signal in signals]
     if not min(steps) > 0.0 or max(steps) > (1.0 + SAME) * min(steps):

@@ -79,7 +79,7 @@ class SpeedCalibration:
 
 
 def nominal_of(vehicle: Vehicle) -> Nominal:
-    """Take the model's constants from the vehicle; its middle gear stands for all.
+    """Take the model's constants from the vehicle; its middle gear means all.
 
     The corrections make up for what is only roughly so.
     """
@@ -99,7 +99,7 @@ def speed_rows(drive: Drive, vehicle: Vehicle, mass: float, sampling: SpeedSampl
     Raises
     ------
     DriveError
-        There is too little speed, or nothing tells the grade.
+        There is too little speed, or nothing shows the grade.
     """
     if not any(drive.has(name) for name in SPEEDS):
         raise refused("calibration.no_speed", drive=drive.name, missing=" and no ".join(SPEEDS))
@@ -132,7 +132,7 @@ def calibrate_by_speed(
 
     Parameters
     ----------
-    drives : with speed, and with what tells the grade
+    drives : with speed, and with what shows the grade
     masses : known mass of each [kg]
     base : what is known of the vehicle
     nominal : constants of the model; from the vehicle when None

@@ -27,7 +27,7 @@ _SAME_TIME: Final = 0.5
 _NO_SENSOR: Final = 1.5e-3
 _APART: Final = 10.0
 
-# A pause in which nothing was recorded is told [s].
+# A pause in which nothing was recorded is shown [s].
 _PAUSE: Final = 60.0
 
 # Way in a pause that is long enough to be compared with positions [m].
@@ -75,7 +75,7 @@ def _packets(signal: Signal, table: str) -> Problem | None:
 
 
 def _as_long_as_speed(drive: Drive, signal: Signal) -> bool:
-    """Tell whether a signal of another table runs over the same time as the speed."""
+    """Say whether a signal of another table runs over the same time as the speed."""
     speed = drive.speed
     if speed is None or len(speed) < 10:
         return False
@@ -169,7 +169,7 @@ def check_splices(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def _way_agrees(drive: Drive, start: float, length: float) -> bool:
-    """Tell whether positions before and after a pause are as far apart as the vehicle went.
+    """Say whether positions before and after a pause are as far apart as the vehicle went.
 
     A tunnel bends less than `_BENT`; a clock set forward leaves the two side by side.
     """
@@ -193,7 +193,7 @@ def _united(clocks: list[Floats]) -> Floats:
 
 
 def _goes_on(clocks: list[Floats]) -> bool:
-    """Tell whether one clock alone shows that nothing paused."""
+    """Say whether one clock alone shows that nothing paused."""
     clocks = [time for time in clocks if time.size]
     if not clocks:
         return False

@@ -15,7 +15,7 @@ SPAN: Final = 30.0
 0.01 m/s^2 then [s]."""
 
 FEWEST: Final = 10
-"""Spans in motion that tell."""
+"""Spans in motion that show."""
 
 SLOWEST: Final = 3.0
 """Mean speed of a span in motion, at least [m/s]."""

@@ -26,7 +26,7 @@ FLAT: Final = 1.8
 """Samples at the first steps over those at the second ones: more are a peak of their own [-]."""
 
 FEWEST: Final = 200
-"""Samples at each of the first steps that tell [-]."""
+"""Samples at each of the first steps that show [-]."""
 
 MOVES: Final = 1.0
 """Slower, an axis may rest at zero [m/s]."""
@@ -72,7 +72,7 @@ def _moving(time: Floats, speed: Signal | None) -> Bools:
 
 
 def _cut(values: Floats, step: float) -> bool:
-    """Tell whether the step of an axis (n,) at zero is twice as wide as those beside it."""
+    """Say whether the step of an axis (n,) at zero is twice as wide as those beside it."""
     place = np.rint(values / step)
     second, first, zero, next_first, next_second = (
         np.count_nonzero(place == k) for k in (-2, -1, 0, 1, 2)

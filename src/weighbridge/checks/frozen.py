@@ -1,7 +1,7 @@
 """Values that stand still while the vehicle goes on: torque, engine speed, vehicle speed.
 
 A bus that fell silent, or a logger that writes its last value on, leaves readings that look
-sound. They are told apart from a steady drive by what else changes meanwhile, and left out.
+sound. They are separated from a steady drive by what else changes meanwhile, and left out.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ samples, makes no mass [-]: rows chosen by what is left made a car 48 % light at
 and were right at 0.48 and 0.11, and at 0.59 and 0.30."""
 
 ENDS: Final = 60.0
-"""A signal that ends, or begins, so long before, or after, the rest is told [s]."""
+"""A signal that ends, or begins, so long before, or after, the rest is shown [s]."""
 
 
 def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:
@@ -114,7 +114,7 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
     if dragged is not None and len(signal) > 200:
         floor = min(dragged.level) + 3.0 * dragged.scatter
         if floor < 0.0 <= float(signal.values.min()):
-            # What may be the size of a negative reading is as doubtful as a zero.
+            # What may be the size of a negative reading is as uncertain as a zero.
             doubtful = signal.values <= 3.0 * dragged.scatter - min(dragged.level)
             marked = marked | doubtful
             notes.append(
@@ -133,7 +133,7 @@ def _without_ends(drive: Drive, name: str, vehicle: Vehicle | None) -> Drive:
 def _piled(signal: Signal, vehicle: Vehicle) -> tuple[Bools, list[Problem]]:
     """Mark a torque's samples at ends at which it is cut off, and say so.
 
-    At a motor's own limit they tell nothing wrong; the rest weighs without them as well. The lowest
+    At a motor's own limit they show nothing wrong; the rest weighs without them as well. The lowest
     is looked at of motors alone: an engine that is dragged reads the same for long.
     """
     marked, notes = np.zeros(len(signal), dtype=bool), list[Problem]()

@@ -59,7 +59,7 @@ def show(name: str, value: float) -> str:
 
 
 def moves(drive: Drive) -> bool:
-    """Tell whether any source saw the vehicle move."""
+    """Say whether any source saw the vehicle move."""
     for name in ("vehicle_speed", "gnss_speed"):
         s = drive.get(name)
         if s is not None and len(s) and float(np.max(np.abs(s.values))) > 1.0:

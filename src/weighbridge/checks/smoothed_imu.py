@@ -27,7 +27,7 @@ means over 0.3 s and 0.026 to 0.06 over 1 s, which do no harm; 0.017 to 0.024 ov
 0.020 over 3 s, of which masses came out up to 15 % heavy."""
 
 MADE: Final = 0.001
-"""Less is no sensor's, but a simulation's without noise, and tells nothing [m/s^2]."""
+"""Less is no sensor's, but a simulation's without noise, and shows nothing [m/s^2]."""
 
 FAST: Final = 5.0
 """A slower vehicle need not shake [m/s]."""

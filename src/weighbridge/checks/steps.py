@@ -107,7 +107,7 @@ def check_steps(
 
 
 def _cleared(ratio: float, witnesses: Sequence[Finding]) -> bool:
-    """Tell whether a witness has the reading nearer to what it was than to so much of it."""
+    """Say whether a witness has the reading nearer to what it was than to so much of it."""
     return any(
         f.verdict == "agrees" and abs(f.scale - 1.0) < abs(f.scale - ratio) for f in witnesses
     )

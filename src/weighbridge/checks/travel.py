@@ -85,7 +85,7 @@ def check_standstill(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]
 def _unit_changes(drive: Drive, s: Signal, k: int) -> str:
     """Which change of unit the jump after sample k is, in words; empty where it is none.
 
-    A unit that changes leaves the engine's speed as it is. Where GNSS tells the speed, it judges.
+    A unit that changes leaves the engine's speed as it is. Where GNSS shows the speed, it judges.
     """
     engine = drive.get("engine_speed")
     if engine is None or len(engine) < 2 or drive.get("gnss_speed") is not None:

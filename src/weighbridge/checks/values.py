@@ -55,7 +55,7 @@ def check_stuck(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
 
 
 def _along_an_axis(drive: Drive, name: str) -> bool:
-    """Tell whether the course lets a latitude or longitude stay, as on a road due east."""
+    """Say whether the course lets a latitude or longitude stay, as on a road due east."""
     part = {"latitude": np.cos, "longitude": np.sin}.get(name)
     course = drive.get("gnss_course")
     if part is None or course is None or not len(course):

@@ -158,7 +158,7 @@ def _in_common(before: Floats, after: Floats) -> float:
 
 
 def _apart(a: Floats, b: Floats) -> bool:
-    """Tell whether two sets of gears cannot be of one gearbox.
+    """Say whether two sets of gears cannot be of one gearbox.
 
     Gears that one part never used lie beside those it used. Between the gears of one gearbox
     there are none of its own.

@@ -81,7 +81,7 @@ def check_witnesses(
 
 
 def _thawed(drive: Drive, vehicle: Vehicle) -> Drive:
-    """Leave out where a witness froze: it tells nothing there."""
+    """Leave out where a witness froze: it shows nothing there."""
     for name in {n for relation in vehicle.witnesses for n in BY_SIGNAL[relation.signal].needs}:
         signal = drive.get(name)
         marked = frozen(drive, name) if signal is not None else None
@@ -92,7 +92,7 @@ def _thawed(drive: Drive, vehicle: Vehicle) -> Drive:
 
 
 def _outvoted(off: Sequence[Finding]) -> bool:
-    """Tell whether two witnesses are off by the same: then it is the reading."""
+    """Say whether two witnesses are off by the same: then it is the reading."""
     scales = sorted(f.scale for f in off if f.scaled and f.blur == 0.0 and not _part(f))
     return any(b - a < DOUBTFUL for a, b in pairwise(scales))
 

@@ -44,7 +44,7 @@ _LEFT: Final[dict[str, Any]] = {"title_justify": "left", "caption_justify": "lef
 
 
 def _kilograms(text: str) -> float:
-    """Read one mass; several in one text are told apart from what is no number."""
+    """Read one mass; several in one text are separated from what is no number."""
     try:
         return float(text)
     except ValueError:
@@ -239,7 +239,7 @@ def masses_of_parts(
     ----------
     parts : drives of each recording
     masses : as given: one of all, one for each recording, or one for each drive; None where each
-        drive tells its own
+        drive shows its own
 
     Raises
     ------

@@ -110,7 +110,7 @@ class KernelCache:
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """All that `weighbridge doctor` tells."""
+    """All that `weighbridge doctor` shows."""
 
     version: str
     folder: Path
@@ -314,7 +314,7 @@ def _kernels(module: ModuleType) -> Iterator[Any]:
 
 
 def _is_compiled(cache: Any) -> bool:
-    """Tell whether a kernel is on the disk, of its present source and for this processor."""
+    """Say whether a kernel is on the disk, of its present source and for this processor."""
     from numba.core.registry import cpu_target
 
     try:
@@ -327,7 +327,7 @@ def _is_compiled(cache: Any) -> bool:
 
 
 def _writable(folder: Path) -> bool:
-    """Tell whether a folder can be written to, or made."""
+    """Say whether a folder can be written to, or made."""
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     return os.access(folder, os.W_OK)

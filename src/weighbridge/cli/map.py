@@ -163,7 +163,7 @@ def _again(logs: list[Path], columns: str | None, dbc: list[str], output: Path |
 
 
 def _to_ask(drafts: list[Draft], again: list[str]) -> str:
-    """Say how to be asked, to a person at a terminal and where something is doubtful."""
+    """Say how to be asked, to a person at a terminal and where something is uncertain."""
     doubtful = any(found.all_doubts for found in drafts)
     if not (doubtful and sys.stdin.isatty() and sys.stdout.isatty()):
         return ""
@@ -331,7 +331,7 @@ def _drives_beside_each_other(drafts: list[Draft]) -> bool:
 
 
 def _show(found: Draft, screen: Console) -> None:
-    """Print what a file seems to be, and what is doubtful."""
+    """Print what a file seems to be, and what is uncertain."""
     from rich.table import Table
 
     taken = found.time_format or found.time_unit or "date"

@@ -24,14 +24,14 @@ _NONE = "none"
 def asked(found: Draft, *, torque: bool = True) -> Draft:
     """Ask about a draft: its time, then each column whose meaning or unit is not sure.
 
-    Where no column is known by its name, or none of the log tells a torque, each is asked about.
+    Where no column is known by its name, or none of the log shows a torque, each is asked about.
 
     Where nobody answers, what was drafted stays, with its doubts.
 
     Parameters
     ----------
     found
-    torque : some column of the log tells one
+    torque : some column of the log shows one
     """
     from weighbridge.io.draft import timed
 
@@ -93,7 +93,7 @@ def _asked_rate(time: DraftTime) -> DraftTime:
 
 
 def _asked_meaning(column: DraftColumn, taken: set[str]) -> DraftColumn:
-    """Ask what a column is where no name of the log tells of any."""
+    """Ask what a column is where no name of the log shows any."""
     from weighbridge.signals import QUANTITIES
 
     if column.quantity or not column.count:

@@ -1,4 +1,4 @@
-"""Bars on a terminal that tell how much of the work is done, and how long the rest takes."""
+"""Bars on a terminal that show how much of the work is done, and how long the rest takes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Bar:
     Parameters
     ----------
     total : of all steps, each counted by its share of the work
-    clock : tells the time [s]
+    clock : shows the time [s]
     """
 
     def __init__(self, total: float, clock: Callable[[], float] = monotonic) -> None:
@@ -117,7 +117,7 @@ def each(items: Sequence[Item], what: str, name: Callable[[Item], Any] = str) ->
     ----------
     items : worked on one after the other
     what : is done with them
-    name : of an item, as the bar tells it
+    name : of an item, as the bar shows it
     """
     if len(items) < 2:
         yield from items

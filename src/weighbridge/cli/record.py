@@ -99,7 +99,7 @@ def record(
 
 
 def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
-    """Wait until all that is needed arrives; ask on a terminal, tell elsewhere, what does not.
+    """Wait until all that is needed arrives; ask on a terminal, show elsewhere, what does not.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
 
 
 def _confirmed(question: str) -> bool:
-    """Ask a person; Ctrl-C ends it at once, whichever thread the system tells of it."""
+    """Ask a person; Ctrl-C ends it at once, whichever thread the system shows it."""
     try:
         waiting = [sys.stdin.fileno()]
     except (AttributeError, OSError, ValueError):
@@ -158,7 +158,7 @@ def _confirmed(question: str) -> bool:
 
 
 def run(feed: Feed, recorder: Recorder, ended: Callable[[], bool]) -> Arrivals:
-    """Record until it is ended, the sources have no more or the disk is full; tell how it goes."""
+    """Record until it is ended, the sources have no more or the disk is full; show how it goes."""
     from weighbridge.live.arrival import Arrivals
 
     arrivals = Arrivals()

@@ -84,7 +84,7 @@ class Inputs:
             yield drive
             folder = drive if drive.is_dir() else None
             if folder is None and drive.suffix.lower() == ".npy":
-                # Its times may stand in an array beside it.
+                # Its times may are in an array beside it.
                 folder = drive.parent
             if folder is not None:
                 with contextlib.suppress(OSError):
@@ -183,7 +183,7 @@ def refuse_results(read: Inputs, results: Sequence[Result]) -> None:
 
 
 def write_json(path: str | None, text: str) -> bool:
-    """Write JSON to a file, or print it where the path is -; tell whether it was printed."""
+    """Write JSON to a file, or print it where the path is -; show whether it was printed."""
     if path == "-":
         say_json(text)
         return True
@@ -282,7 +282,7 @@ def _may_be_read(path: Path) -> bool:
 
 
 def _is_of_kind(path: Path, kind: Kind) -> bool:
-    """Tell whether a file is empty or an earlier result of a kind."""
+    """Say whether a file is empty or an earlier result of a kind."""
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)

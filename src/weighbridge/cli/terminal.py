@@ -61,7 +61,7 @@ class Terminal(io.TextIOBase):
                 self.below.flush()
 
     def isatty(self) -> bool:
-        """Tell whether a person reads along."""
+        """Say whether a person reads along."""
         compatible = os.environ.get("TTY_COMPATIBLE") != "0"
         return compatible and not self.below.closed and self.below.isatty()
 
@@ -181,7 +181,7 @@ def console(*, stderr: bool = False, **settings: Any) -> Console:
                 yield s if s.control else Segment(visible_text(s.text), s.style)
 
         def on_broken_pipe(self) -> None:
-            # The one who called the command is told, as by any other write.
+            # The one who called the command is shown, as by any other write.
             raise
 
     stream = sys.stderr if stderr else sys.stdout

@@ -1,4 +1,4 @@
-"""How much a command tells beside its results: ``--quiet`` and ``--verbose`` of every command."""
+"""How much a command shows beside its results: ``--quiet`` and ``--verbose`` of every command."""
 
 from __future__ import annotations
 
@@ -102,12 +102,12 @@ def _leaves(commands: Iterable[Any]) -> Iterator[Any]:
 
 
 def watched() -> bool:
-    """Tell whether a person at a terminal wants to see how far the work is."""
+    """Say whether a person at a terminal wants to see how far the work is."""
     return not _asked.quiet and sys.stderr.isatty()
 
 
 def quiet() -> bool:
-    """Tell whether results and errors alone are wanted."""
+    """Say whether results and errors alone are wanted."""
     return _asked.quiet
 
 

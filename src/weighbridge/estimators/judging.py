@@ -24,7 +24,7 @@ from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 SLOW_TORQUE: Final = 1.5
-"""Rows further apart are told, where stretches of them are too short [s]: of a van's torque every
+"""Rows further apart are shown, where stretches of them are too short [s]: of a van's torque every
 1 s most rows were used, every 2 s a third, every 3 s none."""
 
 STOP: Final = 20.0
@@ -43,7 +43,7 @@ SQUAT_STD: Final = 0.03
 no calibration took that up [-]: recorded cars leaned by 2 to 5 % of the mass."""
 
 HIDDEN_BRAKE_STD: Final = 0.03
-"""Relative standard deviation of a mass where nothing tells of the brake [-]: ordinary drives of
+"""Relative standard deviation of a mass where nothing shows the brake [-]: ordinary drives of
 another simulator had 1.7 % RMS, 3 % at worst, before their braked rows were found, and cruises
 whose few starts are all that weighs more."""
 

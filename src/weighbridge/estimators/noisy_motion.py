@@ -20,13 +20,13 @@ USUAL_STD: Final = 0.5
 that noise is by typical sizes, see `weighbridge.estimators.joint.slow_errors.MOTION_SHARE`."""
 
 SHORTEST: Final = 1.0
-"""Windows whose rows reach less far tell no change of the speed [s]."""
+"""Windows whose rows reach less far show no change of the speed [s]."""
 
 APART: Final = 4.0
 """Windows further apart are not beside each other [s]."""
 
 FEWEST_PAIRS: Final = 40
-"""Fewer pairs of windows tell no noise."""
+"""Fewer pairs of windows show no noise."""
 
 PARTS: Final = 12
 """Parts of a drive that are left out one after another for a standard deviation."""
@@ -53,7 +53,7 @@ class MotionNoise(NamedTuple):
 def learnt_noise(balance: ForceBalance, vehicle: Vehicle, cut: Windows) -> MotionNoise:
     """Find the noise of the motion.
 
-    Three readings tell how the motion changes from one window to the next: accelerometer, torque
+    Three readings show how the motion changes from one window to the next: accelerometer, torque
     and speed. The noise of each is its own, so what one has and shares with neither is its noise.
     The noise of the samples is what is usual, and counts beside it.
 
@@ -189,16 +189,16 @@ def left_open(low: float, unsure: float) -> float:
 
     Returns
     -------
-    One where most of the information is noise: then nothing tells how much of it is not.
+    One where most of the information is noise: then nothing shows how much of it is not.
     """
     return unsure * low if low < too_low(np.full(1, MOSTLY))[0] else 1.0
 
 
 MOSTLY: Final = 0.5
-"""Part of the information that counts as noise, at most [-]: beyond nothing is left to be told."""
+"""Part of the information that counts as noise, at most [-]: beyond nothing is left to be shown."""
 
 ROW_FAST: Final = 2.0
-"""Rows below this speed tell no noise [m/s]."""
+"""Rows below this speed show no noise [m/s]."""
 
 LEAST: Final = 0.01
 """Less is nothing [-]: undamaged drives have 0.002 to 0.004."""

@@ -20,7 +20,7 @@ ROLLING_STD: Final = RESISTANCE_STD / GRAVITY
 """Standard deviation of the slow error of the rolling coefficient [-]: a fifth of a car's."""
 
 GAP: Final = 1.5
-"""Rows of the force further apart tell no mean [s]; of slow polling, 2.5 of its periods."""
+"""Rows of the force further apart show no mean [s]; of slow polling, 2.5 of its periods."""
 
 
 def sampled(

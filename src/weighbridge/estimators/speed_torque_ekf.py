@@ -53,7 +53,7 @@ METHOD: Final = "speed-torque-ekf"
 
 LEVELS: Final = (0.05, 0.05)
 """Noise of the speed beside its resolution [m/s] and of the acceleration [m/s^2 in one second],
-before the drive has told."""
+before the drive has shown."""
 
 SLOPE_STD: Final = 0.004
 """Standard deviation of the slope beside what the grade's says, before the drive has told [-]: with
@@ -63,7 +63,7 @@ UNMEASURED_GRADE: Final = 0.02
 """The same where no grade is used [-]."""
 
 LEVEL_STD: Final = 1.0
-"""Standard deviation of the logarithms of these before the drive has told [-]."""
+"""Standard deviation of the logarithms of these before the drive has shown [-]."""
 
 ROUNDS: Final = 3
 """Passes over the drive, each linearised about the mass of the one before."""
@@ -335,7 +335,7 @@ def initial_state(
 
 
 def constant_std(balance: ForceBalance, vehicle: Vehicle) -> Floats:
-    """Standard deviations of the errors of `constant_columns` before the drive has told (k,)."""
+    """Standard deviations of the errors of `constant_columns` before the drive has shown (k,)."""
     table = balance.table
     torque = highest_torque(table.torque[table.usable])
     stds = [vehicle.road.drag_area.std, source_of(vehicle).cold_torque_std * torque]

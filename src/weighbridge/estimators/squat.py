@@ -44,7 +44,7 @@ LOADS: Final = (0.9, 1.2)
 """A vehicle is as light, and as heavy, as so many times the masses of its calibration [-]."""
 
 SLOWEST_WHEELS: Final = 1.0
-"""Slower than this wheels tell no acceleration [m/s]."""
+"""Slower than this wheels show no acceleration [m/s]."""
 
 AVERAGED: Final = 1.0
 """Accelerations are compared as means over this time [s]."""
@@ -56,7 +56,7 @@ LEAST_ACCEL: Final = 0.15
 """Standard deviation of what is left that is needed [m/s^2]."""
 
 BLOCK: Final = 60.0
-"""Stretches of this length tell how much the slope scatters [s]."""
+"""Stretches of this length show how much the slope scatters [s]."""
 
 FEWEST_BLOCKS: Final = 4
 

@@ -61,7 +61,7 @@ class Job:
 
 
 class Receipt(NamedTuple):
-    """What a worker tells of a recording; its rows are in the part file.
+    """What a worker shows a recording; its rows are in the part file.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ def _key(job: Job, content: str) -> str:
 
 
 def _is_there(job: Job, key: str) -> bool:
-    """Tell whether a recording has its result; note the place where that is a new one."""
+    """Say whether a recording has its result; note the place where that is a new one."""
     source = visible(job.recording.source)
     if not part_path(Path(job.results), key).exists():
         if job.known is None:
@@ -312,7 +312,7 @@ def _written(job: Job, key: str, rows: list[dict[str, Any]], tries: int, begin: 
 
 
 def _of_the_machine(error: BaseException | None) -> bool:
-    """Tell whether an error of the system, such as a network that is gone, is behind another."""
+    """Say whether an error of the system, such as a network that is gone, is behind another."""
     while error is not None:
         if isinstance(error, OSError):
             return True

@@ -71,7 +71,7 @@ def _named(paths: Sequence[Path]) -> Iterable[tuple[str, Path]]:
             lone = len(paths) == 1 and place.stem.lower() not in TABLES
             yield place.suffix.lower() if lone else place.name, place
             if place.suffix.lower() == ".npy":
-                # Its times may stand in an array beside it.
+                # Its times may are in an array beside it.
                 yield from ((f.name, f) for f in place.parent.glob("*.npy") if f.name != place.name)
 
 

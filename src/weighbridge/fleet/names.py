@@ -30,7 +30,7 @@ def some(names: Collection[str | None]) -> str:
 
 
 def is_table_name(name: str) -> bool:
-    """Tell whether a file of such a name makes its folder a drive."""
+    """Say whether a file of such a name makes its folder a drive."""
     if name == INFO_NAME:
         return True
     path = Path(name)
@@ -38,7 +38,7 @@ def is_table_name(name: str) -> bool:
 
 
 def is_drive_name(name: str) -> bool:
-    """Tell whether a file of such a name may be a drive of its own."""
+    """Say whether a file of such a name may be a drive of its own."""
     path = Path(name)
     if _BESIDE.match(name) is not None:
         return False

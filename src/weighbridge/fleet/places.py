@@ -36,7 +36,7 @@ _NOTES: Final = (SHARED, COPIED)
 
 
 def is_there(place: str) -> bool:
-    """Tell whether something is at a place still; true where that cannot be found out."""
+    """Say whether something is at a place still; true where that cannot be found out."""
     if os.path.lexists(place):
         return True
     return all(
@@ -54,7 +54,7 @@ def standing(
     ----------
     heads : rows of `HEAD`, any number for each key
     found : rows of `FOUND`
-    there : tells whether a place still has something; None to take all places as they are
+    there : shows whether a place still has something; None to take all places as they are
 
     Returns
     -------

@@ -60,7 +60,7 @@ def known_masses(
 
 
 def outside(known: pl.DataFrame) -> pl.DataFrame:
-    """Compare known masses with the intervals that were told.
+    """Compare known masses with the intervals that were shown.
 
     Of intervals of 95 % one known mass in twenty lies outside by chance.
 

@@ -19,12 +19,12 @@ _HOME: Final = "weighbridge-"
 
 
 def is_url(text: str) -> bool:
-    """Tell whether a text is a URL and no path."""
+    """Say whether a text is a URL and no path."""
     return _URL.match(text) is not None
 
 
 def was_url(path: Path) -> bool:
-    """Tell whether a path was made of a URL, of which it keeps one slash."""
+    """Say whether a path was made of a URL, of which it keeps one slash."""
     return re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", path.as_posix()) is not None
 
 
@@ -59,7 +59,7 @@ def drives(url: str, *, as_drive: bool) -> Iterator[str]:
 
 
 def exists(url: str) -> bool:
-    """Tell whether something is behind a URL; true where the store cannot be asked."""
+    """Say whether something is behind a URL; true where the store cannot be asked."""
     try:
         files, path = _store(url)
         return bool(files.exists(path))

@@ -68,7 +68,7 @@ _GATHERED: Final = 5_000
 
 
 def is_results(folder: Path) -> bool:
-    """Tell whether a folder holds results of a fleet."""
+    """Say whether a folder holds results of a fleet."""
     return (folder / MARK).is_file()
 
 
@@ -325,7 +325,7 @@ class Results:
 
         Parameters
         ----------
-        there : tells whether a place still has something
+        there : shows whether a place still has something
 
         Raises
         ------
@@ -416,7 +416,7 @@ def _of_version(folder: Path, version: object) -> ConfigError:
 
 
 def check_end(path: Path) -> None:
-    """Raise where a file of a table was cut off, which its end tells.
+    """Raise where a file of a table was cut off, which its end shows.
 
     Raises
     ------

@@ -32,7 +32,7 @@ class Row(NamedTuple):
 
 
 def is_table(path: Path) -> bool:
-    """Tell whether a file is a table of drives, by its column ``files``."""
+    """Say whether a file is a table of drives, by its column ``files``."""
     suffix = path.suffix.lower()
     try:
         if suffix in (".parquet", ".pq"):

@@ -38,8 +38,8 @@ class Assigned:
 
     Attributes
     ----------
-    id : by which it was found; None where nothing tells it
-    file : name of its file; None where its class's data sheet stands in
+    id : by which it was found; None where nothing shows it
+    file : name of its file; None where its class's data sheet is in
     vehicle : of the file; None for the data sheet, which asks the drive for its torque
     kind : name of its class
     mapping : what its logs are read with; None for canonical ones
@@ -56,7 +56,7 @@ class Assigned:
     mapping_file: str | None = None
 
     def as_vehicle(self, drive: Drive) -> Vehicle:
-        """Return the vehicle; that of a data sheet with the best torque that the drive tells."""
+        """Return the vehicle; that of a data sheet with the best torque that the drive shows."""
         if self.vehicle is not None:
             return self.vehicle
         reported = (s for s in TORQUE_SOURCES.values() if s.signed and not s.lacking(drive))

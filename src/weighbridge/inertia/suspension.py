@@ -32,7 +32,7 @@ STILL: Final = 2.0
 """Travels count as dependent within so long, three periods of the body [s]."""
 
 SHORTEST: Final = 10.0
-"""A ride of less does not tell eight parts apart [s]."""
+"""A ride of less does not show eight parts apart [s]."""
 
 LONGEST: Final = 300.0
 """More adds nothing [s]."""
@@ -184,7 +184,7 @@ def check_suspension(
 
     Returns
     -------
-    None where the ride is too short to tell.
+    None where the ride is too short to show.
     """
     if samples.duration < SHORTEST:
         return None

@@ -1,4 +1,4 @@
-"""From a device's clock to the host's: the message with the shortest way tells the difference."""
+"""From a device's clock to the host's: the message with the shortest way shows the difference."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class DeviceClock:
         return stamp + min(self._best, self._before)
 
     def _falls(self, stamp: float) -> bool:
-        """Tell whether a stamp has fallen; take a clock that goes on from there as a new one."""
+        """Say whether a stamp has fallen; take a clock that goes on from there as a new one."""
         if not stamp < self._newest - _LATE:
             self._newest, self._fallen = max(self._newest, stamp), 0
             return False

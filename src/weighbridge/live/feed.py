@@ -127,7 +127,7 @@ class Feed:
         Raises
         ------
         WeighbridgeError
-            A source cannot be used as it was named: that does not mend itself.
+            A source cannot be used as it was named: that does not correct itself.
         """
         with self._changed:
             self._changed.wait_for(
@@ -250,7 +250,7 @@ class _Runner:
                     break
                 pause = min(2.0 * pause, longest)
                 self._restarts += 1
-            # What cannot be mended by trying again is for whoever reads.
+            # What cannot be corrected by trying again is for whoever reads.
             except BaseException as failure:
                 self.ended = True
                 self._feed._end(failure)

@@ -1,4 +1,4 @@
-"""What a drive so far tells of sensors and noise, by which it is weighed on."""
+"""What a drive so far shows sensors and noise, by which it is weighed on."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LONGEST: Final = 2700.0
 
 @dataclass(frozen=True, slots=True)
 class Learned:
-    """What the records until an instant tell.
+    """What the records until an instant show.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Learned:
     problems: tuple[Problem, ...]
 
     def answer(self) -> Learned:
-        """Return what they tell of the mass alone, without what the stages go on from."""
+        """Return what they show the mass alone, without what the stages go on from."""
         return replace(self, setup=None, state=None)
 
 

@@ -41,7 +41,7 @@ class Step(NamedTuple):
 class Look:
     """A look that has begun, and what was known when it did.
 
-    What it tells hangs on that alone, and holds from its instant on: the steps that the stages
+    What it shows depends on that alone, and holds from its instant on: the steps that the stages
     took meanwhile are taken again from there. So the mass after a look is the same to the last bit
     however long the look took, and whether the stages waited for it or not.
 
@@ -85,7 +85,7 @@ class Look:
             self._thread.join()
 
     def found(self) -> Learned:
-        """Return what it tells; wait until it has ended."""
+        """Return what it shows; wait until it has ended."""
         self.end()
         if self._failure is not None:
             raise self._failure
@@ -133,6 +133,6 @@ class Look:
     def _caught(self, vehicle: Vehicle) -> None:
         try:
             self._look(vehicle)
-        # Who feeds the scale is told.
+        # Who feeds the scale is shown.
         except BaseException as failure:
             self._failure = failure

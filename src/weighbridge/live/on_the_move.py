@@ -67,7 +67,7 @@ class OnTheMove:
         self.look_at = min(self.driven * GROWTH, self.driven + PERIOD)
 
     def begin_anew(self) -> None:
-        """Take it that nothing tells of this load yet, as after a start."""
+        """Take it that nothing shows this load yet, as after a start."""
         self.looked_at, self.look_at = self.driven, self.driven + FIRST
 
     @property

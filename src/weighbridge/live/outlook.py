@@ -56,7 +56,7 @@ def outlook(
     since: float = 0.0,
     wait: float = 0.0,
 ) -> Outlook:
-    """Judge a mass by its interval, and tell how much more driving it takes.
+    """Judge a mass by its interval, and show how much more driving it takes.
 
     Noise falls as one over the time on the move; what vehicle file and equipment leave does not.
 

@@ -32,7 +32,7 @@ SILENCE: Final = 3.0
 """Where no sample came for so long, all were silent [s]."""
 
 _FIRST: Final = 1e10
-"""No clock tells such an instant [s]: it is the year 2286."""
+"""No clock shows such an instant [s]: it is the year 2286."""
 
 _ROOM: Final = 256
 
@@ -111,7 +111,7 @@ class Records:
     """Samples of many signals, each on its own clock.
 
     Samples come in any order within ``lateness``; later ones are counted and dropped. What was
-    sealed never changes again, so that what is made of it hangs on neither order nor block sizes.
+    sealed never changes again, so that what is made of it depends on neither order nor block sizes.
     A clock that jumps is brought back: time goes on from the newest sample.
 
     Parameters

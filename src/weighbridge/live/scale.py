@@ -471,7 +471,7 @@ class LiveScale:
         self._take(wait=not self.looks_aside)
 
     def _take(self, *, wait: bool = False) -> None:
-        """Go on from what a look has found, where it tells more than is known."""
+        """Go on from what a look has found, where it shows more than is known."""
         look = self._looking
         if look is None or (look.goes_on and not wait):
             return

@@ -33,7 +33,7 @@ SILENT: Final = 3.0
 
 @dataclass(slots=True)
 class Session:
-    """Feeds a scale, shows what it tells, and keeps its state.
+    """Feeds a scale, shows what it shows, and keeps its state.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Session:
     orders : looked at between samples: what a person asks for, at the terminal or by a file
     ahead : show the provisional mass, which is younger; see `LiveScale.weighing`
     aside : go on showing it while the scale looks at all records, as a vehicle does not wait; what
-        is shown at an instant then hangs on how fast the machine is
+        is shown at an instant then depends on how fast the machine is
     """
 
     feed: Feed

@@ -1,4 +1,4 @@
-"""What a live scale tells at one moment."""
+"""What a live scale shows at one moment."""
 
 from __future__ import annotations
 

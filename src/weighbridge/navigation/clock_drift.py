@@ -46,10 +46,10 @@ _ENOUGH: Final = 6
 _AGREES: Final = 0.2
 # Clocks are looked at again once they were moved; so often at most.
 _ROUNDS: Final = 4
-# Pieces that must show a lag, and lie on what is mended [-].
+# Pieces that must show a lag, and lie on what is corrected [-].
 _SHOWN: Final = 0.6
 _FOLLOWS: Final = 0.9
-# How far a piece may lie off what is mended [s].
+# How far a piece may lie off what is corrected [s].
 _NEAR: Final = 0.25
 # A quarter of a piece [s]: the error of its lag per drift.
 _BLUR: Final = 45.0
@@ -221,7 +221,7 @@ def _judged(lags: Lags, table: str) -> _Path | Problem | None:
 
 
 def _strangers(lags: Lags) -> bool:
-    """Tell whether hardly a piece shows a lag, or each another one."""
+    """Say whether hardly a piece shows a lag, or each another one."""
     few = lags.lag.size < _AGREES * lags.pieces
     return few or (lags.lag.size > 2 and float(np.median(np.abs(np.diff(lags.lag, 2)))) > _STEP)
 
@@ -297,7 +297,7 @@ def _left_out(drive: Drive, lost: tuple[tuple[float, float], ...]) -> Drive:
 
 
 def _speeds_agree(drive: Drive, when: tuple[tuple[float, float], ...]) -> bool | None:
-    """Tell whether vehicle speed and speed over ground are one in some times; None if unknown."""
+    """Say whether vehicle speed and speed over ground are one in some times; None if unknown."""
     speed, ground = drive.get("vehicle_speed"), _gnss_speed(drive)
     if speed is None or ground is None or not len(speed) or not len(ground):
         return None

@@ -111,7 +111,7 @@ def begin(setup: Setup, start: float) -> NavigationState:
 
 
 def lateness(setup: Setup) -> float:
-    """Time that a row waits for what tells of it [s]: delays of the sources, and look-ahead."""
+    """Time that a row waits for what shows it [s]: delays of the sources, and look-ahead."""
     return max(0.0, setup.clocks.speed_delay, setup.clocks.gnss_delay) + AHEAD + LAID_OUT
 
 

@@ -37,13 +37,13 @@ def frozen_stretches(signal: Signal, speed: Signal | None) -> Floats:
     """Find where an inertial axis repeats one value for longer than rounding explains.
 
     Neighbours of a coarse sensor are often alike; the share of such neighbours outside of long
-    runs tells how long a run may be. A sensor at rest may repeat itself, so only runs during
+    runs shows how long a run may be. A sensor at rest may repeat itself, so only runs during
     which the vehicle moves count.
 
     Parameters
     ----------
     signal : one axis
-    speed : tells motion; without it every such run counts
+    speed : shows motion; without it every such run counts
 
     Returns
     -------

@@ -309,7 +309,7 @@ def averaged(period: float, y: Floats) -> Floats:
 
 
 def _shows_squat(nodes: Nodes, end_std: Floats, setup: Setup) -> bool:
-    """Tell whether the drive has shown its squat."""
+    """Say whether the drive has shown its squat."""
     moving = nodes.states[1:, V] ** 2 + nodes.states[1:, V + 1] ** 2 > 4.0
     going = float(np.sum(np.diff(nodes.time)[moving]))
     return bool(end_std[E_SQUAT] < setup.settings.squat_found_std and going > _SQUAT_TIME)
@@ -365,7 +365,7 @@ def _valid(found: Found, accel: Floats, setup: Setup) -> Bools:
 
 
 def scale_is_found(end_std: Floats, setup: Setup) -> bool:
-    """Tell whether the drive has shown the scale of its speed."""
+    """Say whether the drive has shown the scale of its speed."""
     with_both = setup.has_wheel and setup.origin is not None
     return bool(with_both and end_std[E_SCALE] < _SCALE_FOUND)
 

@@ -28,7 +28,7 @@ SLOPE: Final = 5.0
 """Time over which the slope of a slow speed is still that of the vehicle [s]."""
 
 RATE_ROWS: Final = 100
-"""First rows of a motion, which tell its rate."""
+"""First rows of a motion, which show its rate."""
 
 RATE_DIGITS: Final = 6
 """Decimals of that rate [Hz]: the clock is even, and its stamps are rounded."""

@@ -16,37 +16,37 @@ _Model = tuple[Floats, Floats, float, Floats, Floats]
 """Transitions, process covariances, noise variance, first state and its covariance."""
 
 ACCEL_TIME: Final = 3.0
-"""How long a driver keeps an acceleration before the drive has told [s]."""
+"""How long a driver keeps an acceleration before the drive has shown [s]."""
 
 ACCEL_STD: Final = 0.5
-"""Standard deviation of the acceleration of a drive before it has told [m/s^2]."""
+"""Standard deviation of the acceleration of a drive before it has shown [m/s^2]."""
 
 SPEED_NOISE: Final = 0.03
-"""Noise of a vehicle speed beside its resolution, before the drive has told [m/s]."""
+"""Noise of a vehicle speed beside its resolution, before the drive has shown [m/s]."""
 
 GRADE_STD: Final = 0.02
-"""Standard deviation of the grade of roads before the drive has told [-]."""
+"""Standard deviation of the grade of roads before the drive has shown [-]."""
 
 GRADE_LENGTH: Final = 300.0
-"""Length over which a grade lasts, before the drive has told [m]."""
+"""Length over which a grade lasts, before the drive has shown [m]."""
 
 GRADE_NOISE: Final = 0.01
-"""Noise of a measured grade beside its resolution, before the drive has told [rad]."""
+"""Noise of a measured grade beside its resolution, before the drive has shown [rad]."""
 
 HEIGHT_NOISE: Final = 1.0
-"""Noise of heights from fix to fix before the drive has told [m]."""
+"""Noise of heights from fix to fix before the drive has shown [m]."""
 
 HEIGHT_WALK: Final = 4.0
-"""Slow error of GNSS heights before the drive has told [m]."""
+"""Slow error of GNSS heights before the drive has shown [m]."""
 
 HEIGHT_TIME: Final = 100.0
-"""How long the slow error of heights lasts, before the drive has told [s]."""
+"""How long the slow error of heights lasts, before the drive has shown [s]."""
 
 THINNED: Final = 0.1
 """The sizes are found from samples at least so far apart [s]."""
 
 LEVEL_STD: Final = 1.0
-"""Standard deviation of the logarithms of these values before the drive has told [-]."""
+"""Standard deviation of the logarithms of these values before the drive has shown [-]."""
 
 _FARTHEST: Final = 8.0 * LEVEL_STD
 """Logarithms are sought up to here [-]."""
@@ -233,7 +233,7 @@ def smooth_grade(measured: Signal, time: Floats, distance: Floats) -> tuple[Floa
     -------
     grade : (n,) [rad]
     grade_std : (n,) its standard deviation [rad]; of a grade that never changes, whose noise
-        cannot be told, that of any grade
+        cannot be seen, that of any grade
     """
     quantum = resolution(measured.values)
     if not np.ptp(measured.values) > 0.0:

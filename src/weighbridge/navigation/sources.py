@@ -9,7 +9,7 @@ from weighbridge.navigation.aiding import Fixes, Imu, read_fixes, read_imu, spee
 from weighbridge.signals import Drive, Signal
 
 _FEWEST = 10
-"""Fewer samples of a speed tell nothing."""
+"""Fewer samples of a speed show nothing."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ class Item:
     conditions : whose rules ours is made by
     where : place in the code or in the report
     printed : the paper's figure or claim; empty where that of the run is taken
-    ours : ``{name}`` stands for the figure of that name; empty where nothing can be compared
+    ours : ``{name}`` means the figure of that name; empty where nothing can be compared
     tolerance : up to what difference both agree, with its reason
     why : what departs from print; of a figure that differs the reason, of an item without
         ``ours`` why it is not reproducible
@@ -192,7 +192,7 @@ def same(
     close = a.shape == b.shape and bool(
         np.max(np.abs(a - b)) <= ROUNDING * max(float(np.max(np.abs(a))), 1e-300)
     )
-    # One number stands for an array: the one that differs most, else the largest.
+    # One number means an array: the one that differs most, else the largest.
     apart = np.abs(a - b) if a.shape == b.shape and np.any(a != b) else np.abs(a)
     k = int(np.argmax(apart))
     text = [f"{x.flat[k]:.9g} {unit}".strip() for x in (b, a)]

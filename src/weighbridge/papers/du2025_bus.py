@@ -37,7 +37,7 @@ tyres have at 70 km/h, a fifth of the quadratic growth at 30 m/s."""
 
 EARLY_BRAKING: Final = Braking(time=12.0, duration=2.0, decel=1.2)
 """Braking while the estimate still rises, which delays the paper's least squares (sec. 4.2). The
-paper tells no time: at 12 s the bus has driven for 9 s and has 25 km/h."""
+paper shows no time: at 12 s the bus has driven for 9 s and has 25 km/h."""
 
 
 def data_sheet() -> Vehicle:
@@ -93,7 +93,7 @@ def simulate(
     payload : [kg]
     seed : of driver, weather and sensors
     as_paper : on a level road, without `NOT_IN_THE_PAPER`, wind and GNSS; else with
-        all effects. Without GNSS no height tells grade from the accelerometer's
+        all effects. Without GNSS no height shows grade from the accelerometer's
         zero, which the paper's filters know.
     early_braking : brake at `EARLY_BRAKING`, too
     """

@@ -58,7 +58,7 @@ PRINTED: Final = hybrid.HybridSettings(
 """Each row by itself with a forgetting factor of 0.999, forgetting that never stops, no offset,
 Huber's weight in the gain alone, the blend by speed (eqs. 15-20, 34, Table 1), every row of the
 moving bus. Q and R are ours, for the paper gives none, and so are P0, of which it says that it is
-typically the identity, Huber's c and the information at which the first mass is told."""
+typically the identity, Huber's c and the information at which the first mass is shown."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -49,7 +49,7 @@ Spans = list[tuple[float, float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedSays:
-    """What speed and grade tell without a torque.
+    """What speed and grade show without a torque.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ def coasting_speed(head_wind: float) -> Floats:
 
 
 def speed_table(said: SpeedSays) -> Table:
-    """What speed alone does tell: an upper bound of the mass, and the drag area over it."""
+    """What speed alone does show: an upper bound of the mass, and the drag area over it."""
     low, high = said.coast.interval()
     bounds = " / ".join(f"{x:.0f}" for x in said.bounds)
     return Table(

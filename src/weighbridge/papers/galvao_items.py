@@ -109,4 +109,4 @@ ITEMS: Final = (
          why=f"{_RECORDED} with the true grade, as the paper's fit; what the calibration is "
          "surer of is in the mass", check=_COMMAND),
 )  # fmt: skip
-"""In the paper's order; what is not the paper's stands in the tables of the report."""
+"""In the paper's order; what is not the paper's is in the tables of the report."""

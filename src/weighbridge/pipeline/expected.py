@@ -1,4 +1,4 @@
-"""What to expect of a mass by each way to weigh, as `inspect` and docs/accuracy.md tell it."""
+"""What to expect of a mass by each way to weigh, as `inspect` and docs/accuracy.md show it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The mass while a drive goes on: stages that look a second ahead, set up from outside.
 
-A whole drive tells mounting, delays, levels of noise and floors once (`identify_forward`). Then
+A whole drive shows mounting, delays, levels of noise and floors once (`identify_forward`). Then
 the drive is taken in short steps (`step`): navigation by the filter alone, force balance,
 windows, and the joint filter, each from its state and the last seconds of the records. A recorded
 drive is folded with the same steps (`forward_weigh`), so that a vehicle which is weighed on the
@@ -201,7 +201,7 @@ class Running(NamedTuple):
 
 
 NO_WINDOWS: Final = Running(np.empty(0), np.empty(0), np.empty(0))
-"""What a step tells in which no window became complete."""
+"""What a step shows in which no window became complete."""
 
 
 def begin(setup: ForwardSetup, start: float) -> ForwardState:
@@ -243,7 +243,7 @@ def resume(weighing: Weighing, records: Drive, until: float, setup: ForwardSetup
 
 
 def too_wide(state: ForwardState | None, setup: ForwardSetup | None) -> float:
-    """Standard deviation over the mass that is too wide to be told [-]; 0 where it is not.
+    """Standard deviation over the mass that is too wide to be shown [-]; 0 where it is not.
 
     A recorded drive that leaves as much has no mass either.
     """
@@ -257,7 +257,7 @@ def too_wide(state: ForwardState | None, setup: ForwardSetup | None) -> float:
 
 
 def lateness(setup: ForwardSetup) -> float:
-    """Time that a row waits for what tells of it [s]: delays, and look-ahead of the stages."""
+    """Time that a row waits for what shows it [s]: delays, and look-ahead of the stages."""
     by_motion = forward.lateness(setup.navigation) + setup.force.ahead
     late = max(setup.delay, setup.force.engine_delay)
     return max(by_motion, late + setup.force.readings_ahead)
@@ -319,7 +319,7 @@ def with_open(state: ForwardState, setup: ForwardSetup) -> JointState:
     """Return the filter of the mass as if the open window were over.
 
     The noise of its motion is that of a mean over its own, shorter time, between two ends. The
-    first window after a stop tries another load, of which a part of it tells nothing: it waits.
+    first window after a stop tries another load, of which a part of it shows nothing: it waits.
     """
     windows, sizes = state.windows, setup.joint
     if not windows.rows or windows.stood >= STOP:
@@ -377,7 +377,7 @@ def forward_weigh(drive: Drive, setup: ForwardSetup) -> ForwardTrack:
 
     Parameters
     ----------
-    drive : as mended for the weighing of ``setup``
+    drive : as corrected for the weighing of ``setup``
     setup : of `identify_forward`
     """
     state, parts = begin(setup, drive.start), [NO_WINDOWS]

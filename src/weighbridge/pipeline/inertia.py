@@ -291,7 +291,7 @@ def _check(
     """Fit springs and dampers to the last load, or to the longest where that is too short."""
     if troubled:
         # Loads that come and go are no loads, and nobody brakes and turns all the time: then
-        # only the whole ride can tell which part is off.
+        # only the whole ride can show which part is off.
         return check_suspension(samples, ride, average)
     edges = np.searchsorted(samples.time, (-np.inf, *changes, np.inf))
     longest = int(np.argmax(np.diff(edges)))

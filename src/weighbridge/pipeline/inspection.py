@@ -37,7 +37,7 @@ GAP_PERIODS: Final = 5.0
 
 DRIVEN_NEEDED: Final = "the torque of every driven axle (or driven in the vehicle file)"
 REFERENCE_NEEDED: Final = "reference_torque (or reference_torque_nm in the vehicle file)"
-"""What a torque in percent needs that its drive does not tell."""
+"""What a torque in percent needs that its drive does not show."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +110,7 @@ class Way:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inspection:
-    """All that `inspect` tells of a drive.
+    """All that `inspect` shows a drive.
 
     Attributes
     ----------

@@ -52,7 +52,7 @@ def unbacked(vehicle: Vehicle) -> tuple[Problem, ...]:
 
 
 GRADES_APART: Final = 0.003
-"""Grades known better or worse than in the calibration by so much are told [rad]."""
+"""Grades known better or worse than in the calibration by so much are shown [rad]."""
 
 
 def other_equipment(vehicle: Vehicle, motion: Motion) -> tuple[Problem, ...]:
@@ -86,7 +86,7 @@ def fitted_for_another(vehicle: Vehicle, method: str) -> tuple[Problem, ...]:
 
 
 def beside_speed(drive: Drive) -> tuple[Problem, ...]:
-    """Say what a speed beside a grade does tell; nothing without a grade."""
+    """Say what a speed beside a grade does show; nothing without a grade."""
     if not (drive.has("grade") or drive.has("altitude")):
         return ()
     return (Problem.of("speed.bounds"),)
@@ -120,7 +120,7 @@ def overload(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
 def beyond_class(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
     """Say whether a mass is far from those of the class; nothing if not.
 
-    Where the vehicle file states tare or permitted mass, or was calibrated, those tell more.
+    Where the vehicle file states tare or permitted mass, or was calibrated, those show more.
     """
     known = (vehicle.tare, vehicle.gross, *vehicle.provenance.masses)
     if any(mass is not None for mass in known) or result.status is not Status.CONVERGED:
@@ -151,7 +151,7 @@ LIGHTER: Final = 0.9
 def lighter_than_known(vehicle: Vehicle, result: MassTrack) -> tuple[Problem, ...]:
     """Say whether a mass is far below all of the calibration; nothing if not.
 
-    Where the vehicle file states its tare, that tells more.
+    Where the vehicle file states its tare, that shows more.
     """
     masses = vehicle.provenance.masses
     if vehicle.tare is not None or not masses or result.status is not Status.CONVERGED:

@@ -1,6 +1,6 @@
 """What speed alone does say beside a grade: an upper bound of the mass, and drag over mass.
 
-Neither is a weighing: a bound is no estimate, and a coast-down tells no mass.
+Neither is a weighing: a bound is no estimate, and a coast-down shows no mass.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def _graded(drive: Drive, vehicle: Vehicle) -> Motion:
     Raises
     ------
     DriveError
-        Nothing tells the grade.
+        Nothing shows the grade.
     """
     motion = find_motion(without_accelerometer(drive), vehicle)
     if motion.source != "speed_grade":
@@ -172,7 +172,7 @@ def _graded(drive: Drive, vehicle: Vehicle) -> Motion:
 def _windows(
     drive: Drive, motion: Motion, vehicle: Vehicle
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Cut a drive into windows and tell the energy that each takes.
+    """Cut a drive into windows and show the energy that each takes.
 
     Returns
     -------

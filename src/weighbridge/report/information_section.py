@@ -67,7 +67,7 @@ class Manoeuvre(IntEnum):
 
 
 class _Shown(NamedTuple):
-    """How a manoeuvre is told: name, definition, as a cause, and colour."""
+    """How a manoeuvre is shown: name, definition, as a cause, and colour."""
 
     name: str
     definition: str
@@ -121,7 +121,7 @@ def information_gained(result: MassTrack) -> Gained | None:
 
     Information is one over the variance of the mass, as the noise of the
     drive alone leaves it. After a stop it dips, for the load may have changed,
-    and comes back while the next windows tell that it has not. So a window
+    and comes back while the next windows show that it has not. So a window
     counts with its part of what was known more than ever before under that
     load, not with what it only brought back.
 

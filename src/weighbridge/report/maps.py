@@ -111,7 +111,7 @@ def mark(
     limits: tuple[float | None, float | None] = (None, None),
     **marker: object,
 ) -> None:
-    """Add marks to a map whose colour tells a value.
+    """Add marks to a map whose colour shows a value.
 
     Parameters
     ----------

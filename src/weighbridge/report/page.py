@@ -95,7 +95,7 @@ def _title(weighings: Sequence[MassResult]) -> str:
 
 
 def _known(weighing: MassResult, truth: Mapping[str, float]) -> Known | None:
-    """Find the true mass at the end of the drive; None where none is told.
+    """Find the true mass at the end of the drive; None where none is shown.
 
     That of ``drive.toml`` is of its start: the fuel that some methods reckon with is taken off.
     """

@@ -21,7 +21,7 @@ GREY: Final = "#8a8a8a"
 PURPLE: Final = "#b0679b"
 ORANGE: Final = "#c08300"
 BROWN: Final = "#a67c52"
-"""Mid tones told apart with any colour vision; after Okabe and Ito, Color Universal Design, 2008.
+"""Mid tones separated with any colour vision; after Okabe and Ito, Color Universal Design, 2008.
 Each has a contrast of 3 or more on light and dark paper (WCAG 2.2, 1.4.11)."""
 
 REACH: Final = float(ndtri(0.975))

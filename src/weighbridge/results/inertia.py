@@ -61,7 +61,7 @@ class InertiaResult:
     refusal : why there is no mass; None where there is
     track : the filter's parameters over time; None where nothing could be estimated
     suspension : each spring and damper against the vehicle file; None where the ride is
-        too short to tell
+        too short to show
     model_std : (3,) relative standard deviation beside the filter's: of the vehicle
         file, of what does not fit, and of noise [-]
     segments : parameters between changes of load

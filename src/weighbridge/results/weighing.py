@@ -153,7 +153,7 @@ class MassResult:
 
     @property
     def load_changed(self) -> bool:
-        """Whether segments are loads told apart, not just legs of a drive."""
+        """Whether segments are loads separated, not just legs of a drive."""
         result = self.result
         return self.estimator.segments_are_loads and result is not None and len(result.segments) > 1
 

@@ -57,7 +57,7 @@ def find_engine_delay(
     stamps, engine_speed : (n,) [s], [rad/s]
     motion : (m,) instants, rising [s], and speeds of the vehicle [m/s]
     gearings : (k,) falling, roughly [1/m]
-    usual : lateness before the drive has told [s]
+    usual : lateness before the drive has shown [s]
 
     References
     ----------

@@ -108,7 +108,7 @@ def _values(section: Section, keys: Sequence[Key], faults: Faults) -> dict[str, 
 
 
 def _refuse_lost_mapping(root: Section) -> None:
-    """Say where the mapping of a vehicle's logs belongs, where it stands in another section."""
+    """Say where the mapping of a vehicle's logs belongs, where it is in another section."""
     remedy = "belongs into [vehicle]: move the line there"
     if "mapping" in root.data:
         root.fail("mapping", remedy)
@@ -241,7 +241,7 @@ def _value(section: Section, key: Key) -> Any:
 
 
 def _written(section: Section, key: Key) -> str:
-    """Key as it stands in the file, in whichever unit."""
+    """Key as it is in the file, in whichever unit."""
     return next(
         (k for k in section.data if k == key.name or k.startswith(f"{key.stem}_")), key.name
     )
@@ -285,7 +285,7 @@ def _alternative_drag(section: Section, values: dict[str, Any]) -> None:
 
 
 def _built(build: type[Any], section: Section, values: Mapping[str, Any]) -> Any:
-    """Make the part; what its own checks refuse is told with the key's line."""
+    """Make the part; what its own checks refuse is shown with the key's line."""
     try:
         return build(**values)
     except ConfigError as e:

@@ -37,7 +37,7 @@ class Key:
 
     @property
     def name(self) -> str:
-        """As it stands in a file."""
+        """As it is in a file."""
         return (f"{self.stem}_{self.suffix}" if self.suffix else self.stem) + self.tail
 
 

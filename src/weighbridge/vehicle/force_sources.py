@@ -22,10 +22,10 @@ STANDING: Final = 0.1
 """Slower than this the vehicle stands [m/s]."""
 
 FEWEST_STANDING: Final = 20
-"""Samples at standstill that tell what a battery gives beside driving."""
+"""Samples at standstill that show what a battery gives beside driving."""
 
 NEAR: Final = 60.0
-"""Standstill so near driving tells what the battery gives beside it [s]."""
+"""Standstill so near driving shows what the battery gives beside it [s]."""
 
 OLDEST: Final = 3.0
 """Periods of a signal within which a value of it holds [-]."""

@@ -10,7 +10,7 @@ from weighbridge.arguments import check_number
 from weighbridge.errors import ConfigError
 
 MASSES: Final = (10.0, 1_000_000.0)
-"""Masses that may stand in a vehicle file, of any class and with any payload [kg]."""
+"""Masses that may are in a vehicle file, of any class and with any payload [kg]."""
 
 
 def curve(x_name: str, x: tuple[float, ...], y_name: str, y: tuple[float, ...]) -> None:

@@ -2,7 +2,7 @@
 
 Torque times speed is what the motor gives, voltage times current what the battery gives.
 Driving, the battery gives more than the motor by the losses of inverter and motor;
-recuperating, it gets less by them. So both together tell the losses and how much too high
+recuperating, it gets less by them. So both together show the losses and how much too high
 the torque is read, with no calibration: a torque read too high makes driving look too
 efficient and recuperation too lossy.
 """
@@ -25,7 +25,7 @@ from weighbridge.vehicle.torque import engine_torque, source_of
 
 LEAST_LOSS: Final = 0.01
 """Of inverter and motor in proportion to power, at least [-]: their best efficiency is below
-97 %, and part of what they lose hangs on speed alone (Burress, Benchmarking EV and HEV
+97 %, and part of what they lose depends on speed alone (Burress, Benchmarking EV and HEV
 Technologies, Oak Ridge National Laboratory, 2016)."""
 
 HIGHEST_LOSS: Final = 0.15
@@ -36,7 +36,7 @@ METER_STD: Final = 0.015
 heater, with meters of its own, took 0.96 to 1.00 of what the battery's said."""
 
 LEAST_POWER: Final = 3000.0
-"""Power at the shaft from which a second tells the efficiency [W]."""
+"""Power at the shaft from which a second shows the efficiency [W]."""
 
 LEAST_TIME: Final = 15.0
 """Time above that power that is needed, driving and recuperating [s]."""
@@ -62,7 +62,7 @@ CONTRADICTION: Final = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PowerBalance:
-    """What the power of the battery tells of the torque.
+    """What the power of the battery shows the torque.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ def find_power_balance(drive: Drive, vehicle: Vehicle) -> PowerBalance | None:
 
     With T the torque read and s its scale, electric power is ``T w / s`` and losses. Losses
     have the same sign both ways, so the electric power per shaft power is ``(1 + l) / s``
-    driving and ``(1 - l) / s`` recuperating: their mean tells s, their difference the losses
+    driving and ``(1 - l) / s`` recuperating: their mean shows s, their difference the losses
     l. No losses driving and twice of them recuperating, or the other way round, are the
     bounds; between them equal losses are the likeliest (a triangular distribution). Heating,
     cooling and electronics change slowly and are taken off with all that does (`SLOW`).

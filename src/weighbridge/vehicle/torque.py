@@ -16,14 +16,14 @@ from weighbridge.vehicle.model import TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TorqueSource
 
 DRAGGED_TIME: Final = 0.5
-"""Time over which a load tells whether the engine is dragged [s]."""
+"""Time over which a load shows whether the engine is dragged [s]."""
 
 JITTER: Final = 0.1
 """By how much stamps may miss the ends of a window, over their period [-]."""
 
 
 EXPONENT_STEP: Final = 0.1
-"""Change of the charge's power by which its effect is told [-]."""
+"""Change of the charge's power by which its effect is shown [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,9 +227,9 @@ def engine_torque(
     ----------
     engine_speed : (n,) at the same stamps [rad/s]; may be NaN for measured torque
     time : (n,) [s]
-    share : what a reading stands for in this air, (n,) of `in_air` [-]
+    share : what a reading means in this air, (n,) of `in_air` [-]
     period : between readings; that of the drive when None [s]
-    ahead : how far past a reading others may tell of it [s]
+    ahead : how far past a reading others may show it [s]
 
     Raises
     ------
@@ -255,7 +255,7 @@ def engine_torque(
 
 
 def in_air(charge: float | None, exponent: float, air: Air, altitude: Floats) -> Floats | float:
-    """What a reading stands for in this air, over what it does in that of the calibration [-].
+    """What a reading means in this air, over what it does in that of the calibration [-].
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def in_air(charge: float | None, exponent: float, air: Air, altitude: Floats) ->
 
 
 def _by_map(model: TorqueModel, reading: Floats, engine_speed: Floats) -> Floats:
-    """Torque that a reading stands for (n,) [N m]; engine speed is asked for where it tells."""
+    """Torque that a reading means (n,) [N m]; engine speed is asked for where it shows."""
     straight = len(model.coefficients) <= 2 and not model.curvature and not model.knots
     known = np.zeros_like(reading) if straight else engine_speed
     torque = rows_of(model, reading, known) @ parameters(model)

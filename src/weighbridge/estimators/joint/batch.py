@@ -93,7 +93,7 @@ UNCALIBRATED_MOTION_STD: Final[dict[MotionSource, float]] = {"speed_grade": 0.05
 of the motion is not known [-]."""
 
 UNTOLD_RETARDER_STD: Final = 0.08
-"""The same of a data sheet alone where a retarder may work that nothing tells of [-]: nine drives
+"""The same of a data sheet alone where a retarder may work that nothing shows [-]: nine drives
 of a simulated truck and bus at 1 Hz came out 9 % light with their retarder logged, 13 % without."""
 
 
@@ -126,7 +126,7 @@ def estimate(
     changed; the running mass is the mean of both. The final answer is that of
     the whole drive smoothed, at its end: the fuel burnt by then is taken off,
     and where the load has changed, it is the mass after the last change; the
-    segments tell those before.
+    segments show those before.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def _ask(
         )
         return _Asked(problem=problem, body=body, rows=rows, y=y, stood=stood)
 
-    # They should not hang on the guess.
+    # They should not depend on the guess.
     return of(_sensible(of(None).problem.mass_unchanged()))
 
 
@@ -423,7 +423,7 @@ def _air_std(balance: ForceBalance, problem: Problem, solved: _Solved, cut: Wind
 def _sizes(
     balance: ForceBalance, asked: _Asked, solved: _Solved, attenuating: Floats, systematic: float
 ) -> JointSizes:
-    """Keep what the drive tells of noise; ``attenuating`` is that of the motion [m^2/s^4]."""
+    """Keep what the drive shows noise; ``attenuating`` is that of the motion [m^2/s^4]."""
     return JointSizes(
         std=asked.problem.std,
         fast=solved.fast,
@@ -495,7 +495,7 @@ def _systematic_std(balance: ForceBalance, vehicle: Vehicle, mass: float) -> flo
 
 
 def _prior(balance: ForceBalance, vehicle: Vehicle, cut: Windows, guess: float) -> Floats:
-    """Standard deviations of the states before the drive has told, of a rough mass [kg]."""
+    """Standard deviations of the states before the drive has shown, of a rough mass [kg]."""
     torque = highest_torque(balance.table.torque[cut.index])
     return prior_std(vehicle, guess, torque, unmeasured_grade=balance.motion.unmeasured_grade)
 

@@ -24,7 +24,7 @@ KNEE: Final = 0.55
 answer to hills and wind passes for a bend too."""
 
 PRIOR_STD: Final = 0.5
-"""Standard deviation of the part that is missing or too much, before the drive has told [-]."""
+"""Standard deviation of the part that is missing or too much, before the drive has shown [-]."""
 
 BENT: Final = 0.14
 """A larger part that is missing contradicts the calibration [-]: undamaged drives of three
@@ -44,8 +44,8 @@ class TorqueBend:
 
     Attributes
     ----------
-    part : of the torque above it that the reading does not tell, at least [-]; negative where it
-        tells more
+    part : of the torque above it that the reading does not show, at least [-]; negative where it
+        shows more
     std : its standard deviation [-]
     knee : [N m] at the engine or motor
     """

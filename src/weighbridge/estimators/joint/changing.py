@@ -44,10 +44,10 @@ LEAST: Final = 0.08
 study showed one of 0.07."""
 
 LAUNCH: Final = 1e6
-"""Variance of the first window after a stop over that of the others [-]: it tells nothing."""
+"""Variance of the first window after a stop over that of the others [-]: it shows nothing."""
 
 SCALE_STD: Final = 0.3
-"""Standard deviation of a change of scale before the drive has told [-]."""
+"""Standard deviation of a change of scale before the drive has shown [-]."""
 
 AS_WELL: Final = 0.0
 """Gain of likelihood of a change of scale over the changes of load found, from which it may be the
@@ -190,7 +190,7 @@ def largest(given: FilterInput) -> ScaleChange | None:
     time = given.time
     if time.size < 4 * STEPS:
         return None
-    # Even in what the windows weigh, so that each part can tell.
+    # Even in what the windows weigh, so that each part can show.
     information = np.cumsum(given.rows[:, 0] ** 2 / given.noise)
     instants = np.interp((np.arange(STEPS - 1) + 1) / STEPS, information / information[-1], time)
     instants = instants[(instants >= time[ENDS]) & (instants <= time[-ENDS])]

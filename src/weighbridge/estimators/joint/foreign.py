@@ -1,4 +1,4 @@
-"""Is the vehicle file another vehicle's? What its road load has to be stretched by tells."""
+"""Is the vehicle file another vehicle's? What its road load has to be stretched by shows."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def stretched(track: MassTrack, vehicle: Vehicle) -> float:
 def of_another(vehicle: Vehicle, track: MassTrack) -> tuple[bool, Problem | None]:
     """Say why the vehicle file is another vehicle's; nothing if it may be its own.
 
-    Only files of a refined fit can tell: a data sheet leaves more open, and fits
+    Only files of a refined fit can show: a data sheet leaves more open, and fits
     for others put their road load elsewhere.
 
     Parameters

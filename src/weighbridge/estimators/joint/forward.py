@@ -141,7 +141,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
     Parameters
     ----------
     state : before it
-    window : accessories of the power that the setup tells are taken out of it as far as the
+    window : accessories of the power that the setup shows are taken out of it as far as the
         windows until then show that they are on
     setup
 
@@ -198,7 +198,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
 def _first_switch(
     state: disturbance.DisturbanceState, params: disturbance.DisturbanceParams, setup: JointSetup
 ) -> switched.SwitchState | None:
-    """Begin to tell when accessories are on; None where none are switched."""
+    """Begin to show when accessories are on; None where none are switched."""
     if not setup.switched_power > 0.0:
         return None
     return switched.initial_state(  # type: ignore[no-any-return]

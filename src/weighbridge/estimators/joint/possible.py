@@ -17,7 +17,7 @@ from weighbridge.signals import Floats
 from weighbridge.signals.instants import instant
 
 FEWEST: Final = 3
-"""Fewer windows after a stop, over those without which no change is believed, cannot tell what was
+"""Fewer windows after a stop, over those without which no change is believed, cannot show what was
 loaded there [-]."""
 
 MOST: Final = 40
@@ -103,7 +103,7 @@ def averaged(given: FilterInput, std: Floats, settings: JointSettings) -> Averag
     Parameters
     ----------
     given : of the estimator
-    std : (k,) of the states before the drive has told
+    std : (k,) of the states before the drive has shown
     settings
 
     References

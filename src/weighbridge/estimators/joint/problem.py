@@ -32,7 +32,7 @@ def first_state(
 
     Parameters
     ----------
-    std : (k,) of the states before the drive has told; that of the mass is its guess as well
+    std : (k,) of the states before the drive has shown; that of the mass is its guess as well
     slow : level of the disturbance over its usual size [-]
     time : of the first window [s]
     settings
@@ -78,7 +78,7 @@ class Problem:
     y : (m,) force that is left for them [N]
     odds : (m,) logarithm of the odds that the load changed before a window; NaN where it cannot
     variance : (m,) of the usual fast noise of ``y`` [N^2]
-    std : (k,) of the states before the drive has told; that of the mass is its guess as well
+    std : (k,) of the states before the drive has shown; that of the mass is its guess as well
     settings
     """
 
@@ -186,7 +186,7 @@ class FilterInput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointSizes:
-    """Sizes of noise and states that the whole drive tells.
+    """Sizes of noise and states that the whole drive shows.
 
     Attributes
     ----------

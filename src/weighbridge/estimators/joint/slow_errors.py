@@ -43,7 +43,7 @@ MOTION_SHARE: Final = 0.25
 """What of that noise the mean of a window keeps [-]: in 58 drives of three simulators, vibration,
 rough roads and vehicles of all classes, noise of one sample from 0.010 to 0.113 m/s^2,
 `motion_variance` meets the true error of the mean of a window within a quarter (RMS); how much a
-window keeps hangs on how fast the noise is, and on rough roads of one simulator it was twice as
+window keeps depends on how fast the noise is, and on rough roads of one simulator it was twice as
 much."""
 
 MOTION_WINDOW_STD: Final = 0.007
@@ -82,7 +82,7 @@ class SlowErrors:
     constants : the states that last as long as the drive, by name, each with its standard
         deviation: ``cold_torque``, friction of the start in the reading [N m]; ``drag_area``, C_d A
         above that of the vehicle file [m^2]; and those of `DATA_SHEET_NAMES`: by how much the
-        file's model of the torque tells too much [N m], the part of it that grows with engine
+        file's model of the torque shows too much [N m], the part of it that grows with engine
         speed, at `USUAL_SPEED` [N m], and inertias above those of the file [kg m^2]
     """
 
@@ -219,7 +219,7 @@ def window_motion_variance(motion: Motion, length: float = WINDOW) -> float:
 def motion_variance(motion: Motion, length: float = WINDOW) -> float:
     """Variance of the noise in the mean specific force over ``length`` [s] [m^2/s^4].
 
-    The drive tells it by the noise of the samples of its accelerometer. The slope of a
+    The drive shows it by the noise of the samples of its accelerometer. The slope of a
     smoothed speed is a conditional mean, and what is unknown of it no such noise.
     """
     level = motion.specific_force_std
@@ -237,7 +237,7 @@ def with_variance(motion: Motion, variance: float) -> Motion:
 def prior_std(
     vehicle: Vehicle, mass: float, torque: float, *, unmeasured_grade: float = 0.0
 ) -> Floats:
-    """Standard deviations (7,), (9,) or (11,) of the states before the drive has told.
+    """Standard deviations (7,), (9,) or (11,) of the states before the drive has shown.
 
     Parameters
     ----------

@@ -138,7 +138,7 @@ def find_switched(
 
 
 def without_switched(problem: Problem, column: Floats, found: Switched) -> Problem:
-    """Take out what is switched; where it is doubtful whether it was on is noise."""
+    """Take out what is switched; where it is uncertain whether it was on is noise."""
     force = found.power * column
     return replace(
         problem,

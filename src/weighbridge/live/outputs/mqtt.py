@@ -129,7 +129,7 @@ class Topics:
     def messages(self, weighing: LiveWeighing) -> list[tuple[str, bytes]]:
         """Return the messages of a weighing, as topic and payload.
 
-        The weight by VSS carries no uncertainty: it is told where the vehicle is weighed, and
+        The weight by VSS carries no uncertainty: it is shown where the vehicle is weighed, and
         withdrawn by an empty message where it is not.
         """
         mass = weighing.mass
@@ -140,7 +140,7 @@ class Topics:
         ]
 
     def discovery(self) -> list[tuple[str, bytes]]:
-        """Return what tells Home Assistant of the sensors, as topic and payload.
+        """Return what shows Home Assistant of the sensors, as topic and payload.
 
         An alert that is not watched any more is taken back by an empty message.
         """
@@ -345,7 +345,7 @@ class _Session:
         self._confirmed: set[int] = set()
 
     def begin(self) -> None:
-        """Connect, and tell who we are.
+        """Connect, and show who we are.
 
         Raises
         ------

@@ -123,7 +123,7 @@ def _rounded(value: float) -> float | None:
 
 
 class _Newest:
-    """What pages are told: the newest weighing and the points. Threads may share it."""
+    """What pages are shown: the newest weighing and the points. Threads may share it."""
 
     def __init__(self) -> None:
         self.closed = False
@@ -229,7 +229,7 @@ def make_app(newest: _Newest, host: str, names: Collection[str]) -> Starlette:
 
     Parameters
     ----------
-    newest : what the stream tells
+    newest : what the stream shows
     host, names : as of `Page`
     """
     from starlette.applications import Starlette
@@ -310,7 +310,7 @@ class _Guard:
         An address cannot be pointed elsewhere, as a name can.
         """
         name = host.lower()
-        # An address of IPv6 stands in brackets, before the port.
+        # An address of IPv6 is in brackets, before the port.
         end = "]" if name.startswith("[") else ":"
         name = name.removeprefix("[").partition(end)[0]
         if name in self._names:

@@ -42,7 +42,7 @@ _PERIOD: Final = 0.2
 # Lines that the newest view leaves free at the end: the mass, what was written, the prompt.
 _AFTER: Final = 5
 
-# From this width on, two signals stand in one line.
+# From this width on, two signals are in one line.
 _WIDE: Final = 78
 _LONGEST_NAME: Final = 26
 
@@ -56,7 +56,7 @@ class TerminalView:
     Parameters
     ----------
     console : of the terminal, for standard error
-    clock : tells the time [s], for how often the view is drawn
+    clock : shows the time [s], for how often the view is drawn
     """
 
     name = "terminal"

@@ -119,7 +119,7 @@ class ElmSource:
 
 
 class _Stopped(Exception):
-    """The source was told to stop while it waited for the adapter."""
+    """The source was shown to stop while it waited for the adapter."""
 
 
 class ElmCarrier:

@@ -65,7 +65,7 @@ class SentenceReader:
         return rows
 
     def _values(self, said: Sentence) -> dict[str, float]:
-        """Values of one sentence; as in a file, RMC tells the speed and GGA the place."""
+        """Values of one sentence; as in a file, RMC shows the speed and GGA the place."""
         values: dict[str, float] = {}
         if said.kind == "RMC":
             self._motion_told = True

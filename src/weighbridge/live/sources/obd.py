@@ -76,7 +76,7 @@ class ObdSource:
 
 
 def is_request(identifier: int, extended: bool, data: bytes) -> bool:
-    """Tell whether a frame is a request of service 01: the only kind that is ever sent."""
+    """Say whether a frame is a request of service 01: the only kind that is ever sent."""
     if extended:
         known = identifier == _ALL_29 or (identifier & 0x1FFF00FF) == _TO_29
     else:

@@ -28,13 +28,13 @@ _LEVEL: Final = 30.0
 """Means over so long are taken off: they are grade and bias [s]."""
 
 _SLOW: Final = 1.0
-"""Slower, wheels do not tell their speed [m/s]."""
+"""Slower, wheels do not show their speed [m/s]."""
 
 _BLOCK: Final = 60.0
-"""Blocks tell how the scale scatters and changes [s]."""
+"""Blocks show how the scale scatters and changes [s]."""
 
 _FEWEST: Final = 5
-"""Fewer blocks tell no scale."""
+"""Fewer blocks show no scale."""
 
 _SURE: Final = 4.0
 """Standard deviations by which a scale is off [-]."""
@@ -68,7 +68,7 @@ one beside an error of the squat would pass for a scale."""
 _VARIES: Final = 0.02
 _GRAVITY_VARYING: Final = 0.025
 """Where what is read of gravity varies by so much over the drive [-], it is no bias, and a smaller
-error tells."""
+error shows."""
 
 _SHARE: Final = (0.35, 2.0)
 """Share of gravity's error that the speed shows [-]: 0.5 to 0.9 where it is the scale, for the
@@ -91,7 +91,7 @@ _CHANGE_SURE: Final = 25.0
 """Squared error that a change of the scale must explain, over its variance [-]."""
 
 _FLOOR: Final = 0.005
-"""No block tells its scale better than so [-]."""
+"""No block shows its scale better than so [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ def find_gain(
 
     Returns
     -------
-    None where the scale is right, or where the drive does not tell.
+    None where the scale is right, or where the drive does not show.
     """
     pairs = changes_of_speed(motion, speed, _SPAN)
     if pairs is None:
@@ -182,7 +182,7 @@ def find_gain(
     at = np.bincount(block, time)[strong] / np.bincount(block)[strong]
     if at.size < _FEWEST:
         return None
-    # Weighed by what each block tells, so that quiet ones do no harm.
+    # Weighed by what each block shows, so that quiet ones do no harm.
     inverse, weight = common / square, square / float(np.mean(square))
     mean = float(common.sum() / square.sum())
     curve = np.full(2, mean)
@@ -216,7 +216,7 @@ def find_gain(
 
 
 def _upheld(gain: Gain, gravity: tuple[Floats, Floats]) -> bool:
-    """Tell whether gravity is read wrong too, and by about as much."""
+    """Say whether gravity is read wrong too, and by about as much."""
     time, part = gravity
     sides = (time <= gain.time[0], time >= gain.time[1])
     if gain.value[0] == gain.value[1] or not all(s.any() for s in sides):
@@ -232,7 +232,7 @@ def _upheld(gain: Gain, gravity: tuple[Floats, Floats]) -> bool:
 
 
 def _smoothed(motion: Motion, speed: Signal) -> bool:
-    """Tell whether the speed lacks what is fast in it: then the scale is not off."""
+    """Say whether the speed lacks what is fast in it: then the scale is not off."""
     off = []
     for span in (_SHORT, _LONG):
         pairs = changes_of_speed(motion, speed, span)
@@ -244,9 +244,9 @@ def _smoothed(motion: Motion, speed: Signal) -> bool:
 
 
 def _rougher(time: Floats, error: Floats, ends: Floats) -> bool:
-    """Tell whether speed and force also fit worse after a change: then it is not the scale."""
+    """Say whether speed and force also fit worse after a change: then it is not the scale."""
     middle = 0.5 * (ends[0] + ends[1])
-    # Blocks do not tell the instant: next to it the fit may be wrong.
+    # Blocks do not show the instant: next to it the fit may be wrong.
     before, after = error[time < middle - _BLOCK], error[time > middle + _BLOCK]
     if not before.size or not after.size:
         return True

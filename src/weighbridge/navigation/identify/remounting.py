@@ -32,7 +32,7 @@ _BLOCK: Final = 20.0
 """Rows are averaged over so long [s]."""
 
 _HILL: Final = 60.0
-"""Heights tell the grade over so long on both sides [s]; over less, their drift is larger."""
+"""Heights show the grade over so long on both sides [s]; over less, their drift is larger."""
 
 _HILL_WAY: Final = 300.0
 """and over so much way [m]."""
@@ -49,7 +49,7 @@ simulated vehicles came out less than their standard deviation off at 1 deg of p
 roll and 10 deg of yaw."""
 
 _FLOOR: Final = (math.radians(0.3), math.radians(0.15), math.radians(3.0))
-"""No block tells roll, pitch and yaw better than so [rad]."""
+"""No block shows roll, pitch and yaw better than so [rad]."""
 
 _MOST_CHANGES: Final = 8
 
@@ -331,7 +331,7 @@ def _instant(rows: _Rows, k: int, center: float, angle: float) -> tuple[float, f
 
 
 def _seen_by_gyro(time: Floats, values: Floats, change: Change) -> bool:
-    """Tell whether the gyro turned as far as the accelerometer tilted, as it does on a hill."""
+    """Say whether the gyro turned as far as the accelerometer tilted, as it does on a hill."""
     if change.kind == _YAW:
         return False
     middle, reach = 0.5 * (change.start + change.end), 0.5 * (change.end - change.start) + 4.0

@@ -1,4 +1,4 @@
-"""What a whole drive tells before its samples are folded: one record."""
+"""What a whole drive shows before its samples are folded: one record."""
 
 from __future__ import annotations
 
