@@ -33,9 +33,13 @@ _WEIGHTS = (
     ("questions", 2.0),
     ("studies/recorded", 1.0),
     *((f"{folder}/", 3.0) for folder in ("howto", "tutorials", "concepts")),
-    *((name, 0.3) for name in ("changelog", "papers", "studies/", "reference/", "licence")),
+    *((name, 0.3) for name in ("changelog", "studies/", "reference/", "licence")),
 )
 """How much more a page counts in the search than others, by the begin of its place."""
+
+
+_NUMBERS = ("papers.md",)
+"""Pages that the search leaves out."""
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -61,7 +65,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     """Turn links of the repository into those of the site; offer the notebook; weigh for search."""
     place = page.file.src_uri
     weight = next((w for begin, w in _WEIGHTS if place.startswith(begin)), 1.0)
-    page.meta.setdefault("search", {"boost": weight})
+    # Thousands of numbers are no words to search for, and lunr confuses some of them.
+    page.meta.setdefault("search", {"exclude": True} if place in _NUMBERS else {"boost": weight})
     if place.startswith("tutorials/") and not place.endswith("index.md"):
         name = Path(place).stem
         offer = f"\n\n[Download as a notebook](../downloads/{name}.ipynb){{ .md-button }}\n"
