@@ -61,7 +61,7 @@ def test_an_own_name_asks_no_other_package(package):
     [
         ("raise RuntimeError('not today')", "middle = broken_2:middle", "not today"),
         ("middle = 5", "middle = broken_2:middle", "it is no Record"),
-        ("middle = None", "middle = broken_2:other", "mend or remove that package"),
+        ("middle = None", "middle = broken_2:other", "no attribute 'other'"),
         (f"from {__name__} import Record\nx = Record('huge')", "middle = broken_2:x", "'huge'"),
         (
             f"from {__name__} import Record\nx = Record('large')",
