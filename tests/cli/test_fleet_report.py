@@ -151,8 +151,8 @@ def test_known_masses_outside_the_interval_are_told_everywhere(weighbridge, resu
     ran = weighbridge("fleet", "report", results, "--tickets", tickets, *words)
     assert ran.code == 0
     assert "outside the 95 % interval: 1 of 2 known masses; by chance one in twenty is" in ran.out
-    worst = "worst 2026-05-04 06:00 UTC: known 18500 kg, told 19020 to 20980 kg (+8.1 %)"
-    assert f"  truck1: 1 of 1, {worst}" in ran.out
+    line = next(x for x in ran.out.splitlines() if x.startswith("  truck1: 1 of 1"))
+    assert all(x in line for x in ("2026-05-04 06:00 UTC", "18500", "19020 to 20980", "+8.1 %"))
     told = json.loads((tmp_path / "fleet.json").read_text())
     assert [(r["vehicle_id"], r["outside"]) for r in told["outside"]] == [
         ("truck1", 1),

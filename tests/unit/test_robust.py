@@ -53,5 +53,8 @@ def test_resolution(kind):
     values = np.random.default_rng(2).uniform(0.0, 100.0, 5000)
     assert resolution(np.round(values / 0.39) * 0.39) == pytest.approx(0.39)
     assert resolution(np.random.default_rng(0).normal(size=500)) == 0.0
+    # Far levels are many steps apart: what rounding adds up to there counts no more.
+    accel = np.append(np.round(values / 100.0 / 0.0012) * 0.0012, [13.2, -12.0])
+    assert resolution(accel.astype(kind).astype(np.float64)) == pytest.approx(0.0012, rel=1e-3)
     assert resolution(np.ones(10)) == 0.0
     assert resolution(np.zeros(10)) == 0.0
