@@ -252,6 +252,10 @@ def _times(drive: Drive, *, factors: dict[str, float]) -> Drive:
     return drive.with_signals(*(Signal(s.name, s.time, f * s.values) for s, f in found))
 
 
+def _unchanged(drive: Drive) -> Drive:
+    return drive
+
+
 def _held(drive: Drive, *, name: str) -> Drive:
     """Let a signal keep the value that it has in the middle of the drive."""
     s = drive.signals[name]
@@ -494,7 +498,7 @@ def _misreadings(of: str) -> Iterator[tuple[str, tuple[str, ...], Callable[[Driv
             ("full", "no GNSS"),
             partial(_clock_times, factor=factor),
         )
-    yield "change of the speed as accelerometer", ("calculated axis",), lambda d: d
+    yield "change of the speed as accelerometer", ("calculated axis",), _unchanged
     for span in (1.0, 3.0):
         seen = ("full", "no GNSS")
         yield f"inertial sensor averaged over {span:g} s", seen, partial(_averaged, span=span)
