@@ -35,9 +35,6 @@ _WHOLE: Final = 0.1
 _SHORT: Final = 4.5
 """Gaps over the smallest by which the step is found; over longer ones rounding adds up [-]."""
 
-_MOST: Final = 0.9
-"""Part of the gaps that are multiples of the step [-]."""
-
 
 def spread(values: Floats) -> float:
     """Return the standard deviation of values (n,) about zero by the median of their sizes.
@@ -106,6 +103,6 @@ def resolution(values: Floats) -> float:
     short = gaps[gaps < _SHORT * gaps.min()]
     step = float(short.sum() / np.round(short / gaps.min()).sum())
     ratio = gaps / step
-    whole = np.mean(np.abs(ratio - np.round(ratio)) < _WHOLE)
     # Of a step as fine as rounding, all are multiples.
-    return step if whole > _MOST and step > 10.0 * grain else 0.0
+    on_steps = np.abs(ratio - np.round(ratio)).max() < _WHOLE and step > 10.0 * grain
+    return step if on_steps else 0.0
