@@ -23,6 +23,10 @@ ROUNDS: Final = 4
 REWEIGHTED: Final = 5
 """Rounds of weighing rows by how far they lie off."""
 
+ROBUST: Final = 1.5
+"""Residual over its scatter beyond which a row counts less [-] (Huber). With 1.345 the RMS by
+an accelerometer alone rises by 3 % of itself."""
+
 SLOWEST: Final = 3.0
 """Below clutches slip [m/s]."""
 
@@ -117,5 +121,5 @@ def _slope(rate: Floats, log_ratio: Floats, gear: Floats, alike: float) -> tuple
             return 0.0, np.inf
         slope = float(np.sum(weight * x * y)) / power
         scatter = spread(y - slope * x) + 1e-9
-        weight = huber(y - slope * x, scatter)
+        weight = huber(y - slope * x, scatter, ROBUST)
     return slope, alike * scatter**2 / power
