@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weighbridge.errors import ArgumentTypeError, ConfigError
+
+# Letters of a word that may be a known one written wrong.
+_LONGEST_WORD: Final = 100
 
 
 def type_name(given: object) -> str:
@@ -83,6 +87,56 @@ def check_all(name: str, given: object, kind: type | tuple[type, ...], expected:
         raise ArgumentTypeError(f"{name} must be several {expected}, got {_shown(given)}")
     for one in given:
         check_type(f"each of {name}", one, kind, f"one of several {expected}")
+
+
+def check_choice(name: str, given: object, known: Iterable[str]) -> None:
+    """Refuse what is none of the known words.
+
+    Parameters
+    ----------
+    name : of the argument
+    given : its value
+    known : words it may be
+
+    Raises
+    ------
+    ConfigError
+        The sentence names the argument, what it may be and what came, and a near miss.
+    """
+    if fault := choice_fault(name, given, known):
+        raise ConfigError(fault)
+
+
+def choice_fault(name: str, given: object, known: Iterable[str]) -> str:
+    """Return the sentence of `check_choice`; empty where the value is a known word."""
+    known = list(known)
+    if given in known:
+        return ""
+    meant = near_miss(str(given), known)
+    hint = f"; did you mean {meant}?" if meant else ""
+    return f"{name} must be {either(known)}, got {given!r:.40}{hint}"
+
+
+def either(words: Iterable[str]) -> str:
+    """Write words as ``a, b or c``."""
+    *most, last = words
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean ...?`` for a near miss, or the known words."""
+    known = list(known)
+    meant = near_miss(word, known)
+    return f"; did you mean {meant}?" if meant else f"; known are {', '.join(known)}"
+
+
+def near_miss(word: str, known: Iterable[str]) -> str:
+    """Return the known word that this one is nearly; empty where there is none."""
+    if len(word) > _LONGEST_WORD:
+        return ""
+    lower = {k.lower(): k for k in known}
+    near = difflib.get_close_matches(word.lower(), lower, n=1, cutoff=0.6)
+    return lower[near[0]] if near else ""
 
 
 def as_floats(name: str, given: object) -> NDArray[np.float64]:

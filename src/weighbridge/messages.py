@@ -10,12 +10,19 @@ from importlib.resources import files
 from typing import Any, Final, TypeVar
 
 from weighbridge.arguments import check_flag, check_number, check_text, check_type
+from weighbridge.customary import US, shown_amount, shown_unit
 from weighbridge.errors import ConfigError, DriveError, WeighbridgeError
 from weighbridge.visible import cut
 
 _Error = TypeVar("_Error", bound=DriveError)
 
 _ID: Final = re.compile(r"[a-z]+\.[a-z0-9_]+")
+
+_FIELD: Final = r"\{(\w+)(?::[^{}]*)?\}"
+_AMOUNTS: Final = re.compile(
+    rf"({_FIELD}(?:(?: to | ± | and | or |–){_FIELD})*) ({'|'.join(map(re.escape, US))})(?![\w/²])"
+)
+"""Numbers of a message with the unit behind them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +82,23 @@ class Problem:
         id, signal, start, end, serious : as of the class
         values : what the sentence quotes, by the names that the catalogue uses
         """
-        named = {"signal": signal, "start": start, "end": end, **values}
-        message = catalogue()[id]
-        parts = (message[part] for part in PARTS if part in message)
-        text = "; ".join(part.format_map(named) for part in parts)
+        text = _written(_form(id), signal=signal, start=start, end=end, **values)
         return cls(id, text, signal, _rounded(start), _rounded(end), bool(serious), _plain(values))
+
+    @property
+    def shown(self) -> str:
+        """The text in the units that people chose, see `weighbridge.customary`.
+
+        A message that was read from a file has lost its values, and stays as it is.
+        """
+        form = _form(self.id) if self.id in catalogue() else ""
+        others = _in_shown_units(form, self.values)
+        if others is None:
+            return self.text
+        form, values = others
+        named = {"signal": self.signal, "start": self.start, "end": self.end}
+        written = _written(_form(self.id), **{**named, **self.values})
+        return self.text.replace(written, _written(form, **{**named, **values}))
 
     @classmethod
     def from_error(cls, error: Exception) -> Problem:
@@ -132,6 +151,36 @@ class Problem:
             record["from_s"],
             record["to_s"],
         )
+
+
+def _form(id: str) -> str:
+    """Return a message of the catalogue with its fields in braces."""
+    message = catalogue()[id]
+    return "; ".join(message[part] for part in PARTS if part in message)
+
+
+def _written(form: str, /, **values: Any) -> str:
+    return form.format_map(values)
+
+
+def _in_shown_units(form: str, values: Mapping[str, Any]) -> tuple[str, dict[str, Any]] | None:
+    """Return a form and its values in the units that are shown; None where nothing changes."""
+    changed: dict[str, Any] = {}
+
+    def turned(found: re.Match[str]) -> str:
+        fields, unit = found[1], found[found.re.groups]
+        names = re.findall(_FIELD, fields)
+        if shown_unit(unit) == unit or not all(_is_number(values.get(n)) for n in names):
+            return found[0]
+        changed.update({n: shown_amount(values[n], unit) for n in names})
+        return f"{fields} {shown_unit(unit)}"
+
+    form = _AMOUNTS.sub(turned, form)
+    return (form, {**values, **changed}) if changed else None
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 PARTS: Final = ("text", "effect", "remedy")

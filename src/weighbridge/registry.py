@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, Protocol, TypeVar
 
+from weighbridge.arguments import either
 from weighbridge.errors import ConfigError
 
 
@@ -48,8 +49,7 @@ class Registry(Mapping[str, Record], Generic[Record]):
     @property
     def names(self) -> str:
         """All names in words: ``a, b or c``."""
-        *most, last = self
-        return f"{', '.join(most)} or {last}" if most else last
+        return either(self)
 
     def __getitem__(self, name: str) -> Record:
         own = self._own.get(name)

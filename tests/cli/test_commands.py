@@ -115,7 +115,7 @@ def test_calibrate_refuses_to_overwrite(weighbridge, car, known):
         (["--mass", "1580,1600"], "repeat --mass, as --mass 1580 --mass 1600"),
         (["--mass", "1580,5"], "give a number of kg"),
         (["--torque", "measured"], "no engine_torque"),
-        (["--torque", "guess"], "--torque guess"),
+        (["--torque", "guess"], "--torque must be "),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
     ],
 )
@@ -271,6 +271,17 @@ def test_weigh_refuses(weighbridge, car, loaded, words, said):
     assert ran.err.count("\n") == 1
 
 
+def test_weigh_shows_pounds_and_writes_kilograms(weighbridge, car, loaded, tmp_path):
+    out = tmp_path / "w.json"
+    ran = weighbridge("weigh", loaded.folder, "--vehicle", car, "--units", "us", "--json", out)
+    assert ran.code == 0
+    mass = json.loads(out.read_text())["mass_kg"]
+    assert f"{mass / 0.45359237:.0f} lb" in ran.out
+    assert " kg" not in ran.out
+    # The next command begins anew.
+    assert f"{mass:.0f} kg" in weighbridge("weigh", loaded.folder, "--vehicle", car).out
+
+
 def test_calibrate_into_a_folder_that_is_not_there(weighbridge, known, tmp_path):
     ran = weighbridge("calibrate", known.folder, "-o", tmp_path / "no" / "car.toml")
     assert ran.code == 2
@@ -350,7 +361,9 @@ def test_simulate_writes_a_folder_once(weighbridge, tmp_path):
         (["moon"], "unknown scenario 'moon'"),
         (["hihgway"], "did you mean highway?"),
         (["car-short", "--without", "friction"], "unknown effect 'friction'"),
-        (["car-short", "--format", "xlsx"], "csv or parquet"),
+        (["car-short", "--without", "sqat"], "did you mean squat?"),
+        (["car-short", "--format", "xlsx"], "parquet or csv"),
+        (["car-short", "--format", "parket"], "did you mean parquet?"),
     ],
 )
 def test_simulate_refuses(weighbridge, tmp_path, words, said):

@@ -6,12 +6,13 @@ import re
 import subprocess
 import sys
 
+import numba
 import pytest
 import typer
 from tests.cli.test_terminal import RUN, started
 
 from weighbridge.cli.main import app
-from weighbridge.cli.progress import Bar, time_text
+from weighbridge.cli.progress import Bar, compiling, time_text
 from weighbridge.cli.verbosity import _leaves
 
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-7]|38;|9[0-7])")
@@ -145,6 +146,27 @@ def test_the_time_left_is_that_of_the_shares_that_are_left():
     assert bar.done == 6.0
 
 
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+def test_a_bar_says_while_kernels_compile_and_not_when_they_are_kept(monkeypatch):
+    said = []
+    bar = Bar(1.0)
+    monkeypatch.setattr(bar, "say", lambda more="": said.append(more))
+
+    @numba.njit
+    def inner(x):
+        return x + 1.0
+
+    @numba.njit
+    def outer(x):
+        return inner(x)
+
+    with compiling(bar):
+        assert outer(1.0) == 2.0
+        assert [text[-4:] for text in said] == [" (1)", " (2)", ""]
+        outer(2.0)
+    assert len(said) == 3
+
+
 def test_times_are_told_for_people():
     assert [time_text(s) for s in (0.4, 59.6, 754.0, 7260.0)] == [
         "0 s",
@@ -163,6 +185,11 @@ def test_times_are_told_for_people():
         ("weighbridge calibrate x --torque wh", "wheel_torque"),
         ("weighbridge vehicle new --class tr", "truck"),
         ("weighbridge simulate hi", "highway"),
+        ("weighbridge simulate car --without sq", "squat"),
+        ("weighbridge vehicle new --driven re", "rear"),
+        ("weighbridge reproduce je", "jensen2022"),
+        ("weighbridge convert x y --format pa", "parquet"),
+        ("weighbridge live --source el", "elm:"),
     ],
 )
 def test_the_shell_completes(typed, offered):

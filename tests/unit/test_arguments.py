@@ -8,8 +8,14 @@ import polars as pl
 import pytest
 
 import weighbridge as wb
+from weighbridge.arguments import choice_fault, near_miss
+from weighbridge.calibration.settings import CalibrationSettings
+from weighbridge.errors import ConfigError
 from weighbridge.papers.nguyen2024 import suspension_of
+from weighbridge.signals.units import unit
 from weighbridge.simulation.ride import TRUCK, RideSensors
+from weighbridge.vehicle.driveline import Driveline
+from weighbridge.vehicle.torque_model import TorqueModel
 
 WRONG = (3, 2.5, None, object(), [1, 2], {"a": 1}, b"x", {3}, np.arange(3.0), "\0")
 
@@ -175,3 +181,31 @@ def test_lists_make_a_signal():
     assert made.at([0.5])[0] == 11.25
     with pytest.raises(wb.ConfigError, match=r"times of shape \(3,\) and values of shape \(2,\)"):
         wb.Signal("vehicle_speed", [0, 1, 2], [10, 12.5])
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("trck", "truck"), ("CAR", "car"), ("zeppelin", ""), ("x" * 5000, "")],
+)
+def test_a_word_that_is_nearly_right_is_named(given, meant):
+    known = ("car", "van", "truck")
+    assert near_miss(given, known) == meant
+    fault = choice_fault("class", given, known)
+    assert fault.startswith("class must be car, van or truck, got ")
+    assert fault.endswith(f"; did you mean {meant}?") == bool(meant)
+    assert len(fault) < 120
+
+
+@pytest.mark.parametrize(
+    ("make", "meant"),
+    [
+        (lambda: wb.Vehicle(kind="trcuk"), "truck"),
+        (lambda: Driveline(layout="transvers"), "transverse"),
+        (lambda: CalibrationSettings(method="joit"), "joint"),
+        (lambda: TorqueModel(source="persent"), "percent"),
+        (lambda: unit("kmhh"), "kmh"),
+    ],
+)
+def test_every_choice_names_what_was_meant(make, meant):
+    with pytest.raises(ConfigError, match=rf"did you mean {meant}\?"):
+        make()

@@ -120,8 +120,8 @@ SAID = {
     "mass of each segment",
     "air": "engine_load reads 0.91 times as much as mass_air_flow shows by the calibration of car: "
     "one of the two, or engine_speed, is wrong; a mass from it is off by the same share",
-    "masses": "with 1763 kg the torque of drive 1 reads 0.81 of its value; by data sheets (± 7 %) "
-    "1428 kg are plausible; check the mass",
+    "masses": "with 1763 kg the torque of drive 1 reads 0.81 of its value; by data sheets "
+    "(std 7 %) 1428 kg are plausible; check the mass",
     "squat": "the drive does not show how the body pitches under acceleration; its pitch is read "
     "as grade",
     "level": "no grade and no altitude; the road is assumed to be level",

@@ -14,6 +14,7 @@ from tests.unit.made_weighings import drive, weighing
 
 from weighbridge.errors import ConfigError
 from weighbridge.live.outputs.page import MOST, WINDOW, History, Page
+from weighbridge.live.weighing import AlertState
 
 pytest.importorskip("starlette", reason="starlette is not installed")
 pytest.importorskip("uvicorn", reason="uvicorn is not installed")
@@ -303,3 +304,24 @@ def test_the_chart_begins_with_a_mass_and_a_missing_limit_is_explained(page, bro
     assert tab.inner_text("#payload-name") == "Payload since the tare"
     assert tab.inner_text("#payload") == "−50 kg"
     assert tab.is_visible("#overload")
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+@pytest.mark.parametrize("width", [390, 1280])
+def test_an_active_alert_stands_above_the_mass(page, browser, width):
+    states = [
+        AlertState(limit=2000.0, side="above", active=active, probability=0.98)
+        for active in (True, False)
+    ]
+    page.show(weighing(gross=2000.0, alerts=(states[0],)))
+    tab = browser.new_page(viewport={"width": width, "height": 844})
+    tab.goto(page.name)
+    tab.wait_for_selector("#alert:not([hidden])")
+    assert "2000 kg" in tab.inner_text("#alert")
+    assert "98 %" in tab.inner_text("#alert")
+    bottom = "id => document.getElementById(id).getBoundingClientRect()"
+    assert tab.evaluate(f"({bottom})('alert').bottom <= ({bottom})('mass').top")
+    assert tab.evaluate("document.documentElement.scrollWidth") == width
+    page.show(weighing(time=301.0, gross=2000.0, alerts=(states[1],)))
+    tab.wait_for_selector("#alert", state="hidden")

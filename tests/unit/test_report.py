@@ -25,7 +25,7 @@ from weighbridge.report.style import REASON_STYLE, Panel, blank
 from weighbridge.report.table import Table
 from weighbridge.report.thinning import LINE_POINTS, spread, thin_line
 from weighbridge.results.calibration import Calibration, DelaySearch, FittedRows
-from weighbridge.signals import Drive, Signal
+from weighbridge.signals import Drive, DriveInfo, Signal
 from weighbridge.vehicle.gear import detect_gearings
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, TorqueModel, Vehicle
 
@@ -447,6 +447,14 @@ def test_mass_figure_draws_the_answer():
     low, high = figure.layout.yaxis.range
     assert low < 0.95 * MASS < 1.05 * MASS < high
     assert "1500 kg" in figure.layout.title.text
+    assert figure.layout.margin.t >= 80
+
+
+def test_mass_figure_has_the_known_mass_of_the_drive():
+    weighing = make_weighing()
+    known = replace(weighing, drive=replace(weighing.drive, info=DriveInfo(mass=1510.0)))
+    named = [[trace.name or "" for trace in mass_figure(w).data] for w in (known, weighing)]
+    assert [any("true mass" in name for name in names) for names in named] == [True, False]
 
 
 def test_thinning_keeps_extremes_ends_and_gaps():

@@ -57,6 +57,19 @@ def test_payload_and_permitted_mass_have_the_same_interval(tmp_path):
     assert f"94 % of 1600 kg, within it: {low:.0f} to {high:.0f} %" in page.text
 
 
+def test_a_report_of_several_drives_begins_with_the_overloaded_ones(tmp_path):
+    both = [weighed(30.0, vehicle=replace(VEHICLE, gross=gross)) for gross in (1600.0, 1400.0)]
+    drives = [
+        replace(w, drive=replace(w.drive, name=name))
+        for w, name in zip(both, ("light", "heavy"), strict=True)
+    ]
+    html = written(tmp_path, drives)
+    first = re.search(r'<p class="alert bad">(.*?)</p>', html)
+    assert first.group(1).endswith(": heavy.")
+    assert first.start() < html.index("<table")
+    assert 'class="alert bad"' not in written(tmp_path, [drives[0], drives[0]])
+
+
 @pytest.mark.parametrize(
     ("gross", "verdict"),
     [(1600.0, "within it"), (1520.0, "perhaps above"), (1480.0, "likely above"), (1400.0, "above")],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from numbers import Integral
 
-from weighbridge.arguments import check_flag, check_number, check_text, check_type
+from weighbridge.arguments import check_choice, check_flag, check_number, check_text, check_type
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.fits import FITS, JOINT, RLS, Fit
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
@@ -44,11 +44,9 @@ class CalibrationSettings:
         check_text("method", self.method)
         if self.order is not None and not 0 <= self.order <= 4:
             raise ConfigError(f"order must be between 0 and 4, got {self.order}")
-        if self.source is not None and self.source not in TORQUE_SOURCES:
-            raise ConfigError(f"source must be one of {TORQUE_SOURCES.names}, got {self.source!r}")
-        if self.method not in FITS:
-            *most, last = FITS
-            raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+        if self.source is not None:
+            check_choice("source", self.source, TORQUE_SOURCES)
+        check_choice("method", self.method, FITS)
         if self.grid and self.fit != RLS:
             raise ConfigError("the grid of Jensen 2022 is of method rls; calibrate with that")
 

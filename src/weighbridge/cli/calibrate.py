@@ -131,16 +131,16 @@ def calibrate(
 
     Example: weighbridge calibrate drive-empty/ --mass 1580 -o car.toml
     """
+    from weighbridge.arguments import check_choice
     from weighbridge.calibration.doubted_masses import with_doubts
     from weighbridge.calibration.settings import CalibrationSettings
-    from weighbridge.errors import ConfigError
     from weighbridge.pipeline.given import dbcs_beside, mapping_beside
     from weighbridge.vehicle.model import Vehicle
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
     refuse_overwriting(output, force, "vehicle file")
-    if torque is not None and torque not in TORQUE_SOURCES:
-        raise ConfigError(f"--torque {torque}: must be {TORQUE_SOURCES.names}")
+    if torque is not None:
+        check_choice("--torque", torque, TORQUE_SOURCES)
     base = Vehicle.load(vehicle) if vehicle is not None else None
     chosen = chosen_mapping(base, vehicle, mapping)
     read = inputs(drives, vehicle, chosen, dbc)

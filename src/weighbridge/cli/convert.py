@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from weighbridge.cli.listed import FORMATS, one_of
 from weighbridge.cli.options import (
     DbcPaths,
     MappingPath,
@@ -36,7 +37,12 @@ def convert(
         Path, typer.Argument(help="Folder to write, or an .mf4 file.", show_default=False)
     ],
     table_format: Annotated[
-        str, typer.Option("--format", help="Format of the tables in a folder: parquet or csv.")
+        str,
+        typer.Option(
+            "--format",
+            help="Format of the tables in a folder: parquet or csv.",
+            autocompletion=one_of(*FORMATS),
+        ),
     ] = "parquet",
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
@@ -48,8 +54,9 @@ def convert(
 
     Example: weighbridge convert log.mf4 drive/ --dbc car.dbc --mapping car.toml
     """
-    if table_format not in ("parquet", "csv"):
-        raise ConfigError(f"--format {table_format}: must be parquet or csv")
+    from weighbridge.arguments import check_choice
+
+    check_choice("--format", table_format, FORMATS)
     if out.exists() and drive.exists() and out.samefile(drive):
         raise ConfigError(f"{out}: is the drive itself; name another folder or file")
     read = inputs([drive], None, mapping, dbc)

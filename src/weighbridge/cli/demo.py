@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from weighbridge.cli.options import Units
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Result, inputs, refuse_results
 from weighbridge.cli.terminal import console, say
 from weighbridge.cli.verbosity import quiet
+from weighbridge.customary import shown_amount, shown_unit
 
 if TYPE_CHECKING:
     from weighbridge.pipeline.weighing import Weighing
@@ -30,6 +32,7 @@ def demo(
         "weighbridge-demo.html"
     ),
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")] = 7,
+    units: Units = "si",
     open_report: Annotated[
         bool,
         typer.Option(
@@ -53,7 +56,7 @@ def demo(
     comparisons: list[tuple[Weighing, ...]] = []
     # Shares of the work: a calibration takes twice as long as what is done with each drive.
     with progress("demo", 5 + 3 * len(LOADS)) as bar:
-        bar.begin("simulating a drive of known mass (the first run compiles)", 2)
+        bar.begin("simulating a drive of known mass", 2)
         shorter = replace(make_scenario("car-calibration", seed=seed), duration=DURATION)
         known = simulate_car(shorter, bar.within)
         bar.begin("calibrating by it", 2)
@@ -85,7 +88,7 @@ def demo(
         )
     _show(weighed)
     if not quiet():
-        say("true kg: at the end of the drive, fuel burnt on the way taken off")
+        say("true mass: at the end of the drive, fuel burnt on the way taken off")
         say("known beside the recordings: the wind, by a weather report")
         say(f"report: {output}")
     if open_report and sys.stdout.isatty():
@@ -98,11 +101,11 @@ def _show(weighed: list[tuple[Weighing, float]]) -> None:
     from rich.table import Table
 
     table = Table()
-    for name in ("drive", "true kg", "mass kg", "95 % from", "to", "error %"):
+    unit = shown_unit("kg")
+    for name in ("drive", f"true {unit}", f"mass {unit}", "95 % from", "to", "error %"):
         table.add_column(name, justify="right")
     for w, truth in weighed:
-        low, high = w.interval(0.95)
+        masses = (shown_amount(mass, "kg") for mass in (truth, w.mass, *w.interval(0.95)))
         error = 100.0 * (w.mass / truth - 1.0)
-        numbers = (f"{truth:.0f}", f"{w.mass:.0f}", f"{low:.0f}", f"{high:.0f}", f"{error:+.2f}")
-        table.add_row(w.drive.name, *numbers)
+        table.add_row(w.drive.name, *(f"{mass:.0f}" for mass in masses), f"{error:+.2f}")
     console().print(table)

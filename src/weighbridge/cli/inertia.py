@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
+from weighbridge.cli.listed import filter_names
 from weighbridge.cli.options import (
     DbcPaths,
     JsonPath,
@@ -35,6 +36,7 @@ def inertia(
             "--method",
             help="Filter: kalman-bucy; or inverse, extended or printed, with one fixed process"
             " noise.",
+            autocompletion=filter_names,
         ),
     ] = "kalman-bucy",
     settings: Annotated[

@@ -294,4 +294,4 @@ def _way_table(found: Inspection, every_way: bool) -> Table:
 def _expected(way: Way) -> str:
     if not way.possible:
         return ""
-    return way.accuracy if way.torque == "speed" else f"± {way.accuracy}"
+    return way.accuracy

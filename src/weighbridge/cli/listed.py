@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, Final
 
 from typer.core import TyperCommand, TyperOption
+
+FORMATS: Final = ("parquet", "csv")
+"""Formats of the tables of a drive."""
 
 
 class TellsMethods(TyperCommand):
@@ -69,6 +72,41 @@ def scenario_names(incomplete: str) -> list[str]:
     from weighbridge.simulation.named import SCENARIOS
 
     return _beginning((*SCENARIOS, "ride"), incomplete)
+
+
+def effect_names(incomplete: str) -> list[str]:
+    """Effects of the simulator that begin so."""
+    from dataclasses import fields
+
+    from weighbridge.simulation.scenario import Effects
+
+    return _beginning((f.name for f in fields(Effects)), incomplete)
+
+
+def filter_names(incomplete: str) -> list[str]:
+    """Filters of the ride that begin so."""
+    from weighbridge.inertia.filter import METHODS
+
+    return _beginning(METHODS, incomplete)
+
+
+def paper_names(incomplete: str) -> list[str]:
+    """Papers that begin so."""
+    from weighbridge.papers import PAPERS
+
+    return _beginning((*PAPERS, "all"), incomplete)
+
+
+def source_kinds(incomplete: str) -> list[str]:
+    """Kinds of live sources that begin so, with the colon behind them."""
+    from weighbridge.live.sources import SOURCES
+
+    return _beginning((f"{name}:" for name in SOURCES), incomplete)
+
+
+def one_of(*names: str) -> Callable[[str], list[str]]:
+    """Return the completion of an option that takes one of these names."""
+    return lambda incomplete: _beginning(names, incomplete)
 
 
 def _beginning(names: Iterable[str], incomplete: str) -> list[str]:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.options import DbcPaths, MappingPath, chosen_mapping, load
+from weighbridge.cli.listed import source_kinds
+from weighbridge.cli.options import DbcPaths, MappingPath, Units, chosen_mapping, load
 from weighbridge.cli.results import (
     Result,
     asked_for,
@@ -51,6 +52,7 @@ _Sources = Annotated[
         "--source",
         help="Source of samples, such as elm:/dev/ttyUSB0 or can:socketcan:can0; repeat it"
         " for more. docs/live.md lists all.",
+        autocompletion=source_kinds,
         metavar="KIND:PLACE",
     ),
 ]
@@ -158,6 +160,7 @@ def live(
     lateness: _Lateness = 1.0,
     listen_only: _ListenOnly = False,
     force: _Force = False,
+    units: Units = "si",
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
 ) -> None:
@@ -257,8 +260,10 @@ def _conclude(last: LiveWeighing, *, aloud: bool) -> None:
         complain(f"{last.status}: {last.reason}")
         raise typer.Exit(1)
     if aloud:
+        from weighbridge.report.text import between, kg
+
         low, high = last.interval()
-        say(f"{last.mass:.0f} kg, {low:.0f} to {high:.0f} kg with 95 % probability")
+        say(f"{kg(last.mass)}, {between(low, high)} with 95 % probability")
 
 
 def _sources(

@@ -145,7 +145,7 @@ def _failed(error: Exception) -> int:
         # Usage errors of typer, whose home differs between its versions. A group of commands
         # alone has none: its help is printed.
         if text := error.format_message():
-            complain(f"weighbridge: {text}; weighbridge COMMAND --help shows how")
+            complain(f"weighbridge: {text.rstrip('.')}; weighbridge COMMAND --help shows how")
     else:
         sys.excepthook = _show_bug
         raise error

@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
+from weighbridge.cli.listed import one_of
+from weighbridge.cli.verbosity import show_in
+from weighbridge.customary import SYSTEMS
+
 if TYPE_CHECKING:
     from weighbridge.signals import Drive
     from weighbridge.vehicle.model import Vehicle
@@ -43,6 +47,16 @@ DbcPaths = Annotated[
         "--dbc",
         help="DBC for raw CAN logs; repeat it for more files; write 1:FILE for bus 1 only.",
         metavar="FILE",
+    ),
+]
+
+Units = Annotated[
+    str,
+    typer.Option(
+        "--units",
+        help="What people read: si, or us for pounds, feet and miles. Files stay SI.",
+        callback=show_in,
+        autocompletion=one_of(*SYSTEMS),
     ),
 ]
 

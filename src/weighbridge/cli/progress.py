@@ -31,6 +31,7 @@ class Bar:
         self._before = self._share = 0.0
         self._clock = clock
         self._begun = self._told = clock()
+        self._what = ""
         self._progress: Progress | None = None
 
     def begin(self, what: str, share: float = 1.0) -> None:
@@ -38,8 +39,14 @@ class Bar:
         self._before += self._share
         self._share = share
         self._advance(self._before)
+        self._what = what
+        self.say()
+
+    def say(self, more: str = "") -> None:
+        """Show what is done, and more about it."""
         if self._progress is not None:
-            self._progress.update(self._progress.task_ids[0], description=shown(what))
+            text = shown(f"{self._what}{more}")
+            self._progress.update(self._progress.task_ids[0], description=text)
 
     def within(self, done: float, total: float) -> None:
         """Say how much of the step under way is done."""
@@ -68,7 +75,7 @@ class Bar:
 
     def _show(self, progress: Progress, what: str) -> None:
         progress.add_task(shown(what), total=self.total or None)
-        self._progress = progress
+        self._progress, self._what = progress, what
 
 
 @contextlib.contextmanager
@@ -107,7 +114,30 @@ def progress(what: str, total: float = 0.0) -> Iterator[Bar]:
         *columns, console=console(stderr=True), transient=True, redirect_stdout=False, expand=True
     ) as drawn:
         bar._show(drawn, what)
-        yield bar
+        with compiling(bar):
+            yield bar
+
+
+@contextlib.contextmanager
+def compiling(bar: Bar) -> Iterator[None]:
+    """Let a bar say so while kernels are compiled, which only the first run does."""
+    from numba.core import event
+
+    class Compiling(event.Listener):
+        # A kernel that calls another waits for it.
+        waiting = begun = 0
+
+        def on_start(self, event: object) -> None:
+            self.waiting, self.begun = self.waiting + 1, self.begun + 1
+            bar.say(f": compiling, in the first run only ({self.begun})")
+
+        def on_end(self, event: object) -> None:
+            self.waiting -= 1
+            if not self.waiting:
+                bar.say()
+
+    with event.install_listener("numba:compile", Compiling()):
+        yield
 
 
 def each(items: Sequence[Item], what: str, name: Callable[[Item], Any] = str) -> Iterator[Item]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Optional
 
 import typer
 
+from weighbridge.cli.listed import source_kinds
 from weighbridge.cli.options import DbcPaths, MappingPath
 from weighbridge.cli.terminal import complain, console
 from weighbridge.cli.verbosity import notice, say_written, watched
@@ -39,7 +40,12 @@ _TOLD: Final = 60.0
 def record(
     source: Annotated[
         list[str],
-        typer.Option("--source", help="Source of samples; repeat it for more.", show_default=False),
+        typer.Option(
+            "--source",
+            help="Source of samples; repeat it for more.",
+            autocompletion=source_kinds,
+            show_default=False,
+        ),
     ],
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Folder to record into.", show_default=False)

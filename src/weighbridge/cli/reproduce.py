@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
+from weighbridge.cli.listed import paper_names
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import Kind, Result, asked_for, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import complain, console, say
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
 
 def reproduce(
     paper: Annotated[
-        str, typer.Argument(help="du2025, galvao, jensen2022, nguyen2024 or all.")
+        str,
+        typer.Argument(
+            help="du2025, galvao, jensen2022, nguyen2024 or all.", autocompletion=paper_names
+        ),
     ] = "all",
     report: Annotated[
         Optional[Path],  # noqa: UP045  (typer reads the annotation at run time)
@@ -67,11 +71,10 @@ def reproduce(
     Example: weighbridge reproduce jensen2022 --report jensen2022.html
     """
     from weighbridge import papers
-    from weighbridge.errors import ConfigError
+    from weighbridge.arguments import check_choice
     from weighbridge.estimators.settings import differences
 
-    if paper != "all" and paper not in papers.PAPERS:
-        raise ConfigError(f"{paper}: known papers are {', '.join(papers.PAPERS)} and all")
+    check_choice("paper", paper, (*papers.PAPERS, "all"))
     names = list(papers.PAPERS) if paper == "all" else [paper]
     settings = _settings(paper, changes or [])
     pages = _pages(report, names, every=paper == "all")

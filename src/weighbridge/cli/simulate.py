@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from weighbridge.cli.fleet import RunsDrives, Unnamed
-from weighbridge.cli.listed import scenario_names
+from weighbridge.cli.listed import FORMATS, effect_names, one_of, scenario_names
 from weighbridge.cli.progress import progress
 from weighbridge.cli.results import inputs, refuse_folder, refuse_overwriting
 from weighbridge.cli.terminal import say
@@ -47,17 +47,28 @@ def simulate(
     ] = None,
     without: Annotated[
         Optional[list[str]],  # noqa: UP045
-        typer.Option("--without", help="Effect to switch off, such as squat; repeat it for more."),
+        typer.Option(
+            "--without",
+            help="Effect to switch off, such as squat; repeat it for more.",
+            autocompletion=effect_names,
+        ),
     ] = None,
     road: Annotated[
         Optional[str],  # noqa: UP045
-        typer.Option("--road", help="For ride: ISO 8608 class A to H; C by default."),
+        typer.Option(
+            "--road",
+            help="For ride: ISO 8608 class A to H; C by default.",
+            autocompletion=one_of(*"ABCDEFGH"),
+        ),
     ] = None,
     speed: Annotated[
         Optional[float],  # noqa: UP045
         typer.Option("--speed", help="For ride: speed in km/h; 60 by default."),
     ] = None,
-    table: Annotated[str, typer.Option("--format", help="Tables: csv or parquet.")] = "parquet",
+    table: Annotated[
+        str,
+        typer.Option("--format", help="Tables: csv or parquet.", autocompletion=one_of(*FORMATS)),
+    ] = "parquet",
     force: Annotated[bool, typer.Option("--force", help="Write into an existing folder.")] = False,
 ) -> None:
     """Simulate a drive and write it as a folder of tables, with the true values.
@@ -66,14 +77,14 @@ def simulate(
     """
     from dataclasses import replace
 
+    from weighbridge.arguments import check_choice
     from weighbridge.errors import ConfigError
     from weighbridge.signals.units import scalar_to_si
     from weighbridge.simulation import make_scenario, simulate_car
 
     refuse_folder(inputs(), output)
     refuse_overwriting(output, force, "folder")
-    if table not in ("csv", "parquet"):
-        raise ConfigError(f"--format {table}: must be csv or parquet")
+    check_choice("--format", table, FORMATS)
     if scenario == "ride":
         if wind is not None or wind_from is not None or without:
             raise ConfigError("a ride knows no --wind, --wind-from and --without; leave them out")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from weighbridge.cli.listed import TellsSources, class_names, source_names
+from weighbridge.cli.listed import TellsSources, class_names, one_of, source_names
 from weighbridge.cli.options import MappingPath
 from weighbridge.cli.results import Result, inputs, refuse_overwriting, refuse_results
 from weighbridge.cli.terminal import console, say, shown
@@ -47,7 +47,12 @@ _Radius = Annotated[
 ]
 _DrivenAxles = Annotated[
     _Text,
-    typer.Option("--driven", help="Driven axles: front, rear or all.", show_default=False),
+    typer.Option(
+        "--driven",
+        help="Driven axles: front, rear or all.",
+        autocompletion=one_of("front", "rear", "all"),
+        show_default=False,
+    ),
 ]
 _GearRatios = Annotated[
     _Text,
@@ -69,6 +74,7 @@ _Layout = Annotated[
     typer.Option(
         "--layout",
         help="Engine of a car or van: transverse or longitudinal.",
+        autocompletion=one_of("transverse", "longitudinal"),
         show_default=False,
     ),
 ]
@@ -89,7 +95,13 @@ def new(
     ] = "car",
     name: Annotated[str, typer.Option("--name", help="Name shown in results.")] = "vehicle",
     engine: Annotated[
-        _Text, typer.Option("--engine", help="petrol, diesel or electric.", show_default=False)
+        _Text,
+        typer.Option(
+            "--engine",
+            help="petrol, diesel or electric.",
+            autocompletion=one_of("petrol", "diesel", "electric"),
+            show_default=False,
+        ),
     ] = None,
     tare: _Tare = None,
     gross: _Gross = None,

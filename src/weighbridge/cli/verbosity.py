@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperGroup, TyperOption
 
 from weighbridge.cli.terminal import complain, say
+from weighbridge.customary import shown_in
 
 _SHARED: Final = ("quiet", "verbose")
 """Options that stand behind every command as well as before it."""
@@ -49,6 +50,12 @@ def _take(*, quiet: bool = False, verbose: int = 0) -> None:
         from weighbridge.cli.logs import logged
 
         _asked.ends.enter_context(logged(_asked.quiet, _asked.verbose))
+
+
+def show_in(units: str) -> str:
+    """Show what people read in these units until the command ends."""
+    _asked.ends.enter_context(shown_in(units))
+    return units
 
 
 Quiet = Annotated[

@@ -15,6 +15,7 @@ from weighbridge.cli.options import (
     DrivePaths,
     MappingPath,
     ReportPath,
+    Units,
     Whole,
     chosen_mapping,
     load_parts,
@@ -23,6 +24,7 @@ from weighbridge.cli.progress import Bar, progress
 from weighbridge.cli.results import asked_for, inputs, refuse_results, write_json
 from weighbridge.cli.terminal import console, say, say_notes, shown
 from weighbridge.cli.verbosity import say_written
+from weighbridge.customary import shown_amount, shown_unit
 from weighbridge.whole import is_stream
 
 if TYPE_CHECKING:
@@ -104,6 +106,7 @@ def weigh(
     report: ReportPath = None,
     compare: _Compare = False,
     tiles: _Tiles = None,
+    units: Units = "si",
     whole: Whole = False,
     mapping: MappingPath = None,
     dbc: DbcPaths = None,
@@ -252,25 +255,27 @@ def _show(
         screen.print(method_table(methods, narrow=narrow))
         without = [w for w in methods if w.status != "converged"]
         for w in without if narrow else ():
-            screen.print(shown(f"{w.method}: no mass: {w.reason}"), highlight=False)
+            screen.print(shown(f"{w.method}: no mass: {_reason(w.row)}"), highlight=False)
         if note := made_for(methods):
             say_notes([note], screen)
 
 
 def _show_one(row: WeighingRow, car: Vehicle, screen: Console) -> None:
+    from weighbridge.report.text import between, kg, with_half
+
     if row.status == "converged":
         low, high = row.interval
-        say(f"{row.drive}: {row.mass:.0f} kg, 95 % between {low:.0f} and {high:.0f} kg")
+        say(f"{row.drive}: {kg(row.mass)}, 95 % between {between(low, high, 'and')}")
         if car.tare is not None:
-            say(f"payload {row.payload:.0f} kg over a tare of {car.tare:.0f} kg")
+            say(f"payload {kg(row.payload)} over a tare of {kg(car.tare)}")
         if row.load_changed:
-            loads = ", then ".join(f"{s.mass:.0f} ± {1.96 * s.std:.0f} kg" for s in row.segments)
+            loads = ", then ".join(with_half(s.mass, 1.96 * s.std) for s in row.segments)
             say(f"the load changed: {loads}")
         minutes = row.used_time / 60.0
         say(f"from {minutes:.1f} min of {row.duration / 60.0:.1f} min, method {row.method}")
     else:
-        say(f"{row.drive}: no mass ({row.status}): {row.reason}")
-    say_notes(row.warnings, screen)
+        say(f"{row.drive}: no mass ({row.status}): {_reason(row)}")
+    say_notes([p.shown for p in row.problems], screen)
 
 
 def method_table(methods: tuple[Weighing, ...], *, narrow: bool = False) -> Table:
@@ -309,7 +314,8 @@ def made_for(methods: tuple[Weighing, ...]) -> str:
 
 def _numbers(row: WeighingRow) -> list[str]:
     """Mass, interval and payload; empty where there is none."""
-    return [f"{x:.0f}" if x == x else "" for x in (row.mass, *row.interval, row.payload)]
+    shown = (shown_amount(x, "kg") for x in (row.mass, *row.interval, row.payload))
+    return [f"{x:.0f}" if x == x else "" for x in shown]
 
 
 def _table(*, narrow: bool) -> Table:
@@ -324,7 +330,8 @@ def _table(*, narrow: bool) -> Table:
 
 def _add_outcome_columns(table: Table, kept: int, *, narrow: bool) -> None:
     """Add the first columns of numbers, and the outcome; a heading may break, a number may not."""
-    for name in ("mass kg", "95 % from", "to", "payload kg")[:kept]:
+    unit = shown_unit("kg")
+    for name in (f"mass {unit}", "95 % from", "to", f"payload {unit}")[:kept]:
         widest = max(map(len, name.split()))
         table.add_column(name, justify="right", min_width=max(widest, 5), no_wrap=not narrow)
     table.add_column("status" if narrow else "status or reason", no_wrap=narrow)
@@ -333,7 +340,11 @@ def _add_outcome_columns(table: Table, kept: int, *, narrow: bool) -> None:
 def _outcome(row: WeighingRow, *, narrow: bool) -> str:
     if narrow or row.status == "converged":
         return str(row.status)
-    return shown(f"{row.status}: {row.reason}")
+    return shown(f"{row.status}: {_reason(row)}")
+
+
+def _reason(row: WeighingRow) -> str:
+    return "" if row.refusal is None else row.refusal.shown
 
 
 def warning_lines(rows: list[WeighingRow]) -> list[str]:
@@ -343,10 +354,11 @@ def warning_lines(rows: list[WeighingRow]) -> list[str]:
     """
     if not rows:
         return []
-    shared = set.intersection(*(set(r.warnings) for r in rows)) if len(rows) > 1 else set()
-    lines = [f"every drive: {text}" for text in dict.fromkeys(rows[0].warnings) if text in shared]
-    for row in rows:
-        own = [p.text for p in row.problems if p.text not in shared and p.id != "file.part"]
+    said = [{p.shown: p for p in r.problems} for r in rows]
+    shared = set.intersection(*map(set, said)) if len(rows) > 1 else set()
+    lines = [f"every drive: {text}" for text in said[0] if text in shared]
+    for row, texts in zip(rows, said, strict=True):
+        own = [t for t, p in texts.items() if t not in shared and p.id != "file.part"]
         lines += [f"{row.drive}: {text}" for text in own[:_NOTED]]
         if len(own) > _NOTED:
             lines.append(f"{row.drive}: {len(own) - _NOTED} more, see --json")
@@ -356,7 +368,7 @@ def warning_lines(rows: list[WeighingRow]) -> list[str]:
 def reason_lines(rows: list[WeighingRow], failed: list[tuple[str, Problem]]) -> list[str]:
     """Say why drives have no mass, for a table that has no room for it."""
     without = [r for r in rows if r.status != "converged"]
-    return [f"{r.drive}: no mass ({r.status}): {r.reason}" for r in without] + [
+    return [f"{r.drive}: no mass ({r.status}): {_reason(r)}" for r in without] + [
         why.text if name in why.text else f"{name}: {why.text}" for name, why in failed
     ]
 

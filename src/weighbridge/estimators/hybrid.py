@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.arguments import check_choice
 from weighbridge.balance import ForceBalance
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import ekf, robust_rls
@@ -80,8 +81,7 @@ class HybridSettings(GateSettings):
 
     def __post_init__(self) -> None:
         GateSettings.__post_init__(self)
-        if self.blend not in list(Blend):
-            raise ConfigError(f"blend must be one of {', '.join(Blend)}, got {self.blend}")
+        check_choice("blend", self.blend, Blend)
         if not self.blend_width > 0.0:
             raise ConfigError(f"blend_width must be positive, got {self.blend_width}")
         positive("blend_memory", self.blend_memory)

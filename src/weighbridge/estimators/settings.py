@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any, Final
 
-from weighbridge.arguments import type_name
+from weighbridge.arguments import suggestion, type_name
 from weighbridge.errors import ConfigError
 
 WORD: Final = re.compile(r"(?!(true|false|nan|inf)$)[a-z][a-z-]*")
@@ -77,9 +77,7 @@ def _with(settings: Any, whole: str, path: list[str], value: object) -> Any:
     first, *rest = path
     known = [f.name for f in dataclasses.fields(settings)]
     if first not in known:
-        raise ConfigError(
-            f"there is no setting {whole!r}; known are {', '.join(_values(settings))}"
-        )
+        raise ConfigError(f"there is no setting {whole!r}{suggestion(whole, _values(settings))}")
     old = getattr(settings, first)
     if dataclasses.is_dataclass(old) and rest:
         return dataclasses.replace(settings, **{first: _with(old, whole, rest, value)})

@@ -325,7 +325,7 @@ def _drift_text(watched: tuple[str, str, str], change: Drift) -> str:
     _, what, unit = watched
     if not change.sure:
         return ""
-    return f"the {what} drifts by {change.slope:+.2g} ± {change.std:.1g} {unit} in 30 days"
+    return f"the {what} drifts by {change.slope:+.2g} {unit} (std {change.std:.1g}) in 30 days"
 
 
 def with_drift(refined: Vehicle, change: Drift, times: Sequence[datetime]) -> Vehicle:

@@ -350,7 +350,7 @@ function quality() {
 
 function learnt() {
   const rank = { contradicted: 3, drifts: 2, "not refined": 1, refined: 0 };
-  const spread = (x, std, digits) => (x === null ? "–" : `${x > 0 ? "+" : ""}${x.toFixed(digits)} ±\u00a0${std.toFixed(digits)}`);
+  const spread = (x, std, digits) => (x === null ? "–" : `${x > 0 ? "+" : ""}${x.toFixed(digits)} ±\u00a0${(1.96 * std).toFixed(digits)}`);
   const drift = (head, name, std, digits) =>
     ({ head, value: of(G[name]), show: (x, k) => spread(x, G[std][k], digits), kind: "n" });
   table("learnt", G.v.length, [

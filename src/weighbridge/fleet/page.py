@@ -37,8 +37,7 @@ _SECTIONS: Final = (
     (
         "learnt",
         "Learnt from tickets",
-        "Vehicle files that their drives contradict, and what drifts in 30 days. Here ± is one "
-        "standard deviation.",
+        "Vehicle files that their drives contradict, and what drifts in 30 days.",
     ),
     ("verdicts", "Known masses", "Verdicts by the loads of Regulation (EU) 2019/1213, Annex IV."),
 )

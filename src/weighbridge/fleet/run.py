@@ -11,6 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from weighbridge.arguments import suggestion
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.engine import Count, plain, run_jobs
 from weighbridge.fleet.inputs import Recording, recordings, refuse_missing
@@ -22,7 +23,6 @@ from weighbridge.fleet.remote import is_url, was_url
 from weighbridge.fleet.store import KEYS, Results
 from weighbridge.fleet.tickets import read_tickets
 from weighbridge.fleet.vehicles import Vehicles
-from weighbridge.signals.tomlfile import suggestion
 
 if TYPE_CHECKING:
     import polars as pl

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, NamedTuple
 
+from weighbridge.arguments import check_choice
 from weighbridge.errors import ConfigError
 from weighbridge.fleet.keys import file_digest, text_digest
 from weighbridge.io.dbc import dbc_path, with_path
@@ -115,8 +116,7 @@ class Vehicles:
         if not folder.is_dir():
             raise ConfigError(f"{folder}: no such folder of vehicle files")
         kind = "car" if kind is None else kind
-        if kind not in VEHICLE_CLASSES:
-            raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {kind!r}")
+        check_choice("class", kind, VEHICLE_CLASSES)
         self._kind = kind
         self._mapping = mapping
         self.files = tuple(
@@ -191,8 +191,7 @@ class Vehicles:
 
     def _sheet(self, name: str | None, kind: str | None) -> Assigned:
         kind = kind or self._kind
-        if kind not in VEHICLE_CLASSES:
-            raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {kind!r}")
+        check_choice("class", kind, VEHICLE_CLASSES)
         if (name, kind) not in self._sheets:
             mapping = self._mapping_file(self._mapping)
             self._sheets[name, kind] = Assigned(

@@ -15,13 +15,12 @@ from typing import Final, Literal
 import numpy as np
 from scipy.special import ndtri
 
-from weighbridge.arguments import as_floats, check_number, check_type
+from weighbridge.arguments import as_floats, check_number, check_type, suggestion
 from weighbridge.errors import ConfigError
 from weighbridge.inertia.settings import InertiaSettings
 from weighbridge.kernels import inertia as kernel
 from weighbridge.kernels import kalman_bucy
 from weighbridge.signals import Bools, Floats
-from weighbridge.signals.tomlfile import suggestion
 from weighbridge.vehicle.model import Ride
 
 Method = Literal["kalman-bucy", "inverse", "extended", "printed"]

@@ -7,9 +7,10 @@ from typing import Final
 
 import tomlkit
 
+from weighbridge.arguments import suggestion
 from weighbridge.errors import DriveError
 from weighbridge.signals import QUANTITIES, DriveInfo
-from weighbridge.signals.tomlfile import Section, exact_text, parse_toml, read_toml, suggestion
+from weighbridge.signals.tomlfile import Section, exact_text, parse_toml, read_toml
 
 FILE_NAME: Final = "drive.toml"
 

@@ -45,13 +45,13 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, Final
 
-from weighbridge.arguments import check_texts, check_type
+from weighbridge.arguments import check_texts, check_type, suggestion
 from weighbridge.errors import ConfigError, DriveError
 from weighbridge.io.columns import bracketed_unit, dimension_of, suffixes_of, unit_suffix
 from weighbridge.io.dbc import dbc_path, seen_from
 from weighbridge.io.table import MOST_COLUMNS, TextFormat, column_list
 from weighbridge.signals import QUANTITIES, Problem, Quantity
-from weighbridge.signals.tomlfile import Faults, Section, read_toml, suggestion
+from weighbridge.signals.tomlfile import Faults, Section, read_toml
 from weighbridge.signals.units import UNITS
 
 FORMAT_VERSION: Final = 1

@@ -10,8 +10,9 @@ from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
     IndexDataCacheFile,
-    UserProvidedCacheLocator,
+    UserWideCacheLocator,
 )
+from numba.misc.appdirs import AppDirs
 
 
 def _sources() -> str:
@@ -28,13 +29,17 @@ SOURCES = _sources()
 notices edits of a function's own file, and not of those it calls."""
 
 
-class _ByContent(UserProvidedCacheLocator):
-    """Folder in NUMBA_CACHE_DIR named by the sources: a checkout and a wheel share it."""
+class _ByContent(UserWideCacheLocator):
+    """Folder named by the sources, in NUMBA_CACHE_DIR or else in the user's cache folder.
 
-    @classmethod
-    def get_suitable_cache_subpath(cls, py_file):
-        """Return the name of the folder, whatever the path of the file."""
-        return f"weighbridge_{SOURCES[:16]}_numba_{numba.__version__}"
+    Checkouts and wheels of the same kernels share it, and each environment of ``uvx`` finds it.
+    """
+
+    def __init__(self, py_func, py_file):
+        super().__init__(py_func, py_file)
+        own = AppDirs("weighbridge", appauthor=False).user_cache_dir
+        name = f"weighbridge_{SOURCES[:16]}_numba_{numba.__version__}"
+        self._cache_path = str(Path(numba.config.CACHE_DIR or own) / name)
 
 
 class _Place(CompileResultCacheImpl):

@@ -97,7 +97,7 @@ def refuse_absurd(state: ForwardState | None, setup: ForwardSetup | None) -> Non
         return
     mass, std = state.joint.mass, state.joint.std(setup.joint)
     if not (LIGHTEST < mass < HEAVIEST and 0.0 < std < mass):
-        raise ConfigError(f"the checkpoint is not used: it holds {mass:.0f} ± {std:.0f} kg")
+        raise ConfigError(f"the checkpoint is not used: it holds {mass:.0f} kg, std {std:.0f} kg")
 
 
 def _plain(value: Any) -> Any:

@@ -83,9 +83,10 @@ class Keeper:
         told = scale.weighing()
         if told.mass != told.mass:
             return scale, ""
+        low, high = told.interval()
         return scale, (
-            f"going on from {told.mass:.0f} kg ± {told.std:.0f} kg of the checkpoint: press l "
-            "where the load has changed since"
+            f"going on from {told.mass:.0f} ± {0.5 * (high - low):.0f} kg of the checkpoint: "
+            "press l where the load has changed since"
         )
 
     def _of_another_time(self, newest: float, start: float) -> str:

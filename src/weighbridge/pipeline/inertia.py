@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from weighbridge.arguments import check_path, check_text, check_type
+from weighbridge.arguments import check_path, check_text, check_type, suggestion
 from weighbridge.checks import mend_drive, refuse_serious
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
@@ -59,7 +59,6 @@ from weighbridge.pipeline.given import (
 )
 from weighbridge.results.inertia import TOO_WIDE, InertiaResult, LoadSegment
 from weighbridge.signals import Drive, Floats
-from weighbridge.signals.tomlfile import suggestion
 from weighbridge.vehicle.model import Ride, Vehicle
 
 DEFAULT_METHOD: Final[Method] = "kalman-bucy"

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from weighbridge.arguments import check_flag, check_path, check_text, check_type
+from weighbridge.arguments import check_flag, check_path, check_text, check_type, suggestion
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.bandwidth import smoothed_torque
 from weighbridge.balance.charge import in_this_air
@@ -62,7 +62,6 @@ from weighbridge.pipeline.notes import (
 )
 from weighbridge.results.weighing import MassResult
 from weighbridge.signals import Drive
-from weighbridge.signals.tomlfile import suggestion
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.power_balance import by_power
@@ -117,11 +116,22 @@ class Weighing(MassResult):
         compared = [self.compare()] if compare else None
         write_report([self], path, comparisons=compared, tiles=tiles)
 
-    def plot(self) -> Any:
-        """Return a plotly figure of the mass over time."""
+    def plot(self, *, truth: float | None = None) -> Any:
+        """Return a plotly figure of the mass over time, with title and legend.
+
+        Parameters
+        ----------
+        truth : true mass at the end of the drive [kg], to draw beside it; that of ``drive.toml``,
+            less the fuel burnt, when None
+
+        Raises
+        ------
+        ConfigError
+            Nothing was estimated, so there is no mass to draw.
+        """
         from weighbridge.report import mass_figure
 
-        return mass_figure(self)
+        return mass_figure(self, truth=truth)
 
 
 def weigh(

@@ -77,7 +77,7 @@ def mass_figure(weighing: MassResult, *, truth: float | None = None) -> go.Figur
     Parameters
     ----------
     weighing : of one drive
-    truth : true mass [kg]; the known mass of the drive when None
+    truth : true mass at the end of the drive [kg]; as the report shows it when None
 
     Raises
     ------
@@ -86,9 +86,16 @@ def mass_figure(weighing: MassResult, *, truth: float | None = None) -> go.Figur
     """
     from weighbridge.errors import ConfigError
     from weighbridge.report.mass_section import mass_panel
+    from weighbridge.report.page import known_mass
+    from weighbridge.report.style import in_shown_units
 
-    panel = mass_panel(weighing, truth if truth is not None else weighing.drive.info.mass)
+    known = known_mass(weighing, {} if truth is None else {weighing.drive.name: truth})
+    panel = mass_panel(weighing, known.mass if known else None)
     if panel.figure is None:
         raise ConfigError(f"{weighing.drive.name}: {panel.absent}")
-    panel.figure.update_layout(title_text=panel.title, margin_t=60)
+    in_shown_units(panel.figure)
+    # The legend is one line above the figure, the title above that.
+    panel.figure.update_layout(
+        title={"text": panel.title, "x": 0.01, "y": 0.97, "yanchor": "top"}, margin_t=90
+    )
     return panel.figure

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Final
 from weighbridge.estimators import Status
 from weighbridge.navigation.motion import BY_SPEED
 from weighbridge.report.style import REACH
-from weighbridge.report.text import capital, kg, prose, sentence, signed_kg
+from weighbridge.report.text import (
+    between,
+    capital,
+    kg,
+    pounds,
+    prose,
+    sentence,
+    signed_kg,
+    with_half,
+)
 from weighbridge.vehicle.data_sheet import by_data_sheet, scale_std
 from weighbridge.vehicle.telling import can_weigh
 
@@ -115,15 +124,14 @@ def answer_block(answer: Answer) -> str:
     low, high = answer.interval
     sure = math.isfinite(answer.half)
     named = grade(answer.mass, answer.half if sure else math.inf)
-    half = f" ± {answer.half:.0f}" if sure else ""
     told = f"{named}: ± {_percent(answer.half / answer.mass)}" if sure else "rough: no upper bound"
-    holds = f"95 % interval {low:.0f} to {high:.0f} kg" if sure else "no interval"
+    holds = f"95 % interval {between(low, high)}" if sure else "no interval"
     judged = "".join(f'<p class="why">{prose(text)}</p>' for text in answer.judged)
     alert = _alert(answer)
     over = " over" if alert else ""
     return (
         f'<div class="verdict {named}{over}">{alert}'
-        f'<p class="answer {named}">{answer.mass:.0f}{half} kg '
+        f'<p class="answer {named}">{with_half(answer.mass, answer.half)} '
         f'<span class="grade">{told}</span></p><p class="holds">{holds}</p>{judged}'
         f'<dl class="key">{_payload(answer)}{_share(answer)}'
         f"{_item('vehicle file', answer.file)}{_item('for a better answer', answer.advice)}"
@@ -147,7 +155,7 @@ def no_answer_block(status: Status, reason: str, remedy: str) -> str:
 def weighing_answer(weighing: MassResult, judged: tuple[str, ...]) -> str:
     """Return the block of a weighing as HTML; ``judged`` holds it against other masses."""
     if weighing.status is not Status.CONVERGED or not math.isfinite(weighing.mass):
-        return no_answer_block(weighing.status, weighing.reason, remedy(weighing))
+        return no_answer_block(weighing.status, shown_reason(weighing), remedy(weighing))
     low, high = weighing.interval(0.95)
     tare = weighing.vehicle.tare
     empty = math.nan if tare is None else tare
@@ -164,6 +172,17 @@ def weighing_answer(weighing: MassResult, judged: tuple[str, ...]) -> str:
             judged=judged,
         )
     )
+
+
+def shown_reason(weighing: MassResult) -> str:
+    """Say why there is no mass, in the units that are shown."""
+    return "" if weighing.refusal is None else weighing.refusal.shown
+
+
+def overloaded(weighing: MassResult) -> bool:
+    """Say whether the mass is above the permitted one of the vehicle file."""
+    gross = weighing.vehicle.gross
+    return gross is not None and weighing.mass > gross
 
 
 def remedy(weighing: MassResult) -> str:
@@ -210,14 +229,14 @@ def advice(weighing: MassResult) -> str:
     if own > left:
         return (
             "Drive longer, with more firm starts and hills: the drive leaves "
-            f"± {reach * own:.0f} of the ± {half:.0f} kg."
+            f"± {pounds(reach * own):.0f} of the ± {kg(half)}."
         )
     if result.balance.motion.source in BY_SPEED:
         helps = "Record an accelerometer beside the speed."
     else:
         helps = _calibrate(weighing.vehicle)
     return (
-        f"{helps} Vehicle file and sensors leave ± {reach * left:.0f} of the ± {half:.0f} kg; "
+        f"{helps} Vehicle file and sensors leave ± {pounds(reach * left):.0f} of the ± {kg(half)}; "
         "more driving takes none of that away."
     )
 
@@ -249,9 +268,9 @@ def _payload(answer: Answer) -> str:
     if answer.tare is None:
         return _item("payload", "Unknown without a tare: add tare_kg to the vehicle file.")
     low, high = answer.payload
-    half = f" ± {0.5 * (high - low):.0f}" if math.isfinite(high - low) else ""
-    value = signed_kg(answer.mass - answer.tare).removesuffix(" kg")
-    return _item("payload", f"over a tare of {kg(answer.tare)}", f"{value}{half} kg")
+    half = f" ± {pounds(0.5 * (high - low)):.0f}" if math.isfinite(high - low) else ""
+    value, _, unit = signed_kg(answer.mass - answer.tare).partition(" ")
+    return _item("payload", f"over a tare of {kg(answer.tare)}", f"{value}{half} {unit}")
 
 
 def _alert(answer: Answer) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from weighbridge.report.markup import left_out, text_table
-from weighbridge.report.style import Panel, Section
+from weighbridge.report.style import Panel, Section, in_shown_units
 from weighbridge.visible import shown_json, visible, visible_text
 from weighbridge.whole import write_whole
 
@@ -44,7 +44,7 @@ class Page:
             if panel.figure is None:
                 continue
             key = f"figure-{len(self.figures) + 1}"
-            self.figures[key] = panel.figure.to_json(validate=False)
+            self.figures[key] = in_shown_units(panel.figure).to_json(validate=False)
             height = int(panel.figure.layout.height)
             drawn.append(
                 f"<figure{' class=wide' if panel.wide else ''}><h4>{escape(panel.title)}</h4>"

@@ -27,6 +27,7 @@ from weighbridge.report.style import (
     minutes,
     reason_name,
 )
+from weighbridge.report.text import kg
 from weighbridge.report.thinning import SCATTER_POINTS, single, spread, thin_line
 from weighbridge.signals import Floats
 from weighbridge.signals.units import from_si
@@ -90,18 +91,18 @@ def mass_panel(weighing: MassResult, truth: float | None) -> Panel:
                 dash="dot", showlegend=bool(name), meta={"short": "±5 %"},
             )  # fmt: skip
         line(
-            figure, ends, np.full(2, weighing.mass), f"final mass {weighing.mass:.0f} kg",
+            figure, ends, np.full(2, weighing.mass), f"final mass {kg(weighing.mass)}",
             VERMILLION, dash="dash", meta={"short": "final"},
         )  # fmt: skip
         marks += [0.9 * weighing.mass, 1.1 * weighing.mass]
     if truth is not None:
         line(
-            figure, ends, np.full(2, truth), f"true mass {truth:.0f} kg", GREEN,
+            figure, ends, np.full(2, truth), f"true mass {kg(truth)}", GREEN,
             dash="longdashdot", meta={"short": "true"},
         )  # fmt: skip
     figure.update_layout(yaxis_range=_mass_range(mass, half, result.used, marks))
     if converged:
-        title = f"The final mass, {weighing.mass:.0f} kg, and what was known on the way"
+        title = f"The final mass, {kg(weighing.mass)}, and what was known on the way"
         caption = (
             "The running mass is what the data until each moment make of it, with motion and noise "
             "as the whole drive shows them; the final mass is made from the whole drive."
@@ -184,7 +185,7 @@ def fit_panel(weighing: MassResult) -> Panel:
     figure = blank("Specific force with rolling [m/s²]", "Force on the mass [N]")
     dots(figure, single(phi[index]), single(y[index]), "used samples", BLUE)
     ends = np.array([0.0, float(np.max(phi[known]))])
-    name = f"{result.mass:.0f} kg"
+    name = kg(result.mass)
     title = f"The slope of force over specific force is the mass: {name}"
     if weighing.status is not Status.CONVERGED:
         name = f"least squares, {name}, no result"

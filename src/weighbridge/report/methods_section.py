@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from weighbridge.estimators import ESTIMATORS
+from weighbridge.report.answer import shown_reason
 from weighbridge.report.style import (
     BLUE,
     BROWN,
@@ -134,7 +135,7 @@ def _table(weighing: MassResult, comparison: Sequence[MassResult], truth: float 
     for w in comparison:
         errors = (error(w.mass, truth),) if judged else ()
         used = f"{w.used_time / 60.0:.1f} min" if w.result is not None else NOTHING
-        why = (w.reason,) if failed else ()
+        why = (shown_reason(w),) if failed else ()
         rows.append(
             (w.method, kg(w.mass), interval(w), signed_kg(w.payload), *errors, used,
              _agreement(w, weighing, others), *why)
@@ -186,12 +187,12 @@ def interval_panel(
         figure.add_vline(x=truth, line={"color": GREEN, "width": 2, "dash": "longdashdot"})
         figure.add_annotation(
             x=truth, y=1.0, yref="paper", yanchor="bottom", showarrow=False,
-            text=f"true mass {truth:.0f} kg", font={"color": GREEN},
+            text=f"true mass {kg(truth)}", font={"color": GREEN},
         )  # fmt: skip
     masses = [w.mass for w in found]
     return Panel(
         title=f"{len(found)} of {len(comparison)} methods found a mass, "
-        f"within {max(masses) - min(masses):.0f} kg" + _not_fitting(others),
+        f"within {kg(max(masses) - min(masses))}" + _not_fitting(others),
         caption="Marks are the masses, lines their 95 % intervals; shaded is that of the answer. "
         "A cross does not fit: the two masses differ by more than both intervals together.",
         figure=figure,

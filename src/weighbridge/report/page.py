@@ -9,9 +9,10 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from weighbridge.customary import shown_unit
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import Status
-from weighbridge.report.answer import STATUS_TEXT, grade, weighing_answer
+from weighbridge.report.answer import STATUS_TEXT, grade, overloaded, shown_reason, weighing_answer
 from weighbridge.report.calibration_panels import calibration_facts, calibration_panels
 from weighbridge.report.document import Page, write_document
 from weighbridge.report.information_section import information_section
@@ -29,7 +30,9 @@ from weighbridge.report.text import (
     interval,
     kg,
     plus_minus,
+    pounds,
     signed_kg,
+    with_half,
 )
 
 if TYPE_CHECKING:
@@ -71,10 +74,10 @@ def write_page(
     if panels:
         parts.append(page.place(panels))
     if len(weighings) > 1:
-        parts.append(_summary(weighings, [_known(w, truth) for w in weighings]))
+        parts.append(_summary(weighings, [known_mass(w, truth) for w in weighings]))
     for k, weighing in enumerate(weighings):
         compared = comparisons[k] if comparisons else ()
-        known = _known(weighing, truth)
+        known = known_mass(weighing, truth)
         sections = drive_sections(weighing, known.mass if known else None, compared, tiles)
         body = _drive(weighing, known, compared) + page.sections(sections, f"drive-{k + 1}-")
         parts.append(_folded(weighing, body, opened=k == 0) if len(weighings) > 1
@@ -94,7 +97,7 @@ def _title(weighings: Sequence[MassResult]) -> str:
     return f"weighbridge: {len(weighings)} drives"
 
 
-def _known(weighing: MassResult, truth: Mapping[str, float]) -> Known | None:
+def known_mass(weighing: MassResult, truth: Mapping[str, float]) -> Known | None:
     """Find the true mass at the end of the drive; None where none is shown.
 
     That of ``drive.toml`` is of its start: the fuel that some methods reckon with is taken off.
@@ -111,7 +114,9 @@ def _known(weighing: MassResult, truth: Mapping[str, float]) -> Known | None:
     if not burnt > 0.0:
         return Known(mass, "")
     return Known(
-        mass - burnt, f"{kg(mass)} at the start less {burnt:.1f} kg of fuel burnt on the way"
+        mass - burnt,
+        f"{kg(mass)} at the start less {pounds(burnt):.1f} {shown_unit('kg')} of fuel burnt on the "
+        "way",
     )
 
 
@@ -159,7 +164,9 @@ def _summary(weighings: Sequence[MassResult], known: Sequence[Known | None]) -> 
         cells.append((_outcome(weighing), ""))
         rows.append(cells)
     told = '<p class="lead screen">Open a drive to see and print it.</p>'
-    return html_table("All drives", heads, rows) + told
+    over = [w.drive.name for w in weighings if overloaded(w)]
+    alert = f'<p class="alert bad">Above the permitted mass: {escape(", ".join(over))}.</p>'
+    return (alert if over else "") + html_table("All drives", heads, rows) + told
 
 
 def drive_sections(
@@ -192,7 +199,7 @@ def _drive(weighing: MassResult, known: Known | None, comparison: Sequence[MassR
     return (
         weighing_answer(weighing, _judged(weighing, known, comparison))
         + _segments(weighing)
-        + remarks(weighing.warnings)
+        + remarks([p.shown for p in weighing.problems])
         + _facts(weighing)
     )
 
@@ -227,7 +234,7 @@ def _details(weighing: MassResult) -> str:
     result = weighing.result
     if result is None or not _found(weighing) or not math.isfinite(result.bound_std):
         return ""
-    bound = f"± {REACH * result.bound_std:.0f} kg"
+    bound = f"± {kg(REACH * result.bound_std)}"
     facts = facts_list([("Cramér-Rao bound: half the 95 % interval by noise alone", bound)])
     return f"<details><summary>Details</summary>{facts}</details>"
 
@@ -242,8 +249,7 @@ def _segments(weighing: MassResult) -> str:
         [
             (duration(max(s.start - start, 0.0)), "n"),
             (duration(s.end - start), "n"),
-            (f"{s.mass:.0f} ± {reach * s.std:.0f} kg" if math.isfinite(s.mass) else "too little",
-             "n"),
+            (with_half(s.mass, reach * s.std) if math.isfinite(s.mass) else "too little", "n"),
         ]
         for s in weighing.segments
     ]  # fmt: skip
@@ -276,4 +282,4 @@ def _outcome(weighing: MassResult) -> str:
         low, high = weighing.interval(0.95)
         half = 0.5 * (high - low)
         return f"{grade(weighing.mass, half)}: ± {100.0 * half / weighing.mass:.1f} %"
-    return f"{text} ({weighing.reason})" if weighing.reason else text
+    return f"{text} ({shown_reason(weighing)})" if weighing.reason else text

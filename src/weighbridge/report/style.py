@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -10,6 +11,7 @@ import plotly.graph_objects as go
 from scipy.special import ndtri
 
 from weighbridge.balance import REASON_TEXT, Reason
+from weighbridge.customary import shown_amount, shown_unit
 from weighbridge.report.table import Table
 from weighbridge.signals import Drive, Floats
 from weighbridge.signals.units import from_si
@@ -114,6 +116,39 @@ class Section:
 def reason_name(reason: Reason) -> str:
     """Name a reason in a legend."""
     return "used" if reason is Reason.USED else REASON_TEXT[reason]
+
+
+_AXIS_UNIT: Final = re.compile(r"(.*)\[([^\[\]]+)\]$")
+
+
+def in_shown_units(figure: go.Figure) -> go.Figure:
+    """Turn the axes of a figure to the units that are shown, with what is drawn along them."""
+    for axis in (*figure.select_xaxes(), *figure.select_yaxes()):
+        letter, number = axis.plotly_name[0], axis.plotly_name[5:]
+        titled = _AXIS_UNIT.fullmatch(axis.title.text or "")
+        if titled is None or shown_unit(titled[2]) == titled[2]:
+            continue
+        unit, name = titled[2], f"{letter}{number}"
+        axis.title.text = f"{titled[1]}[{shown_unit(unit)}]"
+        if axis.range is not None:
+            axis.range = [shown_amount(end, unit) for end in axis.range]
+        for trace in figure.data:
+            if (trace[f"{letter}axis"] or letter) == name and trace[letter] is not None:
+                trace[letter] = shown_amount(np.asarray(trace[letter]), unit)
+        layout = figure.layout
+        # Without a reference a picture is placed on the paper, and the others along the first axis.
+        drawn = [(d, letter) for d in (*layout.shapes, *layout.annotations)]
+        for item, usual in (*drawn, *((image, "paper") for image in layout.images)):
+            if (item[f"{letter}ref"] or usual) == name:
+                _turn(item, letter, unit)
+    return figure
+
+
+def _turn(drawn: Any, letter: str, unit: str) -> None:
+    """Turn a shape, a text or a picture along one axis."""
+    for key in (letter, f"{letter}0", f"{letter}1", f"size{letter}"):
+        if key in drawn and drawn[key] is not None:
+            drawn[key] = shown_amount(drawn[key], unit)
 
 
 def blank(x: str, y: str, *, height: int = 380, **layout: Any) -> go.Figure:

@@ -7,6 +7,7 @@ import re
 from html import escape
 from typing import TYPE_CHECKING, Final
 
+from weighbridge.customary import shown_amount, shown_unit
 from weighbridge.signals.units import scalar_from_si
 
 if TYPE_CHECKING:
@@ -22,26 +23,43 @@ def kg(mass: float | None) -> str:
     """Print a mass."""
     if mass is None or not math.isfinite(mass):
         return NOTHING
-    return f"{round(mass)} kg".replace("-", "−")
+    return f"{round(pounds(mass))} {shown_unit('kg')}".replace("-", "−")
+
+
+def pounds(mass: float) -> float:
+    """Return a mass in the unit that is shown in place of kg."""
+    return shown_amount(mass, "kg")
 
 
 def signed_kg(mass: float) -> str:
     """Print a difference of masses."""
-    return f"{mass:+.0f} kg".replace("-", "−") if math.isfinite(mass) else NOTHING
+    if not math.isfinite(mass):
+        return NOTHING
+    return f"{pounds(mass):+.0f} {shown_unit('kg')}".replace("-", "−")
+
+
+def between(low: float, high: float, word: str = "to") -> str:
+    """Print two masses with one unit."""
+    return f"{pounds(low):.0f} {word} {kg(high)}"
 
 
 def interval(weighing: MassResult) -> str:
     """Print the 95 % interval."""
     low, high = weighing.interval(0.95)
-    return f"{low:.0f} to {high:.0f} kg" if math.isfinite(high - low) else NOTHING
+    return between(low, high) if math.isfinite(high - low) else NOTHING
+
+
+def with_half(mass: float, half: float) -> str:
+    """Print a mass with half its 95 % interval; alone where that is not known."""
+    if not math.isfinite(half):
+        return kg(mass)
+    return f"{pounds(mass):.0f} ± {kg(half)}"
 
 
 def plus_minus(weighing: MassResult) -> str:
     """Print the mass with half its 95 % interval."""
     low, high = weighing.interval(0.95)
-    if not math.isfinite(high - low):
-        return kg(weighing.mass)
-    return f"{weighing.mass:.0f} ± {0.5 * (high - low):.0f} kg"
+    return with_half(weighing.mass, 0.5 * (high - low))
 
 
 def error(mass: float, known: float | None) -> str:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from decimal import Context, Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
+from weighbridge.arguments import suggestion
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.signals.units import UNITS, Unit, unit
 
@@ -55,22 +55,10 @@ LONGEST_FILE: Final = 4_000_000
 # Levels of sections and lists that are in use are three; the library calls itself for each.
 _DEEPEST: Final = 100
 
-# Letters of a word that may be a known one written wrong.
-_LONGEST_WORD: Final = 100
-
 # So many unknown keys are named; a screen shows no more.
 _SAID: Final = 20
 # Texts that stand in brackets in a message.
 _SHOWN: Final = 40
-
-
-def suggestion(word: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean ...?`` for a near miss, or the known words."""
-    known = list(known)
-    if len(word) > _LONGEST_WORD:
-        return f"; known are {', '.join(known)}"
-    near = difflib.get_close_matches(word.lower(), known, n=1, cutoff=0.6)
-    return f"; did you mean {near[0]}?" if near else f"; known are {', '.join(known)}"
 
 
 def _split(key: str) -> tuple[str, ...]:

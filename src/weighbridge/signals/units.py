@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.arguments import suggestion
 from weighbridge.constants import STANDARD_GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.signals.signal import Floats
@@ -96,7 +97,7 @@ def unit(suffix: str) -> Unit:
     """
     found = UNITS.get(suffix.lower())
     if found is None:
-        raise ConfigError(f"unknown unit {suffix!r}; known are {', '.join(UNITS)}")
+        raise ConfigError(f"unknown unit {suffix!r}{suggestion(suffix, UNITS)}")
     return found
 
 

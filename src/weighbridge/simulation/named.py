@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from weighbridge.arguments import suggestion
 from weighbridge.errors import ConfigError
-from weighbridge.signals.tomlfile import suggestion
 from weighbridge.simulation.car import COMPACT, ELECTRIC, MIDSIZE, SimulatedCar
 from weighbridge.simulation.route import (
     bus_route,

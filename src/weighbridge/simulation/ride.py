@@ -11,11 +11,12 @@ import logging
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 from scipy.linalg import expm
 
+from weighbridge.arguments import check_choice
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.io.write import TableFormat, write_drive
@@ -214,8 +215,7 @@ class SimulatedRide:
 
     def write(self, folder: Path, *, format: TableFormat = "parquet") -> None:
         """Write ``ride`` and ``truth`` tables and ``drive.toml`` into a folder."""
-        if format not in ("parquet", "csv"):
-            raise ConfigError(f"format must be parquet or csv, got {format!r}")
+        check_choice("format", format, get_args(TableFormat))
         columns = {
             "time_s": self.time,
             "sprung_mass_kg": self.inertias[:, 0],

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import k1
 
-from weighbridge.errors import ConfigError
+from weighbridge.arguments import check_choice
 from weighbridge.signals import Floats
 
 ROUGHNESS: Final[dict[str, float]] = {c: 16e-6 * 4.0**k for k, c in enumerate("ABCDEFGH")}
@@ -82,9 +82,8 @@ def draw_road(
     ConfigError
         There is no such class.
     """
-    roughness = ROUGHNESS.get(road_class.upper())
-    if roughness is None:
-        raise ConfigError(f"road class {road_class!r}: known are {', '.join(ROUGHNESS)}")
+    check_choice("road class", road_class.upper(), ROUGHNESS)
+    roughness = ROUGHNESS[road_class.upper()]
     # Two of the longest waves at least, for the spectrum to have lines there.
     points = math.ceil(max(length, 2.0 / BAND[0]) / _STEP)
     frequency = np.fft.rfftfreq(points, _STEP)

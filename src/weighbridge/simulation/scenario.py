@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from weighbridge.arguments import check_choice, suggestion
 from weighbridge.errors import ConfigError
 from weighbridge.simulation.car import SimulatedCar
 from weighbridge.simulation.route import Route
@@ -129,7 +130,7 @@ class Effects:
         known = [f.name for f in fields(self)]
         for name in names:
             if name not in known:
-                raise ConfigError(f"unknown effect {name!r}; known are {', '.join(known)}")
+                raise ConfigError(f"unknown effect {name!r}{suggestion(name, known)}")
         return replace(self, **dict.fromkeys(names, 0.0))
 
 
@@ -241,10 +242,7 @@ class Polling:
     def __post_init__(self) -> None:
         if not 0.2 <= self.rate <= 100.0:
             raise ConfigError(f"poll rate must be in [0.2, 100] Hz, got {self.rate}")
-        if self.speed_rounding not in ("nearest", "down"):
-            raise ConfigError(
-                f"speed_rounding must be nearest or down, got {self.speed_rounding!r}"
-            )
+        check_choice("speed_rounding", self.speed_rounding, ("nearest", "down"))
         for name in ("speed_step", "engine_speed_step"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}")

@@ -7,11 +7,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
+from weighbridge.arguments import check_choice
 from weighbridge.constants import GRAVITY
-from weighbridge.errors import ConfigError
 from weighbridge.io.write import TableFormat, write_drive
 from weighbridge.signals import Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.units import from_si
@@ -139,8 +140,7 @@ class SimulatedDrive:
         ConfigError
             The format is neither.
         """
-        if format not in ("parquet", "csv"):
-            raise ConfigError(f"format must be parquet or csv, got {format!r}")
+        check_choice("format", format, get_args(TableFormat))
         columns = {}
         for f in fields(self.truth):
             values, suffix = getattr(self.truth, f.name), _TRUTH_SUFFIX[f.name]
@@ -170,8 +170,7 @@ def simulate_car(
         The scenario polls what cannot be polled.
     """
     for name in (*scenario.polling.fast, *scenario.polling.slow):
-        if name not in POLLABLE:
-            raise ConfigError(f"cannot poll {name!r}; known are {', '.join(POLLABLE)}")
+        check_choice("what is polled", name, POLLABLE)
     tell = progress or (lambda done, total: None)
     random = streams(scenario.seed, "plan", "drive", "road", "imu", "gnss", "obd", "habits")
     trajectory = simulate_trajectory(scenario, random["plan"], random["drive"], random["habits"])

@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from weighbridge.errors import ConfigError
+from weighbridge.arguments import check_choice
 from weighbridge.simulation.car import ELECTRIC, RPM, SimulatedCar, random_car, rpm
 from weighbridge.simulation.scenario import Habits
 
@@ -250,10 +250,7 @@ def random_vehicle(rng: np.random.Generator, kind: VehicleKind) -> SimulatedCar:
     ConfigError
         There is no such kind.
     """
-    if kind not in get_args(VehicleKind):
-        raise ConfigError(
-            f"unknown kind of vehicle {kind!r}; known are {', '.join(get_args(VehicleKind))}"
-        )
+    check_choice("kind of vehicle", kind, get_args(VehicleKind))
     # A generator of their own: what else is drawn stays the same.
     (details,) = rng.spawn(1)
     if kind in ("petrol_manual", "petrol_dct"):

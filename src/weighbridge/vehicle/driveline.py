@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 
+from weighbridge.arguments import check_choice
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.possible import not_negative, positive, within
 
@@ -72,10 +73,10 @@ class Driveline:
         within("wheel_radius", self.wheel_radius, 0.05, 3.0, "m")
         not_negative("idle_speed", self.idle_speed)
         within("idle_speed", self.idle_speed, 0.0, 1_000.0, "rad/s")
-        if self.layout not in (None, "transverse", "longitudinal"):
-            raise ConfigError(f"layout must be transverse or longitudinal, got {self.layout!r}")
-        if self.driven not in (None, "front", "rear", "all"):
-            raise ConfigError(f"driven must be front, rear or all, got {self.driven!r}")
+        if self.layout is not None:
+            check_choice("layout", self.layout, get_args(Layout))
+        if self.driven is not None:
+            check_choice("driven", self.driven, get_args(Driven))
         if self.efficiency is not None and not 0.0 < self.efficiency <= 1.0:
             raise ConfigError(f"efficiency must be in (0, 1], got {self.efficiency}")
         within("efficiency", self.efficiency, 0.05, 1.0)

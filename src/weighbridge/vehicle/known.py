@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, get_args
 
+from weighbridge.arguments import choice_fault
 from weighbridge.signals.tomlfile import Faults
 from weighbridge.vehicle.classes import VEHICLE_CLASSES
 from weighbridge.vehicle.data_sheet import RADIUS_STD, usual_efficiency
@@ -123,7 +124,7 @@ def describe(known: Known) -> Described:
     )
     if driveline.efficiency is None:
         mean, std = usual_efficiency(vehicle)
-        origins["driveline", "efficiency"] = f"not given; taken as {mean:.3f} ± {std:.3f}"
+        origins["driveline", "efficiency"] = f"not given; taken as {mean:.3f}, std {std:.3f}"
     return Described(vehicle=vehicle, origins=origins)
 
 
@@ -162,16 +163,15 @@ def _refuse(known: Known) -> None:
 
 
 def _wrong_choices(known: Known) -> Iterator[str]:
-    if known.kind not in VEHICLE_CLASSES:
-        yield f"class must be {VEHICLE_CLASSES.names}, got {known.kind!r}"
     for name, value, choice in (
+        ("class", known.kind, tuple(VEHICLE_CLASSES)),
         ("engine", known.engine, get_args(EngineKind)),
         ("torque", known.torque, tuple(TORQUE_SOURCES)),
         ("driven", known.driven, get_args(Driven)),
         ("layout", known.layout, get_args(Layout)),
     ):
-        if value is not None and value not in choice:
-            yield f"{name} must be {', '.join(choice[:-1])} or {choice[-1]}, got {value!r}"
+        if value is not None and (fault := choice_fault(name, value, choice)):
+            yield fault
 
 
 def _wrong_masses(known: Known) -> Iterator[str]:
@@ -205,9 +205,9 @@ def _radius(known: Known, origins: dict[tuple[str, str], str]) -> float:
     origins["driveline", "wheel_radius"] = (
         "given"
         if known.radius is not None
-        else f"of {tyre}, ± {100.0 * RADIUS_STD:.1f} %"
+        else f"of {tyre}, std {100.0 * RADIUS_STD:.1f} %"
         if known.tyre
-        else f"of {tyre}, usual for a {known.kind}, ± 6 %"
+        else f"of {tyre}, usual for a {known.kind}, std 6 %"
     )
     return known.radius if known.radius is not None else round(rolling_radius(tyre), 4)
 
@@ -223,7 +223,7 @@ def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
     single = known.engine == "electric" or len(ratios) == 1
     mean, std = VEHICLE_CLASSES[known.kind].road_prior(single_speed=single)
     for name, k in (("engine_inertia", 2), ("wheel_inertia", 3)):
-        origins["driveline", name] = f"usual for a {known.kind}, ± {std[k]:.2g}"
+        origins["driveline", name] = f"usual for a {known.kind}, std {std[k]:.2g}"
     return Driveline(
         gearings=tuple(round(ratio * factor, 3) for ratio in ratios),
         engine_inertia=float(mean[2]),
@@ -237,9 +237,9 @@ def _driveline(known: Known, origins: dict[tuple[str, str], str]) -> Driveline:
 def _road_load(known: Known, origins: dict[tuple[str, str], str]) -> RoadLoad:
     mean, std = VEHICLE_CLASSES[known.kind].road_prior(single_speed=False)
     area = float(mean[0])
-    origins["road_load", "drag_area"] = f"usual for a {known.kind}, ± {std[0]:.2g}"
+    origins["road_load", "drag_area"] = f"usual for a {known.kind}, std {std[0]:.2g}"
     if known.drag_coefficient is not None and known.frontal_area is not None:
         area = round(known.drag_coefficient * known.frontal_area, 4)
         origins["road_load", "drag_area"] = "of drag coefficient and frontal area, given"
-    origins["road_load", "rolling_coefficient"] = f"usual for a {known.kind}, ± {std[1]:.2g}"
+    origins["road_load", "rolling_coefficient"] = f"usual for a {known.kind}, std {std[1]:.2g}"
     return RoadLoad(drag_area=area, rolling_coefficient=float(mean[1]))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal, get_args
 
-from weighbridge.arguments import check_all, check_text, check_type
+from weighbridge.arguments import check_all, check_choice, check_text, check_type
 from weighbridge.errors import ConfigError
 from weighbridge.signals.shown import in_html, in_lines, plural
 from weighbridge.vehicle.classes import VEHICLE_CLASSES, VehicleClass
@@ -87,11 +87,9 @@ class Vehicle:
             if not (optional and getattr(self, name) is None):
                 check_type(name, getattr(self, name), part, f"a {part.__name__}")
         check_all("witnesses", self.witnesses, WitnessRelation, "WitnessRelation")
-        if self.kind not in VEHICLE_CLASSES:
-            raise ConfigError(f"class must be {VEHICLE_CLASSES.names}, got {self.kind!r}")
-        if self.engine is not None and self.engine not in get_args(EngineKind):
-            kinds = ", ".join(get_args(EngineKind))
-            raise ConfigError(f"engine must be one of {kinds}, got {self.engine!r}")
+        check_choice("class", self.kind, VEHICLE_CLASSES)
+        if self.engine is not None:
+            check_choice("engine", self.engine, get_args(EngineKind))
         for name in ("tare", "gross"):
             positive(name, getattr(self, name))
             within(name, getattr(self, name), *MASSES, "kg")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from weighbridge.arguments import check_choice
 from weighbridge.errors import ConfigError
 from weighbridge.messages import Problem
 from weighbridge.vehicle.fits import FITS, Fit
@@ -67,9 +68,8 @@ class Provenance:
                 "fit_cov must be the lower triangle of a square, 1, 3, 6, 10 ... numbers, "
                 f"got {len(self.fit_cov)}"
             )
-        if self.method is not None and self.method not in FITS:
-            *most, last = FITS
-            raise ConfigError(f"method must be {', '.join(most)} or {last}, got {self.method!r}")
+        if self.method is not None:
+            check_choice("method", self.method, FITS)
 
     @property
     def problems(self) -> tuple[Problem, ...]:

@@ -78,16 +78,16 @@ def worth(vehicle: Vehicle) -> str:
         return "cannot weigh yet: calibrate it on a drive of known mass"
     if scale is None:
         return (
-            f"weighs by data sheet, never calibrated: ± {100.0 * scale_std(vehicle):.1f} % of any "
-            "mass for torque, efficiency and rolling radius, and 3 % more where the sensor's lean "
-            "is not known"
+            "weighs by data sheet, never calibrated: a standard deviation of "
+            f"{100.0 * scale_std(vehicle):.1f} % of any mass for torque, efficiency and rolling "
+            "radius, and 3 % more where the sensor's lean is not known"
         )
     if not vehicle.provenance.drives and not vehicle.provenance.masses:
         return (
-            f"weighs by what the file states, never calibrated: ± {100.0 * scale:.1f} % of any "
-            "mass (mass_scale_std, one std)"
+            "weighs by what the file states, never calibrated: a standard "
+            f"deviation of {100.0 * scale:.1f} % of any mass (mass_scale_std)"
         )
-    text = f"± {100.0 * scale:.1f} % of any mass is left by the calibration (one std)"
+    text = f"the calibration leaves a standard deviation of {100.0 * scale:.1f} % of any mass"
     if len(vehicle.provenance.drives) < _FEWEST_RELIABLE:
         text += "; one drive made it: two more, of other masses, would make it better"
     return text
@@ -148,8 +148,8 @@ def _torque(vehicle: Vehicle) -> str:
     return text
 
 
-def _plus_minus(known: Value, digits: int) -> str:
-    text = f"{known.value:.{digits}f}" + (f" ± {known.std:.{digits}f}" if known.std else "")
+def _with_std(known: Value, digits: int) -> str:
+    text = f"{known.value:.{digits}f}" + (f" (std {known.std:.{digits}f})" if known.std else "")
     return f"{text} (usual for its class)" if known.origin is Origin.CLASS else text
 
 
@@ -157,7 +157,7 @@ def _road(vehicle: Vehicle) -> str:
     drag_area, rolling = vehicle.road.drag_area, vehicle.road.rolling_coefficient
     density = STANDARD_PRESSURE / (GAS_CONSTANT_DRY_AIR * STANDARD_TEMPERATURE)
     drag = 0.5 * density * drag_area.value * _CRUISE**2
-    text = f"C_d A {_plus_minus(drag_area, 2)} m², C_r {_plus_minus(rolling, 4)}"
+    text = f"C_d A {_with_std(drag_area, 2)} m², C_r {_with_std(rolling, 4)}"
     if vehicle.tare is not None:
         force = drag + rolling.value * vehicle.tare * GRAVITY
         text += f"; empty at 100 km/h on the flat {force * _CRUISE / 1000.0:.0f} kW"

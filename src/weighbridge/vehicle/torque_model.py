@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
+from weighbridge.arguments import check_choice
 from weighbridge.errors import ConfigError
 from weighbridge.vehicle.possible import curve, not_negative, positive, within
 from weighbridge.vehicle.torque_source import TorqueSource
@@ -72,8 +73,8 @@ class TorqueModel:
     charge_exponent_std: float | None = None
 
     def __post_init__(self) -> None:
-        if self.source is not None and self.source not in TORQUE_SOURCES:
-            raise ConfigError(f"torque source must be {TORQUE_SOURCES.names}, got {self.source!r}")
+        if self.source is not None:
+            check_choice("torque source", self.source, TORQUE_SOURCES)
         source = self.of_source
         if source.needs_map and len(self.coefficients) == 1:
             raise ConfigError(
@@ -240,10 +241,7 @@ class WitnessRelation:
     temperature: float | None = None
 
     def __post_init__(self) -> None:
-        if self.signal not in WITNESS_TERMS:
-            raise ConfigError(
-                f"signal must be one of {', '.join(WITNESS_TERMS)}, got {self.signal!r}"
-            )
+        check_choice("signal", self.signal, WITNESS_TERMS)
         many = WITNESS_TERMS[self.signal]
         if len(self.coefficients) != many:
             raise ConfigError(

@@ -15,6 +15,7 @@ from threading import Lock, Thread
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Final
 
+from weighbridge.customary import shown_amount, shown_unit
 from weighbridge.errors import ConfigError, MissingExtraError
 from weighbridge.live.outputs.lines import json_line
 from weighbridge.live.weighing import LiveWeighing
@@ -128,6 +129,8 @@ class _Newest:
     def __init__(self) -> None:
         self.closed = False
         self._lock = Lock()
+        # Chosen by who makes the page; its threads do not know of it.
+        self._unit = json.dumps({"name": shown_unit("kg"), "per": shown_amount(1.0, "kg")})
         self._history = History()
         self._weighing: LiveWeighing | None = None
         self._version = 0
@@ -145,7 +148,8 @@ class _Newest:
                 return None
             weighing = self._weighing
             points = json.dumps(self._history.since(number), allow_nan=False)
-            text = f'{{"weighing": {json_line(weighing)}, "points": {points}}}'
+            news = f'"weighing": {json_line(weighing)}, "points": {points}, "unit": {self._unit}'
+            text = f"{{{news}}}"
             return self._version, self._history.number, text
 
 

@@ -15,11 +15,12 @@ from weighbridge.live.outputs.words import (
     overload_text,
     payload_text,
     rate_text,
+    reason_text,
     signals_text,
     state_text,
 )
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, SignalHealth
-from weighbridge.report.text import capital, duration, kg
+from weighbridge.report.text import between, capital, duration, kg
 from weighbridge.visible import cut, visible
 
 if TYPE_CHECKING:
@@ -144,8 +145,8 @@ def terminal(console: Console) -> TerminalView | PlainLines:
 def plain_line(weighing: LiveWeighing) -> str:
     """Write a weighing in one line."""
     parts = [f"{weighing.vehicle}, driven {duration(weighing.driven)}: {weighing.status}"]
-    if weighing.reason:
-        parts[0] += f" ({weighing.reason})"
+    if reason := reason_text(weighing):
+        parts[0] += f" ({reason})"
     if weighing.mass == weighing.mass:
         parts += [mass_text(weighing), payload_text(weighing)]
         if weighing.share is not None:
@@ -191,7 +192,7 @@ def lines(w: LiveWeighing, width: int, height: int, *, ascii_only: bool = False)
         title.append(" " * gap + driven, style="not bold dim")
     bars = _bars(w, width, ascii_only=ascii_only)
     reason = _wrapped(
-        capital(w.reason), width, "yellow" if w.status is LiveStatus.LEARNING else "red"
+        capital(reason_text(w)), width, "yellow" if w.status is LiveStatus.LEARNING else "red"
     )
     advice = _wrapped(capital(w.advice), width, "cyan")
     load = ", ".join(t for t in (payload_text(w), overload_text(w)) if t)
@@ -204,7 +205,11 @@ def lines(w: LiveWeighing, width: int, height: int, *, ascii_only: bool = False)
         return [*head, *signals][: max(height, 1)]
     top = [title, Text(""), *head, Text("")]
     left = height - len(top)
-    notes = [line for note in reversed(w.notes) for line in _wrapped(f"Note: {note}", width, "dim")]
+    notes = [
+        line
+        for note in reversed([p.shown for p in w.problems])
+        for line in _wrapped(f"Note: {note}", width, "dim")
+    ]
     table = _table(w.signals, width)
     if not w.signals or len(table) > left:
         table = _wrapped(signals_text(w), width, _signals_style(w))
@@ -219,7 +224,7 @@ def _mass_line(w: LiveWeighing, width: int) -> Text:
     line.append("  ")
     line.append(f" {w.status} ", style=_STATUS_STYLE[w.status])
     low, high = w.interval()
-    told = f"  {low:.0f} to {high:.0f} kg with 95 %"
+    told = f"  {between(low, high)} with 95 %"
     if known and high - low < float("inf") and line.cell_len + len(told) <= width:
         line.append(told, style="dim")
     line.truncate(width)

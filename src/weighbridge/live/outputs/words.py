@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from weighbridge.live.weighing import LiveWeighing, SignalHealth
-from weighbridge.report.text import NOTHING, kg
+from weighbridge.report.text import NOTHING, kg, with_half
 
 
 def half_width(weighing: LiveWeighing) -> float:
@@ -16,10 +16,12 @@ def half_width(weighing: LiveWeighing) -> float:
 
 def mass_text(weighing: LiveWeighing) -> str:
     """Write the mass with half the width of its interval of 95 %."""
-    half = half_width(weighing)
-    if not math.isfinite(half):
-        return kg(weighing.mass)
-    return f"{weighing.mass:.0f} ± {half:.0f} kg"
+    return with_half(weighing.mass, half_width(weighing))
+
+
+def reason_text(weighing: LiveWeighing) -> str:
+    """Write why there is no mass that counts; empty where there is."""
+    return "" if weighing.refusal is None else weighing.refusal.shown
 
 
 def payload_text(weighing: LiveWeighing) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from weighbridge.arguments import near_miss
 from weighbridge.errors import ConfigError
 from weighbridge.io.dbc import DbcSource
 from weighbridge.io.mapping import MappingSource
@@ -118,7 +119,11 @@ def parse_source(
     name, mark, rest = text.partition(":")
     kind = SOURCES.get(name)
     if kind is None:
-        raise ConfigError(f"source {text!r} is of no known kind; begin it with {SOURCES.names}")
+        meant = near_miss(name, SOURCES)
+        hint = f"; did you mean {meant}?" if meant else ""
+        raise ConfigError(
+            f"source {text!r} is of no known kind; begin it with {SOURCES.names}{hint}"
+        )
     if not mark or not rest:
         raise ConfigError(f"source {text!r} says no place; write {kind.form}")
     if listen_only and kind.asks:

@@ -11,7 +11,10 @@ const put = (id, text) => {
 };
 // With the sign that is as wide as a plus; never minus nought.
 const whole = (value) => `${Math.round(value) + 0}`.replace("-", "−");
-const kg = (value) => (value === null ? "–" : `${whole(value)} kg`);
+// Masses come in kg; the unit that people chose comes with them.
+let unit = { name: "kg", per: 1 };
+const mass = (value) => whole(value * unit.per);
+const kg = (value) => (value === null ? "–" : `${mass(value)} ${unit.name}`);
 const percent = (p) => {
   if (p === null) return "–";
   if (p > 0 && p < 0.01) return "< 1 %";
@@ -49,7 +52,8 @@ function columns() {
   const t = points.time;
   const end = t.length ? t[t.length - 1] : 0;
   const x = t.map((v) => (v - end) / 60);
-  return [x, points.high, points.low, points.mass, t.map(() => limit)];
+  const shown = (values) => values.map((m) => (m === null ? null : m * unit.per));
+  return [x, ...[points.high, points.low, points.mass, t.map(() => limit)].map(shown)];
 }
 
 // The intervals at first are as wide as the plot is high: what is known later counts.
@@ -66,7 +70,7 @@ function range() {
   if (near) high = Math.max(high, limit);
   at("limit-key").hidden = !near;
   const pad = Math.max(0.15 * (high - low), 0.02 * high);
-  return [Math.max(low - pad, 0), high + pad];
+  return [Math.max(low - pad, 0) * unit.per, (high + pad) * unit.per];
 }
 
 // Without a mass there is nothing to draw, and no axis that means anything.
@@ -163,9 +167,11 @@ function show(w) {
   put("status", w.status);
   at("status").className = `status ${w.status}`;
   document.body.classList.toggle("inconsistent", w.status === "inconsistent");
-  put("mass", known ? `${Math.round(w.mass_kg)}` : "–");
+  put("mass", known ? mass(w.mass_kg) : "–");
+  put("unit", unit.name);
+  put("plot-unit", unit.name);
   const [low, high] = w.interval95_kg || [null, null];
-  put("interval", low === null ? "no mass yet" : `± ${kg((high - low) / 2)}: ${Math.round(low)} to ${kg(high)} with 95 %`);
+  put("interval", low === null ? "no mass yet" : `± ${kg((high - low) / 2)}: ${mass(low)} to ${kg(high)} with 95 %`);
   put("reason", w.reason);
   put("payload-name", w.tared_kg === null ? "Payload" : "Payload since the tare");
   put("payload", kg(w.payload_kg));
@@ -184,6 +190,10 @@ function show(w) {
     at("share-bar").value = Math.min(w.share_of_permitted, 1);
     at("share-bar").className = p >= 0.5 ? "bad" : p >= 0.05 ? "fair" : "";
   }
+  // What is wrong stands first: each limit that is passed, and how sure that is.
+  const passed = w.alerts.filter((a) => a.active);
+  at("alert").hidden = !passed.length;
+  put("alert", passed.map((a) => `${a.limit_kg === w.permitted_kg ? "Overload" : "Alert"}: ${a.side} ${kg(a.limit_kg)}, ${percent(a.probability)} sure`).join("; "));
   limit = watched ? above.limit_kg : w.permitted_kg;
   put("limit-name", watched ? "limit" : "permitted");
   at("look").hidden = w.look === null;
@@ -211,6 +221,7 @@ let waiting = null;
 function take(event) {
   const news = JSON.parse(event.data);
   heard = Date.now();
+  unit = news.unit;
   waiting = news;
   keep(news.points);
   // A page in the background draws when it is looked at again.

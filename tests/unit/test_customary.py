@@ -1,0 +1,80 @@
+"""Pounds and feet for people; numbers inside and in files stay SI."""
+
+import re
+
+import numpy as np
+import pytest
+from tests.noted import noted
+from tests.unit.test_report import MASS, Elements, make_weighing, written
+
+from weighbridge.customary import shown_amount, shown_in, shown_unit
+from weighbridge.errors import ConfigError
+from weighbridge.messages import Problem
+from weighbridge.report import mass_figure
+from weighbridge.report.style import blank, in_shown_units, line
+
+POUND = 0.45359237
+"""Mass of a pound [kg] (NIST Special Publication 811, 2008, B.8)."""
+
+
+def overload(mass):
+    return Problem.of("mass.below_tare", mass=mass, tare=1400.0)
+
+
+def test_amounts_are_those_of_nist_and_only_while_they_are_asked_for():
+    with shown_in("us"):
+        assert shown_unit("kg") == "lb"
+        assert shown_amount(1000.0, "kg") == pytest.approx(2204.62, abs=0.01)
+        assert shown_amount(np.array([100.0]), "km/h") == pytest.approx([62.137], abs=0.001)
+        assert shown_amount(1.0, "m") == pytest.approx(3.28084, abs=1e-5)
+        assert shown_amount(3.0, "min") == 3.0
+    assert shown_unit("kg") == "kg"
+    assert shown_amount(1000.0, "kg") == 1000.0
+
+
+def test_no_other_system_is_taken():
+    with pytest.raises(ConfigError, match=r"did you mean us\?"), shown_in("uss"):
+        pass
+
+
+def test_a_message_is_shown_in_pounds_and_written_in_kilograms():
+    problem = overload(1300.0).at("drive 1")
+    with shown_in("us"):
+        assert [float(n) for n in re.findall(r"(\d+) lb", problem.shown)] == [2866.0, 3086.0]
+        assert problem.shown.startswith("drive 1: ")
+        assert problem.to_dict()["text"] == problem.text
+        # Read from a file it has no values, and is shown as it was written.
+        again = Problem.from_dict(problem.to_dict())
+        assert again.shown == problem.text
+        assert noted("no number").shown == "no number"
+    assert problem.shown == problem.text
+    assert "1300 kg" in problem.text
+
+
+def test_a_figure_is_turned_along_the_axes_that_have_a_unit():
+    figure = blank("Time since start [min]", "Mass [kg]")
+    line(figure, np.array([0.0, 1.0]), np.array([100.0, 200.0]), "mass", "#2b7bba")
+    figure.add_hline(y=50.0)
+    figure.add_annotation(x=1.0, y=150.0, text="there")
+    figure.update_layout(yaxis_range=[0.0, 300.0])
+    with shown_in("us"):
+        turned = in_shown_units(figure)
+    assert turned.layout.yaxis.title.text == "Mass [lb]"
+    assert turned.layout.xaxis.title.text == "Time since start [min]"
+    assert np.allclose(turned.data[0].y, np.array([100.0, 200.0]) / POUND)
+    assert np.allclose(turned.data[0].x, [0.0, 1.0])
+    assert turned.layout.yaxis.range[1] == pytest.approx(300.0 / POUND)
+    assert turned.layout.shapes[0].y0 == pytest.approx(50.0 / POUND)
+    assert turned.layout.annotations[0].y == pytest.approx(150.0 / POUND)
+    assert turned.layout.annotations[0].x == 1.0
+
+
+def test_a_report_in_pounds_names_no_kilogram(tmp_path):
+    with shown_in("us"):
+        page = Elements(written(tmp_path, [make_weighing()]))
+        figure = mass_figure(make_weighing())
+    assert f"{MASS / POUND:.0f} ± " in page.text
+    assert " kg" not in page.text
+    final = next(t for t in figure.data if (t.name or "").startswith("final mass"))
+    assert np.allclose(final.y, MASS / POUND)
+    assert final.name == f"final mass {MASS / POUND:.0f} lb"
