@@ -476,7 +476,7 @@ def test_report_terminal_and_file_tell_the_same(empty, tmp_path, method):
     for k, w in enumerate(told["coefficients"]):
         value, std = shown[f"torque w{k}"]
         assert float(value) == pytest.approx(w, rel=1e-4, abs=0.02 * float(std))
-        assert report[f"torque w{k}"] == f"{value} ± {std}"
+        assert report[f"torque w{k}"] == f"{value} (std {std})"
     scale = 100.0 * saved["provenance"]["mass_scale_std"]
     assert float(shown["left in every mass (%)"][0]) == pytest.approx(scale, abs=0.0051)
 

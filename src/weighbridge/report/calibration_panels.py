@@ -221,9 +221,8 @@ def calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
         ("drives", ", ".join(vehicle.provenance.drives)),
     ]
     for figure in calibration.figures:
-        std = f" ± {figure.std}" if figure.std[:1].isdigit() else ""
-        said = f" ({figure.std})" if figure.std and not std else ""
-        facts.append((figure.name, figure.value + std + said))
+        said = f"std {figure.std}" if figure.std[:1].isdigit() else figure.std
+        facts.append((figure.name, f"{figure.value} ({said})" if said else figure.value))
     return facts
 
 
