@@ -9,6 +9,7 @@
     [/\bbenchmarks?\b/gi, "$& accuracy"],
     [/\b(coverage|confidence)\b/gi, "interval"],
     [/\b(no|without|missing) torque\b/gi, "$& only speed"],
+    [/\brecalibrat(e[ds]?|ing|ions?)\b/gi, "calibrate again"],
     [/\bsigmas?\b/gi, "standard deviation"],
     [/\bplug[ -]?ins?\b/gi, "plug-in own method"],
     [/\bgps\b/gi, "$& gnss"],
