@@ -44,9 +44,11 @@ def test_each_recording_comes_once(tree):
     assert names(one, f"{tree}/van0/**", one) == [one, str(tree / "van0" / "tuesday")]
 
 
-def test_a_slash_at_the_end_makes_a_folder_one_drive(tree):
-    assert names(f"{tree}/van1/") == [str(tree / "van1")]
+def test_a_slash_behind_a_name_changes_nothing_and_behind_a_pattern_makes_drives(tree):
+    assert names(f"{tree}/van1/") == names(f"{tree}/van1") == [str(tree / "van1" / "day.csv")]
     assert names(f"{tree}/*/") == [f"{tree}/van0", f"{tree}/van1"]
+    assert names(f"file://{tree}/van1/") == names(f"file://{tree}/van1")
+    assert names(f"file://{tree}/*/") == [f"file://{tree}/van0", f"file://{tree}/van1"]
 
 
 def test_a_name_that_is_there_is_no_pattern(tmp_path):

@@ -59,8 +59,8 @@ def recordings(given: Iterable[str]) -> Iterator[Recording]:
 
     A path that is there is that path, whatever letters its name has; any other with ``*``, ``?``
     or ``[`` is a pattern, in which ``**`` is any depth. A folder that holds tables is one drive,
-    and so is one named with a slash at its end; in any other folder each log is one, and folders
-    in it are looked into.
+    and so is each folder of a pattern that ends in a slash; in any other folder each log is one,
+    and folders in it are looked into. A slash behind a folder's own name changes nothing.
 
     Parameters
     ----------
@@ -97,14 +97,15 @@ def _found(text: str) -> Iterator[Recording]:
                 Recording(row.files, row.vehicle, row.kind, row.start) for row in table.rows(path)
             )
         else:
-            yield from _of(path, as_drive=_as_drive(text))
+            yield from _of(path)
     else:
         refuse_missing([text])
         yield from _matching(text)
 
 
 def _as_drive(text: str) -> bool:
-    return text.endswith(("/", os.sep))
+    """Say whether each folder that matches is one drive; a shell adds slashes to names."""
+    return glob.has_magic(text) and text.endswith(("/", os.sep))
 
 
 def _matching(pattern: str) -> Iterator[Recording]:
@@ -123,7 +124,7 @@ def _matching(pattern: str) -> Iterator[Recording]:
     for match in _globbed(pattern):
         path = Path(match)
         if path.is_dir() or _is_drive_file(path):
-            yield from _of(path, as_drive=_as_drive(match))
+            yield from _of(path, as_drive=_as_drive(pattern))
 
 
 def _globbed(pattern: str) -> list[str]:

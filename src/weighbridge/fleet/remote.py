@@ -34,7 +34,7 @@ def drives(url: str, *, as_drive: bool) -> Iterator[str]:
     Parameters
     ----------
     url : such as ``s3://bucket/drives/**``
-    as_drive : the folder is one drive, whatever is in it
+    as_drive : each folder that a pattern matches is one drive, whatever is in it
 
     Raises
     ------
@@ -45,11 +45,12 @@ def drives(url: str, *, as_drive: bool) -> Iterator[str]:
     """
     files, root = _store(url)
     try:
-        if as_drive and not _is_pattern(url):
-            yield url.rstrip("/")
-            return
         if _is_pattern(root) and not files.exists(root):
             found = sorted(files.glob(root))
+            if as_drive:
+                folders = [path for path in found if files.isdir(path)]
+                yield from (files.unstrip_protocol(path.rstrip("/")) for path in folders)
+                return
             below = sorted({f for path in found for f in files.find(path)})
         else:
             below = sorted(files.find(root))
