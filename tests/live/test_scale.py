@@ -15,7 +15,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
 from weighbridge.live.checkpoint import VERSION
 from weighbridge.live.learning import _nothing
-from weighbridge.live.on_the_move import REST
+from weighbridge.live.on_the_move import REST, OnTheMove
 from weighbridge.live.records import LATENESS
 from weighbridge.live.weighing import LiveStatus
 from weighbridge.pipeline.forward import (
@@ -230,6 +230,35 @@ def test_a_scale_learns_and_weighs(car, loaded, weighing):
     assert all(s.fresh for s in told.signals if s.needed)
     same = wb.LiveScale(car, info=loaded.drive.info, step=1.0)
     assert fed(same, drive, even(drive, 37.0)).mass == told.mass
+
+
+def test_a_first_mass_is_shown_before_it_counts_as_weighed(car, loaded):
+    scale = wb.LiveScale(car, info=loaded.drive.info, step=1.0)
+    begin = loaded.drive.start
+    part = loaded.drive.between(begin, begin + 150.0)
+    first = None
+    for block in blocks(part, even(part, 5.0)):
+        scale.update_block(block)
+        told = scale.weighing()
+        if first is None and np.isfinite(told.mass):
+            first = told
+    assert first is not None
+    assert first.driven < 90.0
+    assert first.status is LiveStatus.LEARNING
+    assert first.reason_id.startswith(("motion.", "live.wide"))
+    low, high = first.interval()
+    assert low < loaded.scenario.mass < high
+    assert high - low < 0.31 * first.mass
+
+
+def test_looks_are_frequent_until_there_is_a_mass():
+    move, at = OnTheMove(), []
+    for _ in range(600):
+        move.go_on(1.0, moved=True)
+        if move.is_due:
+            at.append(move.driven)
+            move.looks(weighed=len(at) > 4)
+    assert at == [30.0, 45.0, 60.0, 75.0, 90.0, 135.0, 203.0, 305.0, 458.0]
 
 
 def test_a_checkpoint_loses_nothing(short, weighing, setup, forward, tmp_path):

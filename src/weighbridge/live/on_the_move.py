@@ -13,11 +13,17 @@ from weighbridge.signals import Drive
 GAP: Final = 1.0
 """Of the time between two readings of the speed no more counts [s]."""
 
-FIRST: Final = 60.0
+FIRST: Final = 30.0
 """Time on the move after which a drive is looked at for the first time [s]."""
 
+AGAIN: Final = 15.0
+"""While there is no mass, it is looked at again after so long on the move [s],"""
+
+SLOWER: Final = 1.1
+"""but not before so many times as much [-]."""
+
 GROWTH: Final = 1.5
-"""It is looked at again after so many times as much."""
+"""With a mass it is looked at again after so many times as much [-]."""
 
 PERIOD: Final = 600.0
 """At the latest it is looked at after so long on the move [s]."""
@@ -61,10 +67,11 @@ class OnTheMove:
         rests = self.stood == REST and self.driven >= self.looked_at + FIRST
         return self.driven >= self.look_at or rests
 
-    def looks(self) -> None:
-        """Take it that they are looked at now."""
+    def looks(self, *, weighed: bool) -> None:
+        """Take it that they are looked at now, and that there is a mass already, or none."""
         self.looked_at = self.driven
-        self.look_at = min(self.driven * GROWTH, self.driven + PERIOD)
+        later = self.driven * GROWTH if weighed else max(self.driven + AGAIN, self.driven * SLOWER)
+        self.look_at = min(later, self.driven + PERIOD)
 
     def begin_anew(self) -> None:
         """Take it that nothing shows this load yet, as after a start."""

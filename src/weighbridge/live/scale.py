@@ -399,7 +399,7 @@ class LiveScale:
             reason=reason,
             silent=silent,
             first=FIRST,
-            unproved=self._unproved(mass),
+            unproved=self._unproved(mass, state),
             since=since,
             wait=self._to_look() if waits else 0.0,
         )
@@ -408,9 +408,11 @@ class LiveScale:
         """Time on the move until the next look [s]; 0 while one goes on."""
         return 0.0 if self._looking is not None else self._move.left
 
-    def _unproved(self, mass: float) -> Problem | None:
+    def _unproved(self, mass: float, state: ForwardState | None) -> Problem | None:
         if self.newest == self._kept_to:
             return Problem.of("live.no_sample")
+        if state is None and self._learned is not None and self._learned.early is not None:
+            return self._learned.early
         return of_before(
             self._records, driven_since=self._driven_since(), goes_on=self._is_of_before(mass)
         )
@@ -461,8 +463,8 @@ class LiveScale:
     def _learn(self, drive: Drive, until: float) -> None:
         """Look at all that is kept."""
         self._take(wait=True)
-        self._move.looks()
         mass, std, _, _ = known_mass(self._state, self._setup, self._learned)
+        self._move.looks(weighed=math.isfinite(mass))
         self._looking = Look(
             drive=drive, kept_from=self._kept_from, until=until, step=self._every,
             mass=mass, std=std,
@@ -481,7 +483,7 @@ class LiveScale:
         _LOG.info("looked at %.0f s: %.0f kg %s", look.drive.duration, learned.mass, why)
         if learned.inconsistent or math.isnan(learned.mass):
             return
-        if self._setup is None or look.tells_more(self._since):
+        if learned.early is None and (self._setup is None or look.tells_more(self._since)):
             self._setup, self._state = learned.setup, look.state()
         if learned.since > max(look.drive.start, self._since):
             # The load has changed on the way.
