@@ -83,7 +83,9 @@ def test_what_is_found_beside_is_what_is_found_in_between(car, minutes, held):
     held.set()
     waited.finish()
     scale.finish()
-    assert [a == b for a, b in taken if math.isfinite(b)] == [True, True]
+    found = [a == b for a, b in taken if math.isfinite(b)]
+    assert len(found) > 1
+    assert all(found)
     told, same = scale.weighing(), waited.weighing()
     assert (told.mass, told.std, told.time, told.driven, told.minutes_to_2) == (
         same.mass, same.std, same.time, same.driven, same.minutes_to_2,
