@@ -49,6 +49,7 @@ def rows(**changes):
 
 
 VIEW = rows()
+MOVING = rows(ratio_rate=np.array([0.02, -0.1]))
 NORTH, EAST = law.wind_columns(VIEW)
 
 
@@ -62,6 +63,11 @@ NORTH, EAST = law.wind_columns(VIEW)
         # 1.2 / 2 x 625 ahead, 1 / 2 x 16 from behind.
         (law.drag_column(VIEW), [375.0, -8.0]),
         (law.engine_inertia_column(VIEW.gearing, VIEW.accel), [100.0 * 0.5, -25.0]),
+        # A ratio that moves by 2 % and -10 % per second.
+        (MOVING.engine_accel, [0.5 + 0.4, -1.0 - 1.0]),
+        (law.road_columns(MOVING, 1000.0, 0.3)[:, 2], [100.0 * 0.9, 25.0 * -2.0]),
+        (law.ratio_force(MOVING, CAR), [0.2 * 100.0 * 0.4, 0.2 * 25.0 * -1.0]),
+        (law.rotating_force(MOVING, CAR), [70.0 * 0.5 + 8.0, 55.0 * -1.0 - 5.0]),
         (law.wheel_inertia_column(VIEW.accel, 0.3), [0.5 / 0.09, -1.0 / 0.09]),
         # To the north at 20 m/s in air of 1.2 kg/m^3; to the east at 10 m/s.
         (NORTH, [24.0, 0.0]),

@@ -17,6 +17,7 @@ from weighbridge.vehicle.gear import (
     predict_gear,
     reported_gear_numbers,
     shifting,
+    stepless_range,
 )
 
 GEARINGS = np.array([36.0, 22.0, 14.5, 10.6, 8.4])
@@ -101,6 +102,17 @@ def test_a_stepless_gearbox_is_refused():
     engine = np.clip(engine, 90.0, 500.0) * (1 + rng.normal(0, 0.2, time.size))
     with refused("gear.few_samples", "gear.none", "gear.unclear"):
         detect_gearings(time, engine, speed)
+
+
+def test_a_stepless_gearbox_is_told_from_gears():
+    time = np.arange(4000) * 0.25
+    speed = 15.0 + 8.0 * np.sin(time / 20.0)
+    engine = np.clip(220.0 + 90.0 * np.sin(time / 13.0), 6.0 * speed, 40.0 * speed)
+    low, high = stepless_range(time, engine, speed, idle_speed=80.0)
+    seen = (engine / speed)[speed > 6.0]
+    assert (low, high) == pytest.approx((seen.min(), seen.max()), rel=0.02)
+    assert stepless_range(time[:90], engine[:90], speed[:90], idle_speed=80.0) is None
+    assert stepless_range(*drive(np.random.default_rng(4)), idle_speed=80.0) is None
 
 
 def test_too_short_a_drive_says_so():

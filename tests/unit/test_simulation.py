@@ -596,6 +596,7 @@ def test_squat_of_a_van_grows_with_its_load():
     [
         ("petrol_manual", "car"),
         ("petrol_dct", "car"),
+        ("petrol_cvt", "car"),
         ("diesel_automatic", "car"),
         ("electric", "car"),
         ("van", "van"),
@@ -611,7 +612,8 @@ def test_random_vehicles_of_every_kind_drive(kind, vehicle_class):
         truth = simulate_car(short(car=car, sensors=Sensors(imu_rate=0.0, gnss_rate=0.0))).truth
         assert truth.speed.max() > 6.0
     if kind.startswith("petrol"):
-        wanted = {"petrol_manual": "manual", "petrol_dct": "dual_clutch"}[kind]
+        boxes = {"manual": "manual", "dct": "dual_clutch", "cvt": "stepless"}
+        wanted = boxes[kind.removeprefix("petrol_")]
         assert {car.transmission for car in drawn} == {wanted}
 
 

@@ -37,7 +37,8 @@ SLOWEST: Final = 3.0
 def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     """Part of the steady ratios of engine to vehicle speed that lie at a gearing.
 
-    Only rows with rising speed count: coasting, the engine may idle.
+    Only rows with rising speed count: coasting, the engine may idle. Those of a stepless gearbox
+    lie within its range.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def share_on_gears(balance: ForceBalance, vehicle: Vehicle) -> float | None:
     -------
     In [0, 1] [-]; None without gearings, or where too few ratios hold still
     """
-    if not vehicle.driveline.gearings:
+    if not _known(vehicle):
         return None
     time, ratio = held_ratios(balance)
     if time.size < FEWEST_RATIOS:
@@ -66,9 +67,9 @@ def ratio_apart(balance: ForceBalance, vehicle: Vehicle) -> tuple[float, float]:
     -------
     Both as the engine speed at 100 km/h [rpm]
     """
-    gearings = np.log(np.array(vehicle.driveline.gearings))
+    gearings = np.log(np.array(_known(vehicle)))
     _, ratio = held_ratios(balance)
-    off = np.sort(ratio[np.abs(ratio[:, None] - gearings).min(axis=1) >= NEAR])
+    off = np.sort(ratio[distance(ratio, vehicle) >= NEAR])
     # The densest stretch of the width of a gear.
     counts = np.searchsorted(off, off + NEAR, side="right") - np.arange(off.size)
     most = int(np.argmax(counts))
@@ -89,7 +90,7 @@ def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
     ----------
     balance, vehicle
     """
-    if not vehicle.driveline.gearings:
+    if not _known(vehicle):
         return None
     time, ratio = held_ratios(balance)
     rows = balance.table.time
@@ -115,13 +116,25 @@ def foreign_part(balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
 
 def _share(ratio: Floats, vehicle: Vehicle) -> float:
     """Part of logarithms of ratios (n,) that lie at a gearing [-]."""
-    gearings = np.log(np.array(vehicle.driveline.gearings))
     # A short drive may not show the scale of its speed, which stays the indicated one then.
     true, indicated = (
-        float(np.mean(np.abs(ratio[:, None] - gearings + shift).min(axis=1) < NEAR))
+        float(np.mean(distance(ratio + shift, vehicle) < NEAR))
         for shift in (0.0, np.log(vehicle.driveline.speed_scale))
     )
     return max(true, indicated)
+
+
+def _known(vehicle: Vehicle) -> tuple[float, ...]:
+    """Gearings, or both ends of a range of them [1/m]; empty where they are not known."""
+    return vehicle.driveline.gearing_range or vehicle.driveline.gearings
+
+
+def distance(ratio: Floats, vehicle: Vehicle) -> Floats:
+    """How far logarithms of ratios (n,) are from the gearings, or outside of their range [-]."""
+    gearings = np.log(np.array(_known(vehicle)))
+    if vehicle.driveline.stepless:
+        return np.asarray(np.maximum(np.maximum(gearings[0] - ratio, ratio - gearings[-1]), 0.0))
+    return np.asarray(np.abs(ratio[:, None] - gearings).min(axis=1))
 
 
 def held_ratios(balance: ForceBalance) -> tuple[Floats, Floats]:

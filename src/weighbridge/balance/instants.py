@@ -16,6 +16,7 @@ from weighbridge.signals import Bools, Drive, Floats, Ints, Signal
 from weighbridge.signals.runs import marked_runs
 from weighbridge.vehicle.engine_delay import find_engine_delay
 from weighbridge.vehicle.gear import (
+    UNSLIPPED,
     effective_gearing,
     number_reported_gears,
     predict_gear,
@@ -27,6 +28,12 @@ from weighbridge.vehicle.torque import source_of
 
 SLOWEST_GEARED: Final = 1.5
 """Below this speed gears, slip and torque are not separated [m/s]."""
+
+BEYOND_RANGE: Final = 1.03
+"""A gearing above the highest of a stepless gearbox by this factor is a slip [-]."""
+
+RATE_SPAN: Final = 0.4
+"""The rate of an engine speed is looked at over so long before and after [s]."""
 
 SHIFT_MARGIN: Final = 0.4
 """Samples nearer than this to a change of gear are left out [s]."""
@@ -144,6 +151,28 @@ def engine_speed_at(drive: Drive, vehicle: Vehicle, recorded: Floats, speed: Flo
     return np.full(speed.size, np.nan)
 
 
+def ratio_rate(
+    drive: Drive, stamps: Floats, engine_speed: Floats, speed: Floats, accel: Floats
+) -> Floats:
+    """How fast the logarithm of engine over vehicle speed rises (n,) [1/s].
+
+    Parameters
+    ----------
+    drive : with engine_speed
+    stamps : (n,) those of its engine speed [s]
+    engine_speed, speed, accel : (n,) there [rad/s], [m/s], [m/s^2]
+    """
+    signal = drive.signals["engine_speed"]
+    span = max(RATE_SPAN, signal.period)
+    # No further ahead in sum than the signal may be looked at.
+    nearer = replace(signal, ahead=max(signal.ahead - span, 0.0))
+    change = nearer.at(stamps + span) - signal.at(stamps - span)
+    turning, moving = engine_speed > 0.0, speed > SLOWEST_GEARED
+    known = turning & moving
+    faster = change / (2.0 * span) / np.where(known, engine_speed, 1.0)
+    return np.where(known, faster - accel / np.where(known, speed, 1.0), np.nan)
+
+
 def identify_told_gears(
     drive: Drive, vehicle: Vehicle, recorded: Floats, engine_speed: Floats, speed: Floats
 ) -> Mapping[int, int]:
@@ -176,7 +205,11 @@ def gears_at(
         # Without known ratios the ratio of the moment is the best there is.
         moving = speed > SLOWEST_GEARED
         ratio = np.where(moving, engine_speed / np.where(moving, speed, 1.0), np.nan)
-        return np.zeros(recorded.size, dtype=np.int64), ratio, np.zeros(recorded.size, dtype=bool)
+        slipping = np.zeros(recorded.size, dtype=bool)
+        if vehicle.driveline.gearing_range is not None:
+            highest = BEYOND_RANGE * vehicle.driveline.gearing_range[-1]
+            slipping = (speed < UNSLIPPED) | (np.nan_to_num(ratio) > highest)
+        return np.zeros(recorded.size, dtype=np.int64), ratio, slipping
     gear, mismatch = predict_gear(engine_speed, speed, gearings)
     measured: Signal | None = drive.get("gear")
     if measured is not None and len(measured):
@@ -246,13 +279,21 @@ def read_instants(
     speed = rows["speed"]
     if engine_delay is None:
         engine_delay = identify_engine_delay(drive, vehicle, motion)
-    engine_speed = engine_speed_at(drive, vehicle, time + engine_delay, speed)
+    # A ratio that moves is that of the instant at which the torque was read: both make power.
+    stepless = vehicle.driveline.stepless
+    read_at, rolling = time + engine_delay, speed
+    if stepless:
+        read_at, rolling = recorded, interpolate_motion(motion, recorded - engine_delay)["speed"]
+    engine_speed = engine_speed_at(drive, vehicle, read_at, speed)
     if numbers is None:
         numbers = identify_told_gears(drive, vehicle, recorded, engine_speed, speed)
-    gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, speed, numbers)
+    gear, gearing, slipping = gears_at(drive, vehicle, recorded, engine_speed, rolling, numbers)
     changing = shifting(time, gear, margin=SHIFT_MARGIN, ahead=ahead)
     if vehicle.driveline.single_speed:
         changing[:] = False
+    rate = None
+    if stepless:
+        rate = ratio_rate(drive, read_at, engine_speed, speed, rows["accel"])
     moved = ("speed", "accel", "specific_force", "grade", "pitch", "heading")
     return Instants(
         columns={
@@ -260,6 +301,7 @@ def read_instants(
             "engine_speed": engine_speed,
             "gear": gear,
             "gearing": gearing,
+            "ratio_rate": rate,
             "air_speed": speed + headwind(drive, rows["heading"]),
             **{name: rows[name] for name in moved},
         },

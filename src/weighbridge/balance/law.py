@@ -4,7 +4,7 @@ Along the road, with the traction force F at the wheels::
 
     F = m (f + g C_r(v) cos(grade))                 mass, hills, rolling resistance
       + C_d A q                                     air drag
-      + I_e G^2 a + I_w a / r^2                     engine and wheels that turn faster
+      + I_e G^2 a_e + I_w a / r^2                   engine and wheels that turn faster
       + rho C_d A v (w_n cos(psi) + w_e sin(psi))   wind that nobody reported
       + s d + c                                     gusts and fast errors, lasting offset
       + G q_c exp(-t / tau)                         cold engine: friction in the reading
@@ -14,7 +14,8 @@ Along the road, with the traction force F at the wheels::
     F = eta G T(reading, engine speed)
 
 with the specific force f = dv/dt + g sin(grade), acceleration a, dynamic pressure q, gearing G
-(engine angle per distance), engine speed N, heading psi and speed v. A column is the traction
+(engine angle per distance), engine speed N, heading psi and speed v. The engine's speed rises by
+``G a_e``; in a gear a_e is a, in a stepless gearbox ``a + v G' / G``. A column is the traction
 force that one unit of its parameter takes, so that the sum of columns times parameters is the
 traction. Weighing, calibration, delay search and sensitivity pick the columns they need.
 
@@ -88,7 +89,7 @@ def drag_column(table: ForceTable) -> Floats:
 
 
 def engine_inertia_column(gearing: Floats | float, accel: Floats | float) -> Floats:
-    """Of the inertia at engine or motor, ``G^2 a`` (n,) [1/(m s^2)]."""
+    """Of the inertia at engine or motor, ``G^2 a_e`` (n,) [1/(m s^2)]."""
     return np.asarray(gearing**2 * accel)
 
 
@@ -110,7 +111,7 @@ def road_columns(table: ForceTable, mass: Floats | float, wheel_radius: float) -
         [
             drag_column(table),
             rolling_column(table, mass),
-            engine_inertia_column(table.gearing, table.accel),
+            engine_inertia_column(table.gearing, table.engine_accel),
             wheel_inertia_column(table.accel, wheel_radius),
         ]
     )
@@ -235,6 +236,21 @@ def rotating_mass(vehicle: Vehicle, gearing: Floats | float) -> Floats:
     return np.asarray(wheels + road.engine_inertia.value * gearing**2)
 
 
+def rotating_force(table: ForceTable, vehicle: Vehicle) -> Floats:
+    """Force that makes wheels and engine turn faster (n,) [N]."""
+    return np.asarray(
+        rotating_mass(vehicle, table.gearing) * table.accel + ratio_force(table, vehicle)
+    )
+
+
+def ratio_force(table: ForceTable, vehicle: Vehicle) -> Floats | float:
+    """Part of it that a moving gearing takes, ``I_e G v G'`` (n,) [N]; none where gears hold it."""
+    if table.ratio_rate is None:
+        return 0.0
+    inertia = vehicle.road.engine_inertia.value
+    return np.asarray(inertia * table.gearing**2 * (table.engine_accel - table.accel))
+
+
 def drag_force(table: ForceTable, vehicle: Vehicle) -> Floats:
     """Air drag ``C_d A q`` (n,) [N], in still air or in the wind that ``drive.toml`` reports."""
     return np.asarray(vehicle.road.drag_area.value * drag_column(table))
@@ -250,7 +266,7 @@ def force_on_mass(table: ForceTable, vehicle: Vehicle) -> Floats:
 
     The right-hand side of Jensen 2022, eq. 6.
     """
-    turning = rotating_mass(vehicle, table.gearing) * table.accel
+    turning = rotating_force(table, vehicle)
     return np.asarray(table.traction_force - drag_force(table, vehicle) - turning)
 
 

@@ -92,6 +92,7 @@ class ForceTable:
     fuel_burnt : (n,) since the first row, as far as the drive shows it [kg]
     reason : (n,) `Reason` why a sample is not usable
     set_off : instant at which the vehicle first moved; found from the rows when None [s]
+    ratio_rate : (n,) how fast the logarithm of the gearing rises [1/s]; None where gears hold it
     """
 
     time: Floats
@@ -112,6 +113,7 @@ class ForceTable:
     fuel_burnt: Floats
     reason: NDArray[np.uint8]
     set_off: float | None = None
+    ratio_rate: Floats | None = None
 
     @property
     def first_moved(self) -> float:
@@ -120,6 +122,13 @@ class ForceTable:
             return self.set_off
         moving = np.flatnonzero(self.moving)
         return float(self.time[moving[0]] if moving.size else self.time[0])
+
+    @property
+    def engine_accel(self) -> Floats:
+        """Rate of the engine speed over the gearing (n,) [m/s^2]: of the vehicle, in a gear."""
+        if self.ratio_rate is None:
+            return self.accel
+        return np.asarray(self.accel + self.ratio_rate * self.speed)
 
     @property
     def moving(self) -> Bools:

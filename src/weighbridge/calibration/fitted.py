@@ -9,7 +9,7 @@ import numpy as np
 
 from weighbridge.balance import ForceBalance, force_balance
 from weighbridge.balance.force_balance import dragged_reading
-from weighbridge.balance.law import drag_force, mass_column, rotating_mass
+from weighbridge.balance.law import drag_force, mass_column, rotating_force
 from weighbridge.calibration.problem import Problem
 from weighbridge.calibration.recording import DelayedRows, Recording
 from weighbridge.messages import Problem as Message
@@ -124,7 +124,7 @@ def torques(vehicle: Vehicle, recording: Recording, rows: DelayedRows) -> tuple[
     torque = rows_of(model, recording.reading, rows.engine_speed) @ parameters(model)
     mass = recording.mass - table.fuel_burnt
     taken = mass * mass_column(table, vehicle) + drag_force(table, vehicle)
-    taken += rotating_mass(vehicle, table.gearing) * table.accel
+    taken += rotating_force(table, vehicle)
     return torque, np.asarray(taken / table.gearing)
 
 

@@ -26,7 +26,7 @@ from weighbridge.vehicle.air import identify_air
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.classes import VehicleClass
 from weighbridge.vehicle.engine_delay import find_engine_delay
-from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling
+from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range
 from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
@@ -161,7 +161,7 @@ def problem_of(
     recordings = tuple(
         Recording.of(*one, draft, source) for one in zip(drives, motions, masses, strict=True)
     )
-    if given.gearings and source.gearing is None:
+    if (given.gearings or given.stepless) and source.gearing is None:
         _refuse_foreign_gears(recordings)
     return Problem(
         recordings=recordings,
@@ -223,8 +223,11 @@ def _draft(
     """Find the gears, where they are not known, and let the source mean the torque."""
     gears = None
     driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions, base))
-    if not driveline.gearings:
-        gears = find_gears(drives, motions, idle_speed=base.driveline.idle_speed or None)
+    idle = base.driveline.idle_speed or None
+    if not driveline.gearings and not driveline.stepless:
+        driveline = replace(driveline, gearing_range=_stepless(drives, motions, idle))
+    if not driveline.gearings and not driveline.stepless:
+        gears = find_gears(drives, motions, idle_speed=idle)
         driveline = replace(
             driveline,
             gearings=tuple(float(g) for g in gears.gearings),
@@ -306,6 +309,16 @@ def find_gears(
         stds=found.stds[kept],
         counts=found.counts[kept],
     )
+
+
+def _stepless(
+    drives: Sequence[Drive], motions: Sequence[Motion], idle_speed: float | None
+) -> tuple[float, float] | None:
+    """Range of gearings of all the drives together; None where they show no stepless gearbox."""
+    if not all(len(drive.get("engine_speed") or ()) for drive in drives):
+        return None
+    usual = [motion.speed_delay for motion in motions]
+    return stepless_range(*_engine_and_speed(drives, motions, usual), idle_speed=idle_speed)
 
 
 def _told_gears(drives: Sequence[Drive]) -> int:

@@ -195,6 +195,7 @@ class Recording:
             & self.driven
             & np.isfinite(table.specific_force)
             & np.isfinite(table.gearing)
+            & np.isfinite(table.engine_accel)
             & np.isfinite(self.reading)
             & np.isfinite(engine_speed)
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from weighbridge.balance import ForceBalance, Reason
 from weighbridge.balance.averaging import PAUSE
 from weighbridge.balance.instants import SLOWEST_GEARED
-from weighbridge.balance.law import drag_factor, mass_column, rotating_mass
+from weighbridge.balance.law import drag_factor, mass_column, ratio_force, rotating_mass
 from weighbridge.constants import GRAVITY
 from weighbridge.errors import ConfigError
 from weighbridge.estimators import robust_rls
@@ -100,7 +100,7 @@ def columns(
         regressor = np.full(table.time.size, np.nan)
     return kernel.Columns(
         time=table.time,
-        traction=table.traction_force,
+        traction=np.asarray(table.traction_force - ratio_force(table, vehicle)),
         drag=drag_factor(table, vehicle),
         headwind=table.air_speed - table.speed,
         rotating=rotating_mass(vehicle, table.gearing),

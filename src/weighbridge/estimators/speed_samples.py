@@ -74,7 +74,7 @@ def sampled(
     return time, kernel.Columns(
         length=np.diff(time, prepend=time[0]),
         speed=np.where(motion.valid[every], raw[every], np.nan),
-        force=mean(table.traction_force),
+        force=mean(np.asarray(table.traction_force - law.ratio_force(table, vehicle))),
         # White noise of the rows: its mean over a span falls with the rows in it.
         force_var=mean(table.force_std**2) * period / between,
         drag=mean(law.drag_factor(table, vehicle)),

@@ -20,6 +20,7 @@ from weighbridge.kernels.simulated_driveline import (
     cut_fuel,
     foot_off,
     fuel_flow,
+    gearbox_loss,
     transmit,
 )
 from weighbridge.kernels.simulated_driver import (
@@ -196,17 +197,17 @@ def _shift(power, shaft, road, where, sync, braking, pedal_torque, pedal, dt):
         since_shift += dt
     shaft = Shaft(
         shaft.engine, shaft.torque, shaft.gear, shaft.gear_from, since_shift, shaft.shifting,
-        shaft.locked, shaft.fuel_cut, shaft.phase, pedal_torque, calm_pedal,
+        shaft.locked, shaft.fuel_cut, shaft.phase, pedal_torque, calm_pedal, shaft.gearing,
     )  # fmt: skip
     ready = shaft.shifting <= 0.0 and (shaft.locked or power.converter > 0.0)
-    if power.gearings.size == 1 or not ready:
+    if power.gearings.size == 1 or power.stepless or not ready:
         return shaft
     new = choose_gear(power, shaft, sync, look_up(road.revs, where), braking)
     if new == shaft.gear:
         return shaft
     return Shaft(
         shaft.engine, shaft.torque, new, shaft.gear, 0.0, power.shift_time,
-        shaft.locked, shaft.fuel_cut, shaft.phase, pedal_torque, calm_pedal,
+        shaft.locked, shaft.fuel_cut, shaft.phase, pedal_torque, calm_pedal, shaft.gearing,
     )  # fmt: skip
 
 
@@ -241,7 +242,7 @@ def _step(road, power, resistance, driver, car, weather, uneven, every, dt, out,
     drag, rolling, slope, tail = _resist(road, resistance, weather, where, v, mass, cold)
     resist = drag + rolling + slope
 
-    gearing = power.gearings[shaft.gear - 1]
+    gearing = shaft.gearing if power.stepless else power.gearings[shaft.gear - 1]
     weight = resistance.mass / (resistance.mass + car.load)
     pull = mass * car.a + drag + rolling + slope
     slip = min(0.05, max(-0.05, resistance.tyre_slip * weight * pull))
@@ -278,7 +279,7 @@ def _step(road, power, resistance, driver, car, weather, uneven, every, dt, out,
         gross = max(0.0, crank + crank_side.friction + crank_side.accessory)
         burnt = fuel_flow(power, shaft, crank_side, gross)
 
-    loss = crank_side.loss_constant * min(1.0, v / 0.5) + power.loss_slope * abs(net)
+    loss = gearbox_loss(power, crank_side, gearing, shaft.engine, net, v)
     rotating = power.engine_inertia * gearing * gearing if shaft.phase == DRIVING else 0.0
     force = gearing * (net - loss) - spin
     residual = car.residual * (1.0 - dt / resistance.brake_drag_time)
@@ -342,7 +343,7 @@ def drive(road, power, resistance, driver, noise, chance, dt, steps):
     fast = dt * NOISE_STRIDE
     shaft = Shaft(
         power.idle_speed, 0.0, power.launch_gear, power.launch_gear, 10.0, 0.0,
-        power.electric, False, OPEN, 0.0, 0.0,
+        power.electric, False, OPEN, 0.0, 0.0, power.gearings[power.launch_gear - 1],
     )  # fmt: skip
     intent = Intent(0.0, 0.0, 0, False, 0, True, driver.rest)
     foot = Foot(ON_BRAKE, 0.0, driver.least_high, 0.0, 0.0, 0.0)

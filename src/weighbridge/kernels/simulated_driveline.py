@@ -55,6 +55,12 @@ class Powertrain(NamedTuple):
     overrun_charge: float  # charge kept in overrun before the fuel is cut, over that of idling [-]
     cut_delay: float  # foot off the pedal until the fuel is cut [s]
     cut_speed: float  # engine speed below which it is not [rad/s]
+    stepless: bool  # the gearing moves between the first and the last
+    economy: float  # lowest engine speed that a stepless box holds [rad/s]
+    power_share: float  # part of the highest torque that it lets the engine give [-]
+    ratio_lag: float  # of its ratio [s]
+    ratio_bend: float  # growth of its losses with the squared logarithm of the ratio [-]
+    pump: float  # torque of its pump over engine speed [N m s/rad]
 
 
 class Shaft(NamedTuple):
@@ -71,6 +77,7 @@ class Shaft(NamedTuple):
     phase: int
     pedal_torque: float  # asked for by the pedal [N m]
     calm_pedal: float  # pedal as the gearbox sees it [-]
+    gearing: float  # of the gear, or of a stepless box at the moment [1/m]
 
 
 class Drag(NamedTuple):
@@ -234,6 +241,52 @@ def choose_gear(power, shaft, sync, revs, braking):
 
 
 @inlined_kernel
+def steered_gearing(power, shaft, v, dt):
+    """Gearing of a stepless box after one step [1/m].
+
+    Parameters
+    ----------
+    power, shaft
+        See the types.
+    v : float
+        Vehicle speed [m/s].
+    dt : float
+        Step [s].
+
+    Notes
+    -----
+    The engine turns as fast as the power asked for needs at some part of its highest torque, and
+    not below some speed. The ratio follows with a lag, at most by a factor of e per second.
+    """
+    first, last = power.gearings[0], power.gearings[-1]
+    asked = max(0.0, shaft.pedal_torque) * shaft.engine
+    wanted = max(power.economy, asked / (power.power_share * power.curve_torque.max()))
+    wanted = min(wanted, 0.95 * power.max_speed)
+    goal = min(first, max(last, wanted / max(v, 0.5)))
+    rate = np.log(goal / shaft.gearing) / power.ratio_lag
+    return shaft.gearing * np.exp(min(1.0, max(-1.0, rate)) * dt)
+
+
+@inlined_kernel
+def gearbox_loss(power, drag, gearing, engine, net, v):
+    """Torque that the driveline loses, at the gearbox input [N m].
+
+    Parameters
+    ----------
+    power, drag
+        See the types.
+    gearing, engine, net, v : float
+        Gearing [1/m], engine speed [rad/s], torque at the gearbox input [N m], speed [m/s].
+    """
+    loss = drag.loss_constant * min(1.0, v / 0.5) + power.loss_slope * abs(net)
+    if power.stepless:
+        off = np.log(gearing / np.sqrt(power.gearings[0] * power.gearings[-1]))
+        loss += power.pump * engine * min(1.0, v / 0.5)
+        loss *= 1.0 + power.ratio_bend * off * off
+    return loss
+
+
+@inlined_kernel
 def converter_torques(power, engine, turbine, capacity):
     """Torques of a torque converter.
 
@@ -288,6 +341,14 @@ def _idling(power, engine, load):
 
 
 @inlined_kernel
+def _locking_speed(power, shaft):
+    """Turbine speed from which the converter is locked; of a stepless box in its first ratio."""
+    if power.stepless:
+        return power.lock_speed * shaft.gearing / power.gearings[0]
+    return power.lock_speed
+
+
+@inlined_kernel
 def through_converter(power, shaft, drag, turbine, pedal, keep, dt):
     """Run the engine against an open converter for one step.
 
@@ -316,7 +377,8 @@ def through_converter(power, shaft, drag, turbine, pedal, keep, dt):
     before = shaft.engine
     asked = min(drag.full, max(drag.lowest, shaft.pedal_torque))
     torque = shaft.torque + (asked - shaft.torque) * dt / power.torque_lag
-    closing = shaft.gear >= power.lock_gear and turbine > power.lock_speed and shaft.shifting <= 0.0
+    slowest = _locking_speed(power, shaft)
+    closing = shaft.gear >= power.lock_gear and turbine > slowest and shaft.shifting <= 0.0
     if closing:
         # The clutch draws the engine to the turbine's speed.
         engine = before + (turbine - before) * dt / 0.15
@@ -427,13 +489,18 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
     torque, locked, fuel_cut = shaft.torque, shaft.locked, shaft.fuel_cut
     asked = min(full, max(lowest, shaft.pedal_torque))
     before = shaft.engine
+    turning = 0.0
+    if power.stepless:
+        # The engine gains speed apart from the wheels.
+        old, gearing = gearing, steered_gearing(power, shaft, v, dt)
+        turning = power.engine_inertia * (gearing - old) / dt * v * (1.0 + slip)
     sync = gearing * v * (1.0 + slip)
     if shifting > 0.0 and v > 0.5:
         phase = SHIFTING
         gearing, shifting, engine, torque, net, crank, locked = _between_gears(
             power, shaft, drag, v, 1.0 + slip, gearing, pedal, asked, dt
         )
-    elif power.electric or (locked and sync > _lowest_locked(power, gear)):
+    elif power.electric or (locked and sync > _lowest_locked(power, shaft)):
         phase = DRIVING
         torque += (asked - torque) * dt / power.torque_lag
         if not power.electric:
@@ -442,7 +509,7 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
         if engine > power.max_speed:
             # A limiter cuts the fuel at once.
             torque = min(torque, full)
-        net = torque
+        net = torque - turning
         crank = torque
     elif power.converter > 0.0:
         phase = SLIPPING
@@ -461,13 +528,13 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
         crank = net + power.engine_inertia * (engine - before) / dt
         crank = min(full, max(lowest, crank))
         fuel_cut = False
-    slow = not power.electric and sync <= _lowest_locked(power, gear)
+    slow = not power.electric and sync <= _lowest_locked(power, shaft)
     if slow and (phase == DRIVING or (gear <= power.launch_gear and phase != SLIPPING)):
         locked = False
     return (
         Shaft(
             engine, torque, gear, shaft.gear_from, shaft.since_shift, shifting, locked, fuel_cut,
-            phase, shaft.pedal_torque, shaft.calm_pedal,
+            phase, shaft.pedal_torque, shaft.calm_pedal, gearing,
         ),
         gearing,
         net,
@@ -476,11 +543,11 @@ def transmit(power, shaft, drag, gearing, v, slip, pedal, braking, dt):
 
 
 @inlined_kernel
-def _lowest_locked(power, gear):
+def _lowest_locked(power, shaft):
     """Speed of the gearbox input below which clutch or lock-up opens [rad/s]."""
     if power.converter == 0.0:
         return power.idle_speed * 0.98
-    return 0.85 * power.lock_speed if gear >= power.lock_gear else np.inf
+    return 0.85 * _locking_speed(power, shaft) if shaft.gear >= power.lock_gear else np.inf
 
 
 @inlined_kernel

@@ -25,8 +25,9 @@ class SimulatedCar:
     mass : with driver and full tank, without payload [kg]
     engine : "petrol", "diesel" or "electric"
     transmission : "dual_clutch", "manual", "automatic" (torque converter and power
-        shifts), "automated" (a clutch and interrupted torque) or "single"
-    gear_ratios : gears 1..n [-]
+        shifts), "automated" (a clutch and interrupted torque), "stepless" (a torque converter
+        and a variator) or "single"
+    gear_ratios : gears 1..n; the first and the last of a stepless box [-]
     final_drive : [-]
     wheel_radius : effective rolling radius [m]
     engine_inertia : engine or motor with flywheel and clutch [kg m^2]
@@ -48,7 +49,12 @@ class SimulatedCar:
         speed; 0 where there is none [N m s^2/rad^2]
     stall_ratio : turbine over pump torque at stall [-]
     lock_gear, lock_speed : gear and turbine speed from which the converter is
-        locked, [-], [rad/s]
+        locked, [-], [rad/s]; of a stepless box in its first ratio
+    economy_speed : lowest engine speed that a stepless box holds [rad/s]
+    power_share : part of the highest torque at which it lets the engine give a power [-]
+    ratio_lag : first-order lag of its ratio [s]
+    ratio_bend : growth of its losses with the squared logarithm of the ratio over the middle [-]
+    pump : torque of its pump over engine speed [N m s/rad]
     accessory_power, compressor_power : taken from the crank [W]
     load_full : reading of the calculated load at full torque [-]; a diesel's is
         of the torque there is at the engine speed of the moment (SAE J1979)
@@ -99,9 +105,9 @@ class SimulatedCar:
     kind: str = "car"
     mass: float
     engine: Literal["petrol", "diesel", "electric"] = "petrol"
-    transmission: Literal["dual_clutch", "manual", "automatic", "automated", "single"] = (
-        "dual_clutch"
-    )
+    transmission: Literal[
+        "dual_clutch", "manual", "automatic", "automated", "stepless", "single"
+    ] = "dual_clutch"
     gear_ratios: tuple[float, ...]
     final_drive: float
     wheel_radius: float
@@ -127,6 +133,11 @@ class SimulatedCar:
     stall_ratio: float = 1.0
     lock_gear: int = 1
     lock_speed: float = 0.0
+    economy_speed: float = 1200 * RPM
+    power_share: float = 0.8
+    ratio_lag: float = 0.5
+    ratio_bend: float = 0.0
+    pump: float = 0.0
     accessory_power: float = 700.0
     compressor_power: float = 1500.0
     load_full: float = 0.35
@@ -180,10 +191,10 @@ class SimulatedCar:
             raise ConfigError(
                 f"launch_gear must be one of {len(self.gear_ratios)} gears, got {self.launch_gear}"
             )
-        if (self.transmission == "automatic") != (self.converter_capacity > 0.0):
+        if (self.transmission in ("automatic", "stepless")) != (self.converter_capacity > 0.0):
             raise ConfigError(
-                "an automatic has a converter_capacity above zero and others have none, got "
-                f"{self.converter_capacity} for transmission {self.transmission!r}"
+                "an automatic or stepless box has a converter_capacity above zero and others have "
+                f"none, got {self.converter_capacity} for transmission {self.transmission!r}"
             )
 
     @property

@@ -238,6 +238,12 @@ def _powertrain(scenario: Scenario) -> Powertrain:
         overrun_charge=car.overrun_charge * effects.overrun_fuel,
         cut_delay=car.cut_delay * effects.overrun_fuel,
         cut_speed=car.cut_speed * effects.overrun_fuel,
+        stepless=car.transmission == "stepless",
+        economy=car.economy_speed,
+        power_share=car.power_share,
+        ratio_lag=car.ratio_lag,
+        ratio_bend=car.ratio_bend * effects.driveline_loss,
+        pump=car.pump * effects.driveline_loss,
     )
 
 

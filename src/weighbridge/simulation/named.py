@@ -20,7 +20,7 @@ from weighbridge.simulation.route import (
     straight_route,
 )
 from weighbridge.simulation.scenario import Braking, Effects, Loading, Polling, Scenario, Sensors
-from weighbridge.simulation.vehicles import BUS, DIESEL_AUTOMATIC, TRUCK18, VAN
+from weighbridge.simulation.vehicles import BUS, DIESEL_AUTOMATIC, STEPLESS, TRUCK18, VAN
 
 Maker = Callable[[float, int], Scenario]
 """Makes a scenario from payload [kg] and seed."""
@@ -117,6 +117,11 @@ _TRUCK_POLLING: Final = replace(
     ),
     rate=10.0,
 )
+_TORQUE_POLLING: Final = Polling(
+    fast=("vehicle_speed", "engine_speed", "engine_torque_fraction", "throttle"),
+    slow=("reference_torque", "ambient_temperature", "barometric_pressure"),
+    rate=5.0,
+)
 _DIESEL_POLLING: Final = Polling(
     fast=("vehicle_speed", "engine_speed", "engine_load", "throttle"), rate=5.0
 )
@@ -132,13 +137,15 @@ def usual_polling(car: SimulatedCar) -> Polling:
     Returns
     -------
     Polling
-        J1939 for bus and truck, motor torque for an electric car, calculated load
-        (with air flow for petrol) for the others.
+        J1939 for bus and truck, motor torque for an electric car, torque percent for a stepless
+        box, calculated load (with air flow for petrol) for the others.
     """
     if car.kind in ("bus", "truck"):
         return _TRUCK_POLLING
     if car.electric:
         return _ELECTRIC_POLLING
+    if car.transmission == "stepless":
+        return _TORQUE_POLLING
     return _DIESEL_POLLING if car.engine == "diesel" else Polling()
 
 
@@ -223,6 +230,8 @@ SCENARIOS: Final[dict[str, Maker]] = {
     "bus-calibration": _calibrating("bus-calibration", BUS, 13),
     "diesel": _on_the_road("diesel", DIESEL_AUTOMATIC, 14),
     "diesel-calibration": _calibrating("diesel-calibration", DIESEL_AUTOMATIC, 15),
+    "cvt": _on_the_road("cvt", STEPLESS, 20),
+    "cvt-calibration": _calibrating("cvt-calibration", STEPLESS, 21),
     "van": _on_the_road("van", VAN, 16),
     "van-calibration": _calibrating("van-calibration", VAN, 17),
     "truck": _on_the_road("truck", TRUCK18, 18),
@@ -244,6 +253,8 @@ ABOUT: Final[dict[str, str]] = {
     "bus-calibration": "the bus in all gears, loads and engine speeds",
     "diesel": "diesel car with an 8-speed automatic, about 75 min",
     "diesel-calibration": "the diesel car in all gears, loads and engine speeds",
+    "cvt": "petrol car with a stepless gearbox that tells its engine's torque, about 75 min",
+    "cvt-calibration": "the same car at all loads and engine speeds",
     "van": "diesel van with a manual gearbox, 2100 kg empty to 3500 kg, about 80 min",
     "van-calibration": "the van in all gears, loads and engine speeds",
     "truck": "rigid truck of 18 t, 9000 kg empty, J1939, about 95 min",

@@ -28,6 +28,9 @@ class Driveline:
     gearings : effective gearing ``G = i_t i_d / r`` of gears 1..n, engine angle
         per distance travelled; one value for a single-speed vehicle [1/m]
     gearing_stds : standard deviations of the gearings, same length or empty [1/m]
+    gearing_range : lowest and highest effective gearing of a stepless gearbox, which has no
+        ``gearings``: its gearing is engine over vehicle speed at each instant [1/m]; None where
+        there are gears, or they are not known
     engine_inertia, engine_inertia_std : all that turns with the engine or motor
         and its standard deviation [kg m^2]; None where it is not stated, see `Vehicle.road`
     wheel_inertia, wheel_inertia_std : all wheels and what turns with them [kg m^2], likewise
@@ -44,6 +47,7 @@ class Driveline:
 
     gearings: tuple[float, ...] = ()
     gearing_stds: tuple[float, ...] = ()
+    gearing_range: tuple[float, float] | None = None
     engine_inertia: float | None = None
     engine_inertia_std: float | None = None
     wheel_inertia: float | None = None
@@ -63,6 +67,13 @@ class Driveline:
             raise ConfigError(f"gearings must fall from first to last gear, got {self.gearings}")
         if self.gearing_stds and len(self.gearing_stds) != len(self.gearings):
             raise ConfigError("gearing_stds must be as many as gearings")
+        if self.gearing_range is not None:
+            for g in self.gearing_range:
+                within("one of gearing_range", g, 0.01, 10_000.0, "per m")
+            if not self.gearing_range[0] < self.gearing_range[1]:
+                raise ConfigError(f"gearing_range must rise, got {self.gearing_range}")
+            if self.gearings:
+                raise ConfigError("give gearings, or the gearing_range of a stepless gearbox")
         not_negative("engine_inertia", self.engine_inertia)
         not_negative("wheel_inertia", self.wheel_inertia)
         within("engine_inertia", self.engine_inertia, 0.0, 10_000.0, "kg m^2")
@@ -89,11 +100,17 @@ class Driveline:
         return len(self.gearings) == 1
 
     @property
+    def stepless(self) -> bool:
+        """Whether the gearing moves between two ends."""
+        return self.gearing_range is not None
+
+    @property
     def usual_gearing(self) -> float:
         """Geometric mean of the gearings [1/m]; 0 where there are not several."""
-        if len(self.gearings) < 2:
+        known = self.gearing_range or self.gearings
+        if len(known) < 2:
             return 0.0
-        return float(np.exp(np.mean(np.log(self.gearings))))
+        return float(np.exp(np.mean(np.log(known))))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -84,6 +84,13 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
             ),
             Key("gearing_stds_per_m", "gearing_stds", "their standard deviations", "numbers"),
             Key(
+                "gearing_range_per_m",
+                "gearing_range",
+                "of a stepless gearbox in place of gearings: the lowest and the highest",
+                "numbers",
+                pair=True,
+            ),
+            Key(
                 "engine_inertia", "engine_inertia", "all that turns with the engine", suffix="kgm2"
             ),
             Key(

@@ -116,7 +116,8 @@ class Vehicle:
         ]
         kind = f"{self.engine} {self.kind}" if self.engine is not None else self.kind
         gears = len(self.driveline.gearings)
-        known = plural(gears, "gear") if gears else "gears not known"
+        unknown = "stepless" if self.driveline.stepless else "gears not known"
+        known = plural(gears, "gear") if gears else unknown
         made = self.provenance
         when = f" on {made.date}" if made.date else ""
         by = f"calibrated{when} by {plural(len(made.masses), 'drive')}"

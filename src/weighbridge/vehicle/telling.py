@@ -111,6 +111,9 @@ def _gears(vehicle: Vehicle) -> str:
     line = vehicle.driveline
     if source_of(vehicle).gearing is not None:
         return "not needed: what is read does not depend on them"
+    if line.gearing_range is not None:
+        low, high = (scalar_from_si(g * _CRUISE, "rpm") for g in line.gearing_range)
+        return f"stepless, {low:.0f} to {high:.0f} rpm at 100 km/h; measured at each instant"
     if not line.gearings:
         return "not known; a calibration finds them from engine and vehicle speed"
     last = line.gearings[-1] * _CRUISE

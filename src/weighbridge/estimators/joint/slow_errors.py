@@ -172,7 +172,7 @@ def design(
         columns += [law.torque_offset_column(table), law.torque_growth_column(table)]
         if not line.single_speed:
             columns += [
-                law.engine_inertia_column(np.nan_to_num(table.gearing), table.accel),
+                law.engine_inertia_column(np.nan_to_num(table.gearing), table.engine_accel),
                 law.wheel_inertia_column(table.accel, line.wheel_radius),
             ]
     return np.column_stack(columns), y + phi * table.fuel_burnt
