@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.balance.force_balance import force_balance
@@ -66,3 +67,47 @@ def test_ratios_beyond_those_of_the_calibration_are_another_vehicles(calibrated)
     weighed = wb.weigh(drive(180.0, 3, "cvt").drive, replace(calibrated, driveline=line))
     assert weighed.status == "inconsistent"
     assert weighed.reason_id == "gear.foreign"
+
+
+def with_motor(made):
+    """Let a motor drive alone at low power: the engine stands, and a battery gives the power."""
+    truth, drive = made.truth, made.drive
+    power = truth.engine_torque * truth.engine_speed
+    alone = (power < 2e4).astype(float)
+
+    def unless(name):
+        s = drive.signals[name]
+        return wb.Signal(
+            name, s.time, np.where(np.interp(s.time, truth.time, alone) > 0.5, 0.0, s.values)
+        )
+
+    volts = wb.Signal("battery_voltage", truth.time, np.full(truth.time.size, 210.0))
+    amps = wb.Signal("battery_current", truth.time, power * alone / 210.0)
+    return drive.with_signals(unless("engine_speed"), unless("engine_torque_fraction")), (
+        volts,
+        amps,
+    )
+
+
+def test_a_motor_that_drives_alone_shows_a_hybrid(known, calibrated):
+    drive, _ = with_motor(known[0])
+    assert wb.weigh(drive, calibrated).reason_id == "hybrid.engine_stands"
+    with refused("hybrid.engine_stands"):
+        wb.calibrate([drive], known[0].scenario.mass)
+
+
+def test_a_battery_that_drives_beside_the_engine_shows_a_hybrid(known, calibrated):
+    made = known[0]
+    _, battery = with_motor(made)
+    weighed = wb.weigh(made.drive.with_signals(*battery), calibrated)
+    assert weighed.reason_id == "hybrid.battery"
+    small = [battery[0], wb.Signal("battery_current", battery[1].time, 0.05 * battery[1].values)]
+    assert wb.weigh(made.drive.with_signals(*small), calibrated).reason_id is None
+
+
+def test_of_a_hybrid_the_torque_of_the_engine_is_a_part(known, calibrated):
+    weighed = wb.weigh(known[0].drive, replace(calibrated, kind="hybrid"))
+    assert weighed.status == "missing_signals"
+    assert weighed.reason_id == "hybrid.part"
+    with refused("hybrid.part"):
+        wb.calibrate([known[0].drive], known[0].scenario.mass, vehicle=Vehicle(kind="hybrid"))

@@ -115,7 +115,10 @@ def test_a_data_sheet_with_measured_torque_can_weigh(tmp_path):
     [
         ({"tare": 3483.0, "gross": 2000.0}, "gross of 2000 kg is not above the tare"),
         ({"tare": 50.0}, "tare of 50 kg: a car has 250 to 8000 kg"),
-        ({"kind": "lorry"}, "class must be motorcycle, racer, quad, car, van, bus or truck"),
+        (
+            {"kind": "lorry"},
+            "class must be motorcycle, racer, quad, car, hybrid, van, bus or truck",
+        ),
         ({"gear_ratios": (1.0, 2.0)}, "must fall"),
         ({"gear_ratios": (2.0, -1.0)}, "must be positive"),
         ({"final_drive": 3.9}, "needs gear ratios"),

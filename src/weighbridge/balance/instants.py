@@ -30,7 +30,8 @@ SLOWEST_GEARED: Final = 1.5
 """Below this speed gears, slip and torque are not separated [m/s]."""
 
 BEYOND_RANGE: Final = 1.03
-"""A gearing above the highest of a stepless gearbox by this factor is a slip [-]."""
+"""A gearing beyond those of a stepless gearbox by this factor is a slip, or an engine that is not
+coupled [-]."""
 
 RATE_SPAN: Final = 0.4
 """The rate of an engine speed is looked at over so long before and after [s]."""
@@ -203,12 +204,13 @@ def gears_at(
         return gear, np.full(recorded.size, gearings[0]), np.zeros(recorded.size, dtype=bool)
     if gearings.size == 0:
         # Without known ratios the ratio of the moment is the best there is.
-        moving = speed > SLOWEST_GEARED
+        moving = (speed > SLOWEST_GEARED) & (engine_speed != 0.0)
         ratio = np.where(moving, engine_speed / np.where(moving, speed, 1.0), np.nan)
         slipping = np.zeros(recorded.size, dtype=bool)
         if vehicle.driveline.gearing_range is not None:
-            highest = BEYOND_RANGE * vehicle.driveline.gearing_range[-1]
-            slipping = (speed < UNSLIPPED) | (np.nan_to_num(ratio) > highest)
+            low, high = vehicle.driveline.gearing_range
+            inside = (ratio > low / BEYOND_RANGE) & (ratio < high * BEYOND_RANGE)
+            slipping = (speed < UNSLIPPED) | ~inside
         return np.zeros(recorded.size, dtype=np.int64), ratio, slipping
     gear, mismatch = predict_gear(engine_speed, speed, gearings)
     measured: Signal | None = drive.get("gear")

@@ -11,6 +11,7 @@ import numpy as np
 
 from weighbridge.arguments import check_number, check_type
 from weighbridge.balance.gear_fit import ENOUGH, ratio_apart, share_on_gears
+from weighbridge.balance.hybrid import motor_helps
 from weighbridge.calibration.inverse import knots_between
 from weighbridge.calibration.known_mass import check_mass
 from weighbridge.calibration.recording import Recording
@@ -28,6 +29,7 @@ from weighbridge.vehicle.classes import VehicleClass
 from weighbridge.vehicle.engine_delay import find_engine_delay
 from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range
 from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
+from weighbridge.vehicle.torque import part_of_a_hybrid
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES, TorqueSource
 
 FEWEST_TOLD: Final = 10
@@ -140,7 +142,8 @@ def problem_of(
                 missing=" and no ".join(missing),
                 source=source.name,
             )
-        if why := source.refusal(drive, base.driveline.driven):
+        why = source.refusal(drive, base.driveline.driven) or part_of_a_hybrid(base, source)
+        if why:
             raise why.at(drive.name).error()
     given, base = base.driveline, _held(base, source)
     found = []
@@ -163,6 +166,9 @@ def problem_of(
     )
     if (given.gearings or given.stepless) and source.gearing is None:
         _refuse_foreign_gears(recordings)
+    for recording in recordings:
+        if why := motor_helps(recording.drive, recording.balance(0.0), draft):
+            raise why.at(recording.drive.name).error()
     return Problem(
         recordings=recordings,
         base=base,

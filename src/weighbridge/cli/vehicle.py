@@ -89,7 +89,7 @@ def new(
         str,
         typer.Option(
             "--class",
-            help="car, van, bus, truck, motorcycle, quad or racer.",
+            help="car, hybrid, van, bus, truck, motorcycle, quad or racer.",
             autocompletion=class_names,
         ),
     ] = "car",

@@ -13,7 +13,7 @@ from weighbridge.navigation.motion import Motion
 from weighbridge.signals import Drive
 from weighbridge.vehicle.data_sheet import needs_calibration, wheel_efficiency
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle.torque import part_of_a_hybrid, source_of
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
 
@@ -170,6 +170,8 @@ def what_is_missing(drive: Drive, vehicle: Vehicle) -> Problem | None:
         return Problem.of(
             "vehicle.not_calibrated", vehicle=vehicle.name, title=source.title, source=source.name
         )
+    if (one := part_of_a_hybrid(vehicle, source)) is not None:
+        return one
     missing = source.lacking(drive)
     if not (drive.has("vehicle_speed") or drive.has("gnss_speed")) and not drive.has("latitude"):
         missing.append("vehicle_speed")

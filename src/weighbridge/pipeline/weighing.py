@@ -22,6 +22,7 @@ from weighbridge.balance.delay import (
 )
 from weighbridge.balance.gear_fit import ENOUGH, foreign_part, ratio_apart, share_on_gears
 from weighbridge.balance.gear_scale import scale_contradiction
+from weighbridge.balance.hybrid import motor_helps
 from weighbridge.balance.shaking import shaken
 from weighbridge.balance.speed_balance import speed_balance
 from weighbridge.balance.torque_drift import steadied
@@ -250,7 +251,8 @@ def weigh_balance(
             expected=expected,
         )
     elif not estimator.speed_alone and (
-        why := scale_contradiction(balance, vehicle)
+        why := motor_helps(drive, balance, vehicle)
+        or scale_contradiction(balance, vehicle)
         or foreign_part(balance, vehicle)
         or shaken(drive, balance.motion)
         or _smoothed(drive, vehicle, result)

@@ -6,7 +6,7 @@ A new class is a record in `VEHICLE_CLASSES`, or in the entry points
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -69,6 +69,7 @@ class VehicleClass:
     unanswered : part of the scatter between force and a motion without accelerometer that is noise
         of the motion [-]: short of power, it slows down on a hill that its heights smooth away
     jensen_grid : whether the grid of Jensen 2022, Table 5, is for it
+    motor_helps : a motor drives it beside an engine, so that no torque of the engine shows all
     """
 
     name: str
@@ -96,6 +97,7 @@ class VehicleClass:
     retarded: bool = False
     unanswered: float = 0.0
     jensen_grid: bool = False
+    motor_helps: bool = False
 
     def road_prior(self, *, single_speed: bool) -> tuple[Floats, Floats]:
         """Return C_d A, C_r, I_e, I_w and their standard deviations (4,).
@@ -129,6 +131,34 @@ FASTEST: Final = 72.0
 
 STRONGEST: Final = 150.0
 """Acceleration times speed that hardly any reaches [W/kg]: recorded cars stay below 55 W/kg."""
+
+CAR: Final = VehicleClass(
+    name="car",
+    mass_range=(250.0, 8_000.0),
+    typical_mass=1500.0,
+    emptied=130.0,
+    loaded=1.8,
+    heaviest=2.6,
+    # The driving licence.
+    untowed=3500.0,
+    drag_area=(0.65, 0.25),
+    rolling_coefficient=(0.010, 0.004),
+    engine_inertia=(CAR_ENGINE_INERTIA, 0.06),
+    wheel_inertia=(5.0, 0.7),
+    drag_area_range=(0.30, 1.00),
+    rolling_coefficient_range=(0.002, 0.030),
+    engine_inertia_range=(0.02, 1.00),
+    wheel_inertia_range=(2.0, 12.0),
+    efficiency=(0.95, 0.020),
+    layouts=True,
+    tyre="205/55 R16",
+    # Springs of cars are level or progressive.
+    squat_growth=0.0,
+    fastest=FASTEST,
+    strongest=STRONGEST,
+    jensen_grid=True,
+)
+"""A car with an engine or a motor alone."""
 
 VEHICLE_CLASSES: Final = Registry(
     VehicleClass,
@@ -196,32 +226,8 @@ VEHICLE_CLASSES: Final = Registry(
             fastest=40.0,
             strongest=200.0,
         ),
-        VehicleClass(
-            name="car",
-            mass_range=(250.0, 8_000.0),
-            typical_mass=1500.0,
-            emptied=130.0,
-            loaded=1.8,
-            heaviest=2.6,
-            # The driving licence.
-            untowed=3500.0,
-            drag_area=(0.65, 0.25),
-            rolling_coefficient=(0.010, 0.004),
-            engine_inertia=(CAR_ENGINE_INERTIA, 0.06),
-            wheel_inertia=(5.0, 0.7),
-            drag_area_range=(0.30, 1.00),
-            rolling_coefficient_range=(0.002, 0.030),
-            engine_inertia_range=(0.02, 1.00),
-            wheel_inertia_range=(2.0, 12.0),
-            efficiency=(0.95, 0.020),
-            layouts=True,
-            tyre="205/55 R16",
-            # Springs of cars are level or progressive.
-            squat_growth=0.0,
-            fastest=FASTEST,
-            strongest=STRONGEST,
-            jensen_grid=True,
-        ),
+        CAR,
+        replace(CAR, name="hybrid", motor_helps=True),
         VehicleClass(
             name="van",
             mass_range=(600.0, 15_000.0),

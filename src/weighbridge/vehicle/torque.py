@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from weighbridge.messages import refused
+from weighbridge.messages import Problem, refused
 from weighbridge.signals import Bools, Drive, Floats, Signal
 from weighbridge.vehicle.air import Air
 from weighbridge.vehicle.model import TorqueModel, Vehicle
@@ -47,6 +47,13 @@ class Torque:
 def source_of(vehicle: Vehicle) -> TorqueSource:
     """Return the source of the vehicle's torque."""
     return vehicle.torque.of_source
+
+
+def part_of_a_hybrid(vehicle: Vehicle, source: TorqueSource) -> Problem | None:
+    """Say that a source reads engine or motor of a hybrid alone; None where it reads all."""
+    if not (vehicle.of_class.motor_helps and source.of_one_engine):
+        return None
+    return Problem.of("hybrid.part", vehicle=vehicle.name, title=source.title)
 
 
 def source_signal(drive: Drive, vehicle: Vehicle) -> Signal:

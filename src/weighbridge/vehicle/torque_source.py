@@ -138,6 +138,11 @@ class TorqueSource:
     limit: str = ""
     charge_exponent: tuple[float, float] = (0.0, 0.0)
 
+    @property
+    def of_one_engine(self) -> bool:
+        """Whether it reads one engine or motor, before what a second one adds."""
+        return self.gearing is None or self.before_motor
+
     def between(self, *, single_speed: bool) -> float:
         """Scatter of masses from drive to drive by the reading, relative [-].
 
