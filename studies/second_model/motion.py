@@ -14,7 +14,7 @@ DT = 1.0 / 400.0
 KEEP = 4
 RATE = 1.0 / (DT * KEEP)  # rows per second
 
-MANUAL, CONVERTER, DUAL_CLUTCH, FIXED = 0, 1, 2, 3
+MANUAL, CONVERTER, DUAL_CLUTCH, FIXED, VARIATOR = 0, 1, 2, 3, 4
 DRIVE, COAST, BRAKE = 0, 1, 2
 
 COLUMNS = (
@@ -87,9 +87,9 @@ class Gearbox(NamedTuple):
 
     Attributes
     ----------
-    kind : MANUAL, CONVERTER, DUAL_CLUTCH or FIXED
+    kind : MANUAL, CONVERTER, DUAL_CLUTCH, FIXED or VARIATOR (behind a converter)
     robot : 1 where a control unit shifts, 0 where the driver does
-    ratios : engine over wheel speed, gears 1..n [-]
+    ratios : engine over wheel speed, gears 1..n; of a variator places along its range [-]
     efficiency : of gear mesh and final drive, gears 1..n [-]
     spin_0, spin_1 : loss without load at the input, N m and per rad/s, warm
     cold : spin loss at the start of a cold drive over the warm one, less one [-]
@@ -103,6 +103,11 @@ class Gearbox(NamedTuple):
     lock_gear : first gear with lock-up
     stiffness, damping : of the shafts, at the wheels [N m/rad, N m s/rad]
     start_gear : gear used to start, 1..n
+    input_low, input_speed, input_pedal : a variator turns its input at ``input_low`` [rad/s], and
+        faster by so much per m/s and by so much at full pedal to the power ``input_bend``
+    steps : factor between the virtual gears of a variator, used at pedals above ``step_pedal``; 1
+        without
+    up_rate, down_rate : fastest change of its ratio towards the last and the first one [1/s]
     """
 
     kind: int
@@ -126,6 +131,14 @@ class Gearbox(NamedTuple):
     stiffness: float
     damping: float
     start_gear: int
+    input_low: float
+    input_speed: float
+    input_pedal: float
+    input_bend: float
+    steps: float
+    step_pedal: float
+    up_rate: float
+    down_rate: float
 
 
 class Body(NamedTuple):
@@ -357,6 +370,8 @@ def run(engine, box, body, driver, road, day, rng, steps):
     gears = box.ratios.size
     electric = engine.heating == 0.0
     fixed = box.kind == FIXED
+    variator = box.kind == VARIATOR
+    turbine = box.kind == CONVERTER or variator
     clutched = box.kind == MANUAL or box.kind == DUAL_CLUTCH
 
     mass = day.mass
@@ -397,6 +412,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
     phase, phase_time, next_gear = 0, 0.0, gear
     old_ratio = ratio
     since_shift, full_time = 9.0, 0.0
+    held_ratio = 0.0
     in_neutral = False
     # Warmth.
     x_e, x_o, x_t, x_m = day.engine_warmth, day.oil_warmth, day.tyre_warmth, 0.3
@@ -548,7 +564,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 t_drag = -friction(engine, we) * (1.0 + engine.cold * (1.0 - x_e)) - engine.pumping
             coupled_in = locked and not in_neutral and phase == 0
             f_free = t_drag * ratio / radius if coupled_in else 0.0
-            if box.kind == CONVERTER and not locked:
+            if turbine and not locked:
                 f_free = 0.4 * t_drag * ratio / radius
             a_coast = (f_free - f_roll - f_drag) / mass - G * sin_g
 
@@ -667,7 +683,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 felt = mass * driver.feel
                 if mode == DRIVE and not standing:
                     lift = 1.0
-                    if box.kind == CONVERTER and not locked:
+                    if turbine and not locked:
                         nu = wi / max(we, 10.0)
                         low = 1.0 - (box.converter_ratio - 1.0) * (nu / 0.86 - 1.0)
                         lift = max(1.0, low)
@@ -718,7 +734,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
             since_shift += tick
             n_max = engine.limit
             full_time = full_time + tick if pedal > 0.9 else 0.0
-            if gear > 0 and phase == 0 and not fixed and not standing and v > 0.5:
+            if gear > 0 and phase == 0 and not fixed and not variator and not standing and v > 0.5:
                 w_gear = v / radius * box.ratios[gear - 1]
                 goal_gear = gear
                 lug_w = driver.lug * n_max * (0.85 + 0.45 * pedal)
@@ -729,7 +745,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 if mode == DRIVE and not in_neutral:
                     up = n_max * (driver.up_low + (driver.up_high - driver.up_low) * pedal**1.4)
                     up *= 1.0 + 2.0 * max(0.0, sin_g)
-                    ready = locked or box.kind == CONVERTER
+                    ready = locked or turbine
                     if gear < gears and w_gear > up and since_shift > 1.0 and ready:
                         after = w_gear * box.ratios[gear] / box.ratios[gear - 1]
                         # The next gear has to carry the climb.
@@ -792,6 +808,26 @@ def run(engine, box, body, driver, road, day, rng, steps):
                 ratio = box.ratios[gear - 1]
                 wi = 0.0
                 twist = 0.0
+            if variator and not standing and v > 0.5:
+                # The input turns by pedal and speed; at a high pedal in steps, as gears would.
+                turn = box.input_low + box.input_speed * v + box.input_pedal * pedal**box.input_bend
+                goal_ratio = min(turn, 0.97 * engine.limit) * radius / v
+                if box.steps > 1.0 and pedal > box.step_pedal:
+                    if held_ratio == 0.0:
+                        held_ratio = max(ratio, goal_ratio)
+                    elif held_ratio > box.steps * goal_ratio:
+                        held_ratio = goal_ratio
+                    goal_ratio = held_ratio
+                elif pedal < box.step_pedal - 0.1:
+                    held_ratio = 0.0
+                goal_ratio = min(box.ratios[0], max(box.ratios[-1], goal_ratio))
+                change = (goal_ratio - ratio) / (0.25 * ratio)
+                change = min(box.down_rate, max(-box.up_rate, change))
+                ratio *= 1.0 + change * tick
+                span = np.log(box.ratios[0] / box.ratios[-1])
+                gear = 1 + int(np.log(box.ratios[0] / ratio) / span * (gears - 1) + 0.5)
+                gear = min(gears, max(1, gear))
+                next_gear = gear
 
         # ---- pedals ---------------------------------------------------------------------
         pedal += DT / 0.12 * (pedal_goal - pedal)
@@ -867,7 +903,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
                     cap = 0.0
             if we < 0.9 * engine.idle:
                 cap = 0.0  # the clutch opens before the engine stalls
-        elif box.kind == CONVERTER:
+        elif turbine:
             if phase == 1:
                 gear = next_gear
                 # A wide step takes longer. Upwards the engine's inertia pushes as it slows down:
@@ -926,7 +962,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
             demand = ask * t_limit
             if in_gear and ratio > 0.0:
                 grip = 0.85 * day.grip * body.driven_share * mass * G * radius / ratio
-                if box.kind == CONVERTER and not locked:
+                if turbine and not locked:
                     low = 1.0 - (box.converter_ratio - 1.0) * (wi / max(we, 10.0) / 0.86 - 1.0)
                     grip /= max(1.0, low)
                 demand = min(demand, grip + fric)
@@ -997,7 +1033,7 @@ def run(engine, box, body, driver, road, day, rng, steps):
             spin = (box.spin_0 + box.spin_1 * abs(wi)) * (1.0 + box.cold * (1.0 - x_o))
             loss = (loss + spin) * wi / (abs(wi) + 1.0)
             load = through + loss
-            if box.kind == CONVERTER and not locked:
+            if turbine and not locked:
                 nu = min(wi / max(we, 20.0), 1.35)
                 ease = max(-0.8, 1.0 - nu**5)
                 t_pump = box.converter_k * we * we * ease

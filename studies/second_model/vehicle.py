@@ -9,6 +9,7 @@ from .motion import (
     DUAL_CLUTCH,
     FIXED,
     MANUAL,
+    VARIATOR,
     Body,
     Engine,
     Gearbox,
@@ -137,6 +138,26 @@ def _ratios(first: float, last: float, count: int, bend: float) -> np.ndarray:
     return np.exp(np.log(first) + (np.log(last) - np.log(first)) * (u + bend * u * (1.0 - u)))
 
 
+def _input(kind: str, idle: float, limit: float, rng) -> dict[str, float]:
+    """How a variator turns its input; nothing of the kind for other boxes."""
+    u = rng.uniform
+    if kind != "petrol_cvt":
+        return {
+            "input_low": 0.0, "input_speed": 0.0, "input_pedal": 0.0, "input_bend": 1.0,
+            "steps": 1.0, "step_pedal": 2.0, "up_rate": 0.0, "down_rate": 0.0,
+        }  # fmt: skip
+    return {
+        "input_low": u(1.5, 1.9) * idle,
+        "input_speed": u(5, 20) * RPM,
+        "input_pedal": u(0.5, 0.8) * limit,
+        "input_bend": u(1.3, 2.6),
+        "steps": float(rng.choice([1.0, u(1.15, 1.35)])),
+        "step_pedal": u(0.4, 0.7),
+        "up_rate": u(0.3, 1.0),
+        "down_rate": u(0.5, 1.5),
+    }
+
+
 _KINDS = {
     # tare, gross, drag area, crr, radius, ...
     "small_petrol": (940, 1100, 390, 0.58, 0.66, 0.0085, 0.0115, 0.278, 0.292),
@@ -149,7 +170,11 @@ _KINDS = {
     "electric_car": (1300, 2100, 480, 0.56, 0.72, 0.0075, 0.0100, 0.310, 0.345),
     "electric_bus": (11500, 13500, 6000, 4.6, 5.6, 0.0060, 0.0080, 0.460, 0.490),
 }
-KINDS = (*_KINDS, "petrol_automatic")
+KINDS = (*_KINDS, "petrol_automatic", "petrol_cvt")
+PLACES = 25
+_BASES = {"petrol_automatic": "petrol_dct", "petrol_cvt": "petrol"}
+# Kinds that came later: the draws of the others stay what they are.
+_LATER = ("petrol_cvt",)
 
 
 def random_vehicle(kind: str, seed: int) -> Vehicle:
@@ -167,8 +192,9 @@ def random_vehicle(kind: str, seed: int) -> Vehicle:
     """
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r} is not known; use one of {', '.join(KINDS)}")
-    base = "petrol_dct" if kind == "petrol_automatic" else kind
-    rng = np.random.default_rng([seed, sorted(KINDS).index(kind), 77])
+    base = _BASES.get(kind, kind)
+    order = (*sorted(set(KINDS) - set(_LATER)), *_LATER)
+    rng = np.random.default_rng([seed, order.index(kind), 77])
     u = rng.uniform
     low, high, payload, cda0, cda1, crr0, crr1, r0, r1 = _KINDS[base]
     heavy = base in ("truck", "semi", "electric_bus")
@@ -288,6 +314,10 @@ def random_vehicle(kind: str, seed: int) -> Vehicle:
         top_ratio = 1000.0 * RPM * radius / (per_1000 / 3.6)
         spread = {5: u(3.9, 4.5), 6: u(4.9, 5.9), 7: u(5.8, 6.8), 8: u(6.8, 7.8)}[count]
         ratios = _ratios(top_ratio * spread, top_ratio, count, u(0.25, 0.45))
+    if kind == "petrol_cvt":
+        spread = u(5.8, 7.5)
+        top_ratio = 1000.0 * RPM * radius / (u(44, 56) / 3.6)
+        ratios, kind_box, robot = np.geomspace(top_ratio * spread, top_ratio, PLACES), VARIATOR, 1
     mesh = u(0.975, 0.99, ratios.size)
     final = u(0.975, 0.988) if base in ("small_petrol", "petrol", "petrol_dct") else u(0.955, 0.975)
     if electric:
@@ -296,6 +326,11 @@ def random_vehicle(kind: str, seed: int) -> Vehicle:
     if heavy and not electric:
         direct = np.argmin(np.abs(ratios - ratios[-1]))
         efficiency[direct] = 0.992 * final  # direct drive
+    if kind == "petrol_cvt":
+        # Belt and pulleys: best somewhere near the middle, and worse towards one end.
+        along = np.log(ratios / np.sqrt(ratios[0] * ratios[-1]))
+        efficiency = final * (u(0.92, 0.97) - u(0.01, 0.05) * (along - u(-0.3, 0.3)) ** 2)
+    spin = (u(0.02, 0.05), u(0.01, 0.03)) if kind == "petrol_cvt" else None
     box_inertia = 0.012 * peak / 150.0 + 0.01
     shaft = u(6e3, 11e3) if not heavy else u(50e3, 90e3)
     damping = u(0.018, 0.032) * shaft
@@ -309,8 +344,8 @@ def random_vehicle(kind: str, seed: int) -> Vehicle:
         robot=robot,
         ratios=ratios,
         efficiency=efficiency,
-        spin_0=(0.004 if electric else u(0.006, 0.012)) * peak,
-        spin_1=(0.004 if electric else u(0.006, 0.014)) * peak / limit,
+        spin_0=(spin[0] if spin else 0.004 if electric else u(0.006, 0.012)) * peak,
+        spin_1=(spin[1] if spin else 0.004 if electric else u(0.006, 0.014)) * peak / limit,
         cold=u(0.6, 1.8),
         oil_time=u(900, 1500) * (1.8 if heavy else 1.0),
         inertia=box_inertia,
@@ -322,10 +357,11 @@ def random_vehicle(kind: str, seed: int) -> Vehicle:
         launch_span=(u(350, 500) if heavy else u(900, 1300)) * RPM,
         converter_k=peak * u(0.75, 0.9) / (u(2200, 2700) * RPM) ** 2,
         converter_ratio=u(1.8, 2.1),
-        lock_gear=int(rng.choice([2, 3])),
+        lock_gear=1 if kind == "petrol_cvt" else int(rng.choice([2, 3])),
         stiffness=shaft,
         damping=damping,
         start_gear=start,
+        **_input(kind, idle, limit, rng),
     )
 
     # Body. Pitch 1 to 3 degrees per g (Gillespie, ch. 7; Milliken); heavy vehicles less.

@@ -69,6 +69,7 @@ def settings_of_load(*, knots=(), knot=0.0):
     return FitSettings(
         source=TORQUE_SOURCES["load"], order=2, curved=True, knots=knots, torque_noise=5.0,
         bounds=TorqueTerms(offset=0.5, growth=0.5, speed_growth=1.0, bend=0.5, knot=knot),
+        cold_torque_std=TORQUE_SOURCES["load"].cold_torque_std,
         wheel_radius=RADIUS, prior=VEHICLE_CLASSES["car"].road_prior(single_speed=False),
     )  # fmt: skip
 
@@ -160,6 +161,7 @@ def test_what_gusts_confound_stays_open():
     settings = FitSettings(
         source=TORQUE_SOURCES["percent"], order=0, curved=False, knots=(), torque_noise=5.0,
         bounds=TorqueTerms(offset=0.05, growth=0.02, speed_growth=0.03, bend=0.05, knot=0.012),
+        cold_torque_std=TORQUE_SOURCES["percent"].cold_torque_std,
         wheel_radius=0.5, prior=VEHICLE_CLASSES["truck"].road_prior(single_speed=False),
     )  # fmt: skip
     told = {fit: [], fit_with_gusts: []}

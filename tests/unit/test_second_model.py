@@ -145,7 +145,9 @@ def test_torque_of_the_engine_arrives_at_the_wheels(kind):
     assert np.all(turbine * x["input_speed"] <= pump * x["engine_speed"] + 1e-3 * most)
     assert np.all(np.abs(turbine) <= vehicle.box.converter_ratio * np.abs(pump) + 1e-9)
     assert np.all(np.abs(turbine) >= np.abs(pump) - 1e-9)
-    assert (np.abs(pump).max() > 0.1 * full) == (kind in ("diesel", "petrol_automatic"))
+    assert (np.abs(pump).max() > 0.1 * full) == (
+        kind in ("diesel", "petrol_automatic", "petrol_cvt")
+    )
 
 
 @pytest.mark.parametrize("kind", EVERY_KIND)
@@ -156,7 +158,8 @@ def test_high_gears_lose_little_power(kind):
     torque = x["engine_torque"] - inertia * x["gain_of_engine_speed"]
     given = np.mean(torque * x["engine_speed"], axis=1)
     taken = np.mean(x["traction_force"] * x["speed"], axis=1)
-    gear = x["gear"][:, 0]
+    variator = kind == "petrol_cvt"
+    gear = np.full(given.size, vehicle.box.ratios.size) if variator else x["gear"][:, 0]
     loaded = np.mean(x["engine_torque"], axis=1) > 0.3 * np.quantile(x["engine_torque"], 0.99)
     loaded &= x["clutch_open"].max(axis=1) == 0.0
     high = 0
@@ -166,8 +169,8 @@ def test_high_gears_lose_little_power(kind):
         if lower or np.count_nonzero(rows) < 15:
             continue
         low, middle, top = np.quantile(taken[rows] / given[rows], [0.1, 0.5, 0.9])
-        assert 0.85 < middle < 0.97
-        assert low > 0.80
+        assert (0.75 if variator else 0.85) < middle < 0.97
+        assert low > (0.65 if variator else 0.80)
         assert top < 1.0
         high += 1
     assert high > 0

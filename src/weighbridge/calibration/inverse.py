@@ -116,6 +116,7 @@ class FitSettings:
     torque_noise : of one reading, as torque [N m]
     wheel_radius : [m]
     prior : mean and standard deviation (4,) of C_d A, C_r, I_e, I_w
+    cold_torque_std : of what the cold takes of the torque, over the highest torque [-]
     usual_gearing : of `weighbridge.vehicle.driveline.Driveline` [1/m]
     lasting_drag : learn the drag area from the lasting part of the pressure alone; what comes and
         goes within `AROUND` is taken with that of the class
@@ -131,6 +132,7 @@ class FitSettings:
     torque_noise: float
     wheel_radius: float
     prior: tuple[Floats, Floats]
+    cold_torque_std: float
     usual_gearing: float = 0.0
     lasting_drag: bool = False
     window: float = WINDOW
@@ -357,7 +359,7 @@ def _solve(
             mass * RESISTANCE_STD,
             WIND_STD * mean[0],
             WIND_STD * mean[0],
-            settings.source.cold_torque_std * torque,
+            settings.cold_torque_std * torque,
         ]
     )
     x0 = np.concatenate(([1.0], mean, np.zeros(extra), np.zeros(fading.size)))

@@ -45,6 +45,7 @@ from weighbridge.messages import phrase, refused
 from weighbridge.results.calibration import DelaySearch
 from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Driveline, Provenance, RoadLoad, Timing, Vehicle
+from weighbridge.vehicle.torque import cold_torque_std
 
 LAGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4)
 """Time constants of the reading's smoothing that are tried [s]. Longer ones pass for the smoothness
@@ -243,6 +244,8 @@ def _drive_rows(problem: Problem, rows: Sequence[DelayedRows]) -> list[DriveRows
 
 def _settings(problem: Problem, noise: float) -> FitSettings:
     """State what is fitted and what is known before, with a noise of the torque [N m]."""
+    named = replace(problem.draft.torque, source=problem.source.name, coefficients=(0.0, 1.0))
+    seen = replace(problem.draft, torque=named)
     return FitSettings(
         source=problem.source,
         order=problem.order,
@@ -253,6 +256,7 @@ def _settings(problem: Problem, noise: float) -> FitSettings:
         wheel_radius=problem.draft.driveline.wheel_radius,
         prior=_prior(problem.draft, problem.base.driveline),
         usual_gearing=problem.draft.driveline.usual_gearing,
+        cold_torque_std=cold_torque_std(seen),
     )
 
 

@@ -22,6 +22,10 @@ JITTER: Final = 0.1
 """By how much stamps may miss the ends of a window, over their period [-]."""
 
 
+STEPLESS_COLD: Final = 0.08
+"""What cold oil takes of the torque before a stepless gearbox, over the highest torque [-]: pump
+and belt lose 3 to 5 % of it without load when warm, and up to thrice as much when cold."""
+
 EXPONENT_STEP: Final = 0.1
 """Change of the charge's power by which its effect is shown [-]."""
 
@@ -47,6 +51,12 @@ class Torque:
 def source_of(vehicle: Vehicle) -> TorqueSource:
     """Return the source of the vehicle's torque."""
     return vehicle.torque.of_source
+
+
+def cold_torque_std(vehicle: Vehicle) -> float:
+    """Standard deviation of what the cold takes of the torque, over the highest torque [-]."""
+    cold = STEPLESS_COLD if vehicle.driveline.stepless else 0.0
+    return math.hypot(source_of(vehicle).cold_torque_std, cold)
 
 
 def part_of_a_hybrid(vehicle: Vehicle, source: TorqueSource) -> Problem | None:

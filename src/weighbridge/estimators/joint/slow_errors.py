@@ -21,7 +21,7 @@ from weighbridge.vehicle.data_sheet import (
     offset_std,
 )
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle.torque import cold_torque_std
 
 Variance = TypeVar("Variance", float, Floats)
 
@@ -255,7 +255,7 @@ def prior_std(
         mass * resistance,
         WIND_STD,
         WIND_STD,
-        source_of(vehicle).cold_torque_std * torque,
+        cold_torque_std(vehicle) * torque,
         road.drag_area.std,
     ]
     if by_data_sheet(vehicle):
