@@ -47,7 +47,7 @@ from weighbridge.signals import Bools, Floats
 from weighbridge.signals.robust import resolution
 from weighbridge.vehicle.data_sheet import by_data_sheet, offset_std, scale_std
 from weighbridge.vehicle.model import Vehicle
-from weighbridge.vehicle.torque import source_of
+from weighbridge.vehicle.torque import cold_torque_std
 
 METHOD: Final = "speed-torque-ekf"
 
@@ -338,7 +338,7 @@ def constant_std(balance: ForceBalance, vehicle: Vehicle) -> Floats:
     """Standard deviations of the errors of `constant_columns` before the drive has shown (k,)."""
     table = balance.table
     torque = highest_torque(table.torque[table.usable])
-    stds = [vehicle.road.drag_area.std, source_of(vehicle).cold_torque_std * torque]
+    stds = [vehicle.road.drag_area.std, cold_torque_std(vehicle) * torque]
     if by_data_sheet(vehicle):
         stds += offset_std(vehicle, torque)
     return np.array(stds)
