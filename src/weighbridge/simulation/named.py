@@ -253,7 +253,7 @@ ABOUT: Final[dict[str, str]] = {
     "bus-calibration": "the bus in all gears, loads and engine speeds",
     "diesel": "diesel car with an 8-speed automatic, about 75 min",
     "diesel-calibration": "the diesel car in all gears, loads and engine speeds",
-    "cvt": "petrol car with a stepless gearbox that tells its engine's torque, about 75 min",
+    "cvt": "petrol car with a stepless gearbox that sends its engine's torque, about 75 min",
     "cvt-calibration": "the same car at all loads and engine speeds",
     "van": "diesel van with a manual gearbox, 2100 kg empty to 3500 kg, about 80 min",
     "van-calibration": "the van in all gears, loads and engine speeds",
