@@ -359,8 +359,8 @@ print(rotation.product(1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 0.5))
 
 
 def test_a_kernel_cache_that_is_cut_off_is_made_again(tmp_path, monkeypatch):
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    site = tmp_path / "site-packages"
+    kept, site = tmp_path / "kernels", tmp_path / "site-packages"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kept))
     source = Path(sys.modules["weighbridge"].__file__).parent
     shutil.copytree(source, site / "weighbridge", ignore=shutil.ignore_patterns("__pycache__"))
 
@@ -373,13 +373,13 @@ def test_a_kernel_cache_that_is_cut_off_is_made_again(tmp_path, monkeypatch):
         return ran.stdout
 
     first = run()
-    files = [*site.rglob("*.nbi"), *site.rglob("*.nbc")]
+    files = [*kept.rglob("*.nbi"), *kept.rglob("*.nbc")]
     assert len(files) >= 2
     for pattern in ("*.nbi", "*.nbc"):
-        for file in site.rglob(pattern):
+        for file in kept.rglob(pattern):
             file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
         assert run() == first
     # Made again, it is read again.
-    stamps = {f: f.stat().st_mtime_ns for f in site.rglob("*.nb[ic]")}
+    stamps = {f: f.stat().st_mtime_ns for f in kept.rglob("*.nb[ic]")}
     assert run() == first
-    assert {f: f.stat().st_mtime_ns for f in site.rglob("*.nb[ic]")} == stamps
+    assert {f: f.stat().st_mtime_ns for f in kept.rglob("*.nb[ic]")} == stamps

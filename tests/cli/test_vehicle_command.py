@@ -35,7 +35,6 @@ def test_what_a_calibration_made_is_told_in_words(weighbridge, car):
         "gears",
         "from engine load (PID 04)",
         "the highest the calibration saw",
-        "is left by the",
         "kW",
     ):
         assert words in text

@@ -83,6 +83,6 @@ def test_a_package_adds_source_class_and_estimator(package, tmp_path):
 def test_without_the_package_the_names_are_unknown():
     with pytest.raises(ConfigError, match=r"class must be .*, van, bus or truck, got 'rickshaw'"):
         wb.Vehicle(kind="rickshaw")
-    with pytest.raises(ConfigError, match="source must be one of measured"):
+    with pytest.raises(ConfigError, match="source must be measured"):
         wb.CalibrationSettings(source="fuel")
     assert "median" not in ESTIMATORS

@@ -140,7 +140,7 @@ def test_same_seed_gives_the_same_ride():
 
 
 def test_impossible_rides_are_refused():
-    with pytest.raises(ConfigError, match="road class 'J'"):
+    with pytest.raises(ConfigError, match="got 'J'"):
         simulate_ride(RideScenario(road_class="J", duration=1.0))
     with pytest.raises(ConfigError, match="speed"):
         RideScenario(speed=0.0)
