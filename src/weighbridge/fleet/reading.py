@@ -50,7 +50,7 @@ def read_segments(results: str | Path) -> pl.LazyFrame:
     check_path("results", results)
     drives = read_drives(results).select("key", "part", _vehicle="vehicle_id")
     rows = _rows(Results.opened(Path(results)), "segments").select(list(SEGMENTS))
-    rows = rows.join(drives, on=["key", "part"], how="inner")
+    rows = rows.join(drives, on=["key", "part"], how="inner", maintain_order="left")
     # Tables of version 3 lack it.
     own = pl.coalesce("vehicle_id", "_vehicle").alias("vehicle_id")
     return rows.with_columns(own).select(list(SEGMENTS))
