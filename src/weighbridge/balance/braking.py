@@ -74,7 +74,7 @@ class _Slowing:
     Attributes
     ----------
     needed : (n,) force at the wheels [N]
-    weight : it is shown for [N]
+    weight : it is given for [N]
     beyond : (n,) the same, less what a dragged engine explains [N]
     moving : (n,)
     """

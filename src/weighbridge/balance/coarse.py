@@ -23,8 +23,8 @@ ROUNDING: Final = 1.0 / math.sqrt(12.0)
 def coarse_std(source: Signal, usable: Bools) -> float:
     """Relative standard deviation of a mass by the steps of the torque's reading [-].
 
-    Rounding down takes half a step of every reading, and nothing shows it from rounding to the
-    nearest: the error does not average, and goes with the mean reading of the rows that weigh.
+    Rounding down takes half a step of every reading, and nothing distinguishes it from rounding to
+    the nearest: the error does not average, and goes with the mean reading of the rows that weigh.
 
     Parameters
     ----------

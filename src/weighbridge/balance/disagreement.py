@@ -124,7 +124,7 @@ class Finding:
 
 
 def findings(drive: Drive, vehicle: Vehicle) -> tuple[Finding, ...]:
-    """What each witness of a vehicle file that can show says of a drive's torque reading."""
+    """What each witness of a vehicle file that can judge says of a drive's torque reading."""
     found = (_finding(drive, vehicle, relation) for relation in vehicle.witnesses)
     return tuple(f for f in found if f is not None)
 

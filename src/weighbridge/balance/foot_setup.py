@@ -1,4 +1,4 @@
-"""What a whole drive shows accelerator and floor, by which each reading is judged alone."""
+"""What a whole drive shows of accelerator and floor, by which each reading is judged alone."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class FootSetup:
     asked : what the motion asks of the reading; None where it cannot be seen
     least : torque below which a reading off its floor may be a dragged engine's [N m]; None
         where every such reading lies on its floor
-    pedal : name of the signal of the accelerator; None where nothing shows it
+    pedal : name of the signal of the accelerator; None where nothing gives it
     pedal_up : its position below which no foot is on it
     pedal_period : its period [s]
     ahead : time after a reading that may show it, as far as the motion is known [s]
@@ -299,7 +299,7 @@ def _white_noise(values: Floats, clear: Bools) -> float:
 
 
 def _pedal(drive: Drive, vehicle: Vehicle) -> Signal | None:
-    """Position of the accelerator; None where nothing shows it.
+    """Position of the accelerator; None where nothing gives it.
 
     The throttle of an engine may be the valve of its intake, which is never quite shut.
     """

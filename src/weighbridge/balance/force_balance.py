@@ -91,7 +91,7 @@ def force_balance(
     drive, vehicle, motion
     delay : lateness of the torque; the vehicle's when None, 0 if that is unknown [s]
     lag : time constant of its first-order smoothing; the vehicle's when None [s]
-    signed : whether the torque shows what a dragged engine takes; a load that means it
+    signed : whether the torque shows what a dragged engine takes; not a load in its place
         does not
     setup : what a whole drive shows of its force side; found from this drive when None
     since : what earlier rows left, where ``drive`` and ``motion`` hold the last seconds alone
@@ -258,7 +258,7 @@ def _air_std(vehicle: Vehicle, torque_of: Callable[[float], Torque]) -> float:
 
 
 def _reasons(read: _Read, brakes: Brakes, without: Bools, turning: Bools) -> NDArray[np.uint8]:
-    """Why a row is not usable (n,); the first reason that applies is shown, so the order matters.
+    """Why a row is not usable (n,); the first reason that applies is given, so the order matters.
 
     Parameters
     ----------

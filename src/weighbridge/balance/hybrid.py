@@ -49,7 +49,7 @@ OFTEN: Final = 0.05
 
 
 def motor_helps(drive: Drive, balance: ForceBalance, vehicle: Vehicle) -> Problem | None:
-    """Say by what a motor shows beside the engine whose torque is read; None where none does.
+    """Say what shows that a motor drives beside the engine; None where nothing does.
 
     Parameters
     ----------

@@ -177,7 +177,7 @@ def ratio_rate(
 def identify_told_gears(
     drive: Drive, vehicle: Vehicle, recorded: Floats, engine_speed: Floats, speed: Floats
 ) -> Mapping[int, int]:
-    """Find which gears of the vehicle file are those that the gearbox shows on a whole drive."""
+    """Find which gears of the vehicle file are those that the gearbox reports."""
     measured = drive.get("gear")
     if measured is None or not len(measured) or len(vehicle.driveline.gearings) < 2:
         return {}

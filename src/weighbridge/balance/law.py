@@ -8,7 +8,7 @@ Along the road, with the traction force F at the wheels::
       + rho C_d A v (w_n cos(psi) + w_e sin(psi))   wind that nobody reported
       + s d + c                                     gusts and fast errors, lasting offset
       + G q_c exp(-t / tau)                         cold engine: friction in the reading
-      + G (o + p G v / N_0)                         torque that is shown too high, all data sheets
+      + G (o + p G v / N_0)                         torque reported too high, all data sheets
       + P eta G / N                                 power that the engine gives beside the wheels
 
     F = eta G T(reading, engine speed)
@@ -166,7 +166,7 @@ def cold_torque_column(table: ForceTable) -> Floats:
 
 
 def torque_offset_column(table: ForceTable) -> Floats:
-    """Of what the torque is shown too high by, ``G`` (n,) [1/m]."""
+    """Of what the torque is reported too high by, ``G`` (n,) [1/m]."""
     return np.nan_to_num(table.gearing)
 
 
@@ -273,7 +273,7 @@ def force_on_mass(table: ForceTable, vehicle: Vehicle) -> Floats:
 def needed_force(
     vehicle: Vehicle, specific_force: Floats, pressure: Floats, rotating: Floats | float = 0.0
 ) -> tuple[Floats, float]:
-    """Force at the wheels (n,) that a motion takes, and the weight it is shown for [N].
+    """Force at the wheels (n,) that a motion takes, and the weight it is given for [N].
 
     Its sign depends on the mass through the drag alone. The largest mass known is the
     cautious one: drag explains least of how a heavy vehicle slows down.

@@ -17,7 +17,7 @@ SPAN: Final = 3.0
 """Changes of the speed are compared with those by the accelerometer over so long [s]."""
 
 SHIFTS: Final = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 9.0)
-"""What the accelerometer shows so much earlier explains a speed that is late or smoothed [s]."""
+"""An accelerometer that is ahead by so much explains a speed that is late or smoothed [s]."""
 
 BANDS: Final = 24
 """Bands of engine speed, each with as many samples as any other [-]."""

@@ -25,7 +25,7 @@ MOVING: Final = 0.5
 """Slower a vehicle stands [m/s]."""
 
 UNKNOWN_AIR: Final = 0.02
-"""What the air leaves open of the torque is shown from here on [-]."""
+"""What the air leaves open of the torque is reported from here on [-]."""
 
 
 class Reason(IntEnum):

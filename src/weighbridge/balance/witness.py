@@ -47,7 +47,7 @@ BLOCKS: Final = 12
 """Parts of a drive that are left out one after another for a standard deviation."""
 
 FEWEST_MEANS: Final = 40
-"""Means from which a drive, or a part of it, can show."""
+"""Means from which a drive, or a part of it, can be judged."""
 
 
 Ranges: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
@@ -213,7 +213,7 @@ def rows_of(drive: Drive, vehicle: Vehicle, witness: Witness, later: float = 0.0
     source = source_of(vehicle)
     made_of = source.found(drive)
     motor = vehicle.driveline.single_speed
-    # A reading is no witness of itself, and none shows wheels.
+    # A reading is no witness of itself, and there is none for wheels.
     if set(made_of) & set(witness.needs) or source.gearing or motor != witness.battery:
         return None
     name = made_of[0]

@@ -18,9 +18,9 @@ from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 DOUBTED: Final = 0.06
-"""A drive that weighs so much more or less than the others by the file made of all is shown [-]: of
-nine simulated vehicles the farthest of three drives was 0.03 off, with one mass of three 20 % off
-0.21 to 0.32."""
+"""A drive that weighs so much more or less than the others, by the file made of all, is reported
+[-]: of nine simulated vehicles the farthest of three drives was 0.03 off, with one mass of three
+20 % off 0.21 to 0.32."""
 
 SURE: Final = 0.12
 """The same above which there is no calibration [-]."""
@@ -29,7 +29,7 @@ SIGNIFICANT: Final = 4.0
 """Standard deviations by which it has to be off as well [-]."""
 
 OVER: Final = 1.02
-"""Mass over the permitted one from which it is shown [-]."""
+"""Mass over the permitted one from which it is reported [-]."""
 
 
 def doubted_masses(
@@ -134,7 +134,7 @@ def contradicting(
 def unbacked_scale(vehicle: Vehicle) -> list[Problem]:
     """Ask for tare and permitted mass where nothing else backs the masses of a calibration.
 
-    A torque in N m or percent has a scale of its own. What a load or an air flow is worth is shown
+    A torque in N m or percent has a scale of its own. What a load or an air flow is worth comes
     by the masses alone: times any factor, the fit is as good.
     """
     if source_of(vehicle).signed or vehicle.tare is not None or vehicle.gross is not None:

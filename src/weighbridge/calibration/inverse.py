@@ -87,7 +87,7 @@ AROUND: Final = 60.0
 """Pressures are averaged over so long before and after [s]."""
 
 TYPICAL_SPEED: Final = 300.0
-"""Engine speed at which the growth of torque terms is shown [rad/s]."""
+"""Engine speed at which the growth of torque terms is given [rad/s]."""
 
 KNOT_LENGTH: Final = 0.35
 """Length over which the full-load curve of an engine bends, in the logarithm of its speed [-]."""
@@ -243,7 +243,7 @@ def fit(drives: list[DriveRows], settings: FitSettings) -> InverseFit:
     is regressed: ``w1 G L = m f + C_d A q + ... - G (w0 + w2 N + ...)`` is
     divided by w1, which keeps the problem linear. The curvature needs the
     reading on the right as well; there the fitted one of the round before
-    means it, so that no noise enters.
+    stands in its place, so that no noise enters.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Can the mass that a calibration is shown be true? By tare, gross, class and torque."""
+"""Can the mass that a calibration is given be true? By tare, gross, class and torque."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ BEST_DIESEL, BEST_PETROL = 0.45, 0.38
 flow and its ratio: the best engines have as much at their best point, and nothing of it is lost."""
 
 DRAG_FAR: Final = 2.5
-"""Standard deviations of the class from which a drag area is shown [-]."""
+"""Standard deviations of the class from which a drag area is reported [-]."""
 
 DOUBTFUL: Final = 3.0
-"""Standard deviations from which such a scale is shown [-]."""
+"""Standard deviations from which such a scale is reported [-]."""
 
 
 def check_mass(drive: Drive, kg: float, base: Vehicle) -> None:

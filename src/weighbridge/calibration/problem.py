@@ -226,7 +226,7 @@ def _held(base: Vehicle, source: TorqueSource) -> Vehicle:
 def _draft(
     drives: Sequence[Drive], motions: Sequence[Motion], base: Vehicle, source: TorqueSource
 ) -> tuple[GearDetection | None, Vehicle]:
-    """Find the gears, where they are not known, and let the source mean the torque."""
+    """Find the gears, where they are not known, and let the source take the torque's place."""
     gears = None
     driveline = replace(base.driveline, efficiency=1.0, speed_scale=_speed_scale(motions, base))
     idle = base.driveline.idle_speed or None

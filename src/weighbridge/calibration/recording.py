@@ -128,7 +128,7 @@ class Recording:
         )
 
     def delayed(self, delay: float) -> DelayedRows:
-        """Return rows at a delay [s], for a search: what shows brakes is not read anew."""
+        """Return rows at a delay [s], for a search: what detects brakes is not read anew."""
         return self._moved(self._anchor(delay, 0.0), self.motion, delay)
 
     def search(
@@ -146,7 +146,7 @@ class Recording:
         ----------
         pairs : delays and lags up to ``longest`` [s]
         longest : of the lags tried [s]
-        anchor_lag : lag of the balances that show brakes and overrun [s]
+        anchor_lag : lag of the balances that detect brakes and overrun [s]
         """
         motion = lagged_motion(self.motion, longest)
         late = first_order(self.source.carrier(self.drive).time, self.reading, longest)

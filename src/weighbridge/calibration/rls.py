@@ -179,7 +179,7 @@ def _bounds(base: Vehicle, driveline: Driveline) -> tuple[Floats, Floats]:
     """Bounds of the road parameters; equal where a parameter is known."""
     low, high = base.of_class.road_bounds
     if driveline.single_speed:
-        # One gear cannot show the inertias from the mass, nor rolling resistance from an
+        # One gear cannot separate the inertias from the mass, nor rolling resistance from an
         # offset of the torque.
         road = replace(base, driveline=driveline).road
         low[1:] = high[1:] = (

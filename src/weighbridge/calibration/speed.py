@@ -79,7 +79,7 @@ class SpeedCalibration:
 
 
 def nominal_of(vehicle: Vehicle) -> Nominal:
-    """Take the model's constants from the vehicle; its middle gear means all.
+    """Take the model's constants from the vehicle; its middle gear takes the place of all.
 
     The corrections make up for what is only roughly so.
     """

@@ -27,7 +27,7 @@ _SAME_TIME: Final = 0.5
 _NO_SENSOR: Final = 1.5e-3
 _APART: Final = 10.0
 
-# A pause in which nothing was recorded is shown [s].
+# A pause in which nothing was recorded is reported from this length on [s].
 _PAUSE: Final = 60.0
 
 # Way in a pause that is long enough to be compared with positions [m].

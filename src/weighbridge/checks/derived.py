@@ -15,7 +15,7 @@ SPAN: Final = 30.0
 0.01 m/s^2 then [s]."""
 
 FEWEST: Final = 10
-"""Spans in motion that show."""
+"""Spans in motion that are enough to judge."""
 
 SLOWEST: Final = 3.0
 """Mean speed of a span in motion, at least [m/s]."""

@@ -26,7 +26,7 @@ FLAT: Final = 1.8
 """Samples at the first steps over those at the second ones: more are a peak of their own [-]."""
 
 FEWEST: Final = 200
-"""Samples at each of the first steps that show [-]."""
+"""Samples at each of the first steps that are enough to judge [-]."""
 
 MOVES: Final = 1.0
 """Slower, an axis may rest at zero [m/s]."""

@@ -314,7 +314,7 @@ def _tilt_tie(gravity: Floats, rate: Floats, full: Bools) -> float:
 
     Returns
     -------
-    1 at best; 0 where there are too few windows to show
+    1 at best; 0 where there are too few windows to judge
     """
     inner = _inner(full)
     if np.count_nonzero(inner) < _SOME:
@@ -341,7 +341,7 @@ def _ties(
     -------
     usual, crossed : size of the ties as they should be, and with the axes swapped
     pitch : of pitch rate and force along
-    All 0 where there are too few windows to show.
+    All 0 where there are too few windows to judge.
     """
     inner = _inner(full)
     if np.count_nonzero(inner) < _MANY:

@@ -24,7 +24,7 @@ samples, makes no mass [-]: rows chosen by what is left made a car 48 % light at
 and were right at 0.48 and 0.11, and at 0.59 and 0.30."""
 
 ENDS: Final = 60.0
-"""A signal that ends, or begins, so long before, or after, the rest is shown [s]."""
+"""A signal that ends, or begins, so long before, or after, the rest is reported [s]."""
 
 
 def mended(drive: Drive, vehicle: Vehicle | None = None) -> Drive:

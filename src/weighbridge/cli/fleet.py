@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _RUN: Final = "run"
 
 _NO_WORKER: Final = "no worker is connected to the scheduler: start one there, dask worker ADDRESS"
-_PATIENCE: Final = 10.0  # without a worker until that is shown [s]
+_PATIENCE: Final = 10.0  # without a worker until that is reported [s]
 
 
 class RunsDrives(TyperGroup):
@@ -281,7 +281,7 @@ def _say_learnt(results: Path, learn: Path) -> None:
 
 
 def _lonely() -> Callable[[Count], None]:
-    """Return what shows once that no worker is there to do the work."""
+    """Return what says once that no worker is there to do the work."""
     told, since = False, time.monotonic()
 
     def tell(count: Count) -> None:

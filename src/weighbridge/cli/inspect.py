@@ -188,7 +188,7 @@ def _new_vehicle(found: Inspection, given: _Given, base: Path) -> str:
 
 
 def _other_torque(found: Inspection, car: Vehicle) -> str:
-    """Say that a drive shows torque in another way than the vehicle file weighs by."""
+    """Say that a drive has its torque in another way than the vehicle file weighs by."""
     from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
     told, asked = TORQUE_SOURCES[found.ways[0].torque], car.torque.of_source

@@ -274,7 +274,7 @@ def _sources(
     dbc: list[str] | None,
     listen_only: bool,
 ) -> tuple[list[Source], DriveInfo, float]:
-    """Make the sources; show what is known beside their samples, and when they begin [s]."""
+    """Make the sources; return what is known beside their samples, and when they begin [s]."""
     from weighbridge.live.replay import Replay
     from weighbridge.signals import DriveInfo
 

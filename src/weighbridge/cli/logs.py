@@ -38,7 +38,7 @@ def logged(quiet: bool, verbose: int) -> Iterator[None]:
     Parameters
     ----------
     quiet : errors only
-    verbose : 1 shows each drive, 2 of each stage
+    verbose : 1 logs each drive, 2 each stage
     """
     level = logging.ERROR if quiet else _LEVELS[min(verbose, len(_LEVELS) - 1)]
     root, ours = logging.getLogger(), logging.getLogger("weighbridge")

@@ -24,8 +24,8 @@ from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
 SLOW_TORQUE: Final = 1.5
-"""Rows further apart are shown, where stretches of them are too short [s]: of a van's torque every
-1 s most rows were used, every 2 s a third, every 3 s none."""
+"""Rows further apart are reported, where stretches of them are too short [s]: of a van's torque
+every 1 s most rows were used, every 2 s a third, every 3 s none."""
 
 STOP: Final = 20.0
 """A standstill this long may change the load [s]."""

@@ -66,7 +66,7 @@ class RobustRlsFilter:
         that it is worth, over time [(m/s^2)^2 s]; nothing is known at 0, as in the paper
     kept_information : sum over time of the squared regressor below which nothing
         is forgotten that is not replaced [(m/s^2)^2 s]; 0 forgets as the paper
-    first_information : the same, from which a mass is shown [(m/s^2)^2 s]
+    first_information : the same, from which a mass is given [(m/s^2)^2 s]
     threshold : Huber's, in standard deviations of the innovation [-]
     threshold_force : the same in their place [N]
     settle_windows : means that are folded in before the threshold holds

@@ -25,7 +25,7 @@ def changed(settings: Any, given: Mapping[str, object]) -> Any:
     Parameters
     ----------
     settings : a frozen dataclass of numbers, switches, choices, tuples of numbers and settings
-        within; None means a number that another part of the vehicle or drive gives
+        within; None stands for a number that another part of the vehicle or drive gives
     given : new values by name; ``ekf.start.threshold`` names one of settings within
 
     Raises

@@ -69,7 +69,7 @@ def check_cluster(scheduler: str | None, workers: int | None, memory: str | None
 
 
 def _check_address(scheduler: str) -> None:
-    """Raise what Dask shows with a traceback, after it waited for nothing."""
+    """Raise what Dask reports with a traceback, after it waited for nothing."""
     from distributed.comm.addressing import parse_address, parse_host_port
     from distributed.comm.registry import backends
 

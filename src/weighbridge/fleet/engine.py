@@ -159,7 +159,7 @@ class _Run:
         return self.count
 
     def _fill(self) -> bool:
-        """Submit what the window has room for; show whether jobs wait."""
+        """Submit what the window has room for; say whether jobs wait."""
         self._measure()
         while len(self._inside) < self._window and (job := self._pull()) is not None:
             self._submit(job)

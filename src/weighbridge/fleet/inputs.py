@@ -25,7 +25,7 @@ class Recording(NamedTuple):
     Attributes
     ----------
     paths : of its folder or file, or the files of one drive; paths or URLs
-    vehicle : id that a table of drives gives; None where the path has to show it
+    vehicle : id that a table of drives gives; None where the path has to give it
     kind : vehicle class that such a table gives
     start : begin that such a table gives, ISO 8601
     """

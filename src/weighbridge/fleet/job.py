@@ -61,7 +61,7 @@ class Job:
 
 
 class Receipt(NamedTuple):
-    """What a worker shows a recording; its rows are in the part file.
+    """What a worker reports of a recording; its rows are in the part file.
 
     Attributes
     ----------

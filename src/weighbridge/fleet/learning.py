@@ -36,7 +36,7 @@ FEW: Final = 4
 """Drives that show a drift, at least."""
 
 MONTH: Final = 30 * 86_400.0
-"""The time that drifts are shown for [s]."""
+"""The time that drifts are reported for [s]."""
 
 DRIFTS: Final = (
     ("torque_drift{}_pct", "torque scale", "%"),
@@ -218,7 +218,7 @@ def refuse_output(output: Path, shelf: Vehicles) -> None:
 
 
 def learn_vehicle(lesson: Lesson) -> dict[str, Any]:
-    """Refine one vehicle file, and show whether its drives contradict it, and what drifts.
+    """Refine one vehicle file, and say whether its drives contradict it, and what drifts.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ LEARNT: Final = "learnt.parquet"
 """Its file, in the folder of the results."""
 
 SURE: Final = 3.0
-"""A drift is shown where it is so many standard deviations [-]."""
+"""A drift is reported where it is so many standard deviations [-]."""
 
 COLUMNS: Final[dict[str, Any]] = {
     "vehicle_id": pl.String,

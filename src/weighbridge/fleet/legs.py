@@ -14,7 +14,7 @@ from weighbridge.fleet.couplings import Coupling, with_couplings
 from weighbridge.signals import Floats
 
 SURE: Final = 1.959964
-"""Standard deviations of a change of load that is shown: 95 % of a normal distribution."""
+"""Standard deviations of a change of load that is reported: 95 % of a normal distribution."""
 
 _POSITION: Final = tuple(
     f"{edge}_{axis}_deg" for edge in ("start", "end") for axis in ("latitude", "longitude")
@@ -181,7 +181,7 @@ def load_changes(rows: pl.DataFrame) -> pl.DataFrame:
 
     What both masses share, an error of the vehicle file, moves their difference by as much of it
     as the difference is of the mass. Within a drive the estimator told both loads apart; between
-    drives a change is shown from `SURE` standard deviations on.
+    drives a change is reported from `SURE` standard deviations on.
 
     Parameters
     ----------

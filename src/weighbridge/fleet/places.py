@@ -54,7 +54,7 @@ def standing(
     ----------
     heads : rows of `HEAD`, any number for each key
     found : rows of `FOUND`
-    there : shows whether a place still has something; None to take all places as they are
+    there : says whether a place still has something; None to take all places as they are
 
     Returns
     -------

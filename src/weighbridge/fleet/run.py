@@ -300,7 +300,7 @@ def _known_file(results: Results) -> Path | None:
 
 
 class _Teller:
-    """Writes how far a run is, gathers parts now and then, and shows whoever asked."""
+    """Writes how far a run is, gathers parts now and then, and reports to whoever asked."""
 
     def __init__(self, results: Results, tell: Callable[[Count], None] | None) -> None:
         self._results = results

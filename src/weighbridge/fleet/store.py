@@ -325,7 +325,7 @@ class Results:
 
         Parameters
         ----------
-        there : shows whether a place still has something
+        there : says whether a place still has something
 
         Raises
         ------
@@ -416,7 +416,7 @@ def _of_version(folder: Path, version: object) -> ConfigError:
 
 
 def check_end(path: Path) -> None:
-    """Raise where a file of a table was cut off, which its end shows.
+    """Raise where a file of a table was cut off, as its end shows.
 
     Raises
     ------

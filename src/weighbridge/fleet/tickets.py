@@ -94,7 +94,7 @@ def _ticket(cells: tuple[Any, ...], where: str) -> Ticket:
 
 
 def with_tickets(spans: pl.DataFrame, tickets: Sequence[Ticket]) -> pl.DataFrame:
-    """Return the spans whose mass a ticket shows.
+    """Return the spans whose mass a ticket gives.
 
     A ticket is of the span of its vehicle that is under way at its time, else of the nearest in
     time that ends or begins within `WITHIN`. Of several tickets of one span the nearest counts.

@@ -8,7 +8,7 @@ from weighbridge.fleet.legs import Limits, load_changes
 
 
 def track(legs: pl.DataFrame, limits: Limits | None = None) -> pl.DataFrame:
-    """Return the spans with one load: legs of a vehicle between which no change of load was shown.
+    """Return the spans with one load: legs of a vehicle between which no change of load was found.
 
     The masses of a span are pooled. Their own errors average out, by their squares; the error of
     the vehicle file is common to all and stays.
@@ -16,7 +16,7 @@ def track(legs: pl.DataFrame, limits: Limits | None = None) -> pl.DataFrame:
     Parameters
     ----------
     legs : as of `weighbridge.fleet.legs.legs`; those without a mass or a date are left out
-    limits : by which a trailer and an empty vehicle are shown
+    limits : by which a trailer and an empty vehicle are found
 
     Returns
     -------

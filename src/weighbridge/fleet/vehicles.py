@@ -39,7 +39,7 @@ class Assigned:
 
     Attributes
     ----------
-    id : by which it was found; None where nothing shows it
+    id : by which it was found; None where nothing gives it
     file : name of its file; None where its class's data sheet is in
     vehicle : of the file; None for the data sheet, which asks the drive for its torque
     kind : name of its class

@@ -20,7 +20,7 @@ def compiled_once(work: Callable[[], Result], useful: Callable[[Result], bool]) 
     Parameters
     ----------
     work : what compiles the kernels it needs
-    useful : shows whether it came far enough to have used them
+    useful : says whether it came far enough to have used them
     """
     if _done:
         return work()

@@ -184,7 +184,7 @@ def check_suspension(
 
     Returns
     -------
-    None where the ride is too short to show.
+    None where the ride is too short.
     """
     if samples.duration < SHORTEST:
         return None

@@ -25,7 +25,7 @@ _INERTIAL: Final = "inertial sensor"
 _POSITION: Final = "position"
 
 RATE_SPAN: Final = 10.0
-"""Time over which the rate of a signal is shown [s]."""
+"""Time over which the rate of a signal is measured [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,7 +27,7 @@ def of_before(
     records
     driven_since : time on the move since all signals were silent the last time [s]
     goes_on : whether the mass is still that of before
-    ask : ask to be shown where the load has changed
+    ask : ask for a report where the load has changed
     """
     if not (goes_on and records.silence >= STOP and driven_since < PROVED):
         return None

@@ -1,4 +1,4 @@
-"""What a drive so far shows sensors and noise, by which it is weighed on."""
+"""What a drive so far shows of sensors and noise, by which it is weighed on."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Learned:
     early: Problem | None = None
 
     def answer(self) -> Learned:
-        """Return what they show the mass alone, without what the stages go on from."""
+        """Return what they show of the mass alone, without what the stages go on from."""
         return replace(self, setup=None, state=None)
 
 

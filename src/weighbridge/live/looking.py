@@ -51,7 +51,7 @@ class Look:
     kept_from : what is looked at of it begins there [s]
     until : instant up to which the records are complete [s]
     step : in which they are taken [s]
-    mass, std : of the stages [kg]; NaN where they told none
+    mass, std : of the stages [kg]; NaN where there was none
     steps : that were taken meanwhile
     """
 
@@ -133,6 +133,6 @@ class Look:
     def _caught(self, vehicle: Vehicle) -> None:
         try:
             self._look(vehicle)
-        # Who feeds the scale is shown.
+        # Raised again to who feeds the scale.
         except BaseException as failure:
             self._failure = failure

@@ -32,7 +32,7 @@ SILENCE: Final = 3.0
 """Where no sample came for so long, all were silent [s]."""
 
 _FIRST: Final = 1e10
-"""No clock shows such an instant [s]: it is the year 2286."""
+"""No clock has such an instant [s]: it is the year 2286."""
 
 _ROOM: Final = 256
 

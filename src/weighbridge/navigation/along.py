@@ -33,7 +33,7 @@ ALIKE_IN_PART: Final = 0.8
 """The same in each part in which the vehicle speeds up and slows down."""
 
 MOVING: Final = 0.2
-"""Standard deviation of the change of speed from which a part can show [m/s^2]."""
+"""Standard deviation of the change of speed from which a part can be judged [m/s^2]."""
 
 TURNED: Final = 0.94
 """Cosine of the angle between the directions of a part and of the whole drive, at least [-]: bends

@@ -326,7 +326,7 @@ def _peak(explained: Floats, enough: Bools, size: int) -> tuple[float, float] | 
 
 
 def _explained(x: Floats, force: Floats, felt: Bools) -> tuple[Floats, Bools]:
-    """Part of the variance that the axes explain at each shift, and where it is shown.
+    """Part of the variance that the axes explain at each shift, and where it is known.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def false_rows(accel: Axes, gyro: Axes, moving: Bools, period: float) -> Bools:
     np.sqrt(size, out=size)
     false = np.zeros(size.size, dtype=bool)
     if 0.5 * GRAVITY < float(np.median(size)) < 2.0 * GRAVITY:
-        # Otherwise the unit is wrong, which others show.
+        # Otherwise the unit is wrong, which other checks find.
         false |= (size < _LEAST_FORCE) | (size > _MOST_FORCE)
     del size
     for kind, block in enumerate((accel, gyro)):

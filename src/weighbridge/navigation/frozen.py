@@ -37,7 +37,7 @@ def frozen_stretches(signal: Signal, speed: Signal | None) -> Floats:
     """Find where an inertial axis repeats one value for longer than rounding explains.
 
     Neighbours of a coarse sensor are often alike; the share of such neighbours outside of long
-    runs shows how long a run may be. A sensor at rest may repeat itself, so only runs during
+    runs says how long a run may be. A sensor at rest may repeat itself, so only runs during
     which the vehicle moves count.
 
     Parameters

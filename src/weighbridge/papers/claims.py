@@ -192,7 +192,7 @@ def same(
     close = a.shape == b.shape and bool(
         np.max(np.abs(a - b)) <= ROUNDING * max(float(np.max(np.abs(a))), 1e-300)
     )
-    # One number means an array: the one that differs most, else the largest.
+    # One number is given for an array: the one that differs most, else the largest.
     apart = np.abs(a - b) if a.shape == b.shape and np.any(a != b) else np.abs(a)
     k = int(np.argmax(apart))
     text = [f"{x.flat[k]:.9g} {unit}".strip() for x in (b, a)]

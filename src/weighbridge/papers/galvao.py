@@ -311,7 +311,7 @@ def tests_table(done: Reproduction) -> Table:
 
 
 def starts_table(done: Reproduction) -> Table:
-    """Show what the answer is made of: the filter's start, and what the fit was shown."""
+    """Show what the answer is made of: the filter's start, and what the fit was given."""
     rows = [
         (f"filter started at {start:.0f} kg", f"{ours:.1f}", f"{printed:.0f}", "")
         for start, ours, printed in done.starts

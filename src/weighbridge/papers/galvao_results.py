@@ -16,7 +16,7 @@ from weighbridge.signals import Floats
 from weighbridge.vehicle.model import Vehicle
 
 LAST: Final = 200
-"""Samples over which Table 2 shows the band."""
+"""Samples over which Table 2 gives the band."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,11 +88,11 @@ class Reproduction:
     tests : the three drives
     starts : masses the filter is started from, and where the second drive ends then, by ours and
         with noise as printed [kg]
-    stated : masses the calibration is shown, and what the second drive weighs then [kg], and R² of
+    stated : masses the calibration is given, and what the second drive weighs then [kg], and R² of
         the fit
     trials : drives the paper did not try
     torque : the tests with the torque recorded
-    says : what speed alone shows the tests
+    says : what speed alone says in the tests
     """
 
     vehicle: Vehicle

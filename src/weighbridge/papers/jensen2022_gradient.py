@@ -52,9 +52,9 @@ class GradientRun:
     Attributes
     ----------
     run : 1 to 3
-    distance : (n,) where the motion is shown [m]
+    distance : (n,) where the motion is given [m]
     true : (n,) slope of the road [rad]
-    printed, ours : (n,) by the paper's rules, whose pitch means the slope, and by ours [rad]
+    printed, ours : (n,) by the paper's rules, whose pitch is taken for the slope, and by ours [rad]
     largest : largest errors of both while moving [rad]
     """
 
@@ -67,7 +67,7 @@ class GradientRun:
 
 
 def gradient_road() -> Route:
-    """Return the road; what the paper does not show it is chosen."""
+    """Return the road; what the paper does not state of it is chosen."""
     road = flat_route(LENGTH, limit=LIMIT)
     at = np.arange(road.grade.size, dtype=np.float64)
     grade, curvature = np.zeros(at.size), np.zeros(at.size)

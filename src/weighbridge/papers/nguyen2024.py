@@ -120,7 +120,7 @@ FOLLOWED: Final = {
     "inverse": INVERSE,
     "ours": PAPERS_CASE,
 }
-"""Cases of which all that Table 2 and sec. 5 show is listed, by the code of their figures."""
+"""Cases of which all that Table 2 and sec. 5 state is listed, by the code of their figures."""
 
 SETTINGS: Final = Settings
 """What ``weighbridge reproduce nguyen2024 --set`` changes."""
@@ -257,7 +257,7 @@ def _figures(results: dict[str, list[RideResult]]) -> dict[str, Found]:
 
 
 def _followed(found: list[RideResult]) -> dict[str, Found]:
-    """What Table 2 and sec. 5 show a filter: of the roads the median."""
+    """What Table 2 and sec. 5 state of a filter: of the roads the median."""
     near = _each(found, "near")[:, 1:]
     mape, rmse, velocity_rmse, velocity_mape = (
         np.median(_each(found, n), axis=0)

@@ -53,7 +53,7 @@ def _drawing(number: int, why: str) -> Item:
 def _followed(
     code: str, words: str, where: str, why: str, check: str, conditions: Conditions
 ) -> tuple[Item, ...]:
-    """Write what Table 2 and sec. 5 show, by one filter."""
+    """Write what Table 2 and sec. 5 state, by one filter."""
     rows = [
         Item(
             item="table 2", what=f"{what}, {words}", conditions=conditions, where=where,

@@ -201,7 +201,7 @@ class Running(NamedTuple):
 
 
 NO_WINDOWS: Final = Running(np.empty(0), np.empty(0), np.empty(0))
-"""What a step shows in which no window became complete."""
+"""Output of a step in which no window became complete."""
 
 
 def begin(setup: ForwardSetup, start: float) -> ForwardState:

@@ -110,7 +110,7 @@ class Way:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inspection:
-    """All that `inspect` shows a drive.
+    """All that `inspect` shows of a drive.
 
     Attributes
     ----------

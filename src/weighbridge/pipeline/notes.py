@@ -52,7 +52,7 @@ def unbacked(vehicle: Vehicle) -> tuple[Problem, ...]:
 
 
 GRADES_APART: Final = 0.003
-"""Grades known better or worse than in the calibration by so much are shown [rad]."""
+"""Grades known better or worse than in the calibration by so much are reported [rad]."""
 
 
 def other_equipment(vehicle: Vehicle, motion: Motion) -> tuple[Problem, ...]:

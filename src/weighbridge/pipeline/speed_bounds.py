@@ -172,7 +172,7 @@ def _graded(drive: Drive, vehicle: Vehicle) -> Motion:
 def _windows(
     drive: Drive, motion: Motion, vehicle: Vehicle
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Cut a drive into windows and show the energy that each takes.
+    """Cut a drive into windows and return the energy that each takes.
 
     Returns
     -------

@@ -77,7 +77,7 @@ def mass_figure(weighing: MassResult, *, truth: float | None = None) -> go.Figur
     Parameters
     ----------
     weighing : of one drive
-    truth : true mass at the end of the drive [kg]; as the report shows it when None
+    truth : true mass at the end of the drive [kg]; as the simulation or the log states it when None
 
     Raises
     ------

@@ -98,7 +98,7 @@ def _title(weighings: Sequence[MassResult]) -> str:
 
 
 def known_mass(weighing: MassResult, truth: Mapping[str, float]) -> Known | None:
-    """Find the true mass at the end of the drive; None where none is shown.
+    """Find the true mass at the end of the drive; None where none is known.
 
     That of ``drive.toml`` is of its start: the fuel that some methods reckon with is taken off.
     """

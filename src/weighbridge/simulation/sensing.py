@@ -291,7 +291,7 @@ def _retarder(scenario: Scenario, drive: Trajectory) -> Floats:
 def _net_fraction(scenario: Scenario, drive: Trajectory) -> Floats:
     """Torque at the flywheel as a part of the reference torque, as read from J1939.
 
-    The control unit shows the indicated torque it believes in, which bends away
+    The control unit reports the indicated torque it believes in, which bends away
     from the true one at part load, and the friction of the warm engine without its
     accessories, each in percent (SAE J1939-71, SPN 513 and 514).
     """

@@ -33,7 +33,7 @@ def standard_pressure(altitude: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Air:
-    """What a whole drive shows the air.
+    """What a whole drive shows of the air.
 
     Attributes
     ----------

@@ -285,7 +285,7 @@ def _alternative_drag(section: Section, values: dict[str, Any]) -> None:
 
 
 def _built(build: type[Any], section: Section, values: Mapping[str, Any]) -> Any:
-    """Make the part; what its own checks refuse is shown with the key's line."""
+    """Make the part; what its own checks refuse is reported with the key's line."""
     try:
         return build(**values)
     except ConfigError as e:

@@ -338,7 +338,7 @@ SECTIONS: Final[dict[str, tuple[type[Any], tuple[Key, ...]]]] = {
                 "dbc", "dbc", "DBC files they were read with, seen from this file's folder", "texts"
             ),
             Key("notes", "notes", "free text", "text"),
-            Key("doubts", "doubts", "on its masses, shown at each weighing", "texts"),
+            Key("doubts", "doubts", "on its masses, reported at each weighing", "texts"),
             Key(
                 "fit_cov",
                 "fit_cov",

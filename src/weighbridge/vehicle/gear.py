@@ -291,7 +291,7 @@ def predict_gear(
 
 
 def reported_gear_numbers(reported: Ints, gearing: Floats, gearings: Floats) -> dict[int, int]:
-    """Find which gears of the vehicle file the gears are that a gearbox shows.
+    """Find which gears of the vehicle file the gears are that a gearbox reports.
 
     A file fitted to drives that never used the first gears counts from the
     lowest one used, and a gearbox from its own first gear. Each gear told is
@@ -321,7 +321,7 @@ def reported_gear_numbers(reported: Ints, gearing: Floats, gearings: Floats) -> 
 
 
 def number_reported_gears(reported: Ints, numbers: Mapping[int, int]) -> Ints:
-    """Number the gears a gearbox shows (n,) by those of the vehicle file; 0 where none."""
+    """Number the gears a gearbox reports (n,) by those of the vehicle file; 0 where none."""
     gear = np.zeros(reported.size, dtype=np.int64)
     for k, number in numbers.items():
         gear[reported == k] = number

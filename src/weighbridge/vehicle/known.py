@@ -46,7 +46,7 @@ class Known:
     driven : which axles are: "front", "rear" or "all"
     gear_ratios : of the gears, falling; of an electric car 1 alone where ``final_drive`` has all
     final_drive : ratio behind the gearbox; 1 when None
-    torque : how the drives show torque, by the name of its source
+    torque : how the drives have their torque, by the name of its source
     reference_torque : 100 % of a torque in percent [N m]
     drag_coefficient, frontal_area : [-], [m^2]
     layout : how the engine lies, "transverse" or "longitudinal"
@@ -101,7 +101,7 @@ def describe(known: Known) -> Described:
     Raises
     ------
     ConfigError
-        Values are impossible, or some are missing that others need: all of them are shown.
+        Values are impossible, or some are missing that others need: all of them are named.
     """
     _refuse(known)
     origins: dict[tuple[str, str], str] = {}

@@ -62,7 +62,7 @@ CONTRADICTION: Final = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PowerBalance:
-    """What the power of the battery shows the torque.
+    """What the power of the battery shows of the torque.
 
     Attributes
     ----------

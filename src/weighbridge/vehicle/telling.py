@@ -32,7 +32,7 @@ _MOTIONS: Final = {
 }
 
 _CRUISE: Final = 100.0 / 3.6
-"""Speed at which gears and road load are shown [m/s]."""
+"""Speed at which gears and road load are given [m/s]."""
 
 _FEWEST_RELIABLE: Final = 2
 """Calibration drives from which a file is told as good as in the table of docs/accuracy.md."""
@@ -59,7 +59,7 @@ def tell(vehicle: Vehicle) -> list[tuple[str, str]]:
 def can_weigh(vehicle: Vehicle) -> bool:
     """Whether a drive can be weighed with it: it says what the torque is worth.
 
-    A torque that the vehicle shows needs no gears in the file: engine and vehicle speed show them.
+    A reported torque needs no gears in the file: engine and vehicle speed show them.
     """
     if vehicle.provenance.torque_fitted or vehicle.provenance.fit is not None:
         return True

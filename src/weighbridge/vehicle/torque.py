@@ -27,7 +27,7 @@ STEPLESS_COLD: Final = 0.08
 and belt lose 3 to 5 % of it without load when warm, and up to thrice as much when cold."""
 
 EXPONENT_STEP: Final = 0.1
-"""Change of the charge's power by which its effect is shown [-]."""
+"""Change of the charge's power by which its effect is measured [-]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -222,7 +222,7 @@ class WitnessRelation:
     value_range : values of the witness that the relation has seen, in its own SI unit
     speed_range : engine speeds that it has seen [rad/s]
     blur, lag : time constant by which the reading is smoother than the witness, and by how much
-        it is later [s]; None where the drives were sampled too slowly to show
+        it is later [s]; None where the drives were sampled too slowly
     unexplained : part of the variance of single readings that is left then [-]
     pressure, temperature : of the ambient air [Pa], [K]; None where it was not known
     """

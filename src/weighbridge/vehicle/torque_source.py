@@ -172,14 +172,14 @@ class TorqueSource:
 REPORTED_TERMS: Final = TorqueTerms(
     offset=0.05, growth=0.02, speed_growth=0.03, bend=0.05, knot=0.012
 )
-"""Of a torque that is shown: the maker has modelled it to a few percent of the full-load torque."""
+"""Of a reported torque: the maker has modelled it to a few percent of the full-load torque."""
 
 ROUGH_TERMS: Final = TorqueTerms(offset=0.15, growth=0.10, speed_growth=0.30, bend=0.15, knot=0.08)
 """Of a reading that is only roughly torque: friction and accessories are a tenth of the full-load
 torque and grow with speed (Heywood, 1988, ch. 13); the full-load curve is smooth."""
 
 MOTOR_BETWEEN_STD: Final = 0.006
-"""Of a motor's torque that is shown, see `TorqueSource.between_std`. A magnet loses 0.1 % per
+"""Of a motor's torque that is reported, see `TorqueSource.between_std`. A magnet loses 0.1 % per
 kelvin, and the inverter allows for it roughly. Twelve electric cars of the second model (seeds 9400
 to 9411), calibrated by one drive of two kinds: errors of 1.2 and 1.4 % RMS where 1.0 % was told."""
 
@@ -192,7 +192,7 @@ REPORTED: Final = partial(
     cold_std=0.02,
     cold_torque_std=0.012,
 )
-"""A source of torque that a control unit shows; what differs is given with its name."""
+"""A source of torque that a control unit reports; what differs is given with its name."""
 
 ROUGH: Final = partial(
     TorqueSource,

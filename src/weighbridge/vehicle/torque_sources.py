@@ -73,7 +73,7 @@ SAME_REFERENCE: Final = 0.02
 
 
 def reference_torques(reference: Signal) -> list[tuple[float, float]]:
-    """Reference torques that a drive shows, each in a tenth of the samples or more.
+    """Reference torques that a drive reports, each in a tenth of the samples or more.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def reference_torques(reference: Signal) -> list[tuple[float, float]]:
 
     Returns
     -------
-    Values [N m] with the time each was shown first [s], in the order of time
+    Values [N m] with the time each was reported first [s], in the order of time
     """
     order = np.argsort(reference.values)
     ascending = reference.values[order]
@@ -96,7 +96,7 @@ def reference_torques(reference: Signal) -> list[tuple[float, float]]:
 def _reference(drive: Drive, time: Floats, model: TorqueConstants) -> Floats:
     """Return the torque that a percent torque is a part of, at stamps [N m].
 
-    That of the log; where the log shows several, that of the vehicle file, else the one told last.
+    That of the log; where the log has several, that of the vehicle file, else the last one.
     """
     reference = drive.get("reference_torque")
     if reference is not None and len(reference):

@@ -93,7 +93,7 @@ UNCALIBRATED_MOTION_STD: Final[dict[MotionSource, float]] = {"speed_grade": 0.05
 of the motion is not known [-]."""
 
 UNTOLD_RETARDER_STD: Final = 0.08
-"""The same of a data sheet alone where a retarder may work that nothing shows [-]: nine drives
+"""The same of a data sheet alone where a retarder may work that nothing reports [-]: nine drives
 of a simulated truck and bus at 1 Hz came out 9 % light with their retarder logged, 13 % without."""
 
 
@@ -423,7 +423,7 @@ def _air_std(balance: ForceBalance, problem: Problem, solved: _Solved, cut: Wind
 def _sizes(
     balance: ForceBalance, asked: _Asked, solved: _Solved, attenuating: Floats, systematic: float
 ) -> JointSizes:
-    """Keep what the drive shows noise; ``attenuating`` is that of the motion [m^2/s^4]."""
+    """Keep what the drive shows of noise; ``attenuating`` is that of the motion [m^2/s^4]."""
     return JointSizes(
         std=asked.problem.std,
         fast=solved.fast,

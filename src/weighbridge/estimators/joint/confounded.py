@@ -1,4 +1,4 @@
-"""What a drive cannot show from the mass, and what the mass is uncertain by for it."""
+"""What a drive cannot separate from the mass, and what the mass is uncertain by for it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def inertia_relative_std(
     """Relative standard deviation of a mass by the inertias of a data sheet with one gear [-].
 
     With one gear the rotating mass is the same all the time. Only hills, which accelerate
-    nothing, show it from the mass, and they show it no better than the accelerometer's
+    nothing, separate it from the mass, and they do so no better than the accelerometer's
     scale and lean are known. So it is considered (Schmidt, 1966), not estimated. With
     several gears it is a state.
 

@@ -1,4 +1,4 @@
-"""Is the vehicle file another vehicle's? What its road load has to be stretched by shows."""
+"""Is the vehicle file another vehicle's? Its road load, stretched to fit, shows it."""
 
 from __future__ import annotations
 

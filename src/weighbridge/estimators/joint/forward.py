@@ -198,7 +198,7 @@ def step(state: JointState, window: Window, setup: JointSetup) -> JointState:
 def _first_switch(
     state: disturbance.DisturbanceState, params: disturbance.DisturbanceParams, setup: JointSetup
 ) -> switched.SwitchState | None:
-    """Begin to show when accessories are on; None where none are switched."""
+    """Begin to find when accessories are on; None where none are switched."""
     if not setup.switched_power > 0.0:
         return None
     return switched.initial_state(  # type: ignore[no-any-return]

@@ -54,7 +54,7 @@ def stood_before(table: ForceTable, time: Floats) -> Floats:
     """
     standing = ~table.moving
     gap = np.diff(table.time, append=table.time[-1])
-    # Rows near in time mean the time until the next; a long gap means itself.
+    # Rows near in time count for the time until the next; a long gap counts as itself.
     still = np.cumsum(np.where(standing | (gap > STOP), gap, 0.0))
     moved = np.flatnonzero(~standing)
     stood = np.zeros(time.size)
@@ -70,12 +70,12 @@ def stood_before(table: ForceTable, time: Floats) -> Floats:
 def change_odds(stood: Floats, *, by_speed: bool = False) -> Floats:
     """Logarithm of the odds that the load changed between each window and the one before it.
 
-    NaN where the vehicle did not mean `SHORTEST` between them.
+    NaN where the vehicle did not stand `SHORTEST` between them.
 
     Parameters
     ----------
     stood : (m,) how long it stood there [s]
-    by_speed : no accelerometer shows the motion, and it is `SHORTEST_BY_SPEED`
+    by_speed : no accelerometer measures the motion, and it is `SHORTEST_BY_SPEED`
     """
     odds = np.full(stood.size, np.nan)
     stops = stood >= (SHORTEST_BY_SPEED if by_speed else SHORTEST)

@@ -186,7 +186,7 @@ class FilterInput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointSizes:
-    """Sizes of noise and states that the whole drive shows.
+    """Sizes of noise and states, from the whole drive.
 
     Attributes
     ----------

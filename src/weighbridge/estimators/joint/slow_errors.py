@@ -82,7 +82,7 @@ class SlowErrors:
     constants : the states that last as long as the drive, by name, each with its standard
         deviation: ``cold_torque``, friction of the start in the reading [N m]; ``drag_area``, C_d A
         above that of the vehicle file [m^2]; and those of `DATA_SHEET_NAMES`: by how much the
-        file's model of the torque shows too much [N m], the part of it that grows with engine
+        file's model of the torque gives too much [N m], the part of it that grows with engine
         speed, at `USUAL_SPEED` [N m], and inertias above those of the file [kg m^2]
     """
 

@@ -83,7 +83,7 @@ def switch_params(filter_params: disturbance.DisturbanceParams) -> switched.Swit
 def find_switched(
     problem: Problem, column: Floats, added: Floats, levels: tuple[float, float]
 ) -> Switched | None:
-    """Find the power that is switched, and when it was on; None where nothing shows it.
+    """Find the power that is switched, and when it was on; None where nothing gives it.
 
     Parameters
     ----------

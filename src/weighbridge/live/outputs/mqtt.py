@@ -140,7 +140,7 @@ class Topics:
         ]
 
     def discovery(self) -> list[tuple[str, bytes]]:
-        """Return what shows Home Assistant of the sensors, as topic and payload.
+        """Return what describes the sensors to Home Assistant, as topic and payload.
 
         An alert that is not watched any more is taken back by an empty message.
         """
@@ -345,7 +345,7 @@ class _Session:
         self._confirmed: set[int] = set()
 
     def begin(self) -> None:
-        """Connect, and show who we are.
+        """Connect, and say who we are.
 
         Raises
         ------

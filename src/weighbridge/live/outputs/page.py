@@ -233,7 +233,7 @@ def make_app(newest: _Newest, host: str, names: Collection[str]) -> Starlette:
 
     Parameters
     ----------
-    newest : what the stream shows
+    newest : what the stream sends
     host, names : as of `Page`
     """
     from starlette.applications import Starlette

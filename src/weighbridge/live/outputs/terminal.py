@@ -57,7 +57,7 @@ class TerminalView:
     Parameters
     ----------
     console : of the terminal, for standard error
-    clock : shows the time [s], for how often the view is drawn
+    clock : gives the time [s], for how often the view is drawn
     """
 
     name = "terminal"

@@ -81,7 +81,7 @@ class BusPlace:
     source : as on the command line, for messages
     interface, channel : as python-can names them
     bitrate : of the bus [bit/s]; None for what the system has set
-    listen_only : show interfaces that can to acknowledge nothing
+    listen_only : set interfaces that can to acknowledge nothing
     """
 
     def __init__(

@@ -119,7 +119,7 @@ class ElmSource:
 
 
 class _Stopped(Exception):
-    """The source was shown to stop while it waited for the adapter."""
+    """The source was asked to stop while it waited for the adapter."""
 
 
 class ElmCarrier:

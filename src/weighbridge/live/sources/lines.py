@@ -126,7 +126,7 @@ def _datagrams(host: str, port: int) -> Iterator[Callable[[], bytes]]:
 
 
 class _UnfitLineError(Exception):
-    """A line that shows nothing; its text is why."""
+    """A line without a value; its text is why."""
 
 
 class LineReader:

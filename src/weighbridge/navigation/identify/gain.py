@@ -168,7 +168,7 @@ def find_gain(
 
     Returns
     -------
-    None where the scale is right, or where the drive does not show.
+    None where the scale is right, or where the drive does not say.
     """
     pairs = changes_of_speed(motion, speed, _SPAN)
     if pairs is None:
