@@ -8,6 +8,7 @@ from tests.noted import refused
 
 import weighbridge as wb
 from weighbridge.balance.force_balance import force_balance
+from weighbridge.calibration.run import run_calibration
 from weighbridge.navigation.select import find_motion
 from weighbridge.simulation import make_scenario, simulate_car
 from weighbridge.vehicle.gear import UNSLIPPED
@@ -42,6 +43,23 @@ def test_it_is_calibrated_and_weighed(known, calibrated):
     assert weighed.status == "converged"
     assert weighed.mass == pytest.approx(made.truth.mass[-1], rel=0.03)
     assert abs(weighed.mass - made.truth.mass[-1]) < 2.5 * weighed.std
+
+
+def test_the_calibration_says_that_it_found_no_gears(known):
+    recorded, masses = [m.drive for m in known], [m.scenario.mass for m in known]
+    assert "gear.stepless" in {p.id for p in run_calibration(recorded, masses).problems}
+
+
+@pytest.mark.parametrize("delay", [0.0, 2.5])
+def test_gears_stay_gears_where_the_engine_speed_is_noisy_or_late(short_drive, delay):
+    engine = short_drive.drive.signals["engine_speed"]
+    noise = np.random.default_rng(1).standard_normal(len(engine)) * (0.02 if delay == 0.0 else 0.0)
+    seen = replace(engine, time=engine.time + delay, values=engine.values * (1.0 + noise))
+    made = wb.calibrate(
+        [short_drive.drive.with_signals(seen)], mass=float(short_drive.truth.mass[0])
+    )
+    assert not made.driveline.stepless
+    assert len(made.driveline.gearings) > 2
 
 
 def test_ratio_and_rate_of_its_engine_are_those_of_the_simulation(known):

@@ -26,7 +26,7 @@ from weighbridge.signals import Drive, Floats
 from weighbridge.vehicle.air import identify_air
 from weighbridge.vehicle.as_read import as_read
 from weighbridge.vehicle.classes import VehicleClass
-from weighbridge.vehicle.engine_delay import find_engine_delay
+from weighbridge.vehicle.engine_delay import find_engine_delay, gathered_delay
 from weighbridge.vehicle.gear import GearDetection, detect_gearings, idling, stepless_range
 from weighbridge.vehicle.model import Driveline, Mounting, TorqueModel, Vehicle
 from weighbridge.vehicle.torque import part_of_a_hybrid
@@ -291,8 +291,7 @@ def find_gears(
         signal = drive.get("engine_speed")
         if signal is None or len(signal) < 30:
             raise refused("calibration.no_engine_speed", drive=drive.name)
-    usual = [motion.speed_delay for motion in motions]
-    found = detect_gearings(*_engine_and_speed(drives, motions, usual), idle_speed=idle_speed)
+    found = detect_gearings(*_gathered(drives, motions), idle_speed=idle_speed)
     late = [
         find_engine_delay(
             drive.signals["engine_speed"].time,
@@ -323,8 +322,21 @@ def _stepless(
     """Range of gearings of all the drives together; None where they show no stepless gearbox."""
     if not all(len(drive.get("engine_speed") or ()) for drive in drives):
         return None
-    usual = [motion.speed_delay for motion in motions]
-    return stepless_range(*_engine_and_speed(drives, motions, usual), idle_speed=idle_speed)
+    return stepless_range(*_gathered(drives, motions), idle_speed=idle_speed)
+
+
+def _gathered(drives: Sequence[Drive], motions: Sequence[Motion]) -> tuple[Floats, Floats, Floats]:
+    """Engine and vehicle speed of all drives at the delays at which their ratios gather most."""
+    late = [
+        gathered_delay(
+            drive.signals["engine_speed"].time,
+            drive.signals["engine_speed"].values,
+            (motion.time, motion.speed),
+            motion.speed_delay,
+        )
+        for drive, motion in zip(drives, motions, strict=True)
+    ]
+    return _engine_and_speed(drives, motions, late)
 
 
 def _told_gears(drives: Sequence[Drive]) -> int:

@@ -164,7 +164,7 @@ def run_calibration(
     )
     balances = tuple(rebalanced(problem, done))
     of_masses = _mass_doubts(done, recorded, balances, problem)
-    few = Message.of("calibration.few", samples=rows.time.size)
+    few, line = Message.of("calibration.few", samples=rows.time.size), done.driveline
     doubts = [
         *of_masses,
         *doubted_masses(done, balances, problem.masses),
@@ -173,6 +173,7 @@ def run_calibration(
         *([few] if rows.time.size < FEW_SAMPLES else []),
         *_other_masses(recorded, problem.masses),
         *([unfound_gears(recorded, problem.gears.gearings.size)] if problem.gears else []),
+        *([Message.of("gear.stepless")] if line.stepless and not problem.given.stepless else []),
         *doubts,
         *contradictions,
     ]

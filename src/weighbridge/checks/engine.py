@@ -13,6 +13,7 @@ from weighbridge.messages import phrase
 from weighbridge.signals import Drive, Problem, Signal
 from weighbridge.signals.correlation import correlation
 from weighbridge.vehicle.data_sheet import FRICTION_PRESSURE, friction_coefficients
+from weighbridge.vehicle.gear import idling
 from weighbridge.vehicle.model import Vehicle
 from weighbridge.vehicle.torque import source_of
 
@@ -21,9 +22,6 @@ _IDLE: Final = (45.0, 135.0)
 _WARM: Final = 343.0
 # Idle over that of the calibration, between these: a cold engine has 1.5 at most [-].
 _IDLES: Final = (0.6, 1.7)
-# Slower than this part of its idle an engine does not run [-]; samples that show its idle.
-_TURNING: Final = 0.3
-_IDLE_FEWEST: Final = 20
 # Torque at idle that alternator and pumps do not take [part of the reference torque].
 _IDLE_TORQUE: Final = 0.03
 
@@ -149,13 +147,9 @@ def check_idle(drive: Drive, vehicle: Vehicle | None) -> Iterator[Problem]:
     engine, speed = drive.get("engine_speed"), drive.speed
     if not known > 0.0 or engine is None or speed is None or not (len(engine) and len(speed)):
         return
-    standing = (np.abs(speed.at(engine.time)) < 0.3) & (engine.values > _TURNING * known)
-    if np.count_nonzero(standing) < _IDLE_FEWEST:
-        return
-    # Of a foot on the accelerator, and of a cold engine, it is the rest that counts.
-    idle = float(np.percentile(engine.values[standing], 10.0))
+    idle = idling(engine.values, np.abs(speed.at(engine.time)))
     low, high = _IDLES
-    if not low < idle / known < high:
+    if idle > 0.0 and not low < idle / known < high:
         yield Problem.of(
             "engine.idle",
             engine.name,

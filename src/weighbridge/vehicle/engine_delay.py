@@ -8,7 +8,14 @@ import numpy as np
 
 from weighbridge.signals import Bools, Floats, Ints
 from weighbridge.signals.robust import huber, spread
-from weighbridge.vehicle.gear import effective_gearing, predict_gear, steady
+from weighbridge.vehicle.gear import (
+    HIGHEST_GEARING,
+    LOWEST_GEARING,
+    UNSLIPPED,
+    effective_gearing,
+    predict_gear,
+    steady,
+)
 
 USUAL_STD: Final = 0.2
 """Standard deviation of how much sooner or later than the vehicle speed it is [s]: control units
@@ -42,6 +49,19 @@ HALF: Final = 0.25
 LASTING: Final = 2.5
 """Errors of neighbouring rows are alike for so long [s]."""
 
+SHIFTS: Final = np.arange(-4.0, 4.01, 0.25)
+"""Delays beside the usual one that are tried [s]."""
+
+ENOUGH_SHIFTED: Final = 2000
+"""Rows that are looked at for each of them."""
+
+NARROWER: Final = 0.3
+"""Entropy by which the ratios must gather more than at the usual delay [nat]. An engine speed that
+is 2.5 s late has 0.7 to 2.7 to gain in 15 vehicles with gears, by 1 Hz and by 10 Hz."""
+
+BIN: Final = 0.01
+"""Width of the bins in which the logarithms of the ratios are counted [-]."""
+
 
 def find_engine_delay(
     stamps: Floats,
@@ -63,12 +83,16 @@ def find_engine_delay(
     gearings : (k,) falling, roughly [1/m]
     usual : lateness before the drive has shown [s]
 
+    Returns
+    -------
+    Where the ratios gather at another delay than the usual one, the search begins there.
+
     References
     ----------
     Errors in time are errors in proportion to the rate: Ljung, System Identification, 2nd ed.,
     1999, sec. 7.5; robust weights: Huber, Robust Statistics, 1981.
     """
-    delay = usual
+    delay = gathered_delay(stamps, engine_speed, motion, usual)
     for _ in range(ROUNDS):
         rows = _in_gear(stamps - delay, engine_speed, motion, gearings)
         if rows is None:
@@ -78,6 +102,40 @@ def find_engine_delay(
         trust = USUAL_STD**2 / (USUAL_STD**2 + variance)
         delay = usual + trust * (delay - slope - usual)
     return float(delay) if abs(delay - usual) > ALIKE else usual
+
+
+def gathered_delay(
+    stamps: Floats, engine_speed: Floats, motion: tuple[Floats, Floats], usual: float
+) -> float:
+    """Lateness at which the ratios of engine to vehicle speed gather most, gears being unknown [s].
+
+    Parameters
+    ----------
+    stamps, engine_speed, motion, usual : as of `find_engine_delay`
+
+    Returns
+    -------
+    ``usual`` where no other delay gathers them clearly more: a stepless gearbox, one gear, or a
+    short drive
+    """
+    step = max(1, stamps.size // ENOUGH_SHIFTED)
+    stamps, engine_speed = stamps[::step], engine_speed[::step]
+    entropies = [_entropy(stamps - usual - shift, engine_speed, motion) for shift in SHIFTS]
+    best = int(np.argmin(entropies))
+    unshifted = entropies[int(np.argmin(np.abs(SHIFTS)))]
+    return usual + float(SHIFTS[best]) if unshifted - entropies[best] > NARROWER else usual
+
+
+def _entropy(time: Floats, engine_speed: Floats, motion: tuple[Floats, Floats]) -> float:
+    """Entropy of the ratios of engine to vehicle speed [nat]; infinite of too few."""
+    speed = np.interp(time, *motion, left=0.0, right=0.0)
+    ratio = effective_gearing(engine_speed, speed)
+    used = (speed > UNSLIPPED) & (ratio > LOWEST_GEARING) & (ratio < HIGHEST_GEARING)
+    if np.count_nonzero(used) < FEWEST:
+        return np.inf
+    counts = np.bincount((np.log(ratio[used] / LOWEST_GEARING) / BIN).astype(np.int64))
+    share = counts[counts > 0] / np.count_nonzero(used)
+    return float(-np.sum(share * np.log(share)))
 
 
 def _in_gear(
