@@ -10,9 +10,10 @@ import weighbridge as wb
 from weighbridge.errors import SourceError
 from weighbridge.live.feed import Feed
 from weighbridge.live.outputs import Outputs
-from weighbridge.live.replay import FASTEST_STEP, Replay
+from weighbridge.live.replay import Replay
 from weighbridge.live.session import Session
 from weighbridge.live.weighing import LiveStatus
+from weighbridge.signals.recent import LONGEST_STEP
 
 IMU = tuple(f"{kind}_{axis}" for kind in ("accel", "gyro") for axis in "xyz")
 GNSS = ("latitude", "longitude", "altitude", "gnss_speed", "gnss_course", "hdop", "gnss_accuracy")
@@ -85,7 +86,7 @@ def faulty(drive, names, fault):
 
 def told(car, drive, end):
     """Every weighing on the way, the last one at the end, by the step of a quick replay."""
-    scale = wb.LiveScale(car, info=drive.info, step=FASTEST_STEP)
+    scale = wb.LiveScale(car, info=drive.info, step=LONGEST_STEP)
     for start in np.arange(drive.start, end, 2.0):
         part = drive.between(start, start + 2.0)
         scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})

@@ -8,7 +8,7 @@ import pytest
 
 import weighbridge as wb
 from weighbridge.live.outputs.page import MOST, Page
-from weighbridge.live.replay import FASTEST_STEP
+from weighbridge.signals.recent import LONGEST_STEP
 
 pytest.importorskip("starlette", reason="starlette is not installed")
 pytest.importorskip("uvicorn", reason="uvicorn is not installed")
@@ -19,7 +19,7 @@ STOP = 300.0
 
 def hour(car, drive):
     """Weighings of a drive again and again, with stops, one each second."""
-    scale, shift = wb.LiveScale(car, info=drive.info, step=FASTEST_STEP), 0.0
+    scale, shift = wb.LiveScale(car, info=drive.info, step=LONGEST_STEP), 0.0
     while True:
         for start in np.arange(drive.start, drive.end, 1.0):
             part = drive.between(start, start + 1.0)

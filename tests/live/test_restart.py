@@ -10,13 +10,14 @@ import weighbridge as wb
 from tests.live.senders import HOST, Senders
 from weighbridge.live.records import Records
 from weighbridge.live.weighing import LiveStatus
+from weighbridge.signals.recent import LONGEST_STEP
 
 
 class Heard:
     """A scale that hears the senders, as a session lets it."""
 
     def __init__(self, car, senders):
-        self.scale, self.told = wb.LiveScale(car, step=1.0), []
+        self.scale, self.told = wb.LiveScale(car, step=LONGEST_STEP), []
         self._senders, self._renewed, self._due = senders, 0, 0.0
 
     def put(self, samples):

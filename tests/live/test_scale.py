@@ -26,7 +26,7 @@ from weighbridge.pipeline.forward import (
     step,
     with_open,
 )
-from weighbridge.signals.recent import STEP, recent
+from weighbridge.signals.recent import LONGEST_STEP, STEP, recent
 from weighbridge.simulation import MIDSIZE, Loading, Scenario, short_route, simulate_car
 
 
@@ -212,7 +212,7 @@ def test_an_open_window_that_is_full_counts_as_the_whole_one(brief, weighing, se
 
 
 def test_a_scale_learns_and_weighs(car, loaded, weighing):
-    scale = wb.LiveScale(car, info=loaded.drive.info, step=1.0)
+    scale = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
     drive = loaded.drive
     statuses = []
     for block in blocks(drive, even(drive, 5.0)):
@@ -228,12 +228,12 @@ def test_a_scale_learns_and_weighs(car, loaded, weighing):
     assert low < loaded.scenario.mass < high
     assert told.progress > 0.3
     assert all(s.fresh for s in told.signals if s.needed)
-    same = wb.LiveScale(car, info=loaded.drive.info, step=1.0)
+    same = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
     assert fed(same, drive, even(drive, 37.0)).mass == told.mass
 
 
 def test_a_first_mass_is_shown_before_it_counts_as_weighed(car, loaded):
-    scale = wb.LiveScale(car, info=loaded.drive.info, step=1.0)
+    scale = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
     begin = loaded.drive.start
     part = loaded.drive.between(begin, begin + 150.0)
     first = None
@@ -388,7 +388,7 @@ def test_a_change_of_load_is_found_on_the_way(car, loaded):
             loading=(Loading(distance=0.45 * route.length, duration=120.0, load=500.0),),
         )
     )  # fmt: skip
-    scale = wb.LiveScale(car, info=made.drive.info, step=1.0)
+    scale = wb.LiveScale(car, info=made.drive.info, step=LONGEST_STEP)
     told = fed(scale, made.drive, even(made.drive, 20.0))
     low, high = told.interval()
     assert low < made.scenario.mass + 500.0 < high

@@ -12,6 +12,7 @@ import weighbridge as wb
 from weighbridge.checks import check_drive
 from weighbridge.errors import DriveError
 from weighbridge.kernels.rotation import euler_to_matrix
+from weighbridge.signals.recent import LONGEST_STEP
 from weighbridge.vehicle.gear import detect_gearings
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -219,7 +220,7 @@ def test_a_log_is_weighed_live_as_it_is_as_a_whole(long):
     """The mass on the way, before all records are looked at once more, and that at the end."""
     drive, car = next(iter(long.values())), wb.Vehicle.load(CANEDGE / "vehicle.toml")
     low, high = wb.weigh(drive, car).interval(0.95)
-    scale = wb.LiveScale(car, info=drive.info, step=1.0)
+    scale = wb.LiveScale(car, info=drive.info, step=LONGEST_STEP)
     for start in np.arange(drive.start, drive.end, 1.0):
         part = drive.between(start, start + 1.0)
         scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})

@@ -313,10 +313,9 @@ def _unwatched(replay: Path | None, speed: float) -> bool:
 
 def _step(replay: Path | None, speed: float) -> float:
     """Choose the step of the scale [s]."""
-    from weighbridge.live.replay import FASTEST_STEP
-    from weighbridge.signals.recent import STEP
+    from weighbridge.signals.recent import LONGEST_STEP, STEP
 
-    return FASTEST_STEP if _unwatched(replay, speed) else STEP
+    return LONGEST_STEP if _unwatched(replay, speed) else STEP
 
 
 def _state_file(state: str | None, replay: Path | None, vehicle: Path) -> Path | None:

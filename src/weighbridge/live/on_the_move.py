@@ -43,6 +43,7 @@ class OnTheMove:
     before : what it was when all signals were silent the last time [s]
     looked_at, look_at : what it was at the last look, and is at the next [s]
     stood : the vehicle has stood for so long [s]
+    rests : with the last step it has stood for `REST`
     """
 
     driven: float = 0.0
@@ -51,20 +52,22 @@ class OnTheMove:
     looked_at: float = 0.0
     look_at: float = FIRST
     stood: float = 0.0
+    rests: bool = False
 
     def go_on(self, step: float, *, moved: bool) -> None:
         """Take a step of so long [s], in which the vehicle moved or stood."""
         if moved:
             self.driven += step
             self.this_load += step
-            self.stood = 0.0
+            self.stood, self.rests = 0.0, False
         else:
+            self.rests = self.stood < REST <= self.stood + step
             self.stood += step
 
     @property
     def is_due(self) -> bool:
         """Whether to look at all records now."""
-        rests = self.stood == REST and self.driven >= self.looked_at + FIRST
+        rests = self.rests and self.driven >= self.looked_at + FIRST
         return self.driven >= self.look_at or rests
 
     def looks(self, *, weighed: bool) -> None:

@@ -18,9 +18,6 @@ BLOCK: Final = 0.1
 FASTEST_BLOCK: Final = 1.0
 """or of so long as fast as it goes [s]."""
 
-FASTEST_STEP: Final = 1.0
-"""A scale takes steps of so long then [s]: nobody waits for what is shown on the way."""
-
 
 class Replay:
     """Hands the samples of a drive over at a rate.

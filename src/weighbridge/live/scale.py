@@ -29,7 +29,14 @@ from weighbridge.pipeline import forward
 from weighbridge.pipeline.forward import ForwardSetup, ForwardState
 from weighbridge.pipeline.given import GivenVehicle, as_vehicle
 from weighbridge.signals import Drive, DriveInfo, Floats
-from weighbridge.signals.recent import BEHIND, FEWEST_SAMPLES, STEP, first_instant, recent
+from weighbridge.signals.recent import (
+    BEHIND,
+    FEWEST_SAMPLES,
+    STEP,
+    first_instant,
+    last_instant,
+    recent,
+)
 
 _LOG = logging.getLogger(__name__)
 
@@ -152,13 +159,18 @@ class LiveScale:
         """
         if not math.isfinite(self._records.newest):
             return
+        last = last_instant(self._records.newest)
         try:
             self._advance(self._records.newest)
+            if self._next is not None and (length := last - self._next + self._every) > 0.0:
+                self._records.seal(last)
+                self._step(last, length)
+                self._next = first_instant(last, self._every)
         finally:
             self._take(wait=True)
         move = self._move
         if self._learns and move.driven > max(move.looked_at, FIRST) and self._next is not None:
-            self._learn(self._records.drive("live", self.info), self._next - self._every)
+            self._learn(self._records.drive("live", self.info), last)
             self._take(wait=True)
 
     def __del__(self) -> None:
@@ -432,23 +444,23 @@ class LiveScale:
         while self._next <= end:
             self._records.seal(self._next)
             if self._records.newest_sealed >= self._next - self._every - BEHIND:
-                self._step(self._next)
+                self._step(self._next, self._every)
                 self._next += self._every
             else:
                 # Nothing came for long: on to the next sample.
                 self._next = first_instant(self._records.waiting_from, self._every)
 
-    def _step(self, until: float) -> None:
+    def _step(self, until: float, length: float) -> None:
         drive = self._records.drive("live", self.info)
-        seen = recent(drive, until, self._every)
+        seen = recent(drive, until, length)
         moved = moves(seen, until)
-        if until - self._every <= self._records.resumed < until:
+        if until - length <= self._records.resumed < until:
             self._move.before = self._move.driven
-        self._move.go_on(self._every, moved=moved)
+        self._move.go_on(length, moved=moved)
         if self._setup is not None and self._state is not None:
             self._state, _ = forward.step(self._state, seen, until, self._setup)
         if self._looking is not None:
-            self._looking.steps.append(Step(until, seen, self._every if moved else 0.0))
+            self._looking.steps.append(Step(until, seen, length if moved else 0.0))
         keep = BEHIND + 2.0 * self._every
         if self._learns:
             keep += LONGEST

@@ -12,12 +12,15 @@ import numpy as np
 from weighbridge.signals.drive import Drive
 from weighbridge.signals.signal import Floats, Signal
 
-STEPS: Final = (0.25, 0.5, 1.0)
+STEPS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
 """The stages take a drive in steps between whole multiples of one of these [s]: powers of two, so
 that no sum of them is rounded."""
 
-STEP: Final = 0.5
+STEP: Final = 1.0
 """The one of them that they take unless another is asked for [s]."""
+
+LONGEST_STEP: Final = STEPS[-1]
+"""The one that they take where nobody waits for what is shown on the way [s]."""
 
 BEHIND: Final = 15.0
 """They look back so far [s]: a reading that runs straight for 10 s was filled in, and filters
@@ -61,6 +64,11 @@ def first_instant(time: float, step: float = STEP) -> float:
     return (math.floor(time / step) + 1) * step
 
 
+def last_instant(time: float) -> float:
+    """Return where the last step ends of a drive that ends at an instant [s]: it is shorter."""
+    return math.floor(time / STEPS[0]) * STEPS[0]
+
+
 def instants(drive: Drive, step: float = STEP) -> Floats:
     """Ends of the steps (n,) of so long that a drive is taken in [s].
 
@@ -71,5 +79,5 @@ def instants(drive: Drive, step: float = STEP) -> Floats:
         return np.empty(0)
     steps = np.unique(np.concatenate([np.floor(t / step) for t in stamps]))
     after = 1.0 + np.arange(round(BEHIND / step) + 1)
-    ends = np.unique(steps[:, None] + after) * step
-    return np.asarray(ends[ends <= drive.end])
+    ends = np.append(np.unique(steps[:, None] + after) * step, last_instant(drive.end))
+    return np.unique(ends[ends <= drive.end])
