@@ -36,7 +36,7 @@ FEWEST_ROWS: Final = 150
 FEWEST_PARTS: Final = 4
 """Fewer pieces show no drift."""
 
-AGREES: Final = 0.7
+AGREES: Final = 0.85
 """Correlation of force and specific force from which on a lag is believed [-]: simulated drives had
 0.89 to 1.00, with 3 s of drift as well."""
 
