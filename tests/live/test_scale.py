@@ -13,10 +13,11 @@ from tests.live.conftest import PHONE, SHORT
 from weighbridge.balance.averaging import WINDOW
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
+from weighbridge.live.arrival import health_of
 from weighbridge.live.checkpoint import VERSION
 from weighbridge.live.learning import _nothing
 from weighbridge.live.on_the_move import REST, OnTheMove
-from weighbridge.live.records import LATENESS
+from weighbridge.live.records import LATENESS, Records
 from weighbridge.live.weighing import LiveStatus
 from weighbridge.pipeline.forward import (
     begin,
@@ -365,6 +366,66 @@ def test_a_signal_that_stays_away_is_named(short, weighing):
     assert told.status is LiveStatus.LEARNING
     assert np.isnan(told.mass)
     assert "engine_load" in told.reason
+
+
+def test_a_parked_vehicle_keeps_its_mass_while_it_is_asked_each_30_s(weighing, setup, short):
+    """The adapter asks a vehicle that is off one request each 30 s; the sensor goes on."""
+    stands = float(short.speed.time[short.speed.values == 0.0][-1])
+    part = short.between(short.start, stands)
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=short.info)
+    scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
+    before = scale.weighing()
+    assert not before.parked
+    time = np.arange(stands + 0.02, stands + 200.0, 0.02)
+    seen = []
+    for first in range(0, time.size, 250):
+        now = time[first : first + 250]
+        block = {
+            n: (now, np.full(now.size, s.values[-1]))
+            for n, s in part.signals.items()
+            if n.startswith(("accel_", "gyro_"))
+        }
+        asked = np.arange(stands + 30.0, now[-1], 30.0)
+        asked = asked[asked >= now[0]]
+        if asked.size:
+            block["vehicle_speed"] = asked, np.zeros(asked.size)
+        scale.update_block(block)
+        seen.append(scale.weighing())
+    assert all(w.parked for w in seen)
+    assert {w.status for w in seen} == {before.status}
+    assert all(w.mass == pytest.approx(before.mass, rel=0.01) for w in seen)
+    assert not any(s.fails for w in seen for s in w.signals)
+    # It drives off, and the torque does not come: that is a fault again.
+    off = time[-1] + np.arange(0.1, 6.0, 0.1)
+    scale.update_block({"vehicle_speed": (off, np.linspace(0.0, 8.0, off.size))})
+    gone = scale.weighing()
+    assert not gone.parked
+    assert gone.reason_id == "live.silent" or "not come" in gone.reason
+
+
+def test_what_never_came_is_a_fault_of_a_vehicle_that_stands_too(weighing, setup, short):
+    stands = float(short.speed.time[short.speed.values == 0.0][-1])
+    part = short.without("engine_load").between(short.start, stands)
+    scale = wb.LiveScale(weighing.vehicle, setup=setup, info=short.info)
+    scale.update_block({n: (s.time, s.values) for n, s in part.signals.items()})
+    parked = scale.weighing(60.0)
+    assert parked.parked
+    assert [s.name for s in parked.signals if s.fails] == ["engine_load"]
+
+
+def test_a_signal_that_comes_each_30_s_is_not_silent():
+    records = Records()
+    for k in range(100):
+        records.add("vehicle_speed", float(k), 20.0)
+        if k % 30 == 5:
+            records.add("ambient_temperature", float(k), 290.0)
+        records.seal(k - 1.0)
+        slow = health_of(records, ("ambient_temperature",), 0.0)[0]
+        assert slow.fresh == (k >= 5), k
+    health = {s.name: s for s in health_of(records, (), 100.0)}
+    assert not health["ambient_temperature"].fresh
+    assert not health["vehicle_speed"].fresh
+    assert health["ambient_temperature"].rate == pytest.approx(1.0 / 30.0)
 
 
 def test_a_change_of_load_forgets_the_learned_mass_and_its_records(car, loaded):

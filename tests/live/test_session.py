@@ -64,8 +64,16 @@ def test_a_replay_is_weighed_as_its_samples(minute, weighing, setup, tmp_path):
     }
 
 
-def test_sources_that_fall_silent_are_not_shown_as_alive(minute, weighing, setup, monkeypatch):
+@pytest.fixture
+def moving(short):
+    """A part that ends on the move."""
+    fast = short.speed.time[short.speed.values > 5.0]
+    return short.between(short.start, float(fast[fast < short.start + 90.0][-1]))
+
+
+def test_sources_that_fall_silent_are_not_shown_as_alive(moving, weighing, setup, monkeypatch):
     """A terminal that says ok for minutes after the plug was pulled is wrong."""
+    minute = moving
     at = [100.0]
     monkeypatch.setattr("weighbridge.live.session.now", lambda: at[0])
     scale = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
@@ -85,6 +93,52 @@ def test_sources_that_fall_silent_are_not_shown_as_alive(minute, weighing, setup
     assert late.age == pytest.approx(first.age + 60.0)
     assert "engine_load" in late.reason
     assert "not come" in late.reason
+
+
+def test_a_parked_vehicle_is_weighed_to_its_last_sample_and_stays_so(
+    minute, weighing, setup, monkeypatch
+):
+    """What could still have been late is weighed; silent signals are no fault."""
+    assert minute.speed.values[-1] == 0.0
+    at = [100.0]
+    monkeypatch.setattr("weighbridge.live.session.now", lambda: at[0])
+    scale = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
+    shown = Shown()
+    with Outputs([shown]) as outputs, Feed([]) as feed:
+        session = Session(feed=feed, scale=scale, outputs=outputs)
+        scale.update_block({n: (s.time, s.values) for n, s in minute.signals.items()})
+        for _ in range(4):
+            session._show(due=True)
+            at[0] += 1200.0
+    first, *later = shown.weighings
+    whole = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
+    whole.update_block({n: (s.time, s.values) for n, s in minute.signals.items()})
+    whole.finish()
+    assert not first.parked
+    for w in later:
+        assert w.parked
+        assert not w.provisional
+        assert (w.mass, w.std, w.status) == (
+            whole.weighing().mass, whole.weighing().std, whole.weighing().status
+        )  # fmt: skip
+        assert w.reason_id != "live.silent"
+        assert not any(s.fails for s in w.signals)
+
+
+def test_the_last_weighing_is_shown_where_a_source_ends_all(minute, weighing, setup):
+    class Wrong:
+        name = "wrong"
+
+        def run(self, put, stop):
+            put({n: (s.time, s.values) for n, s in minute.signals.items()})
+            raise ConfigError("it cannot be used as it was named")
+
+    shown = Shown()
+    scale = LiveScale(weighing.vehicle, setup=setup, info=minute.info)
+    with Outputs([shown]) as outputs, Feed([Wrong()]) as feed, pytest.raises(ConfigError):
+        Session(feed=feed, scale=scale, outputs=outputs).run(Event())
+    assert shown.weighings
+    assert not shown.weighings[-1].provisional
 
 
 def test_a_lost_source_is_told_and_weighing_goes_on(minute, weighing, setup):

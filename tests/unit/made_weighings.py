@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from tests.noted import noted
 
@@ -25,12 +26,18 @@ def health(*, silent: tuple[str, ...] = ()) -> tuple[SignalHealth, ...]:
     )
 
 
+def rests() -> tuple[SignalHealth, ...]:
+    """Signals of a vehicle that is parked."""
+    return tuple(replace(s, rests=True, age=999.0) for s in health())
+
+
 def weighing(time: float = 300.0, **changed: object) -> LiveWeighing:
     """One weighing of a van of 2100 kg, 1800 kg empty, 2400 kg permitted."""
     values: dict[str, object] = {
         "vehicle": "Delivery van",
         "time": time,
         "age": 1.0,
+        "newest": time + 1.0,
         "status": LiveStatus.WEIGHED,
         "refusal": None,
         "mass": 2100.0,
@@ -40,6 +47,7 @@ def weighing(time: float = 300.0, **changed: object) -> LiveWeighing:
         "tared": None,
         "driven": time,
         "progress": 0.85,
+        "progress_to_5": 1.0,
         "minutes_to_5": 0.0,
         "minutes_to_2": 3.0,
         "advice": "Speed up firmly from a stop, in second or third gear.",
@@ -59,7 +67,8 @@ def drive(seconds: int = 600, begin: float = 0.0) -> Iterator[LiveWeighing]:
                 refusal=noted("The vehicle has hardly moved."),
                 mass=math.nan,
                 std=math.nan,
-                progress=k / 600.0,
+                progress=0.0,
+                progress_to_5=math.nan if k < 30 else 0.1,
                 minutes_to_5=math.nan,
                 minutes_to_2=math.nan,
             )
@@ -73,7 +82,8 @@ def drive(seconds: int = 600, begin: float = 0.0) -> Iterator[LiveWeighing]:
             refusal=noted("The interval is wider than 5 %.") if learnt else None,
             mass=mass,
             std=std,
-            progress=min(1.0, 0.02 * mass / (1.96 * std)),
+            progress=min(1.0, (0.02 * mass / (1.96 * std)) ** 2),
+            progress_to_5=min(1.0, (0.05 * mass / (1.96 * std)) ** 2),
             minutes_to_5=5.0 if learnt else 0.0,
             minutes_to_2=30.0,
         )

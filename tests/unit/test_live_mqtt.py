@@ -339,6 +339,36 @@ def test_weighings_are_thinned_but_not_a_change_of_status(tmp_path):
     mqtt.close()
 
 
+def test_the_last_weighing_is_sent_at_the_end_and_what_waits_for_nothing_new_once(tmp_path):
+    with broker() as port:
+        pass
+    mqtt = sender(port, tmp_path, period=5.0)
+    parked = [weighing(103.0, newest=104.0, parked=True, age=float(k)) for k in range(40)]
+    for w in (weighing(100.0), weighing(101.0), *parked):
+        mqtt.show(w)
+    sent = [json.loads(m.payload) for m in mqtt._outbox.after(0, 99) if m.topic == TOPIC]
+    assert [(w["time_s"], w["parked"]) for w in sent] == [(100.0, False), (103.0, True)]
+    mqtt.show(weighing(104.5, newest=106.0, parked=True))
+    mqtt.close()
+    box = Outbox(tmp_path / "outbox.sqlite")
+    sent = [json.loads(m.payload) for m in box.after(0, 99) if m.topic == TOPIC]
+    box.close()
+    assert [w["time_s"] for w in sent] == [100.0, 103.0, 104.5]
+
+
+def test_before_the_first_mass_it_is_told_how_far_it_is(tmp_path):
+    with broker() as port:
+        pass
+    mqtt = sender(port, tmp_path, period=5.0)
+    for w in drive(60):
+        mqtt.show(replace(w, time=math.nan))
+    told = [json.loads(m.payload) for m in mqtt._outbox.after(0, 99) if m.topic == TOPIC]
+    mqtt.close()
+    assert len(told) == 12
+    assert [w["progress_to_5"] for w in told] == [None] * 6 + [0.1] * 6
+    assert all(w["signals"][0]["rate_hz"] == 200.0 and w["advice"] for w in told)
+
+
 def test_an_outbox_has_one_owner(tmp_path):
     first = Outbox(tmp_path / "box")
     with pytest.raises(ConfigError, match="is used by another weighbridge"):

@@ -10,7 +10,7 @@ from importlib.resources import files
 
 import pytest
 from tests.noted import noted
-from tests.unit.made_weighings import drive, weighing
+from tests.unit.made_weighings import NAMES, drive, rests, weighing
 
 from weighbridge.errors import ConfigError
 from weighbridge.live.outputs.page import MOST, WINDOW, History, Page
@@ -304,6 +304,35 @@ def test_the_chart_begins_with_a_mass_and_a_missing_limit_is_explained(page, bro
     assert tab.inner_text("#payload-name") == "Payload since the tare"
     assert tab.inner_text("#payload") == "−50 kg"
     assert tab.is_visible("#overload")
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_before_a_mass_a_phone_shows_signals_and_the_way_to_5_percent_and_then_folds(page, browser):
+    nothing = {"mass": math.nan, "std": math.nan, "progress": 0.0}
+    page.show(weighing(**nothing, progress_to_5=0.4))
+    tab = browser.new_page(viewport={"width": 390, "height": 844})
+    tab.goto(page.name)
+    tab.wait_for_selector("#signals tr")
+    assert tab.inner_text("#learnt") == "40 %"
+    assert "± 5 %" in tab.inner_text("#wanted")
+    assert not tab.is_visible("#parked")
+    page.show(weighing(301.0, parked=True, signals=rests()))
+    tab.wait_for_selector("#signals tr", state="hidden")
+    assert tab.inner_text("#learnt") == "85 %"
+    assert "± 2 %" in tab.inner_text("#wanted")
+    assert tab.is_visible("#parked")
+    assert tab.inner_text("#signals-brief") == f"0 of {len(NAMES)} come"
+    assert tab.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_a_settled_weighing_that_is_a_little_older_clears_no_chart():
+    history = History()
+    for time in (100.0, 101.0, 99.5, 102.0):
+        history.add(weighing(time))
+    assert history.since(0)["time"] == [100.0, 101.0, 102.0]
+    history.add(weighing(10.0))
+    assert history.since(0)["time"] == [10.0]
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

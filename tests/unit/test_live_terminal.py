@@ -1,18 +1,25 @@
 """The view of a live weighing, on terminals of any size and where there is none."""
 
 import io
-import itertools
 import logging
 import math
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
 from tests.noted import noted
-from tests.unit.made_weighings import NAMES, drive, health, weighing
+from tests.unit.made_weighings import NAMES, drive, health, rests, weighing
 
-from weighbridge.live.outputs.terminal import PlainLines, TerminalView, lines, terminal
-from weighbridge.live.outputs.words import needed_text, overload_text
-from weighbridge.live.weighing import AlertState, LiveStatus
+from weighbridge.live.outputs.terminal import (
+    PlainLines,
+    TerminalView,
+    lines,
+    plain_line,
+    terminal,
+)
+from weighbridge.live.outputs.words import needed_text, overload_text, rate_text
+from weighbridge.live.weighing import AlertState, LiveStatus, SignalHealth
+from weighbridge.messages import Problem
 
 
 def text(found):
@@ -94,7 +101,8 @@ def test_control_characters_of_a_name_do_not_act():
 
 
 def test_bars_of_a_terminal_without_unicode_are_letters():
-    bars = [t.plain for t in lines(weighing(), 80, 24, ascii_only=True) if "##" in t.plain]
+    shown = lines(weighing(progress_to_5=0.5), 80, 24, ascii_only=True)
+    bars = [t.plain for t in shown if "##" in t.plain]
     assert len(bars) == 2
     assert all("█" not in bar for bar in bars)
 
@@ -120,18 +128,59 @@ def test_the_view_is_drawn_at_most_five_times_a_second_and_the_last_one_stays():
     assert "1099 ± 49 kg" in out.getvalue()
 
 
-def test_plain_lines_come_once_a_minute_and_on_a_change_of_status():
-    out = io.StringIO()
-    view = PlainLines(Console(file=out, width=40))
-    told = list(drive(600))
+def test_plain_lines_come_each_10_s_until_a_mass_and_then_each_minute_or_where_something_changes():
+    printed, at = io.StringIO(), []
+    view = PlainLines(Console(file=printed, width=40))
+    told = list(drive(300))
+    told[200:] = [replace(w, parked=True) for w in told[200:]]
     for w in told:
+        before = printed.tell()
         view.show(w)
-    printed = out.getvalue().splitlines()
-    changes = sum(a.status is not b.status for a, b in itertools.pairwise(told))
-    assert changes == 1
-    assert len(printed) == 10 + changes
-    assert "Delivery van" in printed[0]
-    assert f"{told[540].mass:.0f} ±" in printed[-1] or f"{told[-20].mass:.0f} ±" in printed[-1]
+        if printed.tell() > before:
+            at.append(w.newest - 1.0)
+    weighed = next(w.time for w in told if w.status is LiveStatus.WEIGHED)
+    assert at == [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, weighed, weighed + 60.0, 200.0, 260.0]
+    lines = printed.getvalue().splitlines()
+    assert "0 % of what ± 5 % needs" in lines[0]
+    assert "10 % of what ± 5 % needs" in lines[3]
+    assert "vehicle_speed 5.0 Hz" in lines[3]
+    assert "needs" not in lines[-1]
+    assert "weighed, parked" in lines[-1]
+
+
+def test_plain_lines_go_on_where_no_mass_has_a_time():
+    """Before the first mass a weighing has no instant; the samples have."""
+    out = io.StringIO()
+    view = PlainLines(Console(file=out))
+    for k in range(31):
+        view.show(weighing(math.nan, newest=float(k), mass=math.nan, std=math.nan))
+    view.show(weighing(math.nan, mass=math.nan, std=math.nan))
+    assert len(out.getvalue().splitlines()) == 4
+
+
+def test_an_active_alert_is_the_first_line():
+    passed = AlertState(limit=2400.0, side="above", active=True, probability=0.97)
+    w = weighing(alerts=(passed,), problems=(Problem.of("live.alert", alert="above 2400 kg"),))
+    shown = [t.plain.strip() for t in lines(w, 60, 30)]
+    assert next(line for line in shown if "2400 kg" in line).startswith(
+        "Overload: above 2400 kg, 97 %"
+    )
+    assert not any("Note" in line for line in shown)
+    assert lines(w, 60, 4)[0].plain.startswith("Overload")
+    assert plain_line(w).startswith("Overload")
+    assert "Overload" not in plain_line(weighing(alerts=(replace(passed, active=False),)))
+
+
+def test_a_parked_vehicle_has_no_signal_that_fails():
+    shown = [t.plain for t in lines(weighing(parked=True, signals=rests()), 40, 40)]
+    assert any("parked" in line for line in shown)
+    assert any(line.startswith("latitude") and "rests" in line for line in shown)
+    assert "not:" not in plain_line(weighing(parked=True, signals=rests()))
+
+
+def test_a_slow_signal_shows_its_period():
+    slow = SignalHealth(name="ambient_temperature", rate=1.0 / 30.0, age=20.0, period=30.0)
+    assert rate_text(slow) == "1/30 s"
 
 
 def test_plain_lines_go_on_when_the_clock_begins_anew():

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from weighbridge.balance.table import MOVING
 from weighbridge.live.records import Records
 from weighbridge.live.source import Samples
-from weighbridge.live.weighing import SignalHealth
+from weighbridge.live.weighing import SILENT, SignalHealth
 from weighbridge.signals.catalogue import IMU_SIGNALS
 from weighbridge.vehicle.torque_sources import TORQUE_SOURCES
 
@@ -23,6 +24,9 @@ _SPEEDS: Final = (("vehicle_speed",), ("gnss_speed",))
 
 _INERTIAL: Final = "inertial sensor"
 _POSITION: Final = "position"
+
+_BY_SENSORS: Final = frozenset((*IMU_SIGNALS, "gnss_speed"))
+"""Signals that come of sensors of their own, whether the vehicle reports or not."""
 
 RATE_SPAN: Final = 10.0
 """Time over which the rate of a signal is measured [s]."""
@@ -93,7 +97,7 @@ def needed_signals(vehicle: Vehicle, came: Iterable[str]) -> tuple[str, ...]:
 
 
 def health_of(
-    records: Records, needed: tuple[str, ...], silence: float
+    records: Records, needed: tuple[str, ...], silence: float, *, parked: bool = False
 ) -> tuple[SignalHealth, ...]:
     """Tell how each signal comes, those that are needed first.
 
@@ -102,19 +106,57 @@ def health_of(
     records
     needed : of `needed_signals`
     silence : time since any sample came last [s]
+    parked : whether the vehicle is, see `is_parked`
     """
-    now = records.newest + silence
     return tuple(
         SignalHealth(
             name=name,
             rate=records.rate(name, RATE_SPAN),
-            age=now - records.newest_of(name) if math.isfinite(now) else math.inf,
+            age=_age(records, name, silence),
+            period=float(records.gaps(name).max(initial=0.0)) or math.nan,
             late=records.late.get(name, 0),
             unfit=records.unfit.get(name, 0),
             needed=name in needed,
+            rests=parked and math.isfinite(records.newest_of(name)),
         )
         for name in dict.fromkeys((*needed, *records.names()))
     )
+
+
+def is_parked(records: Records, needed: tuple[str, ...], silence: float) -> bool:
+    """Tell whether a vehicle is parked: it stands, and has stopped reporting.
+
+    It stands by the newest speed of any sensor. It reports while any signal that a weighing needs
+    of it comes at least each `SILENT`; one that is off is asked much more seldom, and answers.
+
+    Parameters
+    ----------
+    records
+    needed : of `needed_signals`
+    silence : time since any sample came last [s]
+    """
+    speeds = [name for names in _SPEEDS for name in names]
+    last = max(speeds, key=records.newest_of)
+    if not records.newest_value(last) <= MOVING:
+        return False
+    came = [
+        name
+        for name in needed
+        if name not in _BY_SENSORS and math.isfinite(records.newest_of(name))
+    ]
+    return bool(came) and all(_pause(records, name, silence) > SILENT for name in came)
+
+
+def _age(records: Records, name: str, silence: float) -> float:
+    """Time since the newest sample of a signal [s]; infinite where none came."""
+    now = records.newest + silence
+    return now - records.newest_of(name) if math.isfinite(now) else math.inf
+
+
+def _pause(records: Records, name: str, silence: float) -> float:
+    """Time that a signal has paused, or before its newest sample did [s]."""
+    gaps = records.gaps(name)
+    return max(_age(records, name, silence), float(gaps[-1]) if gaps.size else 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -45,6 +45,7 @@ class Learned:
     inconsistent : the records contradict themselves or the vehicle file
     refusal : why there is no mass; None where there is one
     early : what the mass still lacks to count as weighed; None where it lacks nothing
+    std_found : ``std`` over the mass, also of a mass that is not shown [-]; infinite without one
     problems : what was found and what is uncertain
     """
 
@@ -59,6 +60,7 @@ class Learned:
     refusal: Problem | None
     problems: tuple[Problem, ...]
     early: Problem | None = None
+    std_found: float = math.inf
 
     def answer(self) -> Learned:
         """Return what they show of the mass alone, without what the stages go on from."""
@@ -109,7 +111,11 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
     inconsistent = weighing.status is Status.INCONSISTENT and early is None
     if weighing.result is None or not math.isfinite(weighing.mass):
         return _nothing(
-            until, early or weighing.refusal, inconsistent=inconsistent, problems=weighing.problems
+            until,
+            early or weighing.refusal,
+            inconsistent=inconsistent,
+            problems=weighing.problems,
+            std_found=_std_found(weighing),
         )
     if early is not None:
         setup, state, problems = None, None, weighing.problems
@@ -127,6 +133,7 @@ def learn(drive: Drive, vehicle: Vehicle, until: float, step: float) -> Learned:
         refusal=None,
         early=early,
         problems=problems,
+        std_found=_std_found(weighing),
     )
 
 
@@ -158,9 +165,17 @@ def _floor(weighing: Weighing) -> float:
     return left / weighing.mass if math.isfinite(left) else 0.0
 
 
+def _std_found(weighing: Weighing) -> float:
+    """Relative standard deviation of what was found [-], whether it is shown or not."""
+    result = weighing.result
+    if result is None or not result.mass > 0.0:
+        return math.inf
+    return result.std / result.mass
+
+
 def _nothing(
     until: float, refusal: Problem | None, *, inconsistent: bool,
-    problems: tuple[Problem, ...] = (),
+    problems: tuple[Problem, ...] = (), std_found: float = math.inf,
 ) -> Learned:  # fmt: skip
     return Learned(
         until=until,
@@ -173,4 +188,5 @@ def _nothing(
         inconsistent=inconsistent,
         refusal=refusal,
         problems=problems,
+        std_found=std_found,
     )

@@ -37,6 +37,7 @@ class Outlook:
     status: LiveStatus
     reason: Problem | None = None
     progress: float = 0.0
+    progress_to_5: float = math.nan
     reach: float = math.nan
     minutes_to_5: float = math.nan
     minutes_to_2: float = math.nan
@@ -52,6 +53,7 @@ def outlook(
     reason: Problem | None,
     silent: Sequence[str],
     first: float,
+    std_found: float = math.nan,
     unproved: Problem | None = None,
     since: float = 0.0,
     wait: float = 0.0,
@@ -68,6 +70,8 @@ def outlook(
     reason : why there is none; None where nothing says
     silent : signals that are needed and do not come
     first : time on the move before which nothing is weighed [s]
+    std_found : standard deviation over the mass that the last look had, shown or not [-]; NaN
+        before the first
     unproved : why the mass is not yet one of what is driven now; None where it is
     since : time on the move since then, which no look has seen yet [s]
     wait : time on the move until it will [s]
@@ -78,6 +82,7 @@ def outlook(
         return Outlook(
             status=LiveStatus.LEARNING,
             reason=_missing(silent, reason) if silent else reason,
+            progress_to_5=_progress(GOOD, _REACH * std_found),
             advice=ADVICE,
         )
     half = _REACH * std / mass
@@ -96,12 +101,23 @@ def outlook(
     return Outlook(
         status=LiveStatus.LEARNING if reason else LiveStatus.WEIGHED,
         reason=reason,
-        progress=min(1.0, (BETTER / half) ** 2),
+        progress=_progress(BETTER, half),
+        progress_to_5=_progress(GOOD, half),
         reach=_reach(mass, noise, floor, driven),
         minutes_to_5=to_good,
         minutes_to_2=to_better,
         advice=_advice(to_good, to_better),
     )
+
+
+def _progress(wanted: float, half: float) -> float:
+    """Part of the way to an interval [-]: the variance that is allowed over that now.
+
+    Parameters
+    ----------
+    wanted, half : half widths over the mass, wanted and now [-]; NaN where unknown
+    """
+    return half if math.isnan(half) else min(1.0, (wanted / half) ** 2)
 
 
 def _missing(silent: Sequence[str], beside: Problem | None = None) -> Problem:

@@ -12,6 +12,7 @@ from weighbridge.errors import ConfigError
 from weighbridge.live.source import Samples
 from weighbridge.signals import Drive, DriveInfo, Floats, Signal
 from weighbridge.signals.catalogue import QUANTITIES
+from weighbridge.signals.recent import FEWEST_SAMPLES
 
 LATENESS: Final = 1.0
 """A sample may come so much later than the newest [s]: PX4 waits 0.2, openpilot 1 s."""
@@ -339,6 +340,30 @@ class Records:
         """Instant of the newest sample of a signal [s]; -inf without any."""
         column = self._columns.get(name)
         return -math.inf if column is None else column.newest
+
+    def newest_value(self, name: str) -> float:
+        """Value of the newest sample of a signal; NaN without any."""
+        values = self._newest(name, 1)[1]
+        return float(values[-1]) if values.size else math.nan
+
+    def gaps(self, name: str) -> Floats:
+        """Times between the last `FEWEST_SAMPLES` samples of a signal, late ones counted [s].
+
+        Empty where fewer than two came.
+        """
+        return np.diff(self._newest(name, FEWEST_SAMPLES)[0])
+
+    def _newest(self, name: str, count: int) -> tuple[Floats, Floats]:
+        """Return the last samples of a signal in order, ``count`` at most."""
+        column = self._columns.get(name)
+        if column is None:
+            return _NONE, _NONE
+        time, values = column.sealed
+        more = column.waiting()
+        time, values = _in_order(
+            np.concatenate([time[-count:], more[0]]), np.concatenate([values[-count:], more[1]])
+        )
+        return time[-count:], values[-count:]
 
     def rate(self, name: str, span: float) -> float:
         """Sealed samples per second of a signal over the last ``span`` [s] that were sealed.

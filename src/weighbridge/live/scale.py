@@ -13,7 +13,7 @@ import numpy as np
 from weighbridge.arguments import as_floats, check_text, check_type
 from weighbridge.errors import ConfigError
 from weighbridge.estimators.judging import STOP
-from weighbridge.live.arrival import health_of, needed_signals
+from weighbridge.live.arrival import health_of, is_parked, needed_signals
 from weighbridge.live.checkpoint import packed, refuse_absurd, unpacked
 from weighbridge.live.clock import pace
 from weighbridge.live.doubts import doubts, of_before
@@ -317,15 +317,17 @@ class LiveScale:
         self._take()
         state = self._ahead() if ahead else self._state
         mass, std, floor, at = known_mass(state, self._setup, self._learned)
-        health = self._health(silence)
-        found = self._outlook(mass, std, floor, health, state)
+        parked, health = self._health(silence)
+        found = self._outlook(mass, std, floor, health, state, parked=parked)
         newest = self._records.newest
         learned = self._learned
         return LiveWeighing(
             vehicle=self.vehicle.name,
             time=at,
             age=newest + silence - at if math.isfinite(at) else math.nan,
+            newest=newest if math.isfinite(newest) else math.nan,
             status=found.status,
+            parked=parked,
             refusal=found.reason,
             mass=mass,
             std=std,
@@ -389,11 +391,13 @@ class LiveScale:
         floor: float,
         health: tuple[SignalHealth, ...],
         state: ForwardState | None,
+        *,
+        parked: bool,
     ) -> Outlook:
         learned = self._learned
         if learned is not None and learned.inconsistent:
             return Outlook(status=LiveStatus.INCONSISTENT, reason=learned.refusal)
-        silent = [s.name for s in health if s.needed and not s.fresh]
+        silent = [s.name for s in health if s.needed and s.fails]
         reason = learned.refusal if learned is not None else None
         if reason is not None and self._learns:
             left = self._to_look()
@@ -411,7 +415,8 @@ class LiveScale:
             reason=reason,
             silent=silent,
             first=FIRST,
-            unproved=self._unproved(mass, state),
+            std_found=math.nan if learned is None else learned.std_found,
+            unproved=self._unproved(mass, state, parked=parked),
             since=since,
             wait=self._to_look() if waits else 0.0,
         )
@@ -420,11 +425,14 @@ class LiveScale:
         """Time on the move until the next look [s]; 0 while one goes on."""
         return 0.0 if self._looking is not None else self._move.left
 
-    def _unproved(self, mass: float, state: ForwardState | None) -> Problem | None:
+    def _unproved(self, mass: float, state: ForwardState | None, *, parked: bool) -> Problem | None:
         if self.newest == self._kept_to:
             return Problem.of("live.no_sample")
         if state is None and self._learned is not None and self._learned.early is not None:
             return self._learned.early
+        if parked:
+            # Only driving shows another load.
+            return None
         return of_before(
             self._records, driven_since=self._driven_since(), goes_on=self._is_of_before(mass)
         )
@@ -502,8 +510,10 @@ class LiveScale:
             self._since = learned.since
             self._move.this_load = look.driven_since(learned.since)
 
-    def _health(self, silence: float) -> tuple[SignalHealth, ...]:
+    def _health(self, silence: float) -> tuple[bool, tuple[SignalHealth, ...]]:
+        """Whether the vehicle is parked, and how each signal comes."""
         came = self._records.names()
         if came != self._came:
             self._came, self._needed = came, needed_signals(self.vehicle, came)
-        return health_of(self._records, self._needed, silence)
+        parked = is_parked(self._records, self._needed, silence)
+        return parked, health_of(self._records, self._needed, silence, parked=parked)

@@ -63,6 +63,7 @@ class Session:
     _looked: float = field(default=-float("inf"), init=False)
     _renewed: int = field(default=0, init=False)
     _heard: tuple[float, float] = field(default=(-float("inf"), 0.0), init=False)
+    _settled: float = field(default=-float("inf"), init=False)
 
     def run(self, stop: Event) -> LiveWeighing:
         """Weigh until the sources end or ``stop`` is set; return the last weighing."""
@@ -93,7 +94,7 @@ class Session:
                 self.scale.finish()
             if self.keeper is not None:
                 self.keeper.write(self.scale)
-        self._show(due=True, ahead=False)
+            self._show(due=True, ahead=False)
         return self.scale.weighing()
 
     def _show(self, *, due: bool = False, ahead: bool = True) -> None:
@@ -103,6 +104,11 @@ class Session:
         self._shown, self._looked = newest, monotonic()
         silence = self._silence()
         settled = self.scale.weighing(silence)
+        if settled.parked and silence and newest != self._settled:
+            # Nothing is under way any more that could be late.
+            self._settled = newest
+            self.scale.finish()
+            settled = self.scale.weighing(silence)
         for alert in self.alerts:
             event = alert.look(settled)
             if event is not None:
@@ -115,7 +121,7 @@ class Session:
             if s.error and not s.ended
         ]
         told = (*active, *lost, *self._doubts())
-        ahead = ahead and self.ahead
+        ahead = ahead and self.ahead and not settled.parked
         weighing = self.scale.weighing(silence, ahead=True) if ahead else settled
         self.outputs.show(replace(weighing, alerts=states, problems=(*told, *weighing.problems)))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from scipy.special import ndtr, ndtri
 
@@ -15,6 +15,12 @@ from weighbridge.results.writing import check_level
 
 Side = Literal["above", "below"]
 """Of a limit."""
+
+SILENT: Final = 3.0
+"""A signal that has not come for so long may be silent [s]."""
+
+SLOWEST: Final = 60.0
+"""Signals that hardly change are asked for so seldom [s]."""
 
 
 class LiveStatus(StrEnum):
@@ -34,22 +40,35 @@ class SignalHealth:
     name : canonical name
     rate : samples per second lately [Hz]; 0 where none came
     age : since its newest sample, by the newest of all [s]; infinite where none came
+    period : longest time between its last samples [s]; NaN where it came once or never
     late, unfit : samples dropped because they came too late, or were no finite number or an
         impossible instant
     needed : the scale cannot weigh without it
+    rests : it came, and the vehicle is parked: that it is silent is no fault
     """
 
     name: str
     rate: float
     age: float
+    period: float = math.nan
     late: int = 0
     unfit: int = 0
     needed: bool = False
+    rests: bool = False
 
     @property
     def fresh(self) -> bool:
-        """Whether it comes at all: not silent for 3 s and three of its periods."""
-        return self.age <= max(3.0, 3.0 / self.rate if self.rate > 0.0 else 0.0)
+        """Whether it comes at all: not silent for `SILENT` and three of its periods.
+
+        One that came once may be of the slowest, which come each `SLOWEST`.
+        """
+        period = self.period if math.isfinite(self.period) else SLOWEST
+        return self.age <= max(SILENT, 3.0 * period)
+
+    @property
+    def fails(self) -> bool:
+        """Whether it does not come although it should."""
+        return not (self.fresh or self.rests)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,15 +97,19 @@ class LiveWeighing:
     ----------
     vehicle : its name
     time : instant it holds for, on the clock of the samples [s]; NaN before the first
-    age : time from that instant to the newest sample [s]
+    age : time from that instant to now [s]
+    newest : instant of the newest sample of any signal [s]; NaN before the first
     status : ``learning`` until the mass is within 5 % with 95 % probability, ``weighed``, or
         ``inconsistent`` where the drive contradicts itself or the vehicle file
     refusal : why the status is not ``weighed``; None if it is
+    parked : the vehicle stands and has stopped reporting: the mass stays as it was
     mass, std : [kg]; NaN where there is none
     tare, gross : of the vehicle file [kg]; None where it does not say
     tared : mass that the user has tared [kg]; None for ``tare``
     driven : time on the move so far [s]
     progress : part of the way to 2 % [-], 0 to 1: the variance that is allowed then over that now
+    progress_to_5 : the same to 5 %, of what the last look at all records had where it showed no
+        mass; NaN before the first look
     reach : half width of the 95 % interval over the mass that 4.5 h more of driving leave, nearly
         all of it by vehicle file and equipment [-]; NaN where unknown
     minutes_to_5, minutes_to_2 : of driving like until now until the interval of 95 % is as narrow
@@ -116,6 +139,9 @@ class LiveWeighing:
     minutes_to_5: float
     minutes_to_2: float
     advice: str
+    progress_to_5: float = math.nan
+    parked: bool = False
+    newest: float = math.nan
     reach: float = math.nan
     look: float = math.nan
     provisional: bool = False
@@ -179,6 +205,7 @@ class LiveWeighing:
             "time_s": _known(self.time),
             "age_s": _known(self.age),
             "status": str(self.status),
+            "parked": self.parked,
             "reason": self.reason,
             "reason_id": self.reason_id,
             "mass_kg": _known(self.mass),
@@ -200,6 +227,7 @@ class LiveWeighing:
             ],
             "driven_s": self.driven,
             "progress": self.progress,
+            "progress_to_5": _known(self.progress_to_5),
             "look": _known(self.look),
             "provisional": self.provisional,
             "reach_percent": _known(100.0 * self.reach),
@@ -212,6 +240,7 @@ class LiveWeighing:
                     "rate_hz": s.rate,
                     "age_s": _known(s.age),
                     "fresh": s.fresh,
+                    "rests": s.rests,
                     "needed": s.needed,
                     "late": s.late,
                     "unfit": s.unfit,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import re
 import secrets
 import sqlite3
@@ -16,9 +17,10 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import unquote, urlsplit
 
-from weighbridge.errors import ConfigError, MissingExtraError
+from weighbridge.errors import ConfigError, MissingExtraError, WeighbridgeError
 from weighbridge.live.outputs.lines import json_line
 from weighbridge.live.outputs.outbox import MOST, Outbox
+from weighbridge.live.outputs.thinning import News, due, news
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, Side
 
 if TYPE_CHECKING:
@@ -246,7 +248,9 @@ class Mqtt:
         self._period = period
         self._pauses = pauses
         self._outbox = Outbox(outbox, most)
-        self._last: tuple[float, _News] | None = None
+        self._news: News | None = None
+        self._newest = math.nan
+        self._held: LiveWeighing | None = None
         self._stop = Event()
         self._changed = Condition()
         self._told = False
@@ -264,31 +268,38 @@ class Mqtt:
         return self._outbox.dropped
 
     def show(self, weighing: LiveWeighing) -> None:
-        """Put a weighing into the outbox where one is due.
+        """Put a weighing into the outbox where one is due; hold the newest back until one is.
 
         Raises
         ------
         WeighbridgeError
             The disk is full or gone.
         """
-        if self._last is not None:
-            time, news = self._last
-            if news == _news(weighing) and 0.0 <= weighing.time - time < self._period:
-                return
-            if news == _news(weighing) and weighing.time != weighing.time:
-                return
-        self._outbox.put(self._topics.messages(weighing))
-        self._last = weighing.time, _news(weighing)
-        with self._changed:
-            self._changed.notify_all()
+        self._held = weighing
+        if news(weighing) != self._news or due(weighing, self._newest, self._period):
+            self._put()
 
     def close(self) -> None:
-        """Send what waits if the broker is there, say goodbye, and end."""
+        """Send the last weighing and what waits if the broker is there, say goodbye, and end."""
+        if self._held is not None:
+            try:
+                self._put()
+            except WeighbridgeError as error:
+                _logger.warning("%s", error)
         self._stop.set()
         with self._changed:
             self._changed.notify_all()
         self._thread.join()
         self._outbox.close()
+
+    def _put(self) -> None:
+        """Put the newest weighing into the outbox."""
+        weighing = self._held
+        assert weighing is not None
+        self._outbox.put(self._topics.messages(weighing))
+        self._news, self._newest, self._held = news(weighing), weighing.newest, None
+        with self._changed:
+            self._changed.notify_all()
 
     def _run(self) -> None:
         shortest, longest = self._pauses
@@ -316,14 +327,6 @@ class Mqtt:
         elif not trouble and self._told:
             _logger.warning("%s is back, %d messages waited", self.name, self.waiting)
         self._told = bool(trouble)
-
-
-_News = tuple[LiveStatus, tuple[bool, ...]]
-
-
-def _news(weighing: LiveWeighing) -> _News:
-    """Return what is told at once where it changes."""
-    return weighing.status, tuple(alert.active for alert in weighing.alerts)
 
 
 class _Session:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from weighbridge.customary import shown_amount, shown_unit
 from weighbridge.errors import ConfigError, MissingExtraError
 from weighbridge.live.outputs.lines import json_line
+from weighbridge.live.records import BACK
 from weighbridge.live.weighing import LiveWeighing
 
 if TYPE_CHECKING:
@@ -93,11 +94,14 @@ class History:
         return self._number
 
     def add(self, weighing: LiveWeighing) -> None:
-        """Add a point, unless the last one is hardly older; a clock that falls begins anew."""
+        """Add a point, unless the last one is hardly older; a clock that falls begins anew.
+
+        A settled mass that follows a provisional one is a little older, of the same clock.
+        """
         time = weighing.time
         if not math.isfinite(time):
             return
-        if self._points and time < self._points[-1][0]:
+        if self._points and time < self._points[-1][0] - BACK:
             self._points.clear()
             self._fresh = self._number
         # Stamps are multiples of a period in floating point: a little less is as good.

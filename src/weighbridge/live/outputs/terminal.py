@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import logging
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Final, TextIO
 
+from weighbridge.live.outputs.thinning import due, news
 from weighbridge.live.outputs.words import (
     age_text,
+    alerts_text,
     mass_text,
     needed_text,
     overload_text,
     payload_text,
+    progress_text,
     rate_text,
+    rates_text,
     reason_text,
     signals_text,
     state_text,
@@ -48,7 +53,10 @@ _WIDE: Final = 78
 _LONGEST_NAME: Final = 26
 
 _LINE_PERIOD: Final = 60.0
-"""A plain line comes at least so often, on the clock of the samples [s]."""
+"""A plain line comes at least so often, on the clock of the samples [s],"""
+
+_EARLY_PERIOD: Final = 10.0
+"""and before the first mass so often [s]."""
 
 
 class TerminalView:
@@ -93,7 +101,9 @@ class TerminalView:
 
 
 class PlainLines:
-    """Prints a line a minute, and one whenever the status changes.
+    """Prints a line a minute, each 10 s before the first mass, and one for all that changes.
+
+    A change is one of the status, of an alert, and that the vehicle is parked or no longer.
 
     Parameters
     ----------
@@ -104,24 +114,22 @@ class PlainLines:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._status: LiveStatus | None = None
-        self._told = float("-inf")
+        self._news: object = None
+        self._told = float("nan")
 
     def show(self, weighing: LiveWeighing) -> None:
         """Print a line where one is due."""
-        age = weighing.time - self._told
-        # A clock that begins anew is a new drive.
-        if weighing.status is self._status and 0.0 <= age < _LINE_PERIOD:
+        if not due(weighing, self._told, _period(weighing)) and news(weighing) == self._news:
             return
-        if weighing.time != weighing.time and self._status is not None:
-            return
-        self._status = weighing.status
-        if weighing.time == weighing.time:
-            self._told = weighing.time
+        self._told, self._news = weighing.newest, news(weighing)
         self._console.print(plain_line(weighing), markup=False, highlight=False, soft_wrap=True)
 
     def close(self) -> None:
         """Nothing was begun."""
+
+
+def _period(weighing: LiveWeighing) -> float:
+    return _LINE_PERIOD if math.isfinite(weighing.mass) else _EARLY_PERIOD
 
 
 def _through(stream: TextIO) -> list[tuple[logging.StreamHandler[TextIO], TextIO]]:
@@ -144,7 +152,8 @@ def terminal(console: Console) -> TerminalView | PlainLines:
 
 def plain_line(weighing: LiveWeighing) -> str:
     """Write a weighing in one line."""
-    parts = [f"{weighing.vehicle}, driven {duration(weighing.driven)}: {weighing.status}"]
+    parked = ", parked" if weighing.parked else ""
+    parts = [f"{weighing.vehicle}, driven {duration(weighing.driven)}: {weighing.status}{parked}"]
     if reason := reason_text(weighing):
         parts[0] += f" ({reason})"
     if weighing.mass == weighing.mass:
@@ -153,7 +162,11 @@ def plain_line(weighing: LiveWeighing) -> str:
             parts.append(f"{100.0 * weighing.share:.0f} % of {kg(weighing.gross)}")
         parts.append(overload_text(weighing))
     parts += [needed_text(weighing), signals_text(weighing)]
-    return visible(cut("; ".join(part for part in parts if part)))
+    if not math.isfinite(weighing.mass):
+        wanted, part = progress_text(weighing)
+        parts[-2] = f"{100.0 * part:.0f} % of what {wanted} needs"
+        parts += [rates_text(weighing), weighing.advice]
+    return visible(cut("; ".join(part for part in (alerts_text(weighing), *parts) if part)))
 
 
 class View:
@@ -198,7 +211,8 @@ def lines(w: LiveWeighing, width: int, height: int, *, ascii_only: bool = False)
     load = ", ".join(t for t in (payload_text(w), overload_text(w)) if t)
     payload = _wrapped(load, width, _load_style(w))
     needed = _wrapped(needed_text(w), width)
-    head = [_mass_line(w, width), *reason, *payload, *bars, *needed, *advice]
+    alerts = _wrapped(alerts_text(w), width, "bold white on red")
+    head = [*alerts, _mass_line(w, width), *reason, *payload, *bars, *needed, *advice]
     if height < len(head) + 5:
         # Little room: what is known first.
         signals = _wrapped(signals_text(w), width, _signals_style(w))
@@ -207,7 +221,7 @@ def lines(w: LiveWeighing, width: int, height: int, *, ascii_only: bool = False)
     left = height - len(top)
     notes = [
         line
-        for note in reversed([p.shown for p in w.problems])
+        for note in reversed([p.shown for p in w.problems if p.id != "live.alert"])
         for line in _wrapped(f"Note: {note}", width, "dim")
     ]
     table = _table(w.signals, width)
@@ -223,6 +237,8 @@ def _mass_line(w: LiveWeighing, width: int) -> Text:
     line = Text(mass_text(w) if known else "no mass yet", style="bold")
     line.append("  ")
     line.append(f" {w.status} ", style=_STATUS_STYLE[w.status])
+    if w.parked:
+        line.append(" parked ", style="black on cyan")
     low, high = w.interval()
     told = f"  {between(low, high)} with 95 %"
     if known and high - low < float("inf") and line.cell_len + len(told) <= width:
@@ -236,10 +252,9 @@ def _bars(w: LiveWeighing, width: int, *, ascii_only: bool) -> list[Text]:
     if w.share is not None:
         text = f"{100.0 * w.share:4.0f} % of {kg(w.gross)}"
         found.append(("permitted", w.share, _load_style(w), text))
-    waits = w.look == w.look
-    if w.mass == w.mass or not waits:
-        found.append(("learnt", w.progress, "cyan", f"{100.0 * w.progress:4.0f} %"))
-    if waits:
+    wanted, part = progress_text(w)
+    found.append((f"to {wanted}", part, "cyan", f"{100.0 * part:4.0f} %"))
+    if w.look == w.look:
         found.append(("next look", w.look, "cyan", f"{100.0 * w.look:4.0f} %"))
     room = max(len(text) for *_, text in found)
     length = max(min(width - 11 - room, 50), 5)
@@ -269,7 +284,7 @@ def _load_style(w: LiveWeighing) -> str:
 
 
 def _signals_style(w: LiveWeighing) -> str:
-    wrong = [s for s in w.signals if not s.fresh]
+    wrong = [s for s in w.signals if s.fails]
     return "red" if any(s.needed for s in wrong) else "yellow" if wrong else "dim"
 
 
@@ -277,7 +292,7 @@ def _table(signals: tuple[SignalHealth, ...], width: int) -> list[Text]:
     """Signals in one column, or in two where the terminal is wide; those that fail first."""
     from rich.text import Text
 
-    ordered = sorted(signals, key=lambda s: (s.fresh, not s.needed))
+    ordered = sorted(signals, key=lambda s: (not s.fails, not s.needed))
     if width < _WIDE:
         return [_signal(s, width) for s in ordered]
     half = (width - 2) // 2
@@ -295,7 +310,7 @@ def _signal(s: SignalHealth, width: int) -> Text:
     from rich.text import Text
 
     state = state_text(s)
-    style = "green" if s.fresh else "red" if s.needed else "yellow"
+    style = "red" if s.fails and s.needed else "yellow" if s.fails else "green"
     lost = s.late + s.unfit
     tail = f"{rate_text(s):>8}{age_text(s):>7} "
     room = max(min(width - len(tail) - 7, _LONGEST_NAME), 4)

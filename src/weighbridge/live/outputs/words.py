@@ -93,7 +93,9 @@ def needed_text(weighing: LiveWeighing) -> str:
 
 
 def rate_text(signal: SignalHealth) -> str:
-    """Write the rate of a signal."""
+    """Write the rate of a signal, or its period where it comes more seldom than each 10 s."""
+    if 0.0 < signal.rate <= 0.1:
+        return f"1/{1.0 / signal.rate:.0f} s"
     return f"{signal.rate:.1f} Hz" if signal.rate < 1000.0 else f"{signal.rate:.0f} Hz"
 
 
@@ -108,15 +110,44 @@ def age_text(signal: SignalHealth) -> str:
 
 def state_text(signal: SignalHealth) -> str:
     """Write how a signal does, in one word."""
-    if not signal.fresh:
-        return "silent" if math.isfinite(signal.age) else "absent"
-    return "ok"
+    if signal.fresh:
+        return "ok"
+    if signal.rests:
+        return "rests"
+    return "silent" if math.isfinite(signal.age) else "absent"
+
+
+def progress_text(weighing: LiveWeighing) -> tuple[str, float]:
+    """Write which interval is on its way, and the part of the way to it [-]; 0 where unknown."""
+    if weighing.progress_to_5 >= 1.0:
+        return "± 2 %", weighing.progress
+    return "± 5 %", 0.0 if math.isnan(weighing.progress_to_5) else weighing.progress_to_5
 
 
 def signals_text(weighing: LiveWeighing) -> str:
     """Write how many signals come, and which do not, needed ones first."""
     if not weighing.signals:
         return "no signal yet"
-    wrong = sorted((s for s in weighing.signals if not s.fresh), key=lambda s: not s.needed)
-    text = f"{len(weighing.signals) - len(wrong)} of {len(weighing.signals)} signals come"
+    come = sum(s.fresh for s in weighing.signals)
+    wrong = sorted((s for s in weighing.signals if s.fails), key=lambda s: not s.needed)
+    text = f"{come} of {len(weighing.signals)} signals come"
     return f"{text}; not: {', '.join(s.name for s in wrong)}" if wrong else text
+
+
+def rates_text(weighing: LiveWeighing) -> str:
+    """Write how often the signals come that a weighing needs; empty where none does."""
+    come = [f"{s.name} {rate_text(s)}" for s in weighing.signals if s.needed and s.fresh]
+    return ", ".join(come)
+
+
+def alerts_text(weighing: LiveWeighing) -> str:
+    """Write the alerts that are active; empty where none is."""
+    found = []
+    for alert in weighing.alerts:
+        if alert.active:
+            overload = alert.side == "above" and alert.limit == weighing.gross
+            sure = "" if alert.probability is None else f", {_percent(alert.probability)} sure"
+            found.append(
+                f"{'Overload' if overload else 'Alert'}: {alert.side} {kg(alert.limit)}{sure}"
+            )
+    return "; ".join(found)

@@ -4,6 +4,7 @@
 const WINDOW = 1800; // [s]
 const MOST = 1800; // points
 const OLD = 5000; // without news for so long, what is shown is old [ms]
+const wide = matchMedia("(min-width: 60rem)");
 
 const at = (id) => document.getElementById(id);
 const put = (id, text) => {
@@ -141,31 +142,43 @@ function cell(row, text, kind) {
 }
 
 function showSignals(signals) {
-  const rows = [...signals].sort((a, b) => a.fresh - b.fresh || b.needed - a.needed);
+  const fails = (s) => !s.fresh && !s.rests;
+  const rows = [...signals].sort((a, b) => fails(b) - fails(a) || b.needed - a.needed);
   const body = at("signals");
   body.replaceChildren();
   for (const s of rows) {
     const row = body.insertRow();
     // A long name is broken after an underscore.
     cell(row, s.name.replaceAll("_", "_\u200b"));
-    cell(row, `${s.rate_hz.toFixed(1)} Hz`, "n");
+    const seldom = s.rate_hz > 0 && s.rate_hz <= 0.1;
+    cell(row, seldom ? `1/${Math.round(1 / s.rate_hz)} s` : `${s.rate_hz.toFixed(1)} Hz`, "n");
     cell(row, s.age_s === null ? "–" : s.age_s < 100 ? `${Math.max(s.age_s, 0).toFixed(1)} s` : duration(s.age_s), "n");
     cell(row, s.late + s.unfit ? `${s.late + s.unfit}` : "", "n");
-    const state = s.fresh ? "ok" : s.age_s === null ? "absent" : "silent";
-    cell(row, state, s.fresh ? "ok" : s.needed ? "silent needed" : "silent");
+    const state = s.fresh ? "ok" : s.rests ? "rests" : s.age_s === null ? "absent" : "silent";
+    cell(row, state, s.fresh ? "ok" : s.rests ? "soft" : s.needed ? "silent needed" : "silent");
   }
-  const wrong = rows.filter((s) => !s.fresh);
-  const brief = `${rows.length - wrong.length} of ${rows.length} come`;
+  const wrong = rows.filter(fails);
+  const brief = `${rows.filter((s) => s.fresh).length} of ${rows.length} come`;
   put("signals-brief", wrong.length ? `${brief}; not: ${wrong.map((s) => s.name).join(", ")}` : brief);
   at("signals-brief").classList.toggle("wrong", wrong.some((s) => s.needed));
 }
 
+// Before the first mass the signals are the news; on a narrow page they give way to it.
+let known = null;
+
+function unfold(now) {
+  if (now === known) return;
+  if (known === null || !wide.matches) at("signals-box").open = wide.matches || !now;
+  known = now;
+}
+
 function show(w) {
-  const known = w.mass_kg !== null;
+  unfold(w.mass_kg !== null);
   document.title = `${known ? kg(w.mass_kg) : w.status}, ${w.vehicle}`;
   put("vehicle", w.vehicle);
   put("status", w.status);
   at("status").className = `status ${w.status}`;
+  at("parked").hidden = !w.parked;
   document.body.classList.toggle("inconsistent", w.status === "inconsistent");
   put("mass", known ? mass(w.mass_kg) : "–");
   put("unit", unit.name);
@@ -201,8 +214,11 @@ function show(w) {
     put("look-share", `${Math.round(100 * w.look)} %`);
     at("look-bar").value = w.look;
   }
-  put("learnt", `${Math.round(100 * w.progress)} %`);
-  at("learnt-bar").value = w.progress;
+  const reached = w.progress_to_5 >= 1;
+  const part = reached ? w.progress : w.progress_to_5 || 0;
+  put("wanted", `Of what ± ${reached ? 2 : 5} % needs`);
+  put("learnt", `${Math.round(100 * part)} %`);
+  at("learnt-bar").value = part;
   put("needed", needed(w));
   put("advice", w.advice);
   showSignals(w.signals);
@@ -253,7 +269,6 @@ function listen() {
   };
 }
 
-at("signals-box").open = matchMedia("(min-width: 60rem)").matches;
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => plot && draw());
 new ResizeObserver(() => {
   const box = at("plot");

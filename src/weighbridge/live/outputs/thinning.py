@@ -1,0 +1,30 @@
+"""Which weighings go to an output that takes fewer than there are."""
+
+from __future__ import annotations
+
+import math
+
+from weighbridge.live.weighing import LiveStatus, LiveWeighing
+
+News = tuple[LiveStatus, bool, tuple[bool, ...]]
+
+
+def news(weighing: LiveWeighing) -> News:
+    """Return what is told at once where it changes: status, parked or not, alerts."""
+    return weighing.status, weighing.parked, tuple(alert.active for alert in weighing.alerts)
+
+
+def due(weighing: LiveWeighing, last: float, period: float) -> bool:
+    """Tell whether samples came for so long since the last weighing that was told.
+
+    A clock that falls begins anew.
+
+    Parameters
+    ----------
+    weighing
+    last : instant of the newest sample of that one [s]; NaN where none had come
+    period : [s]
+    """
+    if math.isnan(weighing.newest):
+        return False
+    return not 0.0 <= weighing.newest - last < period
