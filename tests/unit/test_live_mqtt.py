@@ -15,6 +15,7 @@ from tests.unit.made_weighings import drive, weighing
 
 from weighbridge.errors import ConfigError, WeighbridgeError
 from weighbridge.live.alerts import Alert
+from weighbridge.live.outputs.lines import json_line
 from weighbridge.live.outputs.mqtt import Mqtt, Topics, parse_broker, slug
 from weighbridge.live.outputs.outbox import Outbox
 from weighbridge.live.weighing import LiveStatus
@@ -149,47 +150,63 @@ def test_weighings_go_to_their_topics_and_are_retained(tmp_path):
     ]
 
 
-def test_home_assistant_is_told_of_the_sensors_of_one_device(tmp_path):
+def described(folder, sides=()):
+    """Entities of the one message to Home Assistant, what they share filled in."""
     with broker() as port:
-        mqtt = sender(port, tmp_path)
-        until(lambda: len(Taken.messages) >= 6)
+        mqtt = sender(port, folder, sides=sides)
+        until(lambda: Taken.of("fleet/delivery-van/available"))
         mqtt.close()
-    sensors = {
-        t: json.loads(p) for t, p, _ in Taken.messages if t.startswith("homeassistant/sensor/")
-    }
-    assert [t.split("/")[3] for t in sensors] == ["mass", "std", "payload", "status", "overload"]
-    assert len({s["unique_id"] for s in sensors.values()}) == 5
-    for topic, sensor in sensors.items():
-        assert topic.startswith("homeassistant/sensor/weighbridge_delivery-van/")
-        assert sensor["device"]["identifiers"] == ["weighbridge_delivery-van"]
-        assert sensor["device"]["name"] == "Delivery van"
-        assert sensor["state_topic"] == TOPIC
-        assert sensor["availability_topic"] == "fleet/delivery-van/available"
-        key = sensor["value_template"].partition("value_json.")[2].split()[0].rstrip(")")
-        assert key in weighing().to_dict()
+    told = {t: json.loads(p) for t, p, _ in Taken.messages if t.startswith("homeassistant/") and p}
+    ((topic, whole),) = told.items()
+    assert topic == "homeassistant/device/weighbridge_delivery-van/config"
+    shared = {k: v for k, v in whole.items() if k not in ("dev", "o", "cmps")}
+    return whole, {k: {**shared, **e} for k, e in whole["cmps"].items()}
 
 
-def test_an_alert_is_a_binary_sensor_and_sent_at_once(tmp_path):
+def test_home_assistant_is_told_of_one_device_in_one_message(tmp_path):
+    whole, entities = described(tmp_path)
+    assert whole["dev"]["ids"] == ["weighbridge_delivery-van"]
+    assert whole["dev"]["name"] == "Delivery van"
+    assert whole["o"]["name"] == "weighbridge"
+    # Of an alert that nobody watches only the platform is named: that takes it back.
+    assert [k for k, e in whole["cmps"].items() if e == {"p": "binary_sensor"}] == [
+        "above",
+        "below",
+    ]
+    shown = {k: e for k, e in entities.items() if "value_template" in e}
+    assert list(shown) == ["mass", "std", "payload", "status", "progress", "overload", "parked"]
+    assert len({e["unique_id"] for e in shown.values()}) == 7
+    for entity in shown.values():
+        assert entity["p"] in ("sensor", "binary_sensor")
+        assert entity["state_topic"] == TOPIC
+        assert entity["availability_topic"] == "fleet/delivery-van/available"
+    old = [t for t, p, _ in Taken.messages if t.startswith("homeassistant/") and not p]
+    assert "homeassistant/sensor/weighbridge_delivery-van/mass/config" in old
+
+
+def test_the_templates_of_home_assistant_fit_a_weighing(tmp_path):
     jinja2 = pytest.importorskip("jinja2", reason="Home Assistant's templates are jinja2's")
-    with broker() as port:
-        mqtt = sender(port, tmp_path, sides=["above"])
-        alert = Alert(2050.0)
-        for k, w in enumerate((weighing(300.0, mass=2000.0), weighing(301.0))):
-            alert.look(w)
-            mqtt.show(replace(w, alerts=(alert.state(w),)))
-            assert alert.active == (k == 1)
-        until(lambda: len(Taken.of(TOPIC)) >= 2)
-        mqtt.close()
-    found = {t: p for t, p, _ in Taken.messages if t.startswith("homeassistant/binary_sensor/")}
-    assert found["homeassistant/binary_sensor/weighbridge_delivery-van/below/config"] == b""
-    told = json.loads(found["homeassistant/binary_sensor/weighbridge_delivery-van/above/config"])
-    assert told["device_class"] == "problem"
-    template = jinja2.Environment(autoescape=False).from_string(told["value_template"])
-    sent = [json.loads(p) for p in in_order(Taken.of(TOPIC))]
-    assert [template.render(value_json=line) for line in sent] == ["OFF", "ON"]
-    assert template.render(value_json={**sent[1], "alerts": []}) == "OFF"
+    _, entities = described(tmp_path, sides=["above"])
+    rendered = jinja2.Environment(autoescape=False).from_string
+
+    def shown(key, w, field="value_template"):
+        return rendered(entities[key][field]).render(value_json=json.loads(json_line(w)))
+
+    alert = Alert(2050.0)
+    alert.look(weighing())
+    w = weighing(alerts=(alert.state(weighing()),), parked=True)
+    assert [shown(k, w) for k in ("mass", "status", "parked", "progress")] == [
+        "2100.0", "weighed", "ON", "100.0"
+    ]  # fmt: skip
+    first = next(iter(drive(1)))
+    assert [shown(k, first) for k in ("mass", "status", "parked", "progress")] == [
+        "None", "learning", "OFF", "None"
+    ]  # fmt: skip
+    assert json.loads(shown("status", w, "json_attributes_template"))["advice"] == w.advice
+    assert entities["above"]["device_class"] == "problem"
+    assert [shown("above", told) for told in (w, replace(w, alerts=()))] == ["ON", "OFF"]
     # 2100 kg with a standard deviation of 25 kg is two of them above.
-    assert sent[1]["alerts"] == [
+    assert json.loads(json_line(w))["alerts"] == [
         {
             "side": "above",
             "limit_kg": 2050.0,
@@ -197,6 +214,34 @@ def test_an_alert_is_a_binary_sensor_and_sent_at_once(tmp_path):
             "probability": pytest.approx(0.9772, abs=1e-4),
         }
     ]
+
+
+def test_an_alert_is_sent_at_once(tmp_path):
+    with broker() as port:
+        pass
+    mqtt = sender(port, tmp_path, sides=["above"], period=5.0)
+    alert = Alert(2050.0)
+    for w in (weighing(300.0, mass=2000.0), weighing(301.0), weighing(302.0)):
+        alert.look(w)
+        mqtt.show(replace(w, alerts=(alert.state(w),)))
+    sent = [json.loads(m.payload) for m in mqtt._outbox.after(0, 99) if m.topic == TOPIC]
+    mqtt.close()
+    assert [w["alerts"][0]["active"] for w in sent] == [False, True]
+
+
+@pytest.mark.parametrize("name", ["vehicle", "雪"])
+def test_scales_of_vehicles_without_a_name_share_no_topic_and_keep_theirs(tmp_path, name):
+    def node(folder, name):
+        mqtt = Mqtt(parse_broker("mqtt://127.0.0.1:1/fleet"), name, tmp_path / folder / "box")
+        mqtt.close()
+        return mqtt._topics.weighing, json.loads(mqtt._topics.discovery()[-1][1])["dev"]
+
+    one, other, again = node("a", name), node("b", name), node("a", name)
+    assert one == again
+    assert one[0] != other[0]
+    assert one[1]["ids"] != other[1]["ids"]
+    assert one[1]["name"] != other[1]["name"]
+    assert node("c", "Truck 7")[0] == "fleet/truck-7/weighing"
 
 
 def test_nothing_is_lost_while_the_broker_restarts_and_the_order_stays(tmp_path, caplog):

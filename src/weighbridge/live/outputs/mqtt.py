@@ -22,6 +22,7 @@ from weighbridge.live.outputs.lines import json_line
 from weighbridge.live.outputs.outbox import MOST, Outbox
 from weighbridge.live.outputs.thinning import News, due, news
 from weighbridge.live.weighing import LiveStatus, LiveWeighing, Side
+from weighbridge.version import VERSION
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client
@@ -32,11 +33,16 @@ PERIOD: Final = 5.0
 """Weighings are sent at most so often, and whenever the status changes [s]."""
 
 VSS_TOPIC: Final = "Vehicle/CurrentOverallWeight"
-"""COVESA Vehicle Signal Specification 5.0, ``Vehicle.CurrentOverallWeight``: uint16, kg."""
+"""COVESA Vehicle Signal Specification 5.0 and 6.0, ``Vehicle.CurrentOverallWeight``: uint16, kg."""
 
 _HIGHEST: Final = 65_535
 
 _SIDES: Final[tuple[Side, ...]] = ("above", "below")
+
+_ON_OR_OFF: Final = "{{{{ 'ON' if {} else 'OFF' }}}}"
+
+# What is left of a vehicle's name where its owner gave it none, or none in Latin letters.
+_UNNAMED: Final = "vehicle"
 
 # Messages that the broker has not yet confirmed at once.
 _WINDOW: Final = 20
@@ -107,7 +113,7 @@ def parse_broker(url: str) -> Broker:
 def slug(vehicle: str) -> str:
     """Write a vehicle's name with what a topic and Home Assistant allow: a-z, 0-9, - and _."""
     plain = unicodedata.normalize("NFKD", vehicle).encode("ascii", "ignore").decode().lower()
-    return re.sub(r"[^a-z0-9_-]+", "-", plain).strip("-") or "vehicle"
+    return re.sub(r"[^a-z0-9_-]+", "-", plain).strip("-") or _UNNAMED
 
 
 class Topics:
@@ -118,12 +124,16 @@ class Topics:
     prefix : first levels of all
     vehicle : its name
     sides : of the limits that are watched
+    own : tells this scale from others, where the name of the vehicle does not
     """
 
-    def __init__(self, prefix: str, vehicle: str, sides: Collection[Side] = ()) -> None:
+    def __init__(
+        self, prefix: str, vehicle: str, sides: Collection[Side] = (), *, own: str = ""
+    ) -> None:
         self._sides = sides
-        self.vehicle = vehicle
-        self.node = slug(vehicle)
+        unnamed = own and slug(vehicle) == _UNNAMED
+        self.vehicle = f"{vehicle} {own}" if unnamed else vehicle
+        self.node = f"{_UNNAMED}-{own}" if unnamed else slug(vehicle)
         self.weighing = f"{prefix}/{self.node}/weighing"
         self.available = f"{prefix}/{self.node}/available"
         self.vss = f"{prefix}/{self.node}/{VSS_TOPIC}"
@@ -142,16 +152,16 @@ class Topics:
         ]
 
     def discovery(self) -> list[tuple[str, bytes]]:
-        """Return what describes the sensors to Home Assistant, as topic and payload.
+        """Return what describes the scale to Home Assistant, as topic and payload.
 
-        An alert that is not watched any more is taken back by an empty message.
+        One message describes the device with all its entities. An alert that is not watched is
+        named with its platform alone, which takes it back. Empty messages take back the topics of
+        each entity, which versions until 0.3 used.
+
+        References
+        ----------
+        Home Assistant, MQTT integration, device discovery payload.
         """
-        device = {
-            "identifiers": [f"weighbridge_{self.node}"],
-            "name": self.vehicle,
-            "manufacturer": "weighbridge",
-            "model": "software weighbridge",
-        }
         weight = {
             "device_class": "weight",
             "unit_of_measurement": "kg",
@@ -159,48 +169,68 @@ class Topics:
             "suggested_display_precision": 0,
         }
         part = {"unit_of_measurement": "%", "state_class": "measurement", "icon": "mdi:weight"}
-        overload = (
-            "{{ (100 * value_json.overload_probability) | round(1) "
-            "if value_json.overload_probability is not none else none }}"
-        )
-        sensors: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
-            ("mass", "Mass", "{{ value_json.mass_kg }}", weight),
-            ("std", "Standard deviation of the mass", "{{ value_json.std_kg }}", weight),
-            ("payload", "Payload", "{{ value_json.payload_kg }}", weight),
-            ("status", "Status", "{{ value_json.status }}", {"icon": "mdi:scale"}),
-            ("overload", "Overload probability", overload, part),
-        )
-        alerts = [
+        why = {
+            "icon": "mdi:scale",
+            "json_attributes_topic": self.weighing,
+            "json_attributes_template": "{{ {'reason': value_json.reason, "
+            "'advice': value_json.advice, 'notes': value_json.notes} | tojson }}",
+        }
+        rows: list[tuple[str, str, str, str, dict[str, Any]]] = [
+            ("sensor", "mass", "Mass", "{{ value_json.mass_kg }}", weight),
+            ("sensor", "std", "Standard deviation of the mass", "{{ value_json.std_kg }}", weight),
+            ("sensor", "payload", "Payload", "{{ value_json.payload_kg }}", weight),
+            ("sensor", "status", "Status", "{{ value_json.status }}", why),
+            ("sensor", "progress", "Progress to 5 %", _percent_of("progress_to_5"), part),
             (
-                side,
-                f"{side.capitalize()} the limit",
-                f"{{{{ 'ON' if value_json.alerts | selectattr('side', 'eq', '{side}') "
-                "| selectattr('active') | list else 'OFF' }}",
-                {"device_class": "problem"},
-            )
-            for side in _SIDES
+                "sensor",
+                "overload",
+                "Overload probability",
+                _percent_of("overload_probability"),
+                part,
+            ),
+            ("binary_sensor", "parked", "Parked", _ON_OR_OFF.format("value_json.parked"), {}),
         ]
-        rows = [("sensor", *row) for row in sensors] + [("binary_sensor", *row) for row in alerts]
-        return [
-            (
-                f"homeassistant/{kind}/weighbridge_{self.node}/{key}/config",
-                b""
-                if kind == "binary_sensor" and key not in self._sides
-                else json.dumps(
-                    {
-                        "name": name,
-                        "unique_id": f"weighbridge_{self.node}_{key}",
-                        "state_topic": self.weighing,
-                        "value_template": template,
-                        "availability_topic": self.available,
-                        "device": device,
-                        "origin": {"name": "weighbridge"},
-                        **more,
-                    }
-                ).encode(),
-            )
-            for kind, key, name, template, more in rows
-        ]
+        for side in _SIDES:
+            active = f"value_json.alerts | selectattr('side', 'eq', '{side}')"
+            template = _ON_OR_OFF.format(f"{active} | selectattr('active') | list")
+            name = f"{side.capitalize()} the limit"
+            rows.append(("binary_sensor", side, name, template, {"device_class": "problem"}))
+        entities = {
+            key: {"p": platform}
+            if key in _SIDES and key not in self._sides
+            else {
+                "p": platform,
+                "name": name,
+                "unique_id": f"weighbridge_{self.node}_{key}",
+                "value_template": template,
+                **more,
+            }
+            for platform, key, name, template, more in rows
+        }
+        origin = {"name": "weighbridge", "sw": VERSION}
+        device = {
+            "ids": [f"weighbridge_{self.node}"],
+            "name": self.vehicle,
+            "mf": "weighbridge",
+            "mdl": "software weighbridge",
+            "sw": VERSION,
+        }
+        told = {
+            "dev": device,
+            "o": origin,
+            "cmps": entities,
+            "state_topic": self.weighing,
+            "availability_topic": self.available,
+        }
+        node = f"weighbridge_{self.node}"
+        before = [(f"homeassistant/{p}/{node}/{key}/config", b"") for p, key, *_ in rows]
+        return [*before, (f"homeassistant/device/{node}/config", json.dumps(told).encode())]
+
+
+def _percent_of(key: str) -> str:
+    """Write the template of a part that may be unknown."""
+    value = f"value_json.{key}"
+    return f"{{{{ (100 * {value}) | round(1) if {value} is not none else none }}}}"
 
 
 class Mqtt:
@@ -244,10 +274,10 @@ class Mqtt:
             raise MissingExtraError("paho-mqtt", "mqtt", "sending to a broker of MQTT") from None
         self.name = broker.name
         self._broker = broker
-        self._topics = Topics(broker.prefix, vehicle, sides)
         self._period = period
         self._pauses = pauses
         self._outbox = Outbox(outbox, most)
+        self._topics = Topics(broker.prefix, vehicle, sides, own=self._outbox.own)
         self._news: News | None = None
         self._newest = math.nan
         self._held: LiveWeighing | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import secrets
 import sqlite3
 from pathlib import Path
 from threading import Lock
@@ -49,6 +50,10 @@ class Outbox:
     path : the file
     most : messages that wait at most
 
+    Attributes
+    ----------
+    own : a few letters and digits that hardly any other outbox has; they stay with the file
+
     Raises
     ------
     ConfigError
@@ -66,6 +71,7 @@ class Outbox:
             raise self._failure(error) from None
         except sqlite3.DatabaseError:
             self._database = self._begun_anew()
+        self.own = f"{self._database.execute('PRAGMA user_version').fetchone()[0]:06x}"
         self._count = int(self._database.execute("SELECT count(*) FROM messages").fetchone()[0])
 
     def __len__(self) -> int:
@@ -146,6 +152,8 @@ class Outbox:
             database.execute("BEGIN EXCLUSIVE")
             database.execute(f"PRAGMA application_id = {_MARK}")
             database.execute(_TABLE)
+            if database.execute("PRAGMA user_version").fetchone()[0] == 0:
+                database.execute(f"PRAGMA user_version = {1 + secrets.randbelow(0xFFFFFF)}")
             database.commit()
             if database.execute("PRAGMA quick_check").fetchone()[0] != "ok":
                 raise sqlite3.DatabaseError("damaged")
