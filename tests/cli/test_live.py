@@ -67,6 +67,7 @@ def test_no_mass_is_exit_1(weighbridge, loaded, car, changed):
         (("--replay", "d", "-o", "new.toml"), "without --ticket KG"),
         (("--replay", "d", "--every", "0"), "--every 0"),
         (("--replay", "d", "--above", "-5"), "-5 kg is no mass"),
+        (("--replay", "d", "--keep-days", "9"), "give --record DRIVE"),
         (("--replay", "d", "--page", "here"), "--page here"),
         (("--source", "warp:core"), "no known kind"),
         (("--source", "elm:/dev/nothing", "--listen-only"), "cannot listen only"),

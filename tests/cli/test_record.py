@@ -47,6 +47,16 @@ def sending():
         thread.join()
 
 
+def test_a_series_goes_on_beside_what_was_recorded(weighbridge, tmp_path):
+    with sending() as port:
+        words = ("--source", f"lines:udp:{port}", "-o", tmp_path / "trip", "--check", "0")
+        for _ in range(2):
+            ran = weighbridge("record", *words, "--duration", "0.5", "--split-mb", "5")
+            assert ran.code == 0, ran.err
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["trip", "trip-2"]
+    assert read_drive(tmp_path / "trip-2").has("accel_x")
+
+
 def test_samples_of_a_source_become_a_drive(weighbridge, tmp_path):
     with sending() as port:
         words = ("--source", f"lines:udp:{port}", "-o", tmp_path / "drive", "--duration", "2")

@@ -237,10 +237,12 @@ def test_a_first_mass_is_shown_before_it_counts_as_weighed(car, loaded):
     scale = wb.LiveScale(car, info=loaded.drive.info, step=LONGEST_STEP)
     begin = loaded.drive.start
     part = loaded.drive.between(begin, begin + 150.0)
-    first = None
+    first, before = None, []
     for block in blocks(part, even(part, 5.0)):
         scale.update_block(block)
         told = scale.weighing()
+        if first is None:
+            before.append(told.progress_to_5)
         if first is None and np.isfinite(told.mass):
             first = told
     assert first is not None
@@ -250,6 +252,9 @@ def test_a_first_mass_is_shown_before_it_counts_as_weighed(car, loaded):
     low, high = first.interval()
     assert low < loaded.scenario.mass < high
     assert high - low < 0.31 * first.mass
+    # The way to 5 %: nothing is known before the first look.
+    assert np.isnan(before[0])
+    assert before[-1] == pytest.approx((0.1 * first.mass / (high - low)) ** 2)
 
 
 def test_looks_are_frequent_until_there_is_a_mass():

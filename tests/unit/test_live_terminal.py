@@ -143,7 +143,7 @@ def test_plain_lines_come_each_10_s_until_a_mass_and_then_each_minute_or_where_s
     lines = printed.getvalue().splitlines()
     assert "0 % of what ± 5 % needs" in lines[0]
     assert "10 % of what ± 5 % needs" in lines[3]
-    assert "vehicle_speed 5.0 Hz" in lines[3]
+    assert "vehicle_speed 5.0 Hz, engine_torque_fraction 5.0 Hz" in lines[3]
     assert "needs" not in lines[-1]
     assert "weighed, parked" in lines[-1]
 

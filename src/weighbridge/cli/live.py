@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Optional
 import typer
 
 from weighbridge.cli.listed import source_kinds
-from weighbridge.cli.options import DbcPaths, MappingPath, Units, chosen_mapping, load
+from weighbridge.cli.options import (
+    DbcPaths,
+    KeepDays,
+    MappingPath,
+    SplitMb,
+    Units,
+    chosen_mapping,
+    load,
+)
 from weighbridge.cli.results import (
     Result,
     asked_for,
@@ -30,7 +38,7 @@ if TYPE_CHECKING:
     from weighbridge.live.keeper import Keeper
     from weighbridge.live.orders import OrderFile
     from weighbridge.live.outputs import Output
-    from weighbridge.live.recorder import Recorder
+    from weighbridge.live.recordings import Recordings
     from weighbridge.live.scale import LiveScale
     from weighbridge.live.session import Session
     from weighbridge.live.source import Source
@@ -150,6 +158,8 @@ def live(
     mqtt: _Mqtt = None,
     page: _Page = None,
     record: _Record = None,
+    split_mb: SplitMb = None,
+    keep_days: KeepDays = None,
     every: _Every = 1.0,
     above: _Above = None,
     below: _Below = None,
@@ -173,6 +183,7 @@ def live(
     """
     import logging
 
+    from weighbridge.errors import ConfigError
     from weighbridge.live.clock import at_rate
     from weighbridge.live.feed import Feed
     from weighbridge.live.keys import keys
@@ -182,6 +193,8 @@ def live(
     from weighbridge.vehicle.model import Vehicle
 
     _refuse_options(source, replay, every, ticket, out)
+    if record is None and (split_mb is not None or keep_days is not None):
+        raise ConfigError("--split-mb and --keep-days are for a recording: give --record DRIVE")
     car = Vehicle.load(vehicle)
     chosen = chosen_mapping(car, vehicle, mapping)
     kept = _state_file(state, replay, vehicle)
@@ -212,7 +225,7 @@ def live(
             outputs=outputs,
             period=every,
             keeper=keeper,
-            recorder=None if record is None else _recorder(record, info),
+            recorder=None if record is None else _recorder(record, info, split_mb, keep_days),
             alerts=alerts,
             ahead=not _unwatched(replay, speed),
             aside=replay is None,
@@ -360,14 +373,14 @@ def _free_file(vehicle: Path) -> Path:
     return found
 
 
-def _recorder(folder: Path, info: DriveInfo) -> Recorder:
+def _recorder(folder: Path, info: DriveInfo, split: float | None, keep: float | None) -> Recordings:
     """Record into a folder, or beside it where it holds a drive: a service starts again."""
-    from weighbridge.live.recorder import Recorder, free_folder
+    from weighbridge.live.recordings import recordings
 
-    free = free_folder(folder)
-    if free != folder:
-        complain(f"{folder} holds something and stays as it is: recorded into {free}")
-    return Recorder(free, info)
+    made = recordings(folder, info, split_mb=split, keep_days=keep)
+    if made.folders != [folder]:
+        complain(f"{folder} holds something and stays as it is: recorded into {made.folders[0]}")
+    return made
 
 
 def _outputs(

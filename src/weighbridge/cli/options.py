@@ -49,6 +49,22 @@ DbcPaths = Annotated[
         metavar="FILE",
     ),
 ]
+SplitMb = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        "--split-mb",
+        min=1.0,
+        help="Go on in a new folder where the recording has so many MB: trip, trip-2 and so on.",
+    ),
+]
+KeepDays = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        "--keep-days",
+        min=1.0,
+        help="Remove folders of this recording that were last written so many days ago.",
+    ),
+]
 
 Units = Annotated[
     str,

@@ -15,7 +15,12 @@ from typing import TYPE_CHECKING, Annotated, Final, Optional
 import typer
 
 from weighbridge.cli.listed import source_kinds
-from weighbridge.cli.options import DbcPaths, MappingPath
+from weighbridge.cli.options import (
+    DbcPaths,
+    KeepDays,
+    MappingPath,
+    SplitMb,
+)
 from weighbridge.cli.terminal import complain, console
 from weighbridge.cli.verbosity import notice, say_written, watched
 from weighbridge.errors import ConfigError, DriveError
@@ -26,6 +31,7 @@ if TYPE_CHECKING:
     from weighbridge.live.arrival import Arrivals, Need
     from weighbridge.live.feed import Feed
     from weighbridge.live.recorder import Recorder
+    from weighbridge.live.recordings import Recordings
 
 _WAIT: Final = 0.25
 """How long samples are waited for at once [s]."""
@@ -72,6 +78,8 @@ def record(
             "--duration", min=0.0, help="End after this time in s; otherwise end with Ctrl-C."
         ),
     ] = None,
+    split_mb: SplitMb = None,
+    keep_days: KeepDays = None,
 ) -> None:
     """Record live sources as a drive, after a check that all signals arrive.
 
@@ -82,6 +90,7 @@ def record(
     from weighbridge.live.arrival import needs
     from weighbridge.live.feed import Feed
     from weighbridge.live.recorder import Recorder
+    from weighbridge.live.recordings import recordings
     from weighbridge.live.sources import parse_source
     from weighbridge.signals import DriveInfo
     from weighbridge.vehicle.model import Vehicle
@@ -91,7 +100,12 @@ def record(
         parse_source(s, dbc=tuple(dbc or ()), mapping=mapping, listen_only=listen_only)
         for s in source
     ]
-    recorder = Recorder(output, DriveInfo(vehicle=car.name if car is not None else None))
+    info = DriveInfo(vehicle=car.name if car is not None else None)
+    recorder: Recorder | Recordings
+    if split_mb is None and keep_days is None:
+        recorder = Recorder(output, info)
+    else:
+        recorder = recordings(output, info, split_mb=split_mb, keep_days=keep_days)
     with recorder, Feed(sources) as feed:
         look(feed, needs(car), check)
         until = monotonic() + duration if duration is not None else float("inf")
@@ -101,7 +115,9 @@ def record(
         raise DriveError(recorder.problem)
     if not arrived.count:
         raise DriveError(f"{output}: nothing was recorded, no sample came; check the sources")
-    say_written(f"{output}, {len(arrived.names)} signals, {arrived.count} samples")
+    folders = [output] if isinstance(recorder, Recorder) else recorder.folders
+    to = f" to {folders[-1]}" if len(folders) > 1 else ""
+    say_written(f"{folders[0]}{to}, {len(arrived.names)} signals, {arrived.count} samples")
 
 
 def look(feed: Feed, wanted: tuple[Need, ...], seconds: float) -> None:
@@ -163,7 +179,7 @@ def _confirmed(question: str) -> bool:
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
-def run(feed: Feed, recorder: Recorder, ended: Callable[[], bool]) -> Arrivals:
+def run(feed: Feed, recorder: Recorder | Recordings, ended: Callable[[], bool]) -> Arrivals:
     """Record until it is ended, the sources have no more or the disk is full; show how it goes."""
     from weighbridge.live.arrival import Arrivals
 

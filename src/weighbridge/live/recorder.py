@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import re
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
@@ -54,6 +55,12 @@ class Recorder:
     period : time between parts [s]
     clock : that time [s]
 
+    Attributes
+    ----------
+    folder
+    samples : that were taken
+    written : bytes of the parts so far
+
     Raises
     ------
     DriveError
@@ -73,6 +80,7 @@ class Recorder:
         self._closed = False
         _refuse_drive(self.folder)
         self.samples = 0
+        self.written = 0
         self._info = info or DriveInfo()
         self._period = period
         self._clock = clock
@@ -163,6 +171,7 @@ class Recorder:
                     path.parent.mkdir()
                     self._tables.add(table)
                 write_frame(frame, path)
+                self.written += path.stat().st_size
         except WeighbridgeError as error:
             self._stop(str(error))
         except OSError as error:
@@ -204,12 +213,15 @@ class Recorder:
 
 
 def free_folder(folder: Path) -> Path:
-    """Return a folder to record into that holds nothing: this one, or one numbered beside it."""
-    found, number = folder, 1
-    while found.is_dir() and any(found.iterdir()):
-        number += 1
-        found = folder.with_name(f"{folder.name}-{number}")
-    return found
+    """Return a folder to record into that holds nothing: this one, or one numbered beside it.
+
+    The number is above all that are there, so that the order of the numbers is that of time.
+    """
+    form = re.compile(rf"{re.escape(folder.name)}(?:-([1-9][0-9]*))?")
+    beside = folder.parent.iterdir() if folder.parent.is_dir() else ()
+    names = [form.fullmatch(f.name) for f in beside if f.is_dir() and any(f.iterdir())]
+    last = max((int(m[1] or 1) for m in names if m), default=0)
+    return folder.with_name(f"{folder.name}-{last + 1}") if last else folder
 
 
 def _refuse_drive(folder: Path) -> None:

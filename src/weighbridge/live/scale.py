@@ -336,6 +336,7 @@ class LiveScale:
             tared=self._tared,
             driven=self._move.driven,
             progress=found.progress,
+            progress_to_5=found.progress_to_5,
             reach=found.reach,
             minutes_to_5=found.minutes_to_5,
             minutes_to_2=found.minutes_to_2,

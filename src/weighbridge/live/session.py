@@ -17,6 +17,7 @@ from weighbridge.live.keeper import Keeper
 from weighbridge.live.orders import LOAD, ORDERS, TARE
 from weighbridge.live.outputs import Outputs
 from weighbridge.live.recorder import Recorder
+from weighbridge.live.recordings import Recordings
 from weighbridge.live.scale import LiveScale
 from weighbridge.live.weighing import LiveWeighing
 from weighbridge.messages import Problem
@@ -54,7 +55,7 @@ class Session:
     outputs: Outputs
     period: float = 1.0
     keeper: Keeper | None = None
-    recorder: Recorder | None = None
+    recorder: Recorder | Recordings | None = None
     alerts: Sequence[Alert] = ()
     orders: Callable[[LiveScale], None] | None = None
     ahead: bool = True

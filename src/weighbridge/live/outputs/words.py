@@ -6,6 +6,7 @@ import math
 
 from weighbridge.live.weighing import LiveWeighing, SignalHealth
 from weighbridge.report.text import NOTHING, kg, with_half
+from weighbridge.signals.catalogue import IMU_SIGNALS
 
 
 def half_width(weighing: LiveWeighing) -> float:
@@ -136,8 +137,12 @@ def signals_text(weighing: LiveWeighing) -> str:
 
 def rates_text(weighing: LiveWeighing) -> str:
     """Write how often the signals come that a weighing needs; empty where none does."""
-    come = [f"{s.name} {rate_text(s)}" for s in weighing.signals if s.needed and s.fresh]
-    return ", ".join(come)
+    come = [s for s in weighing.signals if s.needed and s.fresh]
+    inertial = [s for s in come if s.name in IMU_SIGNALS]
+    found = [f"{s.name} {rate_text(s)}" for s in come if s not in inertial]
+    if inertial:
+        found.append(f"inertial sensor {rate_text(min(inertial, key=lambda s: s.rate))}")
+    return ", ".join(found)
 
 
 def alerts_text(weighing: LiveWeighing) -> str:
