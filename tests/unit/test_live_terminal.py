@@ -181,6 +181,7 @@ def test_a_parked_vehicle_has_no_signal_that_fails():
 def test_a_slow_signal_shows_its_period():
     slow = SignalHealth(name="ambient_temperature", rate=1.0 / 30.0, age=20.0, period=30.0)
     assert rate_text(slow) == "1/30 s"
+    assert rate_text(replace(slow, rate=0.0)) == "–"
 
 
 def test_plain_lines_go_on_when_the_clock_begins_anew():

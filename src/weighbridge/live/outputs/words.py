@@ -94,8 +94,10 @@ def needed_text(weighing: LiveWeighing) -> str:
 
 
 def rate_text(signal: SignalHealth) -> str:
-    """Write the rate of a signal, or its period where it comes more seldom than each 10 s."""
-    if 0.0 < signal.rate <= 0.1:
+    """Write the rate of a signal, or its period where it comes each 10 s or more seldom."""
+    if signal.rate == 0.0:
+        return NOTHING
+    if signal.rate <= 0.1:
         return f"1/{1.0 / signal.rate:.0f} s"
     return f"{signal.rate:.1f} Hz" if signal.rate < 1000.0 else f"{signal.rate:.0f} Hz"
 

@@ -150,8 +150,8 @@ function showSignals(signals) {
     const row = body.insertRow();
     // A long name is broken after an underscore.
     cell(row, s.name.replaceAll("_", "_\u200b"));
-    const seldom = s.rate_hz > 0 && s.rate_hz <= 0.1;
-    cell(row, seldom ? `1/${Math.round(1 / s.rate_hz)} s` : `${s.rate_hz.toFixed(1)} Hz`, "n");
+    const rate = s.rate_hz <= 0.1 ? `1/${Math.round(1 / s.rate_hz)} s` : `${s.rate_hz.toFixed(1)} Hz`;
+    cell(row, s.rate_hz ? rate : "–", "n");
     cell(row, s.age_s === null ? "–" : s.age_s < 100 ? `${Math.max(s.age_s, 0).toFixed(1)} s` : duration(s.age_s), "n");
     cell(row, s.late + s.unfit ? `${s.late + s.unfit}` : "", "n");
     const state = s.fresh ? "ok" : s.rests ? "rests" : s.age_s === null ? "absent" : "silent";
