@@ -116,6 +116,7 @@ def _check_gears(drive: Drive) -> Iterator[Problem]:
             yield Problem.of(
                 "vehicle.two",
                 "engine_speed",
+                serious=True,
                 start=cut,
                 end=drive.end,
                 at=instant(cut),

@@ -74,7 +74,7 @@ def propagate(x, force, turn, dt, noise):
 
     Parameters
     ----------
-    x : (46,) filter state, changed in place
+    x : (47,) filter state, changed in place
     force : 3 floats
         Specific force in body axes [m/s^2].
     turn : 3 floats
@@ -286,7 +286,7 @@ def run(x, cov, samples, rot_bs, noise, rows, states, grade_std):
 
     Parameters
     ----------
-    x : (46,) float64
+    x : (47,) float64
         Filter state, changed in place.
     cov : (400,) float64
         Error covariance, changed in place.

@@ -14,12 +14,12 @@ Filter state, one flat array so that a step allocates nothing:
 19      indicated over true vehicle speed [-]
 20      distance of the sensor ahead of the axle that does not slip sideways [m]
 21      specific force along the body, bias removed, low-passed [m/s^2]
-22      rows of GNSS refused in succession [-]
-23:26   last angular rate, body axes [rad/s]
-26:29   its noise power density by axis, from differences of neighbours
-29:32   last angular rate, bias removed [rad/s]
-32:45   time, sum of ``f_n dt`` and sum of ``rot dt`` since the last node
-45      time of the last sample [s]; NaN before the first
+22, 23  rows of GNSS and of vehicle speed refused in succession [-]
+24:27   last angular rate, body axes [rad/s]
+27:30   its noise power density by axis, from differences of neighbours
+30:33   last angular rate, bias removed [rad/s]
+33:46   time, sum of ``f_n dt`` and sum of ``rot dt`` since the last node
+46      time of the last sample [s]; NaN before the first
 ======  =====================================================================
 
 Error state (20): position, velocity, attitude (rotation vector in navigation
@@ -32,18 +32,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-STATES = 46
-SHOWN = 23
+STATES = 47
+SHOWN = 24
 """Part of the filter state that a run keeps for each node."""
 ERRORS = 20
 MEASUREMENTS = 13
 ROWS = 11
 """Most scalar rows one node can process."""
 
-P, V, Q, BA, BG, PITCH0, YAW0, SQUAT, SCALE, LEVER, FORCE, LOST_GNSS = (
-    0, 3, 6, 10, 13, 16, 17, 18, 19, 20, 21, 22,
+P, V, Q, BA, BG, PITCH0, YAW0, SQUAT, SCALE, LEVER, FORCE, LOST_GNSS, LOST_SPEED = (
+    0, 3, 6, 10, 13, 16, 17, 18, 19, 20, 21, 22, 23,
 )  # fmt: skip
-LAST, PSD, RATE, TRANSITION, TIME = 23, 26, 29, 32, 45
+LAST, PSD, RATE, TRANSITION, TIME = 24, 27, 30, 33, 46
 """Places in the filter state."""
 
 E_P, E_V, E_ATT, E_BA, E_BG, E_PITCH0, E_YAW0, E_SQUAT, E_SCALE, E_LEVER = (
@@ -82,7 +82,7 @@ class Noise(NamedTuple):
     still_std : velocity of a standing body [m/s]
     rest_rate_std : angular rate of a body at rest [rad/s]
     gate : normalised innovation squared above which a row is refused [-]
-    patience : refusals in succession after which a fix is believed again [-]
+    patience : refusals in succession after which a row is believed again [-]
     force_time : time constant of the low-passed specific force [s]
     constraints : 1 with the non-holonomic rows, 0 without
     """

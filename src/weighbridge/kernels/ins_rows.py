@@ -27,6 +27,7 @@ from weighbridge.kernels.ins_model import (
     FORCE,
     LEVER,
     LOST_GNSS,
+    LOST_SPEED,
     PITCH0,
     RATE,
     SCALE,
@@ -213,6 +214,18 @@ def _vehicle_row(x, h, slot, start, kind, measured, noise):
 
 
 @inlined_fast_kernel
+def _is_lost(x, place, refused, noise):
+    """Count refusals in succession; tell whether there are so many that the filter is lost."""
+    if not refused:
+        x[place] = 0.0
+    elif x[place] < noise.patience:
+        x[place] += 1.0
+    else:
+        return True
+    return False
+
+
+@inlined_fast_kernel
 def _first_and_last(z, node, noise):
     """Kinds of row that a node may have: from the first up to the last, which is excluded."""
     fix = not math.isnan(z[node, Z_N]) or not math.isnan(z[node, Z_D])
@@ -232,7 +245,7 @@ def update(x, cov, z, node, noise, rows, slot):
 
     Parameters
     ----------
-    x, cov : filter state (46,) and covariance (400,), changed in place
+    x, cov : filter state (47,) and covariance (400,), changed in place
     z : (m, 13) measurement vectors, NaN where there is none
     node : int
         Place in ``z``.
@@ -248,15 +261,10 @@ def update(x, cov, z, node, noise, rows, slot):
     start = np.int64(0)
     refused = False
     for kind in range(first, last):
-        if fix and kind == VELOCITY:
-            if not refused:
-                x[LOST_GNSS] = 0.0
-            elif x[LOST_GNSS] < noise.patience:
-                x[LOST_GNSS] += 1.0
-            else:
-                for i in range(3):
-                    cov[i * N + i] += 25.0
-                    cov[(E_V + i) * N + E_V + i] += 1.0
+        if fix and kind == VELOCITY and _is_lost(x, LOST_GNSS, refused, noise):
+            for i in range(3):
+                cov[i * N + i] += 25.0
+                cov[(E_V + i) * N + E_V + i] += 1.0
         if SPEED <= kind < STANDING and standing:
             continue
         for j in range(start, start + N):
@@ -279,15 +287,26 @@ def update(x, cov, z, node, noise, rows, slot):
             s = _body_product(cov, h, ph, slot, start) + r
         else:
             s = _direct_product(cov, h, ph, slot, start, place) + r
+        lost = False
         if e * e > noise.gate * s:
             if kind < VELOCITY:
                 refused = True
                 if x[LOST_GNSS] < noise.patience:
                     continue
-            s = abs(e) * math.sqrt(s / noise.gate) if kind == SPEED else e * e / noise.gate
+                s = e * e / noise.gate
+            elif kind == SPEED:
+                lost = _is_lost(x, LOST_SPEED, True, noise)
+                s = abs(e) * math.sqrt(s / noise.gate)
+            else:
+                s = e * e / noise.gate
+        elif kind == SPEED:
+            x[LOST_SPEED] = 0.0
         row = start // N
         innovation[slot, row], innovation_var[slot, row] = e, s
         _accept(x, ph, slot, start, e / s)
         _fold(cov, ph, slot, start, s)
         start += N
+        if lost:
+            for i in range(E_V, E_V + 3):
+                cov[i * N + i] += 1.0
     counts[slot] = start // N

@@ -13,7 +13,7 @@ class State(NamedTuple):
 
     Attributes
     ----------
-    x : (46,) filter state, see `weighbridge.kernels.ins_model`
+    x : (47,) filter state, see `weighbridge.kernels.ins_model`
     cov : (20, 20) covariance of its errors
     """
 
