@@ -163,7 +163,7 @@ function showSignals(signals) {
   at("signals-brief").classList.toggle("wrong", wrong.some((s) => s.needed));
 }
 
-// Before the first mass the signals are the news; on a narrow page they give way to it.
+// Before the first mass the signals are the news; on a narrow page they are folded after it.
 let known = null;
 
 function unfold(now) {
