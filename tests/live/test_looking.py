@@ -111,6 +111,7 @@ def test_the_bar_is_full_while_the_first_look_goes_on(car, minutes, held):
     held.set()
     assert told.look == 1.0
     assert told.status is LiveStatus.LEARNING
+    assert told.reason_id == "live.first_look"
 
 
 def test_the_next_look_waits_for_the_one_before(car, minutes, held):

@@ -83,3 +83,23 @@ def test_minutes_of_a_mass_that_waits_for_a_look_fall_with_the_driving():
     # The interval is no narrower before the next look, however much was driven.
     assert minutes(60.0 * at_look, 45.0) == pytest.approx(0.75)
     assert minutes(0.0, 60.0 * at_look + 60.0) == pytest.approx(at_look + 1.0)
+
+
+@pytest.mark.parametrize(
+    ("std_found", "part"), [(math.nan, None), (math.inf, 0.0), (0.1 / 1.96, 0.25), (0.01, 1.0)]
+)
+def test_the_way_to_5_percent_is_that_of_the_last_look_until_there_is_a_mass(std_found, part):
+    """Four times the variance that 5 % allows is a quarter of the way."""
+    found = outlook(
+        math.nan, math.nan, 0.0, driven=20.0, reason=None, silent=(), first=30.0,
+        std_found=std_found,
+    )  # fmt: skip
+    assert found.reason.id == "live.first_mass"
+    if part is None:
+        assert math.isnan(found.progress_to_5)
+    else:
+        assert found.progress_to_5 == pytest.approx(part, rel=1e-3)
+    weighed = outlook(
+        2000.0, 100.0, 0.0, driven=60.0, reason=None, silent=(), first=30.0, std_found=std_found
+    )
+    assert weighed.progress_to_5 == pytest.approx((0.05 / 0.098) ** 2, rel=1e-3)

@@ -78,7 +78,11 @@ def outlook(
     """
     if math.isnan(mass):
         if reason is None:
-            reason = Problem.of("live.first_mass", driven=driven + since, first=first)
+            reason = (
+                Problem.of("live.first_mass", driven=driven + since, first=first)
+                if driven + since < first
+                else Problem.of("live.first_look", driven=driven + since)
+            )
         return Outlook(
             status=LiveStatus.LEARNING,
             reason=_missing(silent, reason) if silent else reason,
